@@ -1,0 +1,1 @@
+"""Static frictional contact of Hencky and piezoelectric bodies with FEniCSx."""

@@ -1,0 +1,73 @@
+"""Elementary functions that accept UFL expressions, NumPy arrays and numbers alike.
+
+Each constitutive law is written once, with these functions, and is then used inside
+variational forms and on arrays of nodal values.
+"""
+
+from __future__ import annotations
+
+from typing import Any, TypeAlias
+
+import numpy as np
+import ufl
+from ufl.core.expr import Expr
+
+#: A number, a NumPy array or a UFL expression.
+Value: TypeAlias = Any
+
+
+def is_symbolic(*values: Value) -> bool:
+    """Tell whether any of the values is a UFL expression."""
+    return any(isinstance(value, Expr) for value in values)
+
+
+def maximum(a: Value, b: Value) -> Value:
+    """Return the larger of two values, pointwise."""
+    return ufl.max_value(a, b) if is_symbolic(a, b) else np.maximum(a, b)
+
+
+def minimum(a: Value, b: Value) -> Value:
+    """Return the smaller of two values, pointwise."""
+    return ufl.min_value(a, b) if is_symbolic(a, b) else np.minimum(a, b)
+
+
+def clip(a: Value, low: Value, high: Value) -> Value:
+    """Limit a value to the interval [low, high], pointwise."""
+    return minimum(maximum(a, low), high)
+
+
+def positive_part(a: Value) -> Value:
+    """Return [a]^+ = max(a, 0), pointwise."""
+    return maximum(a, 0.0)
+
+
+def where(condition: Value, a: Value, b: Value) -> Value:
+    """Choose ``a`` where the condition holds and ``b`` elsewhere, pointwise."""
+    if is_symbolic(condition, a, b) or isinstance(condition, ufl.classes.Condition):
+        return ufl.conditional(condition, a, b)
+    return np.where(condition, a, b)
+
+
+def less_equal(a: Value, b: Value) -> Value:
+    """Return the condition a <= b."""
+    return ufl.le(a, b) if is_symbolic(a, b) else np.less_equal(a, b)
+
+
+def sqrt(a: Value) -> Value:
+    """Return the square root."""
+    return ufl.sqrt(a) if is_symbolic(a) else np.sqrt(a)
+
+
+def log(a: Value) -> Value:
+    """Return the natural logarithm."""
+    return ufl.ln(a) if is_symbolic(a) else np.log(a)
+
+
+def exp(a: Value) -> Value:
+    """Return the exponential."""
+    return ufl.exp(a) if is_symbolic(a) else np.exp(a)
+
+
+def absolute(a: Value) -> Value:
+    """Return the absolute value."""
+    return abs(a) if is_symbolic(a) else np.abs(a)
