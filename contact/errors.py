@@ -1,0 +1,8 @@
+"""Errors that a user can mend."""
+
+
+class InputError(ValueError):
+    """Bad input: the message names what is wrong and what is accepted.
+
+    The command line prints the message alone and leaves with exit status 2.
+    """
