@@ -53,6 +53,26 @@ def less_equal(a: Value, b: Value) -> Value:
     return ufl.le(a, b) if is_symbolic(a, b) else np.less_equal(a, b)
 
 
+def less(a: Value, b: Value) -> Value:
+    """Return the condition a < b."""
+    return ufl.lt(a, b) if is_symbolic(a, b) else np.less(a, b)
+
+
+def equal(a: Value, b: Value) -> Value:
+    """Return the condition a == b."""
+    return ufl.eq(a, b) if is_symbolic(a, b) else np.equal(a, b)
+
+
+def not_equal(a: Value, b: Value) -> Value:
+    """Return the condition a != b."""
+    return ufl.ne(a, b) if is_symbolic(a, b) else np.not_equal(a, b)
+
+
+def both(a: Value, b: Value) -> Value:
+    """Return the condition that two conditions hold together."""
+    return ufl.And(a, b) if is_symbolic(a, b) else np.logical_and(a, b)
+
+
 def sqrt(a: Value) -> Value:
     """Return the square root."""
     return ufl.sqrt(a) if is_symbolic(a) else np.sqrt(a)
@@ -66,6 +86,21 @@ def log(a: Value) -> Value:
 def exp(a: Value) -> Value:
     """Return the exponential."""
     return ufl.exp(a) if is_symbolic(a) else np.exp(a)
+
+
+def sin(a: Value) -> Value:
+    """Return the sine of an angle in radians."""
+    return ufl.sin(a) if is_symbolic(a) else np.sin(a)
+
+
+def cos(a: Value) -> Value:
+    """Return the cosine of an angle in radians."""
+    return ufl.cos(a) if is_symbolic(a) else np.cos(a)
+
+
+def tan(a: Value) -> Value:
+    """Return the tangent of an angle in radians."""
+    return ufl.tan(a) if is_symbolic(a) else np.tan(a)
 
 
 def absolute(a: Value) -> Value:
