@@ -21,6 +21,11 @@ def is_symbolic(*values: Value) -> bool:
     return any(isinstance(value, Expr) for value in values)
 
 
+def symbolic(a: Value) -> Expr:
+    """Return the value as a UFL expression."""
+    return ufl.as_ufl(a)
+
+
 def maximum(a: Value, b: Value) -> Value:
     """Return the larger of two values, pointwise."""
     return ufl.max_value(a, b) if is_symbolic(a, b) else np.maximum(a, b)
