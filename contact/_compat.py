@@ -1,0 +1,26 @@
+"""Differences between dolfinx 0.9, 0.10 and 0.11."""
+
+import numpy as np
+import numpy.typing as npt
+from dolfinx.mesh import Mesh
+
+
+def geometry_degree(mesh: Mesh) -> int:
+    """Polynomial degree of the cells' geometry."""
+    geometry = mesh.geometry
+    # 0.11 deprecates cmap in favour of a list with one map a cell type.
+    cmap = geometry.cmaps[0] if hasattr(geometry, "cmaps") else geometry.cmap
+    return cmap.degree
+
+
+def geometry_dofmap(mesh: Mesh) -> npt.NDArray[np.int32]:
+    """Geometry nodes of each cell, shape (cells, nodes a cell)."""
+    geometry = mesh.geometry
+    return geometry.dofmaps[0] if hasattr(geometry, "dofmaps") else geometry.dofmap
+
+
+def original_cells(mesh: Mesh) -> npt.NDArray[np.int64]:
+    """Input index of each local cell, shape (cells,)."""
+    original = mesh.topology.original_cell_index
+    # One array a cell type since 0.10.
+    return np.asarray(original[0] if isinstance(original, list) else original)
