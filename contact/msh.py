@@ -60,13 +60,14 @@ def from_msh(comm: MPI.Intracomm, path: str | Path) -> Domain:
         file = Path(path)
         if not file.is_file():
             raise InputError("no such file")
-        with file.open("rb") as stream:
-            if b"$MeshFormat" not in stream.read(4096):
-                raise InputError("this is no Gmsh .msh file of format 2.2 or 4.1")
         try:
-            gmsh.merge(str(file))
-        except Exception as error:  # Gmsh raises nothing more specific.
-            raise InputError(f"Gmsh cannot read it: {error}") from error
+            with file.open("rb") as stream:
+                start = stream.read(4096)
+        except OSError as error:
+            raise InputError(f"it cannot be read ({error.strerror})") from error
+        if b"$MeshFormat" not in start:
+            raise InputError("this is no Gmsh .msh file of format 2.2 or 4.1")
+        gmsh.merge(str(file))
 
     return _from_gmsh(comm, fill, f"mesh file {path}")
 
@@ -94,6 +95,11 @@ def _from_gmsh(comm: MPI.Intracomm, fill: Callable[[Any], None], what: str) -> D
             raw = _run_gmsh(fill)
         except InputError as error:
             problem = str(error)
+        except Exception as error:
+            # Gmsh's errors are of this very class; anything else is a fault of the program.
+            if type(error) is not Exception:
+                raise
+            problem = f"Gmsh says: {error}"
     problem = comm.bcast(problem)
     if problem is not None:
         raise InputError(f"{what}: {problem}")

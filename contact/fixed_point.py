@@ -1,0 +1,201 @@
+"""The outer loop of Algorithms 1, 4, 6 and 8.
+
+Each iteration freezes what makes the problem nonlinear (secant modulus, friction bound, what
+the foundation answers), solves the frozen problem by block relaxation and updates. Elastic
+and piezoelectric bodies, rigid and compliant foundations differ in what there is to freeze.
+"""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from contact.kkt import KKT, evaluate, residual_forces
+from contact.linear import Counters, LinearOperator
+from contact.norms import domain_norm
+from contact.problem import ContactProblem
+from contact.projections import Array
+from contact.report import History, Monitor, Outcome, Record
+from contact.state import Multipliers, bound_of, nodal_iterate, total_pressure
+from contact.uzawa import (
+    Linearised,
+    Relaxation,
+    augmentation,
+    automatic_r,
+    block_relaxation,
+    split,
+)
+
+
+@dataclass(frozen=True)
+class FixedPointOptions:
+    """Options of the fixed point.
+
+    Attributes
+    ----------
+    tolerance
+        On every KKT residual.
+    r
+        Augmentation parameter, or None for `automatic_r`.
+    stopping
+        "residual", or "thesis": (3.45) with `eps` inside and (3.46) or (6.40) with `eps_fp`.
+    depth, over_relaxation, single_loop
+        See `uzawa.Relaxation`.
+    inner_tolerance
+        Of the block relaxation; None for a tenth of the tolerance.
+    material_step
+        "secant" (Kacanov), "tangent" (Newton), or "auto": secant steps until the residual is
+        below 1e-2, then tangent ones as long as they reduce it.
+    """
+
+    tolerance: float = 1e-8
+    r: float | None = None
+    stopping: str = "residual"
+    eps: float = 1e-5
+    eps_fp: float = 1e-5
+    depth: int = 8
+    over_relaxation: float = 1.0
+    single_loop: bool = False
+    inner_tolerance: float | None = None
+    material_step: str = "auto"
+    max_outer: int = 200
+    max_inner: int = 2000
+
+
+@dataclass
+class FixedPoint:
+    """The outer loop, one iteration at a time.
+
+    Parameters
+    ----------
+    problem
+        The contact problem; its iterate is the current one.
+    options
+        Options of the loop.
+    """
+
+    problem: ContactProblem
+    options: FixedPointOptions
+    monitor: Monitor | None = None
+    counters: Counters = field(default_factory=Counters)
+
+    def __post_init__(self) -> None:
+        self.r = self.options.r or automatic_r(self.problem)
+        self.operator = LinearOperator(self.problem, counters=self.counters)
+        self.history = History(self.monitor)
+        self.forces = Multipliers.zero(self.problem)
+        self._augmentation = augmentation(self.problem, self.r)
+        thesis = self.options.stopping == "thesis"
+        inner = self.options.inner_tolerance or self.options.tolerance / 10
+        self._relaxation = Relaxation(
+            self.r,
+            inner,
+            self.options.max_inner,
+            self.options.depth,
+            self.options.over_relaxation,
+            self.options.eps if thesis else None,
+            self.options.single_loop,
+        )
+        self._norm = domain_norm(self.problem) if thesis else None
+
+    def solve(self) -> Outcome:
+        """Iterate from zero displacement until convergence, stagnation or the limit."""
+        begin, problem, options = time.perf_counter(), self.problem, self.options
+        problem.reset()
+        z = split(problem, nodal_iterate(problem)) * self.r
+        bound = np.zeros(problem.trace.nodes.size)
+        tangent = options.material_step == "tangent"
+        best, since = np.inf, 0
+        # Iteration 0 is the pure contact problem that the thesis starts from.
+        first = 0 if problem.frictional else 1
+        for iteration in range(first, options.max_outer + 1):
+            previous = problem.x.x.array[: problem.owned].copy()
+            # Newton's tangent of a zero strain is the secant, and cheaper.
+            inner, z = self._step(bound, z, tangent and iteration > first)
+            residuals = evaluate(problem, self.forces)
+            change, bound = self._update_bound(bound, iteration == 0)
+            note = "tangent" if tangent and iteration > first else ""
+            self.history.add(
+                Record(iteration, inner, residuals, change, time.perf_counter() - begin, note)
+            )
+            if options.stopping == "thesis":
+                if iteration > first and self._thesis_criterion(change, previous):
+                    return self._outcome(residuals, "the thesis's criterion is met")
+            elif residuals.largest <= options.tolerance:
+                return self._outcome(residuals, "")
+            if not np.isfinite(residuals.largest):
+                return Outcome(False, "the iteration diverged", residuals)
+            if options.material_step == "auto" and not problem.linear_material:
+                # Far from the solution the tangent is too soft and overshoots.
+                tangent = residuals.largest < (1e-2 if not tangent else 2 * best)
+            since = 0 if residuals.largest < 0.9 * best else since + 1
+            best = min(best, residuals.largest)
+            if since >= 25 and options.stopping == "residual":
+                return Outcome(False, f"the residual stalled at {best:.2e}", residuals)
+        return Outcome(False, f"not converged in {options.max_outer} outer iterations", residuals)
+
+    def _step(self, bound: Array, z: Array, tangent: bool) -> tuple[int, Array]:
+        """Freeze, solve the frozen problem, and move the iterate."""
+        problem = self.problem
+        form = problem.tangent if tangent else problem.secant
+        nodal = nodal_iterate(problem)
+        blocks = self._augmentation
+        if problem.response.active:
+            pressure = total_pressure(problem, nodal, self.forces)
+            weight = problem.trace.weight[:, None, None]
+            blocks = blocks + weight * problem.response.block(nodal, pressure)
+        self.operator.update(form, blocks, constant=problem.linear_material)
+        residual = self._base_residual(nodal)
+        step = Linearised(self.operator, residual, nodal, bound)
+        result = block_relaxation(problem, step, z, self._relaxation, self._norm)
+        problem.add(result.increment)
+        self.forces = result.forces
+        return result.iterations, result.z
+
+    def _base_residual(self, nodal: Array) -> Array:
+        """Return the residual without multipliers: they are the unknowns of the relaxation.
+
+        The contact flag of the perfect conductor still looks at the last pressure.
+        """
+        problem, trace = self.problem, self.problem.trace
+        residual = residual_forces(problem, self.forces)
+        trace.add(residual, -trace.weight[:, None] * self.forces.vectors(problem))
+        return residual
+
+    def _update_bound(self, old: Array, start: bool) -> tuple[float, Array]:
+        """Return the relative change (3.46) and the new friction bound.
+
+        After the frictionless start the bound is that of zero slip.
+        """
+        problem, trace = self.problem, self.problem.trace
+        if not problem.frictional:
+            return np.nan, old
+        nodal = nodal_iterate(problem)
+        if start:
+            nodal = np.zeros_like(nodal)
+            pressure = total_pressure(problem, nodal_iterate(problem), self.forces)
+            new = np.asarray(problem.friction_bound(pressure, np.zeros_like(pressure)))
+        else:
+            new = bound_of(problem, nodal, self.forces)
+        size = trace.norm(new)
+        return (trace.norm(new - old) / size if size > 0 else 0.0), new
+
+    def _thesis_criterion(self, change: float, previous: Array) -> bool:
+        """Tell whether (3.46), or (6.40) without friction, is met."""
+        if self.problem.frictional:
+            return change < self.options.eps_fp
+        assert self._norm is not None
+        now = self.problem.x.x.array[: self.problem.owned]
+        return self._norm(now - previous) < self.options.eps_fp * self._norm(now)
+
+    def _outcome(self, residuals: KKT, words: str) -> Outcome:
+        tolerance = self.options.tolerance
+        if residuals.largest <= tolerance:
+            return Outcome(True, words or f"all residuals <= {tolerance:g}", residuals)
+        return Outcome(
+            False,
+            f"{words}, but a residual is {residuals.largest:.2e}, above {tolerance:g}",
+            residuals,
+        )

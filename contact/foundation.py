@@ -1,0 +1,113 @@
+"""Rigid foundations: a plane, a circle or sphere, or a gap given as a function."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from contact.errors import InputError
+from contact.projections import Array
+
+
+class Foundation(Protocol):
+    """A rigid obstacle, seen from the contact nodes."""
+
+    def measure(self, points: Array, body_normal: Array) -> tuple[Array, Array]:
+        """Return the contact direction, shape (n, d), and the gap along it, shape (n,).
+
+        Parameters
+        ----------
+        points
+            Node coordinates, shape (n, d).
+        body_normal
+            Outward unit normals of the body, shape (n, d).
+        """
+
+
+@dataclass(frozen=True)
+class GapFunction:
+    """A gap given along the body's own normal.
+
+    Parameters
+    ----------
+    gap
+        Function of points of shape (n, d) that returns the gap, shape (n,) (length).
+    """
+
+    gap: Callable[[Array], Array]
+
+    def measure(self, points: Array, body_normal: Array) -> tuple[Array, Array]:
+        """Return the body's normals and the gap at the points."""
+        return body_normal, np.broadcast_to(self.gap(points), points.shape[:1]).astype(float)
+
+
+@dataclass(frozen=True)
+class Plane:
+    """A half space: the foundation lies below the plane through `point`.
+
+    Parameters
+    ----------
+    point, normal
+        A point of the plane and its normal towards the body, length d.
+    direction
+        "foundation": contact along the plane's normal (default); "body": along the body's.
+    """
+
+    point: tuple[float, ...]
+    normal: tuple[float, ...]
+    direction: str = "foundation"
+
+    def measure(self, points: Array, body_normal: Array) -> tuple[Array, Array]:
+        """Return contact directions and gaps."""
+        normal = np.asarray(self.normal) / np.linalg.norm(self.normal)
+        distance = (points - np.asarray(self.point)) @ normal
+        if self.direction == "foundation":
+            return np.broadcast_to(-normal, points.shape).copy(), distance
+        return body_normal, _along_ray(distance, -body_normal @ normal)
+
+
+@dataclass(frozen=True)
+class Sphere:
+    """A rigid ball (`inside` false), or the outside of a ball that holds the body (true).
+
+    Parameters
+    ----------
+    centre, radius
+        Centre, length d, and radius > 0 (a circle in 2-D).
+    inside
+        Whether the body lies inside the sphere.
+    direction
+        "foundation": contact along the sphere's radius (default); "body": along the body's
+        normal.
+    """
+
+    centre: tuple[float, ...]
+    radius: float
+    inside: bool = False
+    direction: str = "foundation"
+
+    def measure(self, points: Array, body_normal: Array) -> tuple[Array, Array]:
+        """Return contact directions and gaps."""
+        offset = points - np.asarray(self.centre)
+        distance = np.linalg.norm(offset, axis=1)
+        if np.any(distance == 0):
+            raise InputError("contact.foundation: the sphere's centre is a contact node")
+        outward = 1.0 if self.inside else -1.0
+        if self.direction == "foundation":
+            radial = offset / distance[:, None]
+            return outward * radial, outward * (self.radius - distance)
+        # The ray x + t nu meets the sphere where |offset + t nu| = radius.
+        along = np.einsum("ni,ni->n", offset, body_normal)
+        root = along**2 + self.radius**2 - distance**2
+        gap = -along + outward * np.sqrt(np.maximum(root, 0.0))
+        # A ray that misses the ball never touches it.
+        return body_normal, np.where(root >= 0, gap, np.inf)
+
+
+def _along_ray(distance: Array, cosine: Array) -> Array:
+    """Return the distance along a ray; infinite where it does not lead to the foundation."""
+    facing = cosine > 1e-6
+    return np.where(facing, distance / np.where(facing, cosine, 1.0), np.inf)

@@ -1,0 +1,97 @@
+"""Residuals of the discrete contact problem, computed from scratch.
+
+They alone decide whether a run has converged, whatever the method.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from mpi4py import MPI
+
+from contact.problem import ContactProblem
+from contact.projections import Array, project_disc, project_half_line
+from contact.state import Multipliers, bound_of, nodal_iterate, total_pressure
+
+
+@dataclass(frozen=True)
+class KKT:
+    """Relative residuals of equilibrium, contact and friction.
+
+    Attributes
+    ----------
+    equilibrium
+        |F(u) + contact forces| on free unknowns, over the sum of the norms of loads, contact
+        forces and reactions; mechanical and (scaled) electric unknowns together.
+    contact
+        |p - max(0, p + c (u_nu - rho))| / |p| in L2(Gamma_3), c = E/length.
+    friction
+        |lambda_f - proj(lambda_f + c u_tau)| / |p| with the final bound s.
+    """
+
+    equilibrium: float
+    contact: float
+    friction: float
+
+    @property
+    def largest(self) -> float:
+        """The largest of the three; infinity if any is not a number."""
+        values = (self.equilibrium, self.contact, self.friction)
+        return max(values) if np.all(np.isfinite(values)) else np.inf
+
+
+def stiffness_scale(problem: ContactProblem) -> float:
+    """Return c = E / (size of the body): the scale between displacements and stresses."""
+    return float(problem.body.law.young) / problem.domain.size
+
+
+def residual_forces(problem: ContactProblem, forces: Multipliers) -> Array:
+    """Return F(x) - loads + contact and foundation forces, owned unknowns, after `freeze`.
+
+    Its entries at fixed unknowns are minus the reactions of the supports.
+    """
+    trace, nodal = problem.trace, nodal_iterate(problem)
+    residual = problem.internal_forces() - problem.external
+    trace.add(residual, trace.weight[:, None] * forces.vectors(problem))
+    pressure = total_pressure(problem, nodal, forces)
+    trace.add(residual, trace.weight[:, None] * problem.response.force(nodal, pressure))
+    return residual
+
+
+def interface_residuals(
+    problem: ContactProblem, nodal: Array, forces: Multipliers, bound: Array
+) -> tuple[float, float]:
+    """Return the relative contact and friction residuals at nodal unknowns. Collective."""
+    trace, c = problem.trace, stiffness_scale(problem)
+    opening = trace.normal_component(nodal) - trace.gap
+    contact = forces.pressure - project_half_line(forces.pressure + c * opening)
+    trial = forces.friction + c * trace.tangential_component(nodal)
+    friction = forces.friction - project_disc(trial, bound)
+    scale = trace.norm(total_pressure(problem, nodal, forces))
+    if scale == 0:  # open everywhere: compare with the stress that closing would take
+        scale = c * trace.norm(np.minimum(np.abs(opening), problem.domain.size)) or 1.0
+    return trace.norm(contact) / scale, trace.norm(friction) / scale
+
+
+def _global_norm(problem: ContactProblem, values: Array) -> float:
+    return float(np.sqrt(problem.comm.allreduce(np.dot(values, values), op=MPI.SUM)))
+
+
+def evaluate(problem: ContactProblem, forces: Multipliers) -> KKT:
+    """Return the residuals of the iterate `problem.x` and the contact forces. Collective."""
+    problem.freeze()
+    residual = residual_forces(problem, forces)
+    free = problem.free.ravel()
+    trace, nodal = problem.trace, nodal_iterate(problem)
+    contact_forces = np.zeros_like(residual)
+    vectors = total_pressure(problem, nodal, forces)[:, None] * trace.normal + forces.friction
+    trace.add(contact_forces, trace.weight[:, None] * vectors)
+    scale = (
+        _global_norm(problem, problem.external)
+        + _global_norm(problem, contact_forces)
+        + _global_norm(problem, np.where(free, 0.0, residual))
+    )
+    equilibrium = _global_norm(problem, np.where(free, residual, 0.0)) / (scale or 1.0)
+    bound = bound_of(problem, nodal, forces)
+    return KKT(equilibrium, *interface_residuals(problem, nodal, forces, bound))

@@ -1,0 +1,127 @@
+"""A linear operator that is assembled and factorised once and then solves many times.
+
+The operator is a bulk form plus a small dense block at each contact node: the augmentation
+r I of Algorithm 2, a compliant layer, a current, or Newton's linearised contact laws.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from dolfinx import fem
+from dolfinx.fem.petsc import assemble_matrix, create_matrix
+from petsc4py import PETSc
+
+from contact.errors import InputError
+from contact.problem import ContactProblem
+from contact.projections import Array
+
+
+@dataclass
+class Counters:
+    """How often the expensive steps were taken."""
+
+    factorizations: int = 0
+    linear_solves: int = 0
+    linear_iterations: int = 0
+
+
+class LinearOperator:
+    """Bulk operator plus nodal contact blocks, with one factorisation until either changes.
+
+    Parameters
+    ----------
+    problem
+        The problem whose secant or tangent form is assembled.
+    symmetric
+        Whether the blocks are symmetric too: LDL^T instead of LU.
+    prefix
+        Prefix of PETSc options, for instance ``-contact_ksp_type cg``.
+    counters
+        Where factorisations and solves are counted.
+    """
+
+    def __init__(
+        self,
+        problem: ContactProblem,
+        *,
+        symmetric: bool = True,
+        prefix: str = "contact_",
+        counters: Counters | None = None,
+    ) -> None:
+        self.problem = problem
+        self.counters = counters or Counters()
+        self._symmetric = symmetric
+        self.matrix = create_matrix(problem.secant)
+        self._form: fem.Form | None = None
+        self._blocks: Array | None = None
+        self._rhs, self._solution = self.matrix.createVecs()
+        self.ksp = PETSc.KSP().create(problem.comm)
+        self.ksp.setOptionsPrefix(prefix)
+        self.ksp.setType("preonly")
+        pc = self.ksp.getPC()
+        pc.setType("cholesky" if symmetric else "lu")
+        pc.setFactorSolverType("mumps")
+        self.ksp.setFromOptions()
+
+    def update(self, form: fem.Form, blocks: Array, *, constant: bool = False) -> None:
+        """Assemble the operator at the problem's iterate. Collective.
+
+        Parameters
+        ----------
+        form
+            `problem.secant` or `problem.tangent`.
+        blocks
+            Weighted nodal blocks, shape (n, block size, block size).
+        constant
+            Whether the bulk form has not changed since the last call with the same form:
+            nothing is done when the blocks are the same too.
+        """
+        same = constant and form is self._form and self._blocks is not None
+        if same and self._all(np.array_equal(blocks, self._blocks)):
+            return
+        self.matrix.zeroEntries()
+        assemble_matrix(self.matrix, form, bcs=self.problem.bcs)
+        self._add(blocks)
+        self.matrix.assemble()
+        self.matrix.setOption(PETSc.Mat.Option.SYMMETRIC, self._symmetric)
+        self._form, self._blocks = form, blocks.copy()
+        self.ksp.setOperators(self.matrix)
+        self.ksp.setUp()
+        self.counters.factorizations += 1
+
+    def _all(self, flag: bool) -> bool:
+        return bool(self.problem.comm.allreduce(int(flag)) == self.problem.comm.size)
+
+    def _add(self, blocks: Array) -> None:
+        trace = self.problem.trace
+        free = self.problem.free[trace.nodes].astype(float)
+        masked = blocks * free[:, :, None] * free[:, None, :]
+        self.matrix.assemble()
+        rows = np.arange(trace.nodes.size + 1, dtype=PETSc.IntType)
+        nodes = trace.nodes.astype(PETSc.IntType)
+        self.matrix.setValuesBlockedLocalIJV(
+            rows, nodes, masked, addv=PETSc.InsertMode.ADD_VALUES, rowmap=nodes
+        )
+
+    def solve(self, rhs: Array) -> Array:
+        """Solve with the owned part of a right-hand side; fixed unknowns stay 0. Collective.
+
+        Raises
+        ------
+        InputError
+            If the operator is singular: the body is not held.
+        """
+        self._rhs.array[:] = np.where(self.problem.free.ravel(), rhs, 0.0)
+        self.ksp.solve(self._rhs, self._solution)
+        self.counters.linear_solves += 1
+        self.counters.linear_iterations += self.ksp.getIterationNumber()
+        reason = self.ksp.getConvergedReason()
+        finite = bool(np.isfinite(self._solution.norm()))
+        if reason == PETSc.KSP.ConvergedReason.DIVERGED_PCSETUP_FAILED or not finite:
+            raise InputError(
+                "the linear system is singular: the body can move freely; fix enough "
+                "displacement components (or, for a piezoelectric body, a potential)"
+            )
+        return self._solution.array.copy()

@@ -1,0 +1,28 @@
+"""Norms over the body."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import ufl
+from dolfinx import fem
+from dolfinx.fem.petsc import assemble_matrix
+
+from contact.problem import ContactProblem
+from contact.projections import Array
+
+
+def domain_norm(problem: ContactProblem) -> Callable[[Array], float]:
+    """Return the L2(Omega) norm of owned unknowns (displacement and scaled potential)."""
+    trial, test = ufl.TrialFunction(problem.space), ufl.TestFunction(problem.space)
+    mass = assemble_matrix(fem.form(ufl.inner(trial, test) * problem.domain.dx))
+    mass.assemble()
+    vector, image = mass.createVecs()
+
+    def norm(values: Array) -> float:
+        vector.array[:] = values
+        mass.mult(vector, image)
+        return float(np.sqrt(max(vector.dot(image), 0.0)))
+
+    return norm

@@ -1,0 +1,84 @@
+"""What a solver tells while it works and when it is done."""
+
+from __future__ import annotations
+
+import logging
+from dataclasses import dataclass, field
+from typing import Protocol
+
+from contact.kkt import KKT
+
+logger = logging.getLogger("contact.solver")
+
+
+@dataclass(frozen=True)
+class Record:
+    """One outer iteration.
+
+    Attributes
+    ----------
+    iteration
+        Number of the iteration; 0 is the frictionless start of the fixed point.
+    inner
+        Linear solves that it took.
+    kkt
+        Residuals after it.
+    change
+        Relative change of the friction bound, (3.46); NaN where there is none.
+    seconds
+        Since the start of the solve.
+    note
+        What was special about it, for instance "tangent".
+    """
+
+    iteration: int
+    inner: int
+    kkt: KKT
+    change: float
+    seconds: float
+    note: str = ""
+
+
+class Monitor(Protocol):
+    """Told of every outer iteration, on all ranks."""
+
+    def __call__(self, record: Record) -> None:
+        """Take note of an iteration."""
+
+
+@dataclass
+class History:
+    """The outer iterations so far, handed to a monitor as they come."""
+
+    monitor: Monitor | None = None
+    records: list[Record] = field(default_factory=list)
+
+    def add(self, record: Record) -> None:
+        """Append a record."""
+        self.records.append(record)
+        logger.info(
+            "iteration %d: %d solves, residuals %.2e %.2e %.2e %s",
+            record.iteration, record.inner, record.kkt.equilibrium, record.kkt.contact,
+            record.kkt.friction, record.note,
+        )
+        if self.monitor is not None:
+            self.monitor(record)
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """How a solver ended.
+
+    Attributes
+    ----------
+    converged
+        Whether all residuals are below the tolerance.
+    reason
+        In words, also when it has converged.
+    kkt
+        The final residuals.
+    """
+
+    converged: bool
+    reason: str
+    kkt: KKT

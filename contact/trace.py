@@ -1,0 +1,175 @@
+"""The contact nodes: where the foundation acts on the body.
+
+Multipliers and auxiliary variables live at these nodes, and the products of L2(Gamma_3) are
+lumped there. Each rank holds the contact nodes that it owns; sums and norms are global.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+import ufl
+from dolfinx import fem
+from dolfinx.la import InsertMode
+from mpi4py import MPI
+from numpy.typing import NDArray
+
+from contact.domain import Domain
+from contact.errors import InputError
+from contact.foundation import Foundation
+from contact.projections import Array
+
+
+@dataclass(frozen=True)
+class ContactTrace:
+    """The contact nodes that this rank owns.
+
+    Attributes
+    ----------
+    comm
+        Communicator of the mesh.
+    nodes
+        Local node (block) numbers, shape (n,).
+    points
+        Coordinates, shape (n, d) (length).
+    weight
+        Integrals of the nodal basis functions over Gamma_3, shape (n,): they reproduce the
+        nodal forces of a constant pressure (vertex rule for P1, Simpson's for P2 edges).
+    normal
+        Contact direction, a unit vector out of the body, shape (n, d).
+    tangent
+        Projector onto the free tangential directions, shape (n, d, d).
+    gap
+        Distance to the foundation along the contact direction, shape (n,).
+    block_size
+        Unknowns a node: d, or d + 1 with the potential.
+    """
+
+    comm: MPI.Comm
+    nodes: NDArray[np.int32]
+    points: Array
+    weight: Array
+    normal: Array
+    tangent: Array
+    gap: Array
+    block_size: int
+
+    @property
+    def dim(self) -> int:
+        """Dimension d of the displacement."""
+        return self.normal.shape[1]
+
+    def values(self, array: Array) -> Array:
+        """Return the nodal unknowns, shape (n, block_size), of a local dof array."""
+        owned = array[: array.size // self.block_size * self.block_size]
+        return owned.reshape(-1, self.block_size)[self.nodes]
+
+    def add(self, array: Array, nodal: Array) -> None:
+        """Add nodal vectors of shape (n, d) or (n, block_size) to a local dof array."""
+        columns = np.arange(nodal.shape[1])
+        array[self.nodes[:, None] * self.block_size + columns] += nodal
+
+    def normal_component(self, u: Array) -> Array:
+        """Return u . nu, shape (n,), of vectors of shape (n, >= d)."""
+        return np.einsum("ni,ni->n", u[:, : self.dim], self.normal)
+
+    def tangential_component(self, u: Array) -> Array:
+        """Return u_tau in the free tangential directions, shape (n, d)."""
+        return np.einsum("nij,nj->ni", self.tangent, u[:, : self.dim])
+
+    def sum(self, values: Array) -> float:
+        """Return the lumped integral of nodal values over Gamma_3."""
+        return float(self.comm.allreduce(np.dot(self.weight, values), op=MPI.SUM))
+
+    def norm(self, values: Array) -> float:
+        """Return the lumped L2(Gamma_3) norm of scalars (n,) or vectors (n, d)."""
+        squares = values**2 if values.ndim == 1 else np.einsum("ni,ni->n", values, values)
+        return float(np.sqrt(self.sum(squares)))
+
+    def maximum(self, values: Array, default: float = 0.0) -> float:
+        """Return the largest nodal value over all ranks."""
+        return float(self.comm.allreduce(np.max(values, initial=default), op=MPI.MAX))
+
+    @cached_property
+    def size(self) -> int:
+        """Number of contact nodes over all ranks."""
+        return int(self.comm.allreduce(self.nodes.size, op=MPI.SUM))
+
+    def gather(self, values: Array) -> Array:
+        """Return the values of all ranks, in rank order, on every rank."""
+        return np.concatenate(self.comm.allgather(values))
+
+
+def _assembled(space: fem.FunctionSpace, form: ufl.Form) -> Array:
+    """Return the owned part of an assembled vector, one row a node."""
+    vector = fem.assemble_vector(fem.form(form))
+    vector.scatter_reverse(InsertMode.add)
+    size = space.dofmap.index_map.size_local * space.dofmap.index_map_bs
+    return vector.array[:size].reshape(-1, space.dofmap.index_map_bs)
+
+
+def free_components(space: fem.FunctionSpace, bcs: Sequence[fem.DirichletBC]) -> NDArray[np.bool_]:
+    """Return which components of the owned nodes are not fixed, shape (nodes, block size)."""
+    index_map, bs = space.dofmap.index_map, space.dofmap.index_map_bs
+    free = np.ones(index_map.size_local * bs, dtype=bool)
+    for bc in bcs:
+        dofs, owned = bc.dof_indices()
+        free[dofs[:owned]] = False
+    return free.reshape(-1, bs)
+
+
+def build_trace(
+    domain: Domain,
+    space: fem.FunctionSpace,
+    bcs: Sequence[fem.DirichletBC],
+    part: str,
+    foundation: Foundation,
+) -> ContactTrace:
+    """Collect the contact nodes of a boundary part.
+
+    A node whose contact direction is fixed by a Dirichlet condition is left out; a fixed
+    tangential component is removed from its tangent projector. On a symmetry line the
+    direction is turned into the free components.
+
+    Raises
+    ------
+    InputError
+        If no contact node is left on any rank.
+    """
+    d = domain.dim
+    v = ufl.TestFunction(space)
+    nu = ufl.FacetNormal(domain.mesh)
+    ds = domain.ds(part)
+    weight = _assembled(space, v[0] * ds)[:, 0]
+    normal = _assembled(space, sum(nu[i] * v[i] for i in range(d)) * ds)[:, :d]
+
+    measure = domain.comm.allreduce(weight.sum(), op=MPI.SUM)
+    count = domain.comm.allreduce(int(np.count_nonzero(weight)), op=MPI.SUM)
+    # Nodes whose basis function has no mean on Gamma_3 (P2 vertices of triangles) carry none.
+    nodes = np.flatnonzero(weight > 1e-9 * measure / max(count, 1)).astype(np.int32)
+    points = space.tabulate_dof_coordinates()[nodes, :d]
+    normal = normal[nodes] / np.linalg.norm(normal[nodes], axis=1)[:, None]
+    direction, gap = foundation.measure(points, normal)
+
+    free = free_components(space, bcs)[nodes, :d]
+    admissible = direction * free
+    length = np.linalg.norm(admissible, axis=1)
+    # A gap is infinite where the body's normal does not lead to the foundation.
+    keep = (length > 0.5) & np.isfinite(gap)
+    nodes, points, gap, free = nodes[keep], points[keep], gap[keep], free[keep]
+    direction = admissible[keep] / length[keep, None]
+    gap = gap / length[keep]
+    tangent = -direction[:, :, None] * direction[:, None, :]
+    tangent[:, np.arange(d), np.arange(d)] += free
+    trace = ContactTrace(
+        domain.comm, nodes, points, weight[nodes], direction, tangent, gap,
+        space.dofmap.index_map_bs,
+    )
+    if trace.size == 0:
+        raise InputError(
+            f"contact.on: part {part!r} has no node that is free to move towards the foundation"
+        )
+    return trace

@@ -1,0 +1,215 @@
+"""Uzawa block relaxation for one linearised problem: Algorithms 2, 5, 7 and 9.
+
+One step solves for u, projects the auxiliary variables phi and updates the multipliers
+lambda, (3.34)-(3.36). Everything that it hands on is z = lambda + r u: the next multiplier is
+the projection of z, and r phi = z - lambda. The step is therefore a fixed-point map of z,
+which Anderson's method accelerates.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from mpi4py import MPI
+
+from contact.acceleration import Anderson
+from contact.kkt import interface_residuals
+from contact.linear import LinearOperator
+from contact.problem import ContactProblem
+from contact.projections import Array, project_disc
+from contact.state import Multipliers, bound_of
+from forms.foundation import contact_multiplier
+
+
+@dataclass(frozen=True)
+class Relaxation:
+    """Parameters of the block relaxation.
+
+    Attributes
+    ----------
+    r
+        Augmentation parameter (stress/length).
+    tolerance
+        On the relative contact and friction residuals of the iterate.
+    max_iterations
+        Number of linear solves allowed.
+    depth
+        Depth of Anderson's acceleration, 0 for none.
+    over_relaxation
+        Factor in (0, 2) on the step in u; 1 for none.
+    thesis_tolerance
+        If given, stop by the thesis's criterion (3.45) with this epsilon instead.
+    single_loop
+        Whether the friction bound is updated in every iteration.
+    """
+
+    r: float
+    tolerance: float
+    max_iterations: int
+    depth: int = 8
+    over_relaxation: float = 1.0
+    thesis_tolerance: float | None = None
+    single_loop: bool = False
+
+
+@dataclass(frozen=True)
+class Linearised:
+    """The linearised problem about an iterate: A dx = -residual - contact forces.
+
+    Attributes
+    ----------
+    operator
+        Factorised operator, augmented by r at the contact nodes.
+    residual
+        Owned residual without multipliers at the iterate.
+    nodal
+        The iterate at the contact nodes, shape (n, block size).
+    bound
+        Friction bound s_n, shape (n,).
+    """
+
+    operator: LinearOperator
+    residual: Array
+    nodal: Array
+    bound: Array
+
+
+@dataclass
+class RelaxationResult:
+    """Outcome of a block relaxation.
+
+    Attributes
+    ----------
+    increment
+        dx on the owned unknowns.
+    forces
+        Multipliers in equilibrium with the iterate.
+    z
+        State to start the next relaxation from, shape (n, 1 + d).
+    iterations
+        Number of linear solves.
+    residual
+        The largest interface residual reached.
+    """
+
+    increment: Array
+    forces: Multipliers
+    z: Array
+    iterations: int
+    residual: float
+
+
+def automatic_r(problem: ContactProblem) -> float:
+    """Return r* = 1.39 E'/sqrt(h H), the geometric mean of the Steklov spectrum's ends.
+
+    E' = E/(1 - nu^2); h is the spacing of the contact nodes and H the volume of the body over
+    the area of Gamma_3. Good to a factor of a few, which acceleration makes up for.
+    """
+    from dolfinx import fem
+
+    domain, law = problem.domain, problem.body.law
+    one = problem.constant(1.0)
+
+    def integral(measure: object) -> float:
+        return float(problem.comm.allreduce(fem.assemble_scalar(fem.form(one * measure)), MPI.SUM))
+
+    area = integral(domain.ds(problem.contact.on))
+    height = integral(domain.dx) / area
+    spacing = (area / problem.trace.size) ** (1 / (problem.dim - 1))
+    modulus = float(law.young) / (1 - float(law.poisson) ** 2)
+    return 1.39 * modulus / float(np.sqrt(spacing * height))
+
+
+def augmentation(problem: ContactProblem, r: float) -> Array:
+    """Return the weighted nodal blocks of r (u_nu v_nu + u_tau v_tau), (n, bs, bs)."""
+    trace, d = problem.trace, problem.dim
+    blocks = np.zeros((trace.nodes.size, trace.block_size, trace.block_size))
+    blocks[:, :d, :d] = trace.normal[:, :, None] * trace.normal[:, None, :]
+    if problem.frictional:
+        blocks[:, :d, :d] += trace.tangent
+    return r * trace.weight[:, None, None] * blocks
+
+
+def split(problem: ContactProblem, nodal: Array) -> Array:
+    """Return normal and tangential displacements side by side, shape (n, 1 + d)."""
+    trace = problem.trace
+    tangential = trace.tangential_component(nodal)
+    if not problem.frictional:
+        tangential = np.zeros_like(tangential)
+    return np.column_stack([trace.normal_component(nodal), tangential])
+
+
+def _project(problem: ContactProblem, z: Array, r: float, bound: Array) -> Array:
+    """Return the new multipliers, Steps 2 and 3: (3.43) and the friction disc."""
+    pressure = contact_multiplier(z[:, 0], r, 0.0, problem.trace.gap)
+    return np.column_stack([pressure, project_disc(z[:, 1:], bound)])
+
+
+def _vectors(problem: ContactProblem, pairs: Array) -> Array:
+    """Return (normal, tangential) pairs as vectors, shape (n, d)."""
+    return pairs[:, :1] * problem.trace.normal + pairs[:, 1:]
+
+
+def block_relaxation(
+    problem: ContactProblem,
+    step: Linearised,
+    z: Array,
+    parameters: Relaxation,
+    domain_norm: Callable[[Array], float] | None = None,
+) -> RelaxationResult:
+    """Iterate Steps 1 to 3 of Algorithm 2 (5, 7, 9) on one linearised problem. Collective.
+
+    Parameters
+    ----------
+    problem
+        The contact problem; its iterate is left alone.
+    step
+        The linearised problem; its operator holds `augmentation(problem, r)`.
+    z
+        lambda + r u to start from, shape (n, 1 + d).
+    parameters
+        Of the method.
+    domain_norm
+        L2(Omega) norm of owned unknowns, needed for the thesis's criterion.
+    """
+    trace, r, bound = problem.trace, parameters.r, step.bound
+    weights = np.repeat(trace.weight, z.shape[1])
+
+    def inner(a: Array, b: Array) -> Array:
+        return np.asarray(trace.comm.allreduce(a.T @ (weights[:, None] * b), op=MPI.SUM))
+
+    anderson = Anderson(inner, parameters.depth)
+    old_increment, old_phi = None, None
+    residual, forces = np.inf, Multipliers.zero(problem)
+    increment = np.zeros(problem.owned)
+    start = split(problem, step.nodal)
+    for iteration in range(1, parameters.max_iterations + 1):
+        multiplier = _project(problem, z, r, bound)
+        q = 2 * multiplier - z
+        rhs = -step.residual
+        trace.add(rhs, -trace.weight[:, None] * _vectors(problem, q + r * start))
+        increment = step.operator.solve(rhs)
+        nodal = step.nodal + trace.values(increment)
+        u = split(problem, nodal)
+        # q + r u is the force that the foundation exerted in this very solve.
+        forces = Multipliers(q[:, 0] + r * u[:, 0], q[:, 1:] + r * u[:, 1:])
+        if parameters.single_loop:
+            bound = bound_of(problem, nodal, forces)
+        residual = max(interface_residuals(problem, nodal, forces, bound))
+        phi = (z - multiplier) / r
+        image = multiplier + r * (phi + parameters.over_relaxation * (u - phi))
+        if parameters.thesis_tolerance is not None:
+            assert domain_norm is not None
+            phi = (image - _project(problem, image, r, bound)) / r
+            if old_phi is not None and old_increment is not None:
+                change = domain_norm(increment - old_increment) ** 2 + trace.norm(phi - old_phi) ** 2
+                size = domain_norm(problem.x.x.array[: problem.owned] + increment) ** 2
+                if change < parameters.thesis_tolerance**2 * (size + trace.norm(phi) ** 2):
+                    return RelaxationResult(increment, forces, image, iteration, residual)
+            old_phi, old_increment = phi, increment
+        elif residual <= parameters.tolerance or not np.isfinite(residual):
+            return RelaxationResult(increment, forces, image, iteration, residual)
+        z = anderson.next(z.ravel(), image.ravel()).reshape(z.shape)
+    return RelaxationResult(increment, forces, z, parameters.max_iterations, residual)

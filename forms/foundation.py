@@ -1,0 +1,69 @@
+"""What the foundation does to the body: pointwise laws and boundary integrands.
+
+The pointwise laws serve UFL and NumPy alike; the solver applies them at the contact nodes.
+The integrands are those of the weak forms, to be integrated over Gamma_3 with the vertex
+rule, which makes them equal to the nodal ones for P1.
+"""
+
+from __future__ import annotations
+
+import ufl
+from ufl.core.expr import Expr
+
+from forms.kinematics import normal_part, tangential_part
+from forms.ops import Value, positive_part, sqrt
+
+
+def contact_multiplier(pressure: Value, r: Value, u_n: Value, gap: Value) -> Value:
+    """Return (lambda_c + r (u_nu - rho))^+, equation (3.43)."""
+    return positive_part(pressure + r * (u_n - gap))
+
+
+def penalty_pressure(u_n: Value, gap: Value, eps: Value) -> Value:
+    """Return [u_nu - rho]^+ / eps, the pressure of the penalised problem, (4.32)."""
+    return positive_part(u_n - gap) / eps
+
+
+def penalty_friction_modulus(bound: Value, slip: Value, eps: Value) -> Value:
+    """Return s / (|u_tau| + eps): the lagged friction modulus of (4.33)."""
+    return bound / (slip + eps)
+
+
+def augmented_lagrangian(u: Expr, v: Expr, nu: Expr, r: Value, friction: bool = True) -> Expr:
+    """Return r u_nu v_nu + r u_tau . v_tau, the left-hand side of Step 1 of Algorithm 2."""
+    form = r * normal_part(u, nu) * normal_part(v, nu)
+    if friction:
+        form += r * ufl.inner(tangential_part(u, nu), tangential_part(v, nu))
+    return form
+
+
+def auxiliary_load(
+    phi_c: Expr, phi_f: Expr, lambda_c: Expr, lambda_f: Expr, v: Expr, nu: Expr, r: Value
+) -> Expr:
+    """Return the right-hand side of Step 1 of Algorithm 2 on Gamma_3."""
+    normal = (r * phi_c - lambda_c) * normal_part(v, nu)
+    return normal + ufl.inner(r * phi_f - lambda_f, tangential_part(v, nu))
+
+
+def penalty(u: Expr, v: Expr, nu: Expr, gap: Expr, eps: Value) -> Expr:
+    """Return [u_nu - rho]^+ v_nu / eps, the form Phi/eps of (4.32)."""
+    return penalty_pressure(normal_part(u, nu), gap, eps) * normal_part(v, nu)
+
+
+def penalty_friction(
+    u_frozen: Expr, u: Expr, v: Expr, nu: Expr, bound: Expr, eps: Value
+) -> Expr:
+    """Return the form J_eps(u_frozen; u, v) of (4.33) for a friction bound s."""
+    frozen = tangential_part(u_frozen, nu)
+    modulus = penalty_friction_modulus(bound, sqrt(ufl.inner(frozen, frozen)), eps)
+    return modulus * ufl.inner(tangential_part(u, nu), tangential_part(v, nu))
+
+
+def compliance(u: Expr, v: Expr, nu: Expr, p_nu, h_nu, gap: Expr, difference: Value) -> Expr:
+    """Return h_nu(phi - phi_F) p_nu(u_nu - rho_0) v_nu, the form j_1 of section 6.2."""
+    return h_nu(difference) * p_nu(normal_part(u, nu) - gap) * normal_part(v, nu)
+
+
+def electric_contact(u: Expr, phi: Expr, xi: Expr, nu: Expr, psi, phi_l, gap, phi_f) -> Expr:
+    """Return psi(u_nu - rho) phi_L(phi - phi_F) xi, the form l of (5.11)."""
+    return psi(normal_part(u, nu) - gap) * phi_l(phi - phi_f) * xi

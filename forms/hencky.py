@@ -1,0 +1,248 @@
+"""Hencky's deformation theory: secant modulus, energy, stress, secant form, tangent.
+
+Equations (1.11)-(1.13), (7.7)-(7.9). The deviator is three-dimensional in plane strain too.
+Laws are written as functions of q = |dev eps|^2, which is smooth at zero strain where
+|dev eps| is not; `Hencky.g` and its companions take t = |dev eps| and are meant for reading
+and plotting.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Protocol
+
+import numpy as np
+import ufl
+from scipy.optimize import brentq
+from ufl.core.expr import Expr
+
+from forms.kinematics import deviator_squared, embed, strain
+from forms.ops import Value, log, maximum, sqrt
+
+
+class Hencky(Protocol):
+    """What the forms need of a material: two elastic constants and a secant shear modulus."""
+
+    young: float
+    poisson: float
+
+    @property
+    def bulk(self) -> float:
+        """Bulk modulus k0 = E / (3 - 6 nu), equation (7.9)."""
+
+    @property
+    def shear(self) -> float:
+        """Initial shear modulus mu1 = E / (2 + 2 nu), equation (7.9)."""
+
+    def secant_modulus(self, q: Value) -> Value:
+        """Return g at q = |dev eps|^2."""
+
+    def shear_energy(self, q: Value) -> Value:
+        """Return int_0^t 2 g(s) s ds with t = sqrt(q)."""
+
+
+@dataclass(frozen=True)
+class Isotropic:
+    """Elastic constants that every law shares.
+
+    Parameters
+    ----------
+    young
+        Young's modulus E > 0 (stress).
+    poisson
+        Poisson's ratio, -1 < nu < 1/2.
+    """
+
+    young: float
+    poisson: float
+
+    @property
+    def bulk(self) -> float:
+        """Bulk modulus k0 = E / (3 - 6 nu), equation (7.9)."""
+        return self.young / (3 - 6 * self.poisson)
+
+    @property
+    def shear(self) -> float:
+        """Initial shear modulus mu1 = E / (2 + 2 nu), equation (7.9)."""
+        return self.young / (2 + 2 * self.poisson)
+
+
+@dataclass(frozen=True)
+class Linear(Isotropic):
+    """Linear isotropic elasticity: g = mu1."""
+
+    def secant_modulus(self, q: Value) -> Value:
+        """Return g = mu1, whatever the strain."""
+        return self.shear + 0 * q
+
+    def shear_energy(self, q: Value) -> Value:
+        """Return mu1 q."""
+        return self.shear * q
+
+
+@dataclass(frozen=True)
+class Log(Isotropic):
+    """The law (7.8): g(t) = mu1 up to xi_0, mu1 (xi_0/t) (ln(t/xi_0) + 1) beyond.
+
+    Parameters
+    ----------
+    young, poisson
+        Elastic constants.
+    yield_strain
+        The limit xi_0 > 0 (no unit).
+    argument
+        "norm": xi_0 limits t = |dev eps|, so that d(g t)/dt = mu1 xi_0/t > 0.
+        "square": xi_0 limits t^2, as (7.8) is printed; it softens beyond e xi_0.
+    g_min
+        A floor of g (stress), so that assumption (h1) holds uniformly; 0 for none.
+    """
+
+    yield_strain: float = field(kw_only=True)
+    argument: str = field(default="norm", kw_only=True)
+    g_min: float = field(default=0.0, kw_only=True)
+
+    @property
+    def _limit(self) -> float:
+        """The value of q at first yield."""
+        return self.yield_strain**2 if self.argument == "norm" else self.yield_strain
+
+    def _bare_modulus(self, q: Value) -> Value:
+        # Evaluated at max(q, limit), where the elastic branch and the logarithm meet with
+        # equal slopes: no case distinction, and no division by a vanishing strain.
+        ratio = maximum(q, self._limit) / self._limit
+        if self.argument == "norm":
+            return self.shear / sqrt(ratio) * (log(ratio) / 2 + 1)
+        return self.shear / ratio * (log(ratio) + 1)
+
+    def _bare_energy(self, q: Value) -> Value:
+        excess = maximum(q, self._limit)
+        ratio = excess / self._limit
+        elastic = self.shear * (q - excess + self._limit)
+        if self.argument == "norm":
+            return elastic + self.shear * self._limit * sqrt(ratio) * log(ratio)
+        return elastic + self.shear * self._limit * log(ratio) * (1 + log(ratio) / 2)
+
+    @cached_property
+    def _floor_start(self) -> float:
+        """The q from which the floor g_min acts (infinity without a floor)."""
+        if self.g_min <= 0:
+            return np.inf
+        upper = 4 * self._limit
+        while self._bare_modulus(upper) > self.g_min:
+            upper *= 4
+        return float(brentq(lambda q: self._bare_modulus(q) - self.g_min, self._limit, upper))
+
+    def secant_modulus(self, q: Value) -> Value:
+        """Return g at q = |dev eps|^2, equation (7.8)."""
+        g = self._bare_modulus(q)
+        return g if self.g_min <= 0 else maximum(g, self.g_min)
+
+    def shear_energy(self, q: Value) -> Value:
+        """Return the integral of 2 g(s) s over [0, sqrt(q)] in closed form."""
+        start = self._floor_start
+        if not np.isfinite(start):
+            return self._bare_energy(q)
+        beyond = maximum(q - start, 0.0)
+        return self._bare_energy(q - beyond) + self.g_min * beyond
+
+
+@dataclass(frozen=True)
+class UserLaw(Isotropic):
+    """A law with a given secant modulus g(t), t = |dev eps|, made of `forms.ops` functions.
+
+    Parameters
+    ----------
+    young, poisson
+        Elastic constants of small strains; g should tend to mu1 = E/(2+2 nu) at t = 0.
+    modulus
+        The function g(t); it must accept UFL expressions and NumPy arrays.
+
+    Notes
+    -----
+    The energy is integrated by a 12-point Gauss rule on [0, t], exact for a polynomial g of
+    degree 22 and accurate for smooth ones.
+    """
+
+    modulus: Callable[[Value], Value] = field(kw_only=True)
+
+    def secant_modulus(self, q: Value) -> Value:
+        """Return g(sqrt(q)), kept away from the kink of the square root at q = 0."""
+        return self.modulus(sqrt(maximum(q, 1e-28)))
+
+    def shear_energy(self, q: Value) -> Value:
+        """Return the integral of 2 g(s) s over [0, sqrt(q)]."""
+        points, weights = np.polynomial.legendre.leggauss(12)
+        points, weights = (points + 1) / 2, weights / 2
+        total = 0 * q
+        for z, weight in zip(points, weights, strict=True):
+            total = total + 2 * weight * z * self.secant_modulus(float(z) ** 2 * q) * q
+        return total
+
+
+def secant_stress(law: Hencky, frozen: Expr, eps: Expr) -> Expr:
+    """Return (k0 - 2g/3) tr(eps) I + 2 g eps with g taken at the frozen strain, (1.13).
+
+    A 3 x 3 stress: in plane strain sigma_zz = (k0 - 2g/3) tr eps, which is not zero
+    (Remark 7.1 of the thesis says otherwise).
+    """
+    g = law.secant_modulus(deviator_squared(frozen))
+    return (law.bulk - 2 * g / 3) * ufl.tr(eps) * ufl.Identity(3) + 2 * g * embed(eps)
+
+
+def stress(law: Hencky, eps: Expr) -> Expr:
+    """Return the 3 x 3 stress sigma = (k0 - 2g/3) tr(eps) I + 2 g eps, equation (1.13)."""
+    return secant_stress(law, eps, eps)
+
+
+def energy_density(law: Hencky, eps: Expr) -> Expr:
+    """Return M(eps) = (k0/2) (tr eps)^2 + int_0^t 2 g(s) s ds, equation (1.11)."""
+    return law.bulk / 2 * ufl.tr(eps) ** 2 + law.shear_energy(deviator_squared(eps))
+
+
+def secant_form(law: Hencky, u: Expr, v: Expr, w: Expr) -> Expr:
+    """Return the integrand of the Kacanov form B(u; v, w) of section 3.4."""
+    return ufl.inner(secant_stress(law, strain(u), strain(v)), embed(strain(w)))
+
+
+@dataclass(frozen=True)
+class MonotonicityReport:
+    """Constants of assumption (h1) on strains up to ``t_max``.
+
+    Attributes
+    ----------
+    g_0
+        Upper bound of g.
+    alpha
+        Lower bound of d(g t)/dt: the strong monotonicity constant.
+    beta
+        Upper bound of d(g t)/dt.
+    holds
+        Whether alpha > 0.
+    """
+
+    t_max: float
+    g_0: float
+    alpha: float
+    beta: float
+    holds: bool
+
+
+def check_monotonicity(law: Hencky, t_max: float, samples: int = 2000) -> MonotonicityReport:
+    """Sample (h1): 0 < alpha <= d(g(t) t)/dt <= beta for 0 < t <= t_max.
+
+    Parameters
+    ----------
+    law
+        The material.
+    t_max
+        The largest |dev eps| of interest, for instance that of a computed solution.
+    samples
+        Number of intervals; the slopes are those of the chords of g(t) t.
+    """
+    t = np.linspace(0.0, max(t_max, 1e-12), samples + 1)
+    g = np.asarray(law.secant_modulus(t**2)) * np.ones_like(t)
+    slopes = np.diff(g * t) / np.diff(t)
+    alpha, beta = float(slopes.min()), float(slopes.max())
+    return MonotonicityReport(float(t_max), float(g.max()), alpha, beta, alpha > 0)

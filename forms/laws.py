@@ -1,0 +1,197 @@
+"""Laws on the contact boundary: mu, psi, phi_L, p_nu, h_nu, one definition each.
+
+Each law is a frozen dataclass that is called with UFL expressions or NumPy arrays, and
+knows the bounds that the theorems ask for. `derivative` is the derivative with respect to
+the argument, used by Newton's method.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol
+
+from forms.ops import Value, absolute, clip, less_equal, minimum, positive_part, where
+
+
+class FrictionCoefficient(Protocol):
+    """A coefficient mu(|u_tau|), assumption (h2)."""
+
+    @property
+    def maximum(self) -> float:
+        """Upper bound mu*."""
+
+    @property
+    def lipschitz(self) -> float:
+        """Lipschitz constant L_mu (1/length)."""
+
+    def __call__(self, slip: Value) -> Value:
+        """Return mu at the slip |u_tau| >= 0."""
+
+    def derivative(self, slip: Value) -> Value:
+        """Return d mu / d|u_tau|."""
+
+
+@dataclass(frozen=True)
+class ConstantCoefficient:
+    """A coefficient that does not depend on the slip: a number, or one value a node."""
+
+    value: Value
+
+    @property
+    def maximum(self) -> float:
+        """Upper bound mu*."""
+        return float(self.value if not hasattr(self.value, "max") else self.value.max())
+
+    @property
+    def lipschitz(self) -> float:
+        """Lipschitz constant: 0."""
+        return 0.0
+
+    def __call__(self, slip: Value) -> Value:
+        """Return the constant, shaped like the slip."""
+        return self.value + 0 * slip
+
+    def derivative(self, slip: Value) -> Value:
+        """Return 0."""
+        return 0 * slip
+
+
+@dataclass(frozen=True)
+class SlipCoefficient:
+    """mu(s) = a + b / (rho s + 2), equation (7.16): a = 0.5, b = 0.2.
+
+    Parameters
+    ----------
+    a, b
+        Limit for large slip, and twice the excess at rest (no unit).
+    rho
+        Decay rate (1/length), rho >= 0.
+    """
+
+    a: float
+    b: float
+    rho: float
+
+    @property
+    def maximum(self) -> float:
+        """Upper bound mu* = mu(0) = a + b/2."""
+        return self.a + max(self.b, 0.0) / 2
+
+    @property
+    def lipschitz(self) -> float:
+        """Lipschitz constant |b| rho / 4, reached at s = 0."""
+        return abs(self.b) * self.rho / 4
+
+    def __call__(self, slip: Value) -> Value:
+        """Return mu at the slip."""
+        return self.a + self.b / (self.rho * slip + 2)
+
+    def derivative(self, slip: Value) -> Value:
+        """Return d mu / ds."""
+        return -self.b * self.rho / (self.rho * slip + 2) ** 2
+
+
+@dataclass(frozen=True)
+class Truncation:
+    """phi_L(s) = s limited to [-L, L], equation (1.34); L = infinity for none."""
+
+    limit: float
+
+    def __call__(self, s: Value) -> Value:
+        """Return the truncated potential difference."""
+        return clip(s, -self.limit, self.limit)
+
+    def derivative(self, s: Value) -> Value:
+        """Return 1 inside the limits, 0 outside."""
+        return where(less_equal(absolute(s), self.limit), 1.0, 0.0)
+
+
+@dataclass(frozen=True)
+class RampConductivity:
+    """psi(s) = k_e clip(delta s, 0, 1), equation (1.34) as printed, s = u_nu - rho.
+
+    With a unilateral constraint s never exceeds 0 and the ramp never conducts.
+    """
+
+    k_e: float
+    delta: float
+
+    def __call__(self, s: Value) -> Value:
+        """Return the conductivity at s = u_nu - rho."""
+        return self.k_e * clip(self.delta * s, 0.0, 1.0)
+
+
+@dataclass(frozen=True)
+class ShiftedConductivity:
+    """psi(s) = k_e clip(1 + delta s, 0, 1): the ramp moved to the closing gap.
+
+    Full conductivity in contact, none beyond the distance 1/delta; Lipschitz, as (h5) asks.
+    """
+
+    k_e: float
+    delta: float
+
+    def __call__(self, s: Value) -> Value:
+        """Return the conductivity at s = u_nu - rho."""
+        return self.k_e * clip(1 + self.delta * s, 0.0, 1.0)
+
+
+@dataclass(frozen=True)
+class PerfectConductivity:
+    """psi = k_e where the node is in contact, 0 elsewhere, equation (1.33)."""
+
+    k_e: float
+
+    def __call__(self, in_contact: Value) -> Value:
+        """Return the conductivity; the argument tells whether the node is in contact."""
+        return where(in_contact, self.k_e, 0.0)
+
+
+@dataclass(frozen=True)
+class Compliance:
+    """p_nu(s) = [s]^+ limited to n_nu, section 8.1.2, s = penetration of the layer.
+
+    Parameters
+    ----------
+    limit
+        n_nu > 0 (length); infinity gives the law (1.28).
+    """
+
+    limit: float
+
+    def __call__(self, s: Value) -> Value:
+        """Return p_nu at the penetration s = u_nu - rho_0."""
+        return minimum(positive_part(s), self.limit)
+
+    def derivative(self, s: Value) -> Value:
+        """Return the generalised derivative: 1 for 0 < s < n_nu, else 0."""
+        return where(less_equal(s, 0.0), 0.0, where(less_equal(s, self.limit), 1.0, 0.0))
+
+
+@dataclass(frozen=True)
+class PotentialFactor:
+    """h_nu(s) = c_nu (1 + (alpha_nu - 1) min(|s|/s_0, 1)), section 8.1.2, s = phi - phi_F.
+
+    Parameters
+    ----------
+    stiffness
+        c_nu >= 0 (stress/length).
+    factor
+        alpha_nu >= 1: the growth at large potential differences; 1 for no dependence.
+    scale
+        s_0 > 0: the difference from which the growth stops (128 in the thesis).
+    """
+
+    stiffness: float
+    factor: float = 1.0
+    scale: float = 128.0
+
+    def __call__(self, s: Value) -> Value:
+        """Return h_nu at the potential difference s."""
+        return self.stiffness * (1 + (self.factor - 1) * minimum(absolute(s) / self.scale, 1.0))
+
+    def derivative(self, s: Value) -> Value:
+        """Return the generalised derivative of h_nu."""
+        slope = self.stiffness * (self.factor - 1) / self.scale
+        inside = where(less_equal(absolute(s), self.scale), slope, 0.0)
+        return where(less_equal(s, 0.0), -inside, inside)
