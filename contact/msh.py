@@ -4,6 +4,7 @@ Gmsh runs on rank 0 alone. What it finds is checked there, the verdict is broadc
 all ranks go on or raise together.
 """
 
+import re
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -56,7 +57,7 @@ def from_msh(comm: MPI.Intracomm, path: str | Path) -> Domain:
         that is not part of the boundary. The message names the file.
     """
 
-    def fill(gmsh: Any) -> None:
+    def fill(gmsh: Any) -> bool:
         file = Path(path)
         if not file.is_file():
             raise InputError("no such file")
@@ -65,9 +66,18 @@ def from_msh(comm: MPI.Intracomm, path: str | Path) -> Domain:
                 start = stream.read(4096)
         except OSError as error:
             raise InputError(f"it cannot be read ({error.strerror})") from error
-        if b"$MeshFormat" not in start:
+        version = re.search(rb"\$MeshFormat\s+(\d+)", start)
+        if version is None:
             raise InputError("this is no Gmsh .msh file of format 2.2 or 4.1")
-        gmsh.merge(str(file))
+        # Format 2 names the group of each element, but Gmsh keeps one set of groups an entity.
+        # With the two tags of an element switched, the entities are the groups.
+        switch = version[1] < b"4"
+        gmsh.option.setNumber("Mesh.SwitchElementTags", switch)
+        try:
+            gmsh.merge(str(file))
+        finally:
+            gmsh.option.setNumber("Mesh.SwitchElementTags", 0)
+        return switch
 
     return _from_gmsh(comm, fill, f"mesh file {path}")
 
@@ -82,12 +92,14 @@ def from_recipe(comm: MPI.Intracomm, name: str, **parameters: Any) -> Domain:
     """
     import meshes
 
-    return _from_gmsh(
-        comm, lambda gmsh: meshes.build(name, **parameters), f"mesh generator {name!r}"
-    )
+    def fill(gmsh: Any) -> bool:
+        meshes.build(name, **parameters)
+        return False
+
+    return _from_gmsh(comm, fill, f"mesh generator {name!r}")
 
 
-def _from_gmsh(comm: MPI.Intracomm, fill: Callable[[Any], None], what: str) -> Domain:
+def _from_gmsh(comm: MPI.Intracomm, fill: Callable[[Any], bool], what: str) -> Domain:
     """Fill a Gmsh model on rank 0, check it and distribute it."""
     raw, problem = None, None
     if comm.rank == 0:
@@ -129,8 +141,11 @@ def _distribute(comm: MPI.Intracomm, raw: _Raw, dim: int) -> Domain:
     return tagged(mesh, facets, {name: masks >> b & 1 == 1 for b, name in enumerate(raw.names)})
 
 
-def _run_gmsh(fill: Callable[[Any], None]) -> _Raw:
-    """Return the mesh of a model that ``fill`` makes, leaving a running Gmsh as it was."""
+def _run_gmsh(fill: Callable[[Any], bool]) -> _Raw:
+    """Return the mesh of a model that ``fill`` makes, leaving a running Gmsh as it was.
+
+    ``fill`` returns whether the model's entities are the groups themselves.
+    """
     try:
         import gmsh
     except ImportError as error:
@@ -143,8 +158,7 @@ def _run_gmsh(fill: Callable[[Any], None]) -> _Raw:
     gmsh.option.setNumber("General.Terminal", 0)
     gmsh.model.add("contact")
     try:
-        fill(gmsh)
-        return _extract(gmsh.model)
+        return _extract(gmsh.model, fill(gmsh))
     finally:
         gmsh.model.remove()
         gmsh.option.setNumber("General.Terminal", terminal)
@@ -152,7 +166,7 @@ def _run_gmsh(fill: Callable[[Any], None]) -> _Raw:
             gmsh.finalize()
 
 
-def _extract(model: Any) -> _Raw:
+def _extract(model: Any, entities_are_groups: bool) -> _Raw:
     """Take points, cells and boundary groups out of a Gmsh model and check them."""
     kinds = [model.mesh.getElementProperties(t)[:4] for t in model.mesh.getElementTypes()]
     dim = max((kind[1] for kind in kinds), default=-1)
@@ -172,16 +186,14 @@ def _extract(model: Any) -> _Raw:
     order_of_tags = np.argsort(tags)
     tags, xyz = tags[order_of_tags].astype(np.int64), xyz.reshape(-1, 3)[order_of_tags]
 
-    groups = model.getPhysicalGroups(dim)
-    cells = _elements(model, dim, groups or [(dim, None)])
+    bodies = _groups(model, dim, entities_are_groups)
+    cells = _elements(model, dim, sorted({e for es in bodies.values() for e in es}) or [-1])
     cells = cells[_first_of_each(np.sort(cells, axis=1))]
     used = np.unique(cells)
     points = xyz[np.searchsorted(tags, used)]
     cells = np.searchsorted(used, cells)
 
-    by_name: dict[str, list[tuple[int, int]]] = {}
-    for group in model.getPhysicalGroups(dim - 1):
-        by_name.setdefault(model.getPhysicalName(*group) or str(group[1]), []).append(group)
+    by_name = _groups(model, dim - 1, entities_are_groups)
     what = "curves" if dim == 2 else "surfaces"
     if not by_name:
         raise InputError(f"it has no physical groups of {what}, so that no part has a name")
@@ -198,11 +210,23 @@ def _extract(model: Any) -> _Raw:
     return _check(list(by_name), _flatten(points, dim), cells, np.vstack(rows), np.hstack(bits))
 
 
-def _elements(model: Any, dim: int, groups: list[tuple[int, Any]]) -> Ints:
-    """Node tags of the simplices of some physical groups (None: of all), shape (m, dim + 1)."""
-    entities = [-1]
-    if groups[0][1] is not None:
-        entities = sorted({e for g in groups for e in model.getEntitiesForPhysicalGroup(*g)})
+def _groups(model: Any, dim: int, entities_are_groups: bool) -> dict[str, list[int]]:
+    """Name of each physical group of a dimension -> its entities."""
+    if entities_are_groups:
+        found = [(tag, [tag]) for _, tag in model.getEntities(dim) if tag != 0]
+    else:
+        found = [
+            (tag, model.getEntitiesForPhysicalGroup(dim, tag).tolist())
+            for _, tag in model.getPhysicalGroups(dim)
+        ]
+    groups: dict[str, list[int]] = {}
+    for tag, entities in found:
+        groups.setdefault(model.getPhysicalName(dim, tag) or str(tag), []).extend(entities)
+    return groups
+
+
+def _elements(model: Any, dim: int, entities: list[int]) -> Ints:
+    """Node tags of the simplices of some entities (-1: of all), shape (m, dim + 1)."""
     nodes = [model.mesh.getElementsByType(SIMPLEX[dim], entity)[1] for entity in entities]
     return np.concatenate(nodes).astype(np.int64).reshape(-1, dim + 1)
 

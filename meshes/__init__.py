@@ -1,0 +1,96 @@
+"""Mesh recipes: bodies built with Gmsh, their boundary parts as named physical groups.
+
+A recipe is a function with keyword parameters (lengths, all positive) that fills the current
+Gmsh model and meshes it with straight-sided triangles or tetrahedra. ``RECIPES`` lists them by
+name. In a case file::
+
+    [mesh]
+    generator = "quarter_disc"
+    contact_size = 0.1
+
+On the command line: ``python3 -m meshes quarter_disc --contact-size 0.1 --out body.msh``.
+"""
+
+import difflib
+import inspect
+from collections.abc import Callable, Mapping
+from pathlib import Path
+
+from contact.errors import InputError
+from meshes.bars import bar, bar_on_ends, block, column, piezo_bar
+from meshes.hertz import disc, half_disc, quarter_disc, sphere
+
+__all__ = ["RECIPES", "build", "parameters", "write"]
+
+RECIPES: Mapping[str, Callable[..., None]] = {
+    recipe.__name__: recipe
+    for recipe in (
+        quarter_disc,
+        half_disc,
+        disc,
+        sphere,
+        bar,
+        piezo_bar,
+        bar_on_ends,
+        block,
+        column,
+    )
+}
+
+
+def parameters(name: str) -> dict[str, float]:
+    """Return the parameters of a recipe with their defaults.
+
+    Raises
+    ------
+    InputError
+        If there is no such recipe.
+    """
+    if name not in RECIPES:
+        raise InputError(_unknown("mesh recipe", name, RECIPES))
+    signature = inspect.signature(RECIPES[name])
+    return {key: parameter.default for key, parameter in signature.parameters.items()}
+
+
+def build(name: str, **given: float) -> None:
+    """Fill the current Gmsh model by a recipe and mesh it; Gmsh must be initialised.
+
+    Raises
+    ------
+    InputError
+        For an unknown recipe or parameter, and for a length that is not positive.
+    """
+    defaults = parameters(name)
+    for key, value in given.items():
+        if key not in defaults:
+            raise InputError(_unknown(f"parameter of the mesh recipe {name!r}", key, defaults))
+        if isinstance(value, bool) or not isinstance(value, int | float) or not value > 0.0:
+            raise InputError(f"{key} of the mesh recipe must be a positive number; given: {value}")
+    RECIPES[name](**given)
+
+
+def write(name: str, path: str | Path, *, version: float = 4.1, **given: float) -> None:
+    """Write a recipe's mesh to a ``.msh`` file of format 4.1 or 2.2.
+
+    Raises
+    ------
+    InputError
+        As `build`.
+    """
+    import gmsh
+
+    gmsh.initialize(readConfigFiles=False, interruptible=False)
+    try:
+        gmsh.option.setNumber("General.Terminal", 0)
+        gmsh.option.setNumber("Mesh.MshFileVersion", version)
+        gmsh.model.add(name)
+        build(name, **given)
+        gmsh.write(str(path))
+    finally:
+        gmsh.finalize()
+
+
+def _unknown(what: str, given: str, accepted: Mapping[str, object]) -> str:
+    near = difflib.get_close_matches(given, accepted, n=1)
+    hint = f"; did you mean {near[0]!r}?" if near else ""
+    return f"unknown {what}: {given!r}{hint} (accepted: {', '.join(accepted)})"

@@ -1,0 +1,35 @@
+"""Command line: ``python3 -m meshes RECIPE --size 0.5 --out body.msh``."""
+
+import argparse
+import inspect
+import sys
+
+from contact.errors import InputError
+from meshes import RECIPES, parameters, write
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Write a recipe's mesh; returns the exit status."""
+    parser = argparse.ArgumentParser(prog="python3 -m meshes", description="Write a .msh file.")
+    recipes = parser.add_subparsers(dest="recipe", required=True)
+    for name, recipe in RECIPES.items():
+        text = inspect.getdoc(recipe) or ""
+        options = recipes.add_parser(name, help=text.split("\n")[0], description=text)
+        for key, default in parameters(name).items():
+            options.add_argument(
+                f"--{key.replace('_', '-')}", type=float, default=default, help=f"[{default:g}]"
+            )
+        options.add_argument("--out", required=True, metavar="FILE.msh")
+        options.add_argument("--format", type=float, default=4.1, choices=(2.2, 4.1))
+    given = vars(parser.parse_args(arguments))
+    recipe, out, version = given.pop("recipe"), given.pop("out"), given.pop("format")
+    try:
+        write(recipe, out, version=version, **given)
+    except InputError as error:
+        print(f"error: {error}", file=sys.stderr)
+        return 2
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

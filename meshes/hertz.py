@@ -1,0 +1,184 @@
+"""Round bodies that touch the plane y = 0 (z = 0 in space) at the origin (Example 7.1)."""
+
+import math
+
+
+def quarter_disc(
+    *,
+    radius: float = 8.0,
+    size: float = 1.0,
+    contact_size: float = 0.2,
+    contact_width: float = 4.0,
+    growth: float = 0.3,
+) -> None:
+    """Right half of the lower half of a disc with the centre (0, radius).
+
+    Parts: ``symmetry`` (x = 0), ``top`` (the cut y = radius), ``contact`` (the arc). The
+    elements have the size ``contact_size`` up to ``contact_width`` from the origin and grow
+    by ``growth`` a unit length, up to ``size``.
+    """
+    import gmsh
+
+    from meshes.grading import finish, grade
+
+    geo = gmsh.model.geo
+    low, side, centre = (
+        geo.addPoint(*p) for p in ((0, 0, 0), (radius, radius, 0), (0, radius, 0))
+    )
+    arc = geo.addCircleArc(low, centre, side)
+    top = geo.addLine(side, centre)
+    symmetry = geo.addLine(centre, low)
+    body = geo.addPlaneSurface([geo.addCurveLoop([arc, top, symmetry])])
+    geo.synchronize()
+    grade(
+        gmsh,
+        size=size,
+        contact_size=contact_size,
+        width=contact_width,
+        growth=growth,
+        points=[low],
+    )
+    finish(gmsh, 2, [body], {"symmetry": [symmetry], "top": [top], "contact": [arc]})
+
+
+def half_disc(
+    *,
+    radius: float = 8.0,
+    size: float = 1.0,
+    contact_size: float = 0.2,
+    contact_width: float = 4.0,
+    growth: float = 0.3,
+) -> None:
+    """Lower half of a disc with the centre (0, radius).
+
+    Parts: ``top`` (the cut y = radius), ``contact`` (the arc). Sizes as in `quarter_disc`.
+    """
+    import gmsh
+
+    from meshes.grading import finish, grade
+
+    geo = gmsh.model.geo
+    low, right, left, centre = (
+        geo.addPoint(*p)
+        for p in ((0, 0, 0), (radius, radius, 0), (-radius, radius, 0), (0, radius, 0))
+    )
+    arcs = [geo.addCircleArc(left, centre, low), geo.addCircleArc(low, centre, right)]
+    top = [geo.addLine(right, centre), geo.addLine(centre, left)]
+    body = geo.addPlaneSurface([geo.addCurveLoop([*arcs, *top])])
+    geo.synchronize()
+    grade(
+        gmsh,
+        size=size,
+        contact_size=contact_size,
+        width=contact_width,
+        growth=growth,
+        points=[low],
+    )
+    finish(gmsh, 2, [body], {"top": top, "contact": arcs})
+
+
+def disc(
+    *,
+    radius: float = 8.0,
+    size: float = 1.0,
+    contact_size: float = 0.2,
+    contact_width: float = 4.0,
+    growth: float = 0.3,
+    top_angle: float = 30.0,
+) -> None:
+    """Full disc with the centre (0, radius).
+
+    Parts: ``contact`` (the lower half of the circle), ``top`` (the arc within ``top_angle``
+    degrees, at most 90, of the highest point). Sizes as in `quarter_disc`.
+    """
+    import gmsh
+
+    from contact.errors import InputError
+    from meshes.grading import finish, grade
+
+    if top_angle > 90.0:
+        raise InputError(f"top_angle must be at most 90 degrees; given: {top_angle}")
+    geo = gmsh.model.geo
+    centre = geo.addPoint(0, radius, 0)
+    # Angles from the lowest point, counter-clockwise; every arc is shorter than 180 degrees.
+    angles = [-90.0, 0.0, 90.0, 180.0 - top_angle, 180.0, 180.0 + top_angle]
+    if top_angle == 90.0:
+        angles = [-90.0, 0.0, 90.0, 180.0]
+    points = [
+        geo.addPoint(
+            radius * math.sin(math.radians(a)), radius * (1.0 - math.cos(math.radians(a))), 0
+        )
+        for a in angles
+    ]
+    arcs = [
+        geo.addCircleArc(a, centre, b)
+        for a, b in zip(points, points[1:] + points[:1], strict=True)
+    ]
+    body = geo.addPlaneSurface([geo.addCurveLoop(arcs)])
+    geo.synchronize()
+    grade(
+        gmsh,
+        size=size,
+        contact_size=contact_size,
+        width=contact_width,
+        growth=growth,
+        points=[points[1]],
+    )
+    top = arcs[2:] if top_angle == 90.0 else arcs[3:5]
+    finish(gmsh, 2, [body], {"contact": arcs[:2], "top": top})
+
+
+def sphere(
+    *,
+    radius: float = 10.0,
+    size: float = 2.0,
+    contact_size: float = 0.1,
+    contact_width: float = 1.3,
+    growth: float = 0.25,
+) -> None:
+    """Quarter x, y >= 0 of the lower half of a ball with the centre (0, 0, radius).
+
+    Parts: ``symmetry_x`` (x = 0), ``symmetry_y`` (y = 0), ``top`` (the cut z = radius),
+    ``contact`` (the round surface). Sizes as in `quarter_disc`.
+    """
+    import gmsh
+
+    from meshes.grading import finish, grade
+
+    geo = gmsh.model.geo
+    low, on_x, on_y, centre = (
+        geo.addPoint(*p)
+        for p in ((0, 0, 0), (radius, 0, radius), (0, radius, radius), (0, 0, radius))
+    )
+    arc_x = geo.addCircleArc(low, centre, on_x)
+    arc_top = geo.addCircleArc(on_x, centre, on_y)
+    arc_y = geo.addCircleArc(on_y, centre, low)
+    axis = geo.addLine(centre, low)
+    edge_x, edge_y = geo.addLine(on_x, centre), geo.addLine(centre, on_y)
+    contact = geo.addSurfaceFilling(
+        [geo.addCurveLoop([arc_x, arc_top, arc_y])], sphereCenterTag=centre
+    )
+    symmetry_y = geo.addPlaneSurface([geo.addCurveLoop([arc_x, edge_x, axis])])
+    symmetry_x = geo.addPlaneSurface([geo.addCurveLoop([arc_y, -axis, edge_y])])
+    top = geo.addPlaneSurface([geo.addCurveLoop([arc_top, -edge_y, -edge_x])])
+    body = geo.addVolume([geo.addSurfaceLoop([contact, symmetry_y, symmetry_x, top])])
+    geo.synchronize()
+    grade(
+        gmsh,
+        size=size,
+        contact_size=contact_size,
+        width=contact_width,
+        growth=growth,
+        points=[low],
+    )
+    finish(
+        gmsh,
+        3,
+        [body],
+        {
+            "symmetry_x": [symmetry_x],
+            "symmetry_y": [symmetry_y],
+            "top": [top],
+            "contact": [contact],
+        },
+    )
