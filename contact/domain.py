@@ -1,17 +1,21 @@
 """Meshes with named parts: from a generator, a Gmsh file, a recipe or a dolfinx mesh."""
 
 from collections.abc import Callable, Mapping
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
 from dolfinx import mesh as dmesh
+from mpi4py import MPI
 
 from contact import _compat
 from contact.errors import InputError
 from contact.grid import Piece, box, rectangle
 from contact.msh import from_msh, from_recipe
-from contact.parts import Domain, exterior_facets, tagged
+from contact.parts import Domain, exterior_facets, rotate, tagged
+
+if TYPE_CHECKING:
+    from contact.case_body import Mesh as MeshSection
 
 __all__ = [
     "Domain",
@@ -20,11 +24,50 @@ __all__ = [
     "from_mesh",
     "from_msh",
     "from_recipe",
+    "make_domain",
     "rectangle",
     "refined",
 ]
 
 Marker = Callable[[npt.NDArray[np.float64]], npt.NDArray[np.bool_]]
+
+
+def make_domain(section: "MeshSection", comm: MPI.Intracomm) -> Domain:
+    """Make the domain that the section ``[mesh]`` of a case file describes. Collective.
+
+    Raises
+    ------
+    InputError
+        As `rectangle`, `box`, `from_msh` and `from_recipe`.
+    """
+    if section.file is not None:
+        domain = from_msh(comm, section.file)
+    elif section.generator in ("rectangle", "box"):
+        # The section itself demands these three for a grid.
+        assert section.origin is not None
+        assert section.size is not None
+        assert section.cells is not None
+        grid = (section.origin, section.size, section.cells, _pieces(section))
+        if section.generator == "rectangle":
+            domain = rectangle(comm, *grid, diagonal=section.diagonal)
+        else:
+            domain = box(comm, *grid)
+    else:
+        assert section.generator is not None
+        domain = from_recipe(comm, section.generator, **section.parameters)
+    axis = section.axis or (0.0, 1.0, 0.0)
+    rotate(domain.mesh, section.rotation, axis if domain.dim == 3 else (0.0, 0.0, 1.0))
+    for _ in range(section.refine):
+        domain = refined(domain)
+    return domain
+
+
+def _pieces(section: "MeshSection") -> dict[str, list[Piece]]:
+    given = {
+        name: pieces if isinstance(pieces, tuple) else (pieces,)
+        for name, pieces in section.parts.items()
+    }
+    return {name: [Piece(p.side, p.start, p.stop) for p in ps] for name, ps in given.items()}
 
 
 def from_mesh(

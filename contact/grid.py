@@ -9,7 +9,7 @@ from dolfinx import mesh as dmesh
 from mpi4py import MPI
 
 from contact.errors import InputError
-from contact.parts import Domain, exterior_facets, tagged
+from contact.parts import Domain, exterior_facets, rotate, tagged
 
 #: Sides of the generators: name -> (axis, end), end 0 at the lower coordinate.
 RECTANGLE_SIDES = {"left": (0, 0), "right": (0, 1), "bottom": (1, 0), "top": (1, 1)}
@@ -31,7 +31,7 @@ class Piece:
     ----------
     side
         Name of the side.
-    start, end
+    start, stop
         Corners of the piece, in the coordinates before rotation that run along the side: one
         number for a rectangle, two for a box, in the order of the axes (``top``: x, y). None
         means the end of the side.
@@ -39,7 +39,7 @@ class Piece:
 
     side: str
     start: float | Sequence[float] | None = None
-    end: float | Sequence[float] | None = None
+    stop: float | Sequence[float] | None = None
 
 
 def rectangle(
@@ -84,7 +84,7 @@ def rectangle(
         diagonal=kinds[diagonal],
     )
     domain = _tag_grid(mesh, grid, chosen)
-    _rotate(mesh, rotation, (0.0, 0.0, 1.0))
+    rotate(mesh, rotation, (0.0, 0.0, 1.0))
     return domain
 
 
@@ -112,11 +112,9 @@ def box(
     if np.shape(axis) != (3,) or not np.linalg.norm(axis) > 0.0:
         raise InputError(f"mesh axis must be 3 numbers, not all zero; given: {axis}")
     chosen = _boxes(grid, BOX_SIDES, parts or {})
-    mesh = dmesh.create_box(
-        comm, grid[:2], list(cells), ghost_mode=dmesh.GhostMode.none
-    )
+    mesh = dmesh.create_box(comm, grid[:2], list(cells), ghost_mode=dmesh.GhostMode.none)
     domain = _tag_grid(mesh, grid, chosen)
-    _rotate(mesh, rotation, axis)
+    rotate(mesh, rotation, axis)
     return domain
 
 
@@ -126,9 +124,7 @@ _Grid = tuple[npt.NDArray[np.float64], npt.NDArray[np.float64], npt.NDArray[np.f
 _Patch = tuple[int, float, npt.NDArray[np.float64], npt.NDArray[np.float64]]
 
 
-def _grid(
-    origin: Sequence[float], size: Sequence[float], cells: Sequence[int], dim: int
-) -> _Grid:
+def _grid(origin: Sequence[float], size: Sequence[float], cells: Sequence[int], dim: int) -> _Grid:
     for key, given in (("origin", origin), ("size", size), ("cells", cells)):
         if np.shape(given) != (dim,):
             raise InputError(f"mesh {key} must be {dim} numbers; given: {given}")
@@ -155,9 +151,7 @@ def _boxes(
     return {name: [_patch(name, p, grid, sides) for p in ps] for name, ps in pieces.items()}
 
 
-def _patch(
-    name: str, piece: Piece, grid: _Grid, sides: Mapping[str, tuple[int, int]]
-) -> _Patch:
+def _patch(name: str, piece: Piece, grid: _Grid, sides: Mapping[str, tuple[int, int]]) -> _Patch:
     if piece.side not in sides:
         raise InputError(
             f"mesh part {name!r}: unknown side {piece.side!r} (accepted: {', '.join(sides)})"
@@ -166,7 +160,7 @@ def _patch(
     along = [i for i in range(len(grid[0])) if i != axis]
     low, high, h = (values[along] for values in grid)
     start = _on_grid(name, "from", piece.start, low, (low, high, h))
-    stop = _on_grid(name, "to", piece.end, high, (low, high, h))
+    stop = _on_grid(name, "to", piece.stop, high, (low, high, h))
     if np.any(stop - start < 0.5 * h):
         raise InputError(
             f"mesh part {name!r}: to must lie beyond from; given: from {start.tolist()} "
@@ -221,14 +215,3 @@ def _tag_grid(mesh: dmesh.Mesh, grid: _Grid, parts: Mapping[str, list[_Patch]]) 
                 & np.all(along < stop, axis=1)
             )
     return tagged(mesh, facets, marks)
-
-
-def _rotate(mesh: dmesh.Mesh, degrees: float, axis: Sequence[float]) -> None:
-    """Turn the geometry about an axis through the origin (Rodrigues' formula)."""
-    if degrees == 0.0:
-        return
-    a, b, c = np.asarray(axis, dtype=np.float64) / np.linalg.norm(axis)
-    cross = np.array([[0.0, -c, b], [c, 0.0, -a], [-b, a, 0.0]])
-    angle = np.deg2rad(degrees)
-    turn = np.eye(3) + np.sin(angle) * cross + (1.0 - np.cos(angle)) * cross @ cross
-    mesh.geometry.x[:] = mesh.geometry.x @ turn.T

@@ -6,7 +6,6 @@ all ranks go on or raise together.
 
 import re
 from collections.abc import Callable
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +17,7 @@ from dolfinx import graph, io
 from dolfinx import mesh as dmesh
 from mpi4py import MPI
 
+from contact.cells import Cells, check_cells, first_of_each
 from contact.errors import InputError
 from contact.parts import MAX_PARTS, Domain, exterior_facets, tagged
 
@@ -26,20 +26,6 @@ Ints = npt.NDArray[np.int64]
 #: Gmsh's element types of first order, by dimension.
 SIMPLEX = {1: 1, 2: 2, 3: 4}
 CELL_NAME = {2: "triangle", 3: "tetrahedron"}
-
-#: A cell is degenerate if its volume is below this times (longest edge)^d.
-FLAT = 1e-10
-
-
-@dataclass(frozen=True)
-class _Raw:
-    """A checked mesh: points (n, d), cells (m, d + 1), tagged facets (k, d) and their masks."""
-
-    names: list[str]
-    points: npt.NDArray[np.float64]
-    cells: Ints
-    facets: Ints
-    masks: npt.NDArray[np.int32]
 
 
 def from_msh(comm: MPI.Intracomm, path: str | Path) -> Domain:
@@ -117,7 +103,7 @@ def _from_gmsh(comm: MPI.Intracomm, fill: Callable[[Any], bool], what: str) -> D
         raise InputError(f"{what}: {problem}")
     dim, names = comm.bcast((raw.points.shape[1], raw.names) if raw is not None else None)
     if raw is None:
-        raw = _Raw(
+        raw = Cells(
             names,
             np.empty((0, dim)),
             np.empty((0, dim + 1), dtype=np.int64),
@@ -127,7 +113,7 @@ def _from_gmsh(comm: MPI.Intracomm, fill: Callable[[Any], bool], what: str) -> D
     return _distribute(comm, raw, dim)
 
 
-def _distribute(comm: MPI.Intracomm, raw: _Raw, dim: int) -> Domain:
+def _distribute(comm: MPI.Intracomm, raw: Cells, dim: int) -> Domain:
     element = basix.ufl.element("Lagrange", CELL_NAME[dim], 1, shape=(dim,), dtype=np.float64)
     mesh = dmesh.create_mesh(comm, cells=raw.cells, x=raw.points, e=ufl.Mesh(element))
     facets = exterior_facets(mesh)
@@ -141,15 +127,15 @@ def _distribute(comm: MPI.Intracomm, raw: _Raw, dim: int) -> Domain:
     return tagged(mesh, facets, {name: masks >> b & 1 == 1 for b, name in enumerate(raw.names)})
 
 
-def _run_gmsh(fill: Callable[[Any], bool]) -> _Raw:
+def _run_gmsh(fill: Callable[[Any], bool]) -> Cells:
     """Return the mesh of a model that ``fill`` makes, leaving a running Gmsh as it was.
 
     ``fill`` returns whether the model's entities are the groups themselves.
     """
     try:
         import gmsh
-    except ImportError as error:
-        raise InputError(f"the Python module gmsh is needed to read it ({error})") from error
+    except (ImportError, OSError) as error:  # OSError: one of its shared libraries is missing.
+        raise InputError(f"the Python module gmsh is needed ({error})") from error
     started = not gmsh.isInitialized()
     if started:
         gmsh.initialize(readConfigFiles=False, interruptible=False)
@@ -166,7 +152,7 @@ def _run_gmsh(fill: Callable[[Any], bool]) -> _Raw:
             gmsh.finalize()
 
 
-def _extract(model: Any, entities_are_groups: bool) -> _Raw:
+def _extract(model: Any, entities_are_groups: bool) -> Cells:
     """Take points, cells and boundary groups out of a Gmsh model and check them."""
     kinds = [model.mesh.getElementProperties(t)[:4] for t in model.mesh.getElementTypes()]
     dim = max((kind[1] for kind in kinds), default=-1)
@@ -188,7 +174,7 @@ def _extract(model: Any, entities_are_groups: bool) -> _Raw:
 
     bodies = _groups(model, dim, entities_are_groups)
     cells = _elements(model, dim, sorted({e for es in bodies.values() for e in es}) or [-1])
-    cells = cells[_first_of_each(np.sort(cells, axis=1))]
+    cells = cells[first_of_each(np.sort(cells, axis=1))]
     used = np.unique(cells)
     points = xyz[np.searchsorted(tags, used)]
     cells = np.searchsorted(used, cells)
@@ -207,7 +193,9 @@ def _extract(model: Any, entities_are_groups: bool) -> _Raw:
             raise InputError(f"the physical group {name!r} has facets that bound no cell")
         rows.append(places)
         bits.append(np.full(len(places), bit))
-    return _check(list(by_name), _flatten(points, dim), cells, np.vstack(rows), np.hstack(bits))
+    return check_cells(
+        list(by_name), _flatten(points, dim), cells, np.vstack(rows), np.hstack(bits)
+    )
 
 
 def _groups(model: Any, dim: int, entities_are_groups: bool) -> dict[str, list[int]]:
@@ -239,59 +227,3 @@ def _flatten(points: npt.NDArray[np.float64], dim: int) -> npt.NDArray[np.float6
             "physical group) and plane meshes with z = const"
         )
     return np.ascontiguousarray(points[:, :dim])
-
-
-def _first_of_each(rows: Ints) -> Ints:
-    """Index of the first occurrence of each distinct row, ascending."""
-    return np.unique(_number(rows), return_index=True)[1]
-
-
-def _number(rows: Ints) -> Ints:
-    """Number the distinct rows; returns the number of each row, shape (n,)."""
-    order = np.lexsort(rows.T)
-    new = np.any(rows[order][1:] != rows[order][:-1], axis=1)
-    number = np.empty(len(rows), dtype=np.int64)
-    number[order] = np.concatenate([[0], np.cumsum(new)])[: len(rows)]
-    return number
-
-
-def _check(
-    names: list[str], points: npt.NDArray[np.float64], cells: Ints, rows: Ints, bits: Ints
-) -> _Raw:
-    """Check cells and boundary groups; ``rows`` are sorted facets, ``bits`` their groups."""
-    n = cells.shape[1]
-    # Facet i of a cell lies opposite its vertex i.
-    others = np.array([[j for j in range(n) if j != i] for i in range(n)])
-    cell_facets = np.sort(cells[:, others], axis=2)
-    corners = points[cell_facets]
-    apex = points[cells]
-    edges = np.concatenate([corners[:, :, 1:], apex[:, :, None]], axis=2) - corners[:, :, :1]
-    volume = np.linalg.det(edges)
-    longest = np.linalg.norm(edges, axis=-1).max(axis=(1, 2))
-    flat = ~(np.abs(volume).min(axis=1) > FLAT * longest ** points.shape[1])
-    if np.any(flat):
-        middle = ", ".join(f"{v:g}" for v in points[cells[flat][0]].mean(axis=0))
-        raise InputError(f"it has {flat.sum()} cell(s) of zero volume, the first near ({middle})")
-
-    number = _number(np.vstack([cell_facets.reshape(-1, n - 1), rows]))
-    inner, outer = number[: cells.size], number[cells.size :]
-    total = int(number.max()) + 1
-    count = np.bincount(inner, minlength=total)
-    # Two cells that share a facet must lie on either side of it.
-    side = np.bincount(inner, weights=np.sign(volume).ravel(), minlength=total)
-    wrong = (count > 2) | ((count == 2) & (side != 0.0))
-    if np.any(wrong):
-        raise InputError(f"its cells overlap (inverted cells) at {wrong.sum()} facet(s)")
-    for bit, name in enumerate(names):
-        neighbours = count[outer[bits == bit]]
-        if np.any(neighbours == 0):
-            raise InputError(f"the physical group {name!r} has facets that bound no cell")
-        if np.any(neighbours == 2):
-            raise InputError(
-                f"the physical group {name!r} has {np.count_nonzero(neighbours == 2)} interior "
-                "facet(s); a part must lie on the boundary of the body"
-            )
-    masks = np.zeros(total, dtype=np.int32)
-    np.bitwise_or.at(masks, outer, (1 << bits).astype(np.int32))
-    first = np.unique(outer, return_index=True)[1]
-    return _Raw(names, points, cells, rows[first], masks[outer[first]])

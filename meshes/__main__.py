@@ -22,9 +22,9 @@ def main(arguments: list[str] | None = None) -> int:
         options.add_argument("--out", required=True, metavar="FILE.msh")
         options.add_argument("--format", type=float, default=4.1, choices=(2.2, 4.1))
     given = vars(parser.parse_args(arguments))
-    recipe, out, version = given.pop("recipe"), given.pop("out"), given.pop("format")
+    chosen, out, version = given.pop("recipe"), given.pop("out"), given.pop("format")
     try:
-        write(recipe, out, version=version, **given)
+        write(chosen, out, version=version, **given)
     except InputError as error:
         print(f"error: {error}", file=sys.stderr)
         return 2

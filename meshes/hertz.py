@@ -22,9 +22,7 @@ def quarter_disc(
     from meshes.grading import finish, grade
 
     geo = gmsh.model.geo
-    low, side, centre = (
-        geo.addPoint(*p) for p in ((0, 0, 0), (radius, radius, 0), (0, radius, 0))
-    )
+    low, side, centre = (geo.addPoint(*p) for p in ((0, 0, 0), (radius, radius, 0), (0, radius, 0)))
     arc = geo.addCircleArc(low, centre, side)
     top = geo.addLine(side, centre)
     symmetry = geo.addLine(centre, low)
@@ -111,8 +109,7 @@ def disc(
         for a in angles
     ]
     arcs = [
-        geo.addCircleArc(a, centre, b)
-        for a, b in zip(points, points[1:] + points[:1], strict=True)
+        geo.addCircleArc(a, centre, b) for a, b in zip(points, points[1:] + points[:1], strict=True)
     ]
     body = geo.addPlaneSurface([geo.addCurveLoop(arcs)])
     geo.synchronize()
