@@ -120,6 +120,37 @@ class FoundationResponse:
             total[:, -1] -= self.phi_scale * self.charge(x, pressure)
         return total
 
+    def layer_gradient(self, x: Array) -> Array:
+        """Return the derivative of `layer_pressure` by the nodal unknowns, (n, block size)."""
+        total = np.zeros((x.shape[0], self.trace.block_size))
+        if self.layer is None:
+            return total
+        depth, difference = self._penetration(x) + self.layer.thickness, self._difference(x)
+        slope = self.layer.h_nu(difference) * self.layer.p_nu.derivative(depth)
+        total[:, : self.trace.dim] = slope[:, None] * self.trace.normal
+        if self.trace.block_size > self.trace.dim:
+            growth = self.layer.h_nu.derivative(difference) * self.layer.p_nu(depth)
+            total[:, -1] = self.phi_scale * growth
+        return total
+
+    def jacobian(self, x: Array, pressure: Array) -> Array:
+        """Return the full derivative of `force`, shape (n, block size, block size).
+
+        Not symmetric where h_nu depends on the potential or psi on the gap. The contact flag
+        of the perfect conductor is kept; at kinks a one-sided derivative is taken.
+        """
+        d, bs = self.trace.dim, self.trace.block_size
+        total = np.zeros((x.shape[0], bs, bs))
+        total[:, :d, :] = self.trace.normal[:, :, None] * self.layer_gradient(x)[:, None, :]
+        if self.conductor is not None:
+            psi, difference = self.conductor.psi, self._difference(x)
+            slope = self._conductivity(x, pressure) * self.conductor.phi_l.derivative(difference)
+            total[:, -1, -1] -= self.phi_scale**2 * slope
+            if not isinstance(psi, PerfectConductivity):
+                closing = psi.derivative(self._penetration(x)) * self.conductor.phi_l(difference)
+                total[:, -1, :d] -= self.phi_scale * closing[:, None] * self.trace.normal
+        return total
+
     def block(self, x: Array, pressure: Array) -> Array:
         """Return the symmetric linearisation, shape (n, block size, block size).
 

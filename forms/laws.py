@@ -10,7 +10,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Protocol
 
-from forms.ops import Value, absolute, clip, less_equal, minimum, positive_part, where
+from forms.ops import Value, absolute, clip, less, less_equal, minimum, positive_part, where
 
 
 class FrictionCoefficient(Protocol):
@@ -106,6 +106,11 @@ class Truncation:
         return where(less_equal(absolute(s), self.limit), 1.0, 0.0)
 
 
+def _ramp_slope(position: Value, slope: Value) -> Value:
+    """Return the slope where a ramp between positions 0 and 1 rises, 0 elsewhere."""
+    return where(less(0.0, position), where(less(position, 1.0), slope, 0.0), 0.0)
+
+
 @dataclass(frozen=True)
 class RampConductivity:
     """psi(s) = k_e clip(delta s, 0, 1), equation (1.34) as printed, s = u_nu - rho.
@@ -119,6 +124,10 @@ class RampConductivity:
     def __call__(self, s: Value) -> Value:
         """Return the conductivity at s = u_nu - rho."""
         return self.k_e * clip(self.delta * s, 0.0, 1.0)
+
+    def derivative(self, s: Value) -> Value:
+        """Return the generalised derivative, 0 at the kinks."""
+        return _ramp_slope(self.delta * s, self.k_e * self.delta)
 
 
 @dataclass(frozen=True)
@@ -134,6 +143,10 @@ class ShiftedConductivity:
     def __call__(self, s: Value) -> Value:
         """Return the conductivity at s = u_nu - rho."""
         return self.k_e * clip(1 + self.delta * s, 0.0, 1.0)
+
+    def derivative(self, s: Value) -> Value:
+        """Return the generalised derivative, 0 at the kinks."""
+        return _ramp_slope(1 + self.delta * s, self.k_e * self.delta)
 
 
 @dataclass(frozen=True)
