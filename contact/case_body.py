@@ -9,7 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Discriminator, Field, Tag, model_validator
 
+import meshes
 from contact.case_types import (
+    UNKNOWN,
     Accepted,
     Count,
     Formula,
@@ -34,6 +36,9 @@ GENERATORS: Mapping[str, tuple[int, tuple[str, ...]]] = {
     "box": (3, ("left", "right", "front", "back", "bottom", "top")),
 }
 
+#: Keys of `[mesh]` that go with every generator and file.
+COMMON = ("generator", "file", "rotation", "axis", "refine")
+
 Along: TypeAlias = Annotated[
     Number | Annotated[tuple[Number, ...], Field(min_length=2, max_length=2), as_tuple],
     Accepted("a number in the plane, a list of 2 numbers in space"),
@@ -43,13 +48,20 @@ Along: TypeAlias = Annotated[
 class Piece(Section):
     """A side of a generated mesh, or a piece of it."""
 
-    side: Name = Field(description="Side of the generator: `left`, `right`, `bottom`, `top`; "
-                       "of a box also `front`, `back`.")  # fmt: skip
+    side: Name = Field(
+        description="Side of the generator: `left`, `right`, `bottom`, `top`; "
+        "of a box also `front`, `back`."
+    )
     start: Along | None = Field(
-        None, alias="from", description="Where the piece starts, in the coordinates that run "
-        "along the side before rotation (of a box in the order x, y, z). Absent: at its end.")  # fmt: skip
+        default=None,
+        alias="from",
+        description="Where the piece starts, in the coordinates that run "
+        "along the side before rotation (of a box in the order x, y, z). Absent: at its end.",
+    )
     stop: Along | None = Field(
-        None, alias="to", description="Where the piece ends. Both are positions of the grid."
+        default=None,
+        alias="to",
+        description="Where the piece ends. Both are positions of the grid.",
     )
 
 
@@ -63,51 +75,74 @@ Pieces: TypeAlias = Annotated[
     Discriminator(_piece_kind),
     Accepted("a table with side, from, to, or a list of them"),
 ]
-Parameter: TypeAlias = Annotated[
-    Number | Annotated[tuple[Number, ...], as_tuple], Accepted("a number or a list of numbers")
-]
 
 
 class Mesh(Section):
     """`[mesh]`: a generator with its parameters, or a Gmsh file."""
 
     generator: Text | None = Field(
-        None, description="`rectangle`, `box`, or a recipe of the folder meshes. This or `file`.")  # fmt: skip
+        default=None,
+        description="`rectangle`, `box`, or a recipe of the folder meshes. This or `file`.",
+    )
     file: Text | None = Field(
-        None, description="Gmsh file (.msh); its named physical groups are the parts. Relative "
-        "to the case file.")  # fmt: skip
+        default=None,
+        description="Gmsh file (.msh); its named physical groups are the parts. Relative "
+        "to the case file.",
+    )
     origin: Vector | None = Field(
-        None, description="Lower left corner of a rectangle or box. Default: zeros.")  # fmt: skip
-    size: Annotated[tuple[Positive, ...], Field(min_length=2, max_length=3), as_tuple,
-                    Accepted("a list of 2 numbers > 0 for a rectangle, 3 for a box")] | None = Field(
-        None, description="Edge lengths of a rectangle or box; required there.")  # fmt: skip
-    cells: Annotated[tuple[Count, ...], Field(min_length=2, max_length=3), as_tuple,
-                     Accepted("a list of 2 whole numbers >= 1 for a rectangle, 3 for a box"),
-                     ] | None = Field(
-        None, description="Squares or cubes along the edges; required for a rectangle or box.")  # fmt: skip
+        default=None, description="Lower left corner of a rectangle or box. Default: zeros."
+    )
+    size: (
+        Annotated[
+            tuple[Positive, ...],
+            Field(min_length=2, max_length=3),
+            as_tuple,
+            Accepted("a list of 2 numbers > 0 for a rectangle, 3 for a box"),
+        ]
+        | None
+    ) = Field(default=None, description="Edge lengths of a rectangle or box; required there.")
+    cells: (
+        Annotated[
+            tuple[Count, ...],
+            Field(min_length=2, max_length=3),
+            as_tuple,
+            Accepted("a list of 2 whole numbers >= 1 for a rectangle, 3 for a box"),
+        ]
+        | None
+    ) = Field(
+        default=None,
+        description="Squares or cubes along the edges; required for a rectangle or box.",
+    )
     diagonal: Literal["right", "left", "crossed", "left_right", "right_left"] = Field(
-        "right", description="How a rectangle's squares are cut into triangles.")  # fmt: skip
+        default="right", description="How a rectangle's squares are cut into triangles."
+    )
     rotation: Number = Field(
-        0.0, description="Angle (degrees) by which the mesh is turned about the origin of "
-        "coordinates, counter-clockwise; in space about `axis`.")  # fmt: skip
+        default=0.0,
+        description="Angle (degrees) by which the mesh is turned about the origin of "
+        "coordinates, counter-clockwise; in space about `axis`.",
+    )
     axis: Triple | None = Field(
-        None, description="Axis of the rotation of a box. Default: y, `[0, 1, 0]`.")  # fmt: skip
+        default=None, description="Axis of the rotation in space. Default: y, `[0, 1, 0]`."
+    )
     refine: Annotated[int, Field(ge=0, le=10), Accepted("a whole number from 0 to 10")] = Field(
-        0, description="Uniform refinements of the mesh after it is made or read.")  # fmt: skip
+        default=0, description="Uniform refinements of the mesh after it is made or read."
+    )
     parts: dict[Name, Pieces] = Field(
-        {}, description="Further parts of a rectangle or box by name: `[mesh.parts.NAME]`.")  # fmt: skip
-    parameters: dict[Name, Parameter] = Field(
-        {}, description="Parameters of a recipe. They may stand in `[mesh]` itself.")  # fmt: skip
+        default={}, description="Further parts of a rectangle or box by name: `[mesh.parts.NAME]`."
+    )
+    parameters: dict[Name, Number] = Field(
+        default={}, description="Parameters of a recipe. They may stand in `[mesh]` itself."
+    )
 
     @property
     def dimension(self) -> int | None:
         """Space dimension; None if only the mesh itself can tell."""
-        return GENERATORS[self.generator][0] if self.generator in GENERATORS else None
+        return GENERATORS.get(self.generator or "", (None, ()))[0]
 
     @property
     def sides(self) -> tuple[str, ...]:
         """Sides of a rectangle or box; none for other meshes."""
-        return GENERATORS[self.generator][1] if self.generator in GENERATORS else ()
+        return GENERATORS.get(self.generator or "", (None, ()))[1]
 
     @model_validator(mode="before")
     @classmethod
@@ -118,38 +153,53 @@ class Mesh(Section):
         if given["generator"] in GENERATORS:
             dimension, _ = GENERATORS[given["generator"]]
             return {"origin": (0.0,) * dimension, **given}
-        own = {"generator", "file", "rotation", "axis", "refine", "parts", "parameters", "diagonal"}
-        moved = {key: value for key, value in given.items() if key not in own}
-        if not moved or not isinstance(given.get("parameters", {}), Mapping):
+        inner = given.get("parameters", {})
+        if not isinstance(inner, Mapping):
             return given
-        kept = {key: value for key, value in given.items() if key in own}
-        return {**kept, "parameters": {**given.get("parameters", {}), **moved}}
+        kept = {key: given[key] for key in given if key in COMMON}
+        moved = {key: given[key] for key in given if key not in (*COMMON, "parameters")}
+        parameters = {**inner, **moved}
+        cls._check_recipe(given["generator"], parameters)
+        return {**kept, "parameters": parameters}
+
+    @staticmethod
+    def _check_recipe(name: str, parameters: Mapping[str, Any]) -> None:
+        if name not in meshes.RECIPES:
+            raise fault("generator", name, ", ".join((*GENERATORS, *meshes.RECIPES)))
+        accepted = meshes.parameters(name)
+        for key, value in parameters.items():
+            if key not in accepted:
+                raise fault(key, UNKNOWN, ", ".join((*COMMON, *accepted)))
+            if isinstance(value, bool) or not isinstance(value, int | float) or not value > 0:
+                raise fault(key, value, "a number > 0")
 
     @model_validator(mode="after")
     def _check(self) -> Mesh:
         if (self.generator is None) == (self.file is None):
             given = "neither generator nor file" if self.file is None else "generator and file"
             raise fault("generator", Words(given), "one of generator and file")
-        if self.dimension is None:
-            if self.parts:
-                raise fault("parts", Words("parts of a side"), "parts with a rectangle or box "
-                            "only; other meshes name their parts themselves")  # fmt: skip
-        else:
+        if self.axis is not None and not any(self.axis):
+            raise fault("axis", self.axis, "a vector that is not zero")
+        if self.dimension is not None:
             self._check_grid(self.dimension)
+            return self
+        for key in ("origin", "size", "cells", "parts"):
+            if getattr(self, key):
+                raise fault(key, getattr(self, key), f"{key} for a rectangle or box only")
+        if self.generator is None and self.parameters:
+            raise fault("parameters", self.parameters, "parameters of a recipe only")
         return self
 
     def _check_grid(self, dimension: int) -> None:
         if self.parameters:
             key = next(iter(self.parameters))
-            raise fault(f"parameters.{key}", self.parameters[key], "parameters with a recipe only")
+            raise fault(f"parameters.{key}", self.parameters[key], "parameters of a recipe only")
         for key in ("size", "cells", "origin"):
             value = getattr(self, key)
             if value is None:
-                raise fault(key, Words("nothing"), f"a list of {dimension} numbers")
+                raise fault(key, Words("missing"), f"a list of {dimension} numbers")
             if len(value) != dimension:
                 raise fault(key, value, f"a list of {dimension} numbers for a {self.generator}")
-        if self.axis is not None and (dimension == 2 or not any(self.axis)):
-            raise fault("axis", self.axis, "a list of 3 numbers, not all zero, for a box only")
         for name, pieces in self.parts.items():
             if name in self.sides:
                 raise fault(f"parts.{name}", name, "a name that no side has")
@@ -171,7 +221,9 @@ class Space(Section):
     """`[space]`: finite elements."""
 
     degree: Annotated[int, Field(ge=1, le=2), Accepted("1 or 2")] = Field(
-        1, description="Degree of the Lagrange elements of the displacement and the potential.")  # fmt: skip
+        default=1,
+        description="Degree of the Lagrange elements of the displacement and the potential.",
+    )
 
 
 def _matrix(rows: int, columns: int) -> Any:
@@ -188,20 +240,30 @@ class Piezo(Section):
     """
 
     e31: Number | None = Field(
-        None, description="Coupling e31 = e32 of class 6mm (charge/area).")  # fmt: skip
-    e33: Number | None = Field(None, description="Coupling e33 (charge/area).")
-    e15: Number | None = Field(None, description="Coupling e15 = e24 (charge/area).")
-    beta11: Positive | None = Field(None, description="Permittivity across the poling axis.")
-    beta33: Positive | None = Field(None, description="Permittivity along the poling axis.")
+        default=None, description="Coupling e31 = e32 of class 6mm (charge/area)."
+    )
+    e33: Number | None = Field(default=None, description="Coupling e33 (charge/area).")
+    e15: Number | None = Field(default=None, description="Coupling e15 = e24 (charge/area).")
+    beta11: Positive | None = Field(
+        default=None, description="Permittivity across the poling axis."
+    )
+    beta33: Positive | None = Field(default=None, description="Permittivity along the poling axis.")
     e: _matrix(3, 6) | None = Field(  # type: ignore[valid-type]
-        None, description="Coupling matrix, columns 11, 22, 33, 23, 13, 12. With `beta`, instead "
-        "of the five constants.")  # fmt: skip
+        None,
+        description="Coupling matrix, columns 11, 22, 33, 23, 13, 12. With `beta`, instead "
+        "of the five constants.",
+    )
     beta: _matrix(3, 3) | None = Field(  # type: ignore[valid-type]
-        None, description="Permittivity matrix, symmetric and positive definite.")  # fmt: skip
-    poling: Annotated[Number | Triple, Accepted("an angle in the plane, a list of 3 numbers in "
-                                                "space")] | None = Field(
-        None, description="Poling axis: angle (degrees) from x in the plane, a vector in space. "
-        "Default: y in the plane, z in space.")  # fmt: skip
+        None, description="Permittivity matrix, symmetric and positive definite."
+    )
+    poling: (
+        Annotated[Number | Triple, Accepted("an angle in the plane, a list of 3 numbers in space")]
+        | None
+    ) = Field(
+        default=None,
+        description="Poling axis: angle (degrees) from x in the plane, a vector in space. "
+        "Default: y in the plane, z in space.",
+    )
 
     @property
     def voigt(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -221,9 +283,11 @@ class Piezo(Section):
         if set(given) not in ({*short}, {*full}):
             accepted = f"either all of {', '.join(short)}, or e and beta"
             missing = [k for k in (full if set(given) & {*full} else short) if k not in given]
-            raise fault(missing[0] if missing else given[0],
-                        Words(f"only {', '.join(given) or 'nothing'}" if missing else "both ways"),
-                        accepted)  # fmt: skip
+            raise fault(
+                missing[0] if missing else given[0],
+                Words(f"only {', '.join(given) or 'nothing'}" if missing else "both ways"),
+                accepted,
+            )
         beta = self.voigt[1]
         if not np.allclose(beta, beta.T, rtol=1e-10, atol=0):
             raise fault("beta", self.beta, "a symmetric matrix")
@@ -238,59 +302,72 @@ class Material(Section):
     """`[material]`: isotropic Hencky material, sigma = k0 tr(eps) I + 2 g dev(eps)."""
 
     law: Literal["linear", "log"] = Field(
-        "linear", description="`linear`: g = mu1; `log`: (7.8), g = mu1 (s/t)(ln(t/s) + 1) "
-        "beyond the yield strain s.")  # fmt: skip
+        default="linear",
+        description="`linear`: g = mu1; `log`: (7.8), g = mu1 (s/t)(ln(t/s) + 1) "
+        "beyond the yield strain s.",
+    )
     young: Positive = Field(description="Young's modulus E (force/area).")
-    poisson: Annotated[float, Field(gt=-1, lt=0.5),
-                       Accepted("a number between -1 and 0.5, both excluded")] = Field(
-        description="Poisson's ratio.")  # fmt: skip
+    poisson: Annotated[
+        float, Field(gt=-1, lt=0.5), Accepted("a number between -1 and 0.5, both excluded")
+    ] = Field(description="Poisson's ratio.")
     yield_strain: Positive | None = Field(
-        None, description="Yield strain xi_0, a limit on |dev eps|. Required by `log`, of no "
-        "effect on `linear`.")  # fmt: skip
+        default=None,
+        description="Yield strain xi_0, a limit on |dev eps|. Required by `log`, of no "
+        "effect on `linear`.",
+    )
     argument: Literal["norm", "square"] = Field(
-        "norm", description="Argument of g: |dev eps|, or its square as printed in (7.8), which "
-        "softens beyond e xi_0.")  # fmt: skip
+        default="norm",
+        description="Argument of g: |dev eps|, or its square as printed in (7.8), which "
+        "softens beyond e xi_0.",
+    )
     g_min: NonNegative = Field(
-        0.0, description="Floor of g in `log` (force/area); 0: none.")  # fmt: skip
+        default=0.0, description="Floor of g in `log` (force/area); 0: none."
+    )
     piezo: Piezo | None = Field(
-        None, description="Piezoelectric constants, `[material.piezo]`. Absent: mechanical only.")  # fmt: skip
+        default=None,
+        description="Piezoelectric constants, `[material.piezo]`. Absent: mechanical only.",
+    )
 
     @model_validator(mode="after")
     def _check(self) -> Material:
         if self.law == "log" and self.yield_strain is None:
-            raise fault("yield_strain", Words("nothing"), "a number > 0 with law = \"log\"")
+            raise fault("yield_strain", Words("missing"), 'a number > 0 with law = "log"')
         mu1 = self.young / (2 + 2 * self.poisson)
         if self.g_min > mu1:
             raise fault("g_min", self.g_min, f"at most the shear modulus {mu1:g}")
         return self
 
 
-Component: TypeAlias = Annotated[Formula | Literal["free"], Accepted("number")]
-
-
-def _component(given: Any) -> Any:
+def _component(given: Any) -> str:
     return "free" if given == "free" else "Formula"
+
+
+Component: TypeAlias = Annotated[
+    Annotated[Formula, Tag("Formula")] | Annotated[Literal["free"], Tag("free")],
+    Discriminator(_component),
+]
 
 
 class Fixed(Section):
     """`[[fixed]]`: prescribed displacement or potential on a part."""
 
     on: Name = Field(description="Part of the boundary.")
-    displacement: Annotated[
-        tuple[
-            Annotated[
-                Annotated[Formula, Tag("Formula")] | Annotated[Literal["free"], Tag("free")],
-                Discriminator(_component),
-            ],
-            ...,
-        ],
-        Field(min_length=2, max_length=3),
-        as_tuple,
-        Accepted('a list of 2 components in the plane, 3 in space, each a number, a formula '
-                 'or "free"'),
-    ] | None = Field(
-        None, description='Displacement of the part; "free" for a component that is not fixed.')  # fmt: skip
-    potential: Formula | None = Field(None, description="Electric potential of the part.")
+    displacement: (
+        Annotated[
+            tuple[Component, ...],
+            Field(min_length=2, max_length=3),
+            as_tuple,
+            Accepted(
+                "a list of 2 components in the plane, 3 in space, each a number, a formula "
+                'or "free"'
+            ),
+        ]
+        | None
+    ) = Field(
+        default=None,
+        description='Displacement of the part; "free" for a component that is not fixed.',
+    )
+    potential: Formula | None = Field(default=None, description="Electric potential of the part.")
 
     @property
     def is_clamped(self) -> bool:
@@ -302,22 +379,27 @@ class Fixed(Section):
         if self.potential is None and (
             self.displacement is None or all(c == "free" for c in self.displacement)
         ):
-            raise fault("displacement", self.displacement or Words("nothing"),
-                        "a component that is fixed, or a potential")  # fmt: skip
+            raise fault(
+                "displacement",
+                self.displacement or Words("missing"),
+                "a component that is fixed, or a potential",
+            )
         return self
 
 
 class Load(Section):
     """`[[load]]`: forces and charges on a part, or in the whole body."""
 
-    on: Name | None = Field(None, description="Part of the boundary. This or `everywhere`.")
-    everywhere: Switch = Field(False, description="`true`: in the whole body.")
-    traction: FormulaVector | None = Field(None, description="Force per area of the part.")
+    on: Name | None = Field(default=None, description="Part of the boundary. This or `everywhere`.")
+    everywhere: Switch = Field(default=False, description="`true`: in the whole body.")
+    traction: FormulaVector | None = Field(default=None, description="Force per area of the part.")
     pressure: Formula | None = Field(
-        None, description="Normal pressure p on the part: traction -p along the outward normal.")  # fmt: skip
-    charge: Formula | None = Field(None, description="Charge per area of the part.")
-    body_force: FormulaVector | None = Field(None, description="Force per volume.")
-    body_charge: Formula | None = Field(None, description="Charge per volume.")
+        default=None,
+        description="Normal pressure p on the part: traction -p along the outward normal.",
+    )
+    charge: Formula | None = Field(default=None, description="Charge per area of the part.")
+    body_force: FormulaVector | None = Field(default=None, description="Force per volume.")
+    body_charge: Formula | None = Field(default=None, description="Charge per volume.")
 
     @model_validator(mode="after")
     def _check(self) -> Load:
@@ -329,7 +411,9 @@ class Load(Section):
         place = "everywhere = true" if self.everywhere else "on"
         for key in wrong:
             if getattr(self, key) is not None:
-                raise fault(key, Words(f"together with {place}"), f"with {place}: {', '.join(right)}")
+                raise fault(
+                    key, Words(f"together with {place}"), f"with {place}: {', '.join(right)}"
+                )
         if all(getattr(self, key) is None for key in right):
-            raise fault(right[0], Words("nothing"), f"at least one of {', '.join(right)}")
+            raise fault(right[0], Words("missing"), f"at least one of {', '.join(right)}")
         return self

@@ -102,6 +102,14 @@ FormulaVector: TypeAlias = Annotated[
 as_tuple = BeforeValidator(_as_tuple)
 
 
+class Words(str):
+    """Words for a message, as against a text given in the case file."""
+
+
+#: Stands for what was given where a key itself is wrong.
+UNKNOWN = Words("unknown key")
+
+
 def fault(key: str, given: Any, accepted: str) -> PydanticCustomError:
     """Return an error for a validator to raise.
 
@@ -110,15 +118,11 @@ def fault(key: str, given: Any, accepted: str) -> PydanticCustomError:
     key
         Dotted path below the model that raises it.
     given
-        What was given: a value of the case file, or words inside `Words`.
+        What was given: a value of the case file, words inside `Words`, or `UNKNOWN`.
     accepted
         What is accepted, in words.
     """
     return PydanticCustomError("fault", "fault", {"key": key, "given": given, "accepted": accepted})
-
-
-class Words(str):
-    """Words for a message, as against a text given in the case file."""
 
 
 def sections_of(annotation: Any) -> Mapping[str, type[Section]]:
@@ -144,9 +148,7 @@ def accepted_by(annotation: Any, metadata: tuple[Any, ...] | list[Any] = ()) -> 
         return either([f'"{value}"' for value in arguments])
     if origin in (Union, types.UnionType):
         return either([accepted_by(a) for a in arguments if a is not type(None)])
-    if sections_of(annotation):
-        return "a table"
-    return str(annotation)
+    return "a table"
 
 
 def either(options: list[str]) -> str:

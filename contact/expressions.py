@@ -7,6 +7,7 @@ and turned into a small tree that is evaluated on arrays of points or as a UFL e
 from __future__ import annotations
 
 import ast
+import itertools
 import json
 import math
 from collections.abc import Callable, Mapping, Sequence
@@ -159,7 +160,7 @@ class Expression:
         values = np.array(np.broadcast_to(result, points.shape[:1]), dtype=np.float64)
         bad = points[~np.isfinite(values)][:1].tolist()
         # The lowest rank that has a bad point speaks for all.
-        found = bad if comm is None else sum(comm.allgather(bad), [])
+        found = bad if comm is None else list(itertools.chain(*comm.allgather(bad)))
         if found:
             place = ", ".join(f"{c:g}" for c in found[0])
             raise InputError(f"{self} is not finite at ({place}); accepted: a formula that is")
@@ -183,25 +184,30 @@ class Expression:
             raise InputError(f"{self} uses z in a plane problem; accepted there: x and y")
 
     def __repr__(self) -> str:
+        """Return the call that makes this expression."""
         return f"Expression({self.source!r})"
 
     def __str__(self) -> str:
+        """Return the source as in the case file."""
         return shown(self.source)
 
     def __eq__(self, other: object) -> bool:
+        """Compare the sources."""
         return isinstance(other, Expression) and self.source == other.source
 
     def __hash__(self) -> int:
+        """Hash the source."""
         return hash(self.source)
 
     def __reduce__(self) -> tuple[type[Expression], tuple[float | str]]:
-        # The source is enough, and passes between ranks where the tree's lambdas would not.
+        """Pickle the source alone."""
+        # The tree's functions would not pass between ranks.
         return Expression, (self.source,)
 
 
 def shown(given: Any) -> str:
     """Show what the user gave as in the case file, on one line and not too long."""
-    text = json.dumps(given, ensure_ascii=False, default=str)
+    text = str(given) if isinstance(given, float) else json.dumps(given, default=str)
     return text if len(text) <= 60 else text[:57] + "..."
 
 
@@ -287,7 +293,7 @@ def _comparison(signs: Sequence[ast.cmpop], sides: Sequence[_Tree]) -> _Tree:
         raise InputError("only the comparisons < <= > >= == != are accepted")
     links = [
         _call(_COMPARISONS[type(sign)], pair, condition=True)
-        for sign, pair in zip(signs, zip(sides, sides[1:], strict=False), strict=True)
+        for sign, pair in zip(signs, itertools.pairwise(sides), strict=True)
     ]
     if _Number(0.0) in links:
         return _Number(0.0)

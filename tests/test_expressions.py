@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 from contact.errors import InputError
 from contact.expressions import Expression
 
+
 def coordinates(cell):
     element = basix.ufl.element("Lagrange", cell, 1, shape=(3 if cell == "tetrahedron" else 2,))
     return ufl.SpatialCoordinate(ufl.Mesh(element))

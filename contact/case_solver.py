@@ -1,0 +1,114 @@
+"""Sections of the case file about the computation: solver and output."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from pydantic import Field, model_validator
+
+from contact.case_types import Accepted, Count, Positive, Section, Switch, Tolerance, fault
+
+Method = Literal["uzawa", "penalty", "newton"]
+
+#: The method where the case file names none.
+DEFAULT_METHOD: Method = "uzawa"
+
+
+class Solver(Section):
+    """`[solver]`: method, tolerances and limits."""
+
+    method: Method = Field(
+        default=DEFAULT_METHOD,
+        description="`uzawa`: Algorithms 1, 2 and their kin; `penalty`: Algorithm 3; `newton`: "
+        "semismooth Newton.",
+    )
+    tolerance: Tolerance = Field(
+        default=1e-8, description="Tolerance on each KKT residual (relative)."
+    )
+    stopping: Literal["residual", "thesis"] = Field(
+        default="residual",
+        description="`residual`: the KKT residuals end the loops; `thesis`: the rules (3.45) and "
+        "(3.46) on the change between iterations do. The residuals decide `converged` in any case.",
+    )
+    eps: Tolerance = Field(
+        default=1e-5, description="Tolerance of (3.45), inner loop, `thesis` only."
+    )
+    eps_fp: Tolerance = Field(
+        default=1e-5, description="Tolerance of (3.46), outer loop, `thesis` only."
+    )
+    inner_tolerance: Tolerance | None = Field(
+        default=None, description="Tolerance of the inner loop. Default: a tenth of `tolerance`."
+    )
+    max_outer: Count = Field(default=200, description="Most outer iterations.")
+    max_inner: Count = Field(default=5000, description="Most inner iterations in an outer one.")
+    r: Annotated[Literal["auto"] | Positive, Accepted('"auto" or a number > 0')] = Field(
+        default="auto", description="Augmentation parameter of the block relaxation (force/volume)."
+    )
+    acceleration: Literal["anderson", "none"] = Field(
+        default="anderson", description="Acceleration of the block relaxation."
+    )
+    depth: Annotated[int, Field(ge=1, le=100), Accepted("a whole number from 1 to 100")] = Field(
+        default=8, description="Depth of Anderson's acceleration."
+    )
+    relaxation: Annotated[
+        float, Field(gt=0, lt=2), Accepted("a number between 0 and 2, both excluded")
+    ] = Field(
+        default=1.0, description="Relaxation of the multiplier's step; above 1: over-relaxation."
+    )
+    single_loop: Switch = Field(
+        default=False,
+        description="`true`: the friction bound is updated in the block relaxation itself.",
+    )
+    material_step: Literal["secant", "tangent", "auto"] = Field(
+        default="auto",
+        description="Linearisation of the material: `secant` (Kacanov), `tangent`, or secant "
+        "first and tangent near the solution.",
+    )
+    eps_contact: Positive = Field(
+        default=1e-4, description="Penalty method: 1/eps_contact is the stiffness of the contact."
+    )
+    eps_slip: Positive | None = Field(
+        default=None, description="Penalty method: slip length. Default: `eps_contact`."
+    )
+    nested: Switch = Field(
+        default=False, description="`true`: solve on coarser meshes first and start from there."
+    )
+    nested_levels: Annotated[int, Field(ge=2, le=20), Accepted("a whole number from 2 to 20")] | (
+        None
+    ) = Field(
+        default=None, description="Number of nested meshes. Default: as many as there can be."
+    )
+    linear: Literal["auto", "lu", "iterative"] = Field(
+        default="auto", description="Linear solver: `auto` chooses by size."
+    )
+
+    @property
+    def inner(self) -> float:
+        """Tolerance of the inner loop."""
+        return self.tolerance / 10 if self.inner_tolerance is None else self.inner_tolerance
+
+    @property
+    def slip_length(self) -> float:
+        """Slip length of the penalty method."""
+        return self.eps_contact if self.eps_slip is None else self.eps_slip
+
+    @model_validator(mode="after")
+    def _check(self) -> Solver:
+        if self.inner_tolerance is not None and self.inner_tolerance > self.tolerance:
+            raise fault(
+                "inner_tolerance", self.inner_tolerance, f"at most tolerance = {self.tolerance:g}"
+            )
+        if self.nested_levels is not None and not self.nested:
+            raise fault("nested_levels", self.nested_levels, "nested_levels with nested = true")
+        return self
+
+
+class Output(Section):
+    """`[output]`: what is written besides the summary and the tables."""
+
+    fields: Literal["vtx", "xdmf", "none"] = Field(
+        default="vtx", description="Format of the fields: `vtx` (fields.bp), `xdmf` or none."
+    )
+    checkpoint: Switch = Field(
+        default=False, description="`true`: write a checkpoint from which a computation can go on."
+    )
