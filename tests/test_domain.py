@@ -1,0 +1,270 @@
+"""Domains: named parts of generated meshes, of dolfinx meshes, and of refined ones."""
+
+import numpy as np
+import pytest
+import ufl
+from dolfinx import fem
+from dolfinx import mesh as dmesh
+from mpi4py import MPI
+
+from contact.case_body import Mesh as MeshSection
+from contact.domain import Piece, box, from_mesh, make_domain, rectangle, refined
+from contact.errors import InputError
+
+COMM = MPI.COMM_WORLD
+
+
+def integral(domain, measure, integrand=1.0):
+    form = fem.form(ufl.as_ufl(integrand) * fem.Constant(domain.mesh, 1.0) * measure)
+    return COMM.allreduce(fem.assemble_scalar(form))
+
+
+def measures(domain):
+    return {name: integral(domain, domain.ds(name)) for name in domain.parts}
+
+
+def mean_normal(domain, name):
+    nu = ufl.FacetNormal(domain.mesh)
+    length = integral(domain, domain.ds(name))
+    return [integral(domain, domain.ds(name), nu[i]) / length for i in range(domain.dim)]
+
+
+def all_midpoints(domain, name):
+    x = dmesh.compute_midpoints(domain.mesh, domain.dim - 1, domain.facets(name))
+    return np.vstack(COMM.allgather(x.reshape(-1, 3)))
+
+
+BAR = {"left": 1.0, "right": 1.0, "bottom": 4.0, "top": 4.0}
+BRICK = {"left": 2.0, "right": 2.0, "front": 8.0, "back": 8.0, "bottom": 4.0, "top": 4.0}
+
+
+@pytest.mark.parallel
+@pytest.mark.parametrize("rotation", [0.0, 30.0])
+@pytest.mark.parametrize("diagonal", ["right", "left", "crossed", "left_right", "right_left"])
+def test_rectangle_has_its_sides_and_pieces(diagonal, rotation):
+    parts = {
+        "loaded": Piece("top", 2.0, 4.0),
+        "ends": [Piece("bottom", None, 0.5), Piece("bottom", 3.5, None)],
+        "clamped": Piece("left"),
+    }
+    domain = rectangle(COMM, (0, 0), (4, 1), (8, 4), parts, diagonal, rotation)
+    expected = {**BAR, "loaded": 2.0, "ends": 1.0, "clamped": 1.0}
+    assert measures(domain) == pytest.approx(expected, abs=1e-13)
+    assert integral(domain, domain.dx) == pytest.approx(4.0)
+    assert (domain.dim, domain.size) == (2, 4.0)
+
+
+@pytest.mark.parallel
+def test_box_has_its_sides_and_pieces():
+    parts = {"loaded": Piece("top", (2.0, 0.0), (4.0, 0.5)), "low": Piece("right", None, (1, 0))}
+    domain = box(COMM, (0, 0, -1), (4, 1, 2), (4, 2, 4), parts)
+    expected = {**BRICK, "loaded": 1.0, "low": 1.0}
+    assert measures(domain) == pytest.approx(expected, abs=1e-13)
+    planes = {
+        "left": (0, 0.0),
+        "right": (0, 4.0),
+        "front": (1, 0.0),
+        "back": (1, 1.0),
+        "bottom": (2, -1.0),
+        "top": (2, 1.0),
+    }
+    for name, (axis, level) in planes.items():
+        assert np.allclose(all_midpoints(domain, name)[:, axis], level)
+    x = all_midpoints(domain, "loaded")
+    assert x[:, 0].min() > 2.0
+    assert x[:, 1].max() < 0.5
+
+
+@pytest.mark.parallel
+def test_pieces_of_the_vertical_faces_of_a_box_run_along_the_other_axes():
+    parts = {"a": Piece("right", (0, 0), (1, 0.5)), "b": Piece("back", (1, 0.5), (4, 1.5))}
+    domain = box(COMM, (0, 0, 0), (4, 1, 2), (4, 2, 4), parts)
+    assert all_midpoints(domain, "a")[:, 2].max() < 0.5
+    x = all_midpoints(domain, "b")
+    assert x[:, 0].min() > 1.0
+    assert (x[:, 2].min() > 0.5) and (x[:, 2].max() < 1.5)
+    assert {n: m for n, m in measures(domain).items() if n in parts} == pytest.approx(
+        {"a": 0.5, "b": 3.0}
+    )
+
+
+@pytest.mark.parallel
+def test_overlapping_parts_share_their_facets():
+    domain = rectangle(COMM, (0, 0), (4, 1), (8, 4), {"loaded": Piece("top", 2.0, 4.0)})
+    loaded, top = domain.facets("loaded"), domain.facets("top")
+    assert np.all(np.isin(loaded, top))
+    assert COMM.allreduce(loaded.size) == 4
+    assert COMM.allreduce(top.size) == 8
+    assert len(set(COMM.allgather(tuple(domain.parts["top"])))) == 1
+    exterior = domain.facet_tags.indices.size
+    assert COMM.allreduce(exterior) == 2 * (8 + 4)
+
+
+@pytest.mark.parallel
+def test_rotation_turns_the_normals_and_keeps_the_size():
+    plane = rectangle(COMM, (1, 2), (4, 1), (4, 1), rotation=30.0)
+    assert mean_normal(plane, "top") == pytest.approx([-0.5, np.sqrt(0.75)])
+    assert plane.size == 4.0
+    space = box(COMM, (0, 0, 0), (4, 1, 2), (2, 1, 1), rotation=30.0)
+    assert mean_normal(space, "top") == pytest.approx([0.5, 0.0, np.sqrt(0.75)])
+    about_x = box(COMM, (0, 0, 0), (4, 1, 2), (2, 1, 1), rotation=90.0, axis=(2, 0, 0))
+    assert mean_normal(about_x, "top") == pytest.approx([0.0, -1.0, 0.0])
+
+
+def test_unknown_part_names_the_nearest_and_all():
+    domain = rectangle(COMM, (0, 0), (4, 1), (4, 1))
+    with pytest.raises(InputError, match=r"no part 'botom'; did you mean 'bottom'.*left, right"):
+        domain.ds("botom")
+    with pytest.raises(InputError, match="no part 'x'"):
+        domain.facets("x")
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"size": (4, 0)}, "size must be positive"),
+        ({"size": (4, 1, 1)}, "size must be 2 numbers"),
+        ({"origin": 0.0}, "origin must be 2 numbers"),
+        ({"cells": (4, 0)}, "cells must be positive whole"),
+        ({"cells": (4, 1.5)}, "cells must be positive whole"),
+        ({"diagonal": "up"}, "diagonal 'up' is unknown"),
+        ({"parts": {"top": Piece("top")}}, "'top' is a side already"),
+        ({"parts": {"a": Piece("front")}}, "unknown side 'front'"),
+        ({"parts": {"a": Piece("top", 0.3, 4.0)}}, r"from = 0.3 .*nearest: 0, 0.5\)"),
+        ({"parts": {"a": Piece("top", 0.5, 5.0)}}, r"to = 5 .*nearest: 4\)"),
+        ({"parts": {"a": Piece("top", 2.0, 2.0)}}, "to must lie beyond from"),
+        ({"parts": {"a": Piece("top", (2.0, 1.0))}}, "from must be 1 number"),
+        ({"parts": {"a": []}}, "'a' contains no facet"),
+        ({"parts": {f"p{i}": Piece("top") for i in range(28)}}, "32 boundary parts; at most 31"),
+    ],
+)
+@pytest.mark.parallel
+def test_wrong_rectangles_are_refused(change, message):
+    good = {"origin": (0, 0), "size": (4, 1), "cells": (8, 4)}
+    with pytest.raises(InputError, match=message):
+        rectangle(COMM, **{**good, **change})
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"axis": (0, 0, 0)}, "axis must be 3 numbers"),
+        ({"axis": (0, 1)}, "axis must be 3 numbers"),
+        ({"parts": {"a": Piece("top", 0.5)}}, "from must be 2 number"),
+        ({"parts": {"a": Piece("top", (0, 0), (1.1, 1))}}, r"to = 1.1 .*nearest: 1, 2\)"),
+    ],
+)
+def test_wrong_boxes_are_refused(change, message):
+    good = {"origin": (0, 0, 0), "size": (4, 1, 2), "cells": (4, 1, 2)}
+    with pytest.raises(InputError, match=message):
+        box(COMM, **{**good, **change})
+
+
+def test_grid_positions_pass_with_rounding():
+    domain = rectangle(COMM, (0.1, 0), (0.6, 1), (6, 1), {"a": Piece("top", 0.1 + 0.2, 0.7)})
+    assert measures(domain)["a"] == pytest.approx(0.4)
+
+
+@pytest.mark.parallel
+@pytest.mark.parametrize("ghosts", [dmesh.GhostMode.none, dmesh.GhostMode.shared_facet])
+def test_parts_of_a_dolfinx_mesh(ghosts):
+    mesh = dmesh.create_unit_cube(COMM, 3, 3, 3, ghost_mode=ghosts)
+    low = dmesh.locate_entities_boundary(mesh, 2, lambda x: np.isclose(x[2], 0.0))
+    domain = from_mesh(mesh, {"low": low, "half": lambda x: x[0] < 0.34})
+    assert measures(domain) == pytest.approx({"low": 1.0, "half": 1.0 + 4.0 / 3.0})
+    assert domain.size == 1.0
+
+
+@pytest.mark.parallel
+def test_wrong_parts_of_a_dolfinx_mesh_are_refused():
+    mesh = dmesh.create_unit_square(COMM, 4, 4)
+    with pytest.raises(InputError, match="'none' contains no facet"):
+        from_mesh(mesh, {"none": lambda x: x[0] > 2.0})
+    mesh.topology.create_entities(1)
+    inside = np.arange(mesh.topology.index_map(1).size_local, dtype=np.int32)
+    with pytest.raises(InputError, match="'all' contains interior facets"):
+        from_mesh(mesh, {"all": inside})
+    squares = dmesh.create_unit_square(COMM, 4, 4, cell_type=dmesh.CellType.quadrilateral)
+    with pytest.raises(InputError, match="triangles in the plane or of tetrahedra"):
+        from_mesh(squares, {})
+
+
+def refinable():
+    ghosted = dmesh.create_unit_cube(COMM, 2, 2, 2, ghost_mode=dmesh.GhostMode.shared_facet)
+    return {
+        "rectangle": lambda: rectangle(
+            COMM, (0, 0), (4, 1), (8, 2), {"a": Piece("top", 2.0, 4.0)}, rotation=20.0
+        ),
+        "box": lambda: box(COMM, (0, 0, 0), (4, 1, 2), (4, 1, 2), {"a": Piece("left")}),
+        "ghosted": lambda: from_mesh(ghosted, {"a": lambda x: x[2] < 0.6}),
+        "two cells": lambda: rectangle(COMM, (0, 0), (1, 1), (1, 1)),
+    }
+
+
+@pytest.mark.parallel
+@pytest.mark.parametrize("kind", ["rectangle", "box", "ghosted", "two cells"])
+def test_refinement_keeps_the_parts(kind):
+    coarse = refinable()[kind]()
+    fine = refined(refined(coarse))
+    assert measures(fine) == pytest.approx(measures(coarse))
+    assert integral(fine, fine.dx) == pytest.approx(integral(coarse, coarse.dx))
+    assert fine.size == coarse.size
+    assert list(fine.parts) == list(coarse.parts)
+    dim = coarse.dim
+    count = [d.mesh.topology.index_map(dim).size_global for d in (coarse, fine)]
+    assert count[1] == count[0] * 2 ** (2 * dim)
+    for name in coarse.parts:
+        facets = [COMM.allreduce(d.facets(name).size) for d in (coarse, fine)]
+        assert facets[1] == facets[0] * 2 ** (2 * (dim - 1))
+
+
+@pytest.mark.parallel
+def test_ranks_without_cells():
+    domain = rectangle(COMM, (0, 0), (1, 1), (1, 1))
+    assert domain.mesh.topology.index_map(2).size_global == 2
+    assert measures(domain) == pytest.approx(dict.fromkeys(BAR, 1.0))
+    assert domain.size == 1.0
+
+
+SECTIONS = {
+    "rectangle": (
+        {
+            "generator": "rectangle",
+            "size": [4.0, 1.0],
+            "cells": [8, 2],
+            "rotation": 30.0,
+            "refine": 1,
+            "parts": {"loaded": {"side": "top", "from": 2.0, "to": 4.0}},
+        },
+        {**BAR, "loaded": 2.0},
+    ),
+    "box": (
+        {
+            "generator": "box",
+            "origin": [0.0, 0.0, 1.0],
+            "size": [4.0, 1.0, 2.0],
+            "cells": [4, 1, 2],
+            "rotation": 10.0,
+            "axis": [1.0, 0.0, 0.0],
+            "parts": {"a": [{"side": "left"}, {"side": "right"}]},
+        },
+        {**BRICK, "a": 4.0},
+    ),
+    "recipe": (
+        {"generator": "bar", "length": 6.0, "contact_size": 0.2, "size": 0.5},
+        {**BAR, "bottom": 6.0, "top": 6.0, "loaded": 4.0},
+    ),
+    "file": (
+        {"file": "meshes/fixtures/square.msh", "rotation": 45.0},
+        {"bottom": 1.0, "top": 1.0},
+    ),
+}
+
+
+@pytest.mark.parallel
+@pytest.mark.parametrize("kind", SECTIONS)
+def test_domain_of_a_case_file_section(kind, monkeypatch, request):
+    monkeypatch.chdir(request.config.rootpath)
+    given, expected = SECTIONS[kind]
+    domain = make_domain(MeshSection.model_validate(given), COMM)
+    assert measures(domain) == pytest.approx(expected)
