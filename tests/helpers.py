@@ -1,0 +1,221 @@
+"""Small contact problems that several tests solve, and fields and rotations to state them."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import ufl
+from mpi4py import MPI
+
+from contact.domain import Domain, Piece, box, rectangle
+from contact.fixed_point import FixedPoint, FixedPointOptions
+from contact.foundation import GapFunction, Plane
+from contact.problem import Body, Contact, ContactProblem, Fixed, Friction, Load
+from contact.projections import Array
+from contact.report import Outcome
+from contact.state import nodal_iterate
+from forms.hencky import Hencky, Linear, Log
+from forms.laws import FrictionCoefficient, SlipCoefficient
+
+
+@dataclass(frozen=True)
+class Affine:
+    """The scalar field slope . x + value."""
+
+    slope: Sequence[float]
+    value: float = 0.0
+
+    def numpy(self, points: Array) -> Array:
+        return points @ np.asarray(self.slope) + self.value
+
+    def ufl(self, x: ufl.core.expr.Expr) -> ufl.core.expr.Expr:
+        return sum(float(a) * x[i] for i, a in enumerate(self.slope)) + self.value
+
+
+def constant(value: float, dim: int) -> Affine:
+    return Affine((0.0,) * dim, value)
+
+
+def affine_vector(gradient: Array, offset: Array) -> list[Affine]:
+    """Return the components of the field gradient @ x + offset."""
+    return [Affine(tuple(row), float(b)) for row, b in zip(gradient, offset, strict=True)]
+
+
+def turn(dim: int, degrees: float, axis: Sequence[float] = (0.0, 1.0, 0.0)) -> Array:
+    """Return the rotation matrix that `rectangle` and `box` apply to their meshes."""
+    angle = np.deg2rad(degrees)
+    if dim == 2:
+        return np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
+    a, b, c = np.asarray(axis) / np.linalg.norm(axis)
+    cross = np.array([[0.0, -c, b], [c, 0.0, -a], [-b, a, 0.0]])
+    return np.eye(3) + np.sin(angle) * cross + (1 - np.cos(angle)) * cross @ cross
+
+
+def flat(value: float = 0.0) -> GapFunction:
+    """Return a constant gap along the body's normal."""
+    return GapFunction(lambda points: np.full(len(points), value))
+
+
+def bar(
+    comm: MPI.Comm,
+    n: int = 16,
+    f2: float = -0.005,
+    rho: float = 1e5,
+    degree: int = 1,
+    *,
+    law: Hencky | None = None,
+    friction: Friction | None = None,
+) -> ContactProblem:
+    """Return Example 7.2 with n cells per unit length."""
+    domain = rectangle(
+        comm, [0.0, 0.0], [4.0, 1.0], [4 * n, n], parts={"loaded": Piece("top", 2.0, 4.0)}
+    )
+    zero = constant(0.0, 2)
+    body = Body(
+        law or Log(1.0, 0.3, yield_strain=0.05),
+        [Fixed("left", [zero, zero])],
+        [Load("loaded", [zero, constant(f2, 2)])],
+    )
+    friction = friction or Friction(SlipCoefficient(0.5, 0.2, rho))
+    return ContactProblem(domain, body, Contact("bottom", flat()), friction, degree=degree)
+
+
+def leaning_block(
+    comm: MPI.Comm, n: int = 3, degree: int = 1, mu: float = 0.3
+) -> ContactProblem:
+    """Return a block of 2 x 1 x 1, held at the left, pressed and pushed aside on top."""
+    domain = box(comm, [0.0, 0.0, 0.0], [2.0, 1.0, 1.0], [2 * n, n, n])
+    zero = constant(0.0, 3)
+    body = Body(
+        Log(1.0, 0.3, yield_strain=0.01),
+        [Fixed("left", [zero] * 3)],
+        [Load("top", [constant(0.004, 3), constant(0.002, 3), constant(-0.01, 3)])],
+    )
+    plane = Plane((0.0, 0.0, 0.0), (0.0, 0.0, 1.0))
+    friction = Friction(SlipCoefficient(mu, 0.2, 10.0))
+    return ContactProblem(domain, body, Contact("bottom", plane), friction, degree=degree)
+
+
+@dataclass(frozen=True)
+class SlidingBlock:
+    """Closed form 1 of the specification: u = (s + gamma y, -a y) on a block of height 1."""
+
+    law: Hencky
+    mu: FrictionCoefficient
+    squeeze: float
+    push: float
+    slip: float
+
+    @property
+    def shear(self) -> float:
+        return self.push - self.slip
+
+    @property
+    def modulus(self) -> float:
+        return float(self.law.secant_modulus(2 * self.squeeze**2 / 3 + self.shear**2 / 2))
+
+    @property
+    def pressure(self) -> float:
+        return (self.law.bulk + 4 * self.modulus / 3) * self.squeeze
+
+    @property
+    def stress(self) -> float:
+        """The tangential stress that the foundation exerts against the push."""
+        return self.modulus * self.shear
+
+    def domain(
+        self, comm: MPI.Comm, dim: int, degrees: float, axis: Sequence[float]
+    ) -> Domain:
+        if dim == 2:
+            return rectangle(comm, [0.0, 0.0], [1.0, 1.0], [4, 3], rotation=degrees)
+        return box(comm, [0.0] * 3, [1.0] * 3, [2, 3, 2], rotation=degrees, axis=axis)
+
+    def problem(
+        self,
+        comm: MPI.Comm,
+        dim: int = 2,
+        degree: int = 1,
+        degrees: float = 0.0,
+        axis: Sequence[float] = (0.0, 1.0, 0.0),
+    ) -> ContactProblem:
+        """Return the problem, turned together with its foundation.
+
+        In 3-D the plane of the motion is that of x and z; across it, the front and the back
+        are held in y where the axis of the rotation leaves y alone, else in all components.
+        """
+        q = turn(dim, degrees, axis)
+        gradient = np.zeros((dim, dim))
+        gradient[0, -1], gradient[-1, -1] = self.shear, -self.squeeze
+        imposed = affine_vector(q @ gradient @ q.T, q @ (self.slip * np.eye(dim)[0]))
+        fixed = [Fixed(side, imposed) for side in ("left", "right", "top")]
+        if dim == 3:
+            across = [None, constant(0.0, 3), None] if axis == (0.0, 1.0, 0.0) else imposed
+            fixed += [Fixed(side, across) for side in ("front", "back")]
+        normal = tuple(q @ np.eye(dim)[-1])
+        return ContactProblem(
+            self.domain(comm, dim, degrees, axis),
+            Body(self.law, fixed),
+            Contact("bottom", Plane((0.0,) * dim, normal)),
+            Friction(self.mu),
+            degree=degree,
+        )
+
+
+def pressed_block(
+    comm: MPI.Comm,
+    dim: int,
+    degree: int = 1,
+    *,
+    pressure: float = 0.02,
+    gap: float = 0.0,
+    poisson: float = 0.3,
+) -> ContactProblem:
+    """Return a block of height 1 under uniform pressure, on smooth walls on three sides.
+
+    The walls x = 0 and y = 0 hold the normal component, x = 1 and y = 1 are free. The top is
+    held by the load alone, and where there is a gap the foundation is met after it closes.
+    """
+    zero = constant(0.0, dim)
+    if dim == 2:
+        domain = rectangle(comm, [0.0, 0.0], [1.0, 1.0], [3, 4])
+        fixed = [Fixed("left", [zero, None])]
+    else:
+        domain = box(comm, [0.0] * 3, [1.0] * 3, [2, 3, 2])
+        fixed = [Fixed("left", [zero, None, None]), Fixed("front", [None, zero, None])]
+    plane = Plane((0.0,) * (dim - 1) + (-gap,), (0.0,) * (dim - 1) + (1.0,))
+    body = Body(Linear(1.0, poisson), fixed, [Load("top", pressure=constant(pressure, dim))])
+    return ContactProblem(domain, body, Contact("bottom", plane), degree=degree)
+
+
+def solve(problem: ContactProblem, tolerance: float = 1e-10, **options) -> FixedPoint:
+    """Solve by the fixed point and insist on convergence."""
+    loop, outcome = attempt(problem, tolerance=tolerance, **options)
+    assert outcome.converged, outcome
+    return loop
+
+
+def attempt(problem: ContactProblem, **options) -> tuple[FixedPoint, Outcome]:
+    loop = FixedPoint(problem, FixedPointOptions(**options))
+    return loop, loop.solve()
+
+
+def contact_data(loop: FixedPoint) -> dict[str, Array]:
+    """Return what there is at all contact nodes, sorted by position."""
+    problem, trace, forces = loop.problem, loop.problem.trace, loop.forces
+    nodal = nodal_iterate(problem)
+    slip = trace.tangential_component(nodal)
+    bound = problem.friction_bound(forces.pressure, np.linalg.norm(slip, axis=1))
+    size = np.linalg.norm(forces.friction, axis=1)
+    local = {
+        "points": trace.points,
+        "u_n": trace.normal_component(nodal),
+        "u_t": slip,
+        "pressure": forces.pressure,
+        "friction": forces.friction,
+        "bound": np.asarray(bound, dtype=float),
+        "open": forces.pressure <= 1e-6 * trace.maximum(forces.pressure),
+        "sticks": size < 0.9999 * bound,
+    }
+    data = {name: trace.gather(values) for name, values in local.items()}
+    order = np.lexsort(np.round(data["points"], 9).T)
+    return {name: values[order] for name, values in data.items()}
