@@ -145,10 +145,11 @@ class FixedPoint:
         if problem.response.active:
             pressure = total_pressure(problem, nodal, self.forces)
             weight = problem.trace.weight[:, None, None]
-            blocks = blocks + weight * problem.response.block(nodal, pressure)
+            blocks = blocks + weight * problem.response.current_block(nodal, pressure)
         self.operator.update(form, blocks, constant=problem.linear_material)
         residual = self._base_residual(nodal)
-        step = Linearised(self.operator, residual, nodal, bound)
+        law = problem.response.normal_law(nodal)
+        step = Linearised(self.operator, residual, nodal, bound, law)
         result = block_relaxation(problem, step, z, self._relaxation, self._norm)
         problem.add(result.increment)
         self.forces = result.forces
@@ -157,11 +158,15 @@ class FixedPoint:
     def _base_residual(self, nodal: Array) -> Array:
         """Return the residual without multipliers: they are the unknowns of the relaxation.
 
-        The contact flag of the perfect conductor still looks at the last pressure.
+        So is the layer's pressure, unless it is lagged. The contact flag of the perfect
+        conductor still looks at the last pressure.
         """
         problem, trace = self.problem, self.problem.trace
         residual = residual_forces(problem, self.forces)
-        trace.add(residual, -trace.weight[:, None] * self.forces.vectors(problem))
+        unknown = self.forces.vectors(problem)
+        if problem.response.normal_law(nodal) is not None:
+            unknown += problem.response.layer_pressure(nodal)[:, None] * trace.normal
+        trace.add(residual, -trace.weight[:, None] * unknown)
         return residual
 
     def _update_bound(self, old: Array, start: bool) -> tuple[float, Array]:

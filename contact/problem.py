@@ -172,9 +172,13 @@ class ContactProblem:
         self.free = free_components(self.space, self.bcs)
         self._compile()
 
-        self.trace = build_trace(domain, self.space, self.bcs, contact.on, contact.foundation)
+        trace = build_trace(domain, self.space, self.bcs, contact.on, contact.foundation)
+        scale = float(body.law.young) / domain.size
+        self.response = FoundationResponse(
+            trace, contact.layer, conductor, self.phi_scale, scale
+        )
+        self.trace = self.response.constrained_trace
         self.smoothing = Smoothing(self.trace, self.friction.radius)
-        self.response = FoundationResponse(self.trace, contact.layer, conductor, self.phi_scale)
         self.tresca = None
         if self.friction.tresca is not None:
             self.tresca = np.asarray(self.friction.tresca.numpy(self.trace.points), dtype=float)

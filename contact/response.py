@@ -2,26 +2,32 @@
 
 The compliant layer presses with h_nu(phi - phi_F) p_nu(u_nu - rho_0), section 8.1.2, and the
 conductive foundation draws the charge psi(u_nu - rho) phi_L(phi - phi_F), (1.30). Both act
-node by node. `force` gives them at an iterate and `block` their linearisation, which an outer
-loop puts into the operator; what is lagged has no block.
+node by node. Newton's method takes `force` and its full derivative `jacobian`.
+
+The fixed point of Algorithms 6 and 8 freezes h_nu and psi. It treats the layer with the
+unilateral constraint, as the one monotone graph `NormalLaw` of Figure 1.6, and the current
+through `current_block` in the operator. A linearised layer would not do there: a column that
+is stiff enough cycles for ever between the slopes of an open and of a saturated layer.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from contact.projections import Array
 from contact.trace import ContactTrace
 from forms.laws import (
-    Compliance,
+    PenetrationLaw,
     PerfectConductivity,
-    PotentialFactor,
     RampConductivity,
     ShiftedConductivity,
+    StiffnessLaw,
     Truncation,
 )
+
+EPS = float(np.finfo(float).eps)
 
 
 @dataclass(frozen=True)
@@ -31,16 +37,18 @@ class Layer:
     Attributes
     ----------
     thickness
-        rho - rho_0 >= 0: the layer is touched before the rigid part (length).
+        rho - rho_0 >= 0: the layer is touched before the rigid part (length). Infinity: there
+        is no rigid part, law (1.27), and the contact's gap is that of the first touch.
     p_nu, h_nu
-        Penetration law and stiffness of section 8.1.2.
+        Penetration law and stiffness of section 8.1.2, or any others with their derivative.
+        They are vectorised functions; p_nu must vanish for negative arguments.
     lagged
         Whether the force is taken from the previous outer iterate, as in the thesis.
     """
 
     thickness: float
-    p_nu: Compliance
-    h_nu: PotentialFactor
+    p_nu: PenetrationLaw
+    h_nu: StiffnessLaw
     lagged: bool = False
 
 
@@ -68,18 +76,96 @@ class Conductor:
 
 
 @dataclass(frozen=True)
+class NormalLaw:
+    """-sigma_nu as a graph of u_nu (Figure 1.6): free, compliant layer, rigid part.
+
+    Attributes
+    ----------
+    p_nu
+        Penetration law.
+    stiffness
+        h_nu, frozen, shape (n,).
+    touch, gap
+        rho_0 and rho: where the layer and the rigid part are touched, shape (n,).
+    """
+
+    p_nu: PenetrationLaw
+    stiffness: Array
+    touch: Array
+    gap: Array
+
+    def layer(self, u_n: Array) -> Array:
+        """Return the pressure of the layer at normal displacements."""
+        return self.stiffness * self.p_nu(u_n - self.touch)
+
+    def pressure(self, z: Array, r: float) -> Array:
+        """Return the total pressure P for which (phi, P) is on the graph and P + r phi = z.
+
+        This is what (3.43) becomes with a layer. The graph rises, so that P is unique for any
+        r > 0; where p_nu falls, r must exceed its slope.
+        """
+        low, high = self.touch, np.minimum(self.gap, z / r)
+        free, rigid = z <= r * low, z - r * self.gap >= self.layer(high)
+        phi, done = high, free | rigid
+        # Newton's method in a bracket; every third sweep halves it, should Newton not.
+        for sweep in range(90):
+            excess = r * phi + self.layer(phi) - z
+            done |= (np.abs(excess) <= 2 * EPS * np.abs(z)) | (high - low <= 2 * EPS * np.abs(phi))
+            if np.all(done):
+                break
+            low, high = np.where(excess < 0, phi, low), np.where(excess > 0, phi, high)
+            slope = r + self.stiffness * self.p_nu.derivative(phi - self.touch)
+            newton = phi - excess / np.where(slope > 0, slope, r)
+            inside = (newton > low) & (newton < high) & (sweep % 3 < 2)
+            phi = np.where(done, phi, np.where(inside, newton, 0.5 * (low + high)))
+        # The layer's pressure is exact where it is small, the remainder where it is stiff.
+        soft = self.stiffness * self.p_nu.derivative(phi - self.touch) < r
+        pressed = np.where(soft, self.layer(phi), z - r * phi)
+        return np.where(free, 0.0, np.where(rigid, z - r * self.gap, pressed))
+
+
+@dataclass(frozen=True)
 class FoundationResponse:
-    """Layer and conductor at the contact nodes; potentials come divided by `phi_scale`."""
+    """Layer and conductor at the contact nodes; potentials come divided by `phi_scale`.
+
+    `contact_scale` (stress/length) weighs penetrations against pressures.
+    """
 
     trace: ContactTrace
     layer: Layer | None
     conductor: Conductor | None
     phi_scale: float
+    contact_scale: float
 
     @property
     def active(self) -> bool:
         """Whether there is a layer or a conductor."""
         return self.layer is not None or self.conductor is not None
+
+    @property
+    def constrained_trace(self) -> ContactTrace:
+        """The contact nodes with the gap of the unilateral constraint: infinite without one."""
+        if self.layer is None or np.isfinite(self.layer.thickness):
+            return self.trace
+        return replace(self.trace, gap=np.full_like(self.trace.gap, np.inf))
+
+    @property
+    def _touch(self) -> Array:
+        """The gap rho_0 of the layer's first touch."""
+        assert self.layer is not None
+        depth = self.layer.thickness
+        return self.trace.gap - (depth if np.isfinite(depth) else 0.0)
+
+    def normal_law(self, x: Array) -> NormalLaw | None:
+        """Return the layer and the constraint as one graph, h_nu frozen at the nodal unknowns.
+
+        None where there is no layer, or where it is lagged and thus a given force.
+        """
+        if self.layer is None or self.layer.lagged:
+            return None
+        stiffness = np.broadcast_to(self.layer.h_nu(self._difference(x)), x.shape[:1])
+        gap = self.constrained_trace.gap
+        return NormalLaw(self.layer.p_nu, stiffness, self._touch, gap)
 
     def _difference(self, x: Array) -> Array:
         """Return phi - phi_F at the nodes; 0 for a body without potential."""
@@ -96,7 +182,7 @@ class FoundationResponse:
         """Return the pressure of the layer at nodal unknowns of shape (n, block size)."""
         if self.layer is None:
             return np.zeros(x.shape[0])
-        depth = self._penetration(x) + self.layer.thickness
+        depth = self.trace.normal_component(x) - self._touch
         return self.layer.h_nu(self._difference(x)) * self.layer.p_nu(depth)
 
     def charge(self, x: Array, pressure: Array) -> Array:
@@ -110,10 +196,16 @@ class FoundationResponse:
         psi = self.conductor.psi
         if isinstance(psi, PerfectConductivity):
             return psi(pressure > 0)
-        # Where the rigid part presses, u_nu = rho. An iterate misses that by the tolerance of
-        # the inner loop, which the steep ramp would make a thousand times larger.
-        pressed = pressure - self.layer_pressure(x) > 1e-12 * np.abs(pressure)
-        return psi(np.where(pressed, 0.0, self._penetration(x)))
+        return psi(np.where(self._pressed(x, pressure), 0.0, self._penetration(x)))
+
+    def _pressed(self, x: Array, pressure: Array) -> Array:
+        """Tell where the rigid part presses, and u_nu = rho.
+
+        An iterate misses that by the tolerance of the inner loop, which the steep ramp would
+        make a thousand times larger; an open node may carry a multiplier of that size.
+        """
+        opening = self.trace.normal_component(x) - self.constrained_trace.gap
+        return pressure - self.layer_pressure(x) + self.contact_scale * opening > 0
 
     def force(self, x: Array, pressure: Array) -> Array:
         """Return the nodal residual density, shape (n, block size), in scaled unknowns."""
@@ -128,7 +220,8 @@ class FoundationResponse:
         total = np.zeros((x.shape[0], self.trace.block_size))
         if self.layer is None:
             return total
-        depth, difference = self._penetration(x) + self.layer.thickness, self._difference(x)
+        depth = self.trace.normal_component(x) - self._touch
+        difference = self._difference(x)
         slope = self.layer.h_nu(difference) * self.layer.p_nu.derivative(depth)
         total[:, : self.trace.dim] = slope[:, None] * self.trace.normal
         if self.trace.block_size > self.trace.dim:
@@ -150,24 +243,33 @@ class FoundationResponse:
             slope = self._conductivity(x, pressure) * self.conductor.phi_l.derivative(difference)
             total[:, -1, -1] -= self.phi_scale**2 * slope
             if not isinstance(psi, PerfectConductivity):
-                closing = psi.derivative(self._penetration(x)) * self.conductor.phi_l(difference)
-                total[:, -1, :d] -= self.phi_scale * closing[:, None] * self.trace.normal
+                open_slope = psi.derivative(self._penetration(x))
+                closing = np.where(self._pressed(x, pressure), 0.0, open_slope)
+                closing = self.phi_scale * closing * self.conductor.phi_l(difference)
+                total[:, -1, :d] -= closing[:, None] * self.trace.normal
         return total
 
-    def block(self, x: Array, pressure: Array) -> Array:
-        """Return the symmetric linearisation, shape (n, block size, block size).
+    def current_block(self, x: Array, pressure: Array) -> Array:
+        """Return the current's derivative by the potential alone, psi frozen, (n, bs, bs).
 
-        h_nu and psi are frozen: what they add is not symmetric, and is left to the outer loop.
+        Zero for a lagged current. It keeps the operator of the fixed point symmetric.
         """
-        d, bs = self.trace.dim, self.trace.block_size
+        bs = self.trace.block_size
         total = np.zeros((x.shape[0], bs, bs))
-        if self.layer is not None and not self.layer.lagged:
-            depth = self._penetration(x) + self.layer.thickness
-            slope = self.layer.h_nu(self._difference(x)) * self.layer.p_nu.derivative(depth)
-            normal = self.trace.normal
-            total[:, :d, :d] += slope[:, None, None] * normal[:, :, None] * normal[:, None, :]
         if self.conductor is not None and not self.conductor.lagged:
             slope = self._conductivity(x, pressure)
             slope = slope * self.conductor.phi_l.derivative(self._difference(x))
-            total[:, -1, -1] -= self.phi_scale**2 * slope
+            total[:, -1, -1] = -(self.phi_scale**2) * slope
+        return total
+
+    def block(self, x: Array, pressure: Array) -> Array:
+        """Return `jacobian` without the derivatives of h_nu and psi: symmetric.
+
+        A lagged layer or current has none.
+        """
+        total = self.current_block(x, pressure)
+        if self.layer is not None and not self.layer.lagged:
+            normal, d = self.trace.normal, self.trace.dim
+            outer = normal[:, :, None] * self.layer_gradient(x)[:, None, :d]
+            total[:, :d, :d] += outer
         return total

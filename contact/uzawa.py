@@ -19,6 +19,7 @@ from contact.kkt import interface_residuals
 from contact.linear import LinearOperator
 from contact.problem import ContactProblem
 from contact.projections import Array, project_disc
+from contact.response import NormalLaw
 from contact.state import Multipliers, bound_of
 from forms.foundation import contact_multiplier
 
@@ -68,12 +69,16 @@ class Linearised:
         The iterate at the contact nodes, shape (n, block size).
     bound
         Friction bound s_n, shape (n,).
+    law
+        The compliant layer in front of the rigid part, to be solved with the constraint; None
+        without one. The multipliers are then those of the total pressure -sigma_nu.
     """
 
     operator: LinearOperator
     residual: Array
     nodal: Array
     bound: Array
+    law: NormalLaw | None = None
 
 
 @dataclass
@@ -141,9 +146,14 @@ def split(problem: ContactProblem, nodal: Array) -> Array:
     return np.column_stack([trace.normal_component(nodal), tangential])
 
 
-def _project(problem: ContactProblem, z: Array, r: float, bound: Array) -> Array:
+def _project(
+    problem: ContactProblem, z: Array, r: float, bound: Array, law: NormalLaw | None
+) -> Array:
     """Return the new multipliers, Steps 2 and 3: (3.43) and the friction disc."""
-    pressure = contact_multiplier(z[:, 0], r, 0.0, problem.trace.gap)
+    if law is None:
+        pressure = contact_multiplier(z[:, 0], r, 0.0, problem.trace.gap)
+    else:
+        pressure = law.pressure(z[:, 0], r)
     return np.column_stack([pressure, project_disc(z[:, 1:], bound)])
 
 
@@ -186,7 +196,7 @@ def block_relaxation(
     increment = np.zeros(problem.owned)
     start = split(problem, step.nodal)
     for iteration in range(1, parameters.max_iterations + 1):
-        multiplier = _project(problem, z, r, bound)
+        multiplier = _project(problem, z, r, bound, step.law)
         q = 2 * multiplier - z
         rhs = -step.residual
         trace.add(rhs, -trace.weight[:, None] * _vectors(problem, q + r * start))
@@ -194,7 +204,9 @@ def block_relaxation(
         nodal = step.nodal + trace.values(increment)
         u = split(problem, nodal)
         # q + r u is the force that the foundation exerted in this very solve.
-        forces = Multipliers(q[:, 0] + r * u[:, 0], q[:, 1:] + r * u[:, 1:])
+        total = q + r * u
+        layer = 0.0 if step.law is None else step.law.layer(u[:, 0])
+        forces = Multipliers(total[:, 0] - layer, total[:, 1:])
         if parameters.single_loop:
             bound = bound_of(problem, nodal, forces)
         residual = max(interface_residuals(problem, nodal, forces, bound))
@@ -202,7 +214,7 @@ def block_relaxation(
         image = multiplier + r * (phi + parameters.over_relaxation * (u - phi))
         if parameters.thesis_tolerance is not None:
             assert domain_norm is not None
-            phi = (image - _project(problem, image, r, bound)) / r
+            phi = (image - _project(problem, image, r, bound, step.law)) / r
             if old_phi is not None and old_increment is not None:
                 change = domain_norm(increment - old_increment) ** 2 + trace.norm(phi - old_phi) ** 2
                 size = domain_norm(problem.x.x.array[: problem.owned] + increment) ** 2

@@ -160,6 +160,29 @@ class PerfectConductivity:
         return where(in_contact, self.k_e, 0.0)
 
 
+class PenetrationLaw(Protocol):
+    """p_nu: what a layer answers to its penetration s = u_nu - rho_0, assumption (h6).
+
+    It vanishes for s <= 0 and should not fall: else several solutions may coexist.
+    """
+
+    def __call__(self, s: Value) -> Value:
+        """Return p_nu at the penetration."""
+
+    def derivative(self, s: Value) -> Value:
+        """Return d p_nu / ds, one-sided at kinks."""
+
+
+class StiffnessLaw(Protocol):
+    """h_nu: the stiffness of a layer at s = phi - phi_F, assumption (h7)."""
+
+    def __call__(self, s: Value) -> Value:
+        """Return h_nu >= 0 at the potential difference."""
+
+    def derivative(self, s: Value) -> Value:
+        """Return d h_nu / ds, one-sided at kinks."""
+
+
 @dataclass(frozen=True)
 class Compliance:
     """p_nu(s) = [s]^+ limited to n_nu, section 8.1.2, s = penetration of the layer.

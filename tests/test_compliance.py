@@ -34,9 +34,9 @@ def test_jacobian_is_the_derivative_of_the_force(dim, psi):
     rng = np.random.default_rng(3)
     trace = random_trace(200, dim, dim + 1, rng)
     layer = Layer(0.2, Compliance(0.3), PotentialFactor(5.0, 2.0, 3.0))
-    response = FoundationResponse(trace, layer, Conductor(psi, 1.5, Truncation(4.0)), 1.7)
+    response = FoundationResponse(trace, layer, Conductor(psi, 1.5, Truncation(4.0)), 1.7, 1.0)
     x = rng.standard_normal((200, dim + 1))
-    pressure = np.zeros(200)
+    pressure = response.layer_pressure(x) - 100.0  # no node presses on the rigid part
     jacobian = response.jacobian(x, pressure)
     assert np.count_nonzero(jacobian[:, 0, -1]) > 20  # layer reached, h_nu rising
     assert np.count_nonzero(jacobian[:, -1, 0]) > 20
@@ -53,7 +53,7 @@ def test_block_is_the_symmetric_part_without_the_frozen_factors():
     trace = random_trace(50, 2, 3, rng)
     layer = Layer(0.2, Compliance(0.3), PotentialFactor(5.0, 1.0))
     conductor = Conductor(ShiftedConductivity(0.7, 0.0), 1.5)
-    response = FoundationResponse(trace, layer, conductor, 1.7)
+    response = FoundationResponse(trace, layer, conductor, 1.7, 1.0)
     x = rng.standard_normal((50, 3))
     block = response.block(x, np.zeros(50))
     assert np.allclose(block, block.transpose(0, 2, 1), rtol=1e-14)
