@@ -46,7 +46,7 @@ Along: TypeAlias = Annotated[
 
 
 class Piece(Section):
-    """A side of a generated mesh, or a piece of it."""
+    """`[mesh.parts.NAME]`: a side of a rectangle or box, or a piece of it."""
 
     side: Name = Field(
         description="Side of the generator: `left`, `right`, `bottom`, `top`; "
@@ -80,10 +80,9 @@ Pieces: TypeAlias = Annotated[
 class Mesh(Section):
     """`[mesh]`: a generator with its parameters, or a Gmsh file."""
 
-    generator: Text | None = Field(
-        default=None,
-        description="`rectangle`, `box`, or a recipe of the folder meshes. This or `file`.",
-    )
+    generator: (
+        Annotated[str, Accepted('"rectangle", "box" or the name of a mesh recipe')] | None
+    ) = Field(default=None, description="What makes the mesh. This or `file`.")
     file: Text | None = Field(
         default=None,
         description="Gmsh file (.msh); its named physical groups are the parts. Relative "
@@ -113,8 +112,9 @@ class Mesh(Section):
         default=None,
         description="Squares or cubes along the edges; required for a rectangle or box.",
     )
-    diagonal: Literal["right", "left", "crossed", "left_right", "right_left"] = Field(
-        default="right", description="How a rectangle's squares are cut into triangles."
+    diagonal: Literal["right", "left", "crossed", "left_right", "right_left"] | None = Field(
+        default=None,
+        description='How a rectangle\'s squares are cut into triangles; there "right" by default.',
     )
     rotation: Number = Field(
         default=0.0,
@@ -147,12 +147,15 @@ class Mesh(Section):
     @model_validator(mode="before")
     @classmethod
     def _gather_parameters(cls, given: Any) -> Any:
-        """Move the keys of a recipe into `parameters`, and fill in the default origin."""
+        """Move the keys of a recipe into `parameters`, and fill in the defaults of a grid."""
         if not isinstance(given, Mapping) or not isinstance(given.get("generator"), str):
             return given
         if given["generator"] in GENERATORS:
             dimension, _ = GENERATORS[given["generator"]]
-            return {"origin": (0.0,) * dimension, **given}
+            defaults: dict[str, Any] = {"origin": (0.0,) * dimension}
+            if given["generator"] == "rectangle":
+                defaults["diagonal"] = "right"
+            return {**defaults, **given}
         inner = given.get("parameters", {})
         if not isinstance(inner, Mapping):
             return given
@@ -180,6 +183,8 @@ class Mesh(Section):
             raise fault("generator", Words(given), "one of generator and file")
         if self.axis is not None and not any(self.axis):
             raise fault("axis", self.axis, "a vector that is not zero")
+        if self.diagonal is not None and self.generator != "rectangle":
+            raise fault("diagonal", self.diagonal, "diagonal for a rectangle only")
         if self.dimension is not None:
             self._check_grid(self.dimension)
             return self
@@ -233,7 +238,7 @@ def _matrix(rows: int, columns: int) -> Any:
 
 
 class Piezo(Section):
-    """`[material.piezo]`: sigma = F eps + e^T grad(phi), D = e eps - beta grad(phi).
+    """`[material.piezo]`: the law sigma = F eps + e^T grad(phi), D = e eps - beta grad(phi).
 
     A crystal of class 6mm poled along X3, by five constants, or full Voigt matrices. In the
     plane x and y stand for X2 and X3.

@@ -147,7 +147,7 @@ class Contact(Section):
 
 
 class SlipLaw(Section):
-    """`mu = { law = "slip", ... }`: mu(s) = a + b/(rho s + 2) at the slip s, (7.16)."""
+    """`mu = { law = "slip", ... }`: coefficient a + b/(rho s + 2) at the slip s, (7.16)."""
 
     law: Literal["slip"] = Field(description="The slip-dependent law.")
     a: NonNegative = Field(default=0.5, description="Coefficient at large slip.")
@@ -160,7 +160,7 @@ def _mu(given: Any) -> str:
 
 
 class Friction(Section):
-    """`[friction]`: absent, there is none."""
+    """`[friction]`: friction on the contact part. Absent: none."""
 
     law: Literal["none", "tresca", "coulomb"] = Field(
         default="none",
@@ -200,7 +200,7 @@ class Friction(Section):
 
 
 class Electric(Section):
-    """`[electric]`: conductive foundation, D.nu = psi(u_nu - rho) phi_L(phi - phi_f)."""
+    """`[electric]`: a conductive foundation, D.nu = psi(u_nu - rho) phi_L(phi - phi_f)."""
 
     law: Literal["shifted", "perfect", "ramp"] = Field(
         default="shifted",

@@ -49,7 +49,7 @@ def make_domain(section: "MeshSection", comm: MPI.Intracomm) -> Domain:
         assert section.cells is not None
         grid = (section.origin, section.size, section.cells, _pieces(section))
         if section.generator == "rectangle":
-            domain = rectangle(comm, *grid, diagonal=section.diagonal)
+            domain = rectangle(comm, *grid, diagonal=section.diagonal or "right")
         else:
             domain = box(comm, *grid)
     else:

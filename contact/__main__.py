@@ -1,0 +1,179 @@
+"""The command line: ``python3 -m contact solve CASE.toml --out DIR`` and ``... check CASE.toml``.
+
+Exit status: 0 converged, 1 not converged (outputs are written), 2 bad input (one message,
+nothing is written), 130 stopped by Ctrl-C.
+"""
+
+from __future__ import annotations
+
+import argparse
+import difflib
+import os
+import sys
+import traceback
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from types import TracebackType
+from typing import Any, NoReturn, TypeVar
+
+from mpi4py import MPI
+
+from contact.case import Case, load_case
+from contact.errors import InputError
+
+CONVERGED, NOT_CONVERGED, BAD_INPUT, STOPPED = 0, 1, 2, 130
+
+T = TypeVar("T")
+
+
+class _Parser(argparse.ArgumentParser):
+    """A parser that raises InputError, and prints its help on one rank alone."""
+
+    def error(self, message: str) -> NoReturn:
+        raise InputError(f"{message}; accepted: {' '.join(self.format_usage().split())}")
+
+    def _print_message(self, message: str, file: Any = None) -> None:
+        if MPI.COMM_WORLD.rank == 0:
+            super()._print_message(message, file)
+
+
+def _parser() -> _Parser:
+    # PETSc's options begin with one dash and any letter, -h among them.
+    common: dict[str, Any] = {"add_help": False, "allow_abbrev": False}
+    parser = _Parser(prog="contact", description=__doc__, **common)
+    parser.add_argument("--help", action="help", help="show this help and leave")
+    commands = parser.add_subparsers(dest="command", required=True, metavar="solve|check")
+    for name, text in (
+        ("solve", "solve a case and write the results"),
+        ("check", "validate a case and print it with its mesh parts and unknowns"),
+    ):
+        command = commands.add_parser(name, help=text, description=text, **common)
+        command.usage = f"contact {name} CASE.toml [options] [PETSc options]"
+        command.add_argument("case", metavar="CASE.toml", help="case file")
+        command.add_argument(
+            "--set",
+            action="append",
+            default=[],
+            metavar="KEY=VALUE",
+            help="replace a value of the case file; may be repeated",
+        )
+        command.add_argument("--help", action="help", help="show this help and leave")
+        if name == "solve":
+            command.usage = f"contact {name} CASE.toml --out DIR [options] [PETSc options]"
+            command.add_argument("--out", required=True, metavar="DIR", help="folder for results")
+            command.add_argument("--plot", action="store_true", help="draw the figures too")
+            command.add_argument("--quiet", action="store_true", help="show no progress")
+    return parser
+
+
+def parse(arguments: Sequence[str]) -> tuple[argparse.Namespace, list[str]]:
+    """Split a command line into ours and PETSc's.
+
+    Raises
+    ------
+    InputError
+        If it is not understood.
+    """
+    if "-h" in arguments:
+        arguments = ["--help" if argument == "-h" else argument for argument in arguments]
+    options, rest = _parser().parse_known_args(arguments)
+    known = ["--set", "--out", "--plot", "--quiet", "--help"]
+    for i, argument in enumerate(rest):
+        follows = i > 0 and rest[i - 1].startswith("-")
+        if argument.startswith("--"):
+            near = difflib.get_close_matches(argument.partition("=")[0], known, n=1)
+            hint = f", did you mean {near[0]}?" if near else ""
+            raise InputError(f"{argument}: unknown option{hint}; accepted: {', '.join(known)}")
+        if not argument.startswith("-") and not follows:
+            raise InputError(f"{argument}: one argument too many; accepted: one case file")
+    return options, rest
+
+
+def _shared(comm: MPI.Intracomm, action: Callable[[], T]) -> T:
+    """Do something on rank 0; its result, or its InputError, is that of all ranks."""
+    result: Any = None
+    if comm.rank == 0:
+        try:
+            result = action()
+        except InputError as error:
+            result = error
+    result = comm.bcast(result)
+    if isinstance(result, InputError):
+        raise result
+    return result
+
+
+def _check_folder(folder: Path) -> None:
+    """Raise an InputError if a folder cannot be written to. Nothing is created yet."""
+    place = folder.absolute()
+    while not place.exists():
+        place = place.parent
+    if not place.is_dir() or not os.access(place, os.W_OK | os.X_OK):
+        what = "not a folder" if not place.is_dir() else "not writable"
+        raise InputError(f"--out {folder}: {place} is {what}; accepted: a folder to write to")
+
+
+def _solve(case: Case, options: argparse.Namespace, comm: MPI.Intracomm) -> int:
+    out = Path(options.out)
+    _shared(comm, lambda: _check_folder(out))
+
+    # These load dolfinx, which PETSc's options have to precede.
+    from contact.output import write_outputs
+    from contact.progress import progress
+    from contact.solving import solve
+
+    with progress(comm, options.quiet) as monitor:
+        solution = solve(case, monitor=monitor, comm=comm)
+    write_outputs(solution, out)
+    if options.plot:
+        from contact.plots import write_figures
+
+        write_figures(solution, out)
+    reason = solution.outcome.reason
+    if comm.rank == 0 and not options.quiet:
+        state = "converged" if solution.converged else "not converged"
+        print(f"{state}: {reason}; results in {out}")
+    if solution.converged:
+        return CONVERGED
+    return STOPPED if reason.startswith("interrupted") else NOT_CONVERGED
+
+
+def _check(case: Case, options: argparse.Namespace, comm: MPI.Intracomm) -> int:
+    from contact.build import build_problem
+    from contact.describe import describe
+
+    text = describe(case, build_problem(case, comm))
+    if comm.rank == 0:
+        print(text)
+    return CONVERGED
+
+
+def _abort_on_crash(
+    kind: type[BaseException], error: BaseException, trace: TracebackType | None
+) -> None:
+    """Show the traceback and end all ranks: the others may wait for this one for ever."""
+    traceback.print_exception(kind, error, trace)
+    sys.stderr.flush()
+    MPI.COMM_WORLD.Abort(STOPPED if issubclass(kind, KeyboardInterrupt) else NOT_CONVERGED)
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the command line and return its exit status."""
+    comm = MPI.COMM_WORLD
+    if comm.size > 1:
+        sys.excepthook = _abort_on_crash
+    try:
+        options, petsc = parse(sys.argv[1:] if arguments is None else arguments)
+        import petsc4py
+
+        petsc4py.init([sys.argv[0], *petsc])
+        case = _shared(comm, lambda: load_case(options.case, options.set))
+        return {"solve": _solve, "check": _check}[options.command](case, options, comm)
+    except InputError as error:
+        if comm.rank == 0:
+            print(f"contact: {error}", file=sys.stderr)
+        return BAD_INPUT
+
+
+if __name__ == "__main__":
+    sys.exit(main())

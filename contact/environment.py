@@ -1,0 +1,94 @@
+"""What a run stands on: versions, and the BLAS that decides the speed of MUMPS."""
+
+from __future__ import annotations
+
+import platform
+import re
+from collections.abc import Iterable
+from dataclasses import dataclass
+from pathlib import Path
+
+#: Name -> pattern of the path of its library, in the order of preference where several are
+#: loaded: NumPy's wheels bring an OpenBLAS of their own, which PETSc does not use.
+_LIBRARIES = (
+    ("OpenBLAS", re.compile(r"openblas")),
+    ("MKL", re.compile(r"libmkl_")),
+    ("BLIS", re.compile(r"libblis")),
+    ("FlexiBLAS", re.compile(r"flexiblas")),
+    ("ATLAS", re.compile(r"atlas")),
+)
+_PRIVATE = re.compile(r"numpy\.libs|scipy\.libs|libscipy_openblas")
+_PLAIN = re.compile(r"/lib[ck]?blas\.so")
+
+ADVICE = (
+    "warning: the reference BLAS is in use; direct solves are about six times faster with "
+    "OpenBLAS (Debian, Ubuntu: apt install libopenblas0-pthread)"
+)
+
+
+@dataclass(frozen=True)
+class Blas:
+    """The BLAS library that PETSc uses.
+
+    Attributes
+    ----------
+    name
+        For instance "OpenBLAS", "reference" or "unknown".
+    path
+        File that was loaded, empty if unknown.
+    """
+
+    name: str
+    path: str = ""
+
+    @property
+    def is_reference(self) -> bool:
+        """True for the slow reference implementation."""
+        return self.name == "reference"
+
+
+def identify(paths: Iterable[str]) -> Blas:
+    """Name the BLAS among the paths of loaded libraries."""
+    candidates = sorted({path for path in paths if not _PRIVATE.search(path)})
+    for name, pattern in _LIBRARIES:
+        for path in candidates:
+            if pattern.search(path):
+                return Blas(name, path)
+    # Debian's alternatives put optimised libraries under the plain name too, in folders that
+    # tell; what is left is the reference.
+    for path in candidates:
+        if _PLAIN.search(path):
+            return Blas("reference", path)
+    return Blas("unknown")
+
+
+def blas() -> Blas:
+    """Name the BLAS that this process has loaded, after loading PETSc."""
+    from petsc4py import PETSc  # noqa: F401  loads the library
+
+    maps = Path("/proc/self/maps")
+    if not maps.exists():
+        return Blas("unknown")
+    lines = (line.split(maxsplit=5) for line in maps.read_text().splitlines())
+    return identify(fields[5] for fields in lines if len(fields) == 6)
+
+
+def versions() -> dict[str, str]:
+    """Return the versions of Python, of the libraries, and the BLAS."""
+    import dolfinx
+    import mpi4py
+    import numpy
+    import ufl
+    from mpi4py import MPI
+    from petsc4py import PETSc
+
+    return {
+        "python": platform.python_version(),
+        "dolfinx": dolfinx.__version__,
+        "ufl": ufl.__version__,
+        "petsc": ".".join(str(part) for part in PETSc.Sys.getVersion()),
+        "mpi4py": mpi4py.__version__,
+        "mpi": MPI.Get_library_version().splitlines()[0].split(",")[0].rstrip("\0"),
+        "numpy": numpy.__version__,
+        "blas": blas().name,
+    }

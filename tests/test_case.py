@@ -1,0 +1,469 @@
+"""The case file: what is accepted, what is refused and how, overrides, reference page."""
+
+import json
+import pickle
+import tomllib
+
+import numpy as np
+import pytest
+
+from contact import reference
+from contact.__main__ import main, parse
+from contact.case import Case, SlipLaw, Sphere, load_case, parse_case
+from contact.case_messages import keys_of
+from contact.case_text import to_toml
+from contact.case_types import sections_of
+from contact.environment import identify
+from contact.errors import InputError
+from contact.expressions import Expression
+
+BAR = """\
+title = "Bar on a rigid foundation"
+[mesh]
+generator = "rectangle"
+origin = [0.0, 0.0]
+size = [4.0, 1.0]
+cells = [8, 2]
+[mesh.parts.loaded]
+side = "top"
+from = 2.0
+to = 4.0
+[space]
+degree = 1
+[material]
+law = "log"
+young = 1.0
+poisson = 0.3
+yield_strain = 0.05
+[[fixed]]
+on = "left"
+displacement = [0.0, 0.0]
+[[load]]
+on = "loaded"
+traction = [0.0, -0.005]
+[contact]
+on = "bottom"
+law = "signorini"
+gap = 0.0
+[friction]
+law = "coulomb"
+mu = { law = "slip", a = 0.5, b = 0.2, rho = 1e4 }
+radius = 0.0
+[solver]
+method = "newton"
+tolerance = 1e-8
+"""
+PIEZO = {"e31": -5.4, "e33": 15.8, "e15": 12.3, "beta11": 8.13866, "beta33": 7.37455}
+
+
+@pytest.fixture
+def bar(tmp_path):
+    path = tmp_path / "bar.toml"
+    path.write_text(BAR)
+    return path
+
+
+def changed(**changes):
+    """Return the tables of the bar with some values replaced: ``a__b=value``, None removes."""
+    data = tomllib.loads(BAR)
+    for path, value in changes.items():
+        *parents, last = path.split("__")
+        place = data
+        for key in parents:
+            place = place[int(key)] if isinstance(place, list) else place.setdefault(key, {})
+        if value is None:
+            del place[last]
+        else:
+            place[int(last) if isinstance(place, list) else last] = value
+    return data
+
+
+def test_the_bar(bar):
+    case = load_case(bar)
+    assert case.source == str(bar)
+    assert case.mesh.dimension == 2
+    assert case.mesh.parts["loaded"].start == 2.0
+    assert case.load[0].traction == (Expression(0.0), Expression(-0.005))
+    assert case.friction.mu == SlipLaw(law="slip", a=0.5, b=0.2, rho=1e4)
+    assert case.contact.gap == Expression(0.0)
+    assert case.solver.inner == pytest.approx(1e-9)
+    assert case.solver.slip_length == case.solver.eps_contact
+    assert case.fixed[0].is_clamped
+    assert pickle.loads(pickle.dumps(case)) == case
+
+
+def test_the_rest_of_the_keys():
+    case = parse_case(
+        changed(
+            mesh={"generator": "box", "size": [1, 1, 2], "cells": [1, 1, 2], "rotation": 30},
+            mesh__parts__strip=[{"side": "top", "from": [0, 0], "to": [1, 0.5]}, {"side": "left"}],
+            material__piezo={**PIEZO, "poling": [0, 0, 1]},
+            fixed=[
+                {"on": "top", "displacement": [0, "free", "0.1*x"]},
+                {"on": "left", "potential": 0},
+            ],
+            load=[
+                {"on": "right", "pressure": "z", "charge": 1},
+                {"everywhere": True, "body_force": [0, 0, -1], "body_charge": "x"},
+            ],
+            contact={
+                "on": "bottom",
+                "law": "compliance",
+                "layer": 0.1,
+                "foundation": {"shape": "sphere", "centre": [0, 0, -1], "radius": 1},
+                "direction": "body",
+            },
+            friction={"law": "tresca", "bound": "1 + x"},
+            electric={"k_e": 1, "phi_f": 32, "delta": 10, "limit": 100, "lagged": True},
+            solver={"r": 25, "stopping": "thesis", "nested": True, "nested_levels": 3},
+            output={"fields": "xdmf", "checkpoint": True},
+        )
+    )
+    assert case.mesh.origin == (0.0, 0.0, 0.0)
+    assert len(case.mesh.parts["strip"]) == 2
+    assert case.fixed[0].displacement == (Expression(0.0), "free", Expression("0.1*x"))
+    assert isinstance(case.contact.foundation, Sphere) and case.contact.gap is None
+    assert (case.contact.stiffness, case.contact.limit) == (10.0, 0.1)
+    assert (case.contact.potential_factor, case.contact.potential_range) == (2.0, 128.0)
+    assert case.solver.r == 25.0
+    e, beta = case.material.piezo.voigt
+    assert e[2].tolist() == [-5.4, -5.4, 15.8, 0, 0, 0] and e[0, 4] == e[1, 3] == 12.3
+    assert np.diag(beta).tolist() == [8.13866, 8.13866, 7.37455]
+    again = parse_case(tomllib.loads(to_toml(case)))
+    assert again == case
+
+
+def test_recipes_take_their_parameters_in_the_mesh_section():
+    case = parse_case(changed(mesh={"generator": "quarter_disc", "contact_size": 0.1}))
+    assert case.mesh.parameters == {"contact_size": 0.1}
+    assert case.mesh.dimension is None and case.mesh.sides == ()
+    assert parse_case(tomllib.loads(to_toml(case))) == case
+
+
+def test_a_mesh_file_belongs_to_the_folder_of_the_case(bar):
+    text = BAR.replace('generator = "rectangle"', 'file = "body.msh"')
+    lines = [line for line in text.splitlines() if not line.startswith(("origin", "size", "cells"))]
+    start, stop = lines.index("[mesh.parts.loaded]"), lines.index("[space]")
+    bar.write_text("\n".join(lines[:start] + lines[stop:]))
+    with pytest.raises(InputError, match=r"mesh\.file: no file .*body\.msh; accepted: a Gmsh file"):
+        load_case(bar)
+    (bar.parent / "body.msh").touch()
+    assert load_case(bar).mesh.file == str(bar.parent / "body.msh")
+
+
+box = {"generator": "box", "size": [1, 1, 1], "cells": [1, 1, 1]}
+full = {"e": [[0] * 6] * 3, "beta": [[1, 0, 0], [0, 1, 0], [0, 0, 1]]}
+electrode = [{"on": "left", "displacement": [0, 0], "potential": 0}]
+
+BAD = {
+    "unknown section": ({"meterial__young": 1}, "meterial: unknown key, did you mean material?"),
+    "unknown key": ({"material__yung": 1}, "material.yung: unknown key, did you mean young?"),
+    "unknown key deep": ({"friction__mu__roh": 1}, "friction.mu.roh: unknown key, did you mean"),
+    "unknown key in a list": ({"load__0__tracton": 1}, "load.0.tracton: unknown key"),
+    "no mesh": ({"mesh": None}, "mesh: missing; accepted: a table"),
+    "no material": ({"material": None}, "material: missing"),
+    "no contact": ({"contact": None}, "contact: missing"),
+    "no supports": ({"fixed": None}, "fixed: missing; accepted: one or more tables [[fixed]]"),
+    "empty supports": ({"fixed": []}, "fixed: given []; accepted: one or more"),
+    "table for a list": ({"load": {"on": "top"}}, "load: given a table; accepted: tables [[load]]"),
+    "number for a table": ({"solver": 3}, "solver: given 3; accepted: a table"),
+    "missing key": ({"material__young": None}, "material.young: missing; accepted: a number > 0"),
+    "negative modulus": ({"material__young": -1.0}, "material.young: given -1.0"),
+    "modulus as text": ({"material__young": "1.0"}, 'material.young: given "1.0"; accepted'),
+    "modulus as switch": ({"material__young": True}, "material.young: given true"),
+    "not a number": ({"material__young": float("nan")}, "material.young: given nan"),
+    "infinite": ({"solver__r": float("inf")}, "solver.r: given inf"),
+    "huge": ({"material__young": 10**400}, "material.young: given 1000"),
+    "incompressible": ({"material__poisson": 0.5}, "a number between -1 and 0.5, both excluded"),
+    "unknown law": ({"material__law": "plastic"}, 'accepted: "linear" or "log"'),
+    "log without yield": ({"material__yield_strain": None}, "material.yield_strain: missing"),
+    "floor above the modulus": ({"material__g_min": 1.0}, "at most the shear modulus 0.384615"),
+    "degree": ({"space__degree": 3}, "space.degree: given 3; accepted: 1 or 2"),
+    "generator": ({"mesh__generator": "circle"}, "mesh.generator: given"),
+    "generator and file": ({"mesh__file": "a.msh"}, "mesh.generator: generator and file"),
+    "neither": ({"mesh__generator": None}, "mesh.generator: neither generator nor file"),
+    "flat mesh": ({"mesh__size": [4.0, 0.0]}, "mesh.size.1: given 0.0"),
+    "no cells": ({"mesh__cells": None}, "mesh.cells: missing; accepted: a list of 2 numbers"),
+    "half cells": ({"mesh__cells": [8, 2.5]}, "mesh.cells.1: given 2.5"),
+    "3 sizes": ({"mesh__size": [1, 1, 1]}, "mesh.size: given [1.0, 1.0, 1.0]; accepted: a list"),
+    "axis in the plane": ({"mesh__axis": [0, 0, 1]}, "mesh.axis"),
+    "diagonal of a box": ({"mesh": {**box, "diagonal": "left"}}, "for a rectangle only"),
+    "side": ({"mesh__parts__loaded__side": "front"}, "left, right, bottom, top"),
+    "backward piece": ({"mesh__parts__loaded__to": 1.0}, "mesh.parts.loaded.to: given 1.0"),
+    "piece in space": ({"mesh__parts__loaded__to": [1, 2]}, "mesh.parts.loaded.to: given [1.0"),
+    "part named as a side": ({"mesh__parts__top": {"side": "left"}}, "a name that no side has"),
+    "recipe key": (
+        {"mesh": {"generator": "quarter_disc", "radios": 1}},
+        "mesh.radios: unknown key, did you mean radius?",
+    ),
+    "recipe value": ({"mesh": {"generator": "quarter_disc", "radius": -1}}, "mesh.radius"),
+    "parameters of a grid": ({"mesh__parameters": {"radius": 1}}, "mesh.parameters.radius"),
+    "unknown part": ({"load__0__on": "laoded"}, "(did you mean loaded?)"),
+    "unknown contact part": ({"contact__on": "floor"}, "contact.on: given"),
+    "contact part clamped": ({"contact__on": "left"}, "a part that fixed.0 does not fix wholly"),
+    "nothing fixed": (
+        {"fixed": [{"on": "left", "displacement": ["free", "free"]}]},
+        "fixed.0.displacement: given",
+    ),
+    "only a potential fixed": (
+        {"fixed": [{"on": "left", "potential": 0}], "material__piezo": PIEZO},
+        "fixed: no displacement fixed",
+    ),
+    "components": ({"fixed__0__displacement": [0, 0, 0]}, "2 components in 2-D"),
+    "components in space": ({"mesh": box, "load__0__on": "top"}, "3 components in 3-D"),
+    "component": ({"fixed__0__displacement": [0, "fre"]}, "fixed.0.displacement.1: "),
+    "contradiction": (
+        {"fixed": [{"on": "left", "displacement": [0, v]} for v in (0, 1)]},
+        "fixed.1.displacement.1: given 1.0; accepted: 0.0, as fixed.0 has",
+    ),
+    "load nowhere": ({"load__0__on": None}, "load.0.on: neither; accepted: one of on and"),
+    "load of nothing": ({"load__0__traction": None}, "load.0.traction: missing; accepted: at"),
+    "body force on a part": ({"load__0__body_force": [0, 1]}, "load.0.body_force"),
+    "traction everywhere": ({"load__0": {"everywhere": True, "traction": [0, 1]}}, "body_force"),
+    "unknown name": ({"load__0__traction": ["10*w", 0]}, 'load.0.traction.0: "10*w": unknown name'),
+    "code": ({"contact__gap": "__import__('os')"}, "contact.gap: "),
+    "z in the plane": ({"load__0__traction": ["z", 0]}, "formulas in x and y in the plane"),
+    "power": ({"contact__gap": "9**9**9"}, "not finite"),
+    "negative gap": ({"contact__gap": -0.1}, "contact.gap: -0.1 is negative"),
+    "gap and shape": (
+        {"contact__foundation": {"shape": "plane", "point": [0, 0], "normal": [0, 1]}},
+        "both gap and foundation",
+    ),
+    "shape": ({"contact__foundation": {"shape": "cube"}}, 'accepted: "plane" or "sphere"'),
+    "normal": (
+        {
+            "contact__gap": None,
+            "contact__foundation": {"shape": "plane", "point": [0, 0], "normal": [0, 0]},
+        },
+        "contact.foundation.normal: given [0.0, 0.0]; accepted: a vector that is not zero",
+    ),
+    "layer": ({"contact__layer": 0.1}, 'contact.layer: given 0.1; accepted: layer with law = "com'),
+    "potential factor": (
+        {"contact__law": "compliance", "contact__potential_factor": 0.5},
+        "a number >= 1",
+    ),
+    "tresca without bound": ({"friction": {"law": "tresca"}}, "friction.bound: missing"),
+    "coulomb without mu": ({"friction": {"law": "coulomb"}}, "friction.mu: missing"),
+    "mu without friction": ({"friction__law": "none"}, 'friction.mu: given with law = "none"'),
+    "negative mu": ({"friction__mu": -0.3}, "friction.mu: -0.3 is negative"),
+    "slip law": ({"friction__mu": {"law": "rate", "rho": 1}}, 'accepted: "slip"'),
+    "radius": ({"friction": {"law": "none", "radius": 1}}, "friction.radius: given 1.0"),
+    "potential without piezo": ({"fixed": electrode}, "with [material.piezo] only"),
+    "charge without piezo": ({"load__0__charge": 1}, "load.0.charge: given 1.0"),
+    "electric without piezo": ({"electric": {"k_e": 1}}, "electric: given a table"),
+    "floating potential": ({"material__piezo": PIEZO}, "fixed: no potential fixed"),
+    "part of piezo": ({"material__piezo": {"e31": 1, "e33": 1}}, "material.piezo.e15: only e31"),
+    "both piezo": ({"material__piezo": {**PIEZO, **full}}, "both ways"),
+    "piezo matrix": ({"material__piezo": {**full, "e": [[0] * 5] * 3}}, "3 rows of 6 numbers"),
+    "permittivity asymmetric": (
+        {"material__piezo": {**full, "beta": [[1, 1, 0], [0, 1, 0], [0, 0, 1]]}},
+        "a symmetric matrix",
+    ),
+    "permittivity indefinite": (
+        {"material__piezo": {**full, "beta": [[1, 0, 0], [0, -1, 0], [0, 0, 1]]}},
+        "a positive definite matrix",
+    ),
+    "poling in the plane": (
+        {"material__piezo": {**PIEZO, "poling": [0, 0, 1]}, "fixed": electrode},
+        "an angle in the plane",
+    ),
+    "conductivity": (
+        {"material__piezo": PIEZO, "fixed": electrode, "electric": {"k_e": -1}},
+        "electric.k_e: given -1; accepted: a number >= 0",
+    ),
+    "method": ({"solver__method": "newtn"}, '"uzawa", "penalty" or "newton"'),
+    "augmentation": ({"solver__r": 0}, 'solver.r: given 0; accepted: "auto" or a number > 0'),
+    "augmentation text": ({"solver__r": "big"}, 'accepted: "auto" or a number > 0'),
+    "relaxation": ({"solver__relaxation": 2.0}, "between 0 and 2, both excluded"),
+    "tolerance": ({"solver__tolerance": 0.0}, "solver.tolerance: given 0.0"),
+    "loose inner loop": ({"solver__inner_tolerance": 1e-3}, "at most tolerance = 1e-08"),
+    "iterations": ({"solver__max_outer": 0}, "solver.max_outer: given 0"),
+    "levels": ({"solver__nested_levels": 3}, "nested_levels with nested = true"),
+    "output": ({"output": {"fields": "vtk"}}, '"vtx", "xdmf" or "none"'),
+    "title": ({"title": 3}, "title: given 3; accepted: a text"),
+}
+
+
+@pytest.mark.parametrize("name", BAD)
+def test_bad_cases_get_one_line_each(name):
+    changes, fragment = BAD[name]
+    with pytest.raises(InputError) as error:
+        parse_case(changed(**changes), source="bar.toml")
+    message = str(error.value)
+    assert message.startswith("bar.toml: ")
+    assert fragment in message
+    assert "\n" not in message and len(message) < 400
+
+
+@pytest.mark.parametrize(
+    ("content", "fragment"),
+    [
+        (b"[mesh\n", "line 1"),
+        (b"title = 'a'\nyoung 3\n", "line 2"),
+        (b"\xff\xfe", "UTF-8"),
+        (b"a = 1\na = 2\n", "not a TOML file"),
+        (b"", "material: missing"),
+    ],
+)
+def test_broken_files_name_the_file(tmp_path, content, fragment):
+    path = tmp_path / "broken.toml"
+    path.write_bytes(content)
+    with pytest.raises(InputError) as error:
+        load_case(path)
+    assert str(error.value).startswith(f"{path}: ") or not content
+    assert fragment in str(error.value) or not content
+
+
+def test_missing_files_name_the_file(tmp_path):
+    with pytest.raises(InputError, match=r"nowhere\.toml: No such file"):
+        load_case(tmp_path / "nowhere.toml")
+    with pytest.raises(InputError, match="directory"):
+        load_case(tmp_path)
+
+
+def test_overrides(bar):
+    case = load_case(
+        bar,
+        [
+            "material.young=2",
+            "material.law=linear",
+            "title=two words",
+            "load.0.traction=[0, '-10*x']",
+            "load.0.traction.0=y",
+            "friction.mu=0.3",
+            "output.fields=none",
+            "solver.nested = true",
+        ],
+    )
+    assert case.material.young == 2.0 and case.material.law == "linear"
+    assert case.title == "two words"
+    assert case.load[0].traction == (Expression("y"), Expression("-10*x"))
+    assert case.friction.mu == Expression(0.3)
+    assert case.output.fields == "none" and case.solver.nested
+    assert load_case(bar, {"material.young": "2"}).material.young == 2.0
+
+
+@pytest.mark.parametrize(
+    ("override", "fragment"),
+    [
+        ("material.young", "no assignment; accepted: path.to.key=value"),
+        ("=3", "no assignment"),
+        ("material.yung=3", "did you mean young?"),
+        ("load.1.on=top", "load has no entry 1; accepted: 0"),
+        ("load.x.on=top", "load has no entry x"),
+        ("load.-1.on=top", "load has no entry -1"),
+        ("material.young.x=3", "material.young is 1.0, no table"),
+        ("load.0.traction=[0, y]", "broken"),
+        ("title='open", "broken"),
+        ("material.young=nan", "given nan"),
+        ("material.young=1\nmaterial.poisson=0", "material.young: given"),
+        ("material.young=", "broken"),
+    ],
+)
+def test_bad_overrides(bar, override, fragment):
+    with pytest.raises(InputError) as error:
+        load_case(bar, [override])
+    assert str(error.value).startswith(f"{bar}: ")
+    assert fragment in str(error.value) and "\n" not in str(error.value)
+
+
+def test_what_only_the_mesh_can_tell():
+    case = parse_case(changed(mesh={"generator": "quarter_disc"}), source="disc.toml")
+    case.check_mesh(2, ["left", "loaded", "bottom"])
+    with pytest.raises(InputError, match=r"disc\.toml: contact\.on: given .* accepted: a part"):
+        case.check_mesh(2, ["left", "loaded", "arc"])
+    with pytest.raises(InputError, match=r"fixed\.0\.displacement: given .* 3 components in 3-D"):
+        case.check_mesh(3, ["left", "loaded", "bottom"])
+
+
+def test_every_key_is_described():
+    sections = [Case]
+    for section in sections:
+        for key, field in keys_of(section).items():
+            assert field.description, f"{section.__name__}.{key}"
+            sections += sections_of(field.annotation).values()
+    assert len(sections) == 16
+
+
+def test_the_reference_page_is_up_to_date():
+    assert reference.PAGE.read_text() == reference.page(), "run python3 -m contact.reference"
+
+
+def test_petsc_options_are_told_from_ours():
+    line = "solve a.toml --out out --set a.b=1 -ksp_type cg --quiet -mat_view -eps -1.5 --set c=2"
+    options, petsc = parse(line.split())
+    assert (options.case, options.out, options.quiet, options.plot) == (
+        "a.toml",
+        "out",
+        True,
+        False,
+    )
+    assert options.set == ["a.b=1", "c=2"]
+    assert petsc == "-ksp_type cg -mat_view -eps -1.5".split()
+    assert parse("check a.toml -help -history".split())[1] == ["-help", "-history"]
+
+
+@pytest.mark.parametrize(
+    ("line", "fragment"),
+    [
+        ("", "accepted: usage: contact"),
+        ("solv a.toml", "solv"),
+        ("solve", "CASE.toml"),
+        ("solve a.toml", "--out"),
+        ("solve a.toml b.toml --out out", "b.toml: one argument too many"),
+        ("solve a.toml --out out --plto", "did you mean --plot?"),
+        ("solve nowhere.toml --out out", "nowhere.toml: No such file"),
+        ("solve BAR --out out --set material.young=0", "material.young: given 0"),
+        ("solve BAR --out BAR/out", "is not a folder"),
+        ("check BAR --set contact.on=flor", "contact.on"),
+    ],
+)
+def test_bad_command_lines_leave_with_status_2(bar, capsys, monkeypatch, line, fragment):
+    monkeypatch.chdir(bar.parent)
+    assert main(line.replace("BAR", str(bar)).split()) == 2
+    message = capsys.readouterr().err
+    assert fragment in message
+    assert message.count("\n") == 1 and message.startswith("contact: ")
+    assert sorted(path.name for path in bar.parent.iterdir()) == ["bar.toml"]
+
+
+def test_check_prints_the_case_the_parts_and_the_unknowns(bar, capsys):
+    assert main(["check", str(bar), "--set", "solver.method=uzawa"]) == 0
+    text = capsys.readouterr().out
+    assert parse_case(tomllib.loads(text), source=str(bar)) == load_case(
+        bar, ["solver.method=uzawa"]
+    )
+    assert "32 cells in 2-D" in text
+    assert "loaded  4" in text
+    assert "unknowns: 54 (2 a node)" in text
+    assert "blas: " in text
+
+
+@pytest.mark.parametrize(
+    ("paths", "name"),
+    [
+        (["/usr/lib/x86_64-linux-gnu/blas/libblas.so.3.12.1"], "reference"),
+        (["/usr/lib/x86_64-linux-gnu/openblas-pthread/libblas.so.3"], "OpenBLAS"),
+        (["/opt/conda/lib/libopenblasp-r0.3.29.so"], "OpenBLAS"),
+        (["/opt/mkl/libmkl_core.so.2", "/opt/mkl/libmkl_rt.so"], "MKL"),
+        (["/usr/lib64/libflexiblas.so.3.4"], "FlexiBLAS"),
+        (
+            [
+                "/x/numpy.libs/libscipy_openblas64_.so",
+                "/usr/lib/x86_64-linux-gnu/blas/libblas.so.3",
+            ],
+            "reference",
+        ),
+        (["/lib/libc.so.6"], "unknown"),
+    ],
+)
+def test_the_blas_is_told_from_the_loaded_libraries(paths, name):
+    assert identify(paths).name == name
+    assert identify(paths).is_reference == (name == "reference")
+
+
+def test_messages_show_values_as_in_the_file():
+    with pytest.raises(InputError) as error:
+        parse_case(changed(title=["long"] * 50))
+    given = str(error.value).split("given ")[1].split("; accepted")[0]
+    assert len(given) == 60 and given.startswith(json.dumps(["long"])[:-1])
