@@ -56,6 +56,8 @@ def residual_forces(problem: ContactProblem, forces: Multipliers) -> Array:
     trace.add(residual, trace.weight[:, None] * forces.vectors(problem))
     pressure = total_pressure(problem, nodal, forces)
     trace.add(residual, trace.weight[:, None] * problem.response.force(nodal, pressure))
+    if problem.held is not None:
+        problem.held.add_force(residual, problem.x.x.array)
     return residual
 
 

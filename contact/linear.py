@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from dolfinx import fem
 from dolfinx.fem.petsc import assemble_matrix, create_matrix
+from numpy.typing import NDArray
 from petsc4py import PETSc
 
 from contact.errors import InputError
@@ -78,12 +79,17 @@ class LinearOperator:
             Whether the bulk form has not changed since the last call with the same form:
             nothing is done when the blocks are the same too.
         """
+        nodes = self.problem.trace.nodes
+        if self.problem.held is not None:
+            held = self.problem.held.block(self.problem.x.x.array)
+            nodes = np.concatenate([nodes, self.problem.held.nodes])
+            blocks = np.concatenate([blocks, held])
         same = constant and form is self._form and self._blocks is not None
         if same and self._all(np.array_equal(blocks, self._blocks)):
             return
         self.matrix.zeroEntries()
         assemble_matrix(self.matrix, form, bcs=self.problem.bcs)
-        self._add(blocks)
+        self._add(nodes, blocks)
         self.matrix.assemble()
         self.matrix.setOption(PETSc.Mat.Option.SYMMETRIC, self._symmetric)
         self._form, self._blocks = form, blocks.copy()
@@ -94,13 +100,12 @@ class LinearOperator:
     def _all(self, flag: bool) -> bool:
         return bool(self.problem.comm.allreduce(int(flag)) == self.problem.comm.size)
 
-    def _add(self, blocks: Array) -> None:
-        trace = self.problem.trace
-        free = self.problem.free[trace.nodes].astype(float)
+    def _add(self, at: NDArray[np.int32], blocks: Array) -> None:
+        free = self.problem.free[at].astype(float)
         masked = blocks * free[:, :, None] * free[:, None, :]
         self.matrix.assemble()
-        rows = np.arange(trace.nodes.size + 1, dtype=PETSc.IntType)
-        nodes = trace.nodes.astype(PETSc.IntType)
+        rows = np.arange(at.size + 1, dtype=PETSc.IntType)
+        nodes = at.astype(PETSc.IntType)
         self.matrix.setValuesBlockedLocalIJV(
             rows, nodes, masked, addv=PETSc.InsertMode.ADD_VALUES, rowmap=nodes
         )

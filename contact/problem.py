@@ -21,10 +21,11 @@ from ufl.core.expr import Expr
 from contact.domain import Domain
 from contact.errors import InputError
 from contact.foundation import Foundation
+from contact.held import HeldCurrent, held_current
 from contact.projections import Array
 from contact.response import Conductor, FoundationResponse, Layer
 from contact.smoothing import Smoothing
-from contact.trace import build_trace, free_components
+from contact.trace import build_trace, candidates, free_components
 from forms.hencky import Hencky, Linear, secant_form
 from forms.laws import FrictionCoefficient
 from forms.piezo import Piezo, symmetrised_form
@@ -179,6 +180,16 @@ class ContactProblem:
         )
         self.trace = self.response.constrained_trace
         self.smoothing = Smoothing(self.trace, self.friction.radius)
+        self.held: HeldCurrent | None = None
+        if conductor is not None and self.piezoelectric:
+            self.held = held_current(
+                candidates(domain, self.space, contact.on),
+                contact.foundation,
+                self.free,
+                self.trace,
+                conductor,
+                self.phi_scale,
+            )
         self.tresca = None
         if self.friction.tresca is not None:
             self.tresca = np.asarray(self.friction.tresca.numpy(self.trace.points), dtype=float)

@@ -121,6 +121,40 @@ def free_components(space: fem.FunctionSpace, bcs: Sequence[fem.DirichletBC]) ->
     return free.reshape(-1, bs)
 
 
+@dataclass(frozen=True)
+class Candidates:
+    """The owned nodes of a boundary part, with their areas and the body's normals.
+
+    Attributes
+    ----------
+    nodes, points, weight, normal
+        As in `ContactTrace`, whatever is fixed there.
+    """
+
+    nodes: NDArray[np.int32]
+    points: Array
+    weight: Array
+    normal: Array
+
+
+def candidates(domain: Domain, space: fem.FunctionSpace, part: str) -> Candidates:
+    """Collect the nodes of a boundary part whose area is not zero. Collective."""
+    d = domain.dim
+    v = ufl.TestFunction(space)
+    nu = ufl.FacetNormal(domain.mesh)
+    ds = domain.ds(part)
+    weight = _assembled(space, v[0] * ds)[:, 0]
+    normal = _assembled(space, sum(nu[i] * v[i] for i in range(d)) * ds)[:, :d]
+
+    measure = domain.comm.allreduce(weight.sum(), op=MPI.SUM)
+    count = domain.comm.allreduce(int(np.count_nonzero(weight)), op=MPI.SUM)
+    # Nodes whose basis function has no mean on Gamma_3 (P2 vertices of triangles) carry none.
+    nodes = np.flatnonzero(weight > 1e-9 * measure / max(count, 1)).astype(np.int32)
+    points = space.tabulate_dof_coordinates()[nodes, :d]
+    normal = normal[nodes] / np.linalg.norm(normal[nodes], axis=1)[:, None]
+    return Candidates(nodes, points, weight[nodes], normal)
+
+
 def build_trace(
     domain: Domain,
     space: fem.FunctionSpace,
@@ -140,32 +174,23 @@ def build_trace(
         If no contact node is left on any rank.
     """
     d = domain.dim
-    v = ufl.TestFunction(space)
-    nu = ufl.FacetNormal(domain.mesh)
-    ds = domain.ds(part)
-    weight = _assembled(space, v[0] * ds)[:, 0]
-    normal = _assembled(space, sum(nu[i] * v[i] for i in range(d)) * ds)[:, :d]
-
-    measure = domain.comm.allreduce(weight.sum(), op=MPI.SUM)
-    count = domain.comm.allreduce(int(np.count_nonzero(weight)), op=MPI.SUM)
-    # Nodes whose basis function has no mean on Gamma_3 (P2 vertices of triangles) carry none.
-    nodes = np.flatnonzero(weight > 1e-9 * measure / max(count, 1)).astype(np.int32)
-    points = space.tabulate_dof_coordinates()[nodes, :d]
-    normal = normal[nodes] / np.linalg.norm(normal[nodes], axis=1)[:, None]
-    direction, gap = foundation.measure(points, normal)
+    found = candidates(domain, space, part)
+    nodes, points, weight = found.nodes, found.points, found.weight
+    direction, gap = foundation.measure(points, found.normal)
 
     free = free_components(space, bcs)[nodes, :d]
     admissible = direction * free
     length = np.linalg.norm(admissible, axis=1)
     # A gap is infinite where the body's normal does not lead to the foundation.
     keep = (length > 0.5) & np.isfinite(gap)
-    nodes, points, gap, free = nodes[keep], points[keep], gap[keep], free[keep]
+    nodes, points, weight = nodes[keep], points[keep], weight[keep]
+    gap, free = gap[keep], free[keep]
     direction = admissible[keep] / length[keep, None]
     gap = gap / length[keep]
     tangent = -direction[:, :, None] * direction[:, None, :]
     tangent[:, np.arange(d), np.arange(d)] += free
     trace = ContactTrace(
-        domain.comm, nodes, points, weight[nodes], direction, tangent, gap,
+        domain.comm, nodes, points, weight, direction, tangent, gap,
         space.dofmap.index_map_bs,
     )
     if trace.size == 0:
