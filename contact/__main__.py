@@ -131,7 +131,7 @@ def _solve(case: Case, options: argparse.Namespace, comm: MPI.Intracomm) -> int:
         write_figures(solution, out)
     reason = solution.outcome.reason
     if comm.rank == 0 and not options.quiet:
-        state = "converged" if solution.converged else "not converged"
+        state = "converged" if solution.converged else "stopped"
         print(f"{state}: {reason}; results in {out}")
     if solution.converged:
         return CONVERGED

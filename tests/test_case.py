@@ -2,7 +2,9 @@
 
 import json
 import pickle
+import sys
 import tomllib
+import types
 
 import numpy as np
 import pytest
@@ -425,6 +427,20 @@ def test_bad_command_lines_leave_with_status_2(bar, capsys, monkeypatch, line, f
     assert fragment in message
     assert message.count("\n") == 1 and message.startswith("contact: ")
     assert sorted(path.name for path in bar.parent.iterdir()) == ["bar.toml"]
+
+
+@pytest.mark.parametrize(("limit", "status"), [(100, 0), (1, 1)])
+def test_exit_status_and_outputs_of_a_solve(bar, capsys, monkeypatch, limit, status):
+    written = []
+    output = types.ModuleType("contact.output")
+    output.write_outputs = lambda solution, out: written.append((solution.converged, out))
+    monkeypatch.setitem(sys.modules, "contact.output", output)
+    changes = ["--set", "solver.method=uzawa", "--set", f"solver.max_outer={limit}"]
+    assert main(["solve", str(bar), "--out", str(bar.parent / "out"), *changes]) == status
+    assert written == [(status == 0, bar.parent / "out")]
+    shown = capsys.readouterr()
+    assert shown.out.startswith("stopped: " if status else "converged: ")
+    assert "iteration 0" in shown.err
 
 
 def test_check_prints_the_case_the_parts_and_the_unknowns(bar, capsys):
