@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass, replace
+
 import numpy as np
 import pytest
+from compliance_cases import PIEZO_REGIMES, REGIMES, LayerColumn
+from helpers import solve
 from mpi4py import MPI
 
 from contact.response import Conductor, FoundationResponse, Layer
+from contact.state import nodal_iterate
 from contact.trace import ContactTrace
 from forms.laws import (
     Compliance,
@@ -15,6 +20,7 @@ from forms.laws import (
     ShiftedConductivity,
     Truncation,
 )
+from forms.ops import positive_part
 
 
 def random_trace(n: int, dim: int, block_size: int, rng: np.random.Generator) -> ContactTrace:
@@ -59,3 +65,91 @@ def test_block_is_the_symmetric_part_without_the_frozen_factors():
     assert np.allclose(block, block.transpose(0, 2, 1), rtol=1e-14)
     # Without dependence of h_nu on the potential and of psi on the gap nothing is left out.
     assert np.allclose(block, response.jacobian(x, np.zeros(50)), rtol=1e-14)
+
+
+def check_column(column: LayerColumn, dim: int = 2, degree: int = 1, **options) -> str:
+    """Compare the fixed point with the exact solution; return the regime."""
+    u_n, potential, layer, rest, regime = column.solution()
+    problem = column.problem(dim, degree)
+    loop = solve(problem, tolerance=1e-11, **options)
+    nodal = nodal_iterate(problem)
+    assert np.abs(problem.trace.normal_component(nodal) - u_n).max() < 1e-10
+    assert np.abs(problem.response.layer_pressure(nodal) - layer).max() < 1e-10 * max(layer, 1)
+    assert np.abs(loop.forces.pressure - rest).max() < 1e-10 * max(layer + rest, 1)
+    if column.piezo:
+        assert np.abs(problem.phi_scale * nodal[:, -1] - potential).max() < 1e-10
+    return regime
+
+
+@pytest.mark.parametrize("regime", REGIMES)
+@pytest.mark.parametrize(("dim", "degree"), [(2, 1), (2, 2), (3, 1)])
+def test_elastic_column(regime, dim, degree):
+    assert check_column(REGIMES[regime], dim, degree) == regime
+
+
+@pytest.mark.parametrize("regime", PIEZO_REGIMES)
+@pytest.mark.parametrize(("dim", "degree"), [(2, 1), (2, 2), (3, 1)])
+def test_piezoelectric_column_with_potential_dependent_stiffness(regime, dim, degree):
+    assert check_column(PIEZO_REGIMES[regime], dim, degree) == regime
+
+
+@pytest.mark.parametrize("regime", PIEZO_REGIMES)
+def test_insulated_piezoelectric_column_without_dependence(regime):
+    column = replace(PIEZO_REGIMES[regime], k_e=0.0, h_nu=PotentialFactor(60.0))
+    assert check_column(column) == regime
+
+
+def test_current_through_a_gap_that_closes():
+    column = replace(PIEZO_REGIMES["linear"], delta=4.0)
+    assert check_column(column) == "linear"
+
+
+@pytest.mark.parametrize("push", [0.3, 0.8, 2.0])
+def test_no_rigid_part(push):
+    column = LayerColumn(push, gap=np.inf, p_nu=Compliance(np.inf))
+    assert check_column(column) == "linear"
+
+
+@dataclass(frozen=True)
+class Quadratic:
+    """A user's law: p_nu(s) = [s]^+^2."""
+
+    def __call__(self, s):
+        return positive_part(s) ** 2
+
+    def derivative(self, s):
+        return 2 * positive_part(s)
+
+
+@dataclass(frozen=True)
+class Softening:
+    """A user's stiffness: h_nu(s) = 900 / (1 + s^2/8)."""
+
+    def __call__(self, s):
+        return 900.0 / (1 + s**2 / 8)
+
+    def derivative(self, s):
+        return -900.0 * s / 4 / (1 + s**2 / 8) ** 2
+
+
+@pytest.mark.parametrize("push", [0.05, 0.3, 2.0])
+@pytest.mark.parametrize("piezo", [False, True])
+def test_laws_of_the_user(push, piezo):
+    column = LayerColumn(push, piezo, Quadratic(), Softening(), k_e=0.3)
+    assert check_column(column) == {0.05: "open", 0.3: "linear", 2.0: "rigid"}[push]
+
+
+def test_a_stiff_column_does_not_cycle_between_open_and_saturated():
+    # With the layer linearised about an iterate, each slope leads back to the other state.
+    column = LayerColumn(0.12, p_nu=Compliance(1e-4), h_nu=PotentialFactor(1e4))
+    assert check_column(column) == "linear"
+
+
+@pytest.mark.parametrize("regime", ["linear", "saturated", "rigid"])
+def test_lagged_layer_reaches_the_same_solution(regime):
+    # As in the thesis; it contracts only where the layer is softer than the column.
+    h_nu = PotentialFactor(15.0, 1.5, 8.0)
+    pushes = {"linear": 0.18, "saturated": 0.3, "rigid": 0.8}
+    for piezo in (False, True):
+        column = LayerColumn(pushes[regime], piezo, h_nu=h_nu, p_nu=Compliance(0.06))
+        assert check_column(replace(column, lagged=True)) == regime
