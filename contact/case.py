@@ -14,9 +14,10 @@ from typing import Annotated, Any
 from pydantic import Field, PrivateAttr, ValidationError, model_validator
 from pydantic_core import PydanticCustomError
 
-from contact.case_body import Fixed, Load, Material, Mesh, Piece, Piezo, Space
+from contact.case_body import Fixed, Load, Material, Piezo, Space
 from contact.case_checks import check_mesh, check_sections
 from contact.case_contact import Contact, Electric, Friction, Plane, SlipLaw, Sphere
+from contact.case_mesh import Mesh, Piece
 from contact.case_messages import describe, describe_fault
 from contact.case_overrides import override
 from contact.case_solver import DEFAULT_METHOD, Output, Solver

@@ -11,7 +11,7 @@ from pydantic.fields import FieldInfo
 from pydantic_core import ErrorDetails, PydanticCustomError
 
 from contact.case_types import UNKNOWN, Section, Words, accepted_by, sections_of
-from contact.expressions import shown
+from contact.formulas import shown
 
 
 def keys_of(section: type[Section]) -> dict[str, FieldInfo]:

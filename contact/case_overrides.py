@@ -7,7 +7,7 @@ from collections.abc import Iterable, Mapping
 from typing import Any
 
 from contact.errors import InputError
-from contact.expressions import shown
+from contact.formulas import shown
 
 
 def override(

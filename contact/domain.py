@@ -15,7 +15,7 @@ from contact.msh import from_msh, from_recipe
 from contact.parts import Domain, exterior_facets, rotate, tagged
 
 if TYPE_CHECKING:
-    from contact.case_body import Mesh as MeshSection
+    from contact.case_mesh import Mesh as MeshSection
 
 __all__ = [
     "Domain",

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 import meshes
-from contact import expressions
+from contact import formulas
 from contact.case import Case
 from contact.case_messages import keys_of
 from contact.case_text import literal
@@ -40,7 +40,7 @@ Lengths, forces and charges are in any consistent system of units; no key has a 
 An unknown key is an error.
 
 **Formulas.** Where a number *or a formula* is accepted, a formula is a text of
-{expressions.ACCEPTED}.
+{formulas.ACCEPTED}.
 Functions have NumPy's meaning: `log` is natural, angles are in radians; `min` and `max` take two
 arguments or more. A comparison counts as 1 or 0. Formulas are parsed, never executed.
 """

@@ -7,7 +7,7 @@ from dolfinx import fem
 from dolfinx import mesh as dmesh
 from mpi4py import MPI
 
-from contact.case_body import Mesh as MeshSection
+from contact.case_mesh import Mesh as MeshSection
 from contact.domain import Piece, box, from_mesh, make_domain, rectangle, refined
 from contact.errors import InputError
 
