@@ -1,1 +1,51 @@
-"""Static frictional contact of Hencky and piezoelectric bodies with FEniCSx."""
+"""Static frictional contact of Hencky elasto-plastic and piezoelectric bodies.
+
+>>> from contact import load_case, solve
+>>> solution = solve(load_case("bar.toml"))  # doctest: +SKIP
+
+The names below are imported on first use, so that a program can import the package and still
+initialise PETSc with its own arguments.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from contact.build import build_problem
+    from contact.case import Case, load_case, parse_case
+    from contact.errors import InputError
+    from contact.output import write_outputs
+    from contact.solution import Solution
+    from contact.solving import solve, solve_problem
+
+_HOMES = {
+    "Case": "case",
+    "InputError": "errors",
+    "Solution": "solution",
+    "build_problem": "build",
+    "load_case": "case",
+    "parse_case": "case",
+    "solve": "solving",
+    "solve_problem": "solving",
+    "write_outputs": "output",
+}
+
+__all__ = [
+    "Case",
+    "InputError",
+    "Solution",
+    "build_problem",
+    "load_case",
+    "parse_case",
+    "solve",
+    "solve_problem",
+    "write_outputs",
+]
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _HOMES:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    return getattr(import_module(f"{__name__}.{_HOMES[name]}"), name)

@@ -8,7 +8,6 @@ from typing import Protocol
 
 import numpy as np
 
-from contact.errors import InputError
 from contact.projections import Array
 
 
@@ -93,11 +92,10 @@ class Sphere:
         """Return contact directions and gaps."""
         offset = points - np.asarray(self.centre)
         distance = np.linalg.norm(offset, axis=1)
-        if np.any(distance == 0):
-            raise InputError("contact.foundation: the sphere's centre is a contact node")
         outward = 1.0 if self.inside else -1.0
         if self.direction == "foundation":
-            radial = offset / distance[:, None]
+            # The centre itself has none: NaN, which `build_trace` refuses on all ranks together.
+            radial = offset / np.where(distance > 0, distance, np.nan)[:, None]
             return outward * radial, outward * (self.radius - distance)
         # The ray x + t nu meets the sphere where |offset + t nu| = radius.
         along = np.einsum("ni,ni->n", offset, body_normal)

@@ -1,4 +1,4 @@
-"""Norms over the body."""
+"""Norms and volumes over the body."""
 
 from __future__ import annotations
 
@@ -8,9 +8,16 @@ import numpy as np
 import ufl
 from dolfinx import fem
 from dolfinx.fem.petsc import assemble_matrix
+from mpi4py import MPI
 
 from contact.problem import ContactProblem
 from contact.projections import Array
+
+
+def volume(problem: ContactProblem, measure: ufl.Measure) -> float:
+    """Return the volume or area that a UFL measure covers, over all ranks. Collective."""
+    form = fem.form(problem.constant(1.0) * measure)
+    return float(problem.comm.allreduce(fem.assemble_scalar(form), op=MPI.SUM))
 
 
 def domain_norm(problem: ContactProblem) -> Callable[[Array], float]:

@@ -27,8 +27,8 @@ from contact.response import Conductor, FoundationResponse, Layer
 from contact.smoothing import Smoothing
 from contact.trace import build_trace, candidates, free_components
 from forms.hencky import Hencky, Linear, secant_form
-from forms.laws import FrictionCoefficient
-from forms.piezo import Piezo, symmetrised_form
+from forms.laws import ConstantCoefficient, FrictionCoefficient
+from forms.piezo import Piezo, electric_load, symmetrised_form
 
 
 class Field(Protocol):
@@ -91,11 +91,14 @@ class Friction:
         A fixed bound S (stress), used instead of mu times the pressure.
     radius
         Radius of the smoothing operator R; 0 for R = identity.
+    mu
+        Coulomb's mu as a function of position, instead of `coefficient`.
     """
 
     coefficient: FrictionCoefficient | None = None
     tresca: Field | None = None
     radius: float = 0.0
+    mu: Field | None = None
 
 
 @dataclass(frozen=True)
@@ -167,6 +170,7 @@ class ContactProblem:
         self._frozen = fem.Function(self.space, name="frozen")
         self.phi_scale = 1.0
         if body.piezo is not None:
+            _check_piezo(body.piezo, self.dim)
             permittivity = float(np.trace(np.asarray(body.piezo.beta))) / 3
             self.phi_scale = float(np.sqrt(body.law.shear / permittivity))
         self.bcs = self._dirichlet()
@@ -179,6 +183,9 @@ class ContactProblem:
             trace, contact.layer, conductor, self.phi_scale, scale
         )
         self.trace = self.response.constrained_trace
+        if self.friction.mu is not None:
+            nodal = ConstantCoefficient(np.asarray(self.friction.mu.numpy(self.trace.points)))
+            self.friction = replace(self.friction, coefficient=nodal)
         self.smoothing = Smoothing(self.trace, self.friction.radius)
         self.held: HeldCurrent | None = None
         if conductor is not None and self.piezoelectric:
@@ -248,9 +255,10 @@ class ContactProblem:
         subspace = self.space.sub(component)
         scalar, _ = subspace.collapse()
         data = fem.Function(scalar)
-        points = scalar.tabulate_dof_coordinates()[:, : self.dim]
-        data.x.array[:] = np.asarray(value.numpy(points)) / scale
         dofs = fem.locate_dofs_topological((subspace, scalar), self.dim - 1, facets)
+        # On the part alone: a formula need not make sense elsewhere.
+        points = scalar.tabulate_dof_coordinates()[dofs[1], : self.dim]
+        data.x.array[dofs[1]] = np.asarray(value.numpy(points)) / scale
         return fem.dirichletbc(data, dofs, subspace)
 
     def constant(self, value: float) -> fem.Constant:
@@ -259,7 +267,7 @@ class ContactProblem:
 
     def _compile(self) -> None:
         mesh, d = self.domain.mesh, self.dim
-        law = _with_constants(self.body.law, self.constant)
+        law = with_constants(self.body.law, self.constant)
         trial, test = ufl.TrialFunction(self.space), ufl.TestFunction(self.space)
         degree = 1 if self.degree == 1 else (2 if self.linear_material else 4)
         dx = self.domain.dx(metadata={"quadrature_degree": degree})
@@ -299,23 +307,27 @@ class ContactProblem:
                         f"load on {load.on or 'the body'!r}: the force has {len(load.force)} "
                         f"components, the body has {d}"
                     )
-                terms += [self._expression(f, x) * v[i] for i, f in enumerate(load.force)]
+                terms += [self.expression(f, x) * v[i] for i, f in enumerate(load.force)]
             if load.pressure is not None:
                 nu = ufl.FacetNormal(self.domain.mesh)
-                terms.append(-self._expression(load.pressure, x) * ufl.dot(nu, v))
+                terms.append(-self.expression(load.pressure, x) * ufl.dot(nu, v))
             if load.charge is not None:
                 if xi is None:
                     raise InputError(
                         f"load on {load.on or 'the body'!r}: a charge needs a piezoelectric "
                         "material"
                     )
-                sign = -1.0 if load.on is None else 1.0
-                terms.append(sign * self._expression(load.charge, x) * xi)
+                charge = self.expression(load.charge, x)
+                if load.on is None:
+                    terms.append(electric_load(xi, body=charge))
+                else:
+                    terms.append(electric_load(xi, surface=charge))
             for term in terms:
                 total = term * measure if total is None else total + term * measure
         return total
 
-    def _expression(self, value: Field, x: Expr) -> Expr:
+    def expression(self, value: Field, x: Expr) -> Expr:
+        """Return a given function as UFL; a number becomes a form constant."""
         expression = value.ufl(x)
         if isinstance(expression, int | float | ufl.constantvalue.ScalarValue | ufl.classes.Zero):
             return self.constant(float(expression))
@@ -362,8 +374,17 @@ class ContactProblem:
         return self.friction.coefficient(slip) * smooth
 
 
-def _with_constants(law: Hencky, constant: Any) -> Hencky:
-    """Return the law with form constants for numbers, so that forms compile once a law."""
+def _check_piezo(piezo: Piezo, dim: int) -> None:
+    try:
+        piezo.check()
+        if dim == 2:
+            piezo.check_plane()
+    except ValueError as error:
+        raise InputError(f"piezoelectric material: {error}") from error
+
+
+def with_constants(law: Hencky, constant: Any) -> Hencky:
+    """Return a law with form constants for its numbers, so that forms compile once a law."""
     if not is_dataclass(law) or getattr(law, "g_min", 0.0) > 0:
         return law
     numbers = {

@@ -171,12 +171,16 @@ def build_trace(
     Raises
     ------
     InputError
-        If no contact node is left on any rank.
+        If no contact node is left on any rank, or one has no contact direction.
     """
     d = domain.dim
     found = candidates(domain, space, part)
     nodes, points, weight = found.nodes, found.points, found.weight
     direction, gap = foundation.measure(points, found.normal)
+    if domain.comm.allreduce(bool(np.isnan(direction).any()), op=MPI.LOR):
+        raise InputError(
+            "contact.foundation: a contact node has no contact direction (it is the sphere's centre)"
+        )
 
     free = free_components(space, bcs)[nodes, :d]
     admissible = direction * free

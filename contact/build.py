@@ -1,0 +1,245 @@
+"""From a case to a contact problem."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+
+import numpy as np
+from mpi4py import MPI
+from ufl.core.expr import Expr
+
+from contact import case as sections
+from contact import problem as parts
+from contact.domain import Domain, make_domain
+from contact.errors import InputError
+from contact.expressions import Expression
+from contact.foundation import Foundation, GapFunction, Plane, Sphere
+from contact.problem import ContactProblem
+from contact.projections import Array
+from contact.response import Conductor, Layer
+from contact.rigid import check_held
+from forms.hencky import Hencky, Linear, Log
+from forms.laws import (
+    Compliance,
+    ConstantCoefficient,
+    FrictionCoefficient,
+    PerfectConductivity,
+    PotentialFactor,
+    RampConductivity,
+    ShiftedConductivity,
+    SlipCoefficient,
+    Truncation,
+)
+from forms.piezo import Piezo, from_voigt
+
+
+def build_problem(
+    case: sections.Case,
+    comm: MPI.Intracomm = MPI.COMM_WORLD,
+    *,
+    domain: Domain | None = None,
+    law: Hencky | None = None,
+    coefficient: FrictionCoefficient | None = None,
+    foundation: Foundation | None = None,
+) -> ContactProblem:
+    """Build the problem that a case describes. Collective.
+
+    Parameters
+    ----------
+    case
+        The case.
+    comm
+        Communicator of the mesh.
+    domain, law, coefficient, foundation
+        Objects that replace the case's mesh, material law, Coulomb's mu and foundation.
+
+    Raises
+    ------
+    InputError
+        If the case does not fit the mesh, a formula has no value at a node or a wrong sign,
+        or the body is not held.
+    """
+    with _named(case.source):
+        domain = make_domain(case.mesh, comm) if domain is None else domain
+        case.check_mesh(domain.dim, domain.parts)
+        body = parts.Body(
+            material_law(case.material) if law is None else law,
+            [_fixed(i, fixed, domain.comm) for i, fixed in enumerate(case.fixed)],
+            [_load(i, load, domain.comm) for i, load in enumerate(case.load)],
+            None if case.material.piezo is None else piezo(case.material.piezo, domain.dim),
+        )
+        obstacle = _foundation(case.contact, domain) if foundation is None else foundation
+        problem = ContactProblem(
+            domain,
+            body,
+            parts.Contact(case.contact.on, obstacle, _layer(case.contact)),
+            _friction(case.friction, domain.comm, coefficient),
+            None if case.electric is None else _conductor(case.electric, domain.size),
+            case.space.degree,
+        )
+        finite = bool(np.isfinite(problem.external).all())
+        if not domain.comm.allreduce(finite, op=MPI.LAND):
+            raise InputError("load: a formula is not finite everywhere on its part")
+        check_held(problem)
+    return problem
+
+
+@contextmanager
+def _named(source: str) -> Iterator[None]:
+    """Let messages name the case file, as those of the case itself do."""
+    try:
+        yield
+    except InputError as error:
+        text = str(error)
+        raise InputError(text if text.startswith(source) else f"{source}: {text}") from error
+
+
+@dataclass(frozen=True)
+class NodalField:
+    """A formula of the case file, evaluated on all ranks together; messages name its key."""
+
+    key: str
+    expression: Expression
+    comm: MPI.Intracomm
+    minimum: float = -np.inf
+
+    def ufl(self, x: Expr) -> Expr:
+        """Return the formula as a UFL expression of the coordinates."""
+        return self.expression.ufl(x)
+
+    def numpy(self, points: Array) -> Array:
+        """Return the values at points of shape (n, d). Collective."""
+        try:
+            values = self.expression.numpy(points, self.comm)
+        except InputError as error:
+            raise InputError(f"{self.key}: {error}") from None
+        least = self.comm.allreduce(float(values.min(initial=np.inf)), op=MPI.MIN)
+        if least < self.minimum:
+            raise InputError(
+                f"{self.key}: {self.expression} is {least:g} at a node; accepted: values >= 0"
+            )
+        return values
+
+
+def material_law(section: sections.Material) -> Hencky:
+    """Return the material law of `[material]`."""
+    if section.law == "linear":
+        return Linear(section.young, section.poisson)
+    assert section.yield_strain is not None  # demanded by the section
+    return Log(
+        section.young,
+        section.poisson,
+        yield_strain=section.yield_strain,
+        argument=section.argument,
+        g_min=section.g_min,
+    )
+
+
+def piezo(section: sections.Piezo, dim: int) -> Piezo:
+    """Return the piezoelectric tensors of `[material.piezo]` in the axes of the body."""
+    material = from_voigt(*section.voigt)
+    if dim == 2:
+        angle = 90.0 if section.poling is None else float(section.poling)  # type: ignore[arg-type]
+        turn = np.deg2rad(angle - 90.0)
+        c, s = np.cos(turn), np.sin(turn)
+        return material.in_plane().rotated([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+    if section.poling is None:
+        return material
+    return material.rotated(_turn_to(np.asarray(section.poling, dtype=float)))
+
+
+def _turn_to(axis: Array) -> Array:
+    """Return the smallest rotation that turns z to an axis."""
+    x, y, z = axis / np.linalg.norm(axis)
+    if z < -1 + 1e-12:
+        return np.diag([1.0, -1.0, -1.0])
+    cross = np.array([[0.0, 0.0, x], [0.0, 0.0, y], [-x, -y, 0.0]])
+    return np.asarray(np.eye(3) + cross + cross @ cross / (1 + z))
+
+
+def _fixed(i: int, section: sections.Fixed, comm: MPI.Intracomm) -> parts.Fixed:
+    key = f"fixed.{i}"
+    displacement = None
+    if section.displacement is not None:
+        displacement = [
+            NodalField(f"{key}.displacement.{k}", c, comm) if isinstance(c, Expression) else None
+            for k, c in enumerate(section.displacement)
+        ]
+    return parts.Fixed(
+        section.on, displacement, _field(f"{key}.potential", section.potential, comm)
+    )
+
+
+def _load(i: int, section: sections.Load, comm: MPI.Intracomm) -> parts.Load:
+    key = f"load.{i}"
+    force = section.body_force if section.everywhere else section.traction
+    charge = section.body_charge if section.everywhere else section.charge
+    return parts.Load(
+        None if section.everywhere else section.on,
+        None if force is None else [NodalField(key, f, comm) for f in force],
+        _field(key, section.pressure, comm),
+        _field(key, charge, comm),
+    )
+
+
+def _field(
+    key: str, expression: Expression | None, comm: MPI.Intracomm, minimum: float = -np.inf
+) -> NodalField | None:
+    return None if expression is None else NodalField(key, expression, comm, minimum)
+
+
+def _foundation(section: sections.Contact, domain: Domain) -> Foundation:
+    match section.foundation:
+        case sections.Plane() as plane:
+            return Plane(plane.point, plane.normal, section.direction)
+        case sections.Sphere() as sphere:
+            return Sphere(sphere.centre, sphere.radius, sphere.inside, section.direction)
+    assert section.gap is not None  # filled in by the section
+    rounding = -1e-12 * domain.size
+    return GapFunction(NodalField("contact.gap", section.gap, domain.comm, rounding).numpy)
+
+
+def _layer(section: sections.Contact) -> Layer | None:
+    if section.law == "signorini":
+        return None
+    # Filled in by the section.
+    assert section.layer is not None
+    assert section.limit is not None
+    assert section.stiffness is not None
+    assert section.potential_factor is not None
+    assert section.potential_range is not None
+    factor = PotentialFactor(section.stiffness, section.potential_factor, section.potential_range)
+    return Layer(section.layer, Compliance(section.limit), factor, section.lagged)
+
+
+def _friction(
+    section: sections.Friction, comm: MPI.Intracomm, coefficient: FrictionCoefficient | None
+) -> parts.Friction:
+    if coefficient is not None:
+        return parts.Friction(coefficient, radius=section.radius)
+    if section.law == "none":
+        return parts.Friction()
+    if section.law == "tresca":
+        return parts.Friction(tresca=_field("friction.bound", section.bound, comm, 0.0))
+    mu = section.mu
+    if isinstance(mu, sections.SlipLaw):
+        return parts.Friction(SlipCoefficient(mu.a, mu.b, mu.rho), radius=section.radius)
+    assert mu is not None  # demanded by the section
+    if mu.is_constant:
+        return parts.Friction(ConstantCoefficient(mu.value), radius=section.radius)
+    field = NodalField("friction.mu", mu, comm, 0.0)
+    return parts.Friction(mu=field, radius=section.radius)
+
+
+def _conductor(section: sections.Electric, size: float) -> Conductor:
+    delta = 1e3 / size if section.delta is None else section.delta
+    laws = {"shifted": ShiftedConductivity, "ramp": RampConductivity}
+    psi = (
+        PerfectConductivity(section.k_e)
+        if section.law == "perfect"
+        else laws[section.law](section.k_e, delta)
+    )
+    limit = np.inf if section.limit is None else section.limit
+    return Conductor(psi, section.phi_f, Truncation(limit), section.lagged)

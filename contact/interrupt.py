@@ -1,0 +1,60 @@
+"""Stop a solve after the running outer iteration, on all ranks together."""
+
+from __future__ import annotations
+
+import signal
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+from types import FrameType
+
+from mpi4py import MPI
+
+from contact.report import Monitor, Record
+
+
+class Interrupted(Exception):
+    """A signal asked for the end of the solve."""
+
+
+@contextmanager
+def stop_on_signal(comm: MPI.Intracomm, monitor: Monitor | None) -> Iterator[Monitor]:
+    """Yield a monitor that raises `Interrupted` on all ranks after a SIGINT or SIGTERM on any.
+
+    Parameters
+    ----------
+    comm
+        Communicator of the problem.
+    monitor
+        Told of every iteration first.
+
+    Notes
+    -----
+    The first signal is noted, the second has its usual effect. Signals can be caught in the
+    main thread alone; in others nothing is changed.
+    """
+    caught: list[int] = []
+    before = {}
+
+    def note(number: int, frame: FrameType | None) -> None:
+        caught.append(number)
+        signal.signal(number, before[number])
+
+    def check(record: Record) -> None:
+        if monitor is not None:
+            monitor(record)
+        number = comm.allreduce(caught[0] if caught else 0, op=MPI.MAX)
+        if number:
+            raise Interrupted(f"interrupted ({signal.Signals(number).name})")
+
+    try:
+        if threading.current_thread() is threading.main_thread():
+            for number in (signal.SIGINT, signal.SIGTERM):
+                handler = signal.getsignal(number)
+                if handler is not None:  # None: not installed from Python, left alone
+                    before[number] = handler
+                    signal.signal(number, note)
+        yield check
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)

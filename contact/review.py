@@ -1,0 +1,61 @@
+"""What a solution is worth: assumption (h1) on its strains, and Theorem 3.1's condition."""
+
+from __future__ import annotations
+
+import numpy as np
+from mpi4py import MPI
+
+from contact.fields import DerivedFields
+from contact.norms import volume
+from contact.solution import Solution
+from forms.hencky import check_monotonicity
+
+
+def review(solution: Solution) -> None:
+    """Add what there is to say to the notes and warnings of a solution. Collective."""
+    solution.max_dev_strain = DerivedFields(solution.problem).largest_strain()
+    for text, good in (_monotonicity(solution), _uniqueness(solution)):
+        if text:
+            (solution.notes if good else solution.warnings).append(text)
+
+
+def _monotonicity(solution: Solution) -> tuple[str, bool]:
+    """Check (h1) on the strains of the solution."""
+    problem, strain = solution.problem, solution.max_dev_strain
+    if not np.isfinite(strain):
+        return "", True
+    report = check_monotonicity(problem.body.law, strain)
+    verdict = "holds" if report.holds else "does not hold: the material softens"
+    text = (
+        f"assumption (h1) {verdict} on the strains of this solution, |dev eps| <= {strain:.4g}: "
+        f"g <= g_0 = {report.g_0:.4g}, alpha = {report.alpha:.4g}, beta = {report.beta:.4g}"
+    )
+    return text, report.holds
+
+
+def _uniqueness(solution: Solution) -> tuple[str, bool]:
+    """Set mu* + L_mu beside the bound that a sliding block gives.
+
+    The constants of Theorem 3.1 cannot be computed. A block of height H under the pressure p
+    slides by s where G (U - s)/H = mu(s) p; the left-hand side falls faster than the right for
+    all s if L_mu < G/(p H), and only then is s unique for every U.
+    """
+    problem, coefficient = solution.problem, solution.problem.friction.coefficient
+    if coefficient is None:
+        return "", True
+    comm, trace = problem.comm, problem.trace
+    own = (coefficient.maximum, coefficient.lipschitz) if trace.nodes.size else (0.0, 0.0)
+    maximum, lipschitz = (comm.allreduce(value, op=MPI.MAX) for value in own)
+    pressure = solution.pressure
+    area = trace.sum((pressure > 0).astype(float))
+    mean = trace.sum(pressure) / area if area > 0 else 0.0
+    text = f"Theorem 3.1: unique if mu* + L_mu = {maximum:.4g} + {lipschitz:.4g} is small enough"
+    if lipschitz == 0 or mean <= 0:
+        return text, True
+    domain = problem.domain
+    height = volume(problem, domain.dx) / volume(problem, domain.ds(problem.contact.on))
+    bound = problem.body.law.shear / (mean * height)
+    text += f"; a sliding block under the mean pressure {mean:.4g} asks for L_mu < {bound:.4g}"
+    if lipschitz < bound:
+        return text, True
+    return f"{text}: several solutions may exist, and this is one reached from zero slip", False

@@ -1,0 +1,117 @@
+"""Is the body held? Rigid motions that supports, contact and friction leave free."""
+
+from __future__ import annotations
+
+import numpy as np
+from mpi4py import MPI
+from scipy.optimize import linprog
+
+from contact.errors import InputError
+from contact.problem import ContactProblem
+from contact.projections import Array
+
+#: Eigenvalues of the Gram matrices below are between 0 and about 1.
+ROUNDING = 1e-9
+
+
+def check_held(problem: ContactProblem) -> None:
+    """Check that no rigid motion is free, before anything is factorised. Collective.
+
+    Two things are asked for: supports and contact (in the tangential directions too if there
+    is friction) leave no rigid motion at all, and the loads do not pull the body off the
+    foundation where that alone holds it.
+
+    Raises
+    ------
+    InputError
+        If the body can move freely or is pulled off.
+    """
+    trace, d = problem.trace, problem.dim
+    points = problem.space.tabulate_dof_coordinates()[: problem.free.shape[0], :d]
+    centre, size = _centre(problem), problem.domain.size
+    fixed = ~problem.free[:, :d]
+    held = np.flatnonzero(fixed.any(axis=1))
+    motions = rigid_motions((points[held] - centre) / size) * fixed[held][:, :, None]
+    supports = _gram(problem, motions)
+    free = _null_space(supports)
+    if free.shape[1] == 0:
+        return
+    at_contact = rigid_motions((trace.points - centre) / size)
+    normal = np.einsum("ni,nim->nm", trace.normal, at_contact)
+    touching = _gram(problem, normal[:, None, :])
+    if problem.frictional:
+        touching = touching + _gram(problem, np.einsum("nij,njm->nim", trace.tangent, at_contact))
+    loose = _null_space(supports + touching)
+    if loose.shape[1] > 0:
+        raise InputError(
+            f"the body is not held: it can move as a rigid body ({_describe(loose, d)}); "
+            "accepted: displacement components fixed so that it cannot"
+        )
+    _check_loads(problem, free, normal, (points - centre) / size)
+
+
+def rigid_motions(points: Array) -> Array:
+    """Return the rigid motions at points of shape (n, d): shape (n, d, 3 or 6).
+
+    Translations come first, then rotations: about z in the plane, about x, y and z in space.
+    """
+    n, d = points.shape
+    motions = np.zeros((n, d, 3 if d == 2 else 6))
+    motions[:, np.arange(d), np.arange(d)] = 1.0
+    for k, (i, j) in enumerate([(0, 1)] if d == 2 else [(1, 2), (2, 0), (0, 1)]):
+        motions[:, i, d + k], motions[:, j, d + k] = -points[:, j], points[:, i]
+    return motions
+
+
+def _centre(problem: ContactProblem) -> Array:
+    """Return the mean of the contact nodes: rotations about it are well scaled."""
+    trace = problem.trace
+    weight = trace.sum(np.ones_like(trace.weight))
+    return np.array([trace.sum(x) for x in trace.points.T]) / weight
+
+
+def _gram(problem: ContactProblem, rows: Array) -> Array:
+    """Return the sum over all ranks of the products of rows (n, k, m), scaled to about 1."""
+    total = problem.comm.allreduce(np.einsum("nkm,nkl->ml", rows, rows), op=MPI.SUM)
+    scale = np.trace(total)
+    return np.asarray(total / scale if scale > 0 else total)
+
+
+def _null_space(gram: Array) -> Array:
+    """Return an orthonormal basis of the null space, shape (m, k)."""
+    values, vectors = np.linalg.eigh(gram)
+    return vectors[:, values < ROUNDING]
+
+
+def _describe(motions: Array, d: int) -> str:
+    """Name the axis motions that a space of rigid motions contains, or count it."""
+    names = ["translation along x", "translation along y"]
+    names += ["rotation"] if d == 2 else ["translation along z"]
+    names += [] if d == 2 else [f"rotation about {axis}" for axis in "xyz"]
+    contained = np.linalg.norm(motions, axis=1) > 1 - 1e-6
+    found = [name for name, inside in zip(names, contained, strict=True) if inside]
+    return ", ".join(found) or "translation and rotation combined"
+
+
+def _check_loads(problem: ContactProblem, free: Array, normal: Array, points: Array) -> None:
+    """Refuse loads that do work on a rigid motion away from the foundation.
+
+    With friction only a motion that leaves the foundation at every node is looked at: along
+    it no friction can act.
+    """
+    d, comm = problem.dim, problem.comm
+    external = problem.external.reshape(-1, problem.block_size)[:, :d]
+    local = np.einsum("ni,nim->m", external, rigid_motions(points))
+    work = comm.allreduce(local, op=MPI.SUM) @ free
+    scale = comm.allreduce(float(np.abs(external).sum()), op=MPI.SUM)
+    rows = problem.trace.gather(normal @ free)
+    pulled = False
+    if comm.rank == 0 and np.abs(work).max() > ROUNDING * scale:
+        bound = -ROUNDING - 1e-3 if problem.frictional else 0.0
+        motion = linprog(-work, rows, np.full(len(rows), bound), bounds=[(-1, 1)] * free.shape[1])
+        pulled = motion.status == 0 and -motion.fun > 1e-6 * scale
+    if comm.bcast(pulled):
+        raise InputError(
+            "the loads pull the body off the foundation, and no support holds it there; accepted: "
+            "loads that press it on, or more displacement components fixed"
+        )

@@ -1,0 +1,142 @@
+"""Solve a problem by the method that is asked for, and say what the result is worth."""
+
+from __future__ import annotations
+
+import logging
+import time
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any, Protocol
+
+from mpi4py import MPI
+
+from contact.build import build_problem
+from contact.case import Case, Solver, load_case
+from contact.fixed_point import FixedPoint, FixedPointOptions
+from contact.interrupt import Interrupted, stop_on_signal
+from contact.kkt import evaluate
+from contact.linear import Counters
+from contact.problem import ContactProblem
+from contact.report import History, Monitor, Outcome
+from contact.review import review
+from contact.solution import Solution
+from contact.state import Multipliers
+
+logger = logging.getLogger("contact.solve")
+
+
+class Method(Protocol):
+    """A solver: it moves the problem's iterate and can be asked at any time where it is."""
+
+    forces: Multipliers
+    history: History
+    counters: Counters
+
+    def solve(self) -> Outcome:
+        """Iterate until convergence or a limit. Collective."""
+
+
+def fixed_point(problem: ContactProblem, settings: Solver, monitor: Monitor | None) -> FixedPoint:
+    """Return the fixed point over block relaxation of `[solver]`: Algorithms 1, 4, 6 and 8."""
+    options = FixedPointOptions(
+        tolerance=settings.tolerance,
+        r=None if settings.r == "auto" else settings.r,
+        stopping=settings.stopping,
+        eps=settings.eps,
+        eps_fp=settings.eps_fp,
+        depth=settings.depth if settings.acceleration == "anderson" else 0,
+        over_relaxation=settings.relaxation,
+        single_loop=settings.single_loop,
+        inner_tolerance=settings.inner_tolerance,
+        material_step=settings.material_step,
+        max_outer=settings.max_outer,
+        max_inner=settings.max_inner,
+    )
+    return FixedPoint(problem, options, monitor)
+
+
+#: Method of `[solver]` -> its maker.
+METHODS: Mapping[str, Callable[[ContactProblem, Solver, Monitor | None], Method]] = {
+    "uzawa": fixed_point,
+}
+
+
+def solve(
+    case: Case | ContactProblem | str | Path,
+    settings: Solver | None = None,
+    monitor: Monitor | None = None,
+    comm: MPI.Intracomm = MPI.COMM_WORLD,
+    **replacements: Any,
+) -> Solution:
+    """Build and solve a case. Collective.
+
+    Parameters
+    ----------
+    case
+        A case, the name of a case file, or a problem that is built already.
+    settings
+        Method and tolerances; those of the case by default.
+    monitor
+        Told of every outer iteration.
+    comm
+        Communicator of the mesh.
+    replacements
+        Objects that take the place of parts of the case; see `build.build_problem`.
+
+    Raises
+    ------
+    InputError
+        If the case does not fit its mesh, or the body is not held.
+    """
+    begin = time.perf_counter()
+    if isinstance(case, ContactProblem):
+        return solve_problem(case, settings or Solver(), monitor)
+    case = case if isinstance(case, Case) else load_case(case)
+    problem = build_problem(case, comm, **replacements)
+    solution = solve_problem(problem, settings or case.solver, monitor)
+    solution.title, solution.output = case.title, case.output
+    solution.seconds["setup"] += time.perf_counter() - begin - sum(solution.seconds.values())
+    return solution
+
+
+def solve_problem(
+    problem: ContactProblem, settings: Solver, monitor: Monitor | None = None
+) -> Solution:
+    """Solve a problem. Collective.
+
+    An interrupt (Ctrl-C, or SIGTERM from a batch system) ends the solve after the running
+    outer iteration and keeps what was computed; a second one ends the program.
+
+    Raises
+    ------
+    InputError
+        If the linear system is singular: the body is not held.
+    """
+    begin = time.perf_counter()
+    with stop_on_signal(problem.comm, monitor) as stop:
+        method = METHODS[settings.method](problem, settings, stop)
+        setup = time.perf_counter() - begin
+        try:
+            outcome = method.solve()
+        except Interrupted as interrupt:
+            outcome = Outcome(False, str(interrupt), evaluate(problem, method.forces))
+    solution = Solution(
+        problem=problem,
+        forces=method.forces,
+        outcome=outcome,
+        history=method.history,
+        counters=method.counters,
+        method=settings.method,
+        seconds={
+            "setup": setup,
+            "solve": time.perf_counter() - begin - setup,
+            "output": 0.0,
+        },
+    )
+    review(solution)
+    if problem.comm.rank == 0:
+        for note in solution.notes:
+            logger.info(note)
+        for warning in solution.warnings:
+            logger.warning(warning)
+    return solution
