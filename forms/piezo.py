@@ -5,6 +5,14 @@ Sign convention, stated once, equations (1.23) and (8.2), with the potential phi
     sigma = F eps(u) + e^T grad(phi),     (e^T grad phi)_jk = e_ijk phi_,i
     D     = e eps(u) - beta grad(phi),    D_i = e_ijk eps_jk - beta_ij phi_,j
 
+With the outward normal, D.nu = q_2 on a charged part, div D = q_0 in the body and
+D.nu = psi(u_nu - rho) phi_L(phi - phi_F) on a conductive foundation. Tested with xi, the saddle
+form takes these as - q_2 xi, + q_0 xi and + psi phi_L xi; the symmetrised form, in which xi is
+negated, with the opposite signs (`electric_load`, and `forms.foundation.electric_contact`).
+
+The stored energy is (1/2) eps : F eps + (1/2) E . beta E with E = -grad(phi): the coupling
+does no work on its own, so that it is positive if F and beta are, whatever e.
+
 Tensors are three-dimensional. A plane body lies in (x, y) = (X2, X3) of the crystal, whose
 axis X3 is that of poling; X1 points out of the plane.
 """
@@ -44,10 +52,64 @@ class Piezo:
     beta: NDArray[np.float64] | Expr
 
     def rotated(self, rotation: ArrayLike) -> Piezo:
-        """Return the material turned by a rotation matrix of shape (3, 3)."""
+        """Return the material turned by a rotation matrix of shape (3, 3).
+
+        Raises
+        ------
+        ValueError
+            If the matrix is no rotation.
+        """
         q = np.asarray(rotation, dtype=float)
+        if q.shape != (3, 3) or not np.allclose(q @ q.T, np.eye(3), atol=1e-12):
+            raise ValueError("a rotation must be an orthogonal 3 x 3 matrix")
+        if np.linalg.det(q) < 0:
+            raise ValueError("a rotation must have the determinant +1, not -1")
         e = np.einsum("ia,jb,kc,abc->ijk", q, q, q, self.e)
         return Piezo(e, q @ np.asarray(self.beta) @ q.T)
+
+    def poled_along(self, axis: ArrayLike) -> Piezo:
+        """Return a material poled along z, turned the shortest way to another axis."""
+        x, y, z = np.asarray(axis, dtype=float) / np.linalg.norm(axis)
+        if z < -1 + 1e-12:
+            return self.rotated(np.diag([1.0, -1.0, -1.0]))
+        cross = np.array([[0.0, 0.0, x], [0.0, 0.0, y], [-x, -y, 0.0]])
+        return self.rotated(np.eye(3) + cross + cross @ cross / (1 + z))
+
+    def check(self) -> None:
+        """Check the tensors, however they were made.
+
+        Raises
+        ------
+        ValueError
+            If a shape is wrong, e_ijk is not symmetric in jk, or beta is not symmetric and
+            positive definite: the stored energy would not be positive.
+        """
+        e, beta = np.asarray(self.e, dtype=float), np.asarray(self.beta, dtype=float)
+        if e.shape != (3, 3, 3) or beta.shape != (3, 3):
+            raise ValueError(f"e must be 3 x 3 x 3 and beta 3 x 3; got {e.shape} and {beta.shape}")
+        if not (np.all(np.isfinite(e)) and np.all(np.isfinite(beta))):
+            raise ValueError("e and beta must be finite")
+        if not np.allclose(e, e.transpose(0, 2, 1), rtol=1e-10, atol=1e-12 * np.abs(e).max()):
+            raise ValueError("the coupling e_ijk must be symmetric in its last two indices")
+        if not np.allclose(beta, beta.T, rtol=1e-10, atol=1e-12 * np.abs(beta).max()):
+            raise ValueError("the permittivity beta must be symmetric")
+        if not np.all(np.linalg.eigvalsh(beta) > 0):
+            raise ValueError("the permittivity beta must be positive definite")
+
+    def check_plane(self) -> None:
+        """Check that a plane body in (x, y) stays plane.
+
+        Raises
+        ------
+        ValueError
+            If a field in the plane would shear the body out of it (e_ij3 with i, j < 3).
+        """
+        e = np.asarray(self.e, dtype=float)
+        if np.abs(e[:2, :2, 2]).max() > 1e-10 * np.abs(e).max():
+            raise ValueError(
+                "the crystal couples fields in the plane with shear out of it: plane strain "
+                "does not hold; turn the crystal or solve in space"
+            )
 
     def in_plane(self) -> Piezo:
         """Return the material with the crystal's (X2, X3, X1) along the body's (x, y, z)."""
@@ -67,14 +129,12 @@ def from_voigt(e: ArrayLike, beta: ArrayLike) -> Piezo:
     e, beta = np.asarray(e, dtype=float), np.asarray(beta, dtype=float)
     if e.shape != (3, 6) or beta.shape != (3, 3):
         raise ValueError(f"e must be 3 x 6 and beta 3 x 3; got {e.shape} and {beta.shape}")
-    if not np.allclose(beta, beta.T, rtol=1e-10, atol=0):
-        raise ValueError("the permittivity beta must be symmetric")
-    if not np.all(np.linalg.eigvalsh(beta) > 0):
-        raise ValueError("the permittivity beta must be positive definite")
     tensor = np.zeros((3, 3, 3))
     for column, (j, k) in enumerate(VOIGT):
         tensor[:, j, k] = tensor[:, k, j] = e[:, column]
-    return Piezo(tensor, beta)
+    material = Piezo(tensor, beta)
+    material.check()
+    return material
 
 
 def hexagonal(e31: float, e33: float, e15: float, beta11: float, beta33: float) -> Piezo:
@@ -83,6 +143,24 @@ def hexagonal(e31: float, e33: float, e15: float, beta11: float, beta33: float) 
     e[2, :3] = e31, e31, e33
     e[0, 4] = e[1, 3] = e15
     return from_voigt(e, np.diag([beta11, beta11, beta33]))
+
+
+def coupling_number(law: Hencky, piezo: Piezo) -> float:
+    """Return the largest eps : e^T beta^-1 e eps / (eps : F eps) over all strains.
+
+    It is the square of the electromechanical coupling: how much stiffer the body becomes
+    without electrodes. diag(F, beta) preconditions the symmetrised form to a spectrum that it
+    alone bounds, whatever the units and the mesh.
+    """
+    # In the orthonormal (Mandel) basis of symmetric tensors, eps : F eps is a plain product.
+    basis = np.zeros((6, 3, 3))
+    for n, (j, k) in enumerate(VOIGT):
+        basis[n, j, k] = basis[n, k, j] = 1.0 if j == k else np.sqrt(0.5)
+    trace = np.trace(basis, axis1=1, axis2=2)
+    stiffness = 2 * law.shear * np.eye(6) + (law.bulk - 2 * law.shear / 3) * np.outer(trace, trace)
+    coupling = np.einsum("ijk,njk->in", np.asarray(piezo.e), basis)
+    induced = coupling.T @ np.linalg.solve(np.asarray(piezo.beta), coupling)
+    return float(np.linalg.eigvals(np.linalg.solve(stiffness, induced)).real.max())
 
 
 def gradient(phi: Expr) -> Expr:
@@ -132,3 +210,12 @@ def symmetrised_form(
     Symmetric and indefinite: convex in v, concave in eta.
     """
     return saddle_form(law, piezo, u, v, eta, w, -xi)
+
+
+def electric_load(xi: Expr, surface: Expr | float = 0.0, body: Expr | float = 0.0) -> Expr:
+    """Return the integrand q_2 xi or - q_0 xi on the right-hand side of the symmetrised form.
+
+    The saddle form takes it with -xi. `surface` is q_2 = D.nu on a part of the boundary and
+    `body` q_0 = div D; give one of them, they are integrated over different sets.
+    """
+    return (surface - body) * xi

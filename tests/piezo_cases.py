@@ -34,6 +34,7 @@ class Units:
     potential: float = 1.0
 
     def law(self) -> Linear:
+        """Return the linear material of Table 8.1."""
         return Linear(YOUNG * self.stress, POISSON)
 
     def crystal(self, scale: float = 1.0) -> Piezo:
@@ -90,6 +91,7 @@ class Column:
         perfect: bool = False,
         mu: float = 0.0,
     ) -> ContactProblem:
+        """Return the column, turned together with its foundation and poling axis."""
         size = [2.0, self.height] if dim == 2 else [2.0, 1.0, self.height]
         cells = [3, 5] if dim == 2 else [2, 2, 4]
         make = rectangle if dim == 2 else box
@@ -140,15 +142,24 @@ def example(
     limit: float = np.inf,
     degree: int = 1,
     units: Units = SCALED,
+    degrees: float = 0.0,
 ) -> ContactProblem:
-    """Return Example 8.1: a bar of 8 x 4 held and grounded at the left, traction load * x."""
-    zero = constant(0.0, 2)
-    traction = [zero, Affine((load * units.stress, 0.0))]
+    """Return Example 8.1, or 8.2 with its law, or a block of 8 x 2 x 4 for three cell counts.
+
+    The bar is held and grounded at the left and carries the traction load * x on top. Body,
+    load and poling axis are turned together (in space about y).
+    """
+    dim = len(cells)
+    zero = constant(0.0, dim)
+    q = turn(dim, degrees)
+    traction = [Affine(tuple(load * units.stress * q[i, -1] * q[:, 0])) for i in range(dim)]
+    q3 = np.eye(3)
+    q3[:dim, :dim] = q
     body = Body(
         law or units.law(),
-        [Fixed("left", [zero, zero], zero)],
+        [Fixed("left", [zero] * dim, zero)],
         [Load("top", traction)],
-        pzt(2, units),
+        pzt(dim, units).rotated(q3),
     )
     psi = ShiftedConductivity(k_e / units.potential, 125.0)
     conductor = Conductor(
@@ -156,7 +167,10 @@ def example(
     )
     if friction is None:
         friction = Friction(SlipCoefficient(0.5, 0.2, 1e5))
-    domain = rectangle(comm, [0.0, 0.0], [8.0, 4.0], list(cells))
+    if dim == 2:
+        domain = rectangle(comm, [0.0, 0.0], [8.0, 4.0], cells, rotation=degrees)
+    else:
+        domain = box(comm, [0.0] * 3, [8.0, 2.0, 4.0], cells, rotation=degrees)
     return ContactProblem(
         domain, body, Contact("bottom", flat()), friction, conductor if k_e else None, degree
     )
