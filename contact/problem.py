@@ -292,7 +292,8 @@ class ContactProblem:
             self.tangent = self.secant
         else:
             self.tangent = fem.form(ufl.derivative(internal(self.x, self.x), self.x, trial))
-        self.external = self._assemble(self._external_form)
+        self._full_external = self._assemble(self._external_form)
+        self.external = self._full_external
 
     def _external(self, v: Expr, xi: Expr | None, d: int) -> ufl.Form | None:
         """Return the work of loads and charges, equation (5.29), or None without any."""
@@ -345,7 +346,13 @@ class ContactProblem:
         """Set the iterate to zero, with the prescribed values."""
         self.x.x.array[:] = 0.0
         self._frozen.x.array[:] = 0.0
-        fem.set_bc(self.x.x.array, self.bcs)
+        self.apply_load(1.0)
+
+    def apply_load(self, factor: float) -> None:
+        """Scale loads and prescribed values, and put the latter into the iterate."""
+        self.external = factor * self._full_external
+        for bc in self.bcs:
+            bc.set(self.x.x.array, None, factor)
         self.x.x.scatter_forward()
 
     def freeze(self) -> None:

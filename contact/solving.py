@@ -16,6 +16,7 @@ from contact.fixed_point import FixedPoint, FixedPointOptions
 from contact.interrupt import Interrupted, stop_on_signal
 from contact.kkt import evaluate
 from contact.linear import Counters
+from contact.newton import Newton, NewtonOptions
 from contact.problem import ContactProblem
 from contact.report import History, Monitor, Outcome
 from contact.review import review
@@ -55,9 +56,15 @@ def fixed_point(problem: ContactProblem, settings: Solver, monitor: Monitor | No
     return FixedPoint(problem, options, monitor)
 
 
+def newton(problem: ContactProblem, settings: Solver, monitor: Monitor | None) -> Newton:
+    """Return semismooth Newton."""
+    return Newton(problem, NewtonOptions(tolerance=settings.tolerance), monitor)
+
+
 #: Method of `[solver]` -> its maker.
 METHODS: Mapping[str, Callable[[ContactProblem, Solver, Monitor | None], Method]] = {
     "uzawa": fixed_point,
+    "newton": newton,
 }
 
 

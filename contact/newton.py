@@ -1,0 +1,211 @@
+"""Semismooth Newton: contact, friction, material and foundation in one loop.
+
+The nodal multipliers are condensed onto the displacement, so that the linear systems keep
+the size and the pattern of the elastic ones. Where the loop cycles, friction is frozen and
+updated outside (Algorithm 1 with Newton inside); where that fails too, the load is applied in
+steps. The history says which.
+
+References
+----------
+Alart and Curnier, Comput. Methods Appl. Mech. Engrg. 92 (1991).
+Hueeber, Stadler and Wohlmuth, SIAM J. Sci. Comput. 30 (2008).
+"""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from contact.kkt import KKT, evaluate, interface_residuals, residual_forces
+from contact.linear import Counters, LinearOperator
+from contact.newton_laws import Moduli, linearise
+from contact.problem import ContactProblem
+from contact.projections import Array
+from contact.report import History, Monitor, Outcome, Record
+from contact.state import Multipliers, bound_of, nodal_iterate, total_pressure
+from contact.uzawa import automatic_r
+
+
+@dataclass(frozen=True)
+class NewtonOptions:
+    """Options of Newton's method.
+
+    Attributes
+    ----------
+    tolerance
+        On every KKT residual.
+    max_iterations
+        Number of linear solves allowed in each stage.
+    gamma
+        Stiffness of the condensed constraints over that of the body.
+    secant_until
+        Equilibrium residual below which the material's tangent replaces its secant.
+    patience
+        Steps without progress after which the stage is given up.
+    """
+
+    tolerance: float = 1e-8
+    max_iterations: int = 60
+    gamma: float = 1e4
+    secant_until: float = 1e-2
+    patience: int = 12
+
+
+@dataclass
+class Newton:
+    """Newton's method on one problem.
+
+    Parameters
+    ----------
+    problem
+        The contact problem; its iterate is the current one.
+    options
+        Options of the method.
+    monitor
+        Told of every step.
+    """
+
+    problem: ContactProblem
+    options: NewtonOptions = field(default_factory=NewtonOptions)
+    monitor: Monitor | None = None
+    counters: Counters = field(default_factory=Counters)
+
+    def __post_init__(self) -> None:
+        middle = automatic_r(self.problem)
+        nodal = middle**2 / float(self.problem.body.law.young)
+        self.moduli = Moduli(middle, nodal, self.options.gamma * max(middle, nodal))
+        self.operator = LinearOperator(
+            self.problem, symmetric=not self._asymmetric, counters=self.counters
+        )
+        self.history = History(self.monitor)
+        self.forces = Multipliers.zero(self.problem)
+        self._status: NDArray[np.int8] | None = None
+        self._begin = 0.0
+
+    @property
+    def _asymmetric(self) -> bool:
+        return self.problem.frictional or self.problem.response.active
+
+    def solve(self) -> Outcome:
+        """Iterate from zero displacement until convergence or the limit. Collective."""
+        self.problem.reset()
+        self.forces = Multipliers.zero(self.problem)
+        self._status = None
+        return self.resume()
+
+    def resume(self) -> Outcome:
+        """Iterate from the present iterate and contact forces. Collective."""
+        self._begin = time.perf_counter()
+        outcome = self._newton("")
+        if not outcome.converged and self.problem.frictional:
+            outcome = self._frozen_friction()
+        if not outcome.converged:
+            outcome = self._load_steps()
+        return outcome
+
+    def _newton(self, note: str, frozen: Array | None = None, goal: float = 0.0) -> Outcome:
+        """Iterate on the full problem, or on the one with a frozen friction bound.
+
+        With a frozen bound the residual of that bound has to fall below `goal`.
+        """
+        problem, options = self.problem, self.options
+        goal = max(goal, options.tolerance)
+        residuals = evaluate(problem, self.forces)
+        best, since, tangent = np.inf, 0, residuals.equilibrium < options.secant_until
+        tangent = tangent and self._status is not None
+        for _ in range(options.max_iterations):
+            before = residuals.equilibrium
+            self._step(tangent, frozen)
+            residuals = evaluate(problem, self.forces)
+            words = " ".join(w for w in (note, "tangent" if tangent else "") if w)
+            self._record(residuals, words)
+            measured = self._measure(residuals, frozen)
+            if residuals.largest <= options.tolerance:
+                return Outcome(True, f"all residuals <= {options.tolerance:g}", residuals)
+            if frozen is not None and measured <= goal:
+                return Outcome(False, "friction bound to be updated", residuals)
+            if not np.isfinite(measured):
+                return Outcome(False, "Newton's method diverged", residuals)
+            if not problem.linear_material:
+                falls = residuals.equilibrium < max(before, options.tolerance)
+                tangent = residuals.equilibrium < options.secant_until and (falls or not tangent)
+            since = 0 if measured < 0.5 * best else since + 1
+            best = min(best, measured)
+            if since >= options.patience:
+                return Outcome(False, f"Newton's method stalled at {best:.1e}", residuals)
+        return Outcome(False, f"not converged in {options.max_iterations} steps", residuals)
+
+    def _measure(self, residuals: KKT, frozen: Array | None) -> float:
+        """Return the largest residual, with the frozen friction bound if there is one."""
+        if frozen is None:
+            return residuals.largest
+        nodal = nodal_iterate(self.problem)
+        interface = interface_residuals(self.problem, nodal, self.forces, frozen)
+        return max(residuals.equilibrium, *interface)
+
+    def _frozen_friction(self) -> Outcome:
+        """Update the friction bound outside of Newton's method: each step is then convex."""
+        bound = bound_of(self.problem, nodal_iterate(self.problem), self.forces)
+        outcome, goal = None, 1e-2
+        for _ in range(40):
+            outcome = self._newton("frozen friction", bound, goal)
+            if outcome.converged or outcome.reason != "friction bound to be updated":
+                break
+            new = bound_of(self.problem, nodal_iterate(self.problem), self.forces)
+            goal = 0.1 * outcome.kkt.largest
+            bound = new
+        assert outcome is not None
+        return outcome
+
+    def _load_steps(self) -> Outcome:
+        """Apply loads and prescribed displacements in steps, halved where they are too large."""
+        problem, step, reached = self.problem, 0.25, 0.0
+        problem.reset()
+        self.forces, self._status = Multipliers.zero(problem), None
+        outcome = None
+        while reached < 1.0 and step > 1e-2:
+            kept = problem.x.x.array.copy(), self.forces, self._status
+            factor = min(1.0, reached + step)
+            problem.apply_load(factor)
+            outcome = self._newton(f"load {factor:.3g}")
+            if not outcome.converged and problem.frictional:
+                outcome = self._frozen_friction()
+            if outcome.converged:
+                reached = factor
+                continue
+            problem.x.x.array[:], self.forces, self._status = kept
+            step /= 2
+        problem.apply_load(1.0)
+        assert outcome is not None
+        return Outcome(outcome.converged, outcome.reason, evaluate(problem, self.forces))
+
+    def _step(self, tangent: bool, frozen: Array | None) -> None:
+        """Take one Newton step: one assembly, one factorisation, one solve."""
+        problem, trace = self.problem, self.problem.trace
+        nodal = nodal_iterate(problem)
+        contact = linearise(problem, nodal, self.forces, self.moduli, self._status, frozen)
+        blocks = contact.blocks
+        if problem.response.active:
+            pressure = total_pressure(problem, nodal, contact.forces)
+            blocks = blocks + problem.response.jacobian(nodal, pressure)
+        self.operator.update(
+            problem.tangent if tangent else problem.secant,
+            trace.weight[:, None, None] * blocks,
+            constant=problem.linear_material,
+        )
+        increment = self.operator.solve(-residual_forces(problem, contact.forces))
+        problem.add(increment)
+        change = np.einsum("nij,nj->ni", contact.blocks, trace.values(increment))
+        vectors = contact.forces.vectors(problem) + change[:, : problem.dim]
+        self.forces = Multipliers(
+            trace.normal_component(vectors), trace.tangential_component(vectors)
+        )
+        self._status = contact.status
+
+    def _record(self, residuals: KKT, note: str) -> None:
+        seconds = time.perf_counter() - self._begin
+        number = len(self.history.records) + 1
+        self.history.add(Record(number, 1, residuals, np.nan, seconds, note))

@@ -1,0 +1,201 @@
+"""Contact and friction laws, linearised node by node for Newton's method.
+
+A node in contact pushes with p + gamma (u_nu - rho), a sticking one with
+lambda + gamma u_tau, a sliding one with its friction bound along the slip. With gamma far
+above the stiffness of the body these are the linearised conditions u_nu = rho and u_tau = 0,
+and their residuals fall by that ratio in every step.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from mpi4py import MPI
+from numpy.typing import NDArray
+
+from contact.problem import ContactProblem
+from contact.projections import Array
+from contact.state import Multipliers, total_pressure
+
+#: What a contact node does.
+OPEN, SLIDES, STICKS = 0, 1, 2
+
+#: Part of a node's own stiffness that a falling friction coefficient may take away.
+SOFTENING = 0.25
+
+
+@dataclass(frozen=True)
+class Moduli:
+    """Stiffnesses (stress/length) that the linearised laws need.
+
+    Attributes
+    ----------
+    status
+        c of the complementarity functions p + c (u_nu - rho) and lambda + c u_tau.
+    nodal
+        Of the body against a displacement of one contact node, about E'/h.
+    gamma
+        Of the condensed constraints, far above the others.
+    """
+
+    status: float
+    nodal: float
+    gamma: float
+
+
+@dataclass(frozen=True)
+class LinearisedContact:
+    """Contact forces at an iterate and their derivative.
+
+    Attributes
+    ----------
+    forces
+        Multipliers, to be put into the residual.
+    blocks
+        Derivative by the nodal unknowns, shape (n, block size, block size), without weights.
+    status
+        OPEN, SLIDES or STICKS, shape (n,).
+    settled
+        Whether no node of any rank has changed its status.
+    """
+
+    forces: Multipliers
+    blocks: Array
+    status: NDArray[np.int8]
+    settled: bool
+
+
+def node_status(
+    problem: ContactProblem, nodal: Array, forces: Multipliers, bound: Array, c: float
+) -> NDArray[np.int8]:
+    """Return OPEN, SLIDES or STICKS at nodal unknowns, contact forces and bounds."""
+    trace = problem.trace
+    opening = trace.normal_component(nodal) - trace.gap
+    trial = forces.friction + c * trace.tangential_component(nodal)
+    touches = forces.pressure + c * opening > 0
+    if problem.response.layer is not None:
+        touches |= problem.response.layer_pressure(nodal) > 0
+    sticks = touches & (np.linalg.norm(trial, axis=1) <= bound) & problem.frictional
+    return np.where(sticks, STICKS, np.where(touches, SLIDES, OPEN)).astype(np.int8)
+
+
+def linearise(
+    problem: ContactProblem,
+    nodal: Array,
+    forces: Multipliers,
+    moduli: Moduli,
+    before: NDArray[np.int8] | None,
+    frozen_bound: Array | None = None,
+) -> LinearisedContact:
+    """Linearise the contact laws at an iterate. Collective.
+
+    Parameters
+    ----------
+    problem, nodal, forces
+        The problem, its iterate at the contact nodes and the contact forces.
+    moduli
+        Stiffnesses.
+    before
+        Status in the step before; None in the first one, where closed nodes stick.
+    frozen_bound
+        A given friction bound: Tresca's law instead of Coulomb's.
+    """
+    trace, d, c = problem.trace, problem.dim, moduli.status
+    p, lam, n = forces.pressure, forces.friction, trace.normal
+    opening = trace.normal_component(nodal) - trace.gap
+    slip = trace.tangential_component(nodal)
+    length = np.linalg.norm(slip, axis=1)
+    total = total_pressure(problem, nodal, forces)
+    bound = problem.friction_bound(total, length) if frozen_bound is None else frozen_bound
+    bound = np.asarray(bound, dtype=float)
+    trial = lam + c * slip
+    size = np.linalg.norm(trial, axis=1)
+
+    closed = p + c * opening > 0
+    if before is None:
+        closed = opening >= -1e-12 * problem.domain.size
+        status = np.where(closed, STICKS if problem.frictional else SLIDES, OPEN).astype(np.int8)
+    else:
+        status = node_status(problem, nodal, forces, bound, c)
+    changed = before is None or not np.array_equal(status, before)
+    settled = problem.comm.allreduce(int(changed), op=MPI.SUM) == 0
+    if frozen_bound is None and not settled and before is not None:
+        # A node that lets go slides on a coefficient that has fallen already: foreseen, this
+        # saves one step for each node that the sliding zone gains.
+        ahead = np.maximum(length, (size - bound) / moduli.nodal)
+        bound = np.where(status == SLIDES, problem.friction_bound(total, ahead), bound)
+
+    pressure = np.where(closed, p + moduli.gamma * opening, 0.0)
+    blocks = np.zeros((p.size, trace.block_size, trace.block_size))
+    slope = np.where(closed, moduli.gamma, 0.0)[:, None] * n
+    blocks[:, :d, :d] = n[:, :, None] * slope[:, None, :]
+    friction = np.zeros_like(lam)
+    if problem.frictional:
+        sticks, slides = status == STICKS, status == SLIDES
+        friction[sticks] = (lam + moduli.gamma * slip)[sticks]
+        blocks[sticks, :d, :d] += moduli.gamma * trace.tangent[sticks]
+
+        along = trial / np.maximum(size, 1e-300)[:, None]
+        across = trace.tangent - along[:, :, None] * along[:, None, :]
+        # Eliminating lambda from lambda = s z/|z|, z = lambda + c u_tau, leaves s/|u_tau|.
+        turning = np.minimum(bound * c / np.maximum(size - bound, 1e-300), moduli.gamma)
+        friction[slides] = bound[slides, None] * along[slides]
+        sliding = turning[:, None, None] * across
+        if frozen_bound is None:
+            rate = _bound_gradient(problem, nodal, total, slip, length, moduli, settled)
+            ahead, follows = _follow_pressure(problem, nodal, length, slope, opening, moduli, closed)
+            friction[slides] += (ahead[:, None] * along)[slides]
+            rate = rate + follows
+            blocks[slides, :d, :] += along[slides, :, None] * rate[slides, None, :]
+        blocks[slides, :d, :d] += sliding[slides]
+    return LinearisedContact(Multipliers(pressure, friction), blocks, status, settled)
+
+
+def _bound_gradient(
+    problem: ContactProblem,
+    nodal: Array,
+    total: Array,
+    slip: Array,
+    length: Array,
+    moduli: Moduli,
+    settled: bool,
+) -> Array:
+    """Return the derivative of mu(|u_tau|) R p by the slip, shape (n, block size).
+
+    Taken only when the sliding zone has settled, and limited: where friction falls faster
+    than the node's own stiffness, the linearised node would snap.
+    """
+    gradient = np.zeros((length.size, problem.block_size))
+    coefficient = problem.friction.coefficient
+    if coefficient is None or not settled:
+        return gradient
+    smooth = np.maximum(problem.smoothing(total), 0.0)
+    fall = np.maximum(coefficient.derivative(length) * smooth, -SOFTENING * moduli.nodal)
+    direction = slip / np.maximum(length, 1e-300)[:, None]
+    gradient[:, : problem.dim] = fall[:, None] * direction
+    return gradient
+
+
+def _follow_pressure(
+    problem: ContactProblem,
+    nodal: Array,
+    length: Array,
+    slope: Array,
+    opening: Array,
+    moduli: Moduli,
+    closed: NDArray[np.bool_],
+) -> tuple[Array, Array]:
+    """Return how the bound follows the pressure of this very step: change and gradient.
+
+    A smoothed pressure (R other than the identity) couples all nodes within the radius and
+    would fill the matrix: it is lagged.
+    """
+    coefficient = problem.friction.coefficient
+    gradient = np.zeros((length.size, problem.block_size))
+    if coefficient is None or problem.friction.radius > 0:
+        return np.zeros_like(length), gradient
+    mu = coefficient(length)
+    gradient[:, : problem.dim] = mu[:, None] * slope
+    gradient += mu[:, None] * problem.response.layer_gradient(nodal)
+    return np.where(closed, mu * moduli.gamma * opening, 0.0), gradient
