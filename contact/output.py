@@ -13,6 +13,7 @@ import os
 import shutil
 import time
 from collections.abc import Callable, Iterable
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -21,10 +22,10 @@ from dolfinx import has_adios2, io
 from mpi4py import MPI
 
 from contact import environment
-from contact.charges import charge_balance
+from contact.electric import charge_balance
 from contact.fields import DerivedFields, unknowns
 from contact.solution import Solution
-from contact.table import Table, contact_table
+from contact.table import Table, contact_table, csv_columns
 
 HISTORY = ("iteration", "inner", "equilibrium", "contact", "friction", "change", "seconds", "note")
 
@@ -44,8 +45,9 @@ def write_outputs(solution: Solution, folder: str | Path) -> None:
     if comm.rank == 0:
         folder.mkdir(parents=True, exist_ok=True)
         assert table is not None  # on rank 0
-        rows = zip(*(column.tolist() for column in table.values()), strict=True)
-        write_csv(folder / "contact.csv", list(table), rows)
+        columns = csv_columns(table)
+        rows = zip(*(column.tolist() for column in columns.values()), strict=True)
+        write_csv(folder / "contact.csv", columns, rows)
         write_csv(folder / "history.csv", HISTORY, _history(solution))
     comm.barrier()
     if solution.output.fields != "none":
@@ -123,8 +125,8 @@ def _electric(solution: Solution) -> dict[str, Any]:
     return {
         "phi_min": problem.comm.allreduce(float(phi.min(initial=math.inf)), op=MPI.MIN),
         "phi_max": problem.comm.allreduce(float(phi.max(initial=-math.inf)), op=MPI.MAX),
-        "total_charge": charges["total"],
-        "charges": charges,
+        "total_charge": charges.total,
+        "charges": asdict(charges),
     }
 
 

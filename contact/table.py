@@ -27,7 +27,9 @@ def tangent_of(normal: Array) -> Array:
 
 
 def contact_table(solution: Solution) -> Table | None:
-    """Return the columns of ``contact.csv`` on rank 0 and None elsewhere. Collective.
+    """Return a column a quantity on rank 0 and None elsewhere. Collective.
+
+    These are the columns of ``contact.csv`` (`csv_columns`) and the contact direction ``nu_x``...
 
     In the plane the rows follow Gamma_3 from node to node, each connected piece from its end
     with the smaller x (then y), and ``u_t`` and ``tau`` are the components of u_tau and
@@ -58,11 +60,17 @@ def contact_table(solution: Solution) -> Table | None:
     if problem.piezoelectric:
         columns["phi"] = problem.phi_scale * nodal[:, -1]
         columns["d_n"] = problem.response.charge(nodal, pressure)
+    columns |= {f"nu_{axis}": values for axis, values in zip("xyz", trace.normal.T, strict=False)}
     order = _order(problem)
     gathered = {name: problem.comm.gather(values) for name, values in columns.items()}
     if order is None:
         return None
     return {name: np.concatenate(values)[order] for name, values in gathered.items()}
+
+
+def csv_columns(table: Table) -> Table:
+    """Return the columns of ``contact.csv``: all but the contact direction."""
+    return {name: values for name, values in table.items() if not name.startswith("nu_")}
 
 
 def _order(problem: ContactProblem) -> NDArray[np.intp] | None:

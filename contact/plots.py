@@ -1,0 +1,88 @@
+"""Figures of a solution: ``figure-contact.png``, ``figure-deformed.png`` and, for a
+piezoelectric body, ``figure-potential.png``.
+"""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import Any
+
+from contact.plots_contact import draw_line, draw_surface
+from contact.plots_fields import Picture, draw_plane, draw_space, picture
+from contact.solution import Solution
+from contact.table import contact_table
+
+#: Quantities drawn on the deformed body: name of the figure, field, label.
+DEFORMED = (
+    ("deformed", "von_mises", "von Mises stress (units of E)"),
+    ("potential", "potential", r"potential $\varphi$"),
+)
+
+#: Settings of all figures.
+STYLE: dict[str, Any] = {
+    "font.size": 9,
+    "font.family": "serif",
+    "mathtext.fontset": "dejavuserif",
+    "axes.linewidth": 0.6,
+    "lines.linewidth": 1.2,
+    "legend.frameon": False,
+    "legend.fontsize": 8,
+    "figure.dpi": 200,
+    "savefig.dpi": 200,
+    "figure.constrained_layout.use": True,
+}
+
+
+def write_figures(solution: Solution, folder: str | Path) -> list[Path]:
+    """Draw the figures of a solution into a folder. Collective; rank 0 draws.
+
+    In the plane the contact figure shows the stresses along Gamma_3 with the friction bound
+    and the zones of stick and slip, as Figure 7.4 of the thesis does, and the deformed body is
+    coloured by the von Mises stress, as in Figure 7.5. In space the contact nodes are seen
+    along the mean contact direction, and the deformed surface from the side.
+
+    Parameters
+    ----------
+    solution
+        The solution.
+    folder
+        Where to; it is made if need be.
+
+    Returns
+    -------
+    The files, in the order in which they were drawn; none on ranks other than 0.
+    """
+    folder, comm = Path(folder), solution.problem.comm
+    table = contact_table(solution)
+    pictures: list[tuple[str, Picture]] = []
+    for name, field, label in DEFORMED:
+        if field != "potential" or solution.problem.piezoelectric:
+            made = picture(solution, field, label)
+            if made is not None:
+                pictures.append((name, made))
+    if comm.rank > 0 or table is None:
+        return []
+    import matplotlib
+
+    folder.mkdir(parents=True, exist_ok=True)
+    plane, files = solution.problem.dim == 2, []
+    with matplotlib.rc_context(STYLE):
+        figure = (draw_line if plane else draw_surface)(table, solution.title)
+        files.append(_save(figure, folder / "figure-contact.png"))
+        for name, made in pictures:
+            path = folder / f"figure-{name}.png"
+            if plane:
+                files.append(_save(draw_plane(made, table, solution.title), path))
+            else:
+                draw_space(made, path)
+                files.append(path)
+    return files
+
+
+def _save(figure: Any, path: Path) -> Path:
+    """Save a figure made without pyplot, under another name first."""
+    partial = path.with_name(f".part-{path.name}")
+    figure.savefig(partial)
+    os.replace(partial, path)
+    return path

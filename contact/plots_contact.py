@@ -1,0 +1,145 @@
+"""The contact figure: stresses on Gamma_3, friction bound, stick and slip."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.patches import Patch
+
+from contact.projections import Array
+from contact.table import Table
+
+#: Okabe and Ito's palette: told apart by colour-blind readers, and in grey.
+BLUE, ORANGE, GREY = "#0072B2", "#D55E00", "#555555"
+ZONES = {"stick": ("#CDE7F0", "sticking"), "slip": ("#FBE3C8", "sliding"), "open": ("#F2F2F2", "open")}
+
+
+def position(table: Table) -> tuple[Array, str]:
+    """Return where the nodes lie along Gamma_3 and what to call it.
+
+    That is a coordinate where Gamma_3 lies along an axis, and the arc length elsewhere.
+    """
+    points = np.column_stack([table["x"], table["y"]])
+    extent = np.ptp(points, axis=0)
+    for axis, name in enumerate("xy"):
+        if extent[1 - axis] <= 1e-9 * extent[axis]:
+            return points[:, axis], name
+    steps = np.linalg.norm(np.diff(points, axis=0), axis=1)
+    return np.concatenate([[0.0], np.cumsum(steps)]), r"\ell"
+
+
+def zones(status: Any, where: Array) -> Iterator[tuple[str, float, float]]:
+    """Yield the runs of nodes of one status, and between which positions they lie."""
+    order = np.argsort(where)
+    status, where = status[order], where[order]
+    edges = np.concatenate([where[:1], (where[1:] + where[:-1]) / 2, where[-1:]])
+    starts = np.flatnonzero(np.concatenate([[True], status[1:] != status[:-1]]))
+    for start, stop in zip(starts, [*starts[1:], status.size], strict=True):
+        yield str(status[start]), float(edges[start]), float(edges[stop])
+
+
+def draw_line(table: Table, title: str = "") -> Figure:
+    """Draw pressure, tangential stress and friction bound along Gamma_3 in the plane."""
+    where, name = position(table)
+    bound, tau = table["bound"], table["tau"]
+    frictional = bool(np.any(bound > 0))
+    figure = Figure(figsize=(6.3, 5.0 if frictional else 3.0))
+    axes = figure.subplots(2 if frictional else 1, sharex=True, squeeze=False)[:, 0]
+    shown = [_shade(ax, table["status"], where) for ax in axes][0]
+    axes[0].plot(where, table["pressure"], color=BLUE, label=r"pressure $-\sigma_\nu$")
+    axes[0].set_ylabel(r"$-\sigma_\nu$ (units of E)")
+    if frictional:
+        axes[1].plot(where, tau, color=ORANGE, label=r"tangential stress $-\sigma_\tau\cdot t$")
+        axes[1].plot(where, bound, "--", color=GREY, lw=0.8, label=r"friction bound $\pm s$")
+        axes[1].plot(where, -bound, "--", color=GREY, lw=0.8)
+        axes[1].axhline(0.0, color="black", lw=0.4)
+        axes[1].set_ylabel(r"$-\sigma_\tau\cdot t$ (units of E)")
+    axes[-1].set_xlabel(f"${name}$ along $\\Gamma_3$ (mesh units)")
+    axes[0].set_xlim(where.min(), where.max())
+    _focus(axes[0], table["pressure"], 0.0)
+    if frictional:
+        _focus(axes[1], bound, -1.0)
+    for k, ax in enumerate(axes):
+        handles = ax.get_legend_handles_labels()[0] + (shown if k == 0 else [])
+        ax.legend(handles=handles, ncols=len(handles), loc="lower left", bbox_to_anchor=(0, 1))
+    if title:
+        figure.suptitle(title, fontsize=10)
+    return figure
+
+
+def _shade(ax: Axes, status: Any, where: Array) -> list[Patch]:
+    """Shade the zones; return the entries of the legend."""
+    for zone, start, stop in zones(status, where):
+        ax.axvspan(start, stop, color=ZONES[zone][0], lw=0, zorder=0)
+    return [
+        Patch(color=colour, label=label)
+        for zone, (colour, label) in ZONES.items()
+        if np.any(status == zone)
+    ]
+
+
+def _focus(ax: Axes, values: Array, low: float) -> None:
+    """Limit the axis where a singular corner would hide all else, and say what is cut off."""
+    largest = float(values.max(initial=0.0))
+    usual = float(np.quantile(values, 0.97)) * 1.6
+    if largest <= 0:
+        return
+    top = usual if 0 < usual < 0.7 * largest else 1.05 * largest
+    ax.set_ylim(low * top, top)
+    if top < largest:
+        text = f"peak {largest:.3g}, cut off"
+        ax.annotate(text, (0.99, 0.97), xycoords="axes fraction", ha="right", va="top", fontsize=7)
+
+
+def draw_surface(table: Table, title: str = "") -> Figure:
+    """Draw pressure with friction arrows, and the status, on Gamma_3 in space."""
+    points = np.column_stack([table[axis] for axis in "xyz"])
+    flat, names = _flatten(points)
+    size = 0.7 * 6.3 / 2 * 72 / np.sqrt(max(len(points), 1))
+    figure = Figure(figsize=(6.3, 3.2))
+    left, right = figure.subplots(1, 2, sharex=True, sharey=True)
+    dots = left.scatter(*flat.T, c=table["pressure"], s=size**2, cmap="viridis", lw=0, marker="s")
+    figure.colorbar(dots, ax=left, location="bottom", label=r"pressure $-\sigma_\nu$ (units of E)")
+    for zone, (colour, label) in ZONES.items():
+        chosen = table["status"] == zone
+        if np.any(chosen):
+            right.scatter(*flat[chosen].T, color=colour, s=size**2, lw=0, label=label, marker="s")
+    friction = _flatten(points, np.column_stack([table[f"tau_{axis}"] for axis in "xyz"]))[0]
+    if np.any(friction):
+        chosen = _thinned(flat, 24)
+        right.quiver(*flat[chosen].T, *friction[chosen].T, color="black", width=0.004)
+    right.legend(ncols=3, loc="upper center", bbox_to_anchor=(0.5, -0.2), markerscale=1.0)
+    for ax in (left, right):
+        ax.set_aspect("equal")
+        ax.set_xlabel(f"{names[0]} (mesh units)")
+    left.set_ylabel(f"{names[1]} (mesh units)")
+    if title:
+        figure.suptitle(title, fontsize=10)
+    return figure
+
+
+def _flatten(points: Array, vectors: Array | None = None) -> tuple[Array, tuple[str, str]]:
+    """Return points, or vectors there, in the two coordinates along which Gamma_3 extends.
+
+    These are two axes if Gamma_3 is flat along them, else its principal directions.
+    """
+    extent = np.ptp(points, axis=0)
+    given = points if vectors is None else vectors
+    thin = int(np.argmin(extent))
+    if extent[thin] <= 0.2 * np.sort(extent)[1]:
+        kept = [k for k in range(3) if k != thin]
+        return given[:, kept], ("xyz"[kept[0]], "xyz"[kept[1]])
+    centred = points - points.mean(axis=0)
+    directions = np.linalg.eigh(centred.T @ centred)[1][:, :0:-1]
+    return given @ directions, ("first principal axis", "second principal axis")
+
+
+def _thinned(flat: Array, count: int) -> Array:
+    """Return the first point of each cell of a grid of count x count cells."""
+    span = np.ptp(flat, axis=0).max() or 1.0
+    cells = np.floor((flat - flat.min(axis=0)) / span * count)
+    return np.unique(cells, axis=0, return_index=True)[1]
