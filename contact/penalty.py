@@ -1,0 +1,305 @@
+"""Algorithm 3: the penalty method, through PETSc's SNES.
+
+The Signorini and Coulomb conditions are replaced by the laws of `contact.regularised`, so that
+the penalised problem (PV_eps) is one nonlinear equation in the displacement. An outer iteration
+freezes the secant modulus of the material and the friction modulus of (4.33); what is left of
+(4.32), the unilateral [u_nu - rho]^+ of the *new* iterate, is solved by SNES as a semismooth
+equation. An outer count is that of Algorithm 3; the inner one counts SNES's iterations.
+
+Convergence. A penalty run solves the penalised problem: it has converged when the equilibrium
+residual with the forces of the regularised laws at the final displacement is below the
+tolerance (those laws then hold by construction). The residuals `contact` and `friction` of the
+reported KKT are those of the Signorini-Coulomb laws themselves; they measure how far the
+penalised solution is from the limit, fall like eps, and do not decide.
+"""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from mpi4py import MPI
+from petsc4py import PETSc
+
+from contact.errors import InputError
+from contact.kkt import KKT, evaluate, residual_forces
+from contact.linear import Counters, LinearOperator
+from contact.norms import domain_norm
+from contact.problem import ContactProblem
+from contact.projections import Array
+from contact.regularised import Implicit, Lagged, NodalLaw, penalised_forces
+from contact.report import History, Monitor, Outcome, Record
+from contact.state import Multipliers, bound_of, nodal_iterate, total_pressure
+
+
+@dataclass(frozen=True)
+class PenaltyOptions:
+    """Options of the penalty method.
+
+    Attributes
+    ----------
+    eps_contact
+        1/stiffness of the foundation (length^3/force).
+    eps_slip
+        Slip length of the regularised friction; None for the number `eps_contact`, as in the
+        thesis.
+    tolerance
+        On the equilibrium residual of the penalised problem.
+    stopping
+        "residual", or "thesis": (4.38) with `eps_fp`.
+    material_step
+        "secant": Algorithm 3 as printed. "tangent": material and friction are implicit in
+        SNES from the first frictional iteration on. "auto": Algorithm 3 until the residual is
+        below 1e-2, implicit from there as long as SNES converges.
+    max_outer, max_inner
+        Largest number of outer iterations, and of SNES iterations in one of them.
+    """
+
+    eps_contact: float = 1e-4
+    eps_slip: float | None = None
+    tolerance: float = 1e-8
+    stopping: str = "residual"
+    eps_fp: float = 1e-5
+    material_step: str = "auto"
+    max_outer: int = 1000
+    max_inner: int = 50
+
+    @property
+    def regularisation(self) -> Regularisation:
+        """Parameters of the penalised laws."""
+        slip = self.eps_contact if self.eps_slip is None else self.eps_slip
+        return Regularisation(self.eps_contact, slip)
+
+
+@dataclass
+class Penalty:
+    """Algorithm 3, one outer iteration at a time.
+
+    Parameters
+    ----------
+    problem
+        The contact problem; its iterate is the current one.
+    options
+        Options of the method.
+    """
+
+    problem: ContactProblem
+    options: PenaltyOptions
+    monitor: Monitor | None = None
+    counters: Counters = field(default_factory=Counters)
+
+    def __post_init__(self) -> None:
+        self.history = History(self.monitor)
+        self.forces = Multipliers.zero(self.problem)
+        self._eps = self.options.regularisation
+        self._solvers: dict[bool, _Inner] = {}
+        self._norm = domain_norm(self.problem) if self.options.stopping == "thesis" else None
+
+    def solve(self) -> Outcome:
+        """Iterate from zero displacement until convergence, stagnation or the limit."""
+        begin, problem, options = time.perf_counter(), self.problem, self.options
+        problem.reset()
+        implicit, best, mark, since = False, np.inf, np.inf, 0
+        # The residual below which material and friction become implicit.
+        switch = {"secant": 0.0, "auto": 1e-2, "tangent": np.inf}[options.material_step]
+        bound: Array = np.zeros(problem.trace.nodes.size)
+        for iteration in range(1, options.max_outer + 1):
+            previous = problem.x.x.array[: problem.owned].copy()
+            inner, note = self._step(implicit)
+            if implicit and note:
+                # Newton's method failed: give its step up, and go on with Algorithm 3 for a while.
+                problem.x.x.array[: problem.owned] = previous
+                problem.x.x.scatter_forward()
+                switch = best / 10
+            nodal = nodal_iterate(problem)
+            self.forces = penalised_forces(problem, nodal, self._eps)
+            residuals = evaluate(problem, self.forces)
+            old, bound = bound, bound_of(problem, nodal, self.forces)
+            record = Record(
+                iteration, inner, residuals, self._change(old, bound),
+                time.perf_counter() - begin, note or ("implicit" if implicit else ""),
+            )
+            self.history.add(record)
+            residual = residuals.equilibrium
+            if not np.isfinite(residual):
+                return Outcome(False, "the iteration diverged", residuals)
+            if options.stopping == "thesis":
+                if self._thesis_criterion(previous):
+                    return self._outcome(residuals, "the thesis's criterion is met")
+            elif residual <= options.tolerance:
+                return self._outcome(residuals, "")
+            best = min(best, residual)
+            # The lagged friction modulus can creep: what counts is the last hundred iterations.
+            since, mark = (0, residual) if residual < 0.99 * mark else (since + 1, mark)
+            if since >= 100 and options.stopping == "residual":
+                return Outcome(False, f"the residual stalled at {best:.2e}", residuals)
+            implicit = residual < switch
+        return Outcome(False, f"not converged in {options.max_outer} outer iterations", residuals)
+
+    def _step(self, implicit: bool) -> tuple[int, str]:
+        """Solve (4.32), or the penalised problem itself, by SNES from the iterate."""
+        problem = self.problem
+        problem.freeze()
+        nodal = nodal_iterate(problem)
+        law: NodalLaw = Lagged(problem, self._eps, nodal)
+        if implicit:
+            law = Implicit(problem, self._eps)
+        symmetric = not (implicit and problem.frictional)
+        if symmetric not in self._solvers:
+            self._solvers[symmetric] = _Inner(problem, self.options, self.counters, symmetric)
+        return self._solvers[symmetric].solve(law, nodal, implicit, self.forces)
+
+    def _change(self, old: Array, new: Array) -> float:
+        """Return the relative change (3.46) of the friction bound."""
+        if not self.problem.frictional:
+            return np.nan
+        size = self.problem.trace.norm(new)
+        return self.problem.trace.norm(new - old) / size if size > 0 else 0.0
+
+    def _thesis_criterion(self, previous: Array) -> bool:
+        """Tell whether (4.38) is met."""
+        assert self._norm is not None
+        now = self.problem.x.x.array[: self.problem.owned]
+        return self._norm(now - previous) < self.options.eps_fp * self._norm(now)
+
+    def _outcome(self, residuals: KKT, words: str) -> Outcome:
+        tolerance, limit = self.options.tolerance, max(residuals.contact, residuals.friction)
+        if residuals.equilibrium <= tolerance:
+            words = words or f"the residual of the penalised problem is <= {tolerance:g}"
+            return Outcome(True, f"{words}; the contact laws hold to {limit:.1e}", residuals)
+        return Outcome(
+            False,
+            f"{words}, but the residual of the penalised problem is "
+            f"{residuals.equilibrium:.2e}, above {tolerance:g}",
+            residuals,
+        )
+
+
+class _Inner:
+    """The nonlinear problem of an outer iteration, in the increment of the owned unknowns.
+
+    SNES asks `LinearOperator` for its linear solves, through a shell preconditioner. Its
+    options have the prefix ``penalty_``, for instance ``-penalty_snes_monitor``.
+    """
+
+    def __init__(
+        self, problem: ContactProblem, options: PenaltyOptions, counters: Counters, symmetric: bool
+    ) -> None:
+        self._problem, self._options = problem, options
+        self._error: InputError | None = None
+        self.operator = LinearOperator(problem, symmetric=symmetric, counters=counters)
+        matrix = self.operator.matrix
+        self._increment, self._residual = matrix.createVecs()
+        self.snes = PETSc.SNES().create(problem.comm)
+        self.snes.setOptionsPrefix("penalty_")
+        self.snes.setFunction(self._function, self._residual)
+        self.snes.setJacobian(self._jacobian, matrix)
+        self.snes.getKSP().setType("preonly")
+        pc = self.snes.getKSP().getPC()
+        pc.setType("python")
+        pc.setPythonContext(self)
+        # A wrong active set raises the residual by 1/eps, for a step.
+        self.snes.setDivergenceTolerance(1e300)
+        # Full steps: the active set of the pressure settles in a few of them, while a line
+        # search on the residual, which has kinks of the size 1/eps, takes tiny ones.
+        given = PETSc.Options()
+        name = "penalty_snes_linesearch_type"
+        default = not given.hasName(name)
+        if default:
+            given[name] = "basic"
+        self.snes.setFromOptions()
+        if default:
+            given.delValue(name)
+
+    def apply(self, _: Any, rhs: PETSc.Vec, solution: PETSc.Vec) -> None:
+        """Solve with the operator: the preconditioner of SNES's KSP."""
+        try:
+            solution.array[:] = self.operator.solve(rhs.array_r)
+        except InputError as error:
+            # Not through PETSc, which would wrap it; SNES stops at a solution without numbers.
+            self._error = error
+            solution.array[:] = np.nan
+
+    def solve(
+        self, law: NodalLaw, nodal: Array, implicit: bool, forces: Multipliers
+    ) -> tuple[int, str]:
+        """Move the iterate to the solution; return the iterations and what went wrong."""
+        problem = self._problem
+        self._law, self._implicit, self._nodal = law, implicit, nodal
+        self._base = problem.x.x.array[: problem.owned].copy()
+        self._assembled = problem.linear_material
+        pressure = total_pressure(problem, nodal, forces)
+        self._response = problem.response.force(nodal, pressure)
+        self._response_block = problem.response.block(nodal, pressure)
+        scale = self._norm(problem.external) + self._norm(residual_forces(problem, forces))
+        scale += self._norm(problem.trace.weight[:, None] * forces.vectors(problem))
+        self.snes.setTolerances(
+            rtol=1e-14, stol=0.0, atol=self._options.tolerance / 10 * scale,
+            max_it=min(self._options.max_inner, 20) if implicit else self._options.max_inner,
+        )
+        self._error = None
+        self._increment.array[:] = self._touch()
+        self.snes.solve(None, self._increment)
+        if self._error is not None and not implicit:
+            raise self._error
+        self._move(self._increment)
+        reason = self.snes.getConvergedReason()
+        note = "" if reason > 0 else f"SNES stopped with reason {reason}"
+        return self.snes.getIterationNumber(), note
+
+    def _touch(self) -> Array:
+        """Return a first guess: zero, or where nothing touches yet, the closest nodes in touch.
+
+        A body that only the foundation holds would otherwise give a singular first system.
+        """
+        problem, trace, nodal = self._problem, self._problem.trace, self._nodal
+        opening = trace.normal_component(nodal) - trace.gap
+        closest = trace.maximum(opening, -np.inf)
+        if closest >= 0:
+            return np.zeros(problem.owned)
+        spring = (opening >= closest - 1e-9 * problem.domain.size) / self._options.eps_contact
+        spring = spring * trace.weight
+        blocks = np.zeros((trace.nodes.size, trace.block_size, trace.block_size))
+        blocks[:, : trace.dim, : trace.dim] = np.einsum(
+            "n,ni,nj->nij", spring, trace.normal, trace.normal
+        )
+        self.operator.update(problem.secant, blocks)
+        rhs = problem.external - problem.internal_forces()
+        trace.add(rhs, -(spring * opening)[:, None] * trace.normal)
+        return self.operator.solve(rhs)
+
+    def _norm(self, values: Array) -> float:
+        return float(np.sqrt(self._problem.comm.allreduce(np.sum(values**2), op=MPI.SUM)))
+
+    def _move(self, increment: PETSc.Vec) -> Array:
+        """Set the iterate to base + increment; return its nodal values."""
+        problem = self._problem
+        problem.x.x.array[: problem.owned] = self._base + increment.array_r
+        problem.x.x.scatter_forward()
+        if self._implicit:
+            problem.freeze()
+        return nodal_iterate(problem)
+
+    def _function(self, _: PETSc.SNES, increment: PETSc.Vec, residual: PETSc.Vec) -> None:
+        problem, trace = self._problem, self._problem.trace
+        nodal = self._move(increment)
+        values = problem.internal_forces() - problem.external
+        trace.add(values, trace.weight[:, None] * self._law.forces(nodal).vectors(problem))
+        change = np.einsum("nij,nj->ni", self._response_block, nodal - self._nodal)
+        trace.add(values, trace.weight[:, None] * (self._response + change))
+        residual.array[:] = np.where(problem.free.ravel(), values, 0.0)
+
+    def _jacobian(
+        self, _: PETSc.SNES, increment: PETSc.Vec, matrix: PETSc.Mat, __: PETSc.Mat
+    ) -> None:
+        problem, d = self._problem, self._problem.dim
+        nodal = self._move(increment)
+        blocks = self._response_block.copy()
+        blocks[:, :d, :d] += self._law.block(nodal)
+        blocks *= problem.trace.weight[:, None, None]
+        form = problem.tangent if self._implicit else problem.secant
+        unchanged = problem.linear_material or (self._assembled and not self._implicit)
+        self.operator.update(form, blocks, constant=unchanged)
+        self._assembled = True

@@ -1,0 +1,184 @@
+"""The penalty method, Algorithm 3, against the multiplier solution of the same problem."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+
+from contact import domain
+from contact.errors import InputError
+from contact.expressions import Expression
+from contact.fixed_point import FixedPoint, FixedPointOptions
+from contact.foundation import GapFunction, Plane
+from contact.penalty import Penalty, PenaltyOptions
+from contact.problem import Body, Contact, ContactProblem, Fixed, Friction, Load
+from contact.regularised import Implicit, Lagged, Regularisation
+from contact.state import nodal_iterate
+from forms.hencky import Linear, Log
+from forms.laws import ConstantCoefficient, SlipCoefficient
+
+ZERO = Expression(0.0)
+
+
+def bar(cells: int = 8, load: float = -0.005, coefficient=None, degree: int = 1, **friction):
+    """Return Example 7.2 on `cells` squares a unit length."""
+    body_domain = domain.rectangle(
+        MPI.COMM_WORLD, [0, 0], [4, 1], [4 * cells, cells],
+        parts={"loaded": domain.Piece("top", 2.0, 4.0)},
+    )
+    body = Body(
+        Log(1.0, 0.3, yield_strain=0.05),
+        [Fixed("left", [ZERO, ZERO])],
+        [Load("loaded", [ZERO, Expression(load)])],
+    )
+    contact = Contact("bottom", GapFunction(lambda x: np.zeros(len(x))))
+    law = Friction(coefficient, **friction) if coefficient or friction else None
+    return ContactProblem(body_domain, body, contact, law, degree=degree)
+
+
+def relative(problem: ContactProblem, a, b) -> float:
+    difference = problem.comm.allreduce(float(np.sum((a - b) ** 2)), op=MPI.SUM)
+    return float(np.sqrt(difference / problem.comm.allreduce(float(np.sum(b**2)), op=MPI.SUM)))
+
+
+@pytest.mark.parametrize("load", [-0.005, -0.05])
+def test_error_and_pressure_fall_like_eps(load):
+    problem = bar(load=load, coefficient=ConstantCoefficient(0.5))
+    reference = FixedPoint(problem, FixedPointOptions(tolerance=1e-11))
+    assert reference.solve().converged
+    x = problem.x.x.array[: problem.owned].copy()
+    errors, pressures = [], []
+    for eps in (1e-7, 1e-8, 1e-9):
+        penalty = Penalty(problem, PenaltyOptions(eps_contact=eps))
+        outcome = penalty.solve()
+        assert outcome.converged, outcome.reason
+        assert outcome.kkt.equilibrium <= 1e-8
+        errors.append(relative(problem, problem.x.x.array[: problem.owned], x))
+        pressure = reference.forces.pressure
+        difference = problem.trace.norm(penalty.forces.pressure - pressure)
+        pressures.append(difference / problem.trace.norm(pressure))
+    assert np.log10(errors[1] / errors[2]) == pytest.approx(1.0, abs=0.1)
+    assert np.log10(pressures[1] / pressures[2]) == pytest.approx(1.0, abs=0.1)
+    assert errors[2] < 1e-5
+
+
+@pytest.mark.parallel
+def test_without_friction_the_penetration_is_eps_times_the_pressure():
+    problem = bar()
+    penalty = Penalty(problem, PenaltyOptions(eps_contact=1e-5))
+    outcome = penalty.solve()
+    assert outcome.converged
+    assert len(penalty.history.records) == 1
+    opening = problem.trace.normal_component(nodal_iterate(problem)) - problem.trace.gap
+    touching = penalty.forces.pressure > 0
+    assert np.allclose(opening[touching], 1e-5 * penalty.forces.pressure[touching])
+    # The Signorini residual is the penetration: c eps with c = E/size = 1/4.
+    assert outcome.kkt.contact == pytest.approx(0.25e-5, rel=1e-6)
+
+
+@pytest.mark.parametrize("material_step", ["secant", "tangent", "auto"])
+def test_all_ways_lead_to_the_same_solution(material_step):
+    problem = bar(load=-0.05, coefficient=SlipCoefficient(0.5, 0.2, 1e5))
+    solutions = []
+    for step in ("auto", material_step):
+        options = PenaltyOptions(eps_contact=1e-3, material_step=step, tolerance=1e-10)
+        outcome = Penalty(problem, options).solve()
+        assert outcome.converged, outcome.reason
+        solutions.append(problem.x.x.array[: problem.owned].copy())
+    assert relative(problem, solutions[1], solutions[0]) < 1e-8
+
+
+def test_the_two_parameters_are_separate():
+    problem = bar(coefficient=ConstantCoefficient(0.5))
+    solutions = {}
+    for contact, slip in ((1e-4, None), (1e-4, 1e-4), (1e-4, 1e-6)):
+        assert Penalty(problem, PenaltyOptions(contact, slip)).solve().converged
+        solutions[contact, slip] = problem.x.x.array[: problem.owned].copy()
+    same, other = solutions[1e-4, None], solutions[1e-4, 1e-6]
+    assert relative(problem, same, solutions[1e-4, 1e-4]) < 1e-12
+    assert relative(problem, other, same) > 1e-3
+
+
+def test_thesis_stopping_counts_like_table_7_2():
+    counts = []
+    for eps in (1e-2, 1e-3, 1e-4):
+        problem = bar(cells=16, coefficient=SlipCoefficient(0.5, 0.2, 1e5))
+        options = PenaltyOptions(
+            eps_contact=eps, stopping="thesis", material_step="secant", tolerance=1e-4
+        )
+        penalty = Penalty(problem, options)
+        assert penalty.solve().converged
+        counts.append(len(penalty.history.records))
+    assert counts == sorted(counts)
+    assert 4 <= counts[0] <= 9
+
+
+def test_a_stop_by_small_change_is_not_convergence():
+    problem = bar(coefficient=SlipCoefficient(0.5, 0.2, 1e5))
+    options = PenaltyOptions(eps_contact=1e-6, stopping="thesis", material_step="secant")
+    outcome = Penalty(problem, options).solve()
+    assert not outcome.converged
+    assert "criterion is met, but the residual" in outcome.reason
+
+
+@pytest.mark.parametrize("radius", [0.0, 0.3])
+def test_smoothed_pressure(radius):
+    problem = bar(coefficient=ConstantCoefficient(0.5), radius=radius)
+    reference = FixedPoint(problem, FixedPointOptions(tolerance=1e-10))
+    assert reference.solve().converged
+    x = problem.x.x.array[: problem.owned].copy()
+    outcome = Penalty(problem, PenaltyOptions(eps_contact=1e-8)).solve()
+    assert outcome.converged, outcome.reason
+    assert relative(problem, problem.x.x.array[: problem.owned], x) < 1e-4
+
+
+@pytest.mark.parametrize("law", ["lagged", "implicit"])
+@pytest.mark.parametrize("dim", [2, 3])
+def test_blocks_are_the_derivative_of_the_forces(law, dim):
+    box = (
+        domain.rectangle(MPI.COMM_SELF, [0, 0], [1, 1], [3, 3])
+        if dim == 2
+        else domain.box(MPI.COMM_SELF, [0, 0, 0], [1, 1, 1], [2, 2, 2])
+    )
+    body = Body(Linear(1.0, 0.3), [Fixed("top", [ZERO] * dim)])
+    gap = GapFunction(lambda x: np.zeros(len(x)))
+    friction = Friction(SlipCoefficient(0.5, 0.2, 10.0))
+    problem = ContactProblem(box, body, Contact("bottom", gap), friction)
+    rng = np.random.default_rng(1)
+    x, d = rng.normal(size=(2, problem.trace.nodes.size, dim))
+    eps = Regularisation(0.3, 0.2)
+    model = Implicit(problem, eps) if law == "implicit" else Lagged(problem, eps, x + d)
+
+    def forces(t: float):
+        return model.forces(x + t * d).vectors(problem)
+
+    step = 1e-6
+    numerical = (forces(step) - forces(-step)) / (2 * step)
+    exact = np.einsum("nij,nj->ni", model.block(x), d)
+    assert np.allclose(numerical, exact, rtol=1e-6, atol=1e-7)
+
+
+def block(fixed, gap: float, force: float = -0.1):
+    square = domain.rectangle(MPI.COMM_WORLD, [0, gap], [1, 1], [4, 4])
+    body = Body(Linear(1.0, 0.3), fixed, [Load("top", [ZERO, Expression(force)])])
+    return ContactProblem(square, body, Contact("bottom", Plane((0.0, 0.0), (0.0, 1.0))))
+
+
+@pytest.mark.parametrize("gap", [0.0, 0.2])
+def test_a_body_that_only_the_foundation_holds(gap):
+    problem = block([Fixed("left", [ZERO, None])], gap)
+    penalty = Penalty(problem, PenaltyOptions(eps_contact=1e-6))
+    outcome = penalty.solve()
+    assert outcome.converged, outcome.reason
+    assert np.allclose(penalty.forces.pressure, 0.1)
+
+
+def test_a_body_that_nothing_holds_does_not_converge():
+    problem = block([Fixed("left", [ZERO, None])], 0.2, force=0.1)
+    try:
+        outcome = Penalty(problem, PenaltyOptions(max_outer=3)).solve()
+    except InputError as error:  # the factorisation found the singularity
+        assert "singular" in str(error)
+    else:
+        assert not outcome.converged
