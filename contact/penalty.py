@@ -29,7 +29,7 @@ from contact.linear import Counters, LinearOperator
 from contact.norms import domain_norm
 from contact.problem import ContactProblem
 from contact.projections import Array
-from contact.regularised import Implicit, Lagged, NodalLaw, penalised_forces
+from contact.regularised import Implicit, Lagged, NodalLaw, Regularisation, penalised_forces
 from contact.report import History, Monitor, Outcome, Record
 from contact.state import Multipliers, bound_of, nodal_iterate, total_pressure
 
@@ -118,8 +118,12 @@ class Penalty:
             residuals = evaluate(problem, self.forces)
             old, bound = bound, bound_of(problem, nodal, self.forces)
             record = Record(
-                iteration, inner, residuals, self._change(old, bound),
-                time.perf_counter() - begin, note or ("implicit" if implicit else ""),
+                iteration,
+                inner,
+                residuals,
+                self._change(old, bound),
+                time.perf_counter() - begin,
+                note or ("implicit" if implicit else ""),
             )
             self.history.add(record)
             residual = residuals.equilibrium
@@ -236,7 +240,9 @@ class _Inner:
         scale = self._norm(problem.external) + self._norm(residual_forces(problem, forces))
         scale += self._norm(problem.trace.weight[:, None] * forces.vectors(problem))
         self.snes.setTolerances(
-            rtol=1e-14, stol=0.0, atol=self._options.tolerance / 10 * scale,
+            rtol=1e-14,
+            stol=0.0,
+            atol=self._options.tolerance / 10 * scale,
             max_it=min(self._options.max_inner, 20) if implicit else self._options.max_inner,
         )
         self._error = None

@@ -24,7 +24,10 @@ ZERO = Expression(0.0)
 def bar(cells: int = 8, load: float = -0.005, coefficient=None, degree: int = 1, **friction):
     """Return Example 7.2 on `cells` squares a unit length."""
     body_domain = domain.rectangle(
-        MPI.COMM_WORLD, [0, 0], [4, 1], [4 * cells, cells],
+        MPI.COMM_WORLD,
+        [0, 0],
+        [4, 1],
+        [4 * cells, cells],
         parts={"loaded": domain.Piece("top", 2.0, 4.0)},
     )
     body = Body(
