@@ -17,6 +17,7 @@ from contact.interrupt import Interrupted, stop_on_signal
 from contact.kkt import evaluate
 from contact.linear import Counters
 from contact.newton import Newton, NewtonOptions
+from contact.penalty import Penalty, PenaltyOptions
 from contact.problem import ContactProblem
 from contact.report import History, Monitor, Outcome
 from contact.review import review
@@ -61,9 +62,25 @@ def newton(problem: ContactProblem, settings: Solver, monitor: Monitor | None) -
     return Newton(problem, NewtonOptions(tolerance=settings.tolerance), monitor)
 
 
+def penalty(problem: ContactProblem, settings: Solver, monitor: Monitor | None) -> Penalty:
+    """Return the penalty method: Algorithm 3."""
+    options = PenaltyOptions(
+        eps_contact=settings.eps_contact,
+        eps_slip=settings.eps_slip,
+        tolerance=settings.tolerance,
+        stopping=settings.stopping,
+        eps_fp=settings.eps_fp,
+        material_step=settings.material_step,
+        max_outer=settings.max_outer,
+        max_inner=settings.max_inner,
+    )
+    return Penalty(problem, options, monitor)
+
+
 #: Method of `[solver]` -> its maker.
 METHODS: Mapping[str, Callable[[ContactProblem, Solver, Monitor | None], Method]] = {
     "uzawa": fixed_point,
+    "penalty": penalty,
     "newton": newton,
 }
 
