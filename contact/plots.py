@@ -1,12 +1,13 @@
-"""Figures of a solution: ``figure-contact.png``, ``figure-deformed.png`` and, for a
-piezoelectric body, ``figure-potential.png``.
-"""
+"""Figures of a solution, as PNG files: contact, deformed body, potential."""
 
 from __future__ import annotations
 
 import os
 from pathlib import Path
 from typing import Any
+
+import matplotlib
+from matplotlib.figure import Figure
 
 from contact.plots_contact import draw_line, draw_surface
 from contact.plots_fields import Picture, draw_plane, draw_space, picture
@@ -63,24 +64,23 @@ def write_figures(solution: Solution, folder: str | Path) -> list[Path]:
                 pictures.append((name, made))
     if comm.rank > 0 or table is None:
         return []
-    import matplotlib
-
     folder.mkdir(parents=True, exist_ok=True)
-    plane, files = solution.problem.dim == 2, []
+    plane, title = solution.problem.dim == 2, solution.title
     with matplotlib.rc_context(STYLE):
-        figure = (draw_line if plane else draw_surface)(table, solution.title)
-        files.append(_save(figure, folder / "figure-contact.png"))
+        figures: dict[str, Figure | None] = {
+            "contact": draw_line(table, title) if plane else draw_surface(table, title)
+        }
         for name, made in pictures:
-            path = folder / f"figure-{name}.png"
-            if plane:
-                files.append(_save(draw_plane(made, table, solution.title), path))
-            else:
-                draw_space(made, path)
-                files.append(path)
-    return files
+            drawn = draw_plane(made, table, title) if plane else draw_space(made, title)
+            figures[name] = drawn
+        return [
+            _save(figure, folder / f"figure-{name}.png")
+            for name, figure in figures.items()
+            if figure is not None
+        ]
 
 
-def _save(figure: Any, path: Path) -> Path:
+def _save(figure: Figure, path: Path) -> Path:
     """Save a figure made without pyplot, under another name first."""
     partial = path.with_name(f".part-{path.name}")
     figure.savefig(partial)

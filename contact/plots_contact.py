@@ -14,8 +14,12 @@ from contact.projections import Array
 from contact.table import Table
 
 #: Okabe and Ito's palette: told apart by colour-blind readers, and in grey.
-BLUE, ORANGE, GREY = "#0072B2", "#D55E00", "#555555"
-ZONES = {"stick": ("#CDE7F0", "sticking"), "slip": ("#FBE3C8", "sliding"), "open": ("#F2F2F2", "open")}
+BLUE, ORANGE, GREY, LIGHT = "#0072B2", "#D55E00", "#555555", "#BBBBBB"
+ZONES = {
+    "stick": ("#CDE7F0", "sticking"),
+    "slip": ("#FBE3C8", "sliding"),
+    "open": ("#F2F2F2", "open"),
+}
 
 
 def position(table: Table) -> tuple[Array, str]:
@@ -49,7 +53,14 @@ def draw_line(table: Table, title: str = "") -> Figure:
     frictional = bool(np.any(bound > 0))
     figure = Figure(figsize=(6.3, 5.0 if frictional else 3.0))
     axes = figure.subplots(2 if frictional else 1, sharex=True, squeeze=False)[:, 0]
-    shown = [_shade(ax, table["status"], where) for ax in axes][0]
+    for ax in axes:
+        for zone, start, stop in zones(table["status"], where):
+            ax.axvspan(start, stop, color=ZONES[zone][0], lw=0, zorder=0)
+    shown = [
+        Patch(color=colour, label=label)
+        for zone, (colour, label) in ZONES.items()
+        if np.any(table["status"] == zone)
+    ]
     axes[0].plot(where, table["pressure"], color=BLUE, label=r"pressure $-\sigma_\nu$")
     axes[0].set_ylabel(r"$-\sigma_\nu$ (units of E)")
     if frictional:
@@ -71,17 +82,6 @@ def draw_line(table: Table, title: str = "") -> Figure:
     return figure
 
 
-def _shade(ax: Axes, status: Any, where: Array) -> list[Patch]:
-    """Shade the zones; return the entries of the legend."""
-    for zone, start, stop in zones(status, where):
-        ax.axvspan(start, stop, color=ZONES[zone][0], lw=0, zorder=0)
-    return [
-        Patch(color=colour, label=label)
-        for zone, (colour, label) in ZONES.items()
-        if np.any(status == zone)
-    ]
-
-
 def _focus(ax: Axes, values: Array, low: float) -> None:
     """Limit the axis where a singular corner would hide all else, and say what is cut off."""
     largest = float(values.max(initial=0.0))
@@ -96,27 +96,36 @@ def _focus(ax: Axes, values: Array, low: float) -> None:
 
 
 def draw_surface(table: Table, title: str = "") -> Figure:
-    """Draw pressure with friction arrows, and the status, on Gamma_3 in space."""
+    """Draw pressure, status and friction arrows on Gamma_3 in space."""
     points = np.column_stack([table[axis] for axis in "xyz"])
     flat, names = _flatten(points)
-    size = 0.7 * 6.3 / 2 * 72 / np.sqrt(max(len(points), 1))
-    figure = Figure(figsize=(6.3, 3.2))
-    left, right = figure.subplots(1, 2, sharex=True, sharey=True)
-    dots = left.scatter(*flat.T, c=table["pressure"], s=size**2, cmap="viridis", lw=0, marker="s")
-    figure.colorbar(dots, ax=left, location="bottom", label=r"pressure $-\sigma_\nu$ (units of E)")
-    for zone, (colour, label) in ZONES.items():
+    figure = Figure(figsize=(6.3, 3.8))
+    # Placed by hand: the automatic layouts leave no room below axes of equal scale.
+    figure.set_layout_engine("none")
+    left, right = (figure.add_axes((x, 0.34, 0.38, 0.5)) for x in (0.1, 0.6))
+    if np.linalg.matrix_rank(flat - flat[0]) == 2:
+        shown = left.tripcolor(*flat.T, table["pressure"], shading="gouraud", cmap="viridis")
+    else:  # too few nodes for triangles
+        shown = left.scatter(*flat.T, c=table["pressure"], cmap="viridis")
+    bar = figure.add_axes((0.1, 0.15, 0.38, 0.03))
+    figure.colorbar(shown, cax=bar, orientation="horizontal", label=r"$-\sigma_\nu$ (units of E)")
+    size = float(np.clip(2e3 / len(points), 0.5, 12))
+    for zone, colour in (("open", LIGHT), ("stick", BLUE), ("slip", ORANGE)):
         chosen = table["status"] == zone
         if np.any(chosen):
-            right.scatter(*flat[chosen].T, color=colour, s=size**2, lw=0, label=label, marker="s")
+            right.scatter(*flat[chosen].T, color=colour, s=size, lw=0, label=ZONES[zone][1])
     friction = _flatten(points, np.column_stack([table[f"tau_{axis}"] for axis in "xyz"]))[0]
     if np.any(friction):
-        chosen = _thinned(flat, 24)
-        right.quiver(*flat[chosen].T, *friction[chosen].T, color="black", width=0.004)
-    right.legend(ncols=3, loc="upper center", bbox_to_anchor=(0.5, -0.2), markerscale=1.0)
-    for ax in (left, right):
+        chosen = _thinned(flat, 16)
+        arrows = {"color": "black", "width": 0.004, "clip_on": False}
+        right.quiver(*flat[chosen].T, *friction[chosen].T, **arrows)
+    figure.legend(ncols=3, handletextpad=0.2, loc="center", bbox_to_anchor=(0.79, 0.165))
+    for ax, name in ((left, "contact pressure"), (right, "status, friction (arrows)")):
         ax.set_aspect("equal")
-        ax.set_xlabel(f"{names[0]} (mesh units)")
-    left.set_ylabel(f"{names[1]} (mesh units)")
+        ax.margins(0.08)
+        ax.set_title(name, fontsize=9)
+        ax.set_xlabel(f"${names[0]}$ (mesh units)")
+    left.set_ylabel(f"${names[1]}$ (mesh units)")
     if title:
         figure.suptitle(title, fontsize=10)
     return figure
@@ -125,7 +134,7 @@ def draw_surface(table: Table, title: str = "") -> Figure:
 def _flatten(points: Array, vectors: Array | None = None) -> tuple[Array, tuple[str, str]]:
     """Return points, or vectors there, in the two coordinates along which Gamma_3 extends.
 
-    These are two axes if Gamma_3 is flat along them, else its principal directions.
+    These are two axes if Gamma_3 is flat along them, else its principal directions x_1, x_2.
     """
     extent = np.ptp(points, axis=0)
     given = points if vectors is None else vectors
@@ -135,7 +144,7 @@ def _flatten(points: Array, vectors: Array | None = None) -> tuple[Array, tuple[
         return given[:, kept], ("xyz"[kept[0]], "xyz"[kept[1]])
     centred = points - points.mean(axis=0)
     directions = np.linalg.eigh(centred.T @ centred)[1][:, :0:-1]
-    return given @ directions, ("first principal axis", "second principal axis")
+    return given @ directions, ("x_1", "x_2")
 
 
 def _thinned(flat: Array, count: int) -> Array:

@@ -5,12 +5,13 @@ from __future__ import annotations
 import logging
 import os
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
-from matplotlib.axes import Axes
 from dolfinx import mesh as dmesh
+from matplotlib.axes import Axes
+from matplotlib.cm import ScalarMappable
 from matplotlib.collections import LineCollection, PolyCollection
+from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 from mpi4py import MPI
 
@@ -169,7 +170,7 @@ def _pixels(comm: MPI.Intracomm, drawn: Array, colours: Array, box: Array) -> Ar
 def draw_plane(picture: Picture, table: Table, title: str = "") -> Figure:
     """Draw a plane body over its outline at rest and the foundation."""
     width, height = picture.box[1] - picture.box[0]
-    figure = Figure(figsize=(6.3, float(np.clip(5.8 * height / width, 1.2, 6.0)) + 1.4))
+    figure = Figure(figsize=(6.3, float(np.clip(5.8 * height / width, 1.2, 5.5)) + 1.4))
     ax = figure.subplots()
     drawn = picture.corners + picture.scale * picture.displacement
     if picture.image is not None:
@@ -194,8 +195,7 @@ def draw_plane(picture: Picture, table: Table, title: str = "") -> Figure:
     ax.autoscale_view()
     ax.set_xlabel("$x$ (mesh units)")
     ax.set_ylabel("$y$ (mesh units)")
-    times = rf"displacements $\times$ {picture.scale:g}" if picture.scale != 1 else "displacements to scale"
-    ax.set_title(f"{title} ({times})" if title else times, fontsize=9)
+    ax.set_title(_with_scale(title, picture.scale), fontsize=9)
     return figure
 
 
@@ -210,23 +210,44 @@ def _foundation(ax: Axes, table: Table, scale: float) -> None:
     ax.fill(*band.T, facecolor="none", edgecolor=BLUE, hatch="////", lw=0)
 
 
-def draw_space(picture: Picture, path: Path) -> None:
-    """Draw the surface of a body in space with pyvista, without a window."""
+def draw_space(picture: Picture, title: str = "") -> Figure | None:
+    """Draw the surface of a body in space, from above and from below, with pyvista."""
     try:
         import pyvista
     except ImportError:
-        logger.warning("%s is not drawn: pyvista is missing", path.name)
-        return
+        logger.warning("the deformed body is not drawn: pyvista is missing")
+        return None
     if not os.environ.get("DISPLAY"):
         pyvista.start_xvfb()
     drawn = (picture.corners + picture.scale * picture.displacement).reshape(-1, 3)
-    faces = np.column_stack([np.full(len(picture.corners), 3), np.arange(len(drawn)).reshape(-1, 3)])
+    corners = np.arange(len(drawn)).reshape(-1, 3)
+    faces = np.column_stack([np.full(len(corners), 3), corners])
     surface = pyvista.PolyData(drawn, faces.ravel())
     place = surface.cell_data if picture.values.ndim == 1 else surface.point_data
-    place[picture.label] = picture.values.ravel()
-    plotter = pyvista.Plotter(off_screen=True, window_size=(1400, 1000))
-    plotter.set_background("white")
-    plotter.add_mesh(surface, scalars=picture.label, cmap="viridis", show_edges=len(faces) < 20000)
-    plotter.add_axes()
-    plotter.screenshot(str(path))
-    plotter.close()
+    place["values"] = picture.values.ravel()
+    figure = Figure(figsize=(6.3, 3.3))
+    norm = Normalize(picture.values.min(), picture.values.max())
+    axes = figure.subplots(1, 2)
+    for ax, name, height in zip(axes, ("from above", "from below"), (0.8, -0.8), strict=True):
+        plotter = pyvista.Plotter(off_screen=True, window_size=(1000, 900))
+        plotter.set_background("white")
+        plotter.add_mesh(
+            surface, scalars="values", cmap="viridis", clim=[norm.vmin, norm.vmax],
+            show_edges=len(faces) < 5000, line_width=0.5, ambient=0.5, diffuse=0.5,
+            show_scalar_bar=False,
+        )
+        plotter.add_axes()
+        plotter.view_vector((1.0, -1.6, height))
+        ax.imshow(plotter.screenshot(return_img=True))
+        plotter.close()
+        ax.set_title(name, fontsize=9)
+        ax.axis("off")
+    colours = ScalarMappable(norm, "viridis")
+    figure.colorbar(colours, ax=axes, location="bottom", label=picture.label, aspect=40, shrink=0.8)
+    figure.suptitle(_with_scale(title, picture.scale), fontsize=10)
+    return figure
+
+
+def _with_scale(title: str, scale: float) -> str:
+    times = rf"displacements $\times$ {scale:g}" if scale != 1 else "displacements to scale"
+    return f"{title} ({times})" if title else times
