@@ -79,7 +79,7 @@ class DerivedFields:
     ----------
     shapes
         Name -> shape of the value: stress (3, 3), von_mises (), dev_strain () and, for a
-        piezoelectric body, electric_displacement (d,).
+        piezoelectric body, electric_displacement (d,) and electric_field (d,).
     """
 
     def __init__(self, problem: ContactProblem) -> None:
@@ -89,6 +89,7 @@ class DerivedFields:
         }
         if problem.piezoelectric:
             self.shapes["electric_displacement"] = (problem.dim,)
+            self.shapes["electric_field"] = (problem.dim,)
 
     @property
     def columns(self) -> Mapping[str, slice]:
@@ -126,6 +127,7 @@ class DerivedFields:
             sigma = sigma + coupling_stress(constants, phi)
             d = electric_displacement(constants, eps, phi)
             induced = [d[i] for i in range(problem.dim)]
+            induced += [-ufl.grad(phi)[i] for i in range(problem.dim)]
         values = [sigma[i, j] for i in range(3) for j in range(3)]
         # Rounding can make |dev eps|^2 slightly negative.
         values += [von_mises(sigma), sqrt(maximum(deviator_squared(eps), 0.0))]
