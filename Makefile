@@ -1,0 +1,49 @@
+# Every target works on a fresh machine: scripts/fx finds FEniCSx or makes a place for it, once.
+FX := scripts/fx
+# a test that hangs on some ranks is ended, and fails
+MPI_TESTS = timeout --foreground 600 $(FX) mpirun -n $(1) \
+	python3 -m mpi4py -m pytest tests -m parallel -q -p no:cacheprovider
+
+.PHONY: help demo test test-serial lint format clean
+.DEFAULT_GOAL := help
+
+help:
+	@echo "make demo     solve Example 7.2 into results/bar, with figures"
+	@echo "make test     all tests: on 2 and 3 ranks, then the serial ones"
+	@echo "make lint     ruff and mypy"
+	@echo "make format   let ruff format the sources"
+	@echo "make NAME     run scripts/NAME.py ($(patsubst scripts/%.py,%,$(wildcard scripts/*.py)))"
+	@echo "make clean    remove results and caches in this folder"
+	@echo "FENICSX_SUITE=sid make test   the same on dolfinx 0.11"
+
+demo:
+	$(FX) python3 -m contact solve scripts/cases/bar.toml --out results/bar --plot
+
+# The ranks first, so that the last line is the closing line of the serial tests. One BLAS
+# thread each: the workers and ranks fill the cores.
+test: export OMP_NUM_THREADS := 1
+test:
+	@status=0; \
+	echo "== 2 ranks"; $(call MPI_TESTS,2) || status=1; \
+	echo "== 3 ranks"; $(call MPI_TESTS,3) || status=1; \
+	echo "== serial"; $(FX) python3 -m pytest tests -n auto || status=1; \
+	exit $$status
+
+test-serial: export OMP_NUM_THREADS := 1
+test-serial:
+	$(FX) python3 -m pytest tests -n auto
+
+lint:
+	scripts/ruff check .
+	$(FX) mypy
+
+format:
+	scripts/ruff format .
+
+clean:
+	rm -rf results build .pytest_cache .mypy_cache .ruff_cache .hypothesis
+	find . -name __pycache__ -type d -prune -exec rm -rf {} +
+
+# tables, figures, benchmarks, ...
+%: scripts/%.py
+	$(FX) python3 $< $(ARGS)

@@ -1,0 +1,61 @@
+"""What all tests share: figures without a display, temporary folders, and ranks in step."""
+
+import io
+import os
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from hypothesis import HealthCheck, settings
+from mpi4py import MPI
+
+os.environ.setdefault("MPLBACKEND", "Agg")
+
+# The same examples on every rank and in every run; forms compile at the first one, so no deadline.
+_common = {"deadline": None, "suppress_health_check": [HealthCheck.too_slow]}
+settings.register_profile("contact", derandomize=True, database=None, **_common)
+settings.register_profile("explore", max_examples=1000, **_common)
+settings.load_profile("contact")
+
+# messages of the hooks below must not meet those of a test that failed half way
+_comm = MPI.COMM_WORLD.Dup()
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_configure(config: pytest.Config) -> None:
+    """Let rank 0 alone report: failures are made common by `pytest_pyfunc_call`."""
+    if _comm.rank > 0:
+        sys.stdout = io.StringIO()
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_pyfunc_call() -> Iterator[None]:
+    """Fail a test on all ranks if it fails on one, so that they stay in step."""
+    if _comm.size == 1:
+        return (yield)
+    error: Exception | None = None
+    result = None
+    try:
+        result = yield
+    except Exception as caught:
+        error = caught
+    errors = _comm.allgather(None if error is None else f"{type(error).__name__}: {error}")
+    if error is not None:
+        raise error
+    failed = [f"rank {rank}: {text}" for rank, text in enumerate(errors) if text is not None]
+    if failed:
+        pytest.fail("\n".join(failed), pytrace=False)
+    return result
+
+
+@pytest.fixture
+def comm() -> MPI.Intracomm:
+    """All ranks of the run."""
+    return MPI.COMM_WORLD
+
+
+@pytest.fixture
+def shared_tmp_path(tmp_path: Path) -> Path:
+    """Rank 0's temporary folder, the same on all ranks."""
+    return _comm.bcast(tmp_path, root=0)
