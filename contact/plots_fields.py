@@ -107,8 +107,10 @@ def picture(solution: Solution, field: str, label: str) -> Picture | None:
     largest = comm.allreduce(float(np.linalg.norm(moved, axis=-1).max(initial=0.0)), op=MPI.MAX)
     scale = magnification(domain.size, largest)
     drawn = corners + scale * moved
-    low = comm.allreduce(drawn.min(axis=(0, 1), initial=np.inf), op=MPI.MIN)
-    high = comm.allreduce(drawn.max(axis=(0, 1), initial=-np.inf), op=MPI.MAX)
+    low = drawn.min(axis=(0, 1), initial=np.inf)
+    high = drawn.max(axis=(0, 1), initial=-np.inf)
+    comm.Allreduce(MPI.IN_PLACE, low, MPI.MIN)
+    comm.Allreduce(MPI.IN_PLACE, high, MPI.MAX)
     box = np.array([low, high])
     outline = _outline(domain)
     if d == 2 and comm.allreduce(len(cells), op=MPI.SUM) > MOST_CELLS:
