@@ -35,7 +35,7 @@ test-serial:
 
 lint:
 	scripts/ruff check .
-	$(FX) mypy
+	$(FX) env -u PYTHONPATH mypy
 
 format:
 	scripts/ruff format .
