@@ -2,8 +2,8 @@
 
 The nodal multipliers are condensed onto the displacement, so that the linear systems keep
 the size and the pattern of the elastic ones. Where the loop cycles, friction is frozen and
-updated outside (Algorithm 1 with Newton inside); where that fails too, the load is applied in
-steps. The history says which.
+updated outside (Algorithm 1 with Newton inside); where that fails too, the block relaxation
+takes over, and at last the load is applied in steps. The history says which.
 
 References
 ----------
@@ -19,6 +19,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from contact.fixed_point import FixedPoint, FixedPointOptions
 from contact.kkt import KKT, evaluate, interface_residuals, residual_forces
 from contact.linear import Counters, LinearOperator
 from contact.newton_laws import Moduli, linearise
@@ -103,8 +104,23 @@ class Newton:
         if not outcome.converged and self.problem.frictional:
             outcome = self._frozen_friction()
         if not outcome.converged:
+            outcome = self._block_relaxation()
+        if not outcome.converged:
             outcome = self._load_steps()
         return outcome
+
+    def _block_relaxation(self) -> Outcome:
+        """Solve by the fixed point over block relaxation, which damps what Newton lets cycle."""
+
+        def note(record: Record) -> None:
+            self._record(record.kkt, "block relaxation", record.inner)
+
+        options = FixedPointOptions(tolerance=self.options.tolerance)
+        relaxed = FixedPoint(self.problem, options, note, self.counters)
+        try:
+            return relaxed.solve()
+        finally:
+            self.forces, self._status = relaxed.forces, None
 
     def _newton(self, note: str, frozen: Array | None = None, goal: float = 0.0) -> Outcome:
         """Iterate on the full problem, or on the one with a frozen friction bound.
@@ -190,7 +206,9 @@ class Newton:
         blocks = contact.blocks
         if problem.response.active:
             pressure = total_pressure(problem, nodal, contact.forces)
-            blocks = blocks + problem.response.jacobian(nodal, pressure)
+            full = contact.settled
+            response = problem.response.jacobian if full else problem.response.block
+            blocks = blocks + response(nodal, pressure)
         self.operator.update(
             problem.tangent if tangent else problem.secant,
             trace.weight[:, None, None] * blocks,
@@ -205,7 +223,7 @@ class Newton:
         )
         self._status = contact.status
 
-    def _record(self, residuals: KKT, note: str) -> None:
+    def _record(self, residuals: KKT, note: str, solves: int = 1) -> None:
         seconds = time.perf_counter() - self._begin
         number = len(self.history.records) + 1
-        self.history.add(Record(number, 1, residuals, np.nan, seconds, note))
+        self.history.add(Record(number, solves, residuals, np.nan, seconds, note))
