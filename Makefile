@@ -2,7 +2,7 @@
 FX := scripts/fx
 # a test that hangs on some ranks is ended, and fails
 MPI_TESTS = timeout --foreground 600 $(FX) mpirun -n $(1) \
-	python3 -m mpi4py -m pytest tests -m parallel -q -p no:cacheprovider
+	python3 -m mpi4py -m pytest tests -m parallel -q --color=no -p no:cacheprovider
 
 .PHONY: help demo test test-serial lint format clean
 .DEFAULT_GOAL := help
