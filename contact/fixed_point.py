@@ -25,7 +25,6 @@ from contact.uzawa import (
     augmentation,
     automatic_r,
     block_relaxation,
-    split,
 )
 
 
@@ -55,7 +54,7 @@ class FixedPointOptions:
     stopping: str = "residual"
     eps: float = 1e-5
     eps_fp: float = 1e-5
-    depth: int = 8
+    depth: int = 30
     over_relaxation: float = 1.0
     single_loop: bool = False
     inner_tolerance: float | None = None
@@ -82,11 +81,11 @@ class FixedPoint:
     counters: Counters = field(default_factory=Counters)
 
     def __post_init__(self) -> None:
+        """Choose r and set up the operator."""
         self.r = self.options.r or automatic_r(self.problem)
         self.operator = LinearOperator(self.problem, counters=self.counters)
         self.history = History(self.monitor)
         self.forces = Multipliers.zero(self.problem)
-        self._augmentation = augmentation(self.problem, self.r)
         thesis = self.options.stopping == "thesis"
         inner = self.options.inner_tolerance or self.options.tolerance / 10
         self._relaxation = Relaxation(
@@ -104,16 +103,17 @@ class FixedPoint:
         """Iterate from zero displacement until convergence, stagnation or the limit."""
         begin, problem, options = time.perf_counter(), self.problem, self.options
         problem.reset()
-        z = split(problem, nodal_iterate(problem)) * self.r
-        bound = np.zeros(problem.trace.nodes.size)
+        z: Array = np.zeros((problem.trace.nodes.size, 1 + problem.dim))
+        bound: Array = np.zeros(problem.trace.nodes.size)
         tangent = options.material_step == "tangent"
         best, since = np.inf, 0
         # Iteration 0 is the pure contact problem that the thesis starts from.
         first = 0 if problem.frictional else 1
         for iteration in range(first, options.max_outer + 1):
+            friction = problem.frictional and iteration > 0
             previous = problem.x.x.array[: problem.owned].copy()
             # Newton's tangent of a zero strain is the secant, and cheaper.
-            inner, z = self._step(bound, z, tangent and iteration > first)
+            inner, z = self._step(bound, z, friction, tangent and iteration > first)
             residuals = evaluate(problem, self.forces)
             change, bound = self._update_bound(bound, iteration == 0)
             note = "tangent" if tangent and iteration > first else ""
@@ -136,12 +136,14 @@ class FixedPoint:
                 return Outcome(False, f"the residual stalled at {best:.2e}", residuals)
         return Outcome(False, f"not converged in {options.max_outer} outer iterations", residuals)
 
-    def _step(self, bound: Array, z: Array, tangent: bool) -> tuple[int, Array]:
+    def _step(
+        self, bound: Array, z: Array, friction: bool, tangent: bool
+    ) -> tuple[int, Array]:
         """Freeze, solve the frozen problem, and move the iterate."""
         problem = self.problem
         form = problem.tangent if tangent else problem.secant
         nodal = nodal_iterate(problem)
-        blocks = self._augmentation
+        blocks = augmentation(problem, self.r, friction)
         if problem.response.active:
             pressure = total_pressure(problem, nodal, self.forces)
             weight = problem.trace.weight[:, None, None]
@@ -149,7 +151,7 @@ class FixedPoint:
         self.operator.update(form, blocks, constant=problem.linear_material)
         residual = self._base_residual(nodal)
         law = problem.response.normal_law(nodal)
-        step = Linearised(self.operator, residual, nodal, bound, law)
+        step = Linearised(self.operator, residual, nodal, bound, law, friction)
         result = block_relaxation(problem, step, z, self._relaxation, self._norm)
         problem.add(result.increment)
         self.forces = result.forces

@@ -124,6 +124,15 @@ class NormalLaw:
         return np.where(free, 0.0, np.where(rigid, z - r * self.gap, pressed))
 
 
+    def pressure_slope(self, z: Array, r: float) -> Array:
+        """Return the derivative of `pressure` by z: 0 free, 1 rigid, between them in the layer."""
+        high = np.minimum(self.gap, z / r)
+        free, rigid = z <= r * self.touch, z - r * self.gap >= self.layer(high)
+        phi = (z - self.pressure(z, r)) / r
+        slope = self.stiffness * self.p_nu.derivative(phi - self.touch)
+        return np.where(free, 0.0, np.where(rigid, 1.0, slope / (slope + r)))
+
+
 @dataclass(frozen=True)
 class FoundationResponse:
     """Layer and conductor at the contact nodes; potentials come divided by `phi_scale`.

@@ -3,7 +3,7 @@
 One step solves for u, projects the auxiliary variables phi and updates the multipliers
 lambda, (3.34)-(3.36). Everything that it hands on is z = lambda + r u: the next multiplier is
 the projection of z, and r phi = z - lambda. The step is therefore a fixed-point map of z,
-which Anderson's method accelerates.
+which `acceleration` speeds up.
 """
 
 from __future__ import annotations
@@ -14,11 +14,11 @@ from dataclasses import dataclass
 import numpy as np
 from mpi4py import MPI
 
-from contact.acceleration import Anderson
+from contact.acceleration import ResidualMinimiser
 from contact.kkt import interface_residuals
 from contact.linear import LinearOperator
 from contact.problem import ContactProblem
-from contact.projections import Array, project_disc
+from contact.projections import Array, disc_derivative, project_disc
 from contact.response import NormalLaw
 from contact.state import Multipliers, bound_of
 from forms.foundation import contact_multiplier
@@ -37,9 +37,9 @@ class Relaxation:
     max_iterations
         Number of linear solves allowed.
     depth
-        Depth of Anderson's acceleration, 0 for none.
+        Number of earlier solves that the acceleration uses, 0 for no acceleration.
     over_relaxation
-        Factor in (0, 2) on the step in u; 1 for none.
+        Factor in (0, 2) on the step in u; 1 for none. Only without acceleration.
     thesis_tolerance
         If given, stop by the thesis's criterion (3.45) with this epsilon instead.
     single_loop
@@ -49,7 +49,7 @@ class Relaxation:
     r: float
     tolerance: float
     max_iterations: int
-    depth: int = 8
+    depth: int = 30
     over_relaxation: float = 1.0
     thesis_tolerance: float | None = None
     single_loop: bool = False
@@ -72,6 +72,8 @@ class Linearised:
     law
         The compliant layer in front of the rigid part, to be solved with the constraint; None
         without one. The multipliers are then those of the total pressure -sigma_nu.
+    friction
+        Whether tangential forces act; the operator is augmented tangentially only then.
     """
 
     operator: LinearOperator
@@ -79,6 +81,7 @@ class Linearised:
     nodal: Array
     bound: Array
     law: NormalLaw | None = None
+    friction: bool = False
 
 
 @dataclass
@@ -127,21 +130,24 @@ def automatic_r(problem: ContactProblem) -> float:
     return 1.39 * modulus / float(np.sqrt(spacing * height))
 
 
-def augmentation(problem: ContactProblem, r: float) -> Array:
-    """Return the weighted nodal blocks of r (u_nu v_nu + u_tau v_tau), (n, bs, bs)."""
+def augmentation(problem: ContactProblem, r: float, friction: bool) -> Array:
+    """Return the weighted nodal blocks of r u_nu v_nu [+ r u_tau v_tau], (n, bs, bs)."""
     trace, d = problem.trace, problem.dim
     blocks = np.zeros((trace.nodes.size, trace.block_size, trace.block_size))
     blocks[:, :d, :d] = trace.normal[:, :, None] * trace.normal[:, None, :]
-    if problem.frictional:
+    if friction:
         blocks[:, :d, :d] += trace.tangent
     return r * trace.weight[:, None, None] * blocks
 
 
-def split(problem: ContactProblem, nodal: Array) -> Array:
-    """Return normal and tangential displacements side by side, shape (n, 1 + d)."""
+def split(problem: ContactProblem, nodal: Array, friction: bool) -> Array:
+    """Return normal and tangential displacements side by side, shape (n, 1 + d).
+
+    Without friction the tangential ones are no unknowns of the relaxation, and 0 here.
+    """
     trace = problem.trace
     tangential = trace.tangential_component(nodal)
-    if not problem.frictional:
+    if not friction:
         tangential = np.zeros_like(tangential)
     return np.column_stack([trace.normal_component(nodal), tangential])
 
@@ -155,6 +161,23 @@ def _project(
     else:
         pressure = law.pressure(z[:, 0], r)
     return np.column_stack([pressure, project_disc(z[:, 1:], bound)])
+
+
+def _derivative(
+    problem: ContactProblem,
+    z: Array,
+    r: float,
+    bound: Array,
+    law: NormalLaw | None,
+    directions: Array,
+) -> Array:
+    """Return the derivatives of `_project` along directions of shape (n, 1 + d, k)."""
+    if law is None:
+        slope = np.where(z[:, 0] > r * problem.trace.gap, 1.0, 0.0)
+    else:
+        slope = law.pressure_slope(z[:, 0], r)
+    normal = slope[:, None, None] * directions[:, :1]
+    return np.concatenate([normal, disc_derivative(z[:, 1:], bound, directions[:, 1:])], axis=1)
 
 
 def _vectors(problem: ContactProblem, pairs: Array) -> Array:
@@ -176,7 +199,7 @@ def block_relaxation(
     problem
         The contact problem; its iterate is left alone.
     step
-        The linearised problem; its operator holds `augmentation(problem, r)`.
+        The linearised problem; its operator holds `augmentation(problem, r, friction)`.
     z
         lambda + r u to start from, shape (n, 1 + d).
     parameters
@@ -184,44 +207,59 @@ def block_relaxation(
     domain_norm
         L2(Omega) norm of owned unknowns, needed for the thesis's criterion.
     """
-    trace, r, bound = problem.trace, parameters.r, step.bound
+    trace, r, bound, law = problem.trace, parameters.r, step.bound, step.law
     weights = np.repeat(trace.weight, z.shape[1])
 
     def inner(a: Array, b: Array) -> Array:
         return np.asarray(trace.comm.allreduce(a.T @ (weights[:, None] * b), op=MPI.SUM))
 
-    anderson = Anderson(inner, parameters.depth)
-    old_increment, old_phi = None, None
+    def project(flat: Array) -> Array:
+        return _project(problem, flat.reshape(z.shape), r, bound, law).ravel()
+
+    def derivative(flat: Array, directions: Array) -> Array:
+        columns = directions.reshape(*z.shape, -1)
+        slopes = _derivative(problem, flat.reshape(z.shape), r, bound, law, columns)
+        return slopes.reshape(directions.shape)
+
+    accelerator = None
+    if parameters.depth > 0:
+        accelerator = ResidualMinimiser(inner, project, derivative, parameters.depth)
+    old_increment: Array | None = None
+    old_phi: Array | None = None
     residual, forces = np.inf, Multipliers.zero(problem)
-    increment = np.zeros(problem.owned)
-    start = split(problem, step.nodal)
+    increment: Array = np.zeros(problem.owned)
+    start = split(problem, step.nodal, step.friction)
     for iteration in range(1, parameters.max_iterations + 1):
-        multiplier = _project(problem, z, r, bound, step.law)
+        multiplier = _project(problem, z, r, bound, law)
         q = 2 * multiplier - z
         rhs = -step.residual
         trace.add(rhs, -trace.weight[:, None] * _vectors(problem, q + r * start))
         increment = step.operator.solve(rhs)
         nodal = step.nodal + trace.values(increment)
-        u = split(problem, nodal)
+        u = split(problem, nodal, step.friction)
         # q + r u is the force that the foundation exerted in this very solve.
         total = q + r * u
-        layer = 0.0 if step.law is None else step.law.layer(u[:, 0])
+        layer = 0.0 if law is None else law.layer(u[:, 0])
         forces = Multipliers(total[:, 0] - layer, total[:, 1:])
         if parameters.single_loop:
             bound = bound_of(problem, nodal, forces)
         residual = max(interface_residuals(problem, nodal, forces, bound))
-        phi = (z - multiplier) / r
+        phi = (z - multiplier) * (1 / r)
         image = multiplier + r * (phi + parameters.over_relaxation * (u - phi))
         if parameters.thesis_tolerance is not None:
             assert domain_norm is not None
-            phi = (image - _project(problem, image, r, bound, step.law)) / r
+            phi = (image - _project(problem, image, r, bound, law)) * (1 / r)
             if old_phi is not None and old_increment is not None:
-                change = domain_norm(increment - old_increment) ** 2 + trace.norm(phi - old_phi) ** 2
+                moved, projected = increment - old_increment, phi - old_phi
+                change = domain_norm(moved) ** 2 + trace.norm(projected) ** 2
                 size = domain_norm(problem.x.x.array[: problem.owned] + increment) ** 2
                 if change < parameters.thesis_tolerance**2 * (size + trace.norm(phi) ** 2):
                     return RelaxationResult(increment, forces, image, iteration, residual)
             old_phi, old_increment = phi, increment
         elif residual <= parameters.tolerance or not np.isfinite(residual):
             return RelaxationResult(increment, forces, image, iteration, residual)
-        z = anderson.next(z.ravel(), image.ravel()).reshape(z.shape)
+        z = image
+        if accelerator is not None:
+            newest = (total + r * u).ravel()
+            z = accelerator.next(total.ravel(), newest, image.ravel()).reshape(z.shape)
     return RelaxationResult(increment, forces, z, parameters.max_iterations, residual)

@@ -26,9 +26,11 @@ class Affine:
     value: float = 0.0
 
     def numpy(self, points: Array) -> Array:
+        """Return the values at points of shape (n, d)."""
         return points @ np.asarray(self.slope) + self.value
 
     def ufl(self, x: ufl.core.expr.Expr) -> ufl.core.expr.Expr:
+        """Return the field as a UFL expression."""
         return sum(float(a) * x[i] for i, a in enumerate(self.slope)) + self.value
 
 
@@ -80,9 +82,7 @@ def bar(
     return ContactProblem(domain, body, Contact("bottom", flat()), friction, degree=degree)
 
 
-def leaning_block(
-    comm: MPI.Comm, n: int = 3, degree: int = 1, mu: float = 0.3
-) -> ContactProblem:
+def leaning_block(comm: MPI.Comm, n: int = 3, degree: int = 1, mu: float = 0.3) -> ContactProblem:
     """Return a block of 2 x 1 x 1, held at the left, pressed and pushed aside on top."""
     domain = box(comm, [0.0, 0.0, 0.0], [2.0, 1.0, 1.0], [2 * n, n, n])
     zero = constant(0.0, 3)
@@ -108,14 +108,17 @@ class SlidingBlock:
 
     @property
     def shear(self) -> float:
+        """The shear strain gamma."""
         return self.push - self.slip
 
     @property
     def modulus(self) -> float:
+        """The secant modulus g at the strain of the block."""
         return float(self.law.secant_modulus(2 * self.squeeze**2 / 3 + self.shear**2 / 2))
 
     @property
     def pressure(self) -> float:
+        """The contact pressure."""
         return (self.law.bulk + 4 * self.modulus / 3) * self.squeeze
 
     @property
@@ -123,9 +126,8 @@ class SlidingBlock:
         """The tangential stress that the foundation exerts against the push."""
         return self.modulus * self.shear
 
-    def domain(
-        self, comm: MPI.Comm, dim: int, degrees: float, axis: Sequence[float]
-    ) -> Domain:
+    def domain(self, comm: MPI.Comm, dim: int, degrees: float, axis: Sequence[float]) -> Domain:
+        """Return the block's mesh, turned."""
         if dim == 2:
             return rectangle(comm, [0.0, 0.0], [1.0, 1.0], [4, 3], rotation=degrees)
         return box(comm, [0.0] * 3, [1.0] * 3, [2, 3, 2], rotation=degrees, axis=axis)

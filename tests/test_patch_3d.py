@@ -16,9 +16,7 @@ from forms.laws import ConstantCoefficient
 @pytest.mark.parametrize(("gap", "poisson"), [(0.0, 0.3), (0.0, 0.45), (0.05, 0.3)])
 def test_uniform_pressure(gap, poisson, dim, degree):
     pressure = 0.02
-    problem = pressed_block(
-        MPI.COMM_SELF, dim, degree, pressure=pressure, gap=gap, poisson=poisson
-    )
+    problem = pressed_block(MPI.COMM_SELF, dim, degree, pressure=pressure, gap=gap, poisson=poisson)
     data = contact_data(solve(problem, 1e-12))
     assert np.abs(data["pressure"] - pressure).max() < 1e-9
     assert np.abs(data["u_n"] - gap).max() < 1e-9
@@ -52,7 +50,10 @@ def test_normals_are_the_body_s_own_for_a_given_gap():
         block = SlidingBlock(Linear(1.0, 0.3), ConstantCoefficient(0.5), 0.01, 0.03, 0.0125)
         with_plane = block.problem(MPI.COMM_SELF, dim, 2, 30.0)
         with_gap = ContactProblem(
-            with_plane.domain, with_plane.body, Contact("bottom", flat()), with_plane.friction,
+            with_plane.domain,
+            with_plane.body,
+            Contact("bottom", flat()),
+            with_plane.friction,
             degree=2,
         )
         assert np.abs(with_plane.trace.normal - with_gap.trace.normal).max() < 1e-12
