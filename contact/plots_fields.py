@@ -157,16 +157,35 @@ def _outline(domain: Domain) -> Array:
 
 
 def _pixels(comm: MPI.Intracomm, drawn: Array, colours: Array, box: Array) -> Array:
-    """Return the mean of the values of the cells whose middle lies in a pixel."""
+    """Return the means over pixels, NaN outside the body: no rank holds the whole mesh."""
     extent = box[1] - box[0]
     shape = np.maximum(np.rint(PIXELS * extent / extent.max()).astype(int), 1)
-    place = np.floor((drawn.mean(axis=1) - box[0]) / extent * shape).astype(int)
-    flat = np.ravel_multi_index(tuple(np.clip(place, 0, shape - 1).T), tuple(shape))
-    value = colours if colours.ndim == 1 else colours.mean(axis=1)
-    sums = np.array([np.bincount(flat, w, shape.prod()) for w in (value, np.ones_like(value))])
+    corners = (drawn - box[0]) / extent * shape
+    values = np.broadcast_to(colours[:, None], (len(drawn), 3)) if colours.ndim == 1 else colours
+    longest = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max(axis=1, initial=0)
+    # Sample each triangle so densely that no pixel inside the body is missed.
+    level = np.ceil(np.log2(np.maximum(2 * longest, 1))).astype(int)
+    sums = np.zeros((2, shape.prod()))
+    for k in np.unique(level):
+        barycentric = _samples(2**k)
+        for cells in np.array_split(np.flatnonzero(level == k), 1 + len(level) * 4**k // 10**7):
+            points = np.floor(np.einsum("sc,ncd->nsd", barycentric, corners[cells])).astype(int)
+            flat = np.ravel_multi_index(tuple(np.clip(points, 0, shape - 1).T), tuple(shape))
+            weights = (barycentric @ values[cells].T).ravel()
+            sums[0] += np.bincount(flat.ravel(), weights, shape.prod())
+            sums[1] += np.bincount(flat.ravel(), minlength=shape.prod())
     comm.Allreduce(MPI.IN_PLACE, sums)
     with np.errstate(invalid="ignore"):
         return np.asarray((sums[0] / sums[1]).reshape(shape).T)
+
+
+def _samples(n: int) -> Array:
+    """Return the centres of the n^2 equal parts of a triangle, in barycentric coordinates."""
+    i, j = (index.ravel() for index in np.indices((n, n)))
+    up, down = i + j < n, i + j < n - 1
+    first = np.concatenate([i[up] + 1 / 3, i[down] + 2 / 3]) / n
+    second = np.concatenate([j[up] + 1 / 3, j[down] + 2 / 3]) / n
+    return np.column_stack([first, second, 1 - first - second])
 
 
 def draw_plane(picture: Picture, table: Table, title: str = "") -> Figure:
@@ -193,6 +212,7 @@ def draw_plane(picture: Picture, table: Table, title: str = "") -> Figure:
     _foundation(ax, table, picture.scale)
     figure.colorbar(shown, ax=ax, location="bottom", label=picture.label, aspect=40, shrink=0.8)
     ax.set_aspect("equal")
+    ax.use_sticky_edges = False
     ax.margins(0.02)
     ax.autoscale_view()
     ax.set_xlabel("$x$ (mesh units)")
