@@ -48,12 +48,14 @@ class Solver(Section):
         default="anderson", description="Acceleration of the block relaxation."
     )
     depth: Annotated[int, Field(ge=1, le=100), Accepted("a whole number from 1 to 100")] = Field(
-        default=8, description="Depth of Anderson's acceleration."
+        default=30, description="Number of earlier solves that the acceleration uses."
     )
     relaxation: Annotated[
         float, Field(gt=0, lt=2), Accepted("a number between 0 and 2, both excluded")
     ] = Field(
-        default=1.0, description="Relaxation of the multiplier's step; above 1: over-relaxation."
+        default=1.0,
+        description="Relaxation of the multiplier's step, without acceleration alone; above 1: "
+        "over-relaxation.",
     )
     single_loop: Switch = Field(
         default=False,
