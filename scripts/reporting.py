@@ -1,0 +1,163 @@
+"""How the scripts of this folder write their tables and figures.
+
+Each table or figure is a CSV file with the numbers, a PNG file for a figure, and a Markdown
+fragment of the same name with caption and remarks. `results.py` puts the fragments together.
+"""
+
+from __future__ import annotations
+
+import argparse
+import csv
+import logging
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from matplotlib import rc_context
+from matplotlib.figure import Figure
+from mpi4py import MPI
+
+from contact import Case, InputError, Solution, build_problem, load_case, solve_problem
+from contact.plots import STYLE
+from contact.problem import ContactProblem
+
+CASES = Path(__file__).parent / "cases"
+
+
+@dataclass(frozen=True)
+class Report:
+    """A folder that tables and figures are written to, by rank 0.
+
+    Parameters
+    ----------
+    out
+        The folder; it is made if need be.
+    """
+
+    out: Path
+
+    def table(
+        self, name: str, caption: str, columns: Mapping[str, Sequence[Any]], note: str = ""
+    ) -> None:
+        """Print a table and write it; the columns have equal lengths."""
+        if MPI.COMM_WORLD.rank > 0:
+            return
+        self._csv(name, columns)
+        rows = [[text(value) for value in row] for row in zip(*columns.values(), strict=True)]
+        lines = [list(columns), *rows]
+        widths = [max(len(line[k]) for line in lines) for k in range(len(columns))]
+        print(f"\n{caption}")
+        for line in lines:
+            print("  ".join(cell.rjust(w) for cell, w in zip(line, widths, strict=True)))
+        if note:
+            print(note)
+        body = [f"| {' | '.join(line)} |" for line in lines]
+        body.insert(1, "|" + " --- |" * len(columns))
+        self._fragment(name, caption, "\n".join(body), note)
+
+    def figure(
+        self,
+        name: str,
+        caption: str,
+        figure: Figure,
+        data: Mapping[str, Sequence[Any]],
+        note: str = "",
+    ) -> None:
+        """Write a figure and the numbers that it shows (columns may have unequal lengths)."""
+        if MPI.COMM_WORLD.rank > 0:
+            return
+        self.out.mkdir(parents=True, exist_ok=True)
+        with rc_context(STYLE):
+            figure.savefig(self.out / f"{name}.png", dpi=130)
+        length = max(len(column) for column in data.values())
+        padded = {
+            key: [*column, *[""] * (length - len(column))] for key, column in data.items()
+        }
+        self._csv(name, padded)
+        self._fragment(name, caption, f"![{caption}]({name}.png)", note)
+
+    def _csv(self, name: str, columns: Mapping[str, Sequence[Any]]) -> None:
+        self.out.mkdir(parents=True, exist_ok=True)
+        with (self.out / f"{name}.csv").open("w", newline="") as stream:
+            writer = csv.writer(stream)
+            writer.writerow(columns)
+            writer.writerows(zip(*columns.values(), strict=True))
+
+    def _fragment(self, name: str, caption: str, body: str, note: str) -> None:
+        parts = [f"**{caption}**", body, *([note] if note else []), f"Numbers: `{name}.csv`"]
+        (self.out / f"{name}.md").write_text("\n\n".join(parts) + "\n")
+
+
+def text(value: Any) -> str:
+    """Return a value as it stands in a table."""
+    if isinstance(value, str):
+        return value
+    if isinstance(value, bool | np.bool_):
+        return "yes" if value else "no"
+    if isinstance(value, int | np.integer):
+        return str(value)
+    if value is None or np.isnan(value):
+        return "—"
+    return f"{value:.4g}"
+
+
+def subplots(
+    rows: int = 1, columns: int = 1, size: tuple[float, float] = (6.6, 3.0), **shared: bool
+) -> tuple[Figure, Any]:
+    """Return a figure in the style of `contact.plots`, and its axes."""
+    with rc_context(STYLE):
+        figure = Figure(figsize=size)
+        return figure, figure.subplots(rows, columns, **shared)
+
+
+def options(text: str, script: str, arguments: Sequence[str] | None = None) -> argparse.Namespace:
+    """Return the options --out and --coarse, which all these scripts have."""
+    parser = argparse.ArgumentParser(description=text.splitlines()[0])
+    parser.add_argument("--out", type=Path, default=Path("results") / script)
+    parser.add_argument("--coarse", action="store_true", help="coarse meshes: quick, for tests")
+    # A table solves a hundred problems; what each is worth is told by `contact solve`.
+    logging.getLogger("contact").setLevel(logging.ERROR)
+    return parser.parse_args(arguments)
+
+
+def bar(n: int, load: float, rho: float, *changes: str) -> Case:
+    """Return Example 7.2 with n cells per unit length, solved by Newton's method."""
+    return load_case(
+        CASES / "bar.toml",
+        [
+            f"mesh.cells=[{4 * n}, {n}]",
+            f"load.0.traction=[0.0, {load}]",
+            f"friction.mu.rho={rho}",
+            "solver.method=newton",
+            *changes,
+        ],
+    )
+
+
+def solved(case: Case, problem: ContactProblem | None = None) -> Solution:
+    """Solve a case, or stop the script. Collective.
+
+    Raises
+    ------
+    InputError
+        If it does not converge: no table or figure shows such numbers.
+    """
+    problem = problem or build_problem(case)
+    solution = solve_problem(problem, case.solver)
+    solution.title = case.title
+    if not solution.converged:
+        raise InputError(f"{case.title}: {solution.outcome.reason}")
+    return solution
+
+
+def iterate(problem: ContactProblem) -> np.ndarray:
+    """Return a copy of the owned unknowns."""
+    return problem.x.x.array[: problem.owned].copy()
+
+
+def observed_orders(parameter: Sequence[float], errors: Sequence[float]) -> list[float]:
+    """Return the slopes between neighbours in a doubly logarithmic plot, after a NaN."""
+    slopes = np.diff(np.log(errors)) / np.diff(np.log(parameter))
+    return [np.nan, *slopes.tolist()]
