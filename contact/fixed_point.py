@@ -111,6 +111,9 @@ class FixedPoint:
         first = 0 if problem.frictional else 1
         for iteration in range(first, options.max_outer + 1):
             friction = problem.frictional and iteration > 0
+            if friction and iteration == 1:
+                # The slip without friction is a bad guess, and so is the contact that goes with it.
+                z = np.zeros_like(z)
             previous = problem.x.x.array[: problem.owned].copy()
             # Newton's tangent of a zero strain is the secant, and cheaper.
             inner, z = self._step(bound, z, friction, tangent and iteration > first)

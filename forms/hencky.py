@@ -97,11 +97,24 @@ class Log(Isotropic):
         "square": xi_0 limits t^2, as (7.8) is printed; it softens beyond e xi_0.
     g_min
         A floor of g (stress), so that assumption (h1) holds uniformly; 0 for none.
+
+    Raises
+    ------
+    ValueError
+        If `argument` is neither, or `g_min` is not below mu1.
     """
 
     yield_strain: float = field(kw_only=True)
     argument: str = field(default="norm", kw_only=True)
     g_min: float = field(default=0.0, kw_only=True)
+
+    def __post_init__(self) -> None:
+        """Refuse what (7.8) has no meaning for."""
+        if self.argument not in ("norm", "square"):
+            raise ValueError(f"argument must be 'norm' or 'square'; given: {self.argument!r}")
+        # Without a floor the constants may be UFL expressions.
+        if self.g_min != 0 and not 0 < self.g_min < self.shear:
+            raise ValueError(f"g_min must lie between 0 and mu1; given: {self.g_min}")
 
     @property
     def _limit(self) -> float:
