@@ -14,6 +14,7 @@ from dolfinx.fem.petsc import assemble_matrix, create_matrix
 from numpy.typing import NDArray
 from petsc4py import PETSc
 
+from contact import linear_amg
 from contact.errors import InputError
 from contact.problem import ContactProblem
 from contact.projections import Array
@@ -41,6 +42,8 @@ class LinearOperator:
         Prefix of PETSc options, for instance ``-contact_ksp_type cg``.
     counters
         Where factorisations and solves are counted.
+    kind
+        "lu", "iterative", or "auto": iterative for large problems.
     """
 
     def __init__(
@@ -50,6 +53,7 @@ class LinearOperator:
         symmetric: bool = True,
         prefix: str = "contact_",
         counters: Counters | None = None,
+        kind: str = "auto",
     ) -> None:
         self.problem = problem
         self.counters = counters or Counters()
@@ -57,13 +61,19 @@ class LinearOperator:
         self.matrix = create_matrix(problem.secant)
         self._form: fem.Form | None = None
         self._blocks: Array | None = None
+        self._bulk: PETSc.Mat | None = None
         self._rhs, self._solution = self.matrix.createVecs()
         self.ksp = PETSc.KSP().create(problem.comm)
         self.ksp.setOptionsPrefix(prefix)
-        self.ksp.setType("preonly")
-        pc = self.ksp.getPC()
-        pc.setType("cholesky" if symmetric else "lu")
-        pc.setFactorSolverType("mumps")
+        self.iterative = kind == "iterative" or (kind == "auto" and linear_amg.is_large(problem))
+        if self.iterative:
+            self.matrix.setNearNullSpace(linear_amg.near_nullspace(problem))
+            linear_amg.configure(self.ksp, problem, symmetric)
+        else:
+            self.ksp.setType("preonly")
+            pc = self.ksp.getPC()
+            pc.setType("cholesky" if symmetric else "lu")
+            pc.setFactorSolverType("mumps")
         self.ksp.setFromOptions()
 
     def update(self, form: fem.Form, blocks: Array, *, constant: bool = False) -> None:
@@ -87,8 +97,14 @@ class LinearOperator:
         same = constant and form is self._form and self._blocks is not None
         if same and self._all(np.array_equal(blocks, self._blocks)):
             return
-        self.matrix.zeroEntries()
-        assemble_matrix(self.matrix, form, bcs=self.problem.bcs)
+        if constant and form is self._form and self._bulk is not None:
+            self._bulk.copy(self.matrix, PETSc.Mat.Structure.SAME_NONZERO_PATTERN)
+        else:
+            self.matrix.zeroEntries()
+            assemble_matrix(self.matrix, form, bcs=self.problem.bcs)
+            self.matrix.assemble()
+            if constant:
+                self._bulk = self.matrix.copy()
         self._add(nodes, blocks)
         self.matrix.assemble()
         self.matrix.setOption(PETSc.Mat.Option.SYMMETRIC, self._symmetric)
@@ -103,15 +119,21 @@ class LinearOperator:
     def _add(self, at: NDArray[np.int32], blocks: Array) -> None:
         free = self.problem.free[at].astype(float)
         masked = blocks * free[:, :, None] * free[:, None, :]
-        self.matrix.assemble()
         rows = np.arange(at.size + 1, dtype=PETSc.IntType)
         nodes = at.astype(PETSc.IntType)
         self.matrix.setValuesBlockedLocalIJV(
             rows, nodes, masked, addv=PETSc.InsertMode.ADD_VALUES, rowmap=nodes
         )
 
-    def solve(self, rhs: Array) -> Array:
+    def solve(self, rhs: Array, rtol: float | None = None) -> Array:
         """Solve with the owned part of a right-hand side; fixed unknowns stay 0. Collective.
+
+        Parameters
+        ----------
+        rhs
+            Owned right-hand side.
+        rtol
+            Relative tolerance of an iterative solver; a direct one ignores it.
 
         Raises
         ------
@@ -119,6 +141,8 @@ class LinearOperator:
             If the operator is singular: the body is not held.
         """
         self._rhs.array[:] = np.where(self.problem.free.ravel(), rhs, 0.0)
+        if rtol is not None:
+            self.ksp.setTolerances(rtol=rtol)
         self.ksp.solve(self._rhs, self._solution)
         self.counters.linear_solves += 1
         self.counters.linear_iterations += self.ksp.getIterationNumber()

@@ -138,10 +138,11 @@ def linearise(
 
         along = trial / np.maximum(size, 1e-300)[:, None]
         across = trace.tangent - along[:, :, None] * along[:, None, :]
-        # Eliminating lambda from lambda = s z/|z|, z = lambda + c u_tau, leaves s/|u_tau|.
+        # Across z = lambda + c u_tau the new multiplier is s/|u_tau| times the new slip:
+        # lambda = s z/|z|, linearised in u and lambda and solved for the latter.
         turning = np.minimum(bound * c / np.maximum(size - bound, 1e-300), moduli.gamma)
-        friction[slides] = bound[slides, None] * along[slides]
         sliding = turning[:, None, None] * across
+        friction[slides] = (bound[:, None] * along + np.einsum("nij,nj->ni", sliding, slip))[slides]
         if frozen_bound is None:
             rate = _bound_gradient(problem, nodal, total, slip, length, moduli, settled)
             ahead, follows = _follow_pressure(problem, nodal, length, slope, opening, moduli, closed)

@@ -1,0 +1,73 @@
+"""Algebraic multigrid for elastic contact problems: GAMG with rigid-body near-nullspace."""
+
+from __future__ import annotations
+
+import numpy as np
+from petsc4py import PETSc
+
+from contact.problem import ContactProblem
+from contact.rigid import rigid_motions
+
+#: Unknowns from which an iterative solver pays, by dimension (seen in `make bench`).
+LARGE = {2: 1_500_000, 3: 60_000}
+
+#: Options of GAMG where the user gives none.
+DEFAULTS = {
+    "pc_gamg_type": "agg",
+    "pc_gamg_agg_nsmooths": "1",
+    "pc_gamg_threshold": "0.01",
+    "pc_gamg_reuse_interpolation": "true",
+    "pc_gamg_coarse_eq_limit": "2000",
+    "pc_gamg_aggressive_coarsening": "1",
+    "mg_levels_ksp_type": "chebyshev",
+    "mg_levels_ksp_max_it": "3",
+    # A node in contact couples its components through the large gamma of the constraint: the
+    # smoother has to invert the nodal blocks.
+    "mg_levels_pc_type": "pbjacobi",
+    "mg_coarse_pc_type": "redundant",
+    "mg_coarse_redundant_pc_type": "lu",
+}
+
+
+def is_large(problem: ContactProblem) -> bool:
+    """Tell whether an iterative solver pays for a problem of this size."""
+    unknowns = problem.space.dofmap.index_map.size_global * problem.block_size
+    return unknowns >= LARGE[problem.dim]
+
+
+def near_nullspace(problem: ContactProblem) -> PETSc.NullSpace:
+    """Return the rigid-body motions on the free unknowns, orthonormalised. Collective."""
+    d, bs = problem.dim, problem.block_size
+    index_map = problem.space.dofmap.index_map
+    points = problem.space.tabulate_dof_coordinates()[: index_map.size_local, :d]
+    low = problem.domain.mesh.geometry.x.min(axis=0, initial=0.0)[:d]
+    motions = rigid_motions((points - low) / problem.domain.size)
+    vectors = []
+    for k in range(motions.shape[2]):
+        values = np.zeros((index_map.size_local, bs))
+        values[:, :d] = motions[:, :, k]
+        vector = PETSc.Vec().createMPI(
+            (index_map.size_local * bs, index_map.size_global * bs), bs, problem.comm
+        )
+        vector.array[:] = np.where(problem.free, values, 0.0).ravel()
+        for other in vectors:
+            vector.axpy(-vector.dot(other), other)
+        vector.normalize()
+        vectors.append(vector)
+    return PETSc.NullSpace().create(vectors=vectors, comm=problem.comm)
+
+
+def configure(ksp: PETSc.KSP, problem: ContactProblem, symmetric: bool) -> None:
+    """Set up CG (GMRES where friction makes the operator non-symmetric) with GAMG.
+
+    Options given by the user under the solver's prefix come first.
+    """
+    ksp.setType("cg" if symmetric else "gmres")
+    if not symmetric:
+        ksp.setGMRESRestart(80)
+    ksp.setTolerances(rtol=1e-10, max_it=500)
+    ksp.getPC().setType("gamg")
+    options = PETSc.Options(ksp.getOptionsPrefix())
+    for name, value in DEFAULTS.items():
+        if not options.hasName(name):
+            options[name] = value
