@@ -21,7 +21,9 @@ from mpi4py import MPI
 
 from contact import Case, InputError, Solution, build_problem, load_case, solve_problem
 from contact.plots import STYLE
+from contact.plots_fields import Picture, draw_plane
 from contact.problem import ContactProblem
+from contact.table import Table
 
 CASES = Path(__file__).parent / "cases"
 
@@ -70,7 +72,7 @@ class Report:
             return
         self.out.mkdir(parents=True, exist_ok=True)
         with rc_context(STYLE):
-            figure.savefig(self.out / f"{name}.png", dpi=130)
+            figure.savefig(self.out / f"{name}.png", dpi=130, bbox_inches="tight")
         length = max(len(column) for column in data.values())
         padded = {
             key: [*column, *[""] * (length - len(column))] for key, column in data.items()
@@ -110,6 +112,12 @@ def subplots(
     with rc_context(STYLE):
         figure = Figure(figsize=size)
         return figure, figure.subplots(rows, columns, **shared)
+
+
+def draw(deformed: Picture, table: Table, title: str = "") -> Figure:
+    """Return `contact.plots`'s drawing of a deformed plane body."""
+    with rc_context(STYLE):
+        return draw_plane(deformed, table, title)
 
 
 def options(text: str, script: str, arguments: Sequence[str] | None = None) -> argparse.Namespace:
