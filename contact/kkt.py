@@ -70,9 +70,9 @@ def interface_residuals(
     contact = forces.pressure - project_half_line(forces.pressure + c * opening)
     trial = forces.friction + c * trace.tangential_component(nodal)
     friction = forces.friction - project_disc(trial, bound)
-    scale = trace.norm(total_pressure(problem, nodal, forces))
-    if scale == 0:  # open everywhere: compare with the stress that closing would take
-        scale = c * trace.norm(np.minimum(np.abs(opening), problem.domain.size)) or 1.0
+    # Where next to nothing presses, rounding is compared with the stress that closing would take.
+    closing = c * trace.norm(np.minimum(np.abs(opening), problem.domain.size))
+    scale = max(trace.norm(total_pressure(problem, nodal, forces)), 1e-4 * closing) or 1.0
     return trace.norm(contact) / scale, trace.norm(friction) / scale
 
 
