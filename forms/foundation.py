@@ -7,11 +7,17 @@ rule, which makes them equal to the nodal ones for P1.
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from typing import TypeAlias
+
 import ufl
 from ufl.core.expr import Expr
 
 from forms.kinematics import normal_part, tangential_part
 from forms.ops import Value, positive_part, sqrt
+
+#: A pointwise law of one argument, for instance one of `forms.laws`.
+Law: TypeAlias = Callable[[Value], Value]
 
 
 def contact_multiplier(pressure: Value, r: Value, u_n: Value, gap: Value) -> Value:
@@ -59,11 +65,15 @@ def penalty_friction(
     return modulus * ufl.inner(tangential_part(u, nu), tangential_part(v, nu))
 
 
-def compliance(u: Expr, v: Expr, nu: Expr, p_nu, h_nu, gap: Expr, difference: Value) -> Expr:
+def compliance(
+    u: Expr, v: Expr, nu: Expr, p_nu: Law, h_nu: Law, gap: Expr, difference: Value
+) -> Expr:
     """Return h_nu(phi - phi_F) p_nu(u_nu - rho_0) v_nu, the form j_1 of section 6.2."""
     return h_nu(difference) * p_nu(normal_part(u, nu) - gap) * normal_part(v, nu)
 
 
-def electric_contact(u: Expr, phi: Expr, xi: Expr, nu: Expr, psi, phi_l, gap, phi_f) -> Expr:
+def electric_contact(
+    u: Expr, phi: Expr, xi: Expr, nu: Expr, psi: Law, phi_l: Law, gap: Expr, phi_f: Value
+) -> Expr:
     """Return psi(u_nu - rho) phi_L(phi - phi_F) xi, the form l of (5.11)."""
     return psi(normal_part(u, nu) - gap) * phi_l(phi - phi_f) * xi

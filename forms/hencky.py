@@ -186,11 +186,11 @@ class UserLaw(Isotropic):
 
     def shear_energy(self, q: Value) -> Value:
         """Return the integral of 2 g(s) s over [0, sqrt(q)]."""
-        points, weights = np.polynomial.legendre.leggauss(12)
-        points, weights = (points + 1) / 2, weights / 2
         total = 0 * q
-        for z, weight in zip(points, weights, strict=True):
-            total = total + 2 * weight * z * self.secant_modulus(float(z) ** 2 * q) * q
+        # The rule on [-1, 1], moved to [0, 1].
+        for point, weight in zip(*np.polynomial.legendre.leggauss(12), strict=True):
+            z = float(point + 1) / 2
+            total = total + float(weight) * z * self.secant_modulus(z**2 * q) * q
         return total
 
 

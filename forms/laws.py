@@ -10,6 +10,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Protocol
 
+import numpy as np
+
 from forms.ops import Value, absolute, clip, less, less_equal, minimum, positive_part, where
 
 
@@ -40,7 +42,8 @@ class ConstantCoefficient:
     @property
     def maximum(self) -> float:
         """Upper bound mu*."""
-        return float(self.value if not hasattr(self.value, "max") else self.value.max())
+        # A rank may hold no node.
+        return float(np.max(self.value, initial=0.0))
 
     @property
     def lipschitz(self) -> float:
@@ -91,6 +94,11 @@ class SlipCoefficient:
         return -self.b * self.rho / (self.rho * slip + 2) ** 2
 
 
+def _unlimited(limit: Value) -> bool:
+    """Tell whether a limit is infinite: compiled forms know no infinity."""
+    return isinstance(limit, float) and limit == np.inf
+
+
 @dataclass(frozen=True)
 class Truncation:
     """phi_L(s) = s limited to [-L, L], equation (1.34); L = infinity for none."""
@@ -99,10 +107,12 @@ class Truncation:
 
     def __call__(self, s: Value) -> Value:
         """Return the truncated potential difference."""
-        return clip(s, -self.limit, self.limit)
+        return s if _unlimited(self.limit) else clip(s, -self.limit, self.limit)
 
     def derivative(self, s: Value) -> Value:
         """Return 1 inside the limits, 0 outside."""
+        if _unlimited(self.limit):
+            return 1.0 + 0 * s
         return where(less_equal(absolute(s), self.limit), 1.0, 0.0)
 
 
@@ -197,11 +207,15 @@ class Compliance:
 
     def __call__(self, s: Value) -> Value:
         """Return p_nu at the penetration s = u_nu - rho_0."""
-        return minimum(positive_part(s), self.limit)
+        depth = positive_part(s)
+        return depth if _unlimited(self.limit) else minimum(depth, self.limit)
 
     def derivative(self, s: Value) -> Value:
         """Return the generalised derivative: 1 for 0 < s < n_nu, else 0."""
-        return where(less_equal(s, 0.0), 0.0, where(less_equal(s, self.limit), 1.0, 0.0))
+        inside = 1.0
+        if not _unlimited(self.limit):
+            inside = where(less_equal(s, self.limit), 1.0, 0.0)
+        return where(less_equal(s, 0.0), 0.0, inside)
 
 
 @dataclass(frozen=True)
