@@ -28,7 +28,7 @@ echo call >>"$FAKES/calls"
 echo "I: stand-in"
 sleep "${FAKE_SECONDS:-0}"
 [[ -z ${FAKE_FAILURE-} ]] || { echo "E: the mirror is gone"; exit 25; }
-for target; do [[ $target != */*.part && $target != - ]] || break; done
+for target; do [[ $target != */*.part/root && $target != - ]] || break; done
 folder=$target
 [[ $target != - ]] || folder=$(mktemp -d)
 mkdir -p "$folder"/{usr,etc/ssl/certs,var} "$folder$FAKES" # for the marker
@@ -91,6 +91,7 @@ class Launcher:
         self.fake("unshare", "exit 1")
 
     def start(self, *command: str, **env: str) -> subprocess.Popen[str]:
+        """Start the launcher, from another folder."""
         return subprocess.Popen(
             [str(self.fx), *command],
             env=self.env | env,
@@ -103,6 +104,7 @@ class Launcher:
         )
 
     def run(self, *command: str, **env: str) -> tuple[int, str, str]:
+        """Run the launcher and return its status and what it wrote."""
         process = self.start(*command, **env)
         out, err = process.communicate(timeout=30)
         return process.returncode, out, err
@@ -113,7 +115,7 @@ class Launcher:
         return len(calls.read_text().split()) if calls.exists() else 0
 
     def roots(self) -> list[str]:
-        """The folders in the cache, finished or not."""
+        """List the folders in the cache, finished or not."""
         return sorted(path.name for path in self.cache.glob("*/*") if path.is_dir())
 
 
@@ -250,7 +252,8 @@ def test_a_failed_bootstrap_is_said_and_removed(launcher):
 def test_signals_reach_the_command(launcher, kind):
     launcher.bootstrap_tools()
     assert launcher.run("true")[0] == 0
-    program = f'trap "echo caught; exit 9" {kind.name[3:]}; echo ready; while :; do sleep 0.05; done'
+    trap = f'trap "echo caught; exit 9" {kind.name[3:]}'
+    program = f"{trap}; echo ready; while :; do sleep 0.05; done"
     process = launcher.start("bash", "-c", program)
     assert process.stdout is not None
     assert process.stdout.readline() == "ready\n"
