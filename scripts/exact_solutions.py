@@ -1,0 +1,175 @@
+"""Problems whose exact solution is known: a manufactured one, and Signorini's with r^(3/2)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any
+
+import basix.ufl
+import numpy as np
+import ufl
+from dolfinx import fem
+from mpi4py import MPI
+
+from contact.domain import box, rectangle
+from contact.foundation import GapFunction
+from contact.interpolate import Errors, errors_to
+from contact.problem import Body, Contact, ContactProblem, Fixed, Load
+from contact.projections import Array
+from forms.hencky import Hencky, Linear, Log, stress
+from forms.kinematics import strain
+from forms.ops import cos, sin
+
+
+@dataclass(frozen=True)
+class Given:
+    """A function of the coordinates, for UFL and NumPy alike."""
+
+    function: Callable[[Any], Any]
+
+    def ufl(self, x: ufl.core.expr.Expr) -> ufl.core.expr.Expr:
+        """Return the function as a UFL expression of the coordinates."""
+        return self.function(x)
+
+    def numpy(self, points: Array) -> Array:
+        """Return the values at points of shape (n, d)."""
+        return np.asarray(self.function(points.T))
+
+
+#: Law of the manufactured problem: some of the body is beyond its yield strain, some not.
+HENCKY = Log(1.0, 0.3, yield_strain=0.13)
+
+
+def smooth(dim: int) -> list[Callable[[Any], Any]]:
+    """Return the components of a smooth displacement in 2-D or 3-D."""
+    up = dim - 1
+    parts: list[Callable[[Any], Any]] = [
+        lambda x: 0.12 * sin(1.7 * x[0]) * cos(1.2 * x[up]),
+        lambda x: 0.12 * cos(0.9 * x[0]) * sin(1.9 * x[up] + 0.3),
+    ]
+    if dim == 3:
+        parts.insert(1, lambda x: 0.1 * sin(1.1 * x[1] + 0.2) * cos(0.8 * x[0]))
+    return parts
+
+
+def manufactured(dim: int, degree: int, n: int, law: Hencky = HENCKY) -> ContactProblem:
+    """Return a Hencky body with the displacement `smooth`, loaded at the bottom. Collective.
+
+    Parameters
+    ----------
+    dim, degree
+        Of space and of the elements.
+    n
+        Cells along each edge of the unit square or cube.
+    law
+        The material.
+    """
+    make = rectangle if dim == 2 else box
+    domain = make(MPI.COMM_WORLD, [0.0] * dim, [1.0] * dim, [n] * dim)
+    sigma = stress(law, strain(exact(dim)(ufl.SpatialCoordinate(domain.mesh))))
+    element = basix.ufl.element("Lagrange", domain.mesh.topology.cell_name(), degree + 2)
+    space = fem.functionspace(domain.mesh, element)
+
+    def load(expression: ufl.core.expr.Expr) -> Given:
+        # Interpolated: UFL would ask for a quadrature of a very high degree.
+        function = fem.Function(space)
+        function.interpolate(fem.Expression(expression, element.basix_element.points))
+        return Given(lambda _: function)
+
+    axes, up = range(dim), dim - 1
+    loads = [
+        Load(None, [load(-sum(sigma[i, j].dx(j) for j in axes)) for i in axes]),
+        Load("bottom", [load(-sigma[i, up]) for i in axes]),
+    ]
+    given = [Given(f) for f in smooth(dim)]
+    sides = ["left", "right", "top"] + ["front", "back"] * (dim == 3)
+    fixed = [Fixed(side, given) for side in sides]
+    far = GapFunction(lambda points: np.full(len(points), 10.0))
+    return ContactProblem(domain, Body(law, fixed, loads), Contact("bottom", far), degree=degree)
+
+
+def exact(dim: int) -> Callable[[Any], ufl.core.expr.Expr]:
+    """Return `smooth` as a UFL vector."""
+    return lambda x: ufl.as_vector([f(x) for f in smooth(dim)])
+
+
+@dataclass(frozen=True)
+class Singular:
+    """Closed form 4: frictionless contact of a half plane y > 0 for x > x0.
+
+    Attributes
+    ----------
+    law
+        Elastic constants, plane strain.
+    amplitude
+        -A > 0: the pressure is |A| sqrt(x - x0).
+    x0
+        Where the contact ends.
+    """
+
+    law: Linear = field(default_factory=lambda: Linear(1.0, 0.3))
+    amplitude: float = 0.1
+    x0: float = 0.53
+
+    def component(self, i: int, x: Any, polar: tuple[Any, Any], ops: Any) -> Any:
+        """Return u_x or u_y at r, theta about (x0, 0); `ops` is the module of cos and sin."""
+        r, theta = polar
+        a, kappa = -self.amplitude, 3 - 4 * self.law.poisson
+        root = a * r**0.5
+        cube = 2 * a / 3 * r**1.5
+        if i == 0:
+            value = (kappa - 1) / 2 * cube * ops.cos(1.5 * theta)
+            value = value - x[1] * root * ops.sin(theta / 2)
+        else:
+            value = (kappa + 1) / 2 * cube * ops.sin(1.5 * theta)
+            value = value - x[1] * root * ops.cos(theta / 2)
+        return value / (2 * self.law.shear)
+
+    def numpy(self, i: int, points: Array) -> Array:
+        """Return a component at points of shape (n, 2)."""
+        x = points.T
+        # Rounding must not take nodes of y = 0 across the branch cut.
+        y = np.maximum(x[1], 0.0)
+        polar = np.hypot(x[0] - self.x0, y), np.arctan2(y, x[0] - self.x0)
+        return np.asarray(self.component(i, x, polar, np))
+
+    def ufl(self, x: ufl.core.expr.Expr) -> ufl.core.expr.Expr:
+        """Return the displacement as a UFL vector."""
+        r = ufl.sqrt((x[0] - self.x0) ** 2 + x[1] ** 2)
+        polar = r, ufl.atan2(x[1], x[0] - self.x0)
+        return ufl.as_vector([self.component(i, x, polar, ufl) for i in range(2)])
+
+    def pressure(self, x: Array) -> Array:
+        """Return the contact pressure along y = 0."""
+        return self.amplitude * np.sqrt(np.maximum(x - self.x0, 0.0))
+
+    def problem(self, n: int, degree: int = 1) -> ContactProblem:
+        """Return the problem on the unit square with n x n cells. Collective."""
+        domain = rectangle(MPI.COMM_WORLD, [0.0, 0.0], [1.0, 1.0], [n, n])
+        given = [_Component(self, i) for i in range(2)]
+        fixed = [Fixed(side, given) for side in ("left", "right", "top")]
+        flat = GapFunction(lambda points: np.zeros(len(points)))
+        return ContactProblem(domain, Body(self.law, fixed), Contact("bottom", flat), degree=degree)
+
+    def errors(self, problem: ContactProblem) -> tuple[Errors, float]:
+        """Return the norms of the error, and the largest one at the nodes. Collective."""
+        points = problem.space.tabulate_dof_coordinates()[: problem.owned // 2, :2]
+        u = problem.x.x.array[: problem.owned].reshape(-1, 2)
+        given = np.column_stack([self.numpy(i, points) for i in range(2)])
+        largest = np.abs(u - given).max(initial=0.0)
+        return errors_to(problem, self.ufl), float(problem.comm.allreduce(largest, op=MPI.MAX))
+
+
+@dataclass(frozen=True)
+class _Component:
+    """A component of the displacement, as a boundary value."""
+
+    solution: Singular
+    index: int
+
+    def ufl(self, x: ufl.core.expr.Expr) -> ufl.core.expr.Expr:
+        return self.solution.ufl(x)[self.index]
+
+    def numpy(self, points: Array) -> Array:
+        return self.solution.numpy(self.index, points)
