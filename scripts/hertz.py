@@ -381,8 +381,8 @@ def spheres(
         "Sphere on a plane (closed form 5) over Hertz's solution",
         columns,
         "Radius from the second moment of the pressure; peak pressure from p^2 as a linear "
-        "function of r^2 near the axis, and as the largest nodal value. The body is a half ball, and the "
-        "approach is that of the middle of its cut, at the depth R; beside it stands Hertz's "
+        "function of r^2 near the axis, and as the largest nodal value. The body is a half ball, "
+        "and the approach is that of the middle of its cut, at the depth R; beside it is Hertz's "
         "displacement at that depth of the half space "
         f"({hertz.axial(hertz.radius):.5f}; of infinitely distant points {hertz.approach:.5f}). "
         "The load is scaled to the area of the polyhedral cut, so that the forces can balance.",
