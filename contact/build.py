@@ -61,7 +61,7 @@ def build_problem(
         If the case does not fit the mesh, a formula has no value at a node or a wrong sign,
         or the body is not held.
     """
-    with _named(case.source):
+    with named(case.source):
         domain = make_domain(case.mesh, comm) if domain is None else domain
         case.check_mesh(domain.dim, domain.parts)
         body = parts.Body(
@@ -87,7 +87,7 @@ def build_problem(
 
 
 @contextmanager
-def _named(source: str) -> Iterator[None]:
+def named(source: str) -> Iterator[None]:
     """Let messages name the case file, as those of the case itself do."""
     try:
         yield

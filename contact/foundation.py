@@ -95,7 +95,8 @@ class Sphere:
         outward = 1.0 if self.inside else -1.0
         if self.direction == "foundation":
             # The centre itself has none: NaN, which `build_trace` refuses on all ranks together.
-            radial = offset / np.where(distance > 0, distance, np.nan)[:, None]
+            known = distance > 1e-12 * self.radius
+            radial = offset / np.where(known, distance, np.nan)[:, None]
             return outward * radial, outward * (self.radius - distance)
         # The ray x + t nu meets the sphere where |offset + t nu| = radius.
         along = np.einsum("ni,ni->n", offset, body_normal)

@@ -1,4 +1,4 @@
-"""Is the body held? Rigid motions that supports, contact and friction leave free."""
+"""Is the body held, and is its potential determined?"""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from scipy.optimize import linprog
 from contact.errors import InputError
 from contact.problem import ContactProblem
 from contact.projections import Array
+from contact.state import Multipliers, nodal_iterate, total_pressure
 
 #: Eigenvalues of the Gram matrices below are between 0 and about 1.
 ROUNDING = 1e-9
@@ -48,6 +49,28 @@ def check_held(problem: ContactProblem) -> None:
             "accepted: displacement components fixed so that it cannot"
         )
     _check_loads(problem, free, normal, (points - centre) / size)
+
+
+def check_potential(problem: ContactProblem, forces: Multipliers) -> None:
+    """Check that the potential of a solution is more than known but for a constant. Collective.
+
+    Raises
+    ------
+    InputError
+        If no potential is prescribed and no current flows, as on a foundation that is conductive
+        but touched nowhere.
+    """
+    if not problem.piezoelectric:
+        return
+    nodal, comm = nodal_iterate(problem), problem.comm
+    slopes = problem.response.jacobian(nodal, total_pressure(problem, nodal, forces))[:, -1, -1]
+    held = bool(np.any(slopes != 0)) or not np.all(problem.free[:, -1])
+    if not comm.allreduce(held, op=MPI.LOR):
+        raise InputError(
+            "the potential is not determined: it is prescribed nowhere, and the foundation "
+            "conducts nowhere; accepted: a potential fixed on a part, or contact with a "
+            "conductive foundation"
+        )
 
 
 def rigid_motions(points: Array) -> Array:

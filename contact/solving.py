@@ -10,7 +10,7 @@ from typing import Any, Protocol
 
 from mpi4py import MPI
 
-from contact.build import build_problem
+from contact.build import build_problem, named
 from contact.case import Case, Solver, load_case
 from contact.fixed_point import FixedPoint, FixedPointOptions
 from contact.interrupt import Interrupted, stop_on_signal
@@ -21,6 +21,7 @@ from contact.penalty import Penalty, PenaltyOptions
 from contact.problem import ContactProblem
 from contact.report import History, Monitor, Outcome
 from contact.review import review
+from contact.rigid import check_potential
 from contact.solution import Solution
 from contact.state import Multipliers
 
@@ -117,7 +118,8 @@ def solve(
         return solve_problem(case, settings or Solver(), monitor)
     case = case if isinstance(case, Case) else load_case(case)
     problem = build_problem(case, comm, **replacements)
-    solution = solve_problem(problem, settings or case.solver, monitor)
+    with named(case.source):
+        solution = solve_problem(problem, settings or case.solver, monitor)
     solution.title, solution.output = case.title, case.output
     solution.seconds["setup"] += time.perf_counter() - begin - sum(solution.seconds.values())
     return solution
@@ -134,7 +136,7 @@ def solve_problem(
     Raises
     ------
     InputError
-        If the linear system is singular: the body is not held.
+        If the linear system is singular, or the potential is not determined.
     """
     begin = time.perf_counter()
     with stop_on_signal(problem.comm, monitor) as stop:
@@ -144,6 +146,7 @@ def solve_problem(
             outcome = method.solve()
         except Interrupted as interrupt:
             outcome = Outcome(False, str(interrupt), evaluate(problem, method.forces))
+    check_potential(problem, method.forces)
     solution = Solution(
         problem=problem,
         forces=method.forces,
