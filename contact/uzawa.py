@@ -217,7 +217,7 @@ def block_relaxation(
         return _project(problem, flat.reshape(z.shape), r, bound, law).ravel()
 
     def derivative(flat: Array, directions: Array) -> Array:
-        columns = directions.reshape(*z.shape, -1)
+        columns = directions.reshape(*z.shape, directions.shape[1])
         slopes = _derivative(problem, flat.reshape(z.shape), r, bound, law, columns)
         return slopes.reshape(directions.shape)
 
