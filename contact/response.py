@@ -110,11 +110,13 @@ class NormalLaw:
         # Newton's method in a bracket; every third sweep halves it, should Newton not.
         for sweep in range(90):
             excess = r * phi + self.layer(phi) - z
-            done |= (np.abs(excess) <= 2 * EPS * np.abs(z)) | (high - low <= 2 * EPS * np.abs(phi))
+            slope = r + self.stiffness * self.p_nu.derivative(phi - self.touch)
+            # Below this the excess is rounding in phi.
+            rounding = 4 * EPS * (np.abs(z) + np.abs(slope) * (np.abs(phi) + np.abs(self.touch)))
+            done |= np.abs(excess) <= rounding
             if np.all(done):
                 break
             low, high = np.where(excess < 0, phi, low), np.where(excess > 0, phi, high)
-            slope = r + self.stiffness * self.p_nu.derivative(phi - self.touch)
             newton = phi - excess / np.where(slope > 0, slope, r)
             inside = (newton > low) & (newton < high) & (sweep % 3 < 2)
             phi = np.where(done, phi, np.where(inside, newton, 0.5 * (low + high)))
@@ -122,7 +124,6 @@ class NormalLaw:
         soft = self.stiffness * self.p_nu.derivative(phi - self.touch) < r
         pressed = np.where(soft, self.layer(phi), z - r * phi)
         return np.where(free, 0.0, np.where(rigid, z - r * self.gap, pressed))
-
 
     def pressure_slope(self, z: Array, r: float) -> Array:
         """Return the derivative of `pressure` by z: 0 free, 1 rigid, between them in the layer."""

@@ -1,0 +1,338 @@
+"""Chapter 6's theorems in numbers: what the proofs promise, and the orders that are observed.
+
+Theorem 6.3: the solution x(mu, k_e) of Problem (PV2) tends to that of (PV1) like mu + k_e.
+Theorems 6.4 and 6.5: the fixed points (6.29) and (6.30), Algorithms 8 and 6, converge.
+Section 1.3.2: the normal compliance law (1.27) tends to Signorini's as it gets stiff.
+Section 1.3.3: with the rigid part far enough away, (1.29) is (1.27).
+
+Run as `scripts/fx python3 scripts/limit_theorem.py [--out DIR] [--cells N]`, also under mpirun.
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import matplotlib
+
+matplotlib.use("Agg")
+
+import matplotlib.pyplot as plt
+import numpy as np
+import ufl
+from dolfinx import fem
+from mpi4py import MPI
+
+from contact import InputError, Solution, build_problem, load_case, solve_problem
+from contact.case import Case
+from contact.foundation import GapFunction
+from contact.problem import Contact, ContactProblem
+from contact.projections import Array
+from contact.report import Monitor, Record
+from contact.response import Layer
+from forms.kinematics import strain
+from forms.laws import Compliance, PotentialFactor
+
+CASES = Path(__file__).parent / "cases"
+
+#: mu = k_e of Table 8.4.
+TABLE_8_4 = (6e-1, 2e-1, 6.8e-2, 5.1e-3, 6.2e-4, 1.4e-5, 3.5e-6, 8.5e-7)
+
+#: mu = k_e of the limit: those of the table and some between them.
+VALUES = tuple(sorted({*TABLE_8_4, 2e-2, 1.5e-3, 2e-4, 6e-5, 4e-6}, reverse=True))
+
+#: Where the layer of the pure compliance law is touched, and its stiffnesses and thicknesses.
+TOUCH = 0.5
+STIFFNESS = tuple(10.0 ** np.arange(2, 8))
+THICKNESS = (0.0, 0.05, 0.1, 0.2, 0.3, 0.4, 0.6)
+
+
+class ProductNorm:
+    """The norms of X = V x W, (5.15): |eps(u)| and |grad(phi)| in L2(Omega).
+
+    Parameters
+    ----------
+    problem
+        Whose unknowns, owned arrays of `problem.x`, are measured.
+    """
+
+    def __init__(self, problem: ContactProblem) -> None:
+        self._x = fem.Function(problem.space)
+        u, phi = problem.parts_of(self._x)
+        parts = [ufl.inner(strain(u), strain(u))]
+        if phi is not None:
+            parts.append(ufl.inner(ufl.grad(phi), ufl.grad(phi)))
+        self._forms = [fem.form(part * problem.domain.dx) for part in parts]
+        self._comm, self._owned = problem.comm, problem.owned
+
+    def __call__(self, x: Array) -> tuple[float, ...]:
+        """Return the norms in V and, with a potential, W of owned unknowns. Collective."""
+        self._x.x.array[: self._owned] = x
+        self._x.x.scatter_forward()
+        squares = [self._comm.allreduce(fem.assemble_scalar(form)) for form in self._forms]
+        return tuple(float(np.sqrt(square)) for square in squares)
+
+
+def case_of(name: str, cells: Sequence[int], changes: Sequence[str] = ()) -> Case:
+    """Return a case file of Examples 8.3 and 8.4 on another mesh, solved to 1e-11."""
+    grid = f"mesh.cells=[{cells[0]}, {cells[1]}]"
+    exact = ("solver.tolerance=1e-11", "solver.inner_tolerance=2e-12")
+    return load_case(CASES / f"{name}.toml", [grid, *exact, *changes])
+
+
+def solved(problem: ContactProblem, case: Case, monitor: Monitor | None = None) -> Solution:
+    """Solve, or say what did not converge."""
+    solution = solve_problem(problem, case.solver, monitor)
+    if not solution.converged:
+        raise InputError(f"{case.title}: {solution.outcome.reason}")
+    return solution
+
+
+def iterate(problem: ContactProblem) -> Array:
+    """Return a copy of the owned unknowns."""
+    return problem.x.x.array[: problem.owned].copy()
+
+
+def observed_orders(parameter: Sequence[float], errors: Sequence[float]) -> Array:
+    """Return the slopes of the errors between neighbours in a doubly logarithmic plot."""
+    return np.diff(np.log(errors)) / np.diff(np.log(parameter))
+
+
+@dataclass(frozen=True)
+class Errors:
+    """Distances to a limit over a parameter.
+
+    Attributes
+    ----------
+    name
+        What was varied.
+    parameter
+        Its values, shape (k,).
+    norms
+        Distances in V (and W), shape (k, 1 or 2).
+    """
+
+    name: str
+    parameter: Array
+    norms: Array
+
+    @property
+    def total(self) -> Array:
+        """Distances in X, shape (k,)."""
+        return np.linalg.norm(self.norms, axis=1)
+
+    @property
+    def orders(self) -> Array:
+        """Observed orders between neighbours, shape (k - 1,)."""
+        return observed_orders(self.parameter, self.total)
+
+    def order(self, low: float, high: float) -> float:
+        """Return the least-squares order over a range of the parameter."""
+        inside = (self.parameter >= low) & (self.parameter <= high)
+        x, y = np.log(self.parameter[inside]), np.log(self.total[inside])
+        return float(np.polyfit(x, y, 1)[0])
+
+
+def theorem_6_3(
+    layer: bool, cells: Sequence[int] = (96, 16), values: Sequence[float] = VALUES
+) -> Errors:
+    """Return |x(mu, k_e) - x(0, 0)| for mu = k_e, by Algorithms 6 and 8. Collective.
+
+    Parameters
+    ----------
+    layer
+        Whether the layer of thickness 0.1 is there; else Example 8.4 as printed.
+    cells
+        Of the mesh.
+    values
+        mu = k_e.
+    """
+    suffix = "-layer" if layer else ""
+    limit_case = case_of(f"compliance-8-3{suffix}", cells)
+    problem = build_problem(limit_case)
+    domain, norm = problem.domain, ProductNorm(problem)
+    solved(problem, limit_case)
+    limit, distances = iterate(problem), []
+    for value in values:
+        changes = [f"friction.mu={value}", f"electric.k_e={value}"]
+        case = case_of(f"compliance-8-4{suffix}", cells, changes)
+        problem = build_problem(case, domain=domain)
+        solved(problem, case)
+        distances.append(norm(iterate(problem) - limit))
+    return Errors("mu = k_e", np.array(values), np.array(distances))
+
+
+def fixed_point_errors(
+    name: str, cells: Sequence[int] = (96, 16), changes: Sequence[str] = ()
+) -> Array:
+    """Return |x_n - x| in X over the outer iterations of a lagged fixed point. Collective.
+
+    Parameters
+    ----------
+    name
+        Case file; its layer and its current are taken from the previous iterate.
+    cells
+        Of the mesh.
+    changes
+        Overrides of the case.
+    """
+    lagged = ["contact.lagged=true", "solver.material_step=secant", *changes]
+    case = case_of(name, cells, lagged)
+    problem = build_problem(case)
+    iterates: list[Array] = []
+
+    def keep(record: Record) -> None:
+        iterates.append(iterate(problem))
+
+    solved(problem, case, keep)
+    norm, exact = ProductNorm(problem), iterates[-1]
+    return np.array([np.linalg.norm(norm(x - exact)) for x in iterates[:-1]])
+
+
+def with_layer(problem: ContactProblem, c: float, thickness: float = np.inf) -> ContactProblem:
+    """Return the problem without friction and current, on a layer that is touched at TOUCH.
+
+    Parameters
+    ----------
+    problem
+        Whose body and contact part are taken.
+    c
+        Stiffness of the law (1.28), p = c [r]^+.
+    thickness
+        Distance of the rigid part behind; infinity for none.
+    """
+    gap = TOUCH + (thickness if np.isfinite(thickness) else 0.0)
+    foundation = GapFunction(lambda points: np.full(len(points), gap))
+    layer = Layer(thickness, Compliance(np.inf), PotentialFactor(c))
+    contact = Contact(problem.contact.on, foundation, layer)
+    return ContactProblem(problem.domain, problem.body, contact)
+
+
+def stiffness_limit(
+    cells: Sequence[int] = (96, 16), stiffness: Sequence[float] = STIFFNESS
+) -> Errors:
+    """Return the distance between (1.27) with p = c [r]^+ and Signorini's law over 1/c.
+
+    Rounding in u, multiplied by c, bounds the residuals that can be reached.
+    """
+    inner = "solver.inner_tolerance=1e-10"
+    case = case_of("compliance-8-3", cells, ["solver.tolerance=1e-9", inner])
+    problem = build_problem(case)
+    solved(problem, case)
+    norm, limit, distances = ProductNorm(problem), iterate(problem), []
+    for c in stiffness:
+        soft = with_layer(problem, c)
+        solved(soft, case)
+        distances.append(norm(iterate(soft) - limit))
+    return Errors("1/c", 1 / np.array(stiffness), np.array(distances))
+
+
+def distance_limit(
+    cells: Sequence[int] = (96, 16), thickness: Sequence[float] = THICKNESS, c: float = 10.0
+) -> tuple[Errors, float]:
+    """Return the distance between (1.29) and (1.27) over rho - rho_0, and the penetration.
+
+    The penetration is that of (1.27). A rigid part behind it is never reached.
+    """
+    case = case_of("compliance-8-3", cells)
+    problem = with_layer(build_problem(case), c)
+    solved(problem, case)
+    norm, limit, distances = ProductNorm(problem), iterate(problem), []
+    u_n = problem.trace.normal_component(problem.trace.values(limit))
+    depth = problem.trace.maximum(u_n) - TOUCH
+    for value in thickness:
+        rigid = with_layer(problem, c, value)
+        solved(rigid, case)
+        distances.append(norm(iterate(rigid) - limit))
+    return Errors("rho - rho_0", np.array(thickness), np.array(distances)), depth
+
+
+def print_errors(title: str, errors: Errors) -> None:
+    """Print a table of errors with the orders between neighbours."""
+    print(f"\n{title}\n{errors.name:>12} {'in V':>10} {'in W':>10} {'order':>6}")
+    orders = ["", *(f"{order:.3f}" for order in errors.orders)]
+    for value, norms, order in zip(errors.parameter, errors.norms, orders, strict=True):
+        print(f"{value:12.2e} {norms[0]:10.3e} {norms[1]:10.3e} {order:>6}")
+
+
+def plot_errors(curves: Mapping[str, Errors], file: Path) -> None:
+    """Draw errors in V and W over the parameter, with a line of slope 1."""
+    figure, axes = plt.subplots(figsize=(6, 4.5), layout="constrained")
+    for label, errors in curves.items():
+        for norms, space, line in zip(errors.norms.T, ("V", "W"), ("o-", "s--"), strict=True):
+            axes.loglog(errors.parameter, norms, line, label=f"{label}, in {space}", ms=4)
+        parameter, scale = errors.parameter, errors.total[-1] / errors.parameter[-1]
+    axes.loglog(parameter, 2 * scale * parameter, "k:", label="slope 1")
+    axes.set(xlabel=errors.name, ylabel="distance to the limit")
+    axes.legend()
+    figure.savefig(file, dpi=150)
+    plt.close(figure)
+
+
+def plot_iterations(curves: Mapping[str, Array], file: Path) -> None:
+    """Draw errors over the iterations of the fixed point."""
+    figure, axes = plt.subplots(figsize=(6, 4.5), layout="constrained")
+    for label, errors in curves.items():
+        axes.semilogy(np.arange(1, errors.size + 1), errors, "o-", label=label, ms=4)
+    axes.set(xlabel="iteration n", ylabel="|x_n - x| in X")
+    axes.legend()
+    figure.savefig(file, dpi=150)
+    plt.close(figure)
+
+
+#: Lagged fixed points whose errors are shown: label -> case file and overrides.
+FIXED_POINTS = {
+    "Theorem 6.4, Algorithm 8": ("compliance-8-3-layer", ()),
+    "Theorem 6.4, yield strain 0.1": ("compliance-8-3-layer", ("material.yield_strain=0.1",)),
+    "Theorem 6.5, mu = k_e = 0.02": (
+        "compliance-8-4-layer",
+        ("friction.mu=0.02", "electric.k_e=0.02", "electric.lagged=true"),
+    ),
+    "Theorem 6.5, yield strain 0.1": (
+        "compliance-8-4-layer",
+        (
+            "friction.mu=0.02",
+            "electric.k_e=0.02",
+            "electric.lagged=true",
+            "material.yield_strain=0.1",
+        ),
+    ),
+}
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Compute, print and draw all."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--out", type=Path, default=Path("results/limit_theorem"))
+    parser.add_argument("--cells", type=int, default=96, help="along the bar, a multiple of 6")
+    options = parser.parse_args(arguments)
+    cells, first = (options.cells, options.cells // 6), MPI.COMM_WORLD.rank == 0
+    limits = {
+        "layer of thickness 0.1": theorem_6_3(True, cells),
+        "as printed": theorem_6_3(False, cells),
+    }
+    iterations = {
+        label: fixed_point_errors(name, cells, changes)
+        for label, (name, changes) in FIXED_POINTS.items()
+    }
+    stiff = stiffness_limit(cells)
+    far, depth = distance_limit(cells)
+    if not first:
+        return
+    options.out.mkdir(parents=True, exist_ok=True)
+    for label, errors in limits.items():
+        print_errors(f"Theorem 6.3, {label}", errors)
+        print(f"observed order on [8.5e-7, 1e-2]: {errors.order(8e-7, 1e-2):.4f}")
+    for label, distances in iterations.items():
+        print(f"\n{label}: |x_n - x|\n" + " ".join(f"{value:.1e}" for value in distances))
+    print_errors("Normal compliance tends to Signorini's law", stiff)
+    print_errors(f"Rigid part at a distance; it is not reached beyond {depth:.4f}", far)
+    plot_errors(limits, options.out / "figure-theorem-6-3.png")
+    plot_errors({"p = c [r]^+": stiff}, options.out / "figure-stiffness.png")
+    plot_iterations(iterations, options.out / "figure-theorems-6-4-6-5.png")
+
+
+if __name__ == "__main__":
+    main()
