@@ -100,6 +100,8 @@ class Solver(Section):
             raise fault(
                 "inner_tolerance", self.inner_tolerance, f"at most tolerance = {self.tolerance:g}"
             )
+        if self.nested and self.method != "newton":
+            raise fault("nested", self.nested, 'nested = true with method = "newton"')
         if self.nested_levels is not None and not self.nested:
             raise fault("nested_levels", self.nested_levels, "nested_levels with nested = true")
         return self

@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from contact.fixed_point import FixedPoint, FixedPointOptions
 from contact.kkt import KKT, evaluate, interface_residuals, residual_forces
 from contact.linear import Counters, LinearOperator
-from contact.newton_laws import Moduli, linearise
+from contact.newton_laws import Moduli, linearise, node_status
 from contact.problem import ContactProblem
 from contact.projections import Array
 from contact.report import History, Monitor, Outcome, Record
@@ -101,10 +101,18 @@ class Newton:
         self.problem.reset()
         self.forces = Multipliers.zero(self.problem)
         self._status = None
-        return self.resume()
+        return self._solve()
 
-    def resume(self) -> Outcome:
-        """Iterate from the present iterate and contact forces. Collective."""
+    def solve_from(self, forces: Multipliers) -> Outcome:
+        """Iterate from the problem's present iterate and given contact forces. Collective."""
+        problem, nodal = self.problem, nodal_iterate(self.problem)
+        bound = bound_of(problem, nodal, forces)
+        self.forces = forces
+        self._status = node_status(problem, nodal, forces, bound, self.moduli.status)
+        return self._solve()
+
+    def _solve(self) -> Outcome:
+        """Iterate, and fall back on slower methods where that fails."""
         self._begin = time.perf_counter()
         outcome = self._newton("")
         if not outcome.converged and self.problem.frictional:
@@ -136,8 +144,9 @@ class Newton:
         problem, options = self.problem, self.options
         goal = max(goal, options.tolerance)
         residuals = evaluate(problem, self.forces)
-        best, since, tangent = np.inf, 0, residuals.equilibrium < options.secant_until
-        tangent = tangent and self._status is not None
+        best, since = np.inf, 0
+        # A start from elsewhere is near the solution; zero displacement has no better tangent.
+        tangent = self._status is not None and not problem.linear_material
         for _ in range(options.max_iterations):
             before = residuals.equilibrium
             self._step(tangent, frozen, residuals.largest)

@@ -16,6 +16,7 @@ from contact.fixed_point import FixedPoint, FixedPointOptions
 from contact.interrupt import Interrupted, stop_on_signal
 from contact.kkt import evaluate
 from contact.linear import Counters
+from contact.nested import coarse_solution, prolong
 from contact.newton import Newton, NewtonOptions
 from contact.penalty import Penalty, PenaltyOptions
 from contact.problem import ContactProblem
@@ -60,7 +61,8 @@ def fixed_point(problem: ContactProblem, settings: Solver, monitor: Monitor | No
 
 def newton(problem: ContactProblem, settings: Solver, monitor: Monitor | None) -> Newton:
     """Return semismooth Newton."""
-    return Newton(problem, NewtonOptions(tolerance=settings.tolerance), monitor)
+    options = NewtonOptions(tolerance=settings.tolerance, linear=settings.linear)
+    return Newton(problem, options, monitor)
 
 
 def penalty(problem: ContactProblem, settings: Solver, monitor: Monitor | None) -> Penalty:
@@ -117,18 +119,30 @@ def solve(
     if isinstance(case, ContactProblem):
         return solve_problem(case, settings or Solver(), monitor)
     case = case if isinstance(case, Case) else load_case(case)
+    settings = settings or case.solver
     problem = build_problem(case, comm, **replacements)
     with named(case.source):
-        solution = solve_problem(problem, settings or case.solver, monitor)
+        start = coarse_solution(case, comm, **replacements) if settings.nested else None
+        solution = solve_problem(problem, settings, monitor, start)
     solution.title, solution.output = case.title, case.output
     solution.seconds["setup"] += time.perf_counter() - begin - sum(solution.seconds.values())
     return solution
 
 
 def solve_problem(
-    problem: ContactProblem, settings: Solver, monitor: Monitor | None = None
+    problem: ContactProblem,
+    settings: Solver,
+    monitor: Monitor | None = None,
+    start: tuple[ContactProblem, Multipliers] | None = None,
 ) -> Solution:
     """Solve a problem. Collective.
+
+    Parameters
+    ----------
+    problem, settings, monitor
+        The problem, the method with its tolerances, and who is told of the outer iterations.
+    start
+        A solution on a coarser mesh, for Newton's method to start from.
 
     An interrupt (Ctrl-C, or SIGTERM from a batch system) ends the solve after the running
     outer iteration and keeps what was computed; a second one ends the program.
@@ -143,7 +157,10 @@ def solve_problem(
         method = METHODS[settings.method](problem, settings, stop)
         setup = time.perf_counter() - begin
         try:
-            outcome = method.solve()
+            if start is not None and isinstance(method, Newton):
+                outcome = method.solve_from(prolong(*start, problem))
+            else:
+                outcome = method.solve()
         except Interrupted as interrupt:
             outcome = Outcome(False, str(interrupt), evaluate(problem, method.forces))
     check_potential(problem, method.forces)
