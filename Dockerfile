@@ -1,5 +1,5 @@
 # docker build -t contact-fenicsx .
-# docker run --rm -v "$PWD:/work" contact-fenicsx python3 -m contact solve case.toml --out results
+# docker run --rm -v "$PWD:/case" contact-fenicsx python3 -m contact solve case.toml --out results
 FROM debian:trixie-slim
 
 COPY scripts/debian-packages.txt /tmp/
@@ -11,6 +11,6 @@ RUN apt-get update \
 COPY . /opt/contact-fenicsx
 # compiled forms, for any user (docker run -u)
 ENV XDG_CACHE_HOME=/tmp/cache
-WORKDIR /work
+WORKDIR /case
 ENTRYPOINT ["/opt/contact-fenicsx/scripts/fx"]
 CMD ["bash"]
