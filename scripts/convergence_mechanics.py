@@ -131,8 +131,9 @@ def figure_7_6(report: Report, coarse: bool) -> dict[str, Array]:
         "Figure 7.6: error against a reference solution, Example 7.2, rho = 1e4",
         "The thesis's reference is its finest tested mesh, so that its last point means nothing; "
         "here it is two levels finer than the finest mesh. The solution is singular at the "
-        "clamped corner, where contact, friction and clamping meet, and where the load starts: "
-        "P1 falls short of order 1 in H1, and P2 gains accuracy but no order.",
+        "corners of the bar, above all at (4, 0), which the load presses down and where the "
+        "pressure peaks, and at the clamped ones: P1 falls short of order 1 in H1, and P2 gains "
+        "accuracy but no order.",
         variants,
     )
 
@@ -152,7 +153,7 @@ def theorem_4_3(report: Report, coarse: bool) -> dict[str, Array]:
         "theorem-4-3",
         "Theorem 4.3: the penalised solution as h -> 0, Example 7.2, rho = 1e4",
         "Both solutions belong to the same eps. A large eps smooths contact and friction, and "
-        "with them the solution; what is left is the singularity of the clamped corners.",
+        "with them the solution; what is left are the singular corners of the bar.",
         variants,
     )
 

@@ -10,12 +10,12 @@ from dataclasses import dataclass
 
 import numpy as np
 from mpi4py import MPI
-from reporting import CASES, Report, draw, options, solved, subplots
+from reporting import CASES, Report, options, solved, subplots
 
 from contact import Case, Solution, build_problem, load_case
 from contact.domain import make_domain
 from contact.norms import volume
-from contact.plots_fields import picture
+from contact.plots_fields import draw_plane, picture
 from contact.projections import Array
 from contact.table import contact_table
 
@@ -317,7 +317,7 @@ def figure_7_2(report: Report, solutions: Mapping[tuple[object, ...], Solution])
     report.figure(
         "figure-7-2b",
         "Figure 7.2 (b): deformed quarter cylinder, von Mises stress",
-        draw(deformed, table),
+        draw_plane(deformed, table),
         {"von Mises": [float(deformed.values.max())]},
         "Coulomb friction (7.16), rho = 1e4, contact along the foundation's normal. The number "
         "is the largest von Mises stress.",

@@ -15,17 +15,18 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from matplotlib import rc_context
+from matplotlib import rcParams
 from matplotlib.figure import Figure
 from mpi4py import MPI
 
 from contact import Case, InputError, Solution, build_problem, load_case, solve_problem
 from contact.plots import STYLE
-from contact.plots_fields import Picture, draw_plane
 from contact.problem import ContactProblem
-from contact.table import Table
 
 CASES = Path(__file__).parent / "cases"
+
+rcParams.update(STYLE)
+rcParams["axes.titlesize"] = 9
 
 
 @dataclass(frozen=True)
@@ -71,8 +72,7 @@ class Report:
         if MPI.COMM_WORLD.rank > 0:
             return
         self.out.mkdir(parents=True, exist_ok=True)
-        with rc_context(STYLE):
-            figure.savefig(self.out / f"{name}.png", dpi=130, bbox_inches="tight")
+        figure.savefig(self.out / f"{name}.png", dpi=130, bbox_inches="tight")
         length = max(len(column) for column in data.values())
         padded = {
             key: [*column, *[""] * (length - len(column))] for key, column in data.items()
@@ -106,18 +106,11 @@ def text(value: Any) -> str:
 
 
 def subplots(
-    rows: int = 1, columns: int = 1, size: tuple[float, float] = (6.6, 3.0), **shared: bool
+    rows: int = 1, columns: int = 1, size: tuple[float, float] = (6.6, 3.0), **shared: Any
 ) -> tuple[Figure, Any]:
-    """Return a figure in the style of `contact.plots`, and its axes."""
-    with rc_context(STYLE):
-        figure = Figure(figsize=size)
-        return figure, figure.subplots(rows, columns, **shared)
-
-
-def draw(deformed: Picture, table: Table, title: str = "") -> Figure:
-    """Return `contact.plots`'s drawing of a deformed plane body."""
-    with rc_context(STYLE):
-        return draw_plane(deformed, table, title)
+    """Return a figure and its axes, in the style of `contact.plots`."""
+    figure = Figure(figsize=size)
+    return figure, figure.subplots(rows, columns, **shared)
 
 
 def options(text: str, script: str, arguments: Sequence[str] | None = None) -> argparse.Namespace:
