@@ -1,0 +1,181 @@
+"""Semismooth Newton: against the block relaxation, its rate, its fall-backs, nested meshes."""
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+
+from contact.case import parse_case
+from contact.fixed_point import FixedPoint, FixedPointOptions
+from contact.nested import coarser_cases
+from contact.newton import Newton, NewtonOptions
+from contact.newton_laws import OPEN, SLIDES, STICKS, Moduli, linearise
+from contact.problem import ContactProblem, Friction
+from contact.solving import solve
+from contact.state import Multipliers, nodal_iterate
+from forms.hencky import Linear, Log
+from forms.laws import ConstantCoefficient
+from tests import helpers
+
+SELF = MPI.COMM_SELF
+
+
+def newton(problem: ContactProblem, **options) -> Newton:
+    method = Newton(problem, NewtonOptions(**{"tolerance": 1e-10, **options}))
+    outcome = method.solve()
+    assert outcome.converged, outcome
+    return method
+
+
+def compare(one: ContactProblem, other: ContactProblem, tolerance: float) -> None:
+    """Solve one problem by Newton's method, its twin by block relaxation."""
+    fast = newton(one)
+    slow = FixedPoint(other, FixedPointOptions(tolerance=1e-10))
+    assert slow.solve().converged
+    size = np.abs(other.x.x.array).max()
+    assert np.allclose(one.x.x.array, other.x.x.array, rtol=0, atol=tolerance * size)
+    pressure = slow.forces.pressure.max()
+    atol = tolerance * pressure
+    assert np.allclose(fast.forces.pressure, slow.forces.pressure, rtol=0, atol=atol)
+    assert np.allclose(fast.forces.friction, slow.forces.friction, rtol=0, atol=atol)
+
+
+@pytest.mark.parametrize("degree", [1, 2])
+@pytest.mark.parametrize("f2", [-0.005, -0.05])
+def test_newton_and_block_relaxation_agree_on_the_bar(degree, f2):
+    friction = Friction(ConstantCoefficient(0.5))
+    pair = [helpers.bar(SELF, 8, f2, degree=degree, friction=friction) for _ in range(2)]
+    compare(*pair, 1e-7)
+
+
+def test_they_agree_in_space_where_sliding_nodes_turn():
+    compare(helpers.leaning_block(SELF), helpers.leaning_block(SELF), 1e-7)
+
+
+def test_they_agree_with_a_smoothed_pressure():
+    friction = Friction(ConstantCoefficient(0.5), radius=0.3)
+    pair = [helpers.bar(SELF, 8, friction=friction) for _ in range(2)]
+    compare(*pair, 1e-7)
+
+
+def test_they_agree_with_tresca_friction():
+    friction = Friction(tresca=helpers.constant(0.002, 2))
+    pair = [helpers.bar(SELF, 8, friction=friction) for _ in range(2)]
+    compare(*pair, 1e-7)
+
+
+def test_the_last_steps_square_the_residual():
+    law = Log(1.0, 0.3, yield_strain=0.01)
+    problem = helpers.bar(SELF, 16, -0.02, law=law, friction=Friction(ConstantCoefficient(0.4)))
+    records = newton(problem, tolerance=1e-12).history.records
+    assert len(records) <= 12
+    before, after = records[-2].kkt.largest, records[-1].kkt.largest
+    # gamma leaves 1e-4 of the interface residual, the material's part is squared
+    assert after < max(2e-4 * before, 1e-13)
+
+
+def test_a_body_that_only_contact_holds_is_solved():
+    problem = helpers.pressed_block(SELF, 3, gap=0.01)
+    method = newton(problem)
+    assert np.allclose(method.forces.pressure, 0.02, rtol=1e-9)
+
+
+def test_the_iterative_solver_finds_the_same_solution():
+    direct, iterative = helpers.leaning_block(SELF, 4), helpers.leaning_block(SELF, 4)
+    newton(direct, linear="lu")
+    method = newton(iterative, linear="iterative")
+    assert method.operator.iterative
+    assert np.allclose(direct.x.x.array, iterative.x.x.array, rtol=0, atol=1e-9)
+
+
+@pytest.mark.parametrize("dimension", [2, 3])
+def test_blocks_are_the_derivative_of_the_contact_forces(dimension):
+    """Compare with finite differences at a sliding and sticking iterate, away from kinks."""
+    problem = helpers.bar(SELF, 4) if dimension == 2 else helpers.leaning_block(SELF, 2)
+    problem.friction = Friction(ConstantCoefficient(0.4))
+    rng = np.random.default_rng(3)
+    problem.reset()
+    problem.x.x.array[:] = 1e-3 * rng.standard_normal(problem.x.x.array.size)
+    nodal = nodal_iterate(problem)
+    n, trace = nodal.shape[0], problem.trace
+    forces = Multipliers(
+        rng.uniform(0.5, 1.0, n),
+        np.einsum("nij,nj->ni", trace.tangent, 0.3 * rng.standard_normal((n, dimension))),
+    )
+    moduli = Moduli(20.0, 20.0, 20.0)
+    before = np.full(n, OPEN, dtype=np.int8)
+    base = linearise(problem, nodal, forces, moduli, before, forces.pressure * 0.4)
+    assert {SLIDES, STICKS} <= set(base.status.tolist())
+    sticks = base.status == STICKS
+    # a sticking node pushes with lambda + gamma u_tau, a pressed one with p + gamma (u_nu - rho)
+    direction = 1e-6 * rng.standard_normal(nodal.shape)
+    moved = linearise(problem, nodal + direction, forces, moduli, before, forces.pressure * 0.4)
+    difference = moved.forces.vectors(problem) - base.forces.vectors(problem)
+    predicted = np.einsum("nij,nj->ni", base.blocks, direction)[:, :dimension]
+    assert np.allclose(difference[sticks], predicted[sticks], rtol=1e-6, atol=1e-12)
+    normal = trace.normal_component(difference)
+    assert np.allclose(normal, trace.normal_component(predicted), rtol=1e-6, atol=1e-12)
+
+
+def bar_case(cells: list[int], **solver) -> dict:
+    return {
+        "mesh": {
+            "generator": "rectangle",
+            "size": [4.0, 1.0],
+            "cells": cells,
+            "parts": {"loaded": {"side": "top", "from": 2.0, "to": 4.0}},
+        },
+        "material": {"law": "log", "young": 1.0, "poisson": 0.3, "yield_strain": 0.05},
+        "fixed": [{"on": "left", "displacement": [0.0, 0.0]}],
+        "load": [{"on": "loaded", "traction": [0.0, -0.05]}],
+        "contact": {"on": "bottom"},
+        "friction": {"law": "coulomb", "mu": 0.5},
+        "solver": {"method": "newton", "tolerance": 1e-10, **solver},
+    }
+
+
+def test_nested_meshes_save_steps_and_change_nothing():
+    plain = solve(parse_case(bar_case([128, 32])), comm=SELF)
+    nested = solve(parse_case(bar_case([128, 32], nested=True)), comm=SELF)
+    assert plain.outcome.converged and nested.outcome.converged
+    assert nested.counters.linear_solves <= 4 < plain.counters.linear_solves
+    assert np.allclose(plain.forces.pressure, nested.forces.pressure, rtol=0, atol=1e-8)
+
+
+def test_nested_levels_halve_the_cells():
+    case = parse_case(bar_case([64, 16], nested=True))
+    assert [c.mesh.cells for c in coarser_cases(case)] == [(16, 4), (32, 8)]
+    assert [c.mesh.cells for c in coarser_cases(case, 2)] == [(32, 8)]
+
+
+def test_a_linear_material_is_assembled_once_and_solved_exactly():
+    problem = helpers.bar(SELF, 8, law=Linear(1.0, 0.3), friction=Friction())
+    method = newton(problem)
+    assert method.counters.factorizations <= method.counters.linear_solves <= 6
+
+
+@pytest.mark.parametrize(
+    ("friction", "note"),
+    [
+        (Friction(ConstantCoefficient(0.5)), "frozen friction"),
+        (Friction(), "block relaxation"),
+    ],
+)
+def test_slower_methods_take_over_where_newton_gives_up(friction, note):
+    problem = helpers.bar(SELF, 8, -0.05, friction=friction)
+    method = newton(problem, max_iterations=2)
+    assert any(record.note.startswith(note) for record in method.history.records)
+
+
+@pytest.mark.parallel
+def test_ranks_agree():
+    world = MPI.COMM_WORLD
+    shared, alone = helpers.leaning_block(world), helpers.leaning_block(SELF)
+    method, reference = newton(shared), newton(alone)
+    assert np.isclose(
+        shared.trace.maximum(method.forces.pressure), reference.forces.pressure.max(), rtol=1e-9
+    )
+    assert np.isclose(
+        shared.trace.norm(method.forces.friction),
+        alone.trace.norm(reference.forces.friction),
+        rtol=1e-9,
+    )
