@@ -1,6 +1,6 @@
 """Non-local friction at work: Example 7.2 over the radius of the smoothing operator R.
 
-`python3 scripts/nonlocal.py [--out DIR] [--coarse]`, also under mpirun.
+`python3 scripts/nonlocal_friction.py [--out DIR] [--coarse]`, also under mpirun.
 """
 
 from __future__ import annotations
@@ -110,7 +110,7 @@ def _draw(
 
 def main(arguments: Sequence[str] | None = None) -> None:
     """Make the tables and figures."""
-    chosen = options(__doc__, "nonlocal", arguments)
+    chosen = options(__doc__, "nonlocal_friction", arguments)
     for load in LOADS:
         study(Report(chosen.out), 8 if chosen.coarse else 64, load)
 
