@@ -5,42 +5,34 @@ Theorems 6.4 and 6.5: the fixed points (6.29) and (6.30), Algorithms 8 and 6, co
 Section 1.3.2: the normal compliance law (1.27) tends to Signorini's as it gets stiff.
 Section 1.3.3: with the rigid part far enough away, (1.29) is (1.27).
 
-Run as `scripts/fx python3 scripts/limit_theorem.py [--out DIR] [--cells N]`, also under mpirun.
+`python3 scripts/limit_theorem.py [--out DIR] [--coarse]`, also under mpirun.
 """
 
 from __future__ import annotations
 
-import argparse
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 
-import matplotlib
-
-matplotlib.use("Agg")
-
-import matplotlib.pyplot as plt
 import numpy as np
 import ufl
 from dolfinx import fem
-from mpi4py import MPI
+from matplotlib.figure import Figure
+from reporting import CASES, Report, iterate, observed_orders, options, solved, subplots
 
-from contact import InputError, Solution, build_problem, load_case, solve_problem
-from contact.case import Case
+from contact import Case, InputError, build_problem, load_case, solve_problem
 from contact.foundation import GapFunction
 from contact.problem import Contact, ContactProblem
 from contact.projections import Array
-from contact.report import Monitor, Record
+from contact.report import Record
 from contact.response import Layer
 from forms.kinematics import strain
 from forms.laws import Compliance, PotentialFactor
-
-CASES = Path(__file__).parent / "cases"
 
 #: mu = k_e of Table 8.4.
 TABLE_8_4 = (6e-1, 2e-1, 6.8e-2, 5.1e-3, 6.2e-4, 1.4e-5, 3.5e-6, 8.5e-7)
 
 #: mu = k_e of the limit: those of the table and some between them.
+SMALLEST = TABLE_8_4[-1]
 VALUES = tuple(sorted({*TABLE_8_4, 2e-2, 1.5e-3, 2e-4, 6e-5, 4e-6}, reverse=True))
 
 #: Where the layer of the pure compliance law is touched, and its stiffnesses and thicknesses.
@@ -82,24 +74,6 @@ def case_of(name: str, cells: Sequence[int], changes: Sequence[str] = ()) -> Cas
     return load_case(CASES / f"{name}.toml", [grid, *exact, *changes])
 
 
-def solved(problem: ContactProblem, case: Case, monitor: Monitor | None = None) -> Solution:
-    """Solve, or say what did not converge."""
-    solution = solve_problem(problem, case.solver, monitor)
-    if not solution.converged:
-        raise InputError(f"{case.title}: {solution.outcome.reason}")
-    return solution
-
-
-def iterate(problem: ContactProblem) -> Array:
-    """Return a copy of the owned unknowns."""
-    return problem.x.x.array[: problem.owned].copy()
-
-
-def observed_orders(parameter: Sequence[float], errors: Sequence[float]) -> Array:
-    """Return the slopes of the errors between neighbours in a doubly logarithmic plot."""
-    return np.diff(np.log(errors)) / np.diff(np.log(parameter))
-
-
 @dataclass(frozen=True)
 class Errors:
     """Distances to a limit over a parameter.
@@ -122,11 +96,6 @@ class Errors:
     def total(self) -> Array:
         """Distances in X, shape (k,)."""
         return np.linalg.norm(self.norms, axis=1)
-
-    @property
-    def orders(self) -> Array:
-        """Observed orders between neighbours, shape (k - 1,)."""
-        return observed_orders(self.parameter, self.total)
 
     def order(self, low: float, high: float) -> float:
         """Return the least-squares order over a range of the parameter."""
@@ -153,13 +122,13 @@ def theorem_6_3(
     limit_case = case_of(f"compliance-8-3{suffix}", cells)
     problem = build_problem(limit_case)
     domain, norm = problem.domain, ProductNorm(problem)
-    solved(problem, limit_case)
+    solved(limit_case, problem)
     limit, distances = iterate(problem), []
     for value in values:
         changes = [f"friction.mu={value}", f"electric.k_e={value}"]
         case = case_of(f"compliance-8-4{suffix}", cells, changes)
         problem = build_problem(case, domain=domain)
-        solved(problem, case)
+        solved(case, problem)
         distances.append(norm(iterate(problem) - limit))
     return Errors("mu = k_e", np.array(values), np.array(distances))
 
@@ -186,7 +155,9 @@ def fixed_point_errors(
     def keep(record: Record) -> None:
         iterates.append(iterate(problem))
 
-    solved(problem, case, keep)
+    outcome = solve_problem(problem, case.solver, keep).outcome
+    if not outcome.converged:
+        raise InputError(f"{case.title}: {outcome.reason}")
     norm, exact = ProductNorm(problem), iterates[-1]
     return np.array([np.linalg.norm(norm(x - exact)) for x in iterates[:-1]])
 
@@ -220,11 +191,11 @@ def stiffness_limit(
     inner = "solver.inner_tolerance=1e-10"
     case = case_of("compliance-8-3", cells, ["solver.tolerance=1e-9", inner])
     problem = build_problem(case)
-    solved(problem, case)
+    solved(case, problem)
     norm, limit, distances = ProductNorm(problem), iterate(problem), []
     for c in stiffness:
         soft = with_layer(problem, c)
-        solved(soft, case)
+        solved(case, soft)
         distances.append(norm(iterate(soft) - limit))
     return Errors("1/c", 1 / np.array(stiffness), np.array(distances))
 
@@ -238,48 +209,52 @@ def distance_limit(
     """
     case = case_of("compliance-8-3", cells)
     problem = with_layer(build_problem(case), c)
-    solved(problem, case)
+    solved(case, problem)
     norm, limit, distances = ProductNorm(problem), iterate(problem), []
     u_n = problem.trace.normal_component(problem.trace.values(limit))
     depth = problem.trace.maximum(u_n) - TOUCH
     for value in thickness:
         rigid = with_layer(problem, c, value)
-        solved(rigid, case)
+        solved(case, rigid)
         distances.append(norm(iterate(rigid) - limit))
     return Errors("rho - rho_0", np.array(thickness), np.array(distances)), depth
 
 
-def print_errors(title: str, errors: Errors) -> None:
-    """Print a table of errors with the orders between neighbours."""
-    print(f"\n{title}\n{errors.name:>12} {'in V':>10} {'in W':>10} {'order':>6}")
-    orders = ["", *(f"{order:.3f}" for order in errors.orders)]
-    for value, norms, order in zip(errors.parameter, errors.norms, orders, strict=True):
-        print(f"{value:12.2e} {norms[0]:10.3e} {norms[1]:10.3e} {order:>6}")
+def table(report: Report, name: str, caption: str, errors: Errors, note: str = "") -> None:
+    """Write a table of distances, with the observed orders between neighbours."""
+    orders = observed_orders(errors.parameter, errors.total)
+    columns = {errors.name: errors.parameter, "in V": errors.norms[:, 0]}
+    columns |= {"in W": errors.norms[:, 1], "order": orders}
+    report.table(name, caption, columns, note)
 
 
-def plot_errors(curves: Mapping[str, Errors], file: Path) -> None:
-    """Draw errors in V and W over the parameter, with a line of slope 1."""
-    figure, axes = plt.subplots(figsize=(6, 4.5), layout="constrained")
-    for label, errors in curves.items():
-        for norms, space, line in zip(errors.norms.T, ("V", "W"), ("o-", "s--"), strict=True):
-            axes.loglog(errors.parameter, norms, line, label=f"{label}, in {space}", ms=4)
-        parameter, scale = errors.parameter, errors.total[-1] / errors.parameter[-1]
-    axes.loglog(parameter, 2 * scale * parameter, "k:", label="slope 1")
+def draw_errors(curves: Mapping[str, Errors]) -> tuple[Figure, dict[str, Array]]:
+    """Draw distances in V and W over the parameter, with a line of slope 1."""
+    figure, axes = subplots(size=(5.5, 3.8))
+    data: dict[str, Array] = {}
+    for (label, errors), fill in zip(curves.items(), ("none", "full"), strict=False):
+        data[f"{errors.name}, {label}"] = errors.parameter
+        for norms, space, line in zip(errors.norms.T, "VW", ("o-", "s--"), strict=True):
+            size = 7 if fill == "none" else 3
+            axes.loglog(
+                errors.parameter, norms, line, label=f"{label}, in {space}", ms=size, fillstyle=fill
+            )
+            data[f"in {space}, {label}"] = norms
+    slope = 2 * errors.total[-1] / errors.parameter[-1]
+    axes.loglog(errors.parameter, slope * errors.parameter, "k:", label="slope 1")
     axes.set(xlabel=errors.name, ylabel="distance to the limit")
     axes.legend()
-    figure.savefig(file, dpi=150)
-    plt.close(figure)
+    return figure, data
 
 
-def plot_iterations(curves: Mapping[str, Array], file: Path) -> None:
+def draw_iterations(curves: Mapping[str, Array]) -> Figure:
     """Draw errors over the iterations of the fixed point."""
-    figure, axes = plt.subplots(figsize=(6, 4.5), layout="constrained")
+    figure, axes = subplots(size=(5.5, 3.8))
     for label, errors in curves.items():
         axes.semilogy(np.arange(1, errors.size + 1), errors, "o-", label=label, ms=4)
-    axes.set(xlabel="iteration n", ylabel="|x_n - x| in X")
+    axes.set(xlabel="iteration n", ylabel="distance to the solution in X")
     axes.legend()
-    figure.savefig(file, dpi=150)
-    plt.close(figure)
+    return figure
 
 
 #: Lagged fixed points whose errors are shown: label -> case file and overrides.
@@ -303,35 +278,40 @@ FIXED_POINTS = {
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
-    """Compute, print and draw all."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--out", type=Path, default=Path("results/limit_theorem"))
-    parser.add_argument("--cells", type=int, default=96, help="along the bar, a multiple of 6")
-    options = parser.parse_args(arguments)
-    cells, first = (options.cells, options.cells // 6), MPI.COMM_WORLD.rank == 0
+    """Compute, print and draw all. Collective."""
+    chosen = options(__doc__, "limit_theorem", arguments)
+    report, cells = Report(chosen.out), (24, 4) if chosen.coarse else (96, 16)
     limits = {
         "layer of thickness 0.1": theorem_6_3(True, cells),
         "as printed": theorem_6_3(False, cells),
     }
+    for name, (label, errors) in zip(("layer", "printed"), limits.items(), strict=True):
+        caption = f"Theorem 6.3: distance of x(mu, k_e) to x(0, 0), Example 8.4, {label}"
+        order = errors.order(SMALLEST, 1e-2)
+        table(report, f"theorem-6-3-{name}", caption, errors, f"Order below 0.01: {order:.4f}")
+    caption = "Theorem 6.3: x(mu, k_e) tends to x(0, 0) like mu + k_e"
+    report.figure("figure-theorem-6-3", caption, *draw_errors(limits))
+
     iterations = {
         label: fixed_point_errors(name, cells, changes)
         for label, (name, changes) in FIXED_POINTS.items()
     }
+    caption = "Theorems 6.4 and 6.5: errors of Algorithms 8 and 6, layer and current lagged"
+    report.figure("figure-theorems-6-4-6-5", caption, draw_iterations(iterations), iterations)
+
     stiff = stiffness_limit(cells)
+    caption = "The normal compliance law (1.28) tends to Signorini's as c grows"
+    table(report, "compliance-stiffness", caption, stiff)
+    report.figure("figure-compliance-stiffness", caption, *draw_errors({"p = c [r]^+": stiff}))
+
     far, depth = distance_limit(cells)
-    if not first:
-        return
-    options.out.mkdir(parents=True, exist_ok=True)
-    for label, errors in limits.items():
-        print_errors(f"Theorem 6.3, {label}", errors)
-        print(f"observed order on [8.5e-7, 1e-2]: {errors.order(8e-7, 1e-2):.4f}")
-    for label, distances in iterations.items():
-        print(f"\n{label}: |x_n - x|\n" + " ".join(f"{value:.1e}" for value in distances))
-    print_errors("Normal compliance tends to Signorini's law", stiff)
-    print_errors(f"Rigid part at a distance; it is not reached beyond {depth:.4f}", far)
-    plot_errors(limits, options.out / "figure-theorem-6-3.png")
-    plot_errors({"p = c [r]^+": stiff}, options.out / "figure-stiffness.png")
-    plot_iterations(iterations, options.out / "figure-theorems-6-4-6-5.png")
+    caption = "Law (1.29) tends to (1.27), c = 10, as the rigid part moves away"
+    report.table(
+        "compliance-distance",
+        caption,
+        {far.name: far.parameter, "in V": far.norms[:, 0], "in W": far.norms[:, 1]},
+        f"Without rigid part the layer is pressed in by {depth:.4f}: farther away it is not met.",
+    )
 
 
 if __name__ == "__main__":
