@@ -80,6 +80,11 @@ class Report:
         self._csv(name, padded)
         self._fragment(name, caption, f"![{caption}]({name}.png)", note)
 
+    def numbers(self, name: str, columns: Mapping[str, Sequence[Any]]) -> None:
+        """Write numbers that are too many for a page."""
+        if MPI.COMM_WORLD.rank == 0:
+            self._csv(name, columns)
+
     def _csv(self, name: str, columns: Mapping[str, Sequence[Any]]) -> None:
         self.out.mkdir(parents=True, exist_ok=True)
         with (self.out / f"{name}.csv").open("w", newline="") as stream:
@@ -115,12 +120,17 @@ def subplots(
 
 def options(text: str, script: str, arguments: Sequence[str] | None = None) -> argparse.Namespace:
     """Return the options --out and --coarse, which all these scripts have."""
-    parser = argparse.ArgumentParser(description=text.splitlines()[0])
-    parser.add_argument("--out", type=Path, default=Path("results") / script)
-    parser.add_argument("--coarse", action="store_true", help="coarse meshes: quick, for tests")
+    return parser(text, script).parse_args(arguments)
+
+
+def parser(text: str, script: str) -> argparse.ArgumentParser:
+    """Return a parser with the options --out and --coarse."""
+    made = argparse.ArgumentParser(description=text.splitlines()[0])
+    made.add_argument("--out", type=Path, default=Path("results") / script)
+    made.add_argument("--coarse", action="store_true", help="coarse meshes: quick, for tests")
     # A table solves a hundred problems; what each is worth is told by `contact solve`.
     logging.getLogger("contact").setLevel(logging.ERROR)
-    return parser.parse_args(arguments)
+    return made
 
 
 def bar(n: int, load: float, rho: float, *changes: str) -> Case:
