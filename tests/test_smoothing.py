@@ -13,16 +13,19 @@ from contact.smoothing import Smoothing
 from forms.hencky import Linear
 from forms.laws import ConstantCoefficient
 
-TRACES = {
-    "P1 in the plane": bar(MPI.COMM_SELF, 8).trace,
-    "P2 in the plane": bar(MPI.COMM_SELF, 8, degree=2).trace,
-    "P1 in space": leaning_block(MPI.COMM_SELF, 4).trace,
-    "P2 in space": pressed_block(MPI.COMM_SELF, 3, 2).trace,
+PROBLEMS = {
+    "P1 in the plane": lambda: bar(MPI.COMM_SELF, 8),
+    "P2 in the plane": lambda: bar(MPI.COMM_SELF, 8, degree=2),
+    "P1 in space": lambda: leaning_block(MPI.COMM_SELF, 4),
+    "P2 in space": lambda: pressed_block(MPI.COMM_SELF, 3, 2),
 }
-every_trace = pytest.mark.parametrize("trace", TRACES.values(), ids=TRACES)
 
 
-@every_trace
+@pytest.fixture(scope="module", params=PROBLEMS)
+def trace(request):
+    return PROBLEMS[request.param]().trace
+
+
 @given(radius=st.floats(1e-6, 50.0))
 @settings(max_examples=25, deadline=None)
 def test_a_constant_is_reproduced_to_rounding_at_any_radius(trace, radius):
@@ -43,7 +46,6 @@ def test_a_linear_pressure_is_kept_in_the_interior(degree, accuracy):
     assert np.abs(smooth - 1 - 2 * x)[x > 4 - radius / 2].max() > 0.01
 
 
-@every_trace
 def test_the_weighted_kernel_is_symmetric_before_its_normalisation(trace):
     """R moves no more from one node to another than back, up to the division at each."""
     smoothing = Smoothing(trace, 0.6)
@@ -71,7 +73,6 @@ def test_a_symmetric_pressure_stays_symmetric(degree):
     assert smooth[0] > 0
 
 
-@every_trace
 def test_it_is_the_identity_at_small_radii(trace):
     pressure = 1 + np.sin(3 * trace.points[:, 0])
     errors = [np.abs(Smoothing(trace, r)(pressure) - pressure).max() for r in (0.8, 0.4, 0.2)]
