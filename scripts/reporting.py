@@ -56,7 +56,7 @@ class Report:
             print("  ".join(cell.rjust(w) for cell, w in zip(line, widths, strict=True)))
         if note:
             print(note)
-        body = [f"| {' | '.join(line)} |" for line in lines]
+        body = [f"| {' | '.join(line)} |" for line in _escaped(lines)]
         body.insert(1, "|" + " --- |" * len(columns))
         self._fragment(name, caption, "\n".join(body), note)
 
@@ -95,6 +95,11 @@ class Report:
     def _fragment(self, name: str, caption: str, body: str, note: str) -> None:
         parts = [f"**{caption}**", body, *([note] if note else []), f"Numbers: `{name}.csv`"]
         (self.out / f"{name}.md").write_text("\n\n".join(parts) + "\n")
+
+
+def _escaped(lines: Sequence[Sequence[str]]) -> list[list[str]]:
+    """Return cells that Markdown does not take for several."""
+    return [[cell.replace("|", "\\|") for cell in line] for line in lines]
 
 
 def text(value: Any) -> str:
