@@ -1,7 +1,7 @@
 """How the scripts of this folder write their tables and figures.
 
 Each table or figure is a CSV file with the numbers, a PNG file for a figure, and a Markdown
-fragment of the same name with caption and remarks. `results.py` puts the fragments together.
+fragment of the same name with caption and remarks. `results_page.py` puts the fragments together.
 """
 
 from __future__ import annotations

@@ -12,7 +12,7 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "scripts"))
 
 import chapters
 import hertz
-import results
+import results_page
 import tables
 from reporting import Report, subplots, text
 
@@ -25,7 +25,7 @@ def test_page(tmp_path):
     report.figure("two", "A figure", figure, {"x": [0, 1], "y": [0]})
     (tmp_path / "results" / "hertz" / "three.csv").write_text("a,b\n1,2\n")
     page = tmp_path / "docs" / "page.md"
-    results.gather(tmp_path / "results", page)
+    results_page.gather(tmp_path / "results", page)
     words = page.read_text()
     assert "| \\|a\\| | b |" in words
     assert "| 2.5 | yes |" in words
