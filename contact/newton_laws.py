@@ -118,6 +118,9 @@ def linearise(
         status = np.where(closed, STICKS if problem.frictional else SLIDES, OPEN).astype(np.int8)
     else:
         status = node_status(problem, nodal, forces, bound, c)
+        # Friction that pushes a sliding node along: it has to stop before it can turn back.
+        pushed = (before == SLIDES) & (np.einsum("ni,ni->n", lam, slip) < 0)
+        status[pushed & (status == SLIDES) & problem.frictional] = STICKS
     changed = before is None or not np.array_equal(status, before)
     settled = problem.comm.allreduce(int(changed), op=MPI.SUM) == 0
     if frozen_bound is None and not settled and before is not None:
