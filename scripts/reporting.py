@@ -19,7 +19,7 @@ from matplotlib import rcParams
 from matplotlib.figure import Figure
 from mpi4py import MPI
 
-from contact import Case, InputError, Solution, build_problem, load_case, solve_problem
+from contact import Case, InputError, Solution, load_case, solve, solve_problem
 from contact.plots import STYLE
 from contact.problem import ContactProblem
 
@@ -160,9 +160,7 @@ def solved(case: Case, problem: ContactProblem | None = None) -> Solution:
     InputError
         If it does not converge: no table or figure shows such numbers.
     """
-    problem = problem or build_problem(case)
-    solution = solve_problem(problem, case.solver)
-    solution.title = case.title
+    solution = solve(case) if problem is None else solve_problem(problem, case.solver)
     if not solution.converged:
         raise InputError(f"{case.title}: {solution.outcome.reason}")
     return solution
