@@ -121,6 +121,15 @@ def free_components(space: fem.FunctionSpace, bcs: Sequence[fem.DirichletBC]) ->
     return free.reshape(-1, bs)
 
 
+def _prescribed(space: fem.FunctionSpace, bcs: Sequence[fem.DirichletBC]) -> Array:
+    """Return the prescribed values of the owned nodes, 0 where free, (nodes, block size)."""
+    values = fem.Function(space)
+    for bc in bcs:
+        bc.set(values.x.array)
+    index_map, bs = space.dofmap.index_map, space.dofmap.index_map_bs
+    return values.x.array[: index_map.size_local * bs].reshape(-1, bs)
+
+
 @dataclass(frozen=True)
 class Candidates:
     """The owned nodes of a boundary part, with their areas and the body's normals.
@@ -166,7 +175,8 @@ def build_trace(
 
     A node whose contact direction is fixed by a Dirichlet condition is left out; a fixed
     tangential component is removed from its tangent projector. On a symmetry line the
-    direction is turned into the free components.
+    direction is turned into the free components, and what the fixed ones contribute to
+    u_nu is taken off the gap.
 
     Raises
     ------
@@ -183,6 +193,7 @@ def build_trace(
         )
 
     free = free_components(space, bcs)[nodes, :d]
+    gap = gap - np.einsum("ni,ni->n", direction, _prescribed(space, bcs)[nodes, :d])
     admissible = direction * free
     length = np.linalg.norm(admissible, axis=1)
     # A gap is infinite where the body's normal does not lead to the foundation.
