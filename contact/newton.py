@@ -163,7 +163,7 @@ class Newton:
             if not problem.linear_material:
                 falls = residuals.equilibrium < max(before, options.tolerance)
                 tangent = residuals.equilibrium < options.secant_until and (falls or not tangent)
-            since = 0 if measured < 0.5 * best else since + 1
+            since = 0 if measured < 0.9 * best else since + 1
             best = min(best, measured)
             if since >= options.patience:
                 return Outcome(False, f"Newton's method stalled at {best:.1e}", residuals)

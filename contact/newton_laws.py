@@ -18,8 +18,9 @@ from contact.problem import ContactProblem
 from contact.projections import Array
 from contact.state import Multipliers, total_pressure
 
-#: What a contact node does.
-OPEN, SLIDES, STICKS = 0, 1, 2
+#: What a contact node does: a friction state, plus CLOSED where it touches. A smoothed
+#: pressure and Tresca's law bound the friction of open nodes too.
+FREE, SLIDES, STICKS, CLOSED = 0, 1, 2, 4
 
 #: Part of a node's own stiffness that a falling friction coefficient may take away.
 SOFTENING = 0.25
@@ -55,7 +56,7 @@ class LinearisedContact:
     blocks
         Derivative by the nodal unknowns, shape (n, block size, block size), without weights.
     status
-        OPEN, SLIDES or STICKS, shape (n,).
+        FREE, SLIDES or STICKS, plus CLOSED, shape (n,).
     settled
         Whether no node of any rank has changed its status.
     """
@@ -69,15 +70,13 @@ class LinearisedContact:
 def node_status(
     problem: ContactProblem, nodal: Array, forces: Multipliers, bound: Array, c: float
 ) -> NDArray[np.int8]:
-    """Return OPEN, SLIDES or STICKS at nodal unknowns, contact forces and bounds."""
+    """Return the states of the nodes at nodal unknowns, contact forces and bounds."""
     trace = problem.trace
-    opening = trace.normal_component(nodal) - trace.gap
-    trial = forces.friction + c * trace.tangential_component(nodal)
-    touches = forces.pressure + c * opening > 0
-    if problem.response.layer is not None:
-        touches |= problem.response.layer_pressure(nodal) > 0
-    sticks = touches & (np.linalg.norm(trial, axis=1) <= bound) & problem.frictional
-    return np.where(sticks, STICKS, np.where(touches, SLIDES, OPEN)).astype(np.int8)
+    closed = forces.pressure + c * (trace.normal_component(nodal) - trace.gap) > 0
+    size = np.linalg.norm(forces.friction + c * trace.tangential_component(nodal), axis=1)
+    state = np.where(size <= bound, STICKS, SLIDES)
+    state[(bound <= 0) & ~closed] = FREE
+    return (state * problem.frictional + CLOSED * closed).astype(np.int8)
 
 
 def linearise(
@@ -112,22 +111,22 @@ def linearise(
     trial = lam + c * slip
     size = np.linalg.norm(trial, axis=1)
 
-    closed = p + c * opening > 0
     if before is None:
-        closed = opening >= -1e-12 * problem.domain.size
-        status = np.where(closed, STICKS if problem.frictional else SLIDES, OPEN).astype(np.int8)
+        touches = opening >= -1e-12 * problem.domain.size
+        status = touches.astype(np.int8) * (CLOSED + STICKS * problem.frictional)
     else:
         status = node_status(problem, nodal, forces, bound, c)
         # Friction that pushes a sliding node along: it has to stop before it can turn back.
-        pushed = (before == SLIDES) & (np.einsum("ni,ni->n", lam, slip) < 0)
-        status[pushed & (status == SLIDES) & problem.frictional] = STICKS
+        pushed = (before & SLIDES > 0) & (np.einsum("ni,ni->n", lam, slip) < 0)
+        status[pushed & (status & SLIDES > 0)] ^= SLIDES | STICKS
+    closed, sticks, slides = (status & flag > 0 for flag in (CLOSED, STICKS, SLIDES))
     changed = before is None or not np.array_equal(status, before)
     settled = problem.comm.allreduce(int(changed), op=MPI.SUM) == 0
     if frozen_bound is None and not settled and before is not None:
         # A node that lets go slides on a coefficient that has fallen already: foreseen, this
         # saves one step for each node that the sliding zone gains.
         ahead = np.maximum(length, (size - bound) / moduli.nodal)
-        bound = np.where(status == SLIDES, problem.friction_bound(total, ahead), bound)
+        bound = np.where(slides, problem.friction_bound(total, ahead), bound)
 
     pressure = np.where(closed, p + moduli.gamma * opening, 0.0)
     blocks = np.zeros((p.size, trace.block_size, trace.block_size))
@@ -135,7 +134,6 @@ def linearise(
     blocks[:, :d, :d] = n[:, :, None] * slope[:, None, :]
     friction = np.zeros_like(lam)
     if problem.frictional:
-        sticks, slides = status == STICKS, status == SLIDES
         friction[sticks] = (lam + moduli.gamma * slip)[sticks]
         blocks[sticks, :d, :d] += moduli.gamma * trace.tangent[sticks]
 
