@@ -107,8 +107,9 @@ class FixedPoint:
         bound: Array = np.zeros(problem.trace.nodes.size)
         tangent = options.material_step == "tangent"
         best, since = np.inf, 0
-        # Iteration 0 is the pure contact problem that the thesis starts from.
-        first = 0 if problem.frictional else 1
+        # Iteration 0 is the pure contact problem that the thesis starts from. A bound that is
+        # updated in the block relaxation needs none.
+        first = 0 if problem.frictional and not options.single_loop else 1
         for iteration in range(first, options.max_outer + 1):
             friction = problem.frictional and iteration > 0
             if friction and iteration == 1:

@@ -189,7 +189,8 @@ def build_trace(
     direction, gap = foundation.measure(points, found.normal)
     if domain.comm.allreduce(bool(np.isnan(direction).any()), op=MPI.LOR):
         raise InputError(
-            "contact.foundation: a contact node has no contact direction (it is the sphere's centre)"
+            "contact.foundation: a contact node has no contact direction "
+            "(it is the sphere's centre)"
         )
 
     free = free_components(space, bcs)[nodes, :d]

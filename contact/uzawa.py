@@ -241,7 +241,7 @@ def block_relaxation(
         total = q + r * u
         layer = 0.0 if law is None else law.layer(u[:, 0])
         forces = Multipliers(total[:, 0] - layer, total[:, 1:])
-        if parameters.single_loop:
+        if parameters.single_loop and step.friction:
             bound = bound_of(problem, nodal, forces)
         residual = max(interface_residuals(problem, nodal, forces, bound))
         phi = (z - multiplier) * (1 / r)
