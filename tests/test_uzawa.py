@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from helpers import Affine, attempt, bar, constant, contact_data, flat, pressed_block, solve
+from helpers import Affine, attempt, bar, contact_data, flat, pressed_block, solve
 from mpi4py import MPI
 
 from contact.acceleration import ResidualMinimiser
