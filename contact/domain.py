@@ -71,7 +71,9 @@ def _pieces(section: "MeshSection") -> dict[str, list[Piece]]:
 
 
 def from_mesh(
-    mesh: dmesh.Mesh, parts: Mapping[str, Marker | npt.NDArray[np.integer[Any]]]
+    mesh: dmesh.Mesh,
+    parts: Mapping[str, Marker | npt.NDArray[np.integer[Any]]],
+    size: float | None = None,
 ) -> Domain:
     """Name parts of the boundary of a dolfinx mesh. Collective.
 
@@ -82,6 +84,8 @@ def from_mesh(
     parts
         Name -> function of x, shape (3, n), that is true at all vertices of the part's facets;
         or the local indices of the facets. The same names on all ranks.
+    size
+        Largest extent of the body; by default that of its bounding box.
 
     Raises
     ------
@@ -109,7 +113,7 @@ def from_mesh(
         if mesh.comm.allreduce(inside) > 0:
             raise InputError(f"the part {name!r} contains interior facets of the mesh")
         marks[name] = np.isin(facets, chosen)
-    return tagged(mesh, facets, marks)
+    return tagged(mesh, facets, marks, size)
 
 
 def refined(domain: Domain) -> Domain:

@@ -1,4 +1,4 @@
-"""Is the body held, and is its potential determined?"""
+"""Checks that the body is held and that its potential is determined."""
 
 from __future__ import annotations
 

@@ -1,0 +1,260 @@
+"""The files that a solve leaves, on any number of ranks."""
+
+import csv
+import json
+import os
+from pathlib import Path
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+
+from contact.build import build_problem
+from contact.case import Case, parse_case
+from contact.case_solver import Output
+from contact.fields import DerivedFields
+from contact.kkt import evaluate
+from contact.output import write_outputs
+from contact.solution import Solution
+from contact.solving import solve
+from contact.table import contact_table, csv_columns, tangent_of
+
+# Debian's adios2 would take its serial library in a run without mpirun.
+os.environ.setdefault("ADIOS2_ALWAYS_USE_MPI", "1")
+
+COLUMNS = {
+    2: "x y weight gap u_n u_t pressure tau bound status".split(),
+    3: "x y z weight gap u_n u_tx u_ty u_tz pressure tau_x tau_y tau_z bound status".split(),
+}
+
+
+def block(dim: int, degree: int = 1, **sections: object) -> Case:
+    """Return a block pressed on a plane and pushed aside, sticking and sliding."""
+    size = [2.0, 1.0] if dim == 2 else [2.0, 1.0, 1.0]
+    return parse_case(
+        {
+            "title": "Block",
+            "mesh": {
+                "generator": "rectangle" if dim == 2 else "box",
+                "size": size,
+                "cells": [8 if degree == 1 else 4, 4] if dim == 2 else [4, 2, 2],
+            },
+            "space": {"degree": degree},
+            "material": {"law": "log", "young": 10.0, "poisson": 0.3, "yield_strain": 0.02},
+            "fixed": [{"on": "top", "displacement": [0.02, *[0.0] * (dim - 2), "-0.02-0.02*x"]}],
+            "contact": {"on": "bottom"},
+            "friction": {"law": "coulomb", "mu": 0.3},
+            **sections,
+        }
+    )
+
+
+PIEZO = {"e31": -5.4, "e33": 15.8, "e15": 12.3, "beta11": 8.13866, "beta33": 7.37455}
+
+
+def electric(dim: int) -> Case:
+    """Return a piezoelectric block on a conductive foundation."""
+    return block(
+        dim,
+        material={"young": 58.7, "poisson": 0.39, "piezo": PIEZO},
+        electric={"k_e": 1.0, "phi_f": 3.0},
+        fixed=[{"on": "top", "displacement": [0.0] * (dim - 1) + [-0.02], "potential": 0.0}],
+    )
+
+
+def written(solution: Solution, folder: Path) -> tuple[dict[str, object], list[dict[str, str]]]:
+    """Write the outputs; return the summary and the rows of the contact table."""
+    write_outputs(solution, folder)
+    summary = json.loads((folder / "summary.json").read_text())
+    with (folder / "contact.csv").open() as file:
+        return summary, list(csv.DictReader(file))
+
+
+@pytest.mark.parallel
+@pytest.mark.parametrize(("dim", "degree"), [(2, 1), (2, 2), (3, 1), (3, 2)])
+def test_fixed_formats(dim: int, degree: int, shared_tmp_path: Path) -> None:
+    """Names, columns and counts are those that other programs read."""
+    solution = solve(block(dim, degree))
+    summary, rows = written(solution, shared_tmp_path)
+    assert summary["converged"] is True
+    assert summary["cells"] == solution.problem.domain.mesh.topology.index_map(dim).size_global
+    assert len(summary["contact_force"]) == dim
+    assert set(summary["kkt"]) == {"equilibrium", "contact", "friction"}
+    assert set(summary["seconds"]) == {"setup", "solve", "output"}
+    assert list(rows[0]) == COLUMNS[dim]
+    status = [row["status"] for row in rows]
+    assert summary["contact_nodes"] == sum(s != "open" for s in status)
+    assert summary["stick_nodes"] == status.count("stick") > 0
+    assert summary["slip_nodes"] == status.count("slip") > 0
+    history = (shared_tmp_path / "history.csv").read_text().splitlines()
+    assert len(history) == 1 + summary["outer_iterations"]
+    assert len(summary["inner_iterations"]) == summary["outer_iterations"]
+    for name in ("fields.bp", "cells.bp"):
+        assert (shared_tmp_path / name).is_dir()
+    assert not list(shared_tmp_path.glob(".*")), "nothing half written is left"
+
+
+@pytest.mark.parallel
+@pytest.mark.parametrize("dim", [2, 3])
+def test_electric_outputs(dim: int, shared_tmp_path: Path) -> None:
+    """A piezoelectric body adds potentials, charges and two columns; charges balance."""
+    summary, rows = written(solve(electric(dim)), shared_tmp_path)
+    assert list(rows[0]) == [*COLUMNS[dim], "phi", "d_n"]
+    assert summary["phi_min"] < summary["phi_max"]
+    through = sum(float(row["weight"]) * float(row["d_n"]) for row in rows)
+    assert abs(through) > 1e-3
+    assert abs(summary["total_charge"]) <= 1e-8 * abs(through)
+
+
+@pytest.mark.parallel
+@pytest.mark.parametrize("dim", [2, 3])
+def test_same_on_any_number_of_ranks(dim: int, shared_tmp_path: Path) -> None:
+    """The table of all ranks is that of one, row by row."""
+    together = contact_table(solve(block(dim), comm=MPI.COMM_WORLD))
+    alone = contact_table(solve(block(dim), comm=MPI.COMM_SELF))
+    assert alone is not None
+    if together is None:
+        return
+    for name, values in csv_columns(alone).items():
+        if name == "status":
+            assert list(values) == list(together[name])
+        else:
+            # All displacements are compared with the imposed one: u_n is zero but for rounding.
+            scale = 0.02 if name.startswith("u_") else np.abs(values).max() or 1.0
+            np.testing.assert_allclose(together[name], values, rtol=0, atol=1e-8 * scale)
+
+
+def test_rows_follow_the_contact_part(shared_tmp_path: Path) -> None:
+    """In the plane neighbours are neighbours, also on an arc and in several pieces."""
+    disc = block(
+        2,
+        mesh={"generator": "half_disc", "size": 2.0, "contact_size": 0.5},
+        fixed=[{"on": "top", "displacement": [0.0, -0.1]}],
+        contact={
+            "on": "contact",
+            "foundation": {"shape": "plane", "point": [0.0, 0.0], "normal": [0.0, 1.0]},
+        },
+    )
+    table = contact_table(solve(disc))
+    assert table is not None
+    points = np.column_stack([table["x"], table["y"]])
+    steps = np.linalg.norm(np.diff(points, axis=0), axis=1)
+    assert np.ptp(points[:, 0]) > 15, "both halves of the arc are there"
+    assert steps.max() < 2.5
+    assert np.all(np.diff(points[:, 0]) > -1e-12)
+
+    parts = {"two": [{"side": "bottom", "to": 0.5}, {"side": "bottom", "from": 1.5}]}
+    pieces = block(
+        2,
+        2,
+        contact={"on": "two"},
+        mesh={"generator": "rectangle", "size": [2.0, 1.0], "cells": [8, 4], "parts": parts},
+    )
+    table = contact_table(solve(pieces))
+    assert table is not None
+    np.testing.assert_allclose(table["x"], [*np.arange(5) / 8, *(1.5 + np.arange(5) / 8)])
+
+
+def test_tangent() -> None:
+    """On the bottom the tangent points along x."""
+    np.testing.assert_allclose(tangent_of(np.array([[0.0, -1.0]])), [[1.0, 0.0]])
+
+
+@pytest.mark.parallel
+def test_contact_force_balances_the_supports(shared_tmp_path: Path) -> None:
+    """The force on the foundation is that of the load, in size and direction."""
+    case = block(
+        2,
+        fixed=[{"on": "left", "displacement": [0.0, "free"]}],
+        load=[{"on": "top", "traction": [0.0, "-0.1*(1+x)"]}],
+    )
+    summary, rows = written(solve(case), shared_tmp_path)
+    assert summary["contact_force"][1] == pytest.approx(-0.4, rel=1e-8)
+    weighted = sum(float(row["weight"]) * float(row["pressure"]) for row in rows)
+    assert weighted == pytest.approx(0.4, rel=1e-8)
+
+
+def test_fields_can_be_read_back(shared_tmp_path: Path) -> None:
+    """fields.bp holds all fields at the nodes, with the values of the solution."""
+    adios2 = pytest.importorskip("adios2")
+    solution = solve(block(2))
+    written(solution, shared_tmp_path)
+    with adios2.FileReader(str(shared_tmp_path / "fields.bp"), MPI.COMM_SELF) as file:
+        names = set(file.available_variables())
+        u = file.read("displacement")
+    assert {"displacement", "stress", "von_mises", "dev_strain"} <= names
+    largest = np.linalg.norm(u, axis=1).max()
+    x = solution.problem.x.x.array.reshape(-1, 2)
+    assert largest == pytest.approx(np.linalg.norm(x, axis=1).max(), rel=1e-12)
+
+
+@pytest.mark.parallel
+def test_xdmf(shared_tmp_path: Path) -> None:
+    """Without VTX the fields go to XDMF, for P2 interpolated to P1."""
+    solution = solve(block(2, 2))
+    solution.output = Output(fields="xdmf")
+    written(solution, shared_tmp_path)
+    text = (shared_tmp_path / "fields.xdmf").read_text()
+    assert all(name in text for name in ("displacement", "stress", "von_mises", "dev_strain"))
+    assert not (shared_tmp_path / "fields.bp").exists()
+
+
+@pytest.mark.parallel
+@pytest.mark.parametrize("degree", [1, 2])
+def test_derived_fields_of_a_known_strain(degree: int) -> None:
+    """Homogeneous compression: the stress is (1.13), in the cells and at the nodes."""
+    problem = build_problem(block(2, degree))
+    points = problem.space.tabulate_dof_coordinates()
+    problem.x.x.array[1::2] = -0.05 * points[:, 1]
+    fields = DerivedFields(problem)
+    law, t = problem.body.law, 0.05 * np.sqrt(2 / 3)
+    g = float(law.secant_modulus(t**2))
+    across = -0.05 * (law.bulk - 2 * g / 3)
+    stress = np.diag([across, across - 0.1 * g, across]).ravel()
+    for made in (fields.cells(), fields.nodes()):
+        np.testing.assert_allclose(made["stress"].x.array.reshape(-1, 9) - stress, 0, atol=1e-12)
+        np.testing.assert_allclose(made["von_mises"].x.array, 0.1 * g, rtol=1e-10)
+        np.testing.assert_allclose(made["dev_strain"].x.array, t, rtol=1e-10)
+    assert fields.largest_strain() == pytest.approx(t, rel=1e-12)
+
+
+@pytest.mark.parallel
+@pytest.mark.parametrize("kind", ["P1", "P2", "piezoelectric"])
+def test_checkpoint(kind: str, shared_tmp_path: Path) -> None:
+    """A problem built on a checkpoint and restored from it is solved already."""
+    pytest.importorskip("adios4dolfinx", exc_type=ImportError)
+    from contact.checkpoint import read_checkpoint
+
+    case = electric(2) if kind == "piezoelectric" else block(2, int(kind[1]))
+    solution = solve(case)
+    solution.output = Output(checkpoint=True)
+    written(solution, shared_tmp_path)
+    checkpoint = read_checkpoint(shared_tmp_path / "checkpoint.bp")
+    assert checkpoint.domain.parts.keys() == solution.problem.domain.parts.keys()
+    problem = build_problem(case, domain=checkpoint.domain)
+    forces = checkpoint.restore(problem)
+    assert evaluate(problem, forces).largest <= 1e-8
+
+
+def test_outputs_are_replaced(shared_tmp_path: Path) -> None:
+    """A second run into the same folder leaves its own files alone."""
+    written(solve(block(2)), shared_tmp_path)
+    summary, rows = written(solve(block(2, 2)), shared_tmp_path)
+    assert summary["dofs"] == 2 * (2 * 4 + 1) * (2 * 4 + 1)
+    assert len(rows) == 9
+
+
+@pytest.mark.parametrize("dim", [2, 3])
+def test_figures(dim: int, shared_tmp_path: Path) -> None:
+    """All figures are drawn."""
+    from contact.plots import write_figures
+
+    if dim == 3:
+        pytest.importorskip("pyvista")
+    files = write_figures(solve(electric(dim)), shared_tmp_path)
+    assert [file.name for file in files] == [
+        "figure-contact.png",
+        "figure-deformed.png",
+        "figure-potential.png",
+    ]
+    assert all(file.stat().st_size > 10_000 for file in files)
