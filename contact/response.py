@@ -15,6 +15,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from contact.projections import Array
 from contact.trace import ContactTrace
@@ -192,8 +193,14 @@ class FoundationResponse:
         """Return the pressure of the layer at nodal unknowns of shape (n, block size)."""
         if self.layer is None:
             return np.zeros(x.shape[0])
-        depth = self.trace.normal_component(x) - self._touch
-        return self.layer.h_nu(self._difference(x)) * self.layer.p_nu(depth)
+        return self.layer.h_nu(self._difference(x)) * self.layer.p_nu(self._depth(x))
+
+    def _depth(self, x: Array) -> Array:
+        """Return how deep the layer is pressed in: not deeper than to the rigid part.
+
+        An iterate may go beyond; what it then takes belongs to the multiplier alone.
+        """
+        return np.minimum(self.trace.normal_component(x), self.constrained_trace.gap) - self._touch
 
     def charge(self, x: Array, pressure: Array) -> Array:
         """Return D.nu = psi phi_L(phi - phi_F) at the nodes; `pressure` tells the contact."""
@@ -208,14 +215,14 @@ class FoundationResponse:
             return psi(pressure > 0)
         return psi(np.where(self._pressed(x, pressure), 0.0, self._penetration(x)))
 
-    def _pressed(self, x: Array, pressure: Array) -> Array:
+    def _pressed(self, x: Array, pressure: Array) -> NDArray[np.bool_]:
         """Tell where the rigid part presses, and u_nu = rho.
 
         An iterate misses that by the tolerance of the inner loop, which the steep ramp would
         make a thousand times larger; an open node may carry a multiplier of that size.
         """
         opening = self.trace.normal_component(x) - self.constrained_trace.gap
-        return pressure - self.layer_pressure(x) + self.contact_scale * opening > 0
+        return np.greater(pressure - self.layer_pressure(x) + self.contact_scale * opening, 0.0)
 
     def force(self, x: Array, pressure: Array) -> Array:
         """Return the nodal residual density, shape (n, block size), in scaled unknowns."""
@@ -230,9 +237,9 @@ class FoundationResponse:
         total = np.zeros((x.shape[0], self.trace.block_size))
         if self.layer is None:
             return total
-        depth = self.trace.normal_component(x) - self._touch
-        difference = self._difference(x)
-        slope = self.layer.h_nu(difference) * self.layer.p_nu.derivative(depth)
+        depth, difference = self._depth(x), self._difference(x)
+        inside = self.trace.normal_component(x) < self.constrained_trace.gap
+        slope = self.layer.h_nu(difference) * self.layer.p_nu.derivative(depth) * inside
         total[:, : self.trace.dim] = slope[:, None] * self.trace.normal
         if self.trace.block_size > self.trace.dim:
             growth = self.layer.h_nu.derivative(difference) * self.layer.p_nu(depth)
