@@ -11,7 +11,7 @@ from contact.case_types import Accepted, Count, Positive, Section, Switch, Toler
 Method = Literal["uzawa", "penalty", "newton"]
 
 #: The method where the case file names none.
-DEFAULT_METHOD: Method = "uzawa"
+DEFAULT_METHOD: Method = "newton"
 
 
 class Solver(Section):
