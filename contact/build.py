@@ -235,11 +235,12 @@ def _friction(
 
 def _conductor(section: sections.Electric, size: float) -> Conductor:
     delta = 1e3 / size if section.delta is None else section.delta
-    laws = {"shifted": ShiftedConductivity, "ramp": RampConductivity}
-    psi = (
-        PerfectConductivity(section.k_e)
-        if section.law == "perfect"
-        else laws[section.law](section.k_e, delta)
-    )
+    psi: ShiftedConductivity | RampConductivity | PerfectConductivity
+    if section.law == "shifted":
+        psi = ShiftedConductivity(section.k_e, delta)
+    elif section.law == "ramp":
+        psi = RampConductivity(section.k_e, delta)
+    else:
+        psi = PerfectConductivity(section.k_e)
     limit = np.inf if section.limit is None else section.limit
     return Conductor(psi, section.phi_f, Truncation(limit), section.lagged)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping
 from functools import cached_property
+from itertools import accumulate
 
 import basix.ufl
 import numpy as np
@@ -85,7 +86,9 @@ class DerivedFields:
     def __init__(self, problem: ContactProblem) -> None:
         self.problem = problem
         self.shapes: dict[str, tuple[int, ...]] = {
-            "stress": (3, 3), "von_mises": (), "dev_strain": ()
+            "stress": (3, 3),
+            "von_mises": (),
+            "dev_strain": (),
         }
         if problem.piezoelectric:
             self.shapes["electric_displacement"] = (problem.dim,)
@@ -95,7 +98,7 @@ class DerivedFields:
     def columns(self) -> Mapping[str, slice]:
         """Where the components of each field are in the rows of values."""
         sizes = [math.prod(shape) for shape in self.shapes.values()]
-        ends = np.cumsum(sizes).tolist()
+        ends = accumulate(sizes)
         return {
             name: slice(end - size, end)
             for name, size, end in zip(self.shapes, sizes, ends, strict=True)

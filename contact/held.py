@@ -47,8 +47,8 @@ class HeldCurrent:
 
     def _at_nodes(self, x: Array) -> tuple[Array, Array]:
         """Return psi and phi - phi_F for a local dof array."""
-        nodal = x[: x.size // self.block_size * self.block_size].reshape(-1, self.block_size)
-        nodal = nodal[self.nodes]
+        size = self.block_size
+        nodal = x[: x.size // size * size].reshape(-1, size)[self.nodes]
         opening = np.einsum("ni,ni->n", nodal[:, :-1], self.direction) - self.gap
         # Closed up to the rounding of the prescribed displacement.
         closed = opening >= -1e-12 * np.abs(self.gap).max(initial=0.0)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import signal
 import threading
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from types import FrameType
 
@@ -34,7 +34,7 @@ def stop_on_signal(comm: MPI.Intracomm, monitor: Monitor | None) -> Iterator[Mon
     main thread alone; in others nothing is changed.
     """
     caught: list[int] = []
-    before = {}
+    before: dict[int, Callable[[int, FrameType | None], object] | int] = {}
 
     def note(number: int, frame: FrameType | None) -> None:
         caught.append(number)
@@ -49,11 +49,11 @@ def stop_on_signal(comm: MPI.Intracomm, monitor: Monitor | None) -> Iterator[Mon
 
     try:
         if threading.current_thread() is threading.main_thread():
-            for number in (signal.SIGINT, signal.SIGTERM):
-                handler = signal.getsignal(number)
+            for ending in (signal.SIGINT, signal.SIGTERM):
+                handler = signal.getsignal(ending)
                 if handler is not None:  # None: not installed from Python, left alone
-                    before[number] = handler
-                    signal.signal(number, note)
+                    before[ending] = handler
+                    signal.signal(ending, note)
         yield check
     finally:
         for number, handler in before.items():

@@ -42,7 +42,7 @@ def near_nullspace(problem: ContactProblem) -> PETSc.NullSpace:
     points = problem.space.tabulate_dof_coordinates()[: index_map.size_local, :d]
     low = problem.domain.mesh.geometry.x.min(axis=0, initial=0.0)[:d]
     motions = rigid_motions((points - low) / problem.domain.size)
-    vectors = []
+    vectors: list[PETSc.Vec] = []
     for k in range(motions.shape[2]):
         values = np.zeros((index_map.size_local, bs))
         values[:, :d] = motions[:, :, k]

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from mpi4py import MPI
 from scipy.spatial import cKDTree
@@ -61,7 +63,7 @@ def coarser_cases(case: Case, levels: int | None = None) -> list[Case]:
 
 
 def coarse_solution(
-    case: Case, comm: MPI.Intracomm, **replacements: object
+    case: Case, comm: MPI.Intracomm, **replacements: Any
 ) -> tuple[ContactProblem, Multipliers]:
     """Solve on all meshes but the finest, each from the one before. Collective."""
     options = NewtonOptions(tolerance=max(COARSE_TOLERANCE, case.solver.tolerance))

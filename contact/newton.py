@@ -78,6 +78,7 @@ class Newton:
     counters: Counters = field(default_factory=Counters)
 
     def __post_init__(self) -> None:
+        """Choose the moduli and set up the operator."""
         middle = automatic_r(self.problem)
         nodal = middle**2 / float(self.problem.body.law.young)
         self.moduli = Moduli(middle, nodal, self.options.gamma * max(middle, nodal))

@@ -146,7 +146,9 @@ def linearise(
         friction[slides] = (bound[:, None] * along + np.einsum("nij,nj->ni", sliding, slip))[slides]
         if frozen_bound is None:
             rate = _bound_gradient(problem, nodal, total, slip, length, moduli, settled)
-            ahead, follows = _follow_pressure(problem, nodal, length, slope, opening, moduli, closed)
+            ahead, follows = _follow_pressure(
+                problem, nodal, length, slope, opening, moduli, closed
+            )
             friction[slides] += (ahead[:, None] * along)[slides]
             rate = rate + follows
             blocks[slides, :d, :] += along[slides, :, None] * rate[slides, None, :]

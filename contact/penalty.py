@@ -91,6 +91,7 @@ class Penalty:
     counters: Counters = field(default_factory=Counters)
 
     def __post_init__(self) -> None:
+        """Start with zero forces and an empty history."""
         self.history = History(self.monitor)
         self.forces = Multipliers.zero(self.problem)
         self._eps = self.options.regularisation

@@ -5,6 +5,7 @@ from __future__ import annotations
 import logging
 import os
 from dataclasses import dataclass
+from typing import Any, TypeAlias
 
 import numpy as np
 from dolfinx import mesh as dmesh
@@ -14,6 +15,7 @@ from matplotlib.collections import LineCollection, PolyCollection
 from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 from mpi4py import MPI
+from numpy.typing import NDArray
 
 from contact import _compat
 from contact.domain import Domain
@@ -25,6 +27,8 @@ from contact.solution import Solution
 from contact.table import Table
 
 logger = logging.getLogger("contact.plots")
+
+Indices: TypeAlias = NDArray[np.integer[Any]]
 
 #: Plane meshes with more cells are drawn as pixels, this many along the body.
 MOST_CELLS, PIXELS = 150_000, 1600
@@ -125,11 +129,11 @@ def picture(solution: Solution, field: str, label: str) -> Picture | None:
     return Picture(corners, moved, colours, outline, None, box, scale, label)
 
 
-def _take(dofs: Array, places: Array) -> Array:
+def _take(dofs: Indices, places: Indices) -> Indices:
     return np.take_along_axis(dofs, places, axis=1)
 
 
-def _triangles(domain: Domain) -> tuple[Array, Array]:
+def _triangles(domain: Domain) -> tuple[Indices, Indices]:
     """Return cells and three corners of each: the cells in the plane, the surface in space."""
     mesh, d = domain.mesh, domain.dim
     if d == 2:

@@ -16,6 +16,7 @@ import ufl
 from dolfinx import fem
 from dolfinx.la import InsertMode
 from mpi4py import MPI
+from numpy.typing import NDArray
 from ufl.core.expr import Expr
 
 from contact.domain import Domain
@@ -179,9 +180,7 @@ class ContactProblem:
 
         trace = build_trace(domain, self.space, self.bcs, contact.on, contact.foundation)
         scale = float(body.law.young) / domain.size
-        self.response = FoundationResponse(
-            trace, contact.layer, conductor, self.phi_scale, scale
-        )
+        self.response = FoundationResponse(trace, contact.layer, conductor, self.phi_scale, scale)
         self.trace = self.response.constrained_trace
         if self.friction.mu is not None:
             nodal = ConstantCoefficient(np.asarray(self.friction.mu.numpy(self.trace.points)))
@@ -250,7 +249,9 @@ class ContactProblem:
                     bcs.append(self._component_bc(component, facets, value))
         return bcs
 
-    def _component_bc(self, component: int, facets: Array, value: Field) -> fem.DirichletBC:
+    def _component_bc(
+        self, component: int, facets: NDArray[np.int32], value: Field
+    ) -> fem.DirichletBC:
         scale = self.phi_scale if component == self.dim else 1.0
         subspace = self.space.sub(component)
         scalar, _ = subspace.collapse()

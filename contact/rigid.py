@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 from mpi4py import MPI
+from numpy.typing import NDArray
 from scipy.optimize import linprog
 
 from contact.errors import InputError
@@ -73,7 +74,7 @@ def check_potential(problem: ContactProblem, forces: Multipliers) -> None:
         )
 
 
-def rigid_motions(points: Array) -> Array:
+def rigid_motions(points: NDArray[np.floating]) -> Array:
     """Return the rigid motions at points of shape (n, d): shape (n, d, 3 or 6).
 
     Translations come first, then rotations: about z in the plane, about x, y and z in space.

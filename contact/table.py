@@ -53,14 +53,14 @@ def contact_table(solution: Solution) -> Table | None:
             "tau": np.einsum("ni,ni->n", friction, tangent),
         }
     else:
-        columns |= {f"u_t{axis}": values for axis, values in zip("xyz", slip.T, strict=True)}
+        columns |= {f"u_t{axis}": slip[:, i] for i, axis in enumerate("xyz")}
         columns["pressure"] = pressure
-        columns |= {f"tau_{axis}": values for axis, values in zip("xyz", friction.T, strict=True)}
+        columns |= {f"tau_{axis}": friction[:, i] for i, axis in enumerate("xyz")}
     columns |= {"bound": solution.friction_bound, "status": solution.status}
     if problem.piezoelectric:
         columns["phi"] = problem.phi_scale * nodal[:, -1]
         columns["d_n"] = problem.response.charge(nodal, pressure)
-    columns |= {f"nu_{axis}": values for axis, values in zip("xyz", trace.normal.T, strict=False)}
+    columns |= {f"nu_{axis}": trace.normal[:, i] for i, axis in enumerate("xyz"[: problem.dim])}
     order = _order(problem)
     gathered = {name: problem.comm.gather(values) for name, values in columns.items()}
     if order is None:

@@ -25,8 +25,13 @@ from forms.ops import Value, log, maximum, sqrt
 class Hencky(Protocol):
     """What the forms need of a material: two elastic constants and a secant shear modulus."""
 
-    young: float
-    poisson: float
+    @property
+    def young(self) -> float:
+        """Young's modulus E > 0 (stress)."""
+
+    @property
+    def poisson(self) -> float:
+        """Poisson's ratio, -1 < nu < 1/2."""
 
     @property
     def bulk(self) -> float:

@@ -43,9 +43,7 @@ def peer(n: int, mu: float) -> Run:
 def measured(command: Sequence[str]) -> Run:
     """Return what a process prints as JSON in its last line."""
     environment = {**os.environ, "OMP_NUM_THREADS": "1"}
-    done = subprocess.run(
-        command, env=environment, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
-    )
+    done = subprocess.run(command, env=environment, capture_output=True, text=True)
     if done.returncode != 0:
         raise RuntimeError(f"{' '.join(command)} failed:\n{done.stderr[-2000:]}")
     result: Run = json.loads(done.stdout.strip().splitlines()[-1])
@@ -77,7 +75,8 @@ def tables_by_method(report: Report, coarse: bool) -> None:
             extra = [f"solver.r={thesis_r}"] if "thesis" in method else []
             result = run(case, *changes, *settings, *extra)
             keys = ("converged", "outer", "solves", "factorizations", "solve")
-            rows.append({"table": table, "row": row, "method": method, **{k: result[k] for k in keys}})
+            found = {key: result[key] for key in keys}
+            rows.append({"table": table, "row": row, "method": method, **found})
     report.table("bench-tables", "Every row of the thesis's tables by every method", columns(rows))
 
 

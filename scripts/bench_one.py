@@ -1,5 +1,7 @@
 """One measurement of the benchmark, in a process of its own; prints one line of JSON.
 
+Start it as one of::
+
     bench_one.py CASE.toml [key=value ...]      a case file of scripts/cases
     bench_one.py bar N MU                       Example 7.2, linear material, constant mu
     bench_one.py ratio DIM N cold|nested        a nonlinear solve and one linear solve

@@ -242,9 +242,13 @@ def main(arguments: Sequence[str] | None = None) -> None:
 def summary(rows: dict[str, list[Any]], methods: Sequence[str]) -> dict[str, list[Any]]:
     """Count by family and method."""
     table: dict[str, list[Any]] = {
-        key: []
-        for key in ("family", "method", "problems", "converged", "without fall-back")
-        + ("median solves", "most solves")
+        "family": [],
+        "method": [],
+        "problems": [],
+        "converged": [],
+        "without fall-back": [],
+        "median solves": [],
+        "most solves": [],
     }
     family = np.array([name.rsplit("-", 1)[0] for name in rows["problem"]])
     for name in dict.fromkeys(family):
