@@ -91,9 +91,7 @@ def summarise(solution: Solution, table: Table | None) -> dict[str, Any]:
         "inner_iterations": [record.inner for record in records],
         "linear_solves": counters.linear_solves,
         "factorizations": counters.factorizations,
-        "kkt": {
-            "equilibrium": kkt.equilibrium, "contact": kkt.contact, "friction": kkt.friction
-        },
+        "kkt": {"equilibrium": kkt.equilibrium, "contact": kkt.contact, "friction": kkt.friction},
         "max_pressure": problem.trace.maximum(solution.pressure),
         "contact_force": solution.contact_force.tolist(),
         "max_displacement": _largest_displacement(solution),
@@ -134,7 +132,14 @@ def _history(solution: Solution) -> Iterable[tuple[Any, ...]]:
     for r in solution.history.records:
         k = r.kkt
         yield (
-            r.iteration, r.inner, k.equilibrium, k.contact, k.friction, r.change, r.seconds, r.note
+            r.iteration,
+            r.inner,
+            k.equilibrium,
+            k.contact,
+            k.friction,
+            r.change,
+            r.seconds,
+            r.note,
         )
 
 
