@@ -258,8 +258,14 @@ def draw_space(picture: Picture, title: str = "") -> Figure | None:
         plotter = pyvista.Plotter(off_screen=True, window_size=(1000, 900))
         plotter.set_background("white")
         plotter.add_mesh(
-            surface, scalars="values", cmap="viridis", clim=[norm.vmin, norm.vmax],
-            show_edges=len(faces) < 5000, line_width=0.5, ambient=0.5, diffuse=0.5,
+            surface,
+            scalars="values",
+            cmap="viridis",
+            clim=[norm.vmin, norm.vmax],
+            show_edges=len(faces) < 5000,
+            line_width=0.5,
+            ambient=0.5,
+            diffuse=0.5,
             show_scalar_bar=False,
         )
         plotter.add_axes()
