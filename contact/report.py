@@ -58,8 +58,12 @@ class History:
         self.records.append(record)
         logger.info(
             "iteration %d: %d solves, residuals %.2e %.2e %.2e %s",
-            record.iteration, record.inner, record.kkt.equilibrium, record.kkt.contact,
-            record.kkt.friction, record.note,
+            record.iteration,
+            record.inner,
+            record.kkt.equilibrium,
+            record.kkt.contact,
+            record.kkt.friction,
+            record.note,
         )
         if self.monitor is not None:
             self.monitor(record)
