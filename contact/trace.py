@@ -206,7 +206,13 @@ def build_trace(
     tangent = -direction[:, :, None] * direction[:, None, :]
     tangent[:, np.arange(d), np.arange(d)] += free
     trace = ContactTrace(
-        domain.comm, nodes, points, weight, direction, tangent, gap,
+        domain.comm,
+        nodes,
+        points,
+        weight,
+        direction,
+        tangent,
+        gap,
         space.dofmap.index_map_bs,
     )
     if trace.size == 0:
