@@ -56,9 +56,7 @@ def penalty(u: Expr, v: Expr, nu: Expr, gap: Expr, eps: Value) -> Expr:
     return penalty_pressure(normal_part(u, nu), gap, eps) * normal_part(v, nu)
 
 
-def penalty_friction(
-    u_frozen: Expr, u: Expr, v: Expr, nu: Expr, bound: Expr, eps: Value
-) -> Expr:
+def penalty_friction(u_frozen: Expr, u: Expr, v: Expr, nu: Expr, bound: Expr, eps: Value) -> Expr:
     """Return the form J_eps(u_frozen; u, v) of (4.33) for a friction bound s."""
     frozen = tangential_part(u_frozen, nu)
     modulus = penalty_friction_modulus(bound, sqrt(ufl.inner(frozen, frozen)), eps)
