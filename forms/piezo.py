@@ -190,9 +190,7 @@ def _mechanical(law: Hencky, piezo: Piezo, u: Expr, v: Expr, eta: Expr, w: Expr)
     return ufl.inner(sigma, embed(strain(w)))
 
 
-def saddle_form(
-    law: Hencky, piezo: Piezo, u: Expr, v: Expr, eta: Expr, w: Expr, xi: Expr
-) -> Expr:
+def saddle_form(law: Hencky, piezo: Piezo, u: Expr, v: Expr, eta: Expr, w: Expr, xi: Expr) -> Expr:
     """Return the integrand of B(x; y, z): positive, not symmetric, equation (5.16).
 
     x = (u, .) is where the secant modulus is frozen, y = (v, eta) the unknown and
