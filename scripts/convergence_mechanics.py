@@ -149,7 +149,11 @@ def theorem_4_3(report: Report, coarse: bool) -> dict[str, Array]:
     cells, reference = ((4, 8), 32) if coarse else ((8, 16, 32), 128)
     variants = [
         Variant(
-            f"eps = {eps:g}", -0.005, 1, cells, reference,
+            f"eps = {eps:g}",
+            -0.005,
+            1,
+            cells,
+            reference,
             ("solver.method=penalty", f"solver.eps_contact={eps}"),
         )
         for eps in (1e-2, 1e-4)
@@ -280,9 +284,7 @@ def watched(iteration: Iteration, n: int) -> tuple[Array, float, float]:
     return np.array(distances[:-1]), DerivedFields(problem).largest_strain(), residual
 
 
-def _solver(
-    problem: ContactProblem, iteration: Iteration, keep: Monitor
-) -> FixedPoint | Penalty:
+def _solver(problem: ContactProblem, iteration: Iteration, keep: Monitor) -> FixedPoint | Penalty:
     tight = 1e-10
     if iteration.eps is not None:
         options_ = PenaltyOptions(iteration.eps, tolerance=tight, material_step="secant")
@@ -301,7 +303,11 @@ def fixed_points(report: Report, coarse: bool) -> dict[str, float]:
     columns: dict[str, list[object]] = {
         name: []
         for name in (
-            "iteration", "iterations", "observed rate", "max |dev eps|", "Kacanov's bound",
+            "iteration",
+            "iterations",
+            "observed rate",
+            "max |dev eps|",
+            "Kacanov's bound",
             "residual",
         )
     }
@@ -315,7 +321,12 @@ def fixed_points(report: Report, coarse: bool) -> dict[str, float]:
         rate = float((middle[-1] / middle[0]) ** (1 / max(len(middle) - 1, 1)))
         rates[iteration.label] = rate
         row = (
-            iteration.label, len(distances) + 1, rate, strain, secant_rate(strain), residual,
+            iteration.label,
+            len(distances) + 1,
+            rate,
+            strain,
+            secant_rate(strain),
+            residual,
         )
         for column, value in zip(columns.values(), row, strict=True):
             column.append(value)
