@@ -239,8 +239,16 @@ CYLINDERS = (
 def cylinders(report: Report, fineness: float) -> Mapping[tuple[object, ...], Solution]:
     """Make the table of cylinders; return its solutions by row. Collective."""
     names = (
-        "shape", "load", "mu", "direction", "b/h", "b/b_H (edge)", "b/b_H (moment)", "p_0/p_H",
-        "force error", "residual",
+        "shape",
+        "load",
+        "mu",
+        "direction",
+        "b/h",
+        "b/b_H (edge)",
+        "b/b_H (moment)",
+        "p_0/p_H",
+        "force error",
+        "residual",
     )
     columns: dict[str, list[object]] = {name: [] for name in names}
     solutions = {}
@@ -251,10 +259,16 @@ def cylinders(report: Report, fineness: float) -> Mapping[tuple[object, ...], So
         solution, found = run(case, part)
         solutions[load, mu, direction, shape] = solution
         row = (
-            shape, load, mu, direction, hertz.half_width / found.h,
-            found.edge / hertz.half_width, found.moment / hertz.half_width,
+            shape,
+            load,
+            mu,
+            direction,
+            hertz.half_width / found.h,
+            found.edge / hertz.half_width,
+            found.moment / hertz.half_width,
             found.peak / hertz.peak,
-            found.force_error, solution.outcome.kkt.largest,
+            found.force_error,
+            solution.outcome.kkt.largest,
         )
         for name, value in zip(names, row, strict=True):
             columns[name].append(value)
@@ -346,14 +360,20 @@ def approach(solution: Solution) -> float:
     return float(problem.comm.allreduce(-u[middle, 2].sum(), op=MPI.SUM))
 
 
-def spheres(
-    report: Report, levels: Sequence[tuple[float, int]]
-) -> dict[str, list[float]]:
+def spheres(report: Report, levels: Sequence[tuple[float, int]]) -> dict[str, list[float]]:
     """Make the table of spheres over (fineness, degree); return the ratios. Collective."""
     hertz = Sphere()
     names = (
-        "a/h wanted", "degree", "dofs", "a/a_H (moment)", "p_0/p_H (fit)",
-        "approach/Hertz's at depth R", "force error", "p_0/p_H (node)", "Newton steps", "residual",
+        "a/h wanted",
+        "degree",
+        "dofs",
+        "a/a_H (moment)",
+        "p_0/p_H (fit)",
+        "approach/Hertz's at depth R",
+        "force error",
+        "p_0/p_H (node)",
+        "Newton steps",
+        "residual",
     )
     columns: dict[str, list[object]] = {name: [] for name in names}
     ratios: dict[str, list[float]] = {"radius": [], "peak": [], "approach": [], "force": []}
@@ -367,8 +387,12 @@ def spheres(
             "force": found.force_error,
         }
         row = (
-            fineness, degree, space.dofmap.index_map.size_global * space.dofmap.index_map_bs,
-            *values.values(), found.peak / hertz.peak, len(solution.history.records),
+            fineness,
+            degree,
+            space.dofmap.index_map.size_global * space.dofmap.index_map_bs,
+            *values.values(),
+            found.peak / hertz.peak,
+            len(solution.history.records),
             solution.outcome.kkt.largest,
         )
         for name, value in zip(names, row, strict=True):
