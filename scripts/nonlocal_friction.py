@@ -35,8 +35,18 @@ def study(report: Report, n: int, load: float) -> dict[str, Solution]:
         Vertical traction f_2.
     """
     names = (
-        "radius", "Newton steps", "linear solves", "Algorithm 1: outer", "inner", "max pressure",
-        "contact force", "friction force", "stick", "slip", "u - u(0) in energy", "residual",
+        "radius",
+        "Newton steps",
+        "linear solves",
+        "Algorithm 1: outer",
+        "inner",
+        "max pressure",
+        "contact force",
+        "friction force",
+        "stick",
+        "slip",
+        "u - u(0) in energy",
+        "residual",
         "residual (Alg. 1)",
     )
     columns: dict[str, list[object]] = {name: [] for name in names}
@@ -56,11 +66,19 @@ def study(report: Report, n: int, load: float) -> dict[str, Solution]:
         records = uzawa.history.records
         force = solution.contact_force
         row = (
-            label, len(solution.history.records), solution.counters.linear_solves,
-            len(records), sum(r.inner for r in records),
-            solution.problem.trace.maximum(solution.pressure), -force[1], force[0],
-            int(np.count_nonzero(status == "stick")), int(np.count_nonzero(status == "slip")),
-            relative.energy, solution.outcome.kkt.largest, uzawa.outcome.kkt.largest,
+            label,
+            len(solution.history.records),
+            solution.counters.linear_solves,
+            len(records),
+            sum(r.inner for r in records),
+            solution.problem.trace.maximum(solution.pressure),
+            -force[1],
+            force[0],
+            int(np.count_nonzero(status == "stick")),
+            int(np.count_nonzero(status == "slip")),
+            relative.energy,
+            solution.outcome.kkt.largest,
+            uzawa.outcome.kkt.largest,
         )
         for name, value in zip(names, row, strict=True):
             columns[name].append(value)
@@ -104,8 +122,13 @@ def _draw(
     axes[0, 1].legend()
     axes[2, 0].set_xlabel("x along Gamma_3 (peaks cut off)")
     axes[2, 1].set_xlabel("x, the end that the load presses down")
-    report.figure(name, f"Pressure, bound and tangential stress over the radius of R: {where}",
-                  figure, data, note)
+    report.figure(
+        name,
+        f"Pressure, bound and tangential stress over the radius of R: {where}",
+        figure,
+        data,
+        note,
+    )
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
