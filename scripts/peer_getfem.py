@@ -78,9 +78,7 @@ def main() -> None:
         begin = time.perf_counter()
         problem.assembly()
         assembled = time.perf_counter()
-        steps, converged = problem.solve(
-            "max_res", 1e-10, "max_iter", 60, "lsolver", "mumps"
-        )
+        steps, converged = problem.solve("max_res", 1e-10, "max_iter", 60, "lsolver", "mumps")
         seconds = time.perf_counter() - assembled
         if not best or seconds < best["solve"]:
             u = problem.variable("u").reshape(-1, 2)
