@@ -74,9 +74,7 @@ class Report:
         self.out.mkdir(parents=True, exist_ok=True)
         figure.savefig(self.out / f"{name}.png", dpi=130, bbox_inches="tight")
         length = max(len(column) for column in data.values())
-        padded = {
-            key: [*column, *[""] * (length - len(column))] for key, column in data.items()
-        }
+        padded = {key: [*column, *[""] * (length - len(column))] for key, column in data.items()}
         self._csv(name, padded)
         self._fragment(name, caption, f"![{caption}]({name}.png)", note)
 
