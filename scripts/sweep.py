@@ -38,9 +38,7 @@ def _turned(force: tuple[float, float], degrees: float) -> list[float]:
     return [float(c * force[0] - s * force[1]), float(s * force[0] + c * force[1])]
 
 
-def _friction(
-    rng: np.random.Generator, slip_length: float, radius: float = 0.0
-) -> dict[str, Any]:
+def _friction(rng: np.random.Generator, slip_length: float, radius: float = 0.0) -> dict[str, Any]:
     """Draw mu from 0 to 1, constant or falling with the slip, rho from 0 to 6e7 a length."""
     mu = float(rng.choice([0.0, 0.1, 0.2, 0.4, 0.6, 0.8, 1.0]))
     if mu == 0.0:
