@@ -58,15 +58,29 @@ def table(report: Report, n: int) -> None:
     counts: dict[str, list[object]] = {
         name: []
         for name in (
-            "f2", "eps", "thesis", "(4.38)", "SNES", "residual then", "Algorithm 3 to 1e-8",
-            "with implicit end", "SNES then", "residual of (PV_eps)",
+            "f2",
+            "eps",
+            "thesis",
+            "(4.38)",
+            "SNES",
+            "residual then",
+            "Algorithm 3 to 1e-8",
+            "with implicit end",
+            "SNES then",
+            "residual of (PV_eps)",
         )
     }
     measured: dict[str, list[object]] = {
         name: []
         for name in (
-            "f2", "eps", "residual of (PV_eps)", "contact residual", "friction residual",
-            "u in L2", "u in energy", "p",
+            "f2",
+            "eps",
+            "residual of (PV_eps)",
+            "contact residual",
+            "friction residual",
+            "u in L2",
+            "u in energy",
+            "p",
         )
     }
     for load in LOADS:
@@ -80,12 +94,26 @@ def table(report: Report, n: int) -> None:
             honest = checked(penalty(problem, n, load, eps))
             error, kkt = distance(reference, x, honest), honest.outcome.kkt
             _append(
-                counts, load, eps, thesis, *_counts(stopped), stopped.outcome.kkt.equilibrium,
-                _counts(alone)[0], *_counts(honest), kkt.equilibrium,
+                counts,
+                load,
+                eps,
+                thesis,
+                *_counts(stopped),
+                stopped.outcome.kkt.equilibrium,
+                _counts(alone)[0],
+                *_counts(honest),
+                kkt.equilibrium,
             )
             _append(
-                measured, load, eps, kkt.equilibrium, kkt.contact, kkt.friction, error.l2,
-                error.energy, error.pressure,
+                measured,
+                load,
+                eps,
+                kkt.equilibrium,
+                kkt.contact,
+                kkt.friction,
+                error.l2,
+                error.energy,
+                error.pressure,
             )
     where = f"Example 7.2, rho = {RHO:g}, {4 * n} x {n} cells"
     report.table(
