@@ -73,9 +73,7 @@ class LayerColumn:
         if self.stress(high) - self.layer(high) > 0:
             u_n, regime = high, "rigid"
         else:
-            u_n = float(
-                brentq(lambda s: self.stress(s) - self.layer(s), -5.0, high, xtol=1e-15)
-            )
+            u_n = float(brentq(lambda s: self.stress(s) - self.layer(s), -5.0, high, xtol=1e-15))
             depth = u_n - self.touch
             saturated = float(self.p_nu.derivative(np.float64(depth))) == 0.0
             regime = "open" if depth <= 0 else "saturated" if saturated else "linear"
