@@ -29,8 +29,14 @@ def random_trace(n: int, dim: int, block_size: int, rng: np.random.Generator) ->
     normal /= np.linalg.norm(normal, axis=1)[:, None]
     tangent = np.eye(dim) - normal[:, :, None] * normal[:, None, :]
     return ContactTrace(
-        MPI.COMM_SELF, np.arange(n, dtype=np.int32), np.zeros((n, dim)), np.ones(n), normal,
-        tangent, rng.uniform(0.0, 0.4, n), block_size,
+        MPI.COMM_SELF,
+        np.arange(n, dtype=np.int32),
+        np.zeros((n, dim)),
+        np.ones(n),
+        normal,
+        tangent,
+        rng.uniform(0.0, 0.4, n),
+        block_size,
     )
 
 
