@@ -78,9 +78,7 @@ def test_plane_reduction_is_the_printed_law():
     phi = p * x[0] + q * x[1]
     plane = CRYSTAL.in_plane()
     d = [value(electric_displacement(plane, eps, phi)[i], square) for i in range(2)]
-    s = [
-        [value(coupling_stress(plane, phi)[i, j], square) for j in range(2)] for i in range(2)
-    ]
+    s = [[value(coupling_stress(plane, phi)[i, j], square) for j in range(2)] for i in range(2)]
     e31, e33, e15 = COUPLING["e31"], COUPLING["e33"], COUPLING["e15"]
     b11, b33 = PERMITTIVITY["beta11"], PERMITTIVITY["beta33"]
     assert d == pytest.approx([2 * e15 * c - b11 * p, e31 * a + e33 * b - b33 * q], rel=1e-13)
