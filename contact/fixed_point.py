@@ -47,6 +47,8 @@ class FixedPointOptions:
     material_step
         "secant" (Kacanov), "tangent" (Newton), or "auto": secant steps until the residual is
         below 1e-2, then tangent ones as long as they reduce it.
+    linear
+        Kind of linear solver, see `linear.LinearOperator`.
     """
 
     tolerance: float = 1e-8
@@ -59,6 +61,7 @@ class FixedPointOptions:
     single_loop: bool = False
     inner_tolerance: float | None = None
     material_step: str = "auto"
+    linear: str = "auto"
     max_outer: int = 200
     max_inner: int = 2000
 
@@ -83,7 +86,9 @@ class FixedPoint:
     def __post_init__(self) -> None:
         """Choose r and set up the operator."""
         self.r = self.options.r or automatic_r(self.problem)
-        self.operator = LinearOperator(self.problem, counters=self.counters)
+        self.operator = LinearOperator(
+            self.problem, counters=self.counters, kind=self.options.linear
+        )
         self.history = History(self.monitor)
         self.forces = Multipliers.zero(self.problem)
         thesis = self.options.stopping == "thesis"

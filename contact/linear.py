@@ -16,6 +16,7 @@ from petsc4py import PETSc
 
 from contact import linear_amg
 from contact.errors import InputError
+from contact.linear_block import BlockPreconditioner
 from contact.problem import ContactProblem
 from contact.projections import Array
 
@@ -66,7 +67,10 @@ class LinearOperator:
         self.ksp = PETSc.KSP().create(problem.comm)
         self.ksp.setOptionsPrefix(prefix)
         self.iterative = kind == "iterative" or (kind == "auto" and linear_amg.is_large(problem))
-        if self.iterative:
+        self._split: BlockPreconditioner | None = None
+        if self.iterative and problem.piezoelectric:
+            self._split = BlockPreconditioner(self.ksp, problem, symmetric)
+        elif self.iterative:
             self.matrix.setNearNullSpace(linear_amg.near_nullspace(problem))
             linear_amg.configure(self.ksp, problem, symmetric)
         else:
@@ -94,10 +98,10 @@ class LinearOperator:
             held = self.problem.held.block(self.problem.x.x.array)
             nodes = np.concatenate([nodes, self.problem.held.nodes])
             blocks = np.concatenate([blocks, held])
-        same = constant and form is self._form and self._blocks is not None
-        if same and self._all(np.array_equal(blocks, self._blocks)):
+        last, same = self._blocks, constant and form is self._form
+        if same and last is not None and self._all(np.array_equal(blocks, last)):
             return
-        if constant and form is self._form and self._bulk is not None:
+        if same and self._bulk is not None:
             self._bulk.copy(self.matrix, PETSc.Mat.Structure.SAME_NONZERO_PATTERN)
         else:
             self.matrix.zeroEntries()
@@ -109,7 +113,8 @@ class LinearOperator:
         self.matrix.assemble()
         self.matrix.setOption(PETSc.Mat.Option.SYMMETRIC, self._symmetric)
         self._form, self._blocks = form, blocks.copy()
-        self.ksp.setOperators(self.matrix)
+        split = self._split
+        self.ksp.setOperators(self.matrix, split.matrix(self.matrix) if split else self.matrix)
         self.ksp.setUp()
         self.counters.factorizations += 1
 
@@ -125,7 +130,9 @@ class LinearOperator:
             rows, nodes, masked, addv=PETSc.InsertMode.ADD_VALUES, rowmap=nodes
         )
 
-    def solve(self, rhs: Array, rtol: float | None = None) -> Array:
+    def solve(
+        self, rhs: Array, rtol: float | None = None, guess: Array | None = None
+    ) -> Array:
         """Solve with the owned part of a right-hand side; fixed unknowns stay 0. Collective.
 
         Parameters
@@ -134,6 +141,8 @@ class LinearOperator:
             Owned right-hand side.
         rtol
             Relative tolerance of an iterative solver; a direct one ignores it.
+        guess
+            Where an iterative solver starts, of the owned unknowns; zero by default.
 
         Raises
         ------
@@ -143,6 +152,10 @@ class LinearOperator:
         self._rhs.array[:] = np.where(self.problem.free.ravel(), rhs, 0.0)
         if rtol is not None:
             self.ksp.setTolerances(rtol=rtol)
+        if self.iterative:
+            self.ksp.setInitialGuessNonzero(guess is not None)
+            if guess is not None:
+                self._solution.array[:] = guess
         self.ksp.solve(self._rhs, self._solution)
         self.counters.linear_solves += 1
         self.counters.linear_iterations += self.ksp.getIterationNumber()

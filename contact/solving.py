@@ -53,6 +53,7 @@ def fixed_point(problem: ContactProblem, settings: Solver, monitor: Monitor | No
         single_loop=settings.single_loop,
         inner_tolerance=settings.inner_tolerance,
         material_step=settings.material_step,
+        linear=settings.linear,
         max_outer=settings.max_outer,
         max_inner=settings.max_inner,
     )

@@ -234,7 +234,7 @@ def block_relaxation(
         q = 2 * multiplier - z
         rhs = -step.residual
         trace.add(rhs, -trace.weight[:, None] * _vectors(problem, q + r * start))
-        increment = step.operator.solve(rhs)
+        increment = step.operator.solve(rhs, guess=increment)
         nodal = step.nodal + trace.values(increment)
         u = split(problem, nodal, step.friction)
         # q + r u is the force that the foundation exerted in this very solve.

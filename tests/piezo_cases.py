@@ -90,10 +90,11 @@ class Column:
         lagged: bool = False,
         perfect: bool = False,
         mu: float = 0.0,
+        cells: Sequence[int] | None = None,
     ) -> ContactProblem:
         """Return the column, turned together with its foundation and poling axis."""
         size = [2.0, self.height] if dim == 2 else [2.0, 1.0, self.height]
-        cells = [3, 5] if dim == 2 else [2, 2, 4]
+        cells = cells or ([3, 5] if dim == 2 else [2, 2, 4])
         make = rectangle if dim == 2 else box
         domain = make(comm, [0.0] * dim, size, cells, rotation=degrees)
         sides = ("left", "right", "front", "back")[: 2 * (dim - 1)]
