@@ -92,9 +92,7 @@ def study(report: Report, n: int, load: float) -> dict[str, Solution]:
         "positive on open nodes too, where friction acts by the letter of (1.37): this is "
         "the price of a law for which existence and uniqueness are proved. Radius 0 is what the "
         "thesis computes with, a positive radius what its theorems are about; a radius up to h "
-        "is no smoothing on the mesh. Newton's method leaves the coupling of neighbours by R out "
-        "of its derivative, and gives way to the block relaxation where that fails (linear "
-        "solves); Algorithm 1 does not notice the radius."
+        "is no smoothing on the mesh."
     )
     report.table(f"{name}-table", f"Smoothing radius of R: {where}", columns, note)
     if MPI.COMM_WORLD.rank == 0:
