@@ -91,6 +91,7 @@ class Newton:
         self.history = History(self.monitor)
         self.forces = Multipliers.zero(self.problem)
         self._status: NDArray[np.int8] | None = None
+        self._layer_pressure: Array | None = None  # after the last step; None: that of the iterate
         self._begin = 0.0
 
     @property
@@ -101,7 +102,7 @@ class Newton:
         """Iterate from zero displacement until convergence or the limit. Collective."""
         self.problem.reset()
         self.forces = Multipliers.zero(self.problem)
-        self._status = None
+        self._status = self._layer_pressure = None
         return self._solve()
 
     def solve_from(self, forces: Multipliers) -> Outcome:
@@ -110,6 +111,7 @@ class Newton:
         bound = bound_of(problem, nodal, forces)
         self.forces = forces
         self._status = node_status(problem, nodal, forces, bound, self.moduli.status)
+        self._layer_pressure = None
         return self._solve()
 
     def _solve(self) -> Outcome:
@@ -135,7 +137,7 @@ class Newton:
         try:
             return relaxed.solve()
         finally:
-            self.forces, self._status = relaxed.forces, None
+            self.forces, self._status, self._layer_pressure = relaxed.forces, None, None
 
     def _newton(self, note: str, frozen: Array | None = None, goal: float = 0.0) -> Outcome:
         """Iterate on the full problem, or on the one with a frozen friction bound.
@@ -196,7 +198,8 @@ class Newton:
         """Apply loads and prescribed displacements in steps, halved where they are too large."""
         problem, step, reached = self.problem, 0.25, 0.0
         problem.reset()
-        self.forces, self._status = Multipliers.zero(problem), None
+        self.forces = Multipliers.zero(problem)
+        self._status = self._layer_pressure = None
         outcome = None
         while reached < 1.0 and step > 1e-2:
             kept = problem.x.x.array.copy(), self.forces, self._status
@@ -209,37 +212,66 @@ class Newton:
                 reached = factor
                 continue
             problem.x.x.array[:], self.forces, self._status = kept
+            self._layer_pressure = None
             step /= 2
         problem.apply_load(1.0)
         assert outcome is not None
         return Outcome(outcome.converged, outcome.reason, evaluate(problem, self.forces))
 
-    def _step(self, tangent: bool, frozen: Array | None, residual: float) -> None:
+    def _step(self, tangent: bool, frozen: Array | None, reached: float) -> None:
         """Take one Newton step: one assembly, one factorisation, one solve."""
         problem, trace = self.problem, self.problem.trace
         nodal = nodal_iterate(problem)
         contact = linearise(problem, nodal, self.forces, self.moduli, self._status, frozen)
         blocks = contact.blocks
+        layer, shift = self._layer(nodal, contact.settled)
         if problem.response.active:
             pressure = total_pressure(problem, nodal, contact.forces)
-            full = contact.settled
-            response = problem.response.jacobian if full else problem.response.block
-            blocks = blocks + response(nodal, pressure)
+            response = problem.response
+            current = response.current_jacobian if contact.settled else response.current_block
+            blocks = blocks + layer + current(nodal, pressure)
         self.operator.update(
             problem.tangent if tangent else problem.secant,
             trace.weight[:, None, None] * blocks,
             constant=problem.linear_material,
         )
         # An iterative solver need not be more accurate than the step itself.
-        rtol = min(1e-3, max(1e-2 * residual, 1e-2 * self.options.tolerance))
-        increment = self.operator.solve(-residual_forces(problem, contact.forces), rtol)
+        rtol = min(1e-3, max(1e-2 * reached, 1e-2 * self.options.tolerance))
+        residual = residual_forces(problem, contact.forces)
+        trace.add(residual, (trace.weight * shift)[:, None] * trace.normal)
+        increment = self.operator.solve(-residual, rtol)
         problem.add(increment)
-        change = np.einsum("nij,nj->ni", contact.blocks, trace.values(increment))
+        moved = trace.values(increment)
+        change = np.einsum("nij,nj->ni", contact.blocks, moved)
         vectors = contact.forces.vectors(problem) + change[:, : problem.dim]
         self.forces = Multipliers(
             trace.normal_component(vectors), trace.tangential_component(vectors)
         )
         self._status = contact.status
+        pressed = trace.normal_component(np.einsum("nij,nj->ni", layer, moved))
+        self._layer_pressure = problem.response.layer_pressure(nodal) + shift + pressed
+
+    def _layer(self, nodal: Array, full: bool) -> tuple[Array, Array]:
+        """Linearise the layer; return its block, and how it differs from the layer's force.
+
+        It is linearised where the law is met from the pressure and the displacement of the
+        step before together, as the status of a contact node is found. Linearised about the
+        displacement alone, a layer stiffer than the body cycles between its regimes.
+        """
+        problem, c = self.problem, self.moduli.status
+        law = problem.response.normal_law(nodal)
+        if law is None:
+            none = np.zeros(nodal.shape[0])
+            return problem.response.layer_block(nodal, full), none
+        trace, response = problem.trace, problem.response
+        u_n, layer = trace.normal_component(nodal), response.layer_pressure(nodal)
+        known = layer if self._layer_pressure is None else self._layer_pressure
+        place = law.displacement(self.forces.pressure + known + c * u_n, c)
+        about = nodal.copy()
+        about[:, : problem.dim] += (place - u_n)[:, None] * trace.normal
+        block = response.layer_block(about, full)
+        back = trace.normal_component(np.einsum("nij,nj->ni", block, nodal - about))
+        return block, response.layer_pressure(about) + back - layer
 
     def _record(self, residuals: KKT, note: str, solves: int = 1) -> None:
         seconds = time.perf_counter() - self._begin

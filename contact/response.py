@@ -126,11 +126,15 @@ class NormalLaw:
         pressed = np.where(soft, self.layer(phi), z - r * phi)
         return np.where(free, 0.0, np.where(rigid, z - r * self.gap, pressed))
 
+    def displacement(self, z: Array, r: float) -> Array:
+        """Return the u_nu that goes with `pressure`."""
+        return (z - self.pressure(z, r)) / r
+
     def pressure_slope(self, z: Array, r: float) -> Array:
         """Return the derivative of `pressure` by z: 0 free, 1 rigid, between them in the layer."""
         high = np.minimum(self.gap, z / r)
         free, rigid = z <= r * self.touch, z - r * self.gap >= self.layer(high)
-        phi = (z - self.pressure(z, r)) / r
+        phi = self.displacement(z, r)
         slope = self.stiffness * self.p_nu.derivative(phi - self.touch)
         return np.where(free, 0.0, np.where(rigid, 1.0, slope / (slope + r)))
 
@@ -246,15 +250,30 @@ class FoundationResponse:
             total[:, -1] = self.phi_scale * growth
         return total
 
+    def layer_block(self, x: Array, full: bool) -> Array:
+        """Return the derivative of the layer's force, shape (n, block size, block size).
+
+        Without that of h_nu, which is not symmetric, unless `full`.
+        """
+        gradient = self.layer_gradient(x)
+        if not full:
+            gradient[:, self.trace.dim :] = 0.0
+        total = np.zeros((*gradient.shape, self.trace.block_size))
+        total[:, : self.trace.dim] = self.trace.normal[:, :, None] * gradient[:, None, :]
+        return total
+
     def jacobian(self, x: Array, pressure: Array) -> Array:
         """Return the full derivative of `force`, shape (n, block size, block size).
 
         Not symmetric where h_nu depends on the potential or psi on the gap. The contact flag
         of the perfect conductor is kept; at kinks a one-sided derivative is taken.
         """
+        return self.layer_block(x, True) + self.current_jacobian(x, pressure)
+
+    def current_jacobian(self, x: Array, pressure: Array) -> Array:
+        """Return the full derivative of the charge, shape (n, block size, block size)."""
         d, bs = self.trace.dim, self.trace.block_size
         total = np.zeros((x.shape[0], bs, bs))
-        total[:, :d, :] = self.trace.normal[:, :, None] * self.layer_gradient(x)[:, None, :]
         if self.conductor is not None:
             psi, difference = self.conductor.psi, self._difference(x)
             slope = self._conductivity(x, pressure) * self.conductor.phi_l.derivative(difference)
@@ -286,7 +305,5 @@ class FoundationResponse:
         """
         total = self.current_block(x, pressure)
         if self.layer is not None and not self.layer.lagged:
-            normal, d = self.trace.normal, self.trace.dim
-            outer = normal[:, :, None] * self.layer_gradient(x)[:, None, :d]
-            total[:, :d, :d] += outer
+            total += self.layer_block(x, False)
         return total

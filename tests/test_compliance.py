@@ -10,6 +10,8 @@ from compliance_cases import PIEZO_REGIMES, REGIMES, LayerColumn
 from helpers import solve
 from mpi4py import MPI
 
+from contact.fixed_point import FixedPoint
+from contact.newton import Newton, NewtonOptions
 from contact.response import Conductor, FoundationResponse, Layer
 from contact.state import nodal_iterate
 from contact.trace import ContactTrace
@@ -75,16 +77,20 @@ def test_block_is_the_symmetric_part_without_the_frozen_factors():
 
 def check_column(column: LayerColumn, dim: int = 2, degree: int = 1, **options) -> str:
     """Compare the fixed point with the exact solution; return the regime."""
-    u_n, potential, layer, rest, regime = column.solution()
     problem = column.problem(dim, degree)
-    loop = solve(problem, tolerance=1e-11, **options)
+    check_solution(column, solve(problem, tolerance=1e-11, **options))
+    return column.solution()[-1]
+
+
+def check_solution(column: LayerColumn, loop: FixedPoint | Newton) -> None:
+    u_n, potential, layer, rest, _ = column.solution()
+    problem = loop.problem
     nodal = nodal_iterate(problem)
     assert np.abs(problem.trace.normal_component(nodal) - u_n).max() < 1e-10
     assert np.abs(problem.response.layer_pressure(nodal) - layer).max() < 1e-10 * max(layer, 1)
     assert np.abs(loop.forces.pressure - rest).max() < 1e-10 * max(layer + rest, 1)
     if column.piezo:
         assert np.abs(problem.phi_scale * nodal[:, -1] - potential).max() < 1e-10
-    return regime
 
 
 @pytest.mark.parametrize("regime", REGIMES)
@@ -145,10 +151,24 @@ def test_laws_of_the_user(push, piezo):
     assert check_column(column) == {0.05: "open", 0.3: "linear", 2.0: "rigid"}[push]
 
 
+#: With the layer linearised about an iterate, each slope leads back to the other state.
+STIFF = LayerColumn(0.12, p_nu=Compliance(1e-4), h_nu=PotentialFactor(1e4))
+
+
 def test_a_stiff_column_does_not_cycle_between_open_and_saturated():
-    # With the layer linearised about an iterate, each slope leads back to the other state.
-    column = LayerColumn(0.12, p_nu=Compliance(1e-4), h_nu=PotentialFactor(1e4))
-    assert check_column(column) == "linear"
+    assert check_column(STIFF) == "linear"
+
+
+@pytest.mark.parametrize(
+    "column",
+    [*REGIMES.values(), *PIEZO_REGIMES.values(), STIFF, replace(STIFF, gap=np.inf)],
+    ids=[*REGIMES, *(f"piezo-{regime}" for regime in PIEZO_REGIMES), "stiff", "endless"],
+)
+def test_newton_on_columns(column):
+    newton = Newton(column.problem(), NewtonOptions(tolerance=1e-11))
+    assert newton.solve().converged
+    assert newton.counters.linear_solves <= 8
+    check_solution(column, newton)
 
 
 @pytest.mark.parametrize("regime", ["linear", "saturated", "rigid"])
