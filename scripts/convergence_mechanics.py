@@ -5,11 +5,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from exact_solutions import Singular, exact, manufactured
+from matplotlib.figure import Figure
+from matplotlib.ticker import NullFormatter
 from reporting import Report, bar, iterate, observed_orders, options, solved, subplots
 
 from contact import InputError, build_problem
@@ -90,9 +93,8 @@ def mesh_series(
     for norm in NORMS:
         columns |= {norm: [], f"order ({norm})": []}
     columns["residual"] = []
-    figure, axes = subplots(1, 3, size=(7.2, 3.2))
     results = {}
-    for variant, marker in zip(variants, "os^v", strict=False):
+    for variant in variants:
         found, residuals = measure(variant)
         results[variant.label] = found
         h = 1 / np.array(variant.cells)
@@ -103,17 +105,30 @@ def mesh_series(
         for k, norm in enumerate(NORMS):
             columns[norm] += found[:, k].tolist()
             columns[f"order ({norm})"] += observed_orders(h, found[:, k])
-            axes[k].loglog(h, found[:, k], f"{marker}-", ms=3, label=variant.label)
-    for k, norm in enumerate(NORMS):
-        power = 2 if norm == "L2" else 1
-        ends = np.array([axes[k].dataLim.x0, axes[k].dataLim.x1])
-        low = axes[k].dataLim.y0
-        axes[k].loglog(ends, 0.7 * low * (ends / ends[0]) ** power, "k:", label=f"h^{power}")
-        axes[k].set(title=f"relative error in {norm}", xlabel="h")
-    axes[0].legend(fontsize=6)
     report.table(f"{name}-table", caption, columns, note)
-    report.figure(name, caption, figure, columns, note)
+    report.figure(name, caption, draw_series(columns), columns, note)
     return results
+
+
+def draw_series(columns: Mapping[str, Sequence[Any]]) -> Figure:
+    """Draw the errors of a table of `mesh_series` over h."""
+    figure, axes = subplots(1, 3, size=(7.2, 3.2))
+    problems, cells = np.array(columns["problem"]), np.array(columns["1/h"], dtype=int)
+    for label, marker in zip(dict.fromkeys(columns["problem"]), "os^v", strict=False):
+        own = problems == label
+        for ax, norm in zip(axes, NORMS, strict=True):
+            values = np.array(columns[norm], dtype=float)[own]
+            ax.loglog(1 / cells[own], values, f"{marker}-", ms=3, label=label)
+    for ax, norm in zip(axes, NORMS, strict=True):
+        power = 2 if norm == "L2" else 1
+        ends, low = np.array([1 / cells.max(), 1 / cells.min()]), ax.dataLim.y0
+        ax.loglog(ends, 0.7 * low * (ends / ends[0]) ** power, "k:", label=f"slope {power}")
+        ax.set(title=f"relative error in {norm}", xlabel="h")
+        shown = np.unique(cells)[::-1]
+        ax.set_xticks(1 / shown, [f"1/{n}" for n in shown])
+        ax.xaxis.set_minor_formatter(NullFormatter())
+        ax.legend(fontsize=6)
+    return figure
 
 
 def figure_7_6(report: Report, coarse: bool) -> dict[str, Array]:
