@@ -6,17 +6,24 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
+import ufl
 from compliance_cases import PIEZO_REGIMES, REGIMES, LayerColumn
-from helpers import solve
+from dolfinx import fem
+from helpers import affine_vector, flat, leaning_block, solve
 from mpi4py import MPI
 
+from contact.domain import box, rectangle
 from contact.fixed_point import FixedPoint
 from contact.newton import Newton, NewtonOptions
+from contact.problem import Body, Contact, ContactProblem, Fixed, Friction
 from contact.response import Conductor, FoundationResponse, Layer
 from contact.state import nodal_iterate
 from contact.trace import ContactTrace
+from forms.foundation import compliance
+from forms.hencky import Linear
 from forms.laws import (
     Compliance,
+    ConstantCoefficient,
     PotentialFactor,
     RampConductivity,
     ShiftedConductivity,
@@ -179,3 +186,87 @@ def test_lagged_layer_reaches_the_same_solution(regime):
     for piezo in (False, True):
         column = LayerColumn(pushes[regime], piezo, h_nu=h_nu, p_nu=Compliance(0.06))
         assert check_column(replace(column, lagged=True)) == regime
+
+
+@pytest.mark.parametrize("dim", [2, 3])
+@pytest.mark.parametrize(("c_nu", "rigid"), [(0.4, False), (0.2, True)])
+def test_friction_bound_takes_the_layer_and_the_rigid_part_together(dim, c_nu, rigid):
+    # Closed form 1, pressed into a layer: u = (s + gamma y, -depth - a y).
+    squeeze, push, mu, depth = 0.01, 0.03, 0.5, 0.05
+    law = Linear(1.0, 0.3)
+    pressure = (law.bulk + 4 * law.shear / 3) * squeeze
+    slip = push - mu * pressure / law.shear
+    gradient, offset = np.zeros((dim, dim)), np.zeros(dim)
+    gradient[0, -1], gradient[-1, -1] = push - slip, -squeeze
+    offset[0], offset[-1] = slip, -depth
+    imposed = affine_vector(gradient, offset)
+    sides = ["left", "right", "top"] + ["front", "back"] * (dim == 3)
+    if dim == 2:
+        domain = rectangle(MPI.COMM_WORLD, [0.0, 0.0], [1.0, 1.0], [4, 3])
+    else:
+        domain = box(MPI.COMM_WORLD, [0.0] * 3, [1.0] * 3, [3, 3, 2])
+    # The layer takes all of the pressure, or a part of it and the rigid part the rest.
+    share = pressure * (0.3 if rigid else 1.0)
+    gap = depth if rigid else depth + 0.01
+    touch = depth - share / c_nu
+    layer = Layer(gap - touch, Compliance(np.inf), PotentialFactor(c_nu))
+    problem = ContactProblem(
+        domain,
+        Body(law, [Fixed(side, imposed) for side in sides]),
+        Contact("bottom", flat(gap), layer),
+        Friction(ConstantCoefficient(mu)),
+    )
+    loop = solve(problem, tolerance=1e-11)
+    nodal = nodal_iterate(problem)
+    assert problem.trace.size > 0
+    assert np.abs(problem.trace.normal_component(nodal) - depth).max() < 1e-10
+    assert np.abs(problem.response.layer_pressure(nodal) - share).max() < 1e-10
+    assert np.abs(loop.forces.pressure - (pressure - share)).max() < 1e-10
+    assert np.abs(loop.forces.friction[:, 0] - mu * pressure).max() < 1e-10
+    assert np.abs(nodal[:, 0] - slip).max() < 1e-10
+
+
+def test_the_form_j_1_is_the_nodal_force():
+    column = PIEZO_REGIMES["linear"]
+    problem = column.problem()
+    solve(problem)
+    test = ufl.TestFunction(problem.space)
+    u, phi = problem.parts_of(problem.x)
+    v, _ = problem.parts_of(test)
+    nu = ufl.FacetNormal(problem.domain.mesh)
+    ds = problem.domain.ds("bottom")(metadata={"quadrature_rule": "vertex", "quadrature_degree": 1})
+    form = compliance(u, v, nu, column.p_nu, column.h_nu, column.touch, phi - column.phi_f)
+    vector = fem.assemble_vector(fem.form(form * ds)).array
+    nodal = np.zeros_like(vector)
+    pressure = problem.response.layer_pressure(nodal_iterate(problem))
+    trace = problem.trace
+    trace.add(nodal, (trace.weight * pressure)[:, None] * trace.normal)
+    assert np.abs(nodal).max() > 1.0
+    assert np.abs(vector - nodal).max() < 1e-12
+
+
+@pytest.mark.parallel
+def test_ranks_agree_on_a_layer_in_space(comm):
+    # Held at the left, pressed and pushed on top, on a layer with a rigid part behind.
+    def problem(comm):
+        bare = leaning_block(comm, 3)
+        layer = Layer(0.004, Compliance(0.003), PotentialFactor(4.0))
+        contact = replace(bare.contact, foundation=flat(0.005), layer=layer)
+        return ContactProblem(bare.domain, bare.body, contact, bare.friction)
+
+    found = []
+    for ranks in (comm, MPI.COMM_SELF):
+        loop = solve(problem(ranks), tolerance=1e-11)
+        nodal, trace = nodal_iterate(loop.problem), loop.problem.trace
+        layer = loop.problem.response.layer_pressure(nodal)
+        found.append(
+            [
+                trace.maximum(np.linalg.norm(nodal, axis=1)),
+                trace.sum(layer),
+                trace.sum(loop.forces.pressure),
+                *(trace.sum(column) for column in loop.forces.friction.T),
+            ]
+        )
+    shared, alone = np.array(found)
+    assert np.all(alone[:3] > 0)
+    assert np.abs(shared - alone).max() < 1e-8 * np.abs(alone).max()
