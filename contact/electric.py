@@ -39,12 +39,16 @@ class ChargeBalance:
         Charge that passes through the contact part.
     body
         Prescribed volume charge: the sum of all the others, by Gauss's law.
+    magnitude
+        The sum of the absolute nodal charges: with an insulator and one electrode all parts
+        are neutral, though not free of charge everywhere.
     """
 
     electrodes: Mapping[str, float]
     given: Mapping[str, float]
     foundation: float
     body: float
+    magnitude: float
 
     @property
     def total(self) -> float:
@@ -53,15 +57,9 @@ class ChargeBalance:
         return surface - self.body
 
     @property
-    def scale(self) -> float:
-        """The sum of the absolute charges."""
-        parts = [*self.electrodes.values(), *self.given.values(), self.foundation, self.body]
-        return float(np.abs(parts).sum())
-
-    @property
     def imbalance(self) -> float:
-        """|total| / scale, or 0 without charges."""
-        return abs(self.total) / self.scale if self.scale > 0 else 0.0
+        """|total| / magnitude, or 0 without charges."""
+        return abs(self.total) / self.magnitude if self.magnitude > 0 else 0.0
 
 
 @dataclass(frozen=True)
@@ -119,6 +117,7 @@ def charge_balance(problem: ContactProblem, forces: Multipliers) -> ChargeBalanc
     d, bs = problem.dim, problem.block_size
     residual = residual_forces(problem, forces) / problem.phi_scale
     electrodes: dict[str, float] = {}
+    magnitude = 0.0
     taken = np.zeros(problem.owned, dtype=bool)
     for fixed in problem.body.fixed:
         if fixed.potential is None:
@@ -128,6 +127,7 @@ def charge_balance(problem: ContactProblem, forces: Multipliers) -> ChargeBalanc
         taken[new] = True
         charge = electrodes.get(fixed.on, 0.0) + _sum(problem, residual[new])
         electrodes[fixed.on] = charge
+        magnitude += _sum(problem, np.abs(residual[new]))
     given: dict[str, float] = {}
     body = 0.0
     x, test = ufl.SpatialCoordinate(problem.domain.mesh), ufl.TestFunction(problem.space)
@@ -138,22 +138,27 @@ def charge_balance(problem: ContactProblem, forces: Multipliers) -> ChargeBalanc
         density = problem.expression(load.charge, x)
         vector = fem.assemble_vector(fem.form(density * test[d] * measure))
         vector.scatter_reverse(InsertMode.add)
-        charge = _sum(problem, vector.array[: problem.owned].reshape(-1, bs)[:, d])
+        nodal = vector.array[: problem.owned].reshape(-1, bs)[:, d]
+        charge = _sum(problem, nodal)
+        magnitude += _sum(problem, np.abs(nodal))
         if load.on is None:
             body += charge
         else:
             given[load.on] = given.get(load.on, 0.0) + charge
-    return ChargeBalance(electrodes, given, _foundation_charge(problem, forces), body)
+    passed = _foundation_charges(problem, forces)
+    magnitude += _sum(problem, np.abs(passed))
+    return ChargeBalance(electrodes, given, _sum(problem, passed), body, magnitude)
 
 
-def _foundation_charge(problem: ContactProblem, forces: Multipliers) -> float:
+def _foundation_charges(problem: ContactProblem, forces: Multipliers) -> Array:
+    """Return the charges that pass through the owned nodes of the contact part."""
     nodal = nodal_iterate(problem)
     density = problem.response.charge(nodal, total_pressure(problem, nodal, forces))
-    charge = problem.trace.weight * density
-    total = _sum(problem, charge)
-    if problem.held is not None:
-        total += _sum(problem, problem.held.weight * problem.held.charge(problem.x.x.array))
-    return total
+    charges = problem.trace.weight * density
+    if problem.held is None:
+        return charges
+    held = problem.held.weight * problem.held.charge(problem.x.x.array)
+    return np.concatenate([charges, held])
 
 
 def force_balance(problem: ContactProblem, forces: Multipliers) -> ForceBalance:

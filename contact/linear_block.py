@@ -33,9 +33,11 @@ MECHANICAL = {
 ELECTRIC = {
     "pc_type": "gamg",
     "pc_gamg_agg_nsmooths": "1",
+    "pc_gamg_aggressive_coarsening": "0",
     "pc_mg_cycle_type": "w",
-    "mg_levels_ksp_max_it": "3",
-    "mg_levels_pc_type": "jacobi",
+    "mg_levels_ksp_type": "chebyshev",
+    "mg_levels_ksp_max_it": "2",
+    "mg_levels_pc_type": "sor",
 }
 
 #: Relative tolerance of a linear solve, in the norm of the preconditioner.
