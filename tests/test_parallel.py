@@ -6,6 +6,7 @@ from dolfinx import fem, graph, mesh
 from helpers import bar, constant, contact_data, flat, leaning_block, pressed_block, solve
 from mpi4py import MPI
 
+from contact._compat import geometry_dofmap
 from contact.domain import Piece, from_mesh, rectangle
 from contact.problem import Body, Contact, ContactProblem, Fixed, Friction, Load
 from contact.smoothing import Smoothing
@@ -100,14 +101,14 @@ def on_one_rank(comm):
     whole = mesh.create_unit_square(MPI.COMM_SELF, 4, 4)
     cells, x = np.empty((0, 3), np.int64), np.empty((0, 2))
     if comm.rank == 0:
-        cells, x = whole.geometry.dofmap.astype(np.int64), whole.geometry.x[:, :2].copy()
+        cells, x = geometry_dofmap(whole).astype(np.int64), whole.geometry.x[:, :2].copy()
 
     def partitioner(_comm, _parts, _types, cells):
         size = len(cells[0]) // 3
         return adjacency(np.zeros((size, 1), dtype=np.int32))
 
     element = whole.ufl_domain().ufl_coordinate_element()
-    return mesh.create_mesh(comm, cells, x, element, partitioner)
+    return mesh.create_mesh(comm, cells, x=x, e=element, partitioner=partitioner)
 
 
 def adjacency(links):
