@@ -10,7 +10,8 @@ import matplotlib
 from matplotlib.figure import Figure
 
 from contact.plots_contact import draw_line, draw_surface
-from contact.plots_fields import Picture, draw_plane, draw_space, picture
+from contact.plots_fields import Picture, draw_plane, picture
+from contact.plots_space import draw_space
 from contact.solution import Solution
 from contact.table import contact_table
 

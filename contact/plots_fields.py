@@ -1,18 +1,14 @@
-"""The deformed body, coloured: triangles in the plane, the surface in space."""
+"""The deformed body, coloured: what is drawn of it, and the drawing of plane bodies."""
 
 from __future__ import annotations
 
-import logging
-import os
 from dataclasses import dataclass
 from typing import Any, TypeAlias
 
 import numpy as np
 from dolfinx import mesh as dmesh
 from matplotlib.axes import Axes
-from matplotlib.cm import ScalarMappable
 from matplotlib.collections import LineCollection, PolyCollection
-from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 from mpi4py import MPI
 from numpy.typing import NDArray
@@ -25,8 +21,6 @@ from contact.plots_contact import BLUE
 from contact.projections import Array
 from contact.solution import Solution
 from contact.table import Table
-
-logger = logging.getLogger("contact.plots")
 
 Indices: TypeAlias = NDArray[np.integer[Any]]
 
@@ -221,7 +215,7 @@ def draw_plane(picture: Picture, table: Table, title: str = "") -> Figure:
     ax.autoscale_view()
     ax.set_xlabel("$x$ (mesh units)")
     ax.set_ylabel("$y$ (mesh units)")
-    ax.set_title(_with_scale(title, picture.scale), fontsize=9)
+    ax.set_title(with_scale(title, picture.scale), fontsize=9)
     return figure
 
 
@@ -236,50 +230,7 @@ def _foundation(ax: Axes, table: Table, scale: float) -> None:
     ax.fill(*band.T, facecolor="none", edgecolor=BLUE, hatch="////", lw=0)
 
 
-def draw_space(picture: Picture, title: str = "") -> Figure | None:
-    """Draw the surface of a body in space, from above and from below, with pyvista."""
-    try:
-        import pyvista
-    except ImportError:
-        logger.warning("the deformed body is not drawn: pyvista is missing")
-        return None
-    if not os.environ.get("DISPLAY"):
-        pyvista.start_xvfb()
-    drawn = (picture.corners + picture.scale * picture.displacement).reshape(-1, 3)
-    corners = np.arange(len(drawn)).reshape(-1, 3)
-    faces = np.column_stack([np.full(len(corners), 3), corners])
-    surface = pyvista.PolyData(drawn, faces.ravel())
-    place = surface.cell_data if picture.values.ndim == 1 else surface.point_data
-    place["values"] = picture.values.ravel()
-    figure = Figure(figsize=(6.3, 3.3))
-    norm = Normalize(picture.values.min(), picture.values.max())
-    axes = figure.subplots(1, 2)
-    for ax, name, height in zip(axes, ("from above", "from below"), (0.8, -0.8), strict=True):
-        plotter = pyvista.Plotter(off_screen=True, window_size=(1000, 900))
-        plotter.set_background("white")
-        plotter.add_mesh(
-            surface,
-            scalars="values",
-            cmap="viridis",
-            clim=[norm.vmin, norm.vmax],
-            show_edges=len(faces) < 5000,
-            line_width=0.5,
-            ambient=0.5,
-            diffuse=0.5,
-            show_scalar_bar=False,
-        )
-        plotter.add_axes()
-        plotter.view_vector((1.0, -1.6, height))
-        ax.imshow(plotter.screenshot(return_img=True))
-        plotter.close()
-        ax.set_title(name, fontsize=9)
-        ax.axis("off")
-    colours = ScalarMappable(norm, "viridis")
-    figure.colorbar(colours, ax=axes, location="bottom", label=picture.label, aspect=40, shrink=0.8)
-    figure.suptitle(_with_scale(title, picture.scale), fontsize=10)
-    return figure
-
-
-def _with_scale(title: str, scale: float) -> str:
+def with_scale(title: str, scale: float) -> str:
+    """Return a title that says by what displacements are multiplied."""
     times = rf"displacements $\times$ {scale:g}" if scale != 1 else "displacements to scale"
     return f"{title} ({times})" if title else times

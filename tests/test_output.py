@@ -3,6 +3,7 @@
 import csv
 import json
 import os
+import signal
 from pathlib import Path
 
 import numpy as np
@@ -15,6 +16,7 @@ from contact.case_solver import Output
 from contact.fields import DerivedFields
 from contact.kkt import evaluate
 from contact.output import write_outputs
+from contact.report import Record
 from contact.solution import Solution
 from contact.solving import solve
 from contact.table import contact_table, csv_columns, tangent_of
@@ -259,3 +261,21 @@ def test_figures(dim: int, shared_tmp_path: Path) -> None:
         "figure-potential.png",
     ]
     assert all(file.stat().st_size > 10_000 for file in files)
+
+
+@pytest.mark.parallel
+def test_interrupted_solve_keeps_its_results(shared_tmp_path: Path) -> None:
+    """A signal on one rank ends the solve on all of them, and what was computed is written."""
+    handler = signal.getsignal(signal.SIGINT)
+
+    def press(record: Record) -> None:
+        if record.iteration == 1 and MPI.COMM_WORLD.rank == 0:
+            signal.raise_signal(signal.SIGINT)
+
+    solution = solve(block(2, solver={"method": "uzawa"}), monitor=press)
+    assert not solution.converged
+    assert solution.history.records[-1].iteration == 1
+    summary, rows = written(solution, shared_tmp_path)
+    assert summary["reason"] == "interrupted (SIGINT)"
+    assert len(rows) == 9
+    assert signal.getsignal(signal.SIGINT) is handler
