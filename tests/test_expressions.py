@@ -1,8 +1,8 @@
 """Formulas: NumPy and UFL agree with each other, and nothing else than formulas is let in."""
 
 import math
-from functools import reduce
 import pickle
+from functools import reduce
 
 import basix.ufl
 import numpy as np
