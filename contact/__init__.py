@@ -9,6 +9,7 @@ initialise PETSc with its own arguments.
 
 from __future__ import annotations
 
+import os
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
@@ -43,6 +44,10 @@ __all__ = [
     "solve_problem",
     "write_outputs",
 ]
+
+# Open MPI reads this as it starts, where nothing has started it before. With its default choice
+# MPI_Dist_graph_create, by which checkpoints are read, may hang (open-mpi/ompi issue 13918).
+os.environ.setdefault("OMPI_MCA_topo", "basic")
 
 
 def __getattr__(name: str) -> Any:

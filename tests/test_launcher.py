@@ -141,13 +141,14 @@ def test_runs_directly_where_fenicsx_is(launcher):
 
 def test_threads_under_mpi_only_where_the_user_set_none(launcher):
     launcher.fake("python3")
-    launcher.fake("mpirun", 'echo "$OMP_NUM_THREADS $PRTE_MCA_rmaps_default_mapping_policy"')
+    variables = "$OMP_NUM_THREADS $PRTE_MCA_rmaps_default_mapping_policy $OMPI_MCA_topo"
+    launcher.fake("mpirun", f'echo "{variables}"')
     launcher.fakes.joinpath("mpirun").write_text(
         launcher.fakes.joinpath("mpirun").read_text()
         + "[[ $1 != --version ]] || echo 'mpirun (Open MPI) 5.0.7'\n"
     )
-    assert launcher.run("mpirun", "-n", "3")[1] == "1 :oversubscribe\n"
-    assert launcher.run("mpirun", "-n", "3", OMP_NUM_THREADS="2")[1] == "2 :oversubscribe\n"
+    assert launcher.run("mpirun", "-n", "3")[1] == "1 :oversubscribe basic\n"
+    assert launcher.run("mpirun", "-n", "3", OMP_NUM_THREADS="2")[1] == "2 :oversubscribe basic\n"
     assert launcher.run("sh", "-c", "echo ${OMP_NUM_THREADS-unset}")[1] == "unset\n"
 
 
