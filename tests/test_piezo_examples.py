@@ -1,5 +1,7 @@
 """Examples 8.1 and 8.2: independent values, the series, ranks, the iterative solver."""
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 from mpi4py import MPI
@@ -87,7 +89,7 @@ def test_potential_grows_with_phi_f_and_k_e():
             solve(problem)
             order = np.argsort(problem.trace.points[:, 0])
             curves.append(potential(problem)[order][4:])
-        for low, high in zip(curves, curves[1:], strict=False):
+        for low, high in pairwise(curves):
             assert np.all(high > low)
 
 
