@@ -128,7 +128,7 @@ class NormalLaw:
 
     def displacement(self, z: Array, r: float) -> Array:
         """Return the u_nu that goes with `pressure`."""
-        return (z - self.pressure(z, r)) / r
+        return np.asarray((z - self.pressure(z, r)) / r, dtype=float)
 
     def pressure_slope(self, z: Array, r: float) -> Array:
         """Return the derivative of `pressure` by z: 0 free, 1 rigid, between them in the layer."""
