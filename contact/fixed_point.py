@@ -27,6 +27,9 @@ from contact.uzawa import (
     block_relaxation,
 )
 
+#: Residual below which frozen coefficients give way to their derivatives.
+NEAR = 1e-2
+
 
 @dataclass(frozen=True)
 class FixedPointOptions:
@@ -93,6 +96,7 @@ class FixedPoint:
         self.forces = Multipliers.zero(self.problem)
         thesis = self.options.stopping == "thesis"
         inner = self.options.inner_tolerance or self.options.tolerance / 10
+        self._followed = np.inf  # residual before the last step that followed psi
         self._relaxation = Relaxation(
             self.r,
             inner,
@@ -138,7 +142,7 @@ class FixedPoint:
                 return Outcome(False, "the iteration diverged", residuals)
             if options.material_step == "auto" and not problem.linear_material:
                 # Far from the solution the tangent is too soft and overshoots.
-                tangent = residuals.largest < (1e-2 if not tangent else 2 * best)
+                tangent = residuals.largest < (NEAR if not tangent else 2 * best)
             since = 0 if residuals.largest < 0.9 * best else since + 1
             best = min(best, residuals.largest)
             if since >= 25 and options.stopping == "residual":
@@ -156,7 +160,7 @@ class FixedPoint:
         if problem.response.active:
             pressure = total_pressure(problem, nodal, self.forces)
             weight = problem.trace.weight[:, None, None]
-            blocks = blocks + weight * problem.response.current_block(nodal, pressure)
+            blocks = blocks + weight * self._current_block(nodal, pressure)
         self.operator.update(form, blocks, constant=problem.linear_material)
         residual = self._base_residual(nodal)
         law = problem.response.normal_law(nodal)
@@ -165,6 +169,23 @@ class FixedPoint:
         problem.add(result.increment)
         self.forces = result.forces
         return result.iterations, result.z
+
+    def _current_block(self, nodal: Array, pressure: Array) -> Array:
+        """Linearise the charge: near the solution with psi, which depends on the gap.
+
+        Frozen, a steep ramp costs many iterations there; followed from afar, it overshoots.
+        """
+        response, records = self.problem.response, self.history.records
+        residual = records[-1].kkt.largest if records else np.inf
+        # Where the residual has grown, psi is frozen again until it has fallen below.
+        if not response.follows_gap or residual > min(NEAR, self._followed):
+            return response.current_block(nodal, pressure)
+        self._followed = residual
+        if self.operator.symmetric:
+            self.operator = LinearOperator(
+                self.problem, symmetric=False, counters=self.counters, kind=self.options.linear
+            )
+        return response.current_jacobian(nodal, pressure)
 
     def _base_residual(self, nodal: Array) -> Array:
         """Return the residual without multipliers: they are the unknowns of the relaxation.

@@ -58,7 +58,7 @@ class LinearOperator:
     ) -> None:
         self.problem = problem
         self.counters = counters or Counters()
-        self._symmetric = symmetric
+        self.symmetric = symmetric
         self.matrix = create_matrix(problem.secant)
         self._form: fem.Form | None = None
         self._blocks: Array | None = None
@@ -111,7 +111,7 @@ class LinearOperator:
                 self._bulk = self.matrix.copy()
         self._add(nodes, blocks)
         self.matrix.assemble()
-        self.matrix.setOption(PETSc.Mat.Option.SYMMETRIC, self._symmetric)
+        self.matrix.setOption(PETSc.Mat.Option.SYMMETRIC, self.symmetric)
         self._form, self._blocks = form, blocks.copy()
         split = self._split
         self.ksp.setOperators(self.matrix, split.matrix(self.matrix) if split else self.matrix)

@@ -158,6 +158,14 @@ class FoundationResponse:
         return self.layer is not None or self.conductor is not None
 
     @property
+    def follows_gap(self) -> bool:
+        """Whether the charge is implicit and depends smoothly on the gap."""
+        conductor = self.conductor
+        if conductor is None or conductor.lagged:
+            return False
+        return not isinstance(conductor.psi, PerfectConductivity) and conductor.psi.k_e > 0
+
+    @property
     def constrained_trace(self) -> ContactTrace:
         """The contact nodes with the gap of the unilateral constraint: infinite without one."""
         if self.layer is None or np.isfinite(self.layer.thickness):
