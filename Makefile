@@ -1,7 +1,7 @@
 # Every target works on a fresh machine: scripts/fx finds FEniCSx or makes a place for it, once.
 FX := scripts/fx
 # a test that hangs on some ranks is ended, and fails
-MPI_TESTS = timeout --foreground 600 $(FX) mpirun -n $(1) \
+MPI_TESTS = timeout --foreground 1200 $(FX) mpirun -n $(1) \
 	python3 -m mpi4py -m pytest tests -m parallel -q --color=no -p no:cacheprovider
 
 .PHONY: help demo test test-serial lint format clean
