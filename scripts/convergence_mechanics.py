@@ -106,7 +106,7 @@ def mesh_series(
             columns[norm] += found[:, k].tolist()
             columns[f"order ({norm})"] += observed_orders(h, found[:, k])
     report.table(f"{name}-table", caption, columns, note)
-    report.figure(name, caption, draw_series(columns), columns, note)
+    report.figure(name, caption, draw_series(columns), columns)
     return results
 
 
@@ -362,7 +362,7 @@ def fixed_points(report: Report, coarse: bool) -> dict[str, float]:
     )
     caption = "Theorems 3.2 and 4.5: errors of the fixed points per iteration, Example 7.2"
     report.table("fixed-point-rates", caption, columns, note)
-    report.figure("fixed-point-errors", caption, figure, data, note)
+    report.figure("fixed-point-errors", caption, figure, data)
     return rates
 
 

@@ -202,7 +202,7 @@ def study(report: Report, n: int, values: Sequence[float] = SMALL) -> dict[str, 
     )
     caption = "Penalty error against eps on Example 7.2, f2 = -0.005 (Theorem 4.2)"
     report.table("theorem-4-2-table", caption, columns, note)
-    report.figure("theorem-4-2", caption, figure, columns, note)
+    report.figure("theorem-4-2", caption, figure, columns)
     return found
 
 
