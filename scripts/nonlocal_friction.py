@@ -96,13 +96,11 @@ def study(report: Report, n: int, load: float) -> dict[str, Solution]:
     )
     report.table(f"{name}-table", f"Smoothing radius of R: {where}", columns, note)
     if MPI.COMM_WORLD.rank == 0:
-        _draw(report, name, where, tables, note)
+        _draw(report, name, where, tables)
     return solutions
 
 
-def _draw(
-    report: Report, name: str, where: str, tables: dict[str, Table | None], note: str
-) -> None:
+def _draw(report: Report, name: str, where: str, tables: dict[str, Table | None]) -> None:
     figure, axes = subplots(3, 2, size=(7.2, 6.6), sharex="col")
     data: dict[str, Sequence[float]] = {}
     for label, table in tables.items():
@@ -120,13 +118,8 @@ def _draw(
     axes[0, 1].legend()
     axes[2, 0].set_xlabel("x along Gamma_3 (peaks cut off)")
     axes[2, 1].set_xlabel("x, the end that the load presses down")
-    report.figure(
-        name,
-        f"Pressure, bound and tangential stress over the radius of R: {where}",
-        figure,
-        data,
-        note,
-    )
+    caption = f"Pressure, bound and tangential stress over the radius of R: {where}"
+    report.figure(name, caption, figure, data)
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
