@@ -135,7 +135,7 @@ def figure_8_7(report: Report, coarse: bool) -> dict[str, Array]:
         scale = measure(reference.x)
         for n in cells:
             other = carry(solution_of(name, (n, n // 2)).problem.x, reference.space)
-            other.x.array[:] -= reference.x.array
+            other.x.array[:] -= reference.x.x.array
             rows.append(measure(other) / scale)
         errors, h = np.array(rows), 4.0 / (np.array(cells) / 2)
         found[label] = errors

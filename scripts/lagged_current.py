@@ -9,6 +9,7 @@ such limit, and what is left is friction's and the material's fixed point.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import pairwise
 
 import numpy as np
 from limit_theorem import ProductNorm
@@ -68,8 +69,8 @@ def errors(
     norm = ProductNorm(problem)
     kept, converged = iterates(problem, steps)
     if not exact:
-        pairs = zip(kept[:-1], kept[1:], strict=True)
-        return np.array([np.linalg.norm(norm(b - a)) for a, b in pairs]), converged
+        moves = [np.linalg.norm(norm(b - a)) for a, b in pairwise(kept)]
+        return np.array(moves), converged
     solution = build_problem(case_of(name, cells, k_e, False), domain=problem.domain)
     found = FixedPoint(solution, FixedPointOptions(tolerance=1e-11)).solve()
     if not found.converged:

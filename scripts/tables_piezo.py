@@ -122,8 +122,8 @@ def series(report: Report, number: str, cells: tuple[int, int]) -> None:
         f"series-k-e-{example.replace('.', '-')}",
         f"Example {example}, load -15x, phi_F = 32: series of k_e, {cells[0]} x {cells[1]} cells",
         columns,
-        "Newton's method. phi on Gamma_3. Charges are integrals of D.nu; imbalances are relative to the absolute "
-        "nodal charges and to the resultant forces.",
+        "Newton's method. phi on Gamma_3. Charges are integrals of D.nu; imbalances are relative "
+        "to the absolute nodal charges and to the resultant forces.",
     )
 
 
