@@ -149,9 +149,7 @@ class FixedPoint:
                 return Outcome(False, f"the residual stalled at {best:.2e}", residuals)
         return Outcome(False, f"not converged in {options.max_outer} outer iterations", residuals)
 
-    def _step(
-        self, bound: Array, z: Array, friction: bool, tangent: bool
-    ) -> tuple[int, Array]:
+    def _step(self, bound: Array, z: Array, friction: bool, tangent: bool) -> tuple[int, Array]:
         """Freeze, solve the frozen problem, and move the iterate."""
         problem = self.problem
         form = problem.tangent if tangent else problem.secant

@@ -130,9 +130,7 @@ class LinearOperator:
             rows, nodes, masked, addv=PETSc.InsertMode.ADD_VALUES, rowmap=nodes
         )
 
-    def solve(
-        self, rhs: Array, rtol: float | None = None, guess: Array | None = None
-    ) -> Array:
+    def solve(self, rhs: Array, rtol: float | None = None, guess: Array | None = None) -> Array:
         """Solve with the owned part of a right-hand side; fixed unknowns stay 0. Collective.
 
         Parameters

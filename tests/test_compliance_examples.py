@@ -109,9 +109,7 @@ def test_example_8_3_takes_two_iterations_as_in_the_thesis():
 
 
 @pytest.mark.parametrize("suffix", ["", "-layer"])
-@pytest.mark.parametrize(
-    "value", [6e-1, 2e-1, 6.8e-2, 5.1e-3, 6.2e-4, 1.4e-5, 3.5e-6, 8.5e-7]
-)
+@pytest.mark.parametrize("value", [6e-1, 2e-1, 6.8e-2, 5.1e-3, 6.2e-4, 1.4e-5, 3.5e-6, 8.5e-7])
 def test_rows_of_table_8_4(suffix, value):
     changes = f"friction.mu={value}", f"electric.k_e={value}"
     uzawa = solved(f"8-4{suffix}", 48, *changes)
