@@ -51,7 +51,8 @@ class HeldCurrent:
         nodal = x[: x.size // size * size].reshape(-1, size)[self.nodes]
         opening = np.einsum("ni,ni->n", nodal[:, :-1], self.direction) - self.gap
         # Closed up to the rounding of the prescribed displacement.
-        closed = opening >= -1e-12 * np.abs(self.gap).max(initial=0.0)
+        reach = np.abs(self.gap) + np.linalg.norm(nodal[:, :-1], axis=1)
+        closed = opening >= -1e-12 * reach
         psi = self.conductor.psi
         conductivity = psi(closed if isinstance(psi, PerfectConductivity) else opening)
         return conductivity, self.phi_scale * nodal[:, -1] - self.conductor.phi_f

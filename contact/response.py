@@ -66,8 +66,9 @@ class Conductor:
     phi_l
         Truncation of the potential difference.
     lagged
-        Whether the charge is taken from the previous outer iterate, as in the thesis; else
-        only psi is.
+        Whether the charge is taken from the previous outer iterate, as Algorithm 4 of the
+        thesis does: it then converges for small k_e only (Theorem 5.2). Else the block
+        relaxation of Algorithm 5 has phi implicit, as a Robin term, and only psi is lagged.
     """
 
     psi: ShiftedConductivity | RampConductivity | PerfectConductivity
