@@ -1,7 +1,9 @@
 """Examples 8.3 and 8.4: values of an independent code, limits of the layer, ranks."""
 
+import sys
 from dataclasses import replace
 from functools import cache
+from importlib import import_module
 from pathlib import Path
 
 import numpy as np
@@ -15,6 +17,7 @@ from contact.table import contact_table
 from forms.laws import SlipCoefficient
 
 CASES = Path(__file__).parents[1] / "scripts/cases"
+sys.path.insert(0, str(CASES.parent))
 
 
 @cache
@@ -156,6 +159,21 @@ def test_other_friction_laws_on_a_layer(law):
     slip = np.linalg.norm(solution.slip, axis=1)
     bound = 0.5 if law == "tresca" else laws[law].coefficient(slip) * total
     assert np.allclose(size[slips], np.broadcast_to(bound, slip.shape)[slips], rtol=1e-6)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("script", "made"),
+    [
+        ("tables_compliance", ["table-8-4.csv", "table-8-4-layer.csv", "examples-8-3-8-4.csv"]),
+        ("figures_compliance", ["figure-1-3.png", "figure-8-9a.png", "figure-8-12.png"]),
+        ("limit_theorem", ["figure-theorem-6-3.png", "theorem-6-3-layer.csv"]),
+    ],
+)
+def test_scripts_on_coarse_meshes(script, made, tmp_path):
+    import_module(script).main(["--coarse", "--out", str(tmp_path)])
+    for name in made:
+        assert (tmp_path / name).stat().st_size > 0
 
 
 @pytest.mark.parallel
