@@ -95,18 +95,25 @@ class Contact(Section):
         description="Contact direction on a rigid shape: normal of the foundation or of the body. "
         "With a gap it is the body's.",
     )
-    layer: NonNegative | None = Field(
+    layer: (
+        Annotated[
+            float, Field(ge=0, allow_inf_nan=True), Accepted("a number >= 0, or inf")
+        ]
+        | None
+    ) = Field(
         default=None,
-        description="Thickness of the layer: first touch at gap - layer. Compliance only, "
-        f"default {LAYER['layer']}.",
+        description="Thickness of the layer: first touch at gap - layer. `inf`: no rigid part, "
+        f"first touch at gap, law (1.27). Compliance only, default {LAYER['layer']}.",
     )
     stiffness: NonNegative | None = Field(
         default=None, description=f"c_nu. Compliance only, default {LAYER['stiffness']}."
     )
-    limit: Positive | None = Field(
+    limit: (
+        Annotated[float, Field(gt=0, allow_inf_nan=True), Accepted("a number > 0, or inf")] | None
+    ) = Field(
         default=None,
-        description="n_nu: depth at which the layer's pressure saturates. Compliance only, "
-        f"default {LAYER['limit']}.",
+        description="n_nu: depth at which the layer's pressure saturates; `inf`: never, (1.28). "
+        f"Compliance only, default {LAYER['limit']}.",
     )
     potential_factor: Annotated[float, Field(ge=1), Accepted("a number >= 1")] | None = Field(
         default=None,

@@ -2,7 +2,15 @@
 
 Each iteration freezes what makes the problem nonlinear (secant modulus, friction bound, what
 the foundation answers), solves the frozen problem by block relaxation and updates. Elastic
-and piezoelectric bodies, rigid and compliant foundations differ in what there is to freeze.
+and piezoelectric bodies, rigid and compliant foundations differ in what there is to freeze:
+
+- Algorithm 1, Problem (PV): the secant modulus and the friction bound s_n.
+- Algorithm 4, Problem (P~V): also psi, or all of the charge l where it is lagged.
+- Algorithm 6, Problem (PV2): also h_nu, or all of the layer's force j_1 where it is lagged.
+- Algorithm 8, Problem (PV1): as Algorithm 6 without friction and current.
+
+All four are `FixedPoint.solve` with `_step`, `_base_residual` and `_update_bound`; their inner
+Algorithms 2, 5, 7 and 9 are `uzawa.block_relaxation`. What differs is `ContactProblem.response`.
 """
 
 from __future__ import annotations

@@ -43,7 +43,9 @@ def contact_table(solution: Solution) -> Table | None:
     # Mesh generators leave coordinates such as -3e-19.
     points = np.where(np.abs(trace.points) < 1e-15 * problem.domain.size, 0.0, trace.points)
     columns: dict[str, NDArray[Any]] = dict(zip("xyz", points.T, strict=False))
-    columns |= {"weight": trace.weight, "gap": trace.gap, "u_n": solution.normal_displacement}
+    # The gap without a rigid part is that of the layer's first touch.
+    gap = problem.response.trace.gap
+    columns |= {"weight": trace.weight, "gap": gap, "u_n": solution.normal_displacement}
     slip, friction = solution.slip, solution.friction
     if problem.dim == 2:
         tangent = tangent_of(trace.normal)

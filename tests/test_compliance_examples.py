@@ -107,6 +107,15 @@ def test_stiff_layer_tends_to_signorini_at_its_touch():
     assert np.allclose(np.log10(np.array(errors[:-1]) / errors[1:]), 1.0, atol=0.05)
 
 
+@pytest.mark.parametrize("method", ["uzawa", "newton"])
+def test_normal_compliance_without_rigid_part(method):
+    soft = solved("8-3-soft", 24, f"solver.method={method}")
+    depth = soft.normal_displacement - 0.5
+    assert np.allclose(soft.pressure, 10.0 * np.maximum(depth, 0.0), rtol=0, atol=1e-7)
+    far = ("contact.gap=2.0", "contact.layer=1.5", "contact.limit=10.0")
+    assert close(soft, solved("8-3-layer", 24, *far, "contact.potential_factor=1.0"), 1e-8)
+
+
 def test_example_8_3_takes_two_iterations_as_in_the_thesis():
     assert len(solved("8-3-layer").history.records) == 2
 
