@@ -22,6 +22,8 @@ demo:
 # The ranks first, so that the last line is the closing line of the serial tests. One BLAS
 # thread each: the workers and ranks fill the cores.
 test: export OMP_NUM_THREADS := 1
+# Ranks that wait give way: there are fewer cores than ranks, or others use them too.
+test: export OMPI_MCA_mpi_yield_when_idle := 1
 test:
 	@status=0; \
 	echo "== 2 ranks"; $(call MPI_TESTS,2) || status=1; \
