@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import signal
 import threading
+import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from types import FrameType
@@ -11,6 +12,9 @@ from types import FrameType
 from mpi4py import MPI
 
 from contact.report import Monitor, Record
+
+#: Seconds in which a second signal is taken for an echo of the first.
+REPEAT = 2.0
 
 
 class Interrupted(Exception):
@@ -30,15 +34,22 @@ def stop_on_signal(comm: MPI.Intracomm, monitor: Monitor | None) -> Iterator[Mon
 
     Notes
     -----
-    The first signal is noted, the second has its usual effect. Signals can be caught in the
-    main thread alone; in others nothing is changed.
+    The first signal is noted; one that comes more than `REPEAT` seconds later has its usual
+    effect (a launcher and its process group may both deliver the same one). Signals can be
+    caught in the main thread alone; in others nothing is changed.
     """
     caught: list[int] = []
+    since: list[float] = []
     before: dict[int, Callable[[int, FrameType | None], object] | int] = {}
 
     def note(number: int, frame: FrameType | None) -> None:
-        caught.append(number)
-        signal.signal(number, before[number])
+        if caught and time.monotonic() - since[0] > REPEAT:
+            for ending, handler in before.items():
+                signal.signal(ending, handler)
+            signal.raise_signal(number)
+        if not caught:
+            caught.append(number)
+            since.append(time.monotonic())
 
     def check(record: Record) -> None:
         if monitor is not None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from mpi4py import MPI
 from petsc4py import PETSc
 
 from contact.problem import ContactProblem
@@ -40,8 +41,9 @@ def near_nullspace(problem: ContactProblem) -> PETSc.NullSpace:
     d, bs = problem.dim, problem.block_size
     index_map = problem.space.dofmap.index_map
     points = problem.space.tabulate_dof_coordinates()[: index_map.size_local, :d]
-    low = problem.domain.mesh.geometry.x.min(axis=0, initial=0.0)[:d]
-    motions = rigid_motions((points - low) / problem.domain.size)
+    # About one centre on all ranks: about different ones these would be no rigid motions.
+    total = problem.comm.allreduce(points.sum(axis=0), op=MPI.SUM)
+    motions = rigid_motions((points - total / index_map.size_global) / problem.domain.size)
     vectors: list[PETSc.Vec] = []
     for k in range(motions.shape[2]):
         values = np.zeros((index_map.size_local, bs))

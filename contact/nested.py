@@ -66,7 +66,9 @@ def coarse_solution(
     case: Case, comm: MPI.Intracomm, **replacements: Any
 ) -> tuple[ContactProblem, Multipliers]:
     """Solve on all meshes but the finest, each from the one before. Collective."""
-    options = NewtonOptions(tolerance=max(COARSE_TOLERANCE, case.solver.tolerance))
+    options = NewtonOptions(
+        tolerance=max(COARSE_TOLERANCE, case.solver.tolerance), linear=case.solver.linear
+    )
     last: tuple[ContactProblem, Multipliers] | None = None
     for level in coarser_cases(case, case.solver.nested_levels):
         problem = build_problem(level, comm, **replacements)

@@ -39,7 +39,9 @@ class NewtonOptions:
     tolerance
         On every KKT residual.
     max_iterations
-        Number of linear solves allowed in each stage.
+        Number of steps allowed in each stage.
+    limit
+        Number of steps allowed in all stages together.
     gamma
         Stiffness of the condensed constraints over that of the body.
     secant_until
@@ -52,6 +54,7 @@ class NewtonOptions:
 
     tolerance: float = 1e-8
     max_iterations: int = 60
+    limit: int = 1000
     gamma: float = 1e4
     secant_until: float = 1e-2
     patience: int = 12
@@ -118,13 +121,18 @@ class Newton:
         """Iterate, and fall back on slower methods where that fails."""
         self._begin = time.perf_counter()
         outcome = self._newton("")
-        if not outcome.converged and self.problem.frictional:
+        if not outcome.converged and self.problem.frictional and self._left > 0:
             outcome = self._frozen_friction()
-        if not outcome.converged:
+        if not outcome.converged and self._left > 0:
             outcome = self._block_relaxation()
-        if not outcome.converged:
+        if not outcome.converged and self._left > 0:
             outcome = self._load_steps()
         return outcome
+
+    @property
+    def _left(self) -> int:
+        """Number of steps that are left of the limit."""
+        return self.options.limit - len(self.history.records)
 
     def _block_relaxation(self) -> Outcome:
         """Solve by the fixed point over block relaxation, which damps what Newton lets cycle."""
@@ -132,7 +140,11 @@ class Newton:
         def note(record: Record) -> None:
             self._record(record.kkt, "block relaxation", record.inner)
 
-        options = FixedPointOptions(tolerance=self.options.tolerance)
+        options = FixedPointOptions(
+            tolerance=self.options.tolerance,
+            max_outer=min(FixedPointOptions.max_outer, self._left),
+            linear=self.options.linear,
+        )
         relaxed = FixedPoint(self.problem, options, note, self.counters)
         try:
             return relaxed.solve()
@@ -150,7 +162,8 @@ class Newton:
         best, since = np.inf, 0
         # A start from elsewhere is near the solution; zero displacement has no better tangent.
         tangent = self._status is not None and not problem.linear_material
-        for _ in range(options.max_iterations):
+        steps = min(options.max_iterations, self._left)
+        for _ in range(steps):
             before = residuals.equilibrium
             self._step(tangent, frozen, residuals.largest)
             residuals = evaluate(problem, self.forces)
@@ -170,7 +183,7 @@ class Newton:
             best = min(best, measured)
             if since >= options.patience:
                 return Outcome(False, f"Newton's method stalled at {best:.1e}", residuals)
-        return Outcome(False, f"not converged in {options.max_iterations} steps", residuals)
+        return Outcome(False, f"not converged in {steps} steps", residuals)
 
     def _measure(self, residuals: KKT, frozen: Array | None) -> float:
         """Return the largest residual, with the frozen friction bound if there is one."""
@@ -201,7 +214,7 @@ class Newton:
         self.forces = Multipliers.zero(problem)
         self._status = self._layer_pressure = None
         outcome = None
-        while reached < 1.0 and step > 1e-2:
+        while reached < 1.0 and step > 1e-2 and self._left > 0:
             kept = problem.x.x.array.copy(), self.forces, self._status
             factor = min(1.0, reached + step)
             problem.apply_load(factor)

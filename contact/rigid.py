@@ -41,15 +41,16 @@ def check_held(problem: ContactProblem) -> None:
     at_contact = rigid_motions((trace.points - centre) / size)
     normal = np.einsum("ni,nim->nm", trace.normal, at_contact)
     touching = _gram(problem, normal[:, None, :])
+    tangential = np.einsum("nij,njm->nim", trace.tangent, at_contact)
     if problem.frictional:
-        touching = touching + _gram(problem, np.einsum("nij,njm->nim", trace.tangent, at_contact))
+        touching = touching + _gram(problem, tangential)
     loose = _null_space(supports + touching)
     if loose.shape[1] > 0:
         raise InputError(
             f"the body is not held: it can move as a rigid body ({_describe(loose, d)}); "
             "accepted: displacement components fixed so that it cannot"
         )
-    _check_loads(problem, free, normal, (points - centre) / size)
+    _check_loads(problem, free, normal, tangential, (points - centre) / size)
 
 
 def check_potential(problem: ContactProblem, forces: Multipliers) -> None:
@@ -117,22 +118,32 @@ def _describe(motions: Array, d: int) -> str:
     return ", ".join(found) or "translation and rotation combined"
 
 
-def _check_loads(problem: ContactProblem, free: Array, normal: Array, points: Array) -> None:
-    """Refuse loads that do work on a rigid motion away from the foundation.
+def _check_loads(
+    problem: ContactProblem, free: Array, normal: Array, tangential: Array, points: Array
+) -> None:
+    """Refuse loads that no contact force can balance.
 
-    With friction only a motion that leaves the foundation at every node is looked at: along
-    it no friction can act.
+    That is so where they do work on a rigid motion m on which no admissible contact force can:
+    m.nu <= -mu |m_tau| at every node (Farkas). A given friction bound, and a smoothed pressure,
+    are not bounded by the pressure at the node: such problems are left to the solver.
     """
+    coefficient = problem.friction.coefficient
+    if problem.tresca is not None or problem.friction.radius > 0:
+        return
+    mu = 0.0 if coefficient is None else coefficient.maximum
+    mu = problem.comm.allreduce(mu, op=MPI.MAX)
     d, comm = problem.dim, problem.comm
     external = problem.external.reshape(-1, problem.block_size)[:, :d]
     local = np.einsum("ni,nim->m", external, rigid_motions(points))
     work = comm.allreduce(local, op=MPI.SUM) @ free
     scale = comm.allreduce(float(np.abs(external).sum()), op=MPI.SUM)
-    rows = problem.trace.gather(normal @ free)
+    # |m_tau| <= sqrt(d) times its largest component: a cone of planes inside the cone.
+    across = [np.sqrt(d) * mu * part @ free for part in np.moveaxis(tangential, 1, 0)]
+    rows = [normal @ free + sign * part for part in across for sign in (-1, 1)]
+    cone = np.concatenate([problem.trace.gather(row) for row in rows])
     pulled = False
     if comm.rank == 0 and np.abs(work).max() > ROUNDING * scale:
-        bound = -ROUNDING - 1e-3 if problem.frictional else 0.0
-        motion = linprog(-work, rows, np.full(len(rows), bound), bounds=[(-1, 1)] * free.shape[1])
+        motion = linprog(-work, cone, np.zeros(len(cone)), bounds=[(-1, 1)] * free.shape[1])
         pulled = motion.status == 0 and -motion.fun > 1e-6 * scale
     if comm.bcast(pulled):
         raise InputError(

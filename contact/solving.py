@@ -62,7 +62,9 @@ def fixed_point(problem: ContactProblem, settings: Solver, monitor: Monitor | No
 
 def newton(problem: ContactProblem, settings: Solver, monitor: Monitor | None) -> Newton:
     """Return semismooth Newton."""
-    options = NewtonOptions(tolerance=settings.tolerance, linear=settings.linear)
+    options = NewtonOptions(
+        tolerance=settings.tolerance, limit=settings.max_outer, linear=settings.linear
+    )
     return Newton(problem, options, monitor)
 
 

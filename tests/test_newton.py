@@ -4,7 +4,9 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
+from contact.build import build_problem
 from contact.case import parse_case
+from contact.errors import InputError
 from contact.fixed_point import FixedPoint, FixedPointOptions
 from contact.nested import coarser_cases
 from contact.newton import Newton, NewtonOptions
@@ -164,6 +166,38 @@ def test_slower_methods_take_over_where_newton_gives_up(friction, note):
     problem = helpers.bar(SELF, 8, -0.05, friction=friction)
     method = newton(problem, max_iterations=2)
     assert any(record.note.startswith(note) for record in method.history.records)
+
+
+@pytest.mark.parametrize("method", ["newton", "uzawa"])
+def test_the_number_of_outer_iterations_is_limited(method):
+    solution = solve(parse_case(bar_case([32, 8], method=method, max_outer=2)), comm=SELF)
+    assert not solution.outcome.converged
+    # the frictionless start of the fixed point is its iteration 0
+    assert len(solution.history.records) <= 3
+
+
+def pushed_block(push: float) -> dict:
+    """Return a block that nothing but friction holds against a push along y."""
+    return {
+        "mesh": {"generator": "box", "size": [1.0, 1.0, 1.0], "cells": [2, 2, 2]},
+        "material": {"law": "linear", "young": 1.0, "poisson": 0.3},
+        "fixed": [{"on": "left", "displacement": [0.0, "free", "free"]}],
+        "load": [{"on": "top", "traction": [0.0, push, -0.05]}],
+        "contact": {"on": "bottom"},
+        "friction": {"law": "coulomb", "mu": 0.4},
+        "solver": {"tolerance": 1e-10},
+    }
+
+
+def test_friction_alone_may_hold_a_body():
+    solution = solve(parse_case(pushed_block(0.004)), comm=SELF)
+    assert solution.outcome.converged
+    assert np.allclose(solution.contact_force[1:], [0.004, -0.05], rtol=1e-7)
+
+
+def test_more_than_friction_can_hold_is_refused():
+    with pytest.raises(InputError, match="pull the body off"):
+        build_problem(parse_case(pushed_block(0.04)), SELF)
 
 
 @pytest.mark.parallel
