@@ -17,7 +17,7 @@ from contact.table import contact_table
 
 #: Quantities drawn on the deformed body: name of the figure, field, label.
 DEFORMED = (
-    ("deformed", "von_mises", "von Mises stress (units of E)"),
+    ("deformed", "von_mises", "von Mises stress (units of the case)"),
     ("potential", "potential", r"potential $\varphi$"),
 )
 

@@ -62,13 +62,13 @@ def draw_line(table: Table, title: str = "") -> Figure:
         if np.any(table["status"] == zone)
     ]
     axes[0].plot(where, table["pressure"], color=BLUE, label=r"pressure $-\sigma_\nu$")
-    axes[0].set_ylabel(r"$-\sigma_\nu$ (units of E)")
+    axes[0].set_ylabel(r"$-\sigma_\nu$ (units of the case)")
     if frictional:
         axes[1].plot(where, tau, color=ORANGE, label=r"tangential stress $-\sigma_\tau\cdot t$")
         axes[1].plot(where, bound, "--", color=GREY, lw=0.8, label=r"friction bound $\pm s$")
         axes[1].plot(where, -bound, "--", color=GREY, lw=0.8)
         axes[1].axhline(0.0, color="black", lw=0.4)
-        axes[1].set_ylabel(r"$-\sigma_\tau\cdot t$ (units of E)")
+        axes[1].set_ylabel(r"$-\sigma_\tau\cdot t$ (units of the case)")
     axes[-1].set_xlabel(f"${name}$ along $\\Gamma_3$ (mesh units)")
     axes[0].set_xlim(where.min(), where.max())
     _focus(axes[0], table["pressure"], 0.0)
@@ -108,7 +108,9 @@ def draw_surface(table: Table, title: str = "") -> Figure:
     else:  # too few nodes for triangles
         shown = left.scatter(*flat.T, c=table["pressure"], cmap="viridis")
     bar = figure.add_axes((0.1, 0.15, 0.38, 0.03))
-    figure.colorbar(shown, cax=bar, orientation="horizontal", label=r"$-\sigma_\nu$ (units of E)")
+    figure.colorbar(
+        shown, cax=bar, orientation="horizontal", label=r"$-\sigma_\nu$ (units of the case)"
+    )
     size = float(np.clip(2e3 / len(points), 0.5, 12))
     for zone, colour in (("open", LIGHT), ("stick", BLUE), ("slip", ORANGE)):
         chosen = table["status"] == zone
