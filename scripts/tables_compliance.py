@@ -41,6 +41,7 @@ EXAMPLES = {
     "8.3": "compliance-8-3",
     "8.3, traction on top only": "compliance-8-3-top",
     "8.3, layer of 0.1": "compliance-8-3-layer",
+    "8.3, no rigid part": "compliance-8-3-soft",
     "8.4": "compliance-8-4",
     "8.4, layer of 0.1": "compliance-8-4-layer",
 }
