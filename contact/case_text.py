@@ -1,4 +1,4 @@
-"""A case as text: the TOML file that says the same with every default written out."""
+"""A case as text: the TOML file that says the same with the defaults written out."""
 
 from __future__ import annotations
 
@@ -13,8 +13,9 @@ _BARE = re.compile(r"[A-Za-z0-9_-]+")
 
 
 def to_toml(case: Case) -> str:
-    """Return a case file that gives the same case again."""
-    data = case.model_dump(by_alias=True, exclude_none=True)
+    """Return a case file that gives the same case again, without what its method ignores."""
+    ignored = {"solver": set(case.solver.unread)}
+    data = case.model_dump(by_alias=True, exclude_none=True, exclude=ignored)
     return "\n".join(_table(data, ())).strip() + "\n"
 
 

@@ -55,6 +55,8 @@ class PenaltyOptions:
         below 1e-2, implicit from there as long as SNES converges.
     max_outer, max_inner
         Largest number of outer iterations, and of SNES iterations in one of them.
+    linear
+        Kind of linear solver, see `linear.LinearOperator`.
     """
 
     eps_contact: float = 1e-4
@@ -65,6 +67,7 @@ class PenaltyOptions:
     material_step: str = "auto"
     max_outer: int = 1000
     max_inner: int = 50
+    linear: str = "auto"
 
     @property
     def regularisation(self) -> Regularisation:
@@ -194,7 +197,9 @@ class _Inner:
     ) -> None:
         self._problem, self._options = problem, options
         self._error: InputError | None = None
-        self.operator = LinearOperator(problem, symmetric=symmetric, counters=counters)
+        self.operator = LinearOperator(
+            problem, symmetric=symmetric, counters=counters, kind=options.linear
+        )
         matrix = self.operator.matrix
         self._increment, self._residual = matrix.createVecs()
         self.snes = PETSc.SNES().create(problem.comm)

@@ -79,6 +79,7 @@ def penalty(problem: ContactProblem, settings: Solver, monitor: Monitor | None) 
         material_step=settings.material_step,
         max_outer=settings.max_outer,
         max_inner=settings.max_inner,
+        linear=settings.linear,
     )
     return Penalty(problem, options, monitor)
 

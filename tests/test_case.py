@@ -88,8 +88,6 @@ def test_the_bar(bar):
     assert case.load[0].traction == (Expression(0.0), Expression(-0.005))
     assert case.friction.mu == SlipLaw(law="slip", a=0.5, b=0.2, rho=1e4)
     assert case.contact.gap == Expression(0.0)
-    assert case.solver.inner == pytest.approx(1e-9)
-    assert case.solver.slip_length == case.solver.eps_contact
     assert case.fixed[0].is_clamped
     assert pickle.loads(pickle.dumps(case)) == case
 
@@ -117,7 +115,7 @@ def test_the_rest_of_the_keys():
             },
             friction={"law": "tresca", "bound": "1 + x"},
             electric={"k_e": 1, "phi_f": 32, "delta": 10, "limit": 100, "lagged": True},
-            solver={"r": 25, "stopping": "thesis", "nested": True, "nested_levels": 3},
+            solver={"method": "uzawa", "r": 25, "stopping": "thesis", "eps": 1e-4},
             output={"fields": "xdmf", "checkpoint": True},
         )
     )
@@ -274,11 +272,42 @@ BAD = {
         "electric.k_e: given -1; accepted: a number >= 0",
     ),
     "method": ({"solver__method": "newtn"}, '"uzawa", "penalty" or "newton"'),
+    "setting of another method": (
+        {"solver__r": 25},
+        'solver.r: given 25.0; accepted: r with method = "uzawa"',
+    ),
+    "stopping rule of Newton's method": (
+        {"solver__stopping": "thesis"},
+        'solver.stopping: given "thesis"; accepted: stopping with method = "uzawa" or "penalty"',
+    ),
+    "most inner iterations of Newton's method": (
+        {"solver__max_inner": 7},
+        'accepted: max_inner with method = "uzawa" or "penalty"',
+    ),
+    "penalty in Newton's method": (
+        {"solver__eps_contact": 1e-5},
+        'accepted: eps_contact with method = "penalty"',
+    ),
+    "default of another method": (
+        {"solver__acceleration": "anderson"},
+        'accepted: acceleration with method = "uzawa"',
+    ),
+    "tolerance of another rule": (
+        {"solver": {"method": "uzawa", "eps": 1e-4}},
+        'solver.eps: given 0.0001; accepted: eps with method = "uzawa" and stopping = "thesis"',
+    ),
+    "over-relaxation of Anderson's steps": (
+        {"solver": {"method": "uzawa", "relaxation": 1.7}},
+        'relaxation with method = "uzawa" and acceleration = "none"',
+    ),
     "augmentation": ({"solver__r": 0}, 'solver.r: given 0; accepted: "auto" or a number > 0'),
     "augmentation text": ({"solver__r": "big"}, 'accepted: "auto" or a number > 0'),
     "relaxation": ({"solver__relaxation": 2.0}, "between 0 and 2, both excluded"),
     "tolerance": ({"solver__tolerance": 0.0}, "solver.tolerance: given 0.0"),
-    "loose inner loop": ({"solver__inner_tolerance": 1e-3}, "at most tolerance = 1e-08"),
+    "loose inner loop": (
+        {"solver": {"method": "uzawa", "inner_tolerance": 1e-3}},
+        "at most tolerance = 1e-08",
+    ),
     "iterations": ({"solver__max_outer": 0}, "solver.max_outer: given 0"),
     "levels": ({"solver__nested_levels": 3}, "nested_levels with nested = true"),
     "output": ({"output": {"fields": "vtk"}}, '"vtx", "xdmf" or "none"'),

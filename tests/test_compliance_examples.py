@@ -74,7 +74,8 @@ def test_potential_and_strain_of_example_8_3():
 @pytest.mark.parametrize("name", ["8-3-layer", "8-4-layer"])
 def test_layer_without_stiffness_is_signorini(name, method):
     changes = ["friction.mu=0.068", "electric.k_e=0.068"] if "8-4" in name else []
-    exact = ["solver.tolerance=1e-11", "solver.inner_tolerance=2e-13", f"solver.method={method}"]
+    exact = ["solver.tolerance=1e-11", f"solver.method={method}"]
+    exact += ["solver.inner_tolerance=2e-13"] if method == "uzawa" else []
     grid = "mesh.cells=[24, 4]"
     case = load_case(
         CASES / f"compliance-{name}.toml", [grid, "contact.stiffness=0.0", *exact, *changes]
