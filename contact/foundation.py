@@ -102,8 +102,9 @@ class Sphere:
         along = np.einsum("ni,ni->n", offset, body_normal)
         root = along**2 + self.radius**2 - distance**2
         gap = -along + outward * np.sqrt(np.maximum(root, 0.0))
-        # A ray that misses the ball never touches it.
-        return body_normal, np.where(root >= 0, gap, np.inf)
+        # A ray that misses the ball, or leads away from it, never touches it.
+        away = (along > 0) & (distance > self.radius) & (not self.inside)
+        return body_normal, np.where((root >= 0) & ~away, gap, np.inf)
 
 
 def _along_ray(distance: Array, cosine: Array) -> Array:

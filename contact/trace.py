@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from contact.domain import Domain
 from contact.errors import InputError
-from contact.foundation import Foundation
+from contact.foundation import Foundation, GapFunction
 from contact.projections import Array
 
 
@@ -164,6 +164,33 @@ def candidates(domain: Domain, space: fem.FunctionSpace, part: str) -> Candidate
     return Candidates(nodes, points, weight[nodes], normal)
 
 
+def _check_place(
+    domain: Domain, space: fem.FunctionSpace, found: Candidates, direction: Array, gap: Array
+) -> None:
+    """Refuse a foundation behind the contact part, or one that the body cuts at rest.
+
+    Nodes that face away are not looked at: all of a disc may be the contact part.
+    """
+    facing = np.einsum("ni,ni->n", direction, found.normal)
+    # Where no ray meets the foundation the gap is infinite, and `build_trace` has its message.
+    seen = np.isfinite(gap)
+    best = domain.comm.allreduce(np.max(facing[seen], initial=-np.inf), op=MPI.MAX)
+    if np.isfinite(best) and best <= 1e-9:
+        raise InputError(
+            "contact.foundation: it lies behind the contact part: the contact direction points "
+            "into the body at every node; accepted: a normal towards the body, a sphere in front "
+            "of it, or inside = true for a body within"
+        )
+    # Degree 2 has nodes on the chords of curved boundaries, and mesh files round.
+    tolerance = (1e-5 if space.ufl_element().embedded_superdegree == 1 else 1e-3) * domain.size
+    depth = domain.comm.allreduce(np.max(-gap[facing > 0], initial=0.0), op=MPI.MAX)
+    if depth > tolerance:
+        raise InputError(
+            f"contact.foundation: the body cuts it at rest, by up to {depth:.3g}; accepted: gaps "
+            f">= 0 but for {tolerance:.1g} (rounding)"
+        )
+
+
 def build_trace(
     domain: Domain,
     space: fem.FunctionSpace,
@@ -181,7 +208,8 @@ def build_trace(
     Raises
     ------
     InputError
-        If no contact node is left on any rank, or one has no contact direction.
+        If no contact node is left on any rank, one has no contact direction, or the foundation
+        lies behind the contact part or cuts the body at rest.
     """
     d = domain.dim
     found = candidates(domain, space, part)
@@ -192,6 +220,8 @@ def build_trace(
             "contact.foundation: a contact node has no contact direction "
             "(it is the sphere's centre)"
         )
+    if not isinstance(foundation, GapFunction):  # whose values are what was asked for
+        _check_place(domain, space, found, direction, gap)
 
     free = free_components(space, bcs)[nodes, :d]
     gap = gap - np.einsum("ni,ni->n", direction, _prescribed(space, bcs)[nodes, :d])

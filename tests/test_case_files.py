@@ -105,6 +105,32 @@ WRONG = {
         'foundation = { shape = "sphere", centre = [1.0, 0.0], radius = 1.0 }',
         ["contact.foundation", "centre"],
     ),
+    "a plane that faces away": (
+        "gap = 0.0",
+        'foundation = { shape = "plane", point = [0.0, 0.0], normal = [0.0, -1.0] }',
+        ["contact.foundation", "behind the contact part", "normal towards the body"],
+    ),
+    "a plane through the body": (
+        "gap = 0.0",
+        'foundation = { shape = "plane", point = [0.0, 0.25], normal = [0.0, 1.0] }',
+        ["contact.foundation", "cuts it at rest", "0.25"],
+    ),
+    "an oblique plane into the body": (
+        "gap = 0.0",
+        'direction = "body"\n'
+        'foundation = { shape = "plane", point = [1.0, 0.0], normal = [0.5, 1.0] }',
+        ["contact.foundation", "cuts it at rest", "0.5"],
+    ),
+    "a sphere on the other side": (
+        "gap = 0.0",
+        'foundation = { shape = "sphere", centre = [1.0, 3.0], radius = 1.0 }',
+        ["contact.foundation", "behind the contact part"],
+    ),
+    "a sphere that does not hold the body": (
+        "gap = 0.0",
+        'foundation = { shape = "sphere", centre = [1.0, 0.5], radius = 0.9, inside = true }',
+        ["contact.foundation", "cuts it at rest"],
+    ),
     "friction negative somewhere": ("mu = 0.3", 'mu = "0.3-x"', ["friction.mu", "0.3-x"]),
     "Coulomb without mu": ("mu = 0.3", "", ["friction.mu", "missing"]),
     "charge without piezoelectricity": (
@@ -265,6 +291,8 @@ def test_problem_without_solution(
         "a load that is not finite",
         "a gap that is negative somewhere",
         "a sphere around a contact node",
+        "a plane that faces away",
+        "a plane through the body",
         "friction negative somewhere",
         "contact nodes that are all fixed",
         "a body that can slide",

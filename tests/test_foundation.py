@@ -154,6 +154,9 @@ def test_sphere_along_its_radius_and_along_the_body_s_normal(inside):
     met = np.isfinite(gap)
     assert met.any()
     assert np.linalg.norm(touching - sphere.centre, axis=1)[met] == pytest.approx(2.0)
+    assert np.all(gap[met] > 0)
+    away = Sphere((1.0, 0.0, 0.0), 2.0, False, "body").measure(points, unit)[1]
+    assert inside or np.all(np.isinf(away)), "a ray that leads away never touches"
 
 
 def test_gap_function_and_directions_of_the_body():
