@@ -1,7 +1,7 @@
 """The command line: ``python3 -m contact solve CASE.toml --out DIR`` and ``... check CASE.toml``.
 
 Exit status: 0 converged, 1 not converged (outputs are written), 2 bad input (one message,
-nothing is written), 130 stopped by Ctrl-C.
+nothing is written), 130 stopped by Ctrl-C, 143 by SIGTERM (what a solve had reached is written).
 """
 
 from __future__ import annotations
@@ -9,6 +9,7 @@ from __future__ import annotations
 import argparse
 import difflib
 import os
+import signal
 import sys
 import traceback
 from collections.abc import Callable, Sequence
@@ -20,8 +21,11 @@ from mpi4py import MPI
 
 from contact.case import Case, load_case
 from contact.errors import InputError
+from contact.interrupt import Terminated, raising_on_sigterm
 
-CONVERGED, NOT_CONVERGED, BAD_INPUT, STOPPED = 0, 1, 2, 130
+CONVERGED, NOT_CONVERGED, BAD_INPUT = 0, 1, 2
+#: Added to the number of the signal that ended a run.
+SIGNALLED = 128
 
 T = TypeVar("T")
 
@@ -129,13 +133,17 @@ def _solve(case: Case, options: argparse.Namespace, comm: MPI.Intracomm) -> int:
         from contact.plots import write_figures
 
         write_figures(solution, out)
-    reason = solution.outcome.reason
-    if comm.rank == 0 and not options.quiet:
-        state = "converged" if solution.converged else "stopped"
-        print(f"{state}: {reason}; results in {out}")
-    if solution.converged:
-        return CONVERGED
-    return STOPPED if reason.startswith("interrupted") else NOT_CONVERGED
+    outcome = solution.outcome
+    if comm.rank == 0 and not (options.quiet and outcome.converged):
+        state = "converged" if outcome.converged else "stopped"
+        text = f"{state}: {outcome.reason}; results in {out}"
+        print(
+            f"contact: {text}" if options.quiet else text,
+            file=sys.stderr if options.quiet else None,
+        )
+    if outcome.signal:
+        return SIGNALLED + outcome.signal
+    return CONVERGED if outcome.converged else NOT_CONVERGED
 
 
 def _check(case: Case, options: argparse.Namespace, comm: MPI.Intracomm) -> int:
@@ -154,7 +162,7 @@ def _abort_on_crash(
     """Show the traceback and end all ranks: the others may wait for this one for ever."""
     traceback.print_exception(kind, error, trace)
     sys.stderr.flush()
-    MPI.COMM_WORLD.Abort(STOPPED if issubclass(kind, KeyboardInterrupt) else NOT_CONVERGED)
+    MPI.COMM_WORLD.Abort(NOT_CONVERGED)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -163,16 +171,28 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if comm.size > 1:
         sys.excepthook = _abort_on_crash
     try:
-        options, petsc = parse(sys.argv[1:] if arguments is None else arguments)
-        import petsc4py
+        with raising_on_sigterm():
+            options, petsc = parse(sys.argv[1:] if arguments is None else arguments)
+            import petsc4py
 
-        petsc4py.init([sys.argv[0], *petsc])
-        case = _shared(comm, lambda: load_case(options.case, options.set))
-        return {"solve": _solve, "check": _check}[options.command](case, options, comm)
+            petsc4py.init([sys.argv[0], *petsc])
+            case = _shared(comm, lambda: load_case(options.case, options.set))
+            return {"solve": _solve, "check": _check}[options.command](case, options, comm)
     except InputError as error:
         if comm.rank == 0:
             print(f"contact: {error}", file=sys.stderr)
         return BAD_INPUT
+    except KeyboardInterrupt as interrupt:
+        return _interrupted(comm, interrupt)
+
+
+def _interrupted(comm: MPI.Intracomm, interrupt: KeyboardInterrupt) -> int:
+    """Say that a signal ended the run where nothing is kept, and end the other ranks too."""
+    number = signal.SIGTERM if isinstance(interrupt, Terminated) else signal.SIGINT
+    print(f"contact: interrupted ({number.name})", file=sys.stderr, flush=True)
+    if comm.size > 1:
+        comm.Abort(SIGNALLED + number)
+    return SIGNALLED + number
 
 
 if __name__ == "__main__":

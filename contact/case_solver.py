@@ -23,6 +23,9 @@ Method = Literal["uzawa", "penalty", "newton"]
 #: The method where the case file names none.
 DEFAULT_METHOD: Method = "newton"
 
+#: Most inner iterations in an outer one.
+MAX_INNER = 5000
+
 #: Settings that not all methods read, and what reads them: values of other settings.
 READ_WITH: Mapping[str, Mapping[str, tuple[str, ...]]] = {
     "stopping": {"method": ("uzawa", "penalty")},
@@ -72,7 +75,7 @@ class Solver(Section):
     )
     max_outer: Count = Field(default=200, description="Most outer iterations.")
     max_inner: Count = Field(
-        default=5000,
+        default=MAX_INNER,
         description="Most inner iterations in an outer one, `uzawa` and `penalty` only.",
     )
     r: Annotated[Literal["auto"] | Positive, Accepted('"auto" or a number > 0')] = Field(

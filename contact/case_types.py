@@ -60,6 +60,9 @@ def _not_negative(expression: expressions.Expression) -> expressions.Expression:
     return expression
 
 
+#: The least tolerance: rounding keeps relative residuals from falling below.
+PRECISION = 1e-15
+
 FORMULA = "a number or a formula"
 
 Formula: TypeAlias = Annotated[expressions.Expression, _FormulaSchema, Accepted(FORMULA)]
@@ -73,7 +76,9 @@ Number: TypeAlias = Annotated[float, Accepted("a number")]
 Positive: TypeAlias = Annotated[float, Field(gt=0), Accepted("a number > 0")]
 NonNegative: TypeAlias = Annotated[float, Field(ge=0), Accepted("a number >= 0")]
 Tolerance: TypeAlias = Annotated[
-    float, Field(gt=0, lt=1), Accepted("a number between 0 and 1, both excluded")
+    float,
+    Field(ge=PRECISION, lt=1),
+    Accepted(f"a number from {PRECISION:g}, the precision of numbers, to 1, excluded"),
 ]
 Count: TypeAlias = Annotated[
     int, Field(ge=1, le=10_000_000), Accepted("a whole number from 1 to 10000000")

@@ -16,10 +16,13 @@ Algorithms 2, 5, 7 and 9 are `uzawa.block_relaxation`. What differs is `ContactP
 from __future__ import annotations
 
 import time
+from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
 
+from contact.case_solver import MAX_INNER
+from contact.case_types import PRECISION
 from contact.kkt import KKT, evaluate, residual_forces
 from contact.linear import Counters, LinearOperator
 from contact.norms import domain_norm
@@ -34,6 +37,10 @@ from contact.uzawa import (
     automatic_r,
     block_relaxation,
 )
+
+#: Outer iterations without progress after which the loop is given up, and how many where the
+#: block relaxation gets no further either.
+PATIENCE, PATIENCE_STALLED = 25, 3
 
 #: Residual below which frozen coefficients give way to their derivatives.
 NEAR = 1e-2
@@ -54,7 +61,7 @@ class FixedPointOptions:
     depth, over_relaxation, single_loop
         See `uzawa.Relaxation`.
     inner_tolerance
-        Of the block relaxation; None for a tenth of the tolerance.
+        Of the block relaxation; None for a tenth of the tolerance, as far as rounding allows.
     material_step
         "secant" (Kacanov), "tangent" (Newton), or "auto": secant steps until the residual is
         below 1e-2, then tangent ones as long as they reduce it.
@@ -74,7 +81,7 @@ class FixedPointOptions:
     material_step: str = "auto"
     linear: str = "auto"
     max_outer: int = 200
-    max_inner: int = 2000
+    max_inner: int = MAX_INNER
 
 
 @dataclass
@@ -87,12 +94,18 @@ class FixedPoint:
         The contact problem; its iterate is the current one.
     options
         Options of the loop.
+    monitor
+        Told of every outer iteration.
+    poll
+        Called in every inner iteration, on all ranks, to stop the solve by an exception; that of
+        the monitor by default.
     """
 
     problem: ContactProblem
     options: FixedPointOptions
     monitor: Monitor | None = None
     counters: Counters = field(default_factory=Counters)
+    poll: Callable[[], None] | None = None
 
     def __post_init__(self) -> None:
         """Choose r and set up the operator."""
@@ -103,7 +116,8 @@ class FixedPoint:
         self.history = History(self.monitor)
         self.forces = Multipliers.zero(self.problem)
         thesis = self.options.stopping == "thesis"
-        inner = self.options.inner_tolerance or self.options.tolerance / 10
+        inner = self.options.inner_tolerance or max(self.options.tolerance / 10, PRECISION)
+        self._stalled = False
         self._followed = np.inf  # residual before the last step that followed psi
         self._relaxation = Relaxation(
             self.r,
@@ -153,7 +167,8 @@ class FixedPoint:
                 tangent = residuals.largest < (NEAR if not tangent else 2 * best)
             since = 0 if residuals.largest < 0.9 * best else since + 1
             best = min(best, residuals.largest)
-            if since >= 25 and options.stopping == "residual":
+            patience = PATIENCE_STALLED if self._stalled else PATIENCE
+            if since >= patience and options.stopping == "residual":
                 return Outcome(False, f"the residual stalled at {best:.2e}", residuals)
         return Outcome(False, f"not converged in {options.max_outer} outer iterations", residuals)
 
@@ -171,7 +186,9 @@ class FixedPoint:
         residual = self._base_residual(nodal)
         law = problem.response.normal_law(nodal)
         step = Linearised(self.operator, residual, nodal, bound, law, friction)
-        result = block_relaxation(problem, step, z, self._relaxation, self._norm)
+        poll = self.poll or self.history.poll
+        result = block_relaxation(problem, step, z, self._relaxation, self._norm, poll)
+        self._stalled = result.stalled
         problem.add(result.increment)
         self.forces = result.forces
         return result.iterations, result.z

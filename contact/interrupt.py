@@ -1,4 +1,4 @@
-"""Stop a solve after the running outer iteration, on all ranks together."""
+"""Stop a solve between its iterations, on all ranks together, and a run anywhere else."""
 
 from __future__ import annotations
 
@@ -7,22 +7,70 @@ import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from dataclasses import dataclass, field
 from types import FrameType
+from typing import TYPE_CHECKING, NoReturn
 
 from mpi4py import MPI
 
-from contact.report import Monitor, Record
+if TYPE_CHECKING:  # it loads dolfinx, which PETSc's options have to precede
+    from contact.report import Monitor, Record
 
 #: Seconds in which a second signal is taken for an echo of the first.
 REPEAT = 2.0
 
 
 class Interrupted(Exception):
-    """A signal asked for the end of the solve."""
+    """A signal asked for the end of the solve.
+
+    Parameters
+    ----------
+    number
+        Of the signal.
+    """
+
+    def __init__(self, number: int) -> None:
+        super().__init__(f"interrupted ({signal.Signals(number).name})")
+        self.number = number
+
+
+class Terminated(KeyboardInterrupt):
+    """SIGTERM, where SIGINT would raise KeyboardInterrupt."""
+
+
+@dataclass
+class Stop:
+    """A monitor that raises `Interrupted` on all ranks after a signal on any.
+
+    Attributes
+    ----------
+    comm
+        Communicator of the problem.
+    monitor
+        Told of every outer iteration first.
+    caught
+        The first signal on this rank, or nothing.
+    """
+
+    comm: MPI.Intracomm
+    monitor: Monitor | None
+    caught: list[int] = field(default_factory=list)
+
+    def __call__(self, record: Record) -> None:
+        """Pass an outer iteration on, and look for signals. Collective."""
+        if self.monitor is not None:
+            self.monitor(record)
+        self.poll()
+
+    def poll(self) -> None:
+        """Look for signals, once an inner iteration. Collective."""
+        number = self.comm.allreduce(self.caught[0] if self.caught else 0, op=MPI.MAX)
+        if number:
+            raise Interrupted(number)
 
 
 @contextmanager
-def stop_on_signal(comm: MPI.Intracomm, monitor: Monitor | None) -> Iterator[Monitor]:
+def stop_on_signal(comm: MPI.Intracomm, monitor: Monitor | None) -> Iterator[Stop]:
     """Yield a monitor that raises `Interrupted` on all ranks after a SIGINT or SIGTERM on any.
 
     Parameters
@@ -38,25 +86,18 @@ def stop_on_signal(comm: MPI.Intracomm, monitor: Monitor | None) -> Iterator[Mon
     effect (a launcher and its process group may both deliver the same one). Signals can be
     caught in the main thread alone; in others nothing is changed.
     """
-    caught: list[int] = []
+    stop = Stop(comm, monitor)
     since: list[float] = []
     before: dict[int, Callable[[int, FrameType | None], object] | int] = {}
 
     def note(number: int, frame: FrameType | None) -> None:
-        if caught and time.monotonic() - since[0] > REPEAT:
+        if stop.caught and time.monotonic() - since[0] > REPEAT:
             for ending, handler in before.items():
                 signal.signal(ending, handler)
             signal.raise_signal(number)
-        if not caught:
-            caught.append(number)
+        if not stop.caught:
+            stop.caught.append(number)
             since.append(time.monotonic())
-
-    def check(record: Record) -> None:
-        if monitor is not None:
-            monitor(record)
-        number = comm.allreduce(caught[0] if caught else 0, op=MPI.MAX)
-        if number:
-            raise Interrupted(f"interrupted ({signal.Signals(number).name})")
 
     try:
         if threading.current_thread() is threading.main_thread():
@@ -65,7 +106,25 @@ def stop_on_signal(comm: MPI.Intracomm, monitor: Monitor | None) -> Iterator[Mon
                 if handler is not None:  # None: not installed from Python, left alone
                     before[ending] = handler
                     signal.signal(ending, note)
-        yield check
+        yield stop
     finally:
         for number, handler in before.items():
             signal.signal(number, handler)
+
+
+@contextmanager
+def raising_on_sigterm() -> Iterator[None]:
+    """Let SIGTERM raise `Terminated`, as SIGINT raises KeyboardInterrupt."""
+
+    def end(number: int, frame: FrameType | None) -> NoReturn:
+        raise Terminated
+
+    default = signal.getsignal(signal.SIGTERM) is signal.SIG_DFL
+    mine = default and threading.current_thread() is threading.main_thread()
+    if mine:
+        signal.signal(signal.SIGTERM, end)
+    try:
+        yield
+    finally:
+        if mine:
+            signal.signal(signal.SIGTERM, signal.SIG_DFL)

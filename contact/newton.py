@@ -145,7 +145,7 @@ class Newton:
             max_outer=min(FixedPointOptions.max_outer, self._left),
             linear=self.options.linear,
         )
-        relaxed = FixedPoint(self.problem, options, note, self.counters)
+        relaxed = FixedPoint(self.problem, options, note, self.counters, self.history.poll)
         try:
             return relaxed.solve()
         finally:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import logging
 from dataclasses import dataclass, field
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 from contact.kkt import KKT
 
@@ -46,6 +46,14 @@ class Monitor(Protocol):
         """Take note of an iteration."""
 
 
+@runtime_checkable
+class Poll(Protocol):
+    """A monitor that can stop the solve within an outer iteration too."""
+
+    def poll(self) -> None:
+        """Raise on all ranks if the solve is to end. Collective."""
+
+
 @dataclass
 class History:
     """The outer iterations so far, handed to a monitor as they come."""
@@ -68,6 +76,11 @@ class History:
         if self.monitor is not None:
             self.monitor(record)
 
+    def poll(self) -> None:
+        """Let the monitor end the solve between two inner iterations. Collective."""
+        if isinstance(self.monitor, Poll):
+            self.monitor.poll()
+
 
 @dataclass(frozen=True)
 class Outcome:
@@ -81,8 +94,11 @@ class Outcome:
         In words, also when it has converged.
     kkt
         The final residuals.
+    signal
+        Number of the signal that ended it; 0 for none.
     """
 
     converged: bool
     reason: str
     kkt: KKT
+    signal: int = 0

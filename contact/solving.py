@@ -149,7 +149,7 @@ def solve_problem(
         A solution on a coarser mesh, for Newton's method to start from.
 
     An interrupt (Ctrl-C, or SIGTERM from a batch system) ends the solve after the running
-    outer iteration and keeps what was computed; a second one ends the program.
+    iteration and keeps what the last outer one left; a second one ends the program.
 
     Raises
     ------
@@ -166,7 +166,9 @@ def solve_problem(
             else:
                 outcome = method.solve()
         except Interrupted as interrupt:
-            outcome = Outcome(False, str(interrupt), evaluate(problem, method.forces))
+            problem.apply_load(1.0)  # it may have come in a load step
+            residuals = evaluate(problem, method.forces)
+            outcome = Outcome(False, str(interrupt), residuals, interrupt.number)
     check_potential(problem, method.forces)
     solution = Solution(
         problem=problem,

@@ -23,6 +23,10 @@ from contact.response import NormalLaw
 from contact.state import Multipliers, bound_of
 from forms.foundation import contact_multiplier
 
+#: Iterations without progress, that is 1 %, after which the relaxation is given up: accelerated,
+#: and plain. With r far from r* the plain one creeps by 1e-4 an iteration, and still gets there.
+PATIENCE, PATIENCE_PLAIN, PROGRESS = 100, 500, 0.99
+
 
 @dataclass(frozen=True)
 class Relaxation:
@@ -100,6 +104,8 @@ class RelaxationResult:
         Number of linear solves.
     residual
         The largest interface residual reached.
+    stalled
+        Whether it was given up because nothing got better: rounding, as a rule.
     """
 
     increment: Array
@@ -107,6 +113,7 @@ class RelaxationResult:
     z: Array
     iterations: int
     residual: float
+    stalled: bool = False
 
 
 def automatic_r(problem: ContactProblem) -> float:
@@ -191,6 +198,7 @@ def block_relaxation(
     z: Array,
     parameters: Relaxation,
     domain_norm: Callable[[Array], float] | None = None,
+    poll: Callable[[], None] | None = None,
 ) -> RelaxationResult:
     """Iterate Steps 1 to 3 of Algorithm 2 (5, 7, 9) on one linearised problem. Collective.
 
@@ -206,6 +214,8 @@ def block_relaxation(
         Of the method.
     domain_norm
         L2(Omega) norm of owned unknowns, needed for the thesis's criterion.
+    poll
+        Called before every iteration, on all ranks; what it raises ends the relaxation.
     """
     trace, r, bound, law = problem.trace, parameters.r, step.bound, step.law
     weights = np.repeat(trace.weight, z.shape[1])
@@ -229,7 +239,11 @@ def block_relaxation(
     residual, forces = np.inf, Multipliers.zero(problem)
     increment: Array = np.zeros(problem.owned)
     start = split(problem, step.nodal, step.friction)
+    best, since = np.inf, 0
+    patience = PATIENCE_PLAIN if accelerator is None else PATIENCE
     for iteration in range(1, parameters.max_iterations + 1):
+        if poll is not None:
+            poll()
         multiplier = _project(problem, z, r, bound, law)
         q = 2 * multiplier - z
         rhs = -step.residual
@@ -246,6 +260,7 @@ def block_relaxation(
         residual = max(interface_residuals(problem, nodal, forces, bound))
         phi = (z - multiplier) * (1 / r)
         image = multiplier + r * (phi + parameters.over_relaxation * (u - phi))
+        measured = residual
         if parameters.thesis_tolerance is not None:
             assert domain_norm is not None
             phi = (image - _project(problem, image, r, bound, law)) * (1 / r)
@@ -253,11 +268,17 @@ def block_relaxation(
                 moved, projected = increment - old_increment, phi - old_phi
                 change = domain_norm(moved) ** 2 + trace.norm(projected) ** 2
                 size = domain_norm(problem.x.x.array[: problem.owned] + increment) ** 2
-                if change < parameters.thesis_tolerance**2 * (size + trace.norm(phi) ** 2):
+                size += trace.norm(phi) ** 2
+                if change < parameters.thesis_tolerance**2 * size:
                     return RelaxationResult(increment, forces, image, iteration, residual)
+                measured = float(np.sqrt(change / size)) if size > 0 else 0.0
             old_phi, old_increment = phi, increment
         elif residual <= parameters.tolerance or not np.isfinite(residual):
             return RelaxationResult(increment, forces, image, iteration, residual)
+        since = 0 if measured < PROGRESS * best else since + 1
+        best = min(best, measured)
+        if since >= patience:
+            return RelaxationResult(increment, forces, image, iteration, residual, stalled=True)
         z = image
         if accelerator is not None:
             newest = (total + r * u).ravel()

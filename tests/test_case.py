@@ -2,6 +2,7 @@
 
 import json
 import pickle
+import signal
 import sys
 import tomllib
 import types
@@ -304,6 +305,7 @@ BAD = {
     "augmentation text": ({"solver__r": "big"}, 'accepted: "auto" or a number > 0'),
     "relaxation": ({"solver__relaxation": 2.0}, "between 0 and 2, both excluded"),
     "tolerance": ({"solver__tolerance": 0.0}, "solver.tolerance: given 0.0"),
+    "tolerance below rounding": ({"solver__tolerance": 1e-16}, "a number from 1e-15"),
     "loose inner loop": (
         {"solver": {"method": "uzawa", "inner_tolerance": 1e-3}},
         "at most tolerance = 1e-08",
@@ -470,6 +472,44 @@ def test_exit_status_and_outputs_of_a_solve(bar, capsys, monkeypatch, limit, sta
     shown = capsys.readouterr()
     assert shown.out.startswith("stopped: " if status else "converged: ")
     assert "iteration 0" in shown.err
+
+
+@pytest.mark.parametrize("stage", ["setup", "nested"])
+@pytest.mark.parametrize(("number", "status"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
+def test_a_signal_before_the_solve_ends_the_run_in_words(
+    bar, capsys, monkeypatch, stage, number, status
+):
+    import contact.nested
+    import contact.solving
+
+    before = [signal.getsignal(ending) for ending in (signal.SIGINT, signal.SIGTERM)]
+    where = contact.solving if stage == "setup" else contact.nested
+    monkeypatch.setattr(where, "build_problem", lambda *_, **__: signal.raise_signal(number))
+    out = bar.parent / "out"
+    nested = ["--set", "solver.nested=true", "--set", "mesh.cells=[32, 8]"]
+    assert main(["solve", str(bar), "--out", str(out), *nested]) == status
+    assert capsys.readouterr().err == f"contact: interrupted ({number.name})\n"
+    assert not out.exists()
+    assert before == [signal.getsignal(ending) for ending in (signal.SIGINT, signal.SIGTERM)]
+
+
+@pytest.mark.parametrize(("number", "status"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
+def test_a_signal_in_a_solve_keeps_what_there_is(bar, capsys, monkeypatch, number, status):
+    from contact.report import History
+
+    add = History.add
+
+    def press(history, record):
+        signal.raise_signal(number)
+        add(history, record)
+
+    monkeypatch.setattr(History, "add", press)
+    out = bar.parent / "out"
+    assert main(["solve", str(bar), "--out", str(out), "--quiet"]) == status
+    assert json.loads((out / "summary.json").read_text())["converged"] is False
+    shown = capsys.readouterr()
+    assert shown.out == ""
+    assert f"contact: stopped: interrupted ({number.name}); results in {out}" in shown.err
 
 
 def test_check_prints_the_case_the_parts_and_the_unknowns(bar, capsys):

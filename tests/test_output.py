@@ -5,6 +5,7 @@ import json
 import os
 import signal
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -12,13 +13,14 @@ from mpi4py import MPI
 
 from contact.build import build_problem
 from contact.case import Case, parse_case
-from contact.case_solver import Output
+from contact.case_solver import Output, Solver
 from contact.fields import DerivedFields
 from contact.kkt import evaluate
+from contact.linear import LinearOperator
 from contact.output import write_outputs
 from contact.report import Record
 from contact.solution import Solution
-from contact.solving import solve
+from contact.solving import solve, solve_problem
 from contact.table import contact_table, csv_columns, tangent_of
 
 # Debian's adios2 would take its serial library in a run without mpirun.
@@ -279,3 +281,41 @@ def test_interrupted_solve_keeps_its_results(shared_tmp_path: Path) -> None:
     assert summary["reason"] == "interrupted (SIGINT)"
     assert len(rows) == 9
     assert signal.getsignal(signal.SIGINT) is handler
+
+
+@pytest.mark.parallel
+def test_a_solve_stops_between_inner_iterations(
+    shared_tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A signal in a long inner loop is not left waiting for its end."""
+    solve_once = LinearOperator.solve
+
+    def press(operator: LinearOperator, *args: Any, **options: Any) -> Any:
+        if operator.counters.linear_solves == 5 and MPI.COMM_WORLD.rank == 0:
+            signal.raise_signal(signal.SIGTERM)
+        return solve_once(operator, *args, **options)
+
+    monkeypatch.setattr(LinearOperator, "solve", press)
+    solution = solve(block(2, solver={"method": "uzawa"}))
+    assert solution.counters.linear_solves == 6
+    assert solution.outcome.signal == signal.SIGTERM
+    summary, _ = written(solution, shared_tmp_path)
+    assert summary["reason"] == "interrupted (SIGTERM)"
+    assert summary["outer_iterations"] == len(solution.history.records)
+
+
+def test_an_interrupted_load_step_is_judged_by_the_full_load() -> None:
+    """The residuals of a solve that ends in a load step are those of the problem itself."""
+    problem = build_problem(block(2))
+
+    def press(record: Record) -> None:
+        problem.apply_load(0.25)
+        signal.raise_signal(signal.SIGINT)
+
+    solution = solve_problem(problem, Solver(), press)
+    assert solution.outcome.signal == signal.SIGINT
+    kept = problem.external.copy(), problem.x.x.array.copy()
+    problem.apply_load(1.0)
+    np.testing.assert_array_equal(problem.external, kept[0])
+    np.testing.assert_array_equal(problem.x.x.array, kept[1])
+    assert solution.outcome.kkt == evaluate(problem, solution.forces)

@@ -136,19 +136,27 @@ def test_automatic_r():
     assert automatic_r(fine) == pytest.approx(automatic_r(problem), rel=1e-12)
 
 
+#: More than numbers can give.
+ROUNDING = {"tolerance": 1e-18, "inner_tolerance": 1e-18, "max_inner": 10**6}
+
+
 @pytest.mark.parametrize(
     ("options", "words"),
     [
         ({"max_outer": 1}, "1 outer iterations"),
         ({"max_inner": 3, "max_outer": 8}, "8 outer iterations"),
         ({"stopping": "thesis", "eps": 1e-3, "eps_fp": 1e-3}, "criterion is met, but"),
+        (ROUNDING, "stalled at"),
+        ({**ROUNDING, "depth": 0, "r": 3.0}, "stalled at"),
+        ({**ROUNDING, "stopping": "thesis", "eps": 1e-17}, "criterion is met, but"),
     ],
 )
 def test_a_run_that_has_not_converged_says_so(options, words):
     loop, outcome = attempt(bar(MPI.COMM_SELF, 8), **options)
     assert not outcome.converged
     assert words in outcome.reason
-    assert outcome.kkt.largest > 1e-8
+    assert outcome.kkt.largest > options.get("tolerance", 1e-8)
+    assert loop.counters.linear_solves < 20_000
     assert outcome.kkt == loop.history.records[-1].kkt
 
 
