@@ -123,7 +123,7 @@ def draw_series(columns: Mapping[str, Sequence[Any]]) -> Figure:
         power = 2 if norm == "L2" else 1
         ends, low = np.array([1 / cells.max(), 1 / cells.min()]), ax.dataLim.y0
         ax.loglog(ends, 0.7 * low * (ends / ends[0]) ** power, "k:", label=f"slope {power}")
-        ax.set(title=f"relative error in {norm}", xlabel="h")
+        ax.set(title=f"relative error in {norm}", xlabel=r"$h$ (mm)")
         shown = np.unique(cells)[::-1]
         ax.set_xticks(1 / shown, [f"1/{n}" for n in shown])
         ax.xaxis.set_minor_formatter(NullFormatter())
@@ -142,9 +142,9 @@ def figure_7_6(report: Report, coarse: bool) -> dict[str, Array]:
     else:
         variants = [
             Variant("P1, f2 = -0.005", small, 1, (8, 16, 32, 64, 128), 512),
-            Variant("P1, f2 = -0.05", large, 1, (8, 16, 32, 64), 256),
-            Variant("P2, f2 = -0.005", small, 2, (8, 16, 32), 128),
-            Variant("P2, f2 = -0.05", large, 2, (8, 16), 64),
+            Variant("P1, f2 = -0.05", large, 1, (8, 16, 32, 64, 128), 512),
+            Variant("P2, f2 = -0.005", small, 2, (8, 16, 32, 64), 256),
+            Variant("P2, f2 = -0.05", large, 2, (8, 16, 32, 64), 256),
         ]
     return mesh_series(
         report,
@@ -351,9 +351,9 @@ def fixed_points(report: Report, coarse: bool) -> dict[str, float]:
     axes[0].set_title("Theorem 3.2 (Algorithm 1)")
     axes[1].set_title("Theorem 4.5 (Algorithm 3)")
     for ax in axes:
-        ax.set_xlabel("iteration n")
+        ax.set_xlabel(r"iteration $n$")
         ax.legend(fontsize=6)
-    axes[0].set_ylabel("|u_n - u| in energy")
+    axes[0].set_ylabel(r"$|u_n - u|$ in energy")
     note = (
         "Kacanov's bound is ln(t/xi_0)/(1 + ln(t/xi_0)) at the largest strain t of the body, the "
         "local rate of the secant iteration there; the observed rate is smaller, as most of the "

@@ -84,9 +84,9 @@ def compare(report: Report, tables: Mapping[str, Table | None]) -> None:
                 usual = 1.6 * float(np.quantile(np.abs(table[key]), 0.97))
                 axes[row, column].set_ylim(-usual if key == "tau" else 0.0, usual)
         axes[0, column].set_title(f"f2 = {FIGURES[exact][0]:g}")
-        axes[1, column].set_xlabel("x along Gamma_3")
-    axes[0, 0].set_ylabel("pressure")
-    axes[1, 0].set_ylabel("tangential stress")
+        axes[1, column].set_xlabel(r"$x$ along $\Gamma_3$ (mm)")
+    axes[0, 0].set_ylabel(r"$-\sigma_\nu$ (daN/mm²)")
+    axes[1, 0].set_ylabel(r"$-\sigma_\tau\cdot t$ (daN/mm²)")
     axes[0, 0].legend()
     report.figure(
         "multipliers-and-penalty",

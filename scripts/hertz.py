@@ -295,7 +295,9 @@ def figure_7_2(report: Report, solutions: Mapping[tuple[object, ...], Solution])
         "(7.16), body's normal": (1600.0, "(7.16)", "body", "quarter_disc"),
     }
     tables = {label: contact_table(solutions[key]) for label, key in shown.items()}
-    deformed = picture(solutions[shown["(7.16), rho = 1e4"]], "von_mises", "von Mises stress")
+    deformed = picture(
+        solutions[shown["(7.16), rho = 1e4"]], "von_mises", "von Mises stress (units of the case)"
+    )
     if MPI.COMM_WORLD.rank > 0:
         return
     x = np.linspace(0, 1.25 * hertz.half_width, 400)
@@ -312,8 +314,9 @@ def figure_7_2(report: Report, solutions: Mapping[tuple[object, ...], Solution])
             (line,) = axes[1].plot(where, table["tau"][near], label=label)
             axes[1].plot(where, -table["bound"][near], ":", lw=0.8, color=line.get_color())
             data |= {f"tau, {label}": table["tau"][near], f"bound, {label}": table["bound"][near]}
-    axes[0].set_ylabel("pressure")
-    axes[1].set(xlabel="x", ylabel="tangential stress; bound dotted")
+    axes[0].set_ylabel(r"$-\sigma_\nu$ (units of the case)")
+    axes[1].set_xlabel(r"$x$ along $\Gamma_3$ (mesh units)")
+    axes[1].set_ylabel(r"$-\sigma_\tau\cdot t$ (units of the case); bound dotted")
     for ax in axes:
         ax.legend()
     report.figure(

@@ -113,11 +113,11 @@ def _draw(report: Report, name: str, where: str, tables: dict[str, Table | None]
             # The peak at the end would hide all else.
             usual = 1.6 * float(np.quantile(np.abs(table[key]), 0.97))
             row[0].set_ylim(-usual if key == "tau" else 0.0, usual)
-    for row, label in zip(axes, ("pressure", "friction bound s", "tangential stress"), strict=True):
-        row[0].set_ylabel(label)
+    for row, label in zip(axes, (r"-\sigma_\nu", "s", r"-\sigma_\tau\cdot t"), strict=True):
+        row[0].set_ylabel(f"${label}$ (daN/mm²)")
     axes[0, 1].legend()
-    axes[2, 0].set_xlabel("x along Gamma_3 (peaks cut off)")
-    axes[2, 1].set_xlabel("x, the end that the load presses down")
+    axes[2, 0].set_xlabel(r"$x$ along $\Gamma_3$ (mm), peaks cut off")
+    axes[2, 1].set_xlabel(r"$x$ (mm), the end that the load presses down")
     caption = f"Pressure, bound and tangential stress over the radius of R: {where}"
     report.figure(name, caption, figure, data)
 
