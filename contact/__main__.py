@@ -8,9 +8,9 @@ from __future__ import annotations
 
 import argparse
 import difflib
-import os
 import signal
 import sys
+import tempfile
 import traceback
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -108,13 +108,19 @@ def _shared(comm: MPI.Intracomm, action: Callable[[], T]) -> T:
 
 
 def _check_folder(folder: Path) -> None:
-    """Raise an InputError if a folder cannot be written to. Nothing is created yet."""
-    place = folder.absolute()
-    while not place.exists():
-        place = place.parent
-    if not place.is_dir() or not os.access(place, os.W_OK | os.X_OK):
-        what = "not a folder" if not place.is_dir() else "not writable"
-        raise InputError(f"--out {folder}: {place} is {what}; accepted: a folder to write to")
+    """Raise an InputError if a folder cannot be written to; nothing is left of the attempt."""
+    missing = [place for place in (folder, *folder.parents) if not place.exists()]
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryFile(dir=folder):
+            pass
+    except OSError as error:
+        reason = error.strerror or "not writable"
+        raise InputError(f"--out {folder}: {reason}; accepted: a folder to write to") from None
+    finally:
+        for place in missing:
+            if place.is_dir():
+                place.rmdir()
 
 
 def _solve(case: Case, options: argparse.Namespace, comm: MPI.Intracomm) -> int:
@@ -182,17 +188,20 @@ def main(arguments: Sequence[str] | None = None) -> int:
         if comm.rank == 0:
             print(f"contact: {error}", file=sys.stderr)
         return BAD_INPUT
+    except MemoryError:
+        text = "not enough memory; accepted: fewer cells, or more ranks on more machines"
+        return _end(comm, text, BAD_INPUT)
     except KeyboardInterrupt as interrupt:
-        return _interrupted(comm, interrupt)
+        number = signal.SIGTERM if isinstance(interrupt, Terminated) else signal.SIGINT
+        return _end(comm, f"interrupted ({number.name})", SIGNALLED + number)
 
 
-def _interrupted(comm: MPI.Intracomm, interrupt: KeyboardInterrupt) -> int:
-    """Say that a signal ended the run where nothing is kept, and end the other ranks too."""
-    number = signal.SIGTERM if isinstance(interrupt, Terminated) else signal.SIGINT
-    print(f"contact: interrupted ({number.name})", file=sys.stderr, flush=True)
+def _end(comm: MPI.Intracomm, text: str, status: int) -> int:
+    """Say what has ended the run on this rank, and end the other ranks too."""
+    print(f"contact: {text}", file=sys.stderr, flush=True)
     if comm.size > 1:
-        comm.Abort(SIGNALLED + number)
-    return SIGNALLED + number
+        comm.Abort(status)
+    return status
 
 
 if __name__ == "__main__":

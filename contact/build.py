@@ -16,6 +16,7 @@ from contact.domain import Domain, make_domain
 from contact.errors import InputError
 from contact.expressions import Expression
 from contact.foundation import Foundation, GapFunction, Plane, Sphere
+from contact.linear import HUGE
 from contact.problem import ContactProblem
 from contact.projections import Array
 from contact.response import Conductor, Layer
@@ -63,9 +64,12 @@ def build_problem(
     """
     with named(case.source):
         domain = make_domain(case.mesh, comm) if domain is None else domain
+        _check_range("mesh", domain.size)
         case.check_mesh(domain.dim, domain.parts)
+        law = material_law(case.material) if law is None else law
+        _check_range("material.young", float(law.young))
         body = parts.Body(
-            material_law(case.material) if law is None else law,
+            law,
             [_fixed(i, fixed, domain.comm) for i, fixed in enumerate(case.fixed)],
             [_load(i, load, domain.comm) for i, load in enumerate(case.load)],
             None if case.material.piezo is None else piezo(case.material.piezo, domain.dim),
@@ -82,8 +86,19 @@ def build_problem(
         finite = bool(np.isfinite(problem.external).all())
         if not domain.comm.allreduce(finite, op=MPI.LAND):
             raise InputError("load: a formula is not finite everywhere on its part")
+        largest = float(np.abs(problem.external).max(initial=0.0))
+        _check_range("load", domain.comm.allreduce(largest, op=MPI.MAX), least=0.0)
         check_held(problem)
     return problem
+
+
+def _check_range(key: str, value: float, least: float = 1 / HUGE) -> None:
+    """Refuse a size whose square is no number any more, or nothing."""
+    if not least <= value <= HUGE:
+        raise InputError(
+            f"{key}: a size of {value:.3g} leads to numbers that overflow; accepted: units that "
+            f"keep sizes between {1 / HUGE:g} and {HUGE:g}"
+        )
 
 
 @contextmanager
@@ -115,6 +130,8 @@ class NodalField:
             values = self.expression.numpy(points, self.comm)
         except InputError as error:
             raise InputError(f"{self.key}: {error}") from None
+        largest = float(np.abs(values).max(initial=0.0))
+        _check_range(self.key, self.comm.allreduce(largest, op=MPI.MAX), least=0.0)
         least = self.comm.allreduce(float(values.min(initial=np.inf)), op=MPI.MIN)
         if least < self.minimum:
             raise InputError(

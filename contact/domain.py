@@ -1,5 +1,7 @@
 """Meshes with named parts: from a generator, a Gmsh file, a recipe or a dolfinx mesh."""
 
+import math
+import os
 from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any
 
@@ -29,6 +31,9 @@ __all__ = [
     "refined",
 ]
 
+#: Bytes that making the mesh takes for a cell, without any unknowns (seen: 235 to 345).
+CELL_MEMORY = 200
+
 Marker = Callable[[npt.NDArray[np.float64]], npt.NDArray[np.bool_]]
 
 
@@ -38,11 +43,15 @@ def make_domain(section: "MeshSection", comm: MPI.Intracomm) -> Domain:
     Raises
     ------
     InputError
-        As `rectangle`, `box`, `from_msh` and `from_recipe`.
+        As `rectangle`, `box`, `from_msh` and `from_recipe`, and if the mesh does not fit into
+        the memory.
     """
     if section.file is not None:
         domain = from_msh(comm, section.file)
     elif section.generator in ("rectangle", "box"):
+        # Triangles of a square, tetrahedra of a cube.
+        cells = math.prod(section.cells or ()) * (2 if section.generator == "rectangle" else 6)
+        _check_memory(comm, cells)
         # The section itself demands these three for a grid.
         assert section.origin is not None
         assert section.size is not None
@@ -58,8 +67,23 @@ def make_domain(section: "MeshSection", comm: MPI.Intracomm) -> Domain:
     axis = section.axis or (0.0, 1.0, 0.0)
     rotate(domain.mesh, section.rotation, axis if domain.dim == 3 else (0.0, 0.0, 1.0))
     for _ in range(section.refine):
+        cells = domain.mesh.topology.index_map(domain.dim).size_global
+        _check_memory(comm, cells * 2**domain.dim)
         domain = refined(domain)
     return domain
+
+
+def _check_memory(comm: MPI.Intracomm, cells: int) -> None:
+    """Refuse a mesh that certainly does not fit, before the system ends the program for it."""
+    machine = os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
+    memory = comm.allreduce(machine, op=MPI.MIN)
+    needed = cells * CELL_MEMORY / comm.size
+    if needed > memory:
+        raise InputError(
+            f"mesh: {cells:.3g} cells take more memory, {needed / 1e9:.3g} GB a rank, than there "
+            f"is, {memory / 1e9:.3g} GB; accepted: fewer cells (mesh.cells, mesh.refine), or more "
+            "ranks on more machines"
+        )
 
 
 def _pieces(section: "MeshSection") -> dict[str, list[Piece]]:

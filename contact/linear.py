@@ -6,6 +6,8 @@ r I of Algorithm 2, a compliant layer, a current, or Newton's linearised contact
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 
 import numpy as np
@@ -19,6 +21,22 @@ from contact.errors import InputError
 from contact.linear_block import BlockPreconditioner
 from contact.problem import ContactProblem
 from contact.projections import Array
+
+#: Numbers beyond this one, or below its inverse, are too near to those whose squares overflow.
+HUGE = 1e150
+
+
+@contextmanager
+def petsc_options(prefix: str) -> Iterator[None]:
+    """Turn what PETSc says of its options while a solver is set up into an InputError."""
+    try:
+        yield
+    except PETSc.Error as error:
+        words = str(error).strip().splitlines()[-1].removeprefix("[0] ")
+        raise InputError(
+            f"PETSc cannot set up its solver: {words}; accepted: options of PETSc with the prefix "
+            f"-{prefix} that it knows, or none"
+        ) from error
 
 
 @dataclass
@@ -68,6 +86,7 @@ class LinearOperator:
         self.ksp.setOptionsPrefix(prefix)
         self.iterative = kind == "iterative" or (kind == "auto" and linear_amg.is_large(problem))
         self._split: BlockPreconditioner | None = None
+        self._prefix = prefix
         if self.iterative and problem.piezoelectric:
             self._split = BlockPreconditioner(self.ksp, problem, symmetric)
         elif self.iterative:
@@ -78,7 +97,8 @@ class LinearOperator:
             pc = self.ksp.getPC()
             pc.setType("cholesky" if symmetric else "lu")
             pc.setFactorSolverType("mumps")
-        self.ksp.setFromOptions()
+        with petsc_options(prefix):
+            self.ksp.setFromOptions()
 
     def update(self, form: fem.Form, blocks: Array, *, constant: bool = False) -> None:
         """Assemble the operator at the problem's iterate. Collective.
@@ -115,7 +135,8 @@ class LinearOperator:
         self._form, self._blocks = form, blocks.copy()
         split = self._split
         self.ksp.setOperators(self.matrix, split.matrix(self.matrix) if split else self.matrix)
-        self.ksp.setUp()
+        with petsc_options(self._prefix):
+            self.ksp.setUp()
         self.counters.factorizations += 1
 
     def _all(self, flag: bool) -> bool:
@@ -145,7 +166,7 @@ class LinearOperator:
         Raises
         ------
         InputError
-            If the operator is singular: the body is not held.
+            If the operator is singular, for the body is not held, or its numbers overflow.
         """
         self._rhs.array[:] = np.where(self.problem.free.ravel(), rhs, 0.0)
         if rtol is not None:
@@ -160,8 +181,20 @@ class LinearOperator:
         reason = self.ksp.getConvergedReason()
         finite = bool(np.isfinite(self._solution.norm()))
         if reason == PETSc.KSP.ConvergedReason.DIVERGED_PCSETUP_FAILED or not finite:
-            raise InputError(
-                "the linear system is singular: the body can move freely; fix enough "
-                "displacement components (or, for a piezoelectric body, a potential)"
-            )
+            raise self._fault()
         return self._solution.array.copy()
+
+    def _fault(self) -> InputError:
+        """Say why there is no solution. Collective."""
+        operator, rhs = self.matrix.norm(), self._rhs.norm()
+        young = float(self.problem.body.law.young)
+        if not (operator < HUGE and rhs < HUGE and rhs < HUGE * young):
+            return InputError(
+                f"numbers overflow: Young's modulus is {young:.3g}, the linear operator of the "
+                f"size {operator:.3g}, its right-hand side {rhs:.3g}; accepted: constants, loads "
+                "and prescribed values in units that bring them nearer to 1"
+            )
+        return InputError(
+            "the linear system is singular: the body can move freely; fix enough "
+            "displacement components (or, for a piezoelectric body, a potential)"
+        )

@@ -25,7 +25,7 @@ from petsc4py import PETSc
 
 from contact.errors import InputError
 from contact.kkt import KKT, evaluate, residual_forces
-from contact.linear import Counters, LinearOperator
+from contact.linear import Counters, LinearOperator, petsc_options
 from contact.norms import domain_norm
 from contact.problem import ContactProblem
 from contact.projections import Array
@@ -219,9 +219,12 @@ class _Inner:
         default = not given.hasName(name)
         if default:
             given[name] = "basic"
-        self.snes.setFromOptions()
-        if default:
-            given.delValue(name)
+        try:
+            with petsc_options("penalty_"):
+                self.snes.setFromOptions()
+        finally:
+            if default:
+                given.delValue(name)
 
     def apply(self, _: Any, rhs: PETSc.Vec, solution: PETSc.Vec) -> None:
         """Solve with the operator: the preconditioner of SNES's KSP."""

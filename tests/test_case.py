@@ -447,7 +447,8 @@ def test_petsc_options_are_told_from_ours():
         ("solve a.toml --out out --plto", "did you mean --plot?"),
         ("solve nowhere.toml --out out", "nowhere.toml: No such file"),
         ("solve BAR --out out --set material.young=0", "material.young: given 0"),
-        ("solve BAR --out BAR/out", "is not a folder"),
+        ("solve BAR --out BAR/out", "Not a directory; accepted: a folder to write to"),
+        ("solve BAR --out /proc/self/x/out", "/out: No such file or directory; accepted: a folder"),
         ("check BAR --set contact.on=flor", "contact.on"),
     ],
 )
@@ -491,6 +492,19 @@ def test_a_signal_before_the_solve_ends_the_run_in_words(
     assert capsys.readouterr().err == f"contact: interrupted ({number.name})\n"
     assert not out.exists()
     assert before == [signal.getsignal(ending) for ending in (signal.SIGINT, signal.SIGTERM)]
+
+
+def test_too_little_memory_is_said_in_words(bar, capsys, monkeypatch):
+    import contact.solving
+
+    def build(*_, **__):
+        raise MemoryError("std::bad_alloc")
+
+    monkeypatch.setattr(contact.solving, "build_problem", build)
+    assert main(["solve", str(bar), "--out", str(bar.parent / "out")]) == 2
+    shown = capsys.readouterr().err
+    assert shown.startswith("contact: not enough memory; accepted: fewer cells")
+    assert shown.count("\n") == 1
 
 
 @pytest.mark.parametrize(("number", "status"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])

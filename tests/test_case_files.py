@@ -4,6 +4,7 @@ from pathlib import Path
 
 import pytest
 from mpi4py import MPI
+from petsc4py import PETSc
 
 from contact.__main__ import BAD_INPUT, CONVERGED, NOT_CONVERGED, main
 
@@ -82,6 +83,25 @@ WRONG = {
     "a formula with a mistake": ("-0.001", '"-0.001*(x"', ["load.0.traction", "not a formula"]),
     "a formula that would run code": ("-0.001", '"__import__(x)"', ["load.0.traction"]),
     "a load that is not finite": ("-0.001", '"log(x-1)"', ["load"]),
+    "a load that overflows": ("-0.001", "-1e300", ["load", "5e+299", "overflow"]),
+    "a load formula that overflows": ("-0.001", '"-1e200*x"', ["load", "overflow"]),
+    "a displacement that overflows": (
+        "[0.0, 0.0]",
+        "[0.0, 1e300]",
+        ["fixed.0.displacement.1", "1e+300", "overflow"],
+    ),
+    "a modulus that overflows": ("young = 1.0", "young = 1e300", ["material.young", "overflow"]),
+    "a modulus that underflows": ("young = 1.0", "young = 1e-300", ["material.young", "1e-300"]),
+    "a body that overflows": (
+        '[2.0, 1.0]\ncells = [4, 2]\n[mesh.parts.half]\nside = "bottom"\nto = 1.0',
+        "[2e300, 1e300]\ncells = [4, 2]",
+        ["mesh", "2e+300", "overflow"],
+    ),
+    "more cells than memory": (
+        "[4, 2]",
+        "[1000000, 1000000]",
+        ["mesh.cells", "2e+12 cells", "memory"],
+    ),
     "a displacement that is not finite": (
         "[0.0, 0.0]",
         '[0.0, "log(y-0.5)"]',
@@ -265,7 +285,30 @@ def test_wrong_command_line(
     assert all(word in lines[0] for word in words), lines
 
 
-@pytest.mark.parametrize("name", ["pulled off", "potential of an open contact"])
+@pytest.mark.parametrize(
+    ("option", "value", "method"),
+    [
+        ("contact_ksp_type", "foo", "newton"),
+        ("contact_pc_factor_mat_solver_type", "foo", "uzawa"),
+        ("penalty_snes_type", "foo", "penalty"),
+    ],
+)
+def test_wrong_petsc_options(
+    option: str, value: str, method: str, shared_tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    """What PETSc does not know is bad input, and nothing is left in its options."""
+    options = PETSc.Options()
+    options[option] = value
+    before = set(options.getAll())
+    try:
+        case = write(shared_tmp_path, BAR + f"[solver]\nmethod = '{method}'\n")
+        refuse(case, ["PETSc", value, option.split("_")[0]], capfd)
+        assert set(options.getAll()) == before
+    finally:
+        options.delValue(option)
+
+
+@pytest.mark.parametrize("name", ["pulled off", "potential of an open contact", "overflow"])
 @pytest.mark.parametrize("method", ["uzawa", "newton"])
 def test_problem_without_solution(
     name: str, method: str, shared_tmp_path: Path, capfd: pytest.CaptureFixture[str]
@@ -274,6 +317,9 @@ def test_problem_without_solution(
     if name == "pulled off":
         text = BAR.replace("[0.0, 0.0]", '[0.0, "free"]').replace("-0.001", "0.001")
         words = ["pull the body off"]
+    elif name == "overflow":
+        text = BAR.replace("-0.001", "-1e149").replace("young = 1.0", "young = 1e-149")
+        words = ["numbers overflow"]
     else:
         text = BAR.replace("[[load]]", PIEZO + "[[load]]").replace("gap = 0.0", "gap = 0.5")
         text += "\n[electric]\nlaw = 'perfect'\nk_e = 1.0\n"
@@ -289,6 +335,8 @@ def test_problem_without_solution(
         "an unknown part",
         "a displacement that is not finite",
         "a load that is not finite",
+        "a load that overflows",
+        "more cells than memory",
         "a gap that is negative somewhere",
         "a sphere around a contact node",
         "a plane that faces away",
