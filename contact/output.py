@@ -23,7 +23,7 @@ from mpi4py import MPI
 
 from contact import environment
 from contact.electric import charge_balance
-from contact.fields import DerivedFields, unknowns
+from contact.fields import DerivedFields, linear, unknowns
 from contact.solution import Solution
 from contact.table import Table, contact_table, csv_columns
 
@@ -32,6 +32,8 @@ HISTORY = ("iteration", "inner", "equilibrium", "contact", "friction", "change",
 
 def write_outputs(solution: Solution, folder: str | Path) -> None:
     """Write ``summary.json``, ``contact.csv``, ``history.csv`` and the fields. Collective.
+
+    Fields and figures of an earlier run in the folder are removed, its checkpoint is not.
 
     Parameters
     ----------
@@ -44,6 +46,7 @@ def write_outputs(solution: Solution, folder: str | Path) -> None:
     table = contact_table(solution)
     if comm.rank == 0:
         folder.mkdir(parents=True, exist_ok=True)
+        _clear(folder)
         assert table is not None  # on rank 0
         columns = csv_columns(table)
         rows = zip(*(column.tolist() for column in columns.values()), strict=True)
@@ -62,6 +65,19 @@ def write_outputs(solution: Solution, folder: str | Path) -> None:
         text = json.dumps(_finite(summary), indent=2, allow_nan=False)
         _write(folder / "summary.json", text + "\n")
     comm.barrier()
+
+
+def _clear(folder: Path) -> None:
+    """Remove what would be taken for results of this run. On one rank.
+
+    The summary goes first and comes last: without it a folder is not complete.
+    """
+    shutil.rmtree(folder / "fields.bp", ignore_errors=True)
+    shutil.rmtree(folder / "cells.bp", ignore_errors=True)
+    for name in ("summary.json", "fields.xdmf", "fields.h5"):
+        (folder / name).unlink(missing_ok=True)
+    for figure in folder.glob("figure-*.png"):
+        figure.unlink()
 
 
 def summarise(solution: Solution, table: Table | None) -> dict[str, Any]:
@@ -163,12 +179,22 @@ def write_fields(solution: Solution, folder: Path) -> None:
         _replace(comm, folder / "fields.bp", lambda to: write_vtx(to, at_nodes))
         _replace(comm, folder / "cells.bp", lambda to: write_vtx(to, in_cells))
         return
-    from contact.fields import linear
-
-    with io.XDMFFile(comm, folder / "fields.xdmf", "w") as file:
+    # The name of the HDF5 file stands in the XDMF file: a folder is moved, not the name changed.
+    partial = folder / ".part-fields"
+    if comm.rank == 0:
+        shutil.rmtree(partial, ignore_errors=True)
+        partial.mkdir()
+    comm.barrier()
+    with io.XDMFFile(comm, partial / "fields.xdmf", "w") as file:
         file.write_mesh(problem.domain.mesh)
         for function in at_nodes:
             file.write_function(linear(function))
+    comm.barrier()
+    if comm.rank == 0:
+        for name in ("fields.h5", "fields.xdmf"):
+            os.replace(partial / name, folder / name)
+        partial.rmdir()
+    comm.barrier()
 
 
 def write_csv(path: Path, header: Iterable[str], rows: Iterable[Iterable[Any]]) -> None:

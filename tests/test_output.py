@@ -200,7 +200,34 @@ def test_xdmf(shared_tmp_path: Path) -> None:
     written(solution, shared_tmp_path)
     text = (shared_tmp_path / "fields.xdmf").read_text()
     assert all(name in text for name in ("displacement", "stress", "von_mises", "dev_strain"))
-    assert not (shared_tmp_path / "fields.bp").exists()
+    assert sorted(path.name for path in shared_tmp_path.iterdir()) == [
+        "contact.csv",
+        "fields.h5",
+        "fields.xdmf",
+        "history.csv",
+        "summary.json",
+    ]
+
+
+@pytest.mark.parametrize("format_", ["xdmf", "vtx"])
+def test_a_failed_write_leaves_no_fields(
+    format_: str, shared_tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Fields come into the folder when they are complete, and the summary after them."""
+    from dolfinx import io
+
+    def fail(*_: Any, **__: Any) -> None:
+        raise OSError("no space left on device")
+
+    solution = solve(block(2))
+    written(solution, shared_tmp_path)
+    solution.output = Output(fields=format_)
+    monkeypatch.setattr(io.XDMFFile, "write_function", fail)
+    monkeypatch.setattr(io, "VTXWriter", fail)
+    with pytest.raises(OSError, match="no space"):
+        write_outputs(solution, shared_tmp_path)
+    left = {path.name for path in shared_tmp_path.iterdir() if not path.name.startswith(".")}
+    assert left == {"contact.csv", "history.csv"}
 
 
 @pytest.mark.parallel
@@ -242,9 +269,23 @@ def test_checkpoint(kind: str, shared_tmp_path: Path) -> None:
 
 
 def test_outputs_are_replaced(shared_tmp_path: Path) -> None:
-    """A second run into the same folder leaves its own files alone."""
-    written(solve(block(2)), shared_tmp_path)
-    summary, rows = written(solve(block(2, 2)), shared_tmp_path)
+    """A second run into the same folder leaves its own files alone, and what is not ours."""
+    from contact.plots import write_figures
+
+    first, second = solve(block(2)), solve(block(2, 2))
+    first.output = Output(fields="xdmf")
+    written(first, shared_tmp_path)
+    write_figures(first, shared_tmp_path)
+    (shared_tmp_path / "notes.txt").write_text("mine")
+    summary, rows = written(second, shared_tmp_path)
+    assert sorted(path.name for path in shared_tmp_path.iterdir()) == [
+        "cells.bp",
+        "contact.csv",
+        "fields.bp",
+        "history.csv",
+        "notes.txt",
+        "summary.json",
+    ]
     assert summary["dofs"] == 2 * (2 * 4 + 1) * (2 * 4 + 1)
     assert len(rows) == 9
 
