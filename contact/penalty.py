@@ -4,7 +4,8 @@ The Signorini and Coulomb conditions are replaced by the laws of `contact.regula
 the penalised problem (PV_eps) is one nonlinear equation in the displacement. An outer iteration
 freezes the secant modulus of the material and the friction modulus of (4.33); what is left of
 (4.32), the unilateral [u_nu - rho]^+ of the *new* iterate, is solved by SNES as a semismooth
-equation. An outer count is that of Algorithm 3; the inner one counts SNES's iterations.
+equation, with a compliant layer where there is one. An outer count is that of Algorithm 3; the
+inner one counts SNES's iterations.
 
 Convergence. A penalty run solves the penalised problem: it has converged when the equilibrium
 residual with the forces of the regularised laws at the final displacement is below the
@@ -29,7 +30,14 @@ from contact.linear import Counters, LinearOperator, petsc_options
 from contact.norms import domain_norm
 from contact.problem import ContactProblem
 from contact.projections import Array
-from contact.regularised import Implicit, Lagged, NodalLaw, Regularisation, penalised_forces
+from contact.regularised import (
+    Implicit,
+    Lagged,
+    NodalLaw,
+    Regularisation,
+    outer,
+    penalised_forces,
+)
 from contact.report import History, Monitor, Outcome, Record
 from contact.state import Multipliers, bound_of, nodal_iterate, total_pressure
 
@@ -213,12 +221,14 @@ class _Inner:
         # A wrong active set raises the residual by 1/eps, for a step.
         self.snes.setDivergenceTolerance(1e300)
         # Full steps: the active set of the pressure settles in a few of them, while a line
-        # search on the residual, which has kinks of the size 1/eps, takes tiny ones.
+        # search on the residual, which has kinks of the size 1/eps, takes tiny ones. A layer that
+        # saturates needs the search: full steps cycle between its open and its saturated state.
         given = PETSc.Options()
         name = "penalty_snes_linesearch_type"
         default = not given.hasName(name)
         if default:
-            given[name] = "basic"
+            layer = problem.contact.layer
+            given[name] = "basic" if layer is None or layer.lagged else "bt"
         try:
             with petsc_options("penalty_"):
                 self.snes.setFromOptions()
@@ -245,7 +255,11 @@ class _Inner:
         self._assembled = problem.linear_material
         pressure = total_pressure(problem, nodal, forces)
         self._response = problem.response.force(nodal, pressure)
-        self._response_block = problem.response.block(nodal, pressure)
+        self._current_block = problem.response.current_block(nodal, pressure)
+        self._layer = problem.response.normal_law(nodal)
+        if self._layer is not None:
+            # Like the unilateral [.]^+ it is that of the new iterate, but for h_nu.
+            self._response[:, : problem.dim] = 0.0
         scale = self._norm(problem.external) + self._norm(residual_forces(problem, forces))
         scale += self._norm(problem.trace.weight[:, None] * forces.vectors(problem))
         self.snes.setTolerances(
@@ -270,7 +284,8 @@ class _Inner:
         A body that only the foundation holds would otherwise give a singular first system.
         """
         problem, trace, nodal = self._problem, self._problem.trace, self._nodal
-        opening = trace.normal_component(nodal) - trace.gap
+        # Of the rigid part, or without one of the layer.
+        opening = trace.normal_component(nodal) - problem.response.trace.gap
         closest = trace.maximum(opening, -np.inf)
         if closest >= 0:
             return np.zeros(problem.owned)
@@ -302,7 +317,10 @@ class _Inner:
         nodal = self._move(increment)
         values = problem.internal_forces() - problem.external
         trace.add(values, trace.weight[:, None] * self._law.forces(nodal).vectors(problem))
-        change = np.einsum("nij,nj->ni", self._response_block, nodal - self._nodal)
+        change = np.einsum("nij,nj->ni", self._current_block, nodal - self._nodal)
+        if self._layer is not None:
+            u_n = np.minimum(trace.normal_component(nodal), trace.gap)
+            change[:, : trace.dim] += self._layer.layer(u_n)[:, None] * trace.normal
         trace.add(values, trace.weight[:, None] * (self._response + change))
         residual.array[:] = np.where(problem.free.ravel(), values, 0.0)
 
@@ -311,9 +329,13 @@ class _Inner:
     ) -> None:
         problem, d = self._problem, self._problem.dim
         nodal = self._move(increment)
-        blocks = self._response_block.copy()
+        blocks, trace = self._current_block.copy(), problem.trace
         blocks[:, :d, :d] += self._law.block(nodal)
-        blocks *= problem.trace.weight[:, None, None]
+        if self._layer is not None:
+            u_n = trace.normal_component(nodal)
+            slope = np.where(u_n < trace.gap, self._layer.layer_slope(u_n), 0.0)
+            blocks[:, :d, :d] += slope[:, None, None] * outer(trace.normal, trace.normal)
+        blocks *= trace.weight[:, None, None]
         form = problem.tangent if self._implicit else problem.secant
         unchanged = problem.linear_material or (self._assembled and not self._implicit)
         self.operator.update(form, blocks, constant=unchanged)

@@ -57,7 +57,8 @@ def _pressure(problem: ContactProblem, nodal: Array, eps: Regularisation) -> tup
     return pressure, (normal >= trace.gap) / eps.contact
 
 
-def _outer(a: Array, b: Array) -> Array:
+def outer(a: Array, b: Array) -> Array:
+    """Return a b^T node by node, shape (n, d, d)."""
     return a[:, :, None] * b[:, None, :]
 
 
@@ -91,7 +92,7 @@ class Lagged:
         """Return the derivative: only the active set of the normal part depends on `nodal`."""
         trace = self._problem.trace
         _, slope = _pressure(self._problem, nodal, self._eps)
-        normal = slope[:, None, None] * _outer(trace.normal, trace.normal)
+        normal = slope[:, None, None] * outer(trace.normal, trace.normal)
         return normal + self._modulus[:, None, None] * trace.tangent
 
 
@@ -135,7 +136,7 @@ class Implicit:
             along += np.asarray(coefficient.derivative(slip)) * ratio * slip / (slip + eps)
             if problem.friction.radius == 0:
                 across = at_rest * slope * slip / (slip + eps)
-        block = slope[:, None, None] * _outer(trace.normal, trace.normal)
+        block = slope[:, None, None] * outer(trace.normal, trace.normal)
         block = block + modulus[:, None, None] * trace.tangent
-        block = block + along[:, None, None] * _outer(unit, unit)
-        return block + across[:, None, None] * _outer(unit, trace.normal)
+        block = block + along[:, None, None] * outer(unit, unit)
+        return block + across[:, None, None] * outer(unit, trace.normal)
