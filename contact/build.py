@@ -44,6 +44,7 @@ def build_problem(
     law: Hencky | None = None,
     coefficient: FrictionCoefficient | None = None,
     foundation: Foundation | None = None,
+    layer: Layer | None = None,
 ) -> ContactProblem:
     """Build the problem that a case describes. Collective.
 
@@ -53,8 +54,9 @@ def build_problem(
         The case.
     comm
         Communicator of the mesh.
-    domain, law, coefficient, foundation
-        Objects that replace the case's mesh, material law, Coulomb's mu and foundation.
+    domain, law, coefficient, foundation, layer
+        Objects that replace the case's mesh, material law, Coulomb's mu, foundation and
+        compliant layer (own p_nu and h_nu).
 
     Raises
     ------
@@ -78,7 +80,9 @@ def build_problem(
         problem = ContactProblem(
             domain,
             body,
-            parts.Contact(case.contact.on, obstacle, _layer(case.contact)),
+            parts.Contact(
+                case.contact.on, obstacle, _layer(case.contact) if layer is None else layer
+            ),
             _friction(case.friction, domain.comm, coefficient),
             None if case.electric is None else _conductor(case.electric, domain.size),
             case.space.degree,

@@ -26,6 +26,7 @@ def check_sections(case: Case) -> None:
     ):
         raise fault("fixed", Words("no displacement fixed"), "at least one component on a part")
     _check_contradictions(case)
+    _check_lagged(case)
     for i, fixed in enumerate(case.fixed):
         if fixed.on == case.contact.on and fixed.is_clamped:
             raise fault("contact.on", case.contact.on, f"a part that fixed.{i} does not fix wholly")
@@ -52,6 +53,14 @@ def _check_mechanical(case: Case) -> None:
                 raise fault(f"load.{i}.{key}", getattr(load, key).source, accepted)
     if case.electric is not None:
         raise fault("electric", Words("given a table"), accepted)
+
+
+def _check_lagged(case: Case) -> None:
+    """Newton's method linearises layer and current; it has no previous outer iteration."""
+    for key, section in (("contact", case.contact), ("electric", case.electric)):
+        if section is not None and section.lagged and case.solver.method == "newton":
+            accepted = 'lagged with solver.method = "uzawa" or "penalty"'
+            raise fault(f"{key}.lagged", section.lagged, accepted)
 
 
 def _check_potential(case: Case) -> None:

@@ -96,14 +96,12 @@ class Contact(Section):
         "With a gap it is the body's.",
     )
     layer: (
-        Annotated[
-            float, Field(ge=0, allow_inf_nan=True), Accepted("a number >= 0, or inf")
-        ]
-        | None
+        Annotated[float, Field(ge=0, allow_inf_nan=True), Accepted("a number >= 0, or inf")] | None
     ) = Field(
         default=None,
-        description="Thickness of the layer: first touch at gap - layer. `inf`: no rigid part, "
-        f"first touch at gap, law (1.27). Compliance only, default {LAYER['layer']}.",
+        description="Thickness of the layer: first touch at gap - layer; one thicker than the gap "
+        "presses on the body at rest. `inf`: no rigid part, first touch at gap, law (1.27). "
+        f"Compliance only, default {LAYER['layer']}.",
     )
     stiffness: NonNegative | None = Field(
         default=None, description=f"c_nu. Compliance only, default {LAYER['stiffness']}."
@@ -128,7 +126,7 @@ class Contact(Section):
     lagged: Switch = Field(
         default=False,
         description="`true`: the layer's force is taken from the previous outer iteration, as in "
-        "Algorithms 6 and 8.",
+        "Algorithms 6 and 8; not with method `newton`.",
     )
 
     @model_validator(mode="before")
@@ -225,5 +223,5 @@ class Electric(Section):
     lagged: Switch = Field(
         default=False,
         description="`true`: the charge is taken from the previous outer iteration, as in "
-        "Algorithm 4; converges for small k_e only.",
+        "Algorithm 4; converges for small k_e only; not with method `newton`.",
     )

@@ -148,7 +148,8 @@ class ContactProblem:
     Raises
     ------
     InputError
-        If a part is missing, a vector has the wrong length, or nothing can touch.
+        If a part is missing, a vector has the wrong length, nothing can touch, or the laws of
+        the layer are none.
     """
 
     def __init__(
@@ -178,6 +179,8 @@ class ContactProblem:
         self.free = free_components(self.space, self.bcs)
         self._compile()
 
+        if contact.layer is not None:
+            contact.layer.check(domain.size)
         trace = build_trace(domain, self.space, self.bcs, contact.on, contact.foundation)
         scale = float(body.law.young) / domain.size
         self.response = FoundationResponse(trace, contact.layer, conductor, self.phi_scale, scale)

@@ -17,6 +17,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from contact.errors import InputError
 from contact.projections import Array
 from contact.trace import ContactTrace
 from forms.laws import (
@@ -51,6 +52,66 @@ class Layer:
     p_nu: PenetrationLaw
     h_nu: StiffnessLaw
     lagged: bool = False
+
+    def check(self, size: float) -> None:
+        """Refuse laws that are none of a layer, (h6) and (h7).
+
+        Parameters
+        ----------
+        size
+            Of the body: p_nu is looked at for penetrations up to it, or to the rigid part.
+
+        Raises
+        ------
+        InputError
+            If the thickness, p_nu or h_nu is negative or no number, a law has no derivative, or
+            p_nu does not vanish before the layer is touched.
+        """
+        if not self.thickness >= 0:
+            raise InputError(f"layer: the thickness is {self.thickness:g}; accepted: >= 0, or inf")
+        depths = self.depths(size)
+        differences = np.concatenate([[0.0], np.logspace(-6, 3, 37)])
+        for name, law, samples in (
+            ("p_nu", self.p_nu, np.concatenate([-size * np.logspace(-9, 0, 37), depths])),
+            ("h_nu", self.h_nu, np.concatenate([-differences, differences])),
+        ):
+            if not callable(getattr(law, "derivative", None)):
+                raise InputError(f"layer: {name} has no method `derivative`")
+            with np.errstate(all="ignore"):
+                values = np.broadcast_to(law(samples), samples.shape)
+                slopes = np.broadcast_to(law.derivative(samples), samples.shape)
+            if not (np.isfinite(values).all() and np.isfinite(slopes).all()):
+                bad = samples[~(np.isfinite(values) & np.isfinite(slopes))][0]
+                raise InputError(f"layer: {name} or its derivative is no number at {bad:g}")
+            if values.min() < 0:
+                bad = samples[np.argmin(values)]
+                raise InputError(f"layer: {name} is negative at {bad:g}; accepted: values >= 0")
+            if name == "p_nu" and np.any(values[samples < 0] > 0):
+                raise InputError(
+                    "layer: p_nu presses before the layer is touched; accepted: 0 at negative "
+                    "penetrations"
+                )
+
+    def depths(self, size: float) -> Array:
+        """Return penetrations from 0 to the rigid part, or to the size of the body if it is less.
+
+        Parameters
+        ----------
+        size
+            Of the body.
+        """
+        return min(self.thickness, size) * np.concatenate([[0.0], np.logspace(-6, 0, 73)])
+
+    def falls(self, size: float) -> bool:
+        """Tell whether p_nu falls somewhere: several solutions may then exist.
+
+        Parameters
+        ----------
+        size
+            Of the body.
+        """
+        values = np.broadcast_to(self.p_nu(self.depths(size)), (74,))
+        return bool(np.any(np.diff(values) < -1e-12 * values.max()))
 
 
 @dataclass(frozen=True)
@@ -100,6 +161,10 @@ class NormalLaw:
         """Return the pressure of the layer at normal displacements."""
         return self.stiffness * self.p_nu(u_n - self.touch)
 
+    def layer_slope(self, u_n: Array) -> Array:
+        """Return the derivative of `layer`."""
+        return self.stiffness * self.p_nu.derivative(u_n - self.touch)
+
     def pressure(self, z: Array, r: float) -> Array:
         """Return the total pressure P for which (phi, P) is on the graph and P + r phi = z.
 
@@ -112,7 +177,7 @@ class NormalLaw:
         # Newton's method in a bracket; every third sweep halves it, should Newton not.
         for sweep in range(90):
             excess = r * phi + self.layer(phi) - z
-            slope = r + self.stiffness * self.p_nu.derivative(phi - self.touch)
+            slope = r + self.layer_slope(phi)
             # Below this the excess is rounding in phi.
             rounding = 4 * EPS * (np.abs(z) + np.abs(slope) * (np.abs(phi) + np.abs(self.touch)))
             done |= np.abs(excess) <= rounding
@@ -123,7 +188,7 @@ class NormalLaw:
             inside = (newton > low) & (newton < high) & (sweep % 3 < 2)
             phi = np.where(done, phi, np.where(inside, newton, 0.5 * (low + high)))
         # The layer's pressure is exact where it is small, the remainder where it is stiff.
-        soft = self.stiffness * self.p_nu.derivative(phi - self.touch) < r
+        soft = self.layer_slope(phi) < r
         pressed = np.where(soft, self.layer(phi), z - r * phi)
         return np.where(free, 0.0, np.where(rigid, z - r * self.gap, pressed))
 
@@ -135,8 +200,7 @@ class NormalLaw:
         """Return the derivative of `pressure` by z: 0 free, 1 rigid, between them in the layer."""
         high = np.minimum(self.gap, z / r)
         free, rigid = z <= r * self.touch, z - r * self.gap >= self.layer(high)
-        phi = self.displacement(z, r)
-        slope = self.stiffness * self.p_nu.derivative(phi - self.touch)
+        slope = self.layer_slope(self.displacement(z, r))
         return np.where(free, 0.0, np.where(rigid, 1.0, slope / (slope + r)))
 
 
@@ -174,8 +238,8 @@ class FoundationResponse:
         return replace(self.trace, gap=np.full_like(self.trace.gap, np.inf))
 
     @property
-    def _touch(self) -> Array:
-        """The gap rho_0 of the layer's first touch."""
+    def touch(self) -> Array:
+        """The gap rho_0 of the layer's first touch, shape (n,)."""
         assert self.layer is not None
         depth = self.layer.thickness
         return self.trace.gap - (depth if np.isfinite(depth) else 0.0)
@@ -189,7 +253,7 @@ class FoundationResponse:
             return None
         stiffness = np.broadcast_to(self.layer.h_nu(self._difference(x)), x.shape[:1])
         gap = self.constrained_trace.gap
-        return NormalLaw(self.layer.p_nu, stiffness, self._touch, gap)
+        return NormalLaw(self.layer.p_nu, stiffness, self.touch, gap)
 
     def _difference(self, x: Array) -> Array:
         """Return phi - phi_F at the nodes; 0 for a body without potential."""
@@ -213,7 +277,7 @@ class FoundationResponse:
 
         An iterate may go beyond; what it then takes belongs to the multiplier alone.
         """
-        return np.minimum(self.trace.normal_component(x), self.constrained_trace.gap) - self._touch
+        return np.minimum(self.trace.normal_component(x), self.constrained_trace.gap) - self.touch
 
     def charge(self, x: Array, pressure: Array) -> Array:
         """Return D.nu = psi phi_L(phi - phi_F) at the nodes; `pressure` tells the contact."""

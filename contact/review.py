@@ -1,4 +1,4 @@
-"""What a solution is worth: assumption (h1) on its strains, and Theorem 3.1's condition."""
+"""What a solution is worth: assumptions on its material and layer, and Theorem 3.1's condition."""
 
 from __future__ import annotations
 
@@ -14,7 +14,12 @@ from forms.hencky import check_monotonicity
 def review(solution: Solution) -> None:
     """Add what there is to say to the notes and warnings of a solution. Collective."""
     solution.max_dev_strain = DerivedFields(solution.problem).largest_strain()
-    for text, good in (_monotonicity(solution), _uniqueness(solution)):
+    for text, good in (
+        _monotonicity(solution),
+        _uniqueness(solution),
+        _preload(solution),
+        _falling(solution),
+    ):
         if text:
             (solution.notes if good else solution.warnings).append(text)
 
@@ -59,3 +64,26 @@ def _uniqueness(solution: Solution) -> tuple[str, bool]:
     if lipschitz < bound:
         return text, True
     return f"{text}: several solutions may exist, and this is one reached from zero slip", False
+
+
+def _preload(solution: Solution) -> tuple[str, bool]:
+    """Say where a layer is thicker than the gap, and presses on the body at rest."""
+    problem = solution.problem
+    if problem.contact.layer is None:
+        return "", True
+    least = -problem.trace.maximum(-problem.response.touch, -np.inf)
+    if least >= -1e-9 * problem.domain.size:
+        return "", True
+    return (
+        f"the layer is thicker than the gap, by up to {-least:.4g}: it presses on the body at rest",
+        False,
+    )
+
+
+def _falling(solution: Solution) -> tuple[str, bool]:
+    """Say where p_nu falls: (h6) asks for less, uniqueness for a law that does not."""
+    layer, size = solution.problem.contact.layer, solution.problem.domain.size
+    if layer is None or not layer.falls(size):
+        return "", True
+    text = "p_nu falls with the penetration: several solutions may exist, and this is one of them"
+    return text, False

@@ -10,11 +10,12 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from contact import Solution, build_problem, load_case, solve, solve_problem
+from contact import InputError, Solution, build_problem, load_case, solve, solve_problem
 from contact.expressions import Expression
 from contact.problem import ContactProblem, Friction
+from contact.response import Layer
 from contact.table import contact_table
-from forms.laws import SlipCoefficient
+from forms.laws import Compliance, PotentialFactor, SlipCoefficient
 
 CASES = Path(__file__).parents[1] / "scripts/cases"
 sys.path.insert(0, str(CASES.parent))
@@ -146,6 +147,38 @@ def test_lagged_layer_and_current_reach_the_implicit_solution():
     changes = "friction.mu=0.0051", "electric.k_e=0.0051"
     lagged = solved("8-4-layer", 48, *changes, "contact.lagged=true", "electric.lagged=true")
     assert close(lagged, solved("8-4-layer", 48, *changes), 1e-8)
+
+
+def test_layer_of_the_user_in_a_case():
+    case = load_case(CASES / "compliance-8-3-soft.toml", ["mesh.cells=[24, 4]"])
+    own = Layer(np.inf, Compliance(np.inf), PotentialFactor(10.0))
+    assert close(solve(case, layer=own), solve(case), 1e-12)
+    softer = solve(case, layer=replace(own, h_nu=PotentialFactor(5.0)))
+    depth = softer.normal_displacement - 0.5
+    assert np.allclose(softer.pressure, 5.0 * np.maximum(depth, 0.0), rtol=0, atol=1e-7)
+
+
+@pytest.mark.parametrize("name", ["8-3-layer", "8-3-soft", "8-4-layer"])
+def test_penalty_on_a_layer(name):
+    changes = ["friction.mu=0.0051", "electric.k_e=0.0051"] if "8-4" in name else []
+    exact = solved(name, 24, *changes)
+    penalised = solved_by_penalty(name, changes)
+    assert penalised.converged, penalised.outcome
+    assert close(exact, penalised, 2e-5)
+
+
+def solved_by_penalty(name: str, changes: list[str]) -> Solution:
+    method = ["solver.method='penalty'", "solver.eps_contact=1e-6", "solver.eps_slip=1e-6"]
+    return solve(
+        load_case(CASES / f"compliance-{name}.toml", ["mesh.cells=[24, 4]", *method, *changes])
+    )
+
+
+@pytest.mark.parametrize("key", ["contact", "electric"])
+def test_newton_has_nothing_to_lag(key):
+    changes = [f"{key}.lagged=true", "solver.method=newton"]
+    with pytest.raises(InputError, match=f"{key}.lagged: given true"):
+        load_case(CASES / "compliance-8-4-layer.toml", changes)
 
 
 @pytest.mark.parametrize("law", ["tresca", "slip"])
