@@ -198,7 +198,10 @@ class Fixed(Section):
 class Load(Section):
     """`[[load]]`: forces and charges on a part, or in the whole body."""
 
-    on: Name | None = Field(default=None, description="Part of the boundary. This or `everywhere`.")
+    on: Name | None = Field(
+        default=None,
+        description="Part of the boundary, beside the contact part. This or `everywhere`.",
+    )
     everywhere: Switch = Field(default=False, description="`true`: in the whole body.")
     traction: FormulaVector | None = Field(default=None, description="Force per area of the part.")
     pressure: Formula | None = Field(

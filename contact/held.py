@@ -67,13 +67,16 @@ class HeldCurrent:
         rows = self.nodes * self.block_size + self.block_size - 1
         residual[rows] -= self.phi_scale * self.weight * self.charge(x)
 
+    def slope(self, x: Array) -> Array:
+        """Return the derivative of D.nu by the potential at the nodes, psi frozen, shape (n,)."""
+        psi, difference = self._at_nodes(x)
+        return np.asarray(psi * self.conductor.phi_l.derivative(difference))
+
     def block(self, x: Array) -> Array:
         """Return the weighted linearisation, (n, block size, block size); 0 if lagged."""
         total = np.zeros((self.nodes.size, self.block_size, self.block_size))
         if not self.conductor.lagged:
-            psi, difference = self._at_nodes(x)
-            slope = self.weight * psi * self.conductor.phi_l.derivative(difference)
-            total[:, -1, -1] = -(self.phi_scale**2) * slope
+            total[:, -1, -1] = -(self.phi_scale**2) * self.weight * self.slope(x)
         return total
 
 

@@ -13,7 +13,7 @@ from contact.plots_contact import draw_line, draw_surface
 from contact.plots_fields import Picture, draw_plane, picture
 from contact.plots_space import draw_space
 from contact.solution import Solution
-from contact.table import contact_table
+from contact.table import contact_table, held_points
 
 #: Quantities drawn on the deformed body: name of the figure, field, label.
 DEFORMED = (
@@ -56,7 +56,7 @@ def write_figures(solution: Solution, folder: str | Path) -> list[Path]:
     The files, in the order in which they were drawn; none on ranks other than 0.
     """
     folder, comm = Path(folder), solution.problem.comm
-    table = contact_table(solution)
+    table, held = contact_table(solution), held_points(solution.problem)
     pictures: list[tuple[str, Picture]] = []
     for name, field, label in DEFORMED:
         if field != "potential" or solution.problem.piezoelectric:
@@ -69,7 +69,7 @@ def write_figures(solution: Solution, folder: str | Path) -> list[Path]:
     plane, title = solution.problem.dim == 2, solution.title
     with matplotlib.rc_context(STYLE):
         figures: dict[str, Figure | None] = {
-            "contact": draw_line(table, title) if plane else draw_surface(table, title)
+            "contact": draw_line(table, title, held) if plane else draw_surface(table, title)
         }
         for name, made in pictures:
             drawn = draw_plane(made, table, title) if plane else draw_space(made, title)

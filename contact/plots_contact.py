@@ -36,6 +36,27 @@ def position(table: Table) -> tuple[Array, str]:
     return np.concatenate([[0.0], np.cumsum(steps)]), r"\ell"
 
 
+def ends(table: Table, held: Array) -> Array:
+    """Return where Gamma_3 begins and ends in the plane, shape (2, 2).
+
+    Parameters
+    ----------
+    table
+        The contact nodes in their order.
+    held
+        Nodes of Gamma_3 that are held, and hence no contact nodes, shape (n, 2).
+    """
+    points = np.column_stack([table["x"], table["y"]])
+    found = points[[0, -1]]
+    if len(held) and len(points) > 1:
+        for k, (last, before) in enumerate([(0, 1), (-1, -2)]):
+            distance = np.linalg.norm(held - points[last], axis=1)
+            spacing = np.linalg.norm(points[last] - points[before])
+            if distance.min() < 1.5 * spacing:
+                found[k] = held[np.argmin(distance)]
+    return found
+
+
 def zones(status: Any, where: Array) -> Iterator[tuple[str, float, float]]:
     """Yield the runs of nodes of one status, and between which positions they lie."""
     order = np.argsort(where)
@@ -46,8 +67,18 @@ def zones(status: Any, where: Array) -> Iterator[tuple[str, float, float]]:
         yield str(status[start]), float(edges[start]), float(edges[stop])
 
 
-def draw_line(table: Table, title: str = "") -> Figure:
-    """Draw pressure, tangential stress and friction bound along Gamma_3 in the plane."""
+def draw_line(table: Table, title: str = "", held: Array | None = None) -> Figure:
+    """Draw pressure, tangential stress and friction bound along Gamma_3 in the plane.
+
+    Parameters
+    ----------
+    table
+        The contact nodes in their order.
+    title
+        Of the figure.
+    held
+        Nodes of Gamma_3 that are no contact nodes, shape (n, 2), to begin and end at.
+    """
     where, name = position(table)
     bound, tau = table["bound"], table["tau"]
     frictional = bool(np.any(bound > 0))
@@ -70,7 +101,8 @@ def draw_line(table: Table, title: str = "") -> Figure:
         axes[1].axhline(0.0, color="black", lw=0.4)
         axes[1].set_ylabel(r"$-\sigma_\tau\cdot t$ (units of the case)")
     axes[-1].set_xlabel(f"${name}$ along $\\Gamma_3$ (mesh units)")
-    axes[0].set_xlim(where.min(), where.max())
+    before, after = _margins(table, held)
+    axes[0].set_xlim(where.min() - before, where.max() + after)
     _focus(axes[0], table["pressure"], 0.0)
     if frictional:
         _focus(axes[1], bound, -1.0)
@@ -80,6 +112,16 @@ def draw_line(table: Table, title: str = "") -> Figure:
     if title:
         figure.suptitle(title, fontsize=10)
     return figure
+
+
+def _margins(table: Table, held: Array | None) -> tuple[float, float]:
+    """Return how far Gamma_3 goes on beyond its contact nodes, at either end of the axis."""
+    if held is None:
+        return 0.0, 0.0
+    outer = np.column_stack([table["x"], table["y"]])[[0, -1]]
+    # The rows begin where x, then y is smaller, and so does the axis.
+    first, last = np.linalg.norm(ends(table, held) - outer, axis=1)
+    return float(first), float(last)
 
 
 def _focus(ax: Axes, values: Array, low: float) -> None:

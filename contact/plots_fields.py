@@ -17,10 +17,10 @@ from contact import _compat
 from contact.domain import Domain
 from contact.fields import DerivedFields, linear
 from contact.parts import exterior_facets
-from contact.plots_contact import BLUE
+from contact.plots_contact import BLUE, ends
 from contact.projections import Array
 from contact.solution import Solution
-from contact.table import Table
+from contact.table import Table, held_points
 
 Indices: TypeAlias = NDArray[np.integer[Any]]
 
@@ -50,6 +50,8 @@ class Picture:
         By which the displacement is multiplied in the drawing.
     label
         Of the colours.
+    held
+        Nodes of Gamma_3 that are no contact nodes, shape (n, d).
     """
 
     corners: Array
@@ -60,6 +62,7 @@ class Picture:
     box: Array
     scale: float
     label: str
+    held: Array
 
 
 def magnification(size: float, largest: float) -> float:
@@ -110,17 +113,17 @@ def picture(solution: Solution, field: str, label: str) -> Picture | None:
     comm.Allreduce(MPI.IN_PLACE, low, MPI.MIN)
     comm.Allreduce(MPI.IN_PLACE, high, MPI.MAX)
     box = np.array([low, high])
-    outline = _outline(domain)
+    outline, held = _outline(domain), held_points(problem)
     if d == 2 and comm.allreduce(len(cells), op=MPI.SUM) > MOST_CELLS:
         image = _pixels(comm, drawn, colours, box)
         empty = np.empty((0, 3, d))
-        made = Picture(empty, empty, np.empty(0), outline, image, box, scale, label)
+        made = Picture(empty, empty, np.empty(0), outline, image, box, scale, label, held)
         return made if comm.rank == 0 else None
     gathered = [comm.gather(array) for array in (corners, moved, colours)]
     if comm.rank > 0:
         return None
     corners, moved, colours = (np.concatenate(arrays) for arrays in gathered if arrays is not None)
-    return Picture(corners, moved, colours, outline, None, box, scale, label)
+    return Picture(corners, moved, colours, outline, None, box, scale, label, held)
 
 
 def _take(dofs: Indices, places: Indices) -> Indices:
@@ -207,7 +210,7 @@ def draw_plane(picture: Picture, table: Table, title: str = "") -> Figure:
     shown.set_cmap("viridis")
     rest = {"colors": "black", "lw": 0.5, "ls": (0, (6, 4))}
     ax.add_collection(LineCollection(list(picture.outline), **rest))
-    _foundation(ax, table, picture.scale)
+    _foundation(ax, table, picture.scale, ends(table, picture.held))
     figure.colorbar(shown, ax=ax, location="bottom", label=picture.label, aspect=40, shrink=0.8)
     ax.set_aspect("equal")
     ax.use_sticky_edges = False
@@ -219,11 +222,14 @@ def draw_plane(picture: Picture, table: Table, title: str = "") -> Figure:
     return figure
 
 
-def _foundation(ax: Axes, table: Table, scale: float) -> None:
+def _foundation(ax: Axes, table: Table, scale: float, edges: Array) -> None:
     """Draw the foundation as far as it faces Gamma_3, moved as the displacements are scaled."""
     points = np.column_stack([table["x"], table["y"]])
-    normal = np.column_stack([table["nu_x"], table["nu_y"]])
-    surface = points + scale * table["gap"][:, None] * normal
+    normal, gap = np.column_stack([table["nu_x"], table["nu_y"]]), table["gap"]
+    points = np.concatenate([edges[:1], points, edges[1:]])
+    normal = np.concatenate([normal[:1], normal, normal[-1:]])
+    gap = np.concatenate([gap[:1], gap, gap[-1:]])
+    surface = points + scale * gap[:, None] * normal
     ax.plot(*surface.T, color="black", lw=1.0)
     thick = 0.03 * np.ptp(points, axis=0).max()
     band = np.concatenate([surface, (surface + thick * normal)[::-1]])

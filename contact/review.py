@@ -63,7 +63,8 @@ def _uniqueness(solution: Solution) -> tuple[str, bool]:
     text += f"; a sliding block under the mean pressure {mean:.4g} asks for L_mu < {bound:.4g}"
     if lipschitz < bound:
         return text, True
-    return f"{text}: several solutions may exist, and this is one reached from zero slip", False
+    several = f"several solutions may exist, and this is one reached from {solution.start}"
+    return f"{text}: {several}", False
 
 
 def _preload(solution: Solution) -> tuple[str, bool]:

@@ -56,6 +56,8 @@ def check_held(problem: ContactProblem) -> None:
 def check_potential(problem: ContactProblem, forces: Multipliers) -> None:
     """Check that the potential of a solution is more than known but for a constant. Collective.
 
+    It is where it is prescribed, and where current flows, also through nodes that cannot move.
+
     Raises
     ------
     InputError
@@ -66,8 +68,10 @@ def check_potential(problem: ContactProblem, forces: Multipliers) -> None:
         return
     nodal, comm = nodal_iterate(problem), problem.comm
     slopes = problem.response.jacobian(nodal, total_pressure(problem, nodal, forces))[:, -1, -1]
-    held = bool(np.any(slopes != 0)) or not np.all(problem.free[:, -1])
-    if not comm.allreduce(held, op=MPI.LOR):
+    known = bool(np.any(slopes != 0)) or not np.all(problem.free[:, -1])
+    if problem.held is not None:
+        known = known or bool(np.any(problem.held.slope(problem.x.x.array) != 0))
+    if not comm.allreduce(known, op=MPI.LOR):
         raise InputError(
             "the potential is not determined: it is prescribed nowhere, and the foundation "
             "conducts nowhere; accepted: a potential fixed on a part, or contact with a "

@@ -46,6 +46,8 @@ class Solution:
         What there is to say about the solution.
     max_dev_strain
         The largest |dev eps|.
+    start
+        From where the iteration started, in words.
     title
         Of the case.
     output
@@ -62,6 +64,7 @@ class Solution:
     notes: list[str] = field(default_factory=list)
     warnings: list[str] = field(default_factory=list)
     max_dev_strain: float = np.nan
+    start: str = "zero slip"
     title: str = ""
     output: Output = field(default_factory=Output)
 

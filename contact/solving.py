@@ -177,6 +177,7 @@ def solve_problem(
         history=method.history,
         counters=method.counters,
         method=settings.method,
+        start="zero slip" if start is None else "the solution on a coarser mesh",
         seconds={
             "setup": setup,
             "solve": time.perf_counter() - begin - setup,

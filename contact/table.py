@@ -13,6 +13,7 @@ from scipy.sparse import csgraph
 from contact.problem import ContactProblem
 from contact.projections import Array
 from contact.solution import Solution
+from contact.trace import candidates
 
 Table = Mapping[str, NDArray[Any]]
 
@@ -73,6 +74,13 @@ def contact_table(solution: Solution) -> Table | None:
 def csv_columns(table: Table) -> Table:
     """Return the columns of ``contact.csv``: all but the contact direction."""
     return {name: values for name, values in table.items() if not name.startswith("nu_")}
+
+
+def held_points(problem: ContactProblem) -> Array:
+    """Return the nodes of Gamma_3 that are no contact nodes, (n, d), from all ranks. Collective."""
+    found = candidates(problem.domain, problem.space, problem.contact.on)
+    points = found.points[~np.isin(found.nodes, problem.trace.nodes)]
+    return np.concatenate(problem.comm.allgather(points))
 
 
 def _order(problem: ContactProblem) -> NDArray[np.intp] | None:

@@ -106,7 +106,7 @@ def example(report: Report, number: str, name: str, what: str, cells: tuple[int,
     report.figure(
         f"figure-{number}a",
         f"Figure {dotted} (a): normal and tangential stress on Gamma_3, {what}",
-        draw_line(table),
+        draw_line(table, held=deformed.held),
         csv_columns(table),
         remark(solution, table),
     )

@@ -42,7 +42,7 @@ def draw(report: Report, number: str, case: Case, text: str, load: float) -> Tab
     report.figure(
         f"figure-{number}a",
         f"Figure {dotted} (a): stresses on Gamma_3, {where}",
-        draw_line(table),
+        draw_line(table, held=deformed.held),
         csv_columns(table),
         _remark(solution, table),
     )

@@ -80,6 +80,16 @@ WRONG = {
         ["load.0.traction", "2 components"],
     ),
     "z in the plane": ("-0.001", '"-z"', ["load.0.traction", "x and y"]),
+    "a load on the contact part": (
+        'on = "top"',
+        'on = "bottom"',
+        ["load.0.on", "bottom", "contact part"],
+    ),
+    "a load on some of the contact part": (
+        'on = "top"',
+        'on = "half"',
+        ["load.0.on", "half shares facets with the contact part bottom"],
+    ),
     "a formula with a mistake": ("-0.001", '"-0.001*(x"', ["load.0.traction", "not a formula"]),
     "a formula that would run code": ("-0.001", '"__import__(x)"', ["load.0.traction"]),
     "a load that is not finite": ("-0.001", '"log(x-1)"', ["load"]),
@@ -326,6 +336,19 @@ def test_problem_without_solution(
         words = ["potential is not determined"]
     text += f"\n[solver]\nmethod = '{method}'\n"
     refuse(write(shared_tmp_path, text), words, capfd)
+
+
+@pytest.mark.parallel
+@pytest.mark.parametrize("method", ["uzawa", "newton"])
+def test_held_nodes_that_conduct_determine_the_potential(
+    method: str, shared_tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    """Where the body rests on supports and is open elsewhere, the current flows through those."""
+    text = BAR.replace("[[load]]", PIEZO + "[[load]]").replace("gap = 0.0", 'gap = "0.5*(x>1)"')
+    text = text.replace("[[load]]", '[[fixed]]\non = "half"\ndisplacement = [0.0, 0.0]\n[[load]]')
+    text += f"\n[electric]\nk_e = 1.0\nphi_f = 2.0\n[solver]\nmethod = '{method}'\n"
+    status, lines = run(write(shared_tmp_path, text), capfd=capfd)
+    assert status == CONVERGED, lines
 
 
 @pytest.mark.parallel

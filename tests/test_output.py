@@ -21,7 +21,7 @@ from contact.output import write_outputs
 from contact.report import Record
 from contact.solution import Solution
 from contact.solving import solve, solve_problem
-from contact.table import contact_table, csv_columns, tangent_of
+from contact.table import contact_table, csv_columns, held_points, tangent_of
 
 # Debian's adios2 would take its serial library in a run without mpirun.
 os.environ.setdefault("ADIOS2_ALWAYS_USE_MPI", "1")
@@ -304,6 +304,41 @@ def test_figures(dim: int, shared_tmp_path: Path) -> None:
         "figure-potential.png",
     ]
     assert all(file.stat().st_size > 10_000 for file in files)
+
+
+def test_figures_begin_at_the_edge_of_the_body() -> None:
+    """The clamped corner is no contact node, but the axis and the foundation reach it."""
+    from contact.plots_contact import draw_line
+    from contact.plots_fields import draw_plane, picture
+
+    case = block(
+        2,
+        fixed=[{"on": "left", "displacement": [0.0, 0.0]}],
+        load=[{"on": "top", "traction": [0.0, -0.1]}],
+    )
+    solution = solve(case)
+    table, held = contact_table(solution), held_points(solution.problem)
+    assert table is not None
+    assert table["x"].min() == 0.25
+    np.testing.assert_allclose(held, [[0.0, 0.0]], atol=1e-15)
+    assert draw_line(table, held=held).axes[0].get_xlim() == pytest.approx((0.0, 2.0))
+    drawn = picture(solution, "von_mises", "stress")
+    assert drawn is not None
+    line = draw_plane(drawn, table).axes[0].lines[0].get_xdata()
+    assert (np.min(line), np.max(line)) == pytest.approx((0.0, 2.0))
+
+
+@pytest.mark.parametrize("nested", [False, True])
+def test_the_warning_says_where_the_iteration_started(nested: bool) -> None:
+    """Several solutions may exist: which one is found depends on the start."""
+    case = block(
+        2,
+        mesh={"generator": "rectangle", "size": [2.0, 1.0], "cells": [16, 8]},
+        friction={"law": "coulomb", "mu": {"law": "slip", "rho": 1e4}},
+        solver={"nested": nested},
+    )
+    start = "the solution on a coarser mesh" if nested else "zero slip"
+    assert any(f"reached from {start}" in text for text in solve(case).warnings)
 
 
 @pytest.mark.parallel
