@@ -180,16 +180,7 @@ def piezo(section: sections.Piezo, dim: int) -> Piezo:
         return material.in_plane().rotated([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
     if section.poling is None:
         return material
-    return material.rotated(_turn_to(np.asarray(section.poling, dtype=float)))
-
-
-def _turn_to(axis: Array) -> Array:
-    """Return the smallest rotation that turns z to an axis."""
-    x, y, z = axis / np.linalg.norm(axis)
-    if z < -1 + 1e-12:
-        return np.diag([1.0, -1.0, -1.0])
-    cross = np.array([[0.0, 0.0, x], [0.0, 0.0, y], [-x, -y, 0.0]])
-    return np.asarray(np.eye(3) + cross + cross @ cross / (1 + z))
+    return material.poled_along(section.poling)
 
 
 def _fixed(i: int, section: sections.Fixed, comm: MPI.Intracomm) -> parts.Fixed:

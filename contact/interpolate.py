@@ -16,8 +16,7 @@ from dolfinx import fem
 from mpi4py import MPI
 
 from contact.problem import ContactProblem, with_constants
-from forms.hencky import energy_density, secant_form
-from forms.kinematics import strain
+from forms.hencky import secant_form
 
 
 @dataclass(frozen=True)
@@ -114,13 +113,6 @@ def errors_to(
             problem, ufl.inner(e, e), ufl.inner(ufl.grad(e), ufl.grad(e)), secant_form(law, u, e, e)
         )
     )
-
-
-def stored_energy(problem: ContactProblem) -> float:
-    """Return the integral of the energy density M(eps), (1.11). Collective."""
-    u, _ = problem.parts_of(problem.x)
-    density = energy_density(with_constants(problem.body.law, problem.constant), strain(u))
-    return _norms(problem, density)[0] ** 2
 
 
 def _norms(problem: ContactProblem, *integrands: ufl.core.expr.Expr) -> list[float]:
