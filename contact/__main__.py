@@ -6,13 +6,19 @@ nothing is written), 130 stopped by Ctrl-C, 143 by SIGTERM (what a solve had rea
 
 from __future__ import annotations
 
+import signal
+
+if __name__ == "__main__":
+    # No traceback of the imports below: until `main` has its handlers, Ctrl-C just ends this.
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
+
 import argparse
 import difflib
-import signal
 import sys
 import tempfile
 import traceback
 from collections.abc import Callable, Sequence
+from importlib import import_module
 from pathlib import Path
 from types import TracebackType
 from typing import Any, NoReturn, TypeVar
@@ -21,7 +27,7 @@ from mpi4py import MPI
 
 from contact.case import Case, load_case
 from contact.errors import InputError
-from contact.interrupt import Terminated, raising_on_sigterm
+from contact.interrupt import Terminated, ending_on_signal
 
 CONVERGED, NOT_CONVERGED, BAD_INPUT = 0, 1, 2
 #: Added to the number of the signal that ended a run.
@@ -127,7 +133,7 @@ def _solve(case: Case, options: argparse.Namespace, comm: MPI.Intracomm) -> int:
     out = Path(options.out)
     _shared(comm, lambda: _check_folder(out))
 
-    # These load dolfinx, which PETSc's options have to precede.
+    # Not earlier: these load dolfinx, which PETSc's options have to precede.
     from contact.output import write_outputs
     from contact.progress import progress
     from contact.solving import solve
@@ -177,12 +183,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if comm.size > 1:
         sys.excepthook = _abort_on_crash
     try:
-        with raising_on_sigterm():
-            options, petsc = parse(sys.argv[1:] if arguments is None else arguments)
-            import petsc4py
+        with ending_on_signal() as ending:
+            with ending.held():
+                options, petsc = parse(sys.argv[1:] if arguments is None else arguments)
+                import petsc4py
 
-            petsc4py.init([sys.argv[0], *petsc])
-            case = _shared(comm, lambda: load_case(options.case, options.set))
+                petsc4py.init([sys.argv[0], *petsc])
+                case = _shared(comm, lambda: load_case(options.case, options.set))
+                import_module("contact.solving")  # after PETSc's options
             return {"solve": _solve, "check": _check}[options.command](case, options, comm)
     except InputError as error:
         if comm.rank == 0:

@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from types import FrameType
-from typing import TYPE_CHECKING, NoReturn
+from typing import TYPE_CHECKING
 
 from mpi4py import MPI
 
@@ -106,25 +106,63 @@ def stop_on_signal(comm: MPI.Intracomm, monitor: Monitor | None) -> Iterator[Sto
                 if handler is not None:  # None: not installed from Python, left alone
                     before[ending] = handler
                     signal.signal(ending, note)
+                if isinstance(handler, Ending) and handler.caught and not stop.caught:
+                    note(handler.caught[0], None)
         yield stop
     finally:
         for number, handler in before.items():
             signal.signal(number, handler)
 
 
+@dataclass
+class Ending:
+    """Handler of SIGINT and SIGTERM outside of a solve: ends the run by an exception.
+
+    Attributes
+    ----------
+    caught
+        The signals so far. Where the exception is lost, in a library that swallows it, the next
+        solve stops for them.
+    """
+
+    caught: list[int] = field(default_factory=list)
+    _held: bool = False
+
+    def __call__(self, number: int, frame: FrameType | None) -> None:
+        """Note a signal, and raise KeyboardInterrupt or `Terminated`, now or later."""
+        self.caught.append(number)
+        if not self._held:
+            self.check()
+
+    def check(self) -> None:
+        """Raise for the first signal, if there was one."""
+        if self.caught:
+            raise Terminated if self.caught[0] == signal.SIGTERM else KeyboardInterrupt
+
+    @contextmanager
+    def held(self) -> Iterator[None]:
+        """Let signals wait: C++ libraries that are being loaded take no exceptions."""
+        self._held = True
+        try:
+            yield
+        finally:
+            self._held = False
+        self.check()
+
+
 @contextmanager
-def raising_on_sigterm() -> Iterator[None]:
-    """Let SIGTERM raise `Terminated`, as SIGINT raises KeyboardInterrupt."""
-
-    def end(number: int, frame: FrameType | None) -> NoReturn:
-        raise Terminated
-
-    default = signal.getsignal(signal.SIGTERM) is signal.SIG_DFL
-    mine = default and threading.current_thread() is threading.main_thread()
-    if mine:
-        signal.signal(signal.SIGTERM, end)
+def ending_on_signal() -> Iterator[Ending]:
+    """Let SIGINT and SIGTERM end a run in words, where Python's own handlers stand."""
+    ending = Ending()
+    before: dict[int, Callable[[int, FrameType | None], object] | int | None] = {}
+    if threading.current_thread() is threading.main_thread():
+        for kind in (signal.SIGINT, signal.SIGTERM):
+            handler = signal.getsignal(kind)
+            if handler in (signal.SIG_DFL, signal.default_int_handler):
+                before[kind] = handler
+                signal.signal(kind, ending)
     try:
-        yield
+        yield ending
     finally:
-        if mine:
-            signal.signal(signal.SIGTERM, signal.SIG_DFL)
+        for number, handler in before.items():
+            signal.signal(number, handler)

@@ -1,5 +1,6 @@
 """The case file: what is accepted, what is refused and how, overrides, reference page."""
 
+import contextlib
 import json
 import pickle
 import signal
@@ -492,6 +493,33 @@ def test_a_signal_before_the_solve_ends_the_run_in_words(
     assert capsys.readouterr().err == f"contact: interrupted ({number.name})\n"
     assert not out.exists()
     assert before == [signal.getsignal(ending) for ending in (signal.SIGINT, signal.SIGTERM)]
+
+
+@pytest.mark.parametrize("place", ["swallowed", "held"])
+def test_no_signal_is_lost(bar, capsys, monkeypatch, place):
+    """Libraries may swallow an exception, and those that are being loaded would not survive one."""
+    import contact.__main__ as command
+    import contact.solving
+
+    load, build = command.load_case, contact.solving.build_problem
+
+    def swallow(*args, **options):
+        with contextlib.suppress(BaseException):
+            signal.raise_signal(signal.SIGTERM)
+        return build(*args, **options)
+
+    def hold(*args):
+        signal.raise_signal(signal.SIGTERM)
+        return load(*args)
+
+    if place == "swallowed":
+        monkeypatch.setattr(contact.solving, "build_problem", swallow)
+    else:
+        monkeypatch.setattr(command, "load_case", hold)
+    out = bar.parent / "out"
+    assert main(["solve", str(bar), "--out", str(out), "--quiet"]) == 143
+    assert out.exists() == (place == "swallowed")
+    assert "interrupted (SIGTERM)" in capsys.readouterr().err
 
 
 def test_too_little_memory_is_said_in_words(bar, capsys, monkeypatch):
