@@ -126,7 +126,7 @@ class Material(Section):
     argument: Literal["norm", "square"] = Field(
         default="norm",
         description="Argument of g: |dev eps|, or its square as printed in (7.8), which "
-        "softens beyond e xi_0.",
+        "softens beyond e xi_0. `log` only.",
     )
     g_min: NonNegative = Field(
         default=0.0, description="Floor of g in `log` (force/area); 0: none."
@@ -140,6 +140,10 @@ class Material(Section):
     def _check(self) -> Material:
         if self.law == "log" and self.yield_strain is None:
             raise fault("yield_strain", Words("missing"), 'a number > 0 with law = "log"')
+        for key in ("argument", "g_min") if self.law == "linear" else ():
+            value = getattr(self, key)
+            if value != type(self).model_fields[key].default:
+                raise fault(key, value, f'{key} with law = "log"')
         mu1 = self.young / (2 + 2 * self.poisson)
         if self.g_min > mu1:
             raise fault("g_min", self.g_min, f"at most the shear modulus {mu1:g}")

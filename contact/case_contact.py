@@ -215,7 +215,9 @@ class Electric(Section):
     k_e: NonNegative = Field(description="Conductivity k_e of the foundation.")
     phi_f: Number = Field(default=0.0, description="Potential phi_F of the foundation.")
     delta: Positive | None = Field(
-        default=None, description="Slope of psi (1/length). Default: 1000 / size of the body."
+        default=None,
+        description="Slope of psi (1/length), `shifted` and `ramp` only. Default: 1000 / size of "
+        "the body.",
     )
     limit: Positive | None = Field(
         default=None, description="Limit L of the truncation phi_L. Default: no truncation."
@@ -225,3 +227,9 @@ class Electric(Section):
         description="`true`: the charge is taken from the previous outer iteration, as in "
         "Algorithm 4; converges for small k_e only; not with method `newton`.",
     )
+
+    @model_validator(mode="after")
+    def _check(self) -> Electric:
+        if self.delta is not None and self.law == "perfect":
+            raise fault("delta", self.delta, 'delta with law = "shifted" or "ramp"')
+        return self

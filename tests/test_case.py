@@ -273,6 +273,22 @@ BAD = {
         {"material__piezo": PIEZO, "fixed": electrode, "electric": {"k_e": -1}},
         "electric.k_e: given -1; accepted: a number >= 0",
     ),
+    "slope of a jump": (
+        {
+            "material__piezo": PIEZO,
+            "fixed": electrode,
+            "electric": {"k_e": 1, "law": "perfect", "delta": 9},
+        },
+        'electric.delta: given 9.0; accepted: delta with law = "shifted" or "ramp"',
+    ),
+    "floor of a constant": (
+        {"material__law": "linear", "material__g_min": 0.1},
+        'material.g_min: given 0.1; accepted: g_min with law = "log"',
+    ),
+    "argument of a constant": (
+        {"material__law": "linear", "material__argument": "square"},
+        'argument with law = "log"',
+    ),
     "method": ({"solver__method": "newtn"}, '"uzawa", "penalty" or "newton"'),
     "setting of another method": (
         {"solver__r": 25},
