@@ -383,8 +383,10 @@ def test_not_converged_writes_outputs(
     """One outer iteration is too few: exit status 1, and the outputs say so."""
     case = write(shared_tmp_path, BAR.replace("mu = 0.3", 'mu = { law = "slip", rho = 1e4 }'))
     options = ("--set", "solver.method=uzawa", "--set", "solver.max_outer=1")
-    status, _ = run(case, *options, capfd=capfd)
+    status, lines = run(case, *options, capfd=capfd)
     assert status == NOT_CONVERGED
+    if MPI.COMM_WORLD.rank == 0:  # --quiet is about progress alone
+        assert "contact: stopped: not converged in 1 outer iterations" in lines[-1]
     summary = (shared_tmp_path / "out" / "summary.json").read_text()
     assert '"converged": false' in summary
     assert "not converged in 1 outer iterations" in summary
