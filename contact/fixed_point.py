@@ -23,6 +23,7 @@ import numpy as np
 
 from contact.case_solver import MAX_INNER
 from contact.case_types import PRECISION
+from contact.following import Following
 from contact.kkt import KKT, evaluate, residual_forces
 from contact.linear import Counters, LinearOperator
 from contact.norms import domain_norm
@@ -118,7 +119,7 @@ class FixedPoint:
         thesis = self.options.stopping == "thesis"
         inner = self.options.inner_tolerance or max(self.options.tolerance / 10, PRECISION)
         self._stalled = False
-        self._followed = np.inf  # residual before the last step that followed psi
+        self._following = Following(NEAR)
         self._relaxation = Relaxation(
             self.r,
             inner,
@@ -200,10 +201,8 @@ class FixedPoint:
         """
         response, records = self.problem.response, self.history.records
         residual = records[-1].kkt.largest if records else np.inf
-        # Where the residual has grown, psi is frozen again until it has fallen below.
-        if not response.follows_gap or residual > min(NEAR, self._followed):
+        if not response.follows_gap or not self._following(residual):
             return response.current_block(nodal, pressure)
-        self._followed = residual
         if self.operator.symmetric:
             self.operator = LinearOperator(
                 self.problem, symmetric=False, counters=self.counters, kind=self.options.linear

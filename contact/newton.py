@@ -20,6 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from contact.fixed_point import FixedPoint, FixedPointOptions
+from contact.following import Following
 from contact.kkt import KKT, evaluate, interface_residuals, residual_forces
 from contact.linear import Counters, LinearOperator
 from contact.newton_laws import Moduli, linearise, node_status
@@ -95,6 +96,7 @@ class Newton:
         self.forces = Multipliers.zero(self.problem)
         self._status: NDArray[np.int8] | None = None
         self._layer_pressure: Array | None = None  # after the last step; None: that of the iterate
+        self._following = Following()
         self._begin = 0.0
 
     @property
@@ -160,6 +162,7 @@ class Newton:
         goal = max(goal, options.tolerance)
         residuals = evaluate(problem, self.forces)
         best, since = np.inf, 0
+        self._following = Following()
         # A start from elsewhere is near the solution; zero displacement has no better tangent.
         tangent = self._status is not None and not problem.linear_material
         steps = min(options.max_iterations, self._left)
@@ -181,7 +184,8 @@ class Newton:
                 tangent = residuals.equilibrium < options.secant_until and (falls or not tangent)
             since = 0 if measured < 0.9 * best else since + 1
             best = min(best, measured)
-            if since >= options.patience:
+            # A node that opens along the ramp of psi, frozen from step to step, takes its time.
+            if since >= options.patience * (3 if self._following.frozen else 1):
                 return Outcome(False, f"Newton's method stalled at {best:.1e}", residuals)
         return Outcome(False, f"not converged in {steps} steps", residuals)
 
@@ -241,7 +245,8 @@ class Newton:
         if problem.response.active:
             pressure = total_pressure(problem, nodal, contact.forces)
             response = problem.response
-            current = response.current_jacobian if contact.settled else response.current_block
+            follow = self._following(reached, contact.settled)
+            current = response.current_jacobian if follow else response.current_block
             blocks = blocks + layer + current(nodal, pressure)
         self.operator.update(
             problem.tangent if tangent else problem.secant,

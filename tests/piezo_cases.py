@@ -141,9 +141,11 @@ def example(
     phi_f: float = 32.0,
     lagged: bool = False,
     limit: float = np.inf,
+    delta: float = 125.0,
     degree: int = 1,
     units: Units = SCALED,
     degrees: float = 0.0,
+    grounded: bool = True,
 ) -> ContactProblem:
     """Return Example 8.1, or 8.2 with its law, or a block of 8 x 2 x 4 for three cell counts.
 
@@ -158,11 +160,11 @@ def example(
     q3[:dim, :dim] = q
     body = Body(
         law or units.law(),
-        [Fixed("left", [zero] * dim, zero)],
+        [Fixed("left", [zero] * dim, zero if grounded else None)],
         [Load("top", traction)],
         pzt(dim, units).rotated(q3),
     )
-    psi = ShiftedConductivity(k_e / units.potential, 125.0)
+    psi = ShiftedConductivity(k_e / units.potential, delta)
     conductor = Conductor(
         psi, phi_f * units.potential, Truncation(limit * units.potential), lagged=lagged
     )

@@ -1,0 +1,55 @@
+"""When the ramp of the conductivity is followed, and what that is good for."""
+
+import numpy as np
+from mpi4py import MPI
+from piezo_cases import example, potential
+
+from contact.fixed_point import FixedPoint, FixedPointOptions
+from contact.following import Following
+from contact.newton import Newton, NewtonOptions
+from contact.problem import Friction
+from forms.laws import SlipCoefficient
+
+
+def test_followed_as_long_as_the_residual_falls():
+    follow = Following(1e-2)
+    assert [follow(r) for r in (1.0, 1e-1, 9e-3, 1e-4, 1e-9)] == [False, False, True, True, True]
+    assert not follow.frozen
+
+
+def test_a_step_that_made_it_worse_is_not_repeated_at_once():
+    """A frozen step takes back what a followed one has spoilt, and not much more."""
+    follow = Following()
+    assert follow(1.83e-3)
+    assert not follow(9.55e-3)
+    assert follow.frozen
+    assert not follow(1.82e-3)
+    assert not follow(1.81e-3)
+    assert follow(1e-4)
+    assert not follow.frozen
+
+
+def test_steps_in_between_that_must_not_follow():
+    follow = Following()
+    assert follow(1e-3)
+    assert not follow(1e-2, allowed=False)
+    assert not follow(9e-4)
+    assert not follow(2e-5, allowed=False)
+    assert not follow.frozen
+    assert follow(1e-5)
+
+
+def test_a_node_opens_along_the_ramp():
+    """A node that draws less current as it opens, and thus opens further: no cycle.
+
+    Followed, the ramp points back to the foundation, where the node is under tension.
+    """
+    friction = Friction(SlipCoefficient(0.5, 0.2, 1.0))
+    found = []
+    for method, options in ((Newton, NewtonOptions()), (FixedPoint, FixedPointOptions())):
+        problem = example(MPI.COMM_WORLD, friction=friction, phi_f=116.0, delta=5.0)
+        solver = method(problem, options)
+        assert solver.solve().converged
+        found.append((potential(problem), solver.history.records))
+    assert {record.note for record in found[0][1]} == {""}, "Newton's method falls back"
+    assert np.allclose(found[0][0], found[1][0], rtol=1e-7)
