@@ -23,6 +23,7 @@ from contact.case_types import (
     as_tuple,
     fault,
 )
+from forms.piezo import hexagonal_voigt
 
 
 class Space(Section):
@@ -78,10 +79,8 @@ class Piezo(Section):
         """Coupling, shape (3, 6), and permittivity, shape (3, 3), poled along X3."""
         if self.e is not None:
             return np.array(self.e), np.array(self.beta)
-        e = np.zeros((3, 6))
-        e[2, :3] = self.e31, self.e31, self.e33
-        e[0, 4] = e[1, 3] = self.e15
-        return e, np.diag([self.beta11, self.beta11, self.beta33])
+        constants = (self.e31, self.e33, self.e15, self.beta11, self.beta33)
+        return hexagonal_voigt(*constants)  # type: ignore[arg-type]
 
     @model_validator(mode="after")
     def _check(self) -> Piezo:

@@ -347,8 +347,17 @@ class ContactProblem:
         return vector.array[: self.owned].copy()
 
     def reset(self) -> None:
-        """Set the iterate to zero, with the prescribed values."""
+        """Set the iterate to zero, with the prescribed values.
+
+        Where no potential is prescribed, it starts from that of the conductive foundation, which
+        alone determines it: far from phi_F a truncated charge has no derivative.
+        """
         self.x.x.array[:] = 0.0
+        conductor = self.response.conductor
+        if self.piezoelectric and conductor is not None:
+            if all(fixed.potential is None for fixed in self.body.fixed):
+                potential = self.x.x.array.reshape(-1, self.block_size)[:, -1]
+                potential[:] = conductor.phi_f / self.phi_scale
         self._frozen.x.array[:] = 0.0
         self.apply_load(1.0)
 

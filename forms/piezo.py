@@ -68,8 +68,18 @@ class Piezo:
         return Piezo(e, q @ np.asarray(self.beta) @ q.T)
 
     def poled_along(self, axis: ArrayLike) -> Piezo:
-        """Return a material poled along z, turned the shortest way to another axis."""
-        x, y, z = np.asarray(axis, dtype=float) / np.linalg.norm(axis)
+        """Return a material poled along z, turned the shortest way to another axis.
+
+        Raises
+        ------
+        ValueError
+            If the axis is no vector of three finite numbers, or zero.
+        """
+        given = np.asarray(axis, dtype=float)
+        length = np.linalg.norm(given)
+        if given.shape != (3,) or not 0 < length < np.inf:
+            raise ValueError(f"a poling axis must be a vector (3 numbers, not all 0); got {given}")
+        x, y, z = given / length
         if z < -1 + 1e-12:
             return self.rotated(np.diag([1.0, -1.0, -1.0]))
         cross = np.array([[0.0, 0.0, x], [0.0, 0.0, y], [-x, -y, 0.0]])
@@ -137,12 +147,19 @@ def from_voigt(e: ArrayLike, beta: ArrayLike) -> Piezo:
     return material
 
 
-def hexagonal(e31: float, e33: float, e15: float, beta11: float, beta33: float) -> Piezo:
-    """Return a material of class 6mm poled along z, with e32 = e31 and e24 = e15."""
+def hexagonal_voigt(
+    e31: float, e33: float, e15: float, beta11: float, beta33: float
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return the Voigt matrices of class 6mm poled along z, with e32 = e31 and e24 = e15."""
     e = np.zeros((3, 6))
     e[2, :3] = e31, e31, e33
     e[0, 4] = e[1, 3] = e15
-    return from_voigt(e, np.diag([beta11, beta11, beta33]))
+    return e, np.diag([beta11, beta11, beta33])
+
+
+def hexagonal(e31: float, e33: float, e15: float, beta11: float, beta33: float) -> Piezo:
+    """Return a material of class 6mm poled along z."""
+    return from_voigt(*hexagonal_voigt(e31, e33, e15, beta11, beta33))
 
 
 def coupling_number(law: Hencky, piezo: Piezo) -> float:

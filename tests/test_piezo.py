@@ -16,9 +16,12 @@ from piezo_cases import (
     pzt,
 )
 
+from contact.build import piezo
+from contact.case_body import Piezo as PiezoSection
 from contact.electric import charge_balance, force_balance, mean_potential, sensor
 from contact.errors import InputError
 from contact.fixed_point import FixedPoint, FixedPointOptions
+from contact.newton import Newton, NewtonOptions
 from contact.problem import Friction
 from forms.laws import (
     PerfectConductivity,
@@ -103,6 +106,32 @@ def test_quarter_turns_and_poling_axis():
     about = CRYSTAL.rotated([[c, -s, 0], [s, c, 0], [0, 0, 1]])
     assert np.allclose(about.e, CRYSTAL.e, atol=1e-14)
     assert np.allclose(CRYSTAL.in_plane().e, turned.e, atol=1e-14)
+
+
+@pytest.mark.parametrize("axis", [[0.0, 0.0, 0.0], [1.0, 0.0], [np.nan, 0.0, 1.0]])
+def test_bad_axis_is_refused(axis):
+    with pytest.raises(ValueError, match="a vector"):
+        CRYSTAL.poled_along(axis)
+
+
+def section(**changes) -> PiezoSection:
+    return PiezoSection(**COUPLING, **PERMITTIVITY, **changes)
+
+
+def test_poling_of_the_case_file():
+    assert np.array_equal(piezo(section(), 3).e, CRYSTAL.e)
+    axis = np.array([1.0, -2.0, 0.5])
+    turned = piezo(section(poling=axis.tolist()), 3)
+    unit = axis / np.linalg.norm(axis)
+    along = np.einsum("ijk,i,j,k", turned.e, unit, unit, unit)
+    assert along == pytest.approx(COUPLING["e33"], rel=1e-14)
+    assert unit @ turned.beta @ unit == pytest.approx(PERMITTIVITY["beta33"], rel=1e-14)
+    # In the plane by an angle from x; upwards unless said otherwise.
+    assert np.allclose(piezo(section(), 2).e, piezo(section(poling=90.0), 2).e, atol=1e-14)
+    right = piezo(section(poling=0.0), 2)
+    assert right.e[0, 0, 0] == pytest.approx(COUPLING["e33"], rel=1e-14)
+    assert right.e[0, 1, 1] == pytest.approx(COUPLING["e31"], rel=1e-14)
+    assert right.e[1, 0, 1] == pytest.approx(COUPLING["e15"], rel=1e-14)
 
 
 BAD = {
@@ -277,6 +306,23 @@ def test_truncation_limits_the_charge():
     assert np.abs(potential(problem) - 32.0).min() > 3.0
     # The node at the clamped end is an electrode's; the foundation takes 3 k_e elsewhere.
     assert charge.foundation == pytest.approx(-3.0 * problem.trace.weight.sum(), rel=1e-9)
+
+
+OPTIONS = {Newton: NewtonOptions(), FixedPoint: FixedPointOptions()}
+
+
+@pytest.mark.parametrize("limit", [np.inf, 1.0])
+@pytest.mark.parametrize("method", OPTIONS)
+def test_body_without_ground(method, limit):
+    """The foundation alone sets the level of the potential, also where its charge is truncated."""
+    found = []
+    for phi_f in (0.0, 32.0):
+        problem = example(COMM, (16, 8), -10.0, phi_f=phi_f, limit=limit, grounded=False)
+        solver = method(problem, OPTIONS[method])
+        assert solver.solve().converged
+        assert charge_balance(problem, solver.forces).imbalance < 1e-8
+        found.append(potential(problem) - phi_f)
+    assert np.allclose(found[0], found[1], rtol=1e-6, atol=1e-6)
 
 
 @pytest.mark.parametrize("k_e", [1e-3, 1e-2, 1e-1])
