@@ -41,7 +41,10 @@ def petsc_options(prefix: str) -> Iterator[None]:
 
 @dataclass
 class Counters:
-    """How often the expensive steps were taken."""
+    """How often the expensive steps were taken.
+
+    `linear_iterations` are those of iterative solvers; a direct one counts one a solve.
+    """
 
     factorizations: int = 0
     linear_solves: int = 0

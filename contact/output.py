@@ -106,6 +106,7 @@ def summarise(solution: Solution, table: Table | None) -> dict[str, Any]:
         "outer_iterations": len(records),
         "inner_iterations": [record.inner for record in records],
         "linear_solves": counters.linear_solves,
+        "linear_iterations": counters.linear_iterations,
         "factorizations": counters.factorizations,
         "kkt": {"equilibrium": kkt.equilibrium, "contact": kkt.contact, "friction": kkt.friction},
         "max_pressure": problem.trace.maximum(solution.pressure),

@@ -110,6 +110,18 @@ def test_electric_outputs(dim: int, shared_tmp_path: Path) -> None:
     assert abs(summary["total_charge"]) <= 1e-8 * abs(through)
 
 
+def test_iterations_of_the_linear_solver_are_written(tmp_path: Path) -> None:
+    """Those of MINRES where it is asked for, none to speak of with a factorisation."""
+    counts = []
+    for kind in ("lu", "iterative"):
+        case = electric(2)
+        settings = case.solver.model_copy(update={"linear": kind})
+        summary, _ = written(solve(case.model_copy(update={"solver": settings})), tmp_path / kind)
+        assert summary["converged"] is True
+        counts.append(summary["linear_iterations"] / summary["linear_solves"])
+    assert counts[0] <= 1 < 5 < counts[1]
+
+
 @pytest.mark.parallel
 @pytest.mark.parametrize("dim", [2, 3])
 def test_same_on_any_number_of_ranks(dim: int, shared_tmp_path: Path) -> None:
