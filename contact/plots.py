@@ -18,7 +18,7 @@ from contact.table import contact_table, held_points
 #: Quantities drawn on the deformed body: name of the figure, field, label.
 DEFORMED = (
     ("deformed", "von_mises", "von Mises stress (units of the case)"),
-    ("potential", "potential", r"potential $\varphi$"),
+    ("potential", "potential", r"potential $\varphi$ (units of the case)"),
 )
 
 #: Settings of all figures.

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 import numpy as np
 from matplotlib.figure import Figure
 from mpi4py import MPI
-from reporting import CASES, Report, options, solved, subplots
+from reporting import CASES, Report, options, solved, subplots, yielded_share
 
 from contact import Solution, build_problem, load_case
 from contact.plots_contact import draw_line
@@ -20,6 +20,10 @@ from contact.response import NormalLaw
 from contact.table import Table, contact_table, csv_columns, tangent_of
 from forms.foundation import contact_multiplier
 from forms.laws import Compliance, PotentialFactor, RampConductivity, ShiftedConductivity
+
+#: Labels of axes and colours.
+POTENTIAL = r"potential $\varphi$ (units of the case)"
+ALONG = r"$x$ along $\Gamma_3$ (mesh units)"
 
 #: mu = k_e of Figures 8.11 and 8.12.
 VALUES = (6e-1, 2e-1, 6.8e-2, 5.1e-3, 8.5e-7)
@@ -99,7 +103,8 @@ def example(report: Report, number: str, name: str, what: str, cells: tuple[int,
     """Draw both parts of Figure 8.9 or 8.10. Collective."""
     solution = solution_of(name, cells)
     table = contact_table(solution)
-    deformed = picture(solution, "potential", r"potential $\varphi$")
+    deformed = picture(solution, "potential", POTENTIAL)
+    share = yielded_share(solution)
     if table is None or deformed is None:
         return
     dotted, values = number.replace("-", "."), deformed.values
@@ -108,11 +113,11 @@ def example(report: Report, number: str, name: str, what: str, cells: tuple[int,
         f"Figure {dotted} (a): normal and tangential stress on Gamma_3, {what}",
         draw_line(table, held=deformed.held),
         csv_columns(table),
-        remark(solution, table),
+        remark(solution, table) + yielding(solution.max_dev_strain, share),
     )
     report.figure(
         f"figure-{number}b",
-        f"Figure {dotted} (b): deformed bar, potential and contact forces (arrows), {what}",
+        f"Figure {dotted} (b): deformed bar, potential and contact forces on it (arrows), {what}",
         with_forces(draw_plane(deformed, table), deformed, table),
         {"smallest potential": [float(values.min())], "largest potential": [float(values.max())]},
     )
@@ -149,6 +154,12 @@ def remark(solution: Solution, table: Table) -> str:
     )
 
 
+def yielding(strain: float, share: float) -> str:
+    """Return a sentence on the largest strain, and where the law has one, on the yielded share."""
+    words = f" Largest |dev eps| {strain:.3g}"
+    return f"{words}, yielded: {100 * share:.2g} % of the body." if share >= 0 else f"{words}."
+
+
 def series(report: Report, cells: tuple[int, int]) -> None:
     """Draw Figures 8.11 and 8.12: stresses and potential for mu = k_e -> 0. Collective."""
     limit = solution_of("compliance-8-3", cells)
@@ -160,10 +171,10 @@ def series(report: Report, cells: tuple[int, int]) -> None:
         tables[f"{value:g}"] = contact_table(solution)
     if MPI.COMM_WORLD.rank > 0:
         return
-    for number, key, what in (
-        ("8-11a", "pressure", "normal stress"),
-        ("8-11b", "tau", "tangential stress"),
-        ("8-12", "phi", "potential"),
+    for number, key, what, ylabel in (
+        ("8-11a", "pressure", "normal stress", r"$-\sigma_\nu$ (units of the case)"),
+        ("8-11b", "tau", "tangential stress", r"$-\sigma_\tau\cdot t$ (units of the case)"),
+        ("8-12", "phi", "potential", POTENTIAL),
     ):
         figure, axes = subplots(size=(6.0, 3.2))
         data: dict[str, Sequence[float]] = {}
@@ -174,8 +185,7 @@ def series(report: Report, cells: tuple[int, int]) -> None:
             style = "k--" if label.startswith("P") else "-"
             name = label if label.startswith("P") else rf"$\mu = k_e = {label}$"
             axes.plot(table["x"], table[key], style, lw=1.0, label=name)
-        ylabel = {"pressure": r"$-\sigma_\nu$", "tau": r"$-\sigma_\tau$", "phi": r"$\varphi$"}[key]
-        axes.set(xlabel="x along Gamma_3", ylabel=ylabel)
+        axes.set(xlabel=ALONG, ylabel=ylabel)
         axes.legend()
         caption = (
             f"Figure {number.replace('-', '.')}: {what} on Gamma_3, phi_F = 32, for mu = k_e -> 0"

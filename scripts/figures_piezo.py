@@ -11,13 +11,12 @@ from dataclasses import dataclass
 import numpy as np
 import ufl
 from dolfinx import fem
-from figures_compliance import example, remark, with_forces
+from figures_compliance import ALONG, POTENTIAL, example, remark, solution_of, with_forces
 from lagged_current import theorem_5_2
 from matplotlib.figure import Figure
 from mpi4py import MPI
-from reporting import CASES, Report, observed_orders, options, solved, subplots
+from reporting import Report, observed_orders, options, subplots
 
-from contact import Solution, build_problem, load_case
 from contact.interpolate import carry
 from contact.plots_fields import draw_plane, picture
 from contact.problem import ContactProblem
@@ -38,23 +37,17 @@ class Curve:
     changes: tuple[str, ...]
 
 
-def solution_of(name: str, cells: tuple[int, int], *changes: str, **objects: object) -> Solution:
-    """Solve a case file on a mesh. Collective."""
-    case = load_case(CASES / f"{name}.toml", [f"mesh.cells=[{cells[0]}, {cells[1]}]", *changes])
-    return solved(case, build_problem(case, **objects))
-
-
 def figure_8_2a(report: Report, cells: tuple[int, int]) -> None:
     """Draw the deformed bar on an insulating foundation. Collective."""
     solution = solution_of("piezo-8-1", cells)
     table = contact_table(solution)
-    deformed = picture(solution, "potential", r"potential $\varphi$")
+    deformed = picture(solution, "potential", POTENTIAL)
     if table is None or deformed is None:
         return
     values = deformed.values
     report.figure(
         "figure-8-2a",
-        "Figure 8.2 (a): deformed bar, potential and contact forces (arrows), k_e = 0, mu = 0.2",
+        "Figure 8.2 (a): deformed bar, potential, contact forces on it (arrows), k_e = 0, mu = 0.2",
         with_forces(draw_plane(deformed, table), deformed, table),
         {"smallest potential": [float(values.min())], "largest potential": [float(values.max())]},
         remark(solution, table),
@@ -70,7 +63,7 @@ def potentials(
     data: dict[str, Array] = {}
     figure, axes = subplots(size=(6.0, 3.2))
     residual = 0.0
-    for curve in curves:
+    for k, curve in enumerate(curves):
         solution = solution_of(name, cells, *curve.changes, domain=domain)
         domain = solution.problem.domain
         residual = max(residual, solution.outcome.kkt.largest)
@@ -78,10 +71,11 @@ def potentials(
         if table is not None:
             data.setdefault("x", table["x"])
             data[curve.label] = table["phi"]
-            axes.plot(table["x"], table["phi"], lw=1.0, label=curve.label)
+            # Dashes let curves be seen that coincide.
+            axes.plot(table["x"], table["phi"], "--" if k % 2 else "-", lw=1.0, label=curve.label)
     if MPI.COMM_WORLD.rank > 0:
         return
-    axes.set(xlabel="x along Gamma_3", ylabel=r"$\varphi$")
+    axes.set(xlabel=ALONG, ylabel=POTENTIAL)
     axes.legend(ncols=2)
     report.figure(
         f"figure-{number}",

@@ -15,13 +15,18 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import ufl
+from dolfinx import fem
 from matplotlib import rcParams
 from matplotlib.figure import Figure
 from mpi4py import MPI
 
 from contact import Case, InputError, Solution, load_case, solve, solve_problem
+from contact.norms import volume
 from contact.plots import STYLE
 from contact.problem import ContactProblem
+from forms.hencky import Log
+from forms.kinematics import deviator_squared, strain
 
 CASES = Path(__file__).parent / "cases"
 
@@ -162,6 +167,23 @@ def solved(case: Case, problem: ContactProblem | None = None) -> Solution:
     if not solution.converged:
         raise InputError(f"{case.title}: {solution.outcome.reason}")
     return solution
+
+
+def yielded_share(solution: Solution) -> float:
+    """Return the share of the body where |dev eps| is beyond the yield strain. Collective.
+
+    NaN for a law without one.
+    """
+    problem = solution.problem
+    law = problem.body.law
+    if not isinstance(law, Log):
+        return np.nan
+    u, _ = problem.parts_of(problem.x)
+    limit = problem.constant(law.yield_strain**2)
+    yielded = ufl.conditional(ufl.gt(deviator_squared(strain(u)), limit), 1.0, 0.0)
+    dx = problem.domain.dx
+    part = problem.comm.allreduce(fem.assemble_scalar(fem.form(yielded * dx)))
+    return float(part / volume(problem, dx))
 
 
 def iterate(problem: ContactProblem) -> np.ndarray:
