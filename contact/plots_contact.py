@@ -88,7 +88,7 @@ def draw_line(table: Table, title: str = "", held: Array | None = None) -> Figur
         for zone, start, stop in zones(table["status"], where):
             ax.axvspan(start, stop, color=ZONES[zone][0], lw=0, zorder=0)
     shown = [
-        Patch(color=colour, label=label)
+        Patch(color=colour, label=label if frictional or zone == "open" else "in contact")
         for zone, (colour, label) in ZONES.items()
         if np.any(table["status"] == zone)
     ]

@@ -52,7 +52,8 @@ def _uniqueness(solution: Solution) -> tuple[str, bool]:
     own = (coefficient.maximum, coefficient.lipschitz) if trace.nodes.size else (0.0, 0.0)
     maximum, lipschitz = (comm.allreduce(value, op=MPI.MAX) for value in own)
     pressure = solution.pressure
-    area = trace.sum((pressure > 0).astype(float))
+    # Pressures of rounding size are none, as in `Solution.status`.
+    area = trace.sum((pressure > 1e-9 * trace.maximum(pressure)).astype(float))
     mean = trace.sum(pressure) / area if area > 0 else 0.0
     text = f"Theorem 3.1: unique if mu* + L_mu = {maximum:.4g} + {lipschitz:.4g} is small enough"
     if lipschitz == 0 or mean <= 0:
