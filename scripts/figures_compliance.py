@@ -25,8 +25,13 @@ from forms.laws import Compliance, PotentialFactor, RampConductivity, ShiftedCon
 POTENTIAL = r"potential $\varphi$ (units of the case)"
 ALONG = r"$x$ along $\Gamma_3$ (mesh units)"
 
-#: mu = k_e of Figures 8.11 and 8.12.
-VALUES = (6e-1, 2e-1, 6.8e-2, 5.1e-3, 8.5e-7)
+#: mu = k_e of Figures 8.11 and 8.12, and how it is written.
+VALUES = {
+    6e-1: "0.6", 2e-1: "0.2", 6.8e-2: "0.068", 5.1e-3: "0.0051", 8.5e-7: r"8.5\times 10^{-7}",
+}  # fmt: skip
+
+#: Arrows shorter than this part of the longest would be dots.
+SHORTEST_ARROW = 0.02
 
 
 def normal_graph(p_nu: Compliance, touch: float, gap: float, stiffness: float) -> tuple[Array, ...]:
@@ -72,7 +77,7 @@ def laws(report: Report) -> None:
         axes.axvline(0.0, color="0.7", lw=0.6)
         axes.plot(u, force, "k", lw=1.6)
         part = r"\tau" if number == "1-7" else r"\nu"
-        axes.set(xlabel=rf"$u_{part}$", ylabel=rf"$-\sigma_{part}$")
+        axes.set(xlabel=rf"$u_{part}$ (arb. units)", ylabel=rf"$-\sigma_{part}$ (arb. units)")
         caption = f"Figure {number.replace('-', '.')}: {what}"
         note = "Drawn from the projection that the block relaxation applies at a contact node."
         report.figure(f"figure-{number}", caption, figure, {"u": u, "-sigma": force}, note)
@@ -87,7 +92,7 @@ def laws(report: Report) -> None:
         data[f"psi, {name}"] = psi(s)
         left.plot(s, psi(s), label=name)
     left.set(xlabel=r"$\delta\,(u_\nu - \varrho)$", ylabel=r"$\psi / k_e$")
-    left.legend()
+    left.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=2)
     depth, difference = np.linspace(-0.1, 0.3, 201), np.linspace(-200.0, 200.0, 201)
     data |= {"depth": depth, "p_nu": Compliance(0.1)(depth)}
     data |= {"phi - phi_F": difference, "h_nu": PotentialFactor(10.0, 2.0)(difference)}
@@ -99,25 +104,57 @@ def laws(report: Report) -> None:
     report.figure("laws-8-1-2", caption, figure, data)
 
 
-def example(report: Report, number: str, name: str, what: str, cells: tuple[int, int]) -> None:
-    """Draw both parts of Figure 8.9 or 8.10. Collective."""
-    solution = solution_of(name, cells)
+def example(
+    report: Report,
+    number: str,
+    name: str,
+    what: str,
+    cells: tuple[int, int],
+    variant: str = "",
+    changes: Sequence[str] = (),
+    note: str = "",
+) -> None:
+    """Draw both parts of Figure 8.9 or 8.10, or of a variant of it. Collective.
+
+    Parameters
+    ----------
+    report
+        Where to.
+    number, name
+        Of the figure, with a hyphen, and of the case file.
+    what
+        What is shown, for the captions.
+    cells
+        Of the mesh.
+    variant
+        Appended to the names of the files.
+    changes
+        Overrides of the case.
+    note
+        Appended to the remark on the stresses.
+    """
+    solution = solution_of(name, cells, *changes)
     table = contact_table(solution)
     deformed = picture(solution, "potential", POTENTIAL)
     share = yielded_share(solution)
     if table is None or deformed is None:
         return
     dotted, values = number.replace("-", "."), deformed.values
+    of, ending = (" of the variant", f"-{variant}") if variant else ("", "")
+    stress = "normal and tangential stress"
+    if not solution.problem.frictional:
+        stress = "normal stress (the tangential one is zero)"
     report.figure(
-        f"figure-{number}a",
-        f"Figure {dotted} (a): normal and tangential stress on Gamma_3, {what}",
+        f"figure-{number}a{ending}",
+        f"Figure {dotted} (a){of}: {stress} on Gamma_3, {what}",
         draw_line(table, held=deformed.held),
         csv_columns(table),
-        remark(solution, table) + yielding(solution.max_dev_strain, share),
+        f"{remark(solution, table)}{yielding(solution.max_dev_strain, share)} {note}".rstrip(),
     )
     report.figure(
-        f"figure-{number}b",
-        f"Figure {dotted} (b): deformed bar, potential and contact forces on it (arrows), {what}",
+        f"figure-{number}b{ending}",
+        f"Figure {dotted} (b){of}: deformed bar, potential and contact forces on it (arrows), "
+        f"{what}",
         with_forces(draw_plane(deformed, table), deformed, table),
         {"smallest potential": [float(values.min())], "largest potential": [float(values.max())]},
     )
@@ -130,10 +167,12 @@ def with_forces(figure: Figure, deformed: Picture, table: Table) -> Figure:
     place = np.column_stack([table["x"], table["y"]])
     place += deformed.scale * (table["u_n"][:, None] * normal + table["u_t"][:, None] * tangent)
     force = -(table["pressure"][:, None] * normal + table["tau"][:, None] * tangent)
-    longest = float(np.linalg.norm(force, axis=1).max(initial=0.0)) or 1.0
+    length = np.linalg.norm(force, axis=1)
+    longest = float(length.max(initial=0.0)) or 1.0
+    shown = length > SHORTEST_ARROW * longest
     reach = 0.08 * float(np.ptp(table["x"]))  # the longest arrow
     arrows = {"angles": "xy", "scale_units": "xy", "scale": longest / reach, "width": 0.002}
-    figure.axes[0].quiver(*place.T, *force.T, color="white", **arrows)
+    figure.axes[0].quiver(*place[shown].T, *force[shown].T, color="white", **arrows)
     return figure
 
 
@@ -148,10 +187,11 @@ def solution_of(
 def remark(solution: Solution, table: Table) -> str:
     """Return how many nodes stick, slide and are open, and the residual."""
     counts = {kind: np.count_nonzero(table["status"] == kind) for kind in ("stick", "slip", "open")}
-    return (
-        f"{counts['stick']} nodes stick, {counts['slip']} slide, {counts['open']} are open; "
-        f"largest residual {solution.outcome.kkt.largest:.1e}."
-    )
+    touching = f"{counts['stick']} nodes stick, {counts['slip']} slide"
+    if not solution.problem.frictional:
+        touching = f"{counts['slip']} nodes are in contact"
+    residual = solution.outcome.kkt.largest
+    return f"{touching}, {counts['open']} are open; largest residual {residual:.1e}."
 
 
 def yielding(strain: float, share: float) -> str:
@@ -164,11 +204,14 @@ def series(report: Report, cells: tuple[int, int]) -> None:
     """Draw Figures 8.11 and 8.12: stresses and potential for mu = k_e -> 0. Collective."""
     limit = solution_of("compliance-8-3", cells)
     domain = limit.problem.domain
-    tables = {"Problem (PV1)": contact_table(limit)}
+    tables = {}
     for value in VALUES:
         changes = f"friction.mu={value}", f"electric.k_e={value}"
         solution = solution_of("compliance-8-4", cells, *changes, domain=domain)
-        tables[f"{value:g}"] = contact_table(solution)
+        tables[f"mu = k_e = {value:g}"] = contact_table(solution)
+    # Last, to lie on top of what tends to it.
+    tables["Problem (PV1)"] = contact_table(limit)
+    names = [*(rf"$\mu = k_e = {words}$" for words in VALUES.values()), "Problem (PV1)"]
     if MPI.COMM_WORLD.rank > 0:
         return
     for number, key, what, ylabel in (
@@ -178,15 +221,14 @@ def series(report: Report, cells: tuple[int, int]) -> None:
     ):
         figure, axes = subplots(size=(6.0, 3.2))
         data: dict[str, Sequence[float]] = {}
-        for label, table in tables.items():
+        for (label, table), name in zip(tables.items(), names, strict=True):
             assert table is not None
             data.setdefault("x", table["x"])
             data[label] = table[key]
             style = "k--" if label.startswith("P") else "-"
-            name = label if label.startswith("P") else rf"$\mu = k_e = {label}$"
             axes.plot(table["x"], table[key], style, lw=1.0, label=name)
         axes.set(xlabel=ALONG, ylabel=ylabel)
-        axes.legend()
+        axes.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
         caption = (
             f"Figure {number.replace('-', '.')}: {what} on Gamma_3, phi_F = 32, for mu = k_e -> 0"
         )
@@ -200,10 +242,18 @@ def main(arguments: Sequence[str] | None = None) -> None:
     if MPI.COMM_WORLD.rank == 0:
         laws(report)
     example(report, "8-9", "compliance-8-3", "Example 8.3", cells)
-    example(report, "8-10", "compliance-8-4", "Example 8.4, mu = 0.6, k_e = 1", cells)
+    data = "Example 8.4, mu = 0.6, k_e = 1"
+    leaning = (
+        "With so much friction and current several solutions coexist, and the mesh decides which "
+        "is found. All triangles lean to one side here, and so does this solution; the mirrored "
+        "mesh gives its mirror image, a symmetric mesh a symmetric one (variant below)."
+    )
+    example(report, "8-10", "compliance-8-4", data, cells, note=leaning)
+    crossed, what = ["mesh.diagonal=crossed"], f"{data}, crossed diagonals"
+    example(report, "8-10", "compliance-8-4", what, cells, "crossed", crossed)
     layer = "layer of thickness 0.1"
-    example(report, "8-9-layer", "compliance-8-3-layer", f"Example 8.3, {layer}", cells)
-    example(report, "8-10-layer", "compliance-8-4-layer", f"Example 8.4, {layer}", cells)
+    example(report, "8-9", "compliance-8-3-layer", f"Example 8.3, {layer}", cells, "layer")
+    example(report, "8-10", "compliance-8-4-layer", f"Example 8.4, {layer}", cells, "layer")
     series(report, cells)
 
 

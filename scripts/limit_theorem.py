@@ -35,6 +35,13 @@ TABLE_8_4 = (6e-1, 2e-1, 6.8e-2, 5.1e-3, 6.2e-4, 1.4e-5, 3.5e-6, 8.5e-7)
 SMALLEST = TABLE_8_4[-1]
 VALUES = tuple(sorted({*TABLE_8_4, 2e-2, 1.5e-3, 2e-4, 6e-5, 4e-6}, reverse=True))
 
+#: How names of parameters and curves are drawn.
+SYMBOLS = {
+    "mu = k_e": r"$\mu = k_e$",
+    "1/c": r"$1/c$ (m/GPa)",
+    "p = c [r]^+": r"$p = c\,[r]^+$",
+}
+
 #: Where the layer of the pure compliance law is touched, and its stiffnesses and thicknesses.
 TOUCH = 0.5
 STIFFNESS = tuple(10.0 ** np.arange(2, 8))
@@ -234,15 +241,16 @@ def draw_errors(curves: Mapping[str, Errors]) -> tuple[Figure, dict[str, Array]]
     data: dict[str, Array] = {}
     for (label, errors), fill in zip(curves.items(), ("none", "full"), strict=False):
         data[f"{errors.name}, {label}"] = errors.parameter
+        words = SYMBOLS.get(label, label)
         for norms, space, line in zip(errors.norms.T, "VW", ("o-", "s--"), strict=True):
             size = 7 if fill == "none" else 3
             axes.loglog(
-                errors.parameter, norms, line, label=f"{label}, in {space}", ms=size, fillstyle=fill
+                errors.parameter, norms, line, label=f"{words}, in {space}", ms=size, fillstyle=fill
             )
             data[f"in {space}, {label}"] = norms
     slope = 2 * errors.total[-1] / errors.parameter[-1]
     axes.loglog(errors.parameter, slope * errors.parameter, "k:", label="slope 1")
-    axes.set(xlabel=errors.name, ylabel="distance to the limit")
+    axes.set(xlabel=SYMBOLS[errors.name], ylabel="distance to the limit (V: m, W: GV)")
     axes.legend()
     return figure, data
 
@@ -251,8 +259,14 @@ def draw_iterations(curves: Mapping[str, Array]) -> Figure:
     """Draw errors over the iterations of the fixed point."""
     figure, axes = subplots(size=(5.5, 3.8))
     for label, errors in curves.items():
-        axes.semilogy(np.arange(1, errors.size + 1), errors, "o-", label=label, ms=4)
-    axes.set(xlabel="iteration n", ylabel="distance to the solution in X")
+        axes.semilogy(
+            np.arange(1, errors.size + 1),
+            errors,
+            "o-",
+            label=label.replace("mu = k_e = 0.02", r"$\mu = k_e = 0.02$"),
+            ms=4,
+        )
+    axes.set(xlabel=r"iteration $n$", ylabel=r"$|x_n - x|$ in $X$")
     axes.legend()
     return figure
 

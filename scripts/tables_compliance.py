@@ -31,7 +31,7 @@ LITERAL = (
     "solver.stopping=thesis",
     f"solver.r={0.25 * 58.7102}",
     "solver.acceleration=none",
-    "solver.max_outer=40",
+    "solver.max_outer=400",
 )
 
 #: Iterations end at a relative change of the friction bound of 1e-5, (3.46).
@@ -63,15 +63,23 @@ def iterations(solution: Solution) -> tuple[float, float]:
     """Return the numbers of iterations to (3.46) and to residuals of 1e-8, NaN if not met."""
     records = solution.history.records
     still = [record.iteration for record in records if record.change < EPS_FP]
+    if solution.converged and not still:
+        # A run ends with its residuals: the next iteration is the first that moves no more.
+        still = [records[-1].iteration + 1]
     exact = [record.iteration for record in records if record.kkt.largest <= 1e-8]
     return (still or [np.nan])[0], (exact or [np.nan])[0]
+
+
+def gave_way(solution: Solution) -> bool:
+    """Tell whether Newton's method has handed over to the block relaxation."""
+    return any("block relaxation" in record.note for record in solution.history.records)
 
 
 def table_8_4(report: Report, cells: tuple[int, int], suffix: str) -> None:
     """Make the counterpart of Table 8.4, as printed or with the layer. Collective."""
     names = (
-        "mu = k_e", "thesis", "Alg. 6, (3.46)", "Alg. 6, literal", "Alg. 6, 1e-8",
-        "implicit, 1e-8", "solves", "residual", "Newton", "difference",
+        "mu = k_e", "thesis", "Alg. 6, (3.46)", "Alg. 6, literal", "residual left",
+        "Alg. 6, 1e-8", "implicit, 1e-8", "solves", "residual", "Newton", "difference",
     )  # fmt: skip
     columns: dict[str, list[object]] = {name: [] for name in names}
     domain = build_problem(case_of(f"compliance-8-4{suffix}", cells)).domain
@@ -84,18 +92,20 @@ def table_8_4(report: Report, cells: tuple[int, int], suffix: str) -> None:
         lagged = iterations(solution(*LAGGED, *EXACT))
         implicit, newton = solution(), solution("solver.method=newton")
         literal = solution(*LITERAL)
+        alone = newton.converged and not gave_way(newton)
         met = "criterion is met" in literal.outcome.reason
         row = (
             value,
             thesis,
             lagged[0],
             literal.history.records[-1].iteration if met else np.nan,
+            literal.outcome.kkt.largest,
             lagged[1],
             iterations(implicit)[1],
             implicit.counters.linear_solves,
             implicit.outcome.kkt.largest,
-            newton.counters.linear_solves if newton.converged else np.nan,
-            difference(implicit, newton),
+            newton.counters.linear_solves if alone else np.nan,
+            difference(implicit, newton) if alone else np.nan,
         )
         for name, entry in zip(names, row, strict=True):
             columns[name].append(entry)
@@ -106,12 +116,14 @@ def table_8_4(report: Report, cells: tuple[int, int], suffix: str) -> None:
         columns,
         "Alg. 6: layer and current lagged, with inner solves to 2e-12; counted to a relative "
         "change (3.46) of the friction bound of 1e-5, and to residuals of 1e-8. Literal: "
-        "r = 0.25 E and the thesis's rules in both loops; — where (3.46) is not met in 40 "
-        "iterations, because the inner loop ends too early to hold the bound still. Implicit: "
-        "the layer solved with the constraint, phi in the operator. Newton: linear solves; "
-        "in hundreds where it falls back on the implicit block relaxation. Difference: of the "
-        "implicit and Newton's solutions, relative in the nodal unknowns. For large mu = k_e "
-        "several solutions coexist, and contact comes and goes between iterations.",
+        "r = 0.25 E and the thesis's rules in both loops; the inner rule ends after two solves "
+        "when the change of one is small, not the error, so that the bound creeps, and what is "
+        "left in the residuals in the end is in the next column (— : (3.46) is not met in 400 "
+        "iterations). Implicit: the layer solved with the constraint, phi in the operator; "
+        "solves and residual are its own. Newton: linear solves, and the relative difference of "
+        "its solution to the implicit one in the nodal unknowns; — where it gives way to the "
+        "block relaxation. For large mu = k_e several solutions coexist, and contact comes and "
+        "goes between iterations: there the lagged counts need not fall with mu = k_e.",
     )
 
 

@@ -237,3 +237,38 @@ def test_ranks_agree(name):
     for key in ("x", "u_n", "u_t", "pressure", "tau", "phi", "d_n"):
         size = max(np.abs(alone[key]).max(), 1e-3)
         assert np.abs(shared[key] - alone[key]).max() <= 1e-8 * size, key
+
+
+@pytest.mark.parametrize(("diagonal", "leans"), [("right", True), ("crossed", False)])
+def test_example_8_4_is_as_symmetric_as_its_mesh(diagonal, leans):
+    solution = solved("8-4", 96, f"mesh.diagonal={diagonal}")
+    order = np.argsort(solution.problem.trace.points[:, 0])
+    pressure = solution.pressure[order]
+    difference = np.abs(pressure - pressure[::-1]).max() / pressure.max()
+    assert difference > 0.5 if leans else difference < 1e-6
+
+
+def test_iterations_are_counted_where_the_residual_ends_the_run():
+    tables = import_module("tables_compliance")
+    changes = "friction.mu=1.4e-5", "electric.k_e=1.4e-5"
+    # Its only frictional iteration moves the bound by more than (3.46) allows.
+    case = tables.case_of("compliance-8-4", (24, 4), *changes, "solver.tolerance=1e-9")
+    solution = tables.run(case)
+    last = solution.history.records[-1]
+    assert solution.converged
+    assert last.iteration == 1
+    assert last.change > tables.EPS_FP
+    assert tables.iterations(solution) == (2, 1)
+    assert not tables.gave_way(solution)
+
+
+def test_mean_pressure_of_the_review_does_not_count_rounding():
+    slip = "friction.mu={law='slip', a=0.05, b=0.02, rho=10.0}"
+    notes = []
+    for method in ("uzawa", "newton"):
+        changes = slip, "electric.k_e=0.05", f"solver.method={method}"
+        solution = solved("8-4", 24, *changes)
+        assert np.any(solution.status == "open")
+        notes += [text for text in solution.notes if "Theorem 3.1" in text]
+    assert notes[0] == notes[1]
+    assert "mean pressure" in notes[0]
