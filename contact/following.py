@@ -34,6 +34,21 @@ class Following:
         """Whether psi is frozen because following it has made things worse."""
         return self._frozen
 
+    def worsened(self, residual: float) -> bool:
+        """Tell whether the last step has followed psi and made things worse: freeze it then.
+
+        Parameters
+        ----------
+        residual
+            The largest residual after that step.
+        """
+        if not self._followed or residual <= self._limit:
+            return False
+        # A step with psi frozen may well undo what this one has done: ask for more.
+        self._limit *= 0.1
+        self._followed, self._frozen = False, True
+        return True
+
     def __call__(self, residual: float, allowed: bool = True) -> bool:
         """Tell whether the next step is to follow psi.
 
@@ -44,11 +59,7 @@ class Following:
         allowed
             Whether the solver would follow it.
         """
-        if self._followed and residual > self._limit:
-            # A step with psi frozen may well undo what this one has done: ask for more.
-            self._limit *= 0.1
-            self._frozen = True
-        elif residual <= self._limit:
+        if not self.worsened(residual) and residual <= self._limit:
             self._frozen = False
         self._followed = allowed and residual <= min(self.near, self._limit)
         if self._followed:

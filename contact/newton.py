@@ -30,6 +30,13 @@ from contact.report import History, Monitor, Outcome, Record
 from contact.state import Multipliers, bound_of, nodal_iterate, total_pressure
 from contact.uzawa import automatic_r
 
+#: Residual from which on the foundation's conductivity is followed although nodes still change
+#: their status.
+NEAR = 0.05
+
+#: Iterate, contact forces, status and layer pressure.
+_State = tuple[Array, Multipliers, NDArray[np.int8] | None, Array | None]
+
 
 @dataclass(frozen=True)
 class NewtonOptions:
@@ -167,11 +174,15 @@ class Newton:
         tangent = self._status is not None and not problem.linear_material
         steps = min(options.max_iterations, self._left)
         for _ in range(steps):
-            before = residuals.equilibrium
+            before, kept = residuals, self._state()
             self._step(tangent, frozen, residuals.largest)
             residuals = evaluate(problem, self.forces)
-            words = " ".join(w for w in (note, "tangent" if tangent else "") if w)
-            self._record(residuals, words)
+            worse = self._following.worsened(residuals.largest)
+            words = (note, "tangent" * tangent, "taken back" * worse)
+            self._record(residuals, " ".join(word for word in words if word))
+            if worse:
+                self._return_to(kept)
+                residuals = evaluate(problem, self.forces)
             measured = self._measure(residuals, frozen)
             if residuals.largest <= options.tolerance:
                 return Outcome(True, f"all residuals <= {options.tolerance:g}", residuals)
@@ -180,7 +191,7 @@ class Newton:
             if not np.isfinite(measured):
                 return Outcome(False, "Newton's method diverged", residuals)
             if not problem.linear_material:
-                falls = residuals.equilibrium < max(before, options.tolerance)
+                falls = residuals.equilibrium < max(before.equilibrium, options.tolerance)
                 tangent = residuals.equilibrium < options.secant_until and (falls or not tangent)
             since = 0 if measured < 0.9 * best else since + 1
             best = min(best, measured)
@@ -219,7 +230,7 @@ class Newton:
         self._status = self._layer_pressure = None
         outcome = None
         while reached < 1.0 and step > 1e-2 and self._left > 0:
-            kept = problem.x.x.array.copy(), self.forces, self._status
+            kept = self._state()
             factor = min(1.0, reached + step)
             problem.apply_load(factor)
             outcome = self._newton(f"load {factor:.3g}")
@@ -228,12 +239,19 @@ class Newton:
             if outcome.converged:
                 reached = factor
                 continue
-            problem.x.x.array[:], self.forces, self._status = kept
-            self._layer_pressure = None
+            self._return_to(kept)
             step /= 2
         problem.apply_load(1.0)
         assert outcome is not None
         return Outcome(outcome.converged, outcome.reason, evaluate(problem, self.forces))
+
+    def _state(self) -> _State:
+        """Return what `_return_to` needs to take steps back."""
+        return self.problem.x.x.array.copy(), self.forces, self._status, self._layer_pressure
+
+    def _return_to(self, kept: _State) -> None:
+        """Go back to a state before."""
+        self.problem.x.x.array[:], self.forces, self._status, self._layer_pressure = kept
 
     def _step(self, tangent: bool, frozen: Array | None, reached: float) -> None:
         """Take one Newton step: one assembly, one factorisation, one solve."""
@@ -245,7 +263,7 @@ class Newton:
         if problem.response.active:
             pressure = total_pressure(problem, nodal, contact.forces)
             response = problem.response
-            follow = self._following(reached, contact.settled)
+            follow = self._following(reached, contact.settled or reached < NEAR)
             current = response.current_jacobian if follow else response.current_block
             blocks = blocks + layer + current(nodal, pressure)
         self.operator.update(
