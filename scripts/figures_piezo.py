@@ -5,7 +5,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -27,6 +27,9 @@ from forms.kinematics import strain
 MU = (0.0, 0.2, 1.0)
 PHI_F = (0, 1, 2, 4, 8, 16, 32)
 K_E = (0.0, 1e-3, 1e-2, 1e-1, 1.0)
+
+#: Norms of Figure 8.7.
+NORMS = ("u in H1", "phi in H1", "u in L2", "phi in L2")
 
 
 @dataclass(frozen=True)
@@ -117,10 +120,8 @@ def norms(problem: ContactProblem) -> Callable[[fem.Function], Array]:
 def figure_8_7(report: Report, coarse: bool) -> dict[str, Array]:
     """Draw the error against a reference two levels finer than the last mesh. Collective."""
     cells, last = ((8, 16), 64) if coarse else ((16, 32, 64, 128), 512)
-    figure, axes = subplots(1, 2, size=(7.2, 3.4))
-    names = ("u in H1", "phi in H1", "u in L2", "phi in L2")
     columns: dict[str, list[object]] = {"problem": [], "cells": [], "reference": []}
-    for name in names:
+    for name in NORMS:
         columns |= {name: [], f"order ({name})": []}
     found = {}
     for label, name in (("Example 8.1", "piezo-8-1-conductive"), ("Example 8.2", "piezo-8-2")):
@@ -136,12 +137,9 @@ def figure_8_7(report: Report, coarse: bool) -> dict[str, Array]:
         columns["problem"] += [label] * h.size
         columns["cells"] += [f"{n} x {n // 2}" for n in cells]
         columns["reference"] += [f"{last} x {last // 2}"] * h.size
-        for k, norm in enumerate(names):
+        for k, norm in enumerate(NORMS):
             columns[norm] += errors[:, k].tolist()
             columns[f"order ({norm})"] += observed_orders(h, errors[:, k])
-            line = "o-" if label.endswith("1") else "x--"
-            axes[k // 2].loglog(h, errors[:, k], line, ms=4, label=f"{norm[:-6]}, {label}")
-    _slopes(figure, h)
     note = (
         "Relative errors; |eps(u)| and |grad(phi)| stand for the norms of H1. The thesis's "
         "reference, 256 x 128 cells, is the finest mesh that it tests, so that its last point "
@@ -150,17 +148,33 @@ def figure_8_7(report: Report, coarse: bool) -> dict[str, Array]:
     )
     caption = "Figure 8.7: errors of u and phi against a reference solution"
     report.table("figure-8-7-table", caption, columns, note)
-    report.figure("figure-8-7", caption, figure, columns, note)
+    report.figure("figure-8-7", caption, error_figure(h, found), columns, note)
     return found
 
 
-def _slopes(figure: Figure, h: Array) -> None:
-    for ax, power, title in zip(figure.axes, (1, 2), ("H1", "L2"), strict=True):
+def error_figure(h: Array, found: Mapping[str, Array]) -> Figure:
+    """Return errors over the mesh size, one curve a problem and norm.
+
+    Parameters
+    ----------
+    h
+        Mesh sizes, shape (n,).
+    found
+        Problem -> its errors in `NORMS`, shape (n, 4).
+    """
+    figure, axes = subplots(1, 2, size=(7.2, 3.4))
+    for line, (label, errors) in zip(("o-", "x--"), found.items(), strict=True):
+        for k, symbol in enumerate(("$u$", r"$\varphi$") * 2):
+            axes[k // 2].loglog(h, errors[:, k], line, ms=4, label=f"{symbol}, {label}")
+    for ax, power, title in zip(axes, (1, 2), ("$H^1$", "$L^2$"), strict=True):
         low = 0.7 * ax.dataLim.y0
         ends = np.array([h.min(), h.max()])
         ax.loglog(ends, low * (ends / ends[0]) ** power, "k:", label=f"slope {power}")
-        ax.set(title=f"relative error in {title}", xlabel="h")
+        ax.set(title=f"relative error in {title}", xlabel="$h$ (mesh units)")
+        ax.set_xticks(h, [f"1/{1 / size:g}" for size in h])
+        ax.minorticks_off()
         ax.legend(fontsize=6)
+    return figure
 
 
 def main(arguments: Sequence[str] | None = None) -> None:

@@ -29,7 +29,8 @@ def case_of(name: str, cells: tuple[int, int], k_e: float, lagged: bool) -> Case
     """Return a case of Example 8.1 or 8.2."""
     grid = f"mesh.cells=[{cells[0]}, {cells[1]}]"
     flag = f"electric.lagged={str(lagged).lower()}"
-    return load_case(CASES / f"{name}.toml", [grid, f"electric.k_e={k_e}", flag])
+    changes = [grid, f"electric.k_e={k_e}", flag, "solver.method=uzawa"]
+    return load_case(CASES / f"{name}.toml", changes)
 
 
 def iterates(

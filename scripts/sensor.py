@@ -93,8 +93,12 @@ def curve(report: Report, case: Case, electrode: str, factors: Sequence[float]) 
     columns: dict[str, Sequence[object]] = {"load factor": factors}
     figure, axes = subplots(1, 2, size=(7.2, 3.0))
     pairs = (
-        ("charge", "charge, short circuit", [np.nan if q is None else q for q in shorted]),
-        ("potential", "mean potential, open", left_open),
+        (
+            "charge",
+            "charge, short circuit (units of the case)",
+            [np.nan if q is None else q for q in shorted],
+        ),
+        ("potential", "mean potential, open (units of the case)", left_open),
     )
     for ax, (name, label, found) in zip(axes, pairs, strict=True):
         columns[name] = found

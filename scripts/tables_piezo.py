@@ -124,8 +124,8 @@ def series(report: Report, number: str, cells: tuple[int, int]) -> None:
         columns,
         "Newton's method. phi on Gamma_3. Charges are integrals of D.nu; imbalances are relative "
         "to the absolute nodal charges and to the resultant forces. Beyond xi_0 = 1.8 are only "
-        "the cells at the two ends of Gamma_3, where the strain is singular and grows as the mesh "
-        "is refined: Example 8.2 differs from 8.1 by next to nothing.",
+        "some cells at corners of the bar, where the strain is singular and grows as the mesh is "
+        "refined: Example 8.2 differs from 8.1 by next to nothing.",
     )
 
 
