@@ -104,6 +104,7 @@ class Newton:
         self._status: NDArray[np.int8] | None = None
         self._layer_pressure: Array | None = None  # after the last step; None: that of the iterate
         self._following = Following()
+        self._calm = 0  # steps in which no node has changed its status
         self._begin = 0.0
 
     @property
@@ -169,7 +170,7 @@ class Newton:
         goal = max(goal, options.tolerance)
         residuals = evaluate(problem, self.forces)
         best, since = np.inf, 0
-        self._following = Following()
+        self._following, self._calm = Following(), 0
         # A start from elsewhere is near the solution; zero displacement has no better tangent.
         tangent = self._status is not None and not problem.linear_material
         steps = min(options.max_iterations, self._left)
@@ -257,7 +258,10 @@ class Newton:
         """Take one Newton step: one assembly, one factorisation, one solve."""
         problem, trace = self.problem, self.problem.trace
         nodal = nodal_iterate(problem)
-        contact = linearise(problem, nodal, self.forces, self.moduli, self._status, frozen)
+        contact = linearise(
+            problem, nodal, self.forces, self.moduli, self._status, frozen, self._calm
+        )
+        self._calm = self._calm + 1 if contact.settled else 0
         blocks = contact.blocks
         layer, shift = self._layer(nodal, contact.settled)
         if problem.response.active:

@@ -22,8 +22,9 @@ from contact.state import Multipliers, total_pressure
 #: pressure and Tresca's law bound the friction of open nodes too.
 FREE, SLIDES, STICKS, CLOSED = 0, 1, 2, 4
 
-#: Part of a node's own stiffness that a falling friction coefficient may take away.
-SOFTENING = 0.25
+#: Part of a node's own stiffness that a falling friction coefficient may take away, and how much
+#: more in each further step in which no node changes its status.
+SOFTENING, MORE_SOFTENING = 0.25, 0.05
 
 
 @dataclass(frozen=True)
@@ -86,6 +87,7 @@ def linearise(
     moduli: Moduli,
     before: NDArray[np.int8] | None,
     frozen_bound: Array | None = None,
+    calm: int = 0,
 ) -> LinearisedContact:
     """Linearise the contact laws at an iterate. Collective.
 
@@ -99,6 +101,8 @@ def linearise(
         Status in the step before; None in the first one, where closed nodes stick.
     frozen_bound
         A given friction bound: Tresca's law instead of Coulomb's.
+    calm
+        Number of steps up to now in which no node has changed its status.
     """
     trace, d, c = problem.trace, problem.dim, moduli.status
     p, lam, n = forces.pressure, forces.friction, trace.normal
@@ -145,7 +149,8 @@ def linearise(
         sliding = turning[:, None, None] * across
         friction[slides] = (bound[:, None] * along + np.einsum("nij,nj->ni", sliding, slip))[slides]
         if frozen_bound is None:
-            rate = _bound_gradient(problem, nodal, total, slip, length, moduli, settled)
+            limit = (SOFTENING + MORE_SOFTENING * calm) * moduli.nodal if settled else None
+            rate = _bound_gradient(problem, total, slip, length, limit)
             ahead, follows = _follow_pressure(
                 problem, nodal, length, slope, opening, moduli, closed
             )
@@ -157,13 +162,7 @@ def linearise(
 
 
 def _bound_gradient(
-    problem: ContactProblem,
-    nodal: Array,
-    total: Array,
-    slip: Array,
-    length: Array,
-    moduli: Moduli,
-    settled: bool,
+    problem: ContactProblem, total: Array, slip: Array, length: Array, limit: float | None
 ) -> Array:
     """Return the derivative of mu(|u_tau|) R p by the slip, shape (n, block size).
 
@@ -172,10 +171,10 @@ def _bound_gradient(
     """
     gradient = np.zeros((length.size, problem.block_size))
     coefficient = problem.friction.coefficient
-    if coefficient is None or not settled:
+    if coefficient is None or limit is None:
         return gradient
     smooth = np.maximum(problem.smoothing(total), 0.0)
-    fall = np.maximum(coefficient.derivative(length) * smooth, -SOFTENING * moduli.nodal)
+    fall = np.maximum(coefficient.derivative(length) * smooth, -limit)
     direction = slip / np.maximum(length, 1e-300)[:, None]
     gradient[:, : problem.dim] = fall[:, None] * direction
     return gradient
