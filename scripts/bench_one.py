@@ -4,6 +4,7 @@ Start it as one of::
 
     bench_one.py CASE.toml [key=value ...]      a case file of scripts/cases
     bench_one.py bar N MU                       Example 7.2, linear material, constant mu
+    bench_one.py hertz DISC.msh MU              Example 7.1 on a mesh file, constant mu
     bench_one.py ratio DIM N cold|nested        a nonlinear solve and one linear solve
     bench_one.py phases DIM N                   seconds by phase
 """
@@ -25,6 +26,7 @@ from reporting import CASES, bar
 
 from contact import Case, build_problem, load_case, solve_problem
 from contact.case import parse_case
+from contact.case_mesh import Mesh
 from contact.linear import LinearOperator
 from contact.nested import coarse_solution
 from contact.problem import ContactProblem
@@ -96,6 +98,14 @@ def bar_with_constant_friction(n: str, mu: str) -> dict[str, Any]:
     """Measure the problem that GetFEM solves too."""
     case = bar(int(n), -0.005, 1.0, "material.law=linear", f"friction.mu={mu}")
     warm(case, lambda: bar(4, -0.005, 1.0, "material.law=linear", f"friction.mu={mu}"))
+    return described(solve_problem(build_problem(case), case.solver))
+
+
+def hertz_with_constant_friction(path: str, mu: str) -> dict[str, Any]:
+    """Measure Hertz's problem that GetFEM solves too."""
+    case = load_case(CASES / "hertz.toml", [f"friction.mu={mu}"])
+    case = case.model_copy(update={"mesh": Mesh(file=path)})
+    warm(case, lambda: load_case(CASES / "hertz.toml", [f"friction.mu={mu}"]))
     return described(solve_problem(build_problem(case), case.solver))
 
 
@@ -179,7 +189,12 @@ def phases(dimension: str, n: str) -> dict[str, Any]:
     return {**clock, "solve": clock["all Newton steps"], "steps": solution.counters.linear_solves}
 
 
-MEASUREMENTS = {"bar": bar_with_constant_friction, "ratio": ratio, "phases": phases}
+MEASUREMENTS = {
+    "bar": bar_with_constant_friction,
+    "hertz": hertz_with_constant_friction,
+    "ratio": ratio,
+    "phases": phases,
+}
 
 
 def main() -> None:
