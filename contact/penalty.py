@@ -41,6 +41,9 @@ from contact.regularised import (
 from contact.report import History, Monitor, Outcome, Record
 from contact.state import Multipliers, bound_of, nodal_iterate, total_pressure
 
+#: What to do about an end without convergence.
+HARDER = "the larger eps_contact and eps_slip, the easier the problem"
+
 
 @dataclass(frozen=True)
 class PenaltyOptions:
@@ -150,9 +153,11 @@ class Penalty:
             # The lagged friction modulus can creep: what counts is the last hundred iterations.
             since, mark = (0, residual) if residual < 0.99 * mark else (since + 1, mark)
             if since >= 100 and options.stopping == "residual":
-                return Outcome(False, f"the residual stalled at {best:.2e}", residuals)
+                words = f"the residual stalled at {best:.2e}; {HARDER}"
+                return Outcome(False, words, residuals)
             implicit = residual < switch
-        return Outcome(False, f"not converged in {options.max_outer} outer iterations", residuals)
+        words = f"not converged in {options.max_outer} outer iterations; {HARDER}"
+        return Outcome(False, words, residuals)
 
     def _step(self, implicit: bool) -> tuple[int, str]:
         """Solve (4.32), or the penalised problem itself, by SNES from the iterate."""
@@ -194,7 +199,7 @@ class Penalty:
 
 
 class _Inner:
-    """The nonlinear problem of an outer iteration, in the increment of the owned unknowns.
+    """The nonlinear problem of an outer iteration, in the owned unknowns.
 
     SNES asks `LinearOperator` for its linear solves, through a shell preconditioner. Its
     options have the prefix ``penalty_``, for instance ``-penalty_snes_monitor``.
@@ -209,7 +214,7 @@ class _Inner:
             problem, symmetric=symmetric, counters=counters, kind=options.linear
         )
         matrix = self.operator.matrix
-        self._increment, self._residual = matrix.createVecs()
+        self._iterate, self._residual = matrix.createVecs()
         self.snes = PETSc.SNES().create(problem.comm)
         self.snes.setOptionsPrefix("penalty_")
         self.snes.setFunction(self._function, self._residual)
@@ -251,7 +256,6 @@ class _Inner:
         """Move the iterate to the solution; return the iterations and what went wrong."""
         problem = self._problem
         self._law, self._implicit, self._nodal = law, implicit, nodal
-        self._base = problem.x.x.array[: problem.owned].copy()
         self._assembled = problem.linear_material
         pressure = total_pressure(problem, nodal, forces)
         self._response = problem.response.force(nodal, pressure)
@@ -264,16 +268,17 @@ class _Inner:
         scale += self._norm(problem.trace.weight[:, None] * forces.vectors(problem))
         self.snes.setTolerances(
             rtol=1e-14,
-            stol=0.0,
+            # Rounding is magnified by 1/eps: the residual may stay above any tolerance.
+            stol=1e-14,
             atol=self._options.tolerance / 10 * scale,
             max_it=min(self._options.max_inner, 20) if implicit else self._options.max_inner,
         )
         self._error = None
-        self._increment.array[:] = self._touch()
-        self.snes.solve(None, self._increment)
+        self._iterate.array[:] = problem.x.x.array[: problem.owned] + self._touch()
+        self.snes.solve(None, self._iterate)
         if self._error is not None and not implicit:
             raise self._error
-        self._move(self._increment)
+        self._move(self._iterate)
         reason = self.snes.getConvergedReason()
         note = "" if reason > 0 else f"SNES stopped with reason {reason}"
         return self.snes.getIterationNumber(), note
@@ -303,18 +308,18 @@ class _Inner:
     def _norm(self, values: Array) -> float:
         return float(np.sqrt(self._problem.comm.allreduce(np.sum(values**2), op=MPI.SUM)))
 
-    def _move(self, increment: PETSc.Vec) -> Array:
-        """Set the iterate to base + increment; return its nodal values."""
+    def _move(self, iterate: PETSc.Vec) -> Array:
+        """Take over an iterate of SNES; return its nodal values."""
         problem = self._problem
-        problem.x.x.array[: problem.owned] = self._base + increment.array_r
+        problem.x.x.array[: problem.owned] = iterate.array_r
         problem.x.x.scatter_forward()
         if self._implicit:
             problem.freeze()
         return nodal_iterate(problem)
 
-    def _function(self, _: PETSc.SNES, increment: PETSc.Vec, residual: PETSc.Vec) -> None:
+    def _function(self, _: PETSc.SNES, iterate: PETSc.Vec, residual: PETSc.Vec) -> None:
         problem, trace = self._problem, self._problem.trace
-        nodal = self._move(increment)
+        nodal = self._move(iterate)
         values = problem.internal_forces() - problem.external
         trace.add(values, trace.weight[:, None] * self._law.forces(nodal).vectors(problem))
         change = np.einsum("nij,nj->ni", self._current_block, nodal - self._nodal)
@@ -325,10 +330,10 @@ class _Inner:
         residual.array[:] = np.where(problem.free.ravel(), values, 0.0)
 
     def _jacobian(
-        self, _: PETSc.SNES, increment: PETSc.Vec, matrix: PETSc.Mat, __: PETSc.Mat
+        self, _: PETSc.SNES, iterate: PETSc.Vec, matrix: PETSc.Mat, __: PETSc.Mat
     ) -> None:
         problem, d = self._problem, self._problem.dim
-        nodal = self._move(increment)
+        nodal = self._move(iterate)
         blocks, trace = self._current_block.copy(), problem.trace
         blocks[:, :d, :d] += self._law.block(nodal)
         if self._layer is not None:

@@ -185,3 +185,14 @@ def test_a_body_that_nothing_holds_does_not_converge():
         assert "singular" in str(error)
     else:
         assert not outcome.converged
+
+
+def test_rounding_ends_the_inner_iterations():
+    """With a stiffness of 1e14 no step makes the residual smaller: SNES must see it."""
+    problem = block([Fixed("left", [ZERO, None])], 0.2)
+    penalty = Penalty(problem, PenaltyOptions(eps_contact=1e-14, tolerance=1e-12, max_inner=5000))
+    outcome = penalty.solve()
+    assert not outcome.converged
+    assert "the residual stalled at" in outcome.reason
+    assert "eps_contact" in outcome.reason
+    assert sum(record.inner for record in penalty.history.records) < 500
