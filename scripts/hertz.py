@@ -308,15 +308,17 @@ def figure_7_2(report: Report, solutions: Mapping[tuple[object, ...], Solution])
         assert table is not None
         near = table["x"] <= x[-1]
         where = table["x"][near]
-        axes[0].plot(where, table["pressure"][near], "-", ms=2, label=label)
+        (line,) = axes[0].plot(where, table["pressure"][near], label=label)
         data |= {f"x, {label}": where, f"pressure, {label}": table["pressure"][near]}
         if np.any(table["bound"] > 0):
-            (line,) = axes[1].plot(where, table["tau"][near], label=label)
-            axes[1].plot(where, -table["bound"][near], ":", lw=0.8, color=line.get_color())
+            colour = line.get_color()
+            axes[1].plot(where, table["tau"][near], color=colour, label=label)
+            bound = f"{label}: bound $-s$"
+            axes[1].plot(where, -table["bound"][near], ":", color=colour, label=bound)
             data |= {f"tau, {label}": table["tau"][near], f"bound, {label}": table["bound"][near]}
     axes[0].set_ylabel(r"$-\sigma_\nu$ (units of the case)")
     axes[1].set_xlabel(r"$x$ along $\Gamma_3$ (mesh units)")
-    axes[1].set_ylabel(r"$-\sigma_\tau\cdot t$ (units of the case); bound dotted")
+    axes[1].set_ylabel(r"$-\sigma_\tau\cdot t$ (units of the case)")
     for ax in axes:
         ax.legend()
     report.figure(

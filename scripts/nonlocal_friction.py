@@ -105,10 +105,12 @@ def _draw(report: Report, name: str, where: str, tables: dict[str, Table | None]
     data: dict[str, Sequence[float]] = {}
     for label, table in tables.items():
         assert table is not None
+        # A radius up to h changes nothing: that curve lies on the one of radius 0.
+        look = {"0": {"lw": 2.6, "color": "0.75"}, "h": {"lw": 0.9, "ls": "--"}}.get(label, {})
         data.setdefault("x", table["x"])
         for row, key in zip(axes, ("pressure", "bound", "tau"), strict=True):
             for ax, near in zip(row, (table["x"] >= 0, table["x"] >= 3.6), strict=True):
-                ax.plot(table["x"][near], table[key][near], lw=0.9, label=f"radius {label}")
+                ax.plot(table["x"][near], table[key][near], label=f"radius {label}", **look)
             data[f"{key}, radius {label}"] = table[key]
             # The peak at the end would hide all else.
             usual = 1.6 * float(np.quantile(np.abs(table[key]), 0.97))
