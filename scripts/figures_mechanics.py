@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 import numpy as np
+from matplotlib.figure import Figure
 from mpi4py import MPI
 from reporting import Report, bar, options, solved, subplots
 
@@ -42,7 +43,7 @@ def draw(report: Report, number: str, case: Case, text: str, load: float) -> Tab
     report.figure(
         f"figure-{number}a",
         f"Figure {dotted} (a): stresses on Gamma_3, {where}",
-        draw_line(table, held=deformed.held),
+        in_units(draw_line(table, held=deformed.held)),
         csv_columns(table),
         _remark(solution, table),
     )
@@ -50,10 +51,19 @@ def draw(report: Report, number: str, case: Case, text: str, load: float) -> Tab
     report.figure(
         f"figure-{number}b",
         f"Figure {dotted} (b): deformed configuration and von Mises stress, {where}",
-        draw_plane(deformed, table),
+        in_units(draw_plane(deformed, table)),
         {"smallest von Mises": [float(values.min())], "largest von Mises": [float(values.max())]},
     )
     return table
+
+
+def in_units(figure: Figure) -> Figure:
+    """Give the axes of a figure the units of Example 7.2 for those of any case."""
+    for ax in figure.axes:
+        for axis in (ax.xaxis, ax.yaxis):
+            words = axis.get_label_text().replace("units of the case", "daN/mm²")
+            axis.set_label_text(words.replace("mesh units", "mm"))
+    return figure
 
 
 def _remark(solution: Solution, table: Table) -> str:

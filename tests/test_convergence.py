@@ -17,7 +17,7 @@ import figures_mechanics
 import nonlocal_friction
 import table_7_2
 from helpers import bar
-from reporting import Report
+from reporting import Report, subplots
 
 from contact.domain import rectangle, refined
 from contact.interpolate import carry, errors
@@ -138,3 +138,10 @@ def test_figures_mechanics(tmp_path):
         assert (tmp_path / f"figure-{name}.png").stat().st_size > 10_000
         assert (tmp_path / f"figure-{name}.csv").is_file()
     assert (tmp_path / "multipliers-and-penalty.png").is_file()
+
+
+def test_units_of_example_7_2():
+    figure, axes = subplots()
+    axes.set(xlabel="$x$ (mesh units)", ylabel="$p$ (units of the case)")
+    figures_mechanics.in_units(figure)
+    assert (axes.get_xlabel(), axes.get_ylabel()) == ("$x$ (mm)", "$p$ (daN/mm²)")
