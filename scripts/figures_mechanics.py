@@ -104,9 +104,10 @@ def compare(report: Report, tables: Mapping[str, Table | None]) -> None:
         figure,
         data,
         "The thesis finds both methods to give the same solution. Here the eye sees a difference "
-        "only in the tangential stress under the smaller load, about where sticking meets sliding: "
-        "the slips there are below the slip length eps, which rounds the kink off. Table 7.2 says "
-        "how far the solutions are apart. The peaks at the end of the bar are cut off.",
+        "in the tangential stress, about where sticking meets sliding and most under the smaller "
+        "load: with the friction law rounded over the slip length eps, nodes creep there that "
+        "ought to stick. Table 7.2 says how far the solutions are apart. The peaks at the end of "
+        "the bar are cut off.",
     )
 
 

@@ -181,6 +181,7 @@ def cylinder(
         f"title=Hertz: {shape}, load {load:g}, mu = {mu}, direction {direction}",
         f"mesh.contact_size={b / fineness}",
         f"mesh.contact_width={1.25 * b}",
+        f"mesh.size={min(0.8, 9.6 / fineness)}",
         f"contact.direction={direction}",
         f"space.degree={degree}",
     ]

@@ -138,9 +138,9 @@ def table(report: Report, n: int) -> None:
         "The penalised problems are solved to 1e-8, the ones with multipliers to 1e-10. The "
         "contact and friction residuals are those of the Signorini and Coulomb laws themselves. "
         "The first is the penetration and falls like eps; the second, like the errors, falls more "
-        "slowly, because eps is also the slip length of the friction law and most nodes slide by "
-        "less than that (see Theorem 4.2 for smaller eps). The last three columns are relative "
-        "errors of displacement and pressure (L2 of Gamma_3).",
+        "slowly: eps is also the slip length of the friction law, and what ought to stick creeps "
+        "by about as much (Theorem 4.2 below has smaller eps). The last three columns are "
+        "relative errors of displacement and pressure (L2 of Gamma_3).",
     )
 
 
