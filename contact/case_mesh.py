@@ -168,7 +168,8 @@ class Mesh(Section):
         for key, value in parameters.items():
             if key not in accepted:
                 raise fault(key, UNKNOWN, ", ".join((*COMMON, *accepted)))
-            if isinstance(value, bool) or not isinstance(value, int | float) or not value > 0:
+            number = isinstance(value, int | float) and not isinstance(value, bool)
+            if not number or not 0 < value < np.inf:
                 raise fault(key, value, "a number > 0")
 
     @model_validator(mode="after")

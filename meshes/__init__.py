@@ -13,6 +13,7 @@ On the command line: ``python3 -m meshes quarter_disc --contact-size 0.1 --out b
 
 import difflib
 import inspect
+import math
 from collections.abc import Callable, Mapping
 from pathlib import Path
 
@@ -58,13 +59,15 @@ def build(name: str, **given: float) -> None:
     Raises
     ------
     InputError
-        For an unknown recipe or parameter, and for a length that is not positive.
+        For an unknown recipe or parameter, for a length that is not positive, and for sizes
+        that would give too many cells.
     """
     defaults = parameters(name)
     for key, value in given.items():
         if key not in defaults:
             raise InputError(_unknown(f"parameter of the mesh recipe {name!r}", key, defaults))
-        if isinstance(value, bool) or not isinstance(value, int | float) or not value > 0.0:
+        number = isinstance(value, int | float) and not isinstance(value, bool)
+        if not number or not 0.0 < value < math.inf:
             raise InputError(f"{key} of the mesh recipe must be a positive number; given: {value}")
     RECIPES[name](**given)
 

@@ -199,6 +199,10 @@ BAD = {
         "mesh.radios: unknown key, did you mean radius?",
     ),
     "recipe value": ({"mesh": {"generator": "quarter_disc", "radius": -1}}, "mesh.radius"),
+    "infinite recipe": (
+        {"mesh": {"generator": "quarter_disc", "size": float("inf")}},
+        "mesh.size: given inf; accepted: a number > 0",
+    ),
     "parameters of a grid": ({"mesh__parameters": {"radius": 1}}, "mesh.parameters.radius"),
     "unknown part": ({"load__0__on": "laoded"}, "(did you mean loaded?)"),
     "unknown contact part": ({"contact__on": "floor"}, "contact.on: given"),

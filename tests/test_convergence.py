@@ -81,6 +81,19 @@ def test_figure_7_6(tmp_path):
         assert (tmp_path / f"figure-7-6.{suffix}").is_file()
 
 
+def test_known_solutions(tmp_path):
+    found = study.known_solutions(Report(tmp_path), coarse=True)
+    for label, table in found.items():
+        degree = 1 if "P1" in label else 2
+        orders = np.log2(table[-2] / table[-1])[:2]
+        low = np.array([degree + 1, degree]) - 0.1
+        if "Signorini" in label:
+            low = np.array([1.8, 0.95 if degree == 1 else 1.3])
+        assert np.all(orders > low), label
+    with (tmp_path / "known-solutions.csv").open() as stream:
+        assert all(float(row["residual"]) <= 1e-9 for row in csv.DictReader(stream))
+
+
 def test_theorem_4_3(tmp_path):
     for table in study.theorem_4_3(Report(tmp_path), coarse=True).values():
         assert np.all(np.log2(table[:-1] / table[1:]) > 0.7)

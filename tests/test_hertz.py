@@ -13,6 +13,8 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "scripts"))
 
 import hertz
 
+from contact.case_contact import Sphere
+
 
 @pytest.mark.parallel
 def test_small_load():
@@ -53,6 +55,19 @@ def test_example_7_1(direction, mu, b, p):
 def test_half_and_full_cylinder(shape):
     _, found = hertz.run(hertz.cylinder(160.0, shape=shape, fineness=12), 160.0)
     exact = hertz.Cylinder(160.0)
+    assert found.moment == pytest.approx(exact.half_width, rel=0.01)
+    assert found.peak == pytest.approx(exact.peak, rel=0.01)
+    assert found.force_error < 1e-8
+
+
+@pytest.mark.parametrize(("centre", "inside"), [(-20.0, False), (20.0, True)])
+def test_round_foundation(centre, inside):
+    """On a circle of radius 20, outside or inside, the curvatures 1/8 and 1/20 add up."""
+    exact = hertz.Cylinder(160.0, radius=1 / (1 / 8 - np.sign(centre) / 20))
+    circle = Sphere(shape="sphere", centre=(0.0, centre), radius=20.0, inside=inside)
+    case = hertz.cylinder(160.0, fineness=20)
+    contact = case.contact.model_copy(update={"foundation": circle})
+    _, found = hertz.run(case.model_copy(update={"contact": contact}), 80.0)
     assert found.moment == pytest.approx(exact.half_width, rel=0.01)
     assert found.peak == pytest.approx(exact.peak, rel=0.01)
     assert found.force_error < 1e-8
