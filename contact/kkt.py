@@ -23,7 +23,8 @@ class KKT:
     ----------
     equilibrium
         |F(u) + contact forces| on free unknowns, over the sum of the norms of loads, contact
-        forces and reactions; mechanical and (scaled) electric unknowns together.
+        forces and reactions; mechanical and (scaled) electric unknowns together. Without loads
+        and contact, reactions of the size of rounding do not count.
     contact
         |p - max(0, p + c (u_nu - rho))| / |p| in L2(Gamma_3), c = E/length.
     friction
@@ -80,6 +81,20 @@ def _global_norm(problem: ContactProblem, values: Array) -> float:
     return float(np.sqrt(problem.comm.allreduce(np.dot(values, values), op=MPI.SUM)))
 
 
+def _least_force(problem: ContactProblem) -> float:
+    """Return 1e-6 of the forces that would hold each node alone at the prescribed displacement.
+
+    Rounding is some 1e-15 of those, so that it passes for nothing at any sensible tolerance.
+    """
+    law, dim, comm = problem.body.law, problem.dim, problem.comm
+    prescribed = problem.x.x.array[: problem.owned][~problem.free.ravel()]
+    largest = comm.allreduce(float(np.abs(prescribed).max(initial=0.0)), op=MPI.MAX)
+    nodes = comm.allreduce(problem.free.shape[0], op=MPI.SUM)
+    spacing = problem.domain.size / nodes ** (1 / dim)
+    stiffness = (float(law.bulk) + 4 / 3 * float(law.shear)) * spacing ** (dim - 2)
+    return 1e-6 * stiffness * largest * float(np.sqrt(nodes))
+
+
 def evaluate(problem: ContactProblem, forces: Multipliers) -> KKT:
     """Return the residuals of the iterate `problem.x` and the contact forces. Collective."""
     problem.freeze()
@@ -89,11 +104,12 @@ def evaluate(problem: ContactProblem, forces: Multipliers) -> KKT:
     contact_forces = np.zeros_like(residual)
     vectors = total_pressure(problem, nodal, forces)[:, None] * trace.normal + forces.friction
     trace.add(contact_forces, trace.weight[:, None] * vectors)
-    scale = (
-        _global_norm(problem, problem.external)
-        + _global_norm(problem, contact_forces)
-        + _global_norm(problem, np.where(free, 0.0, residual))
-    )
+    loads, pushes = _global_norm(problem, problem.external), _global_norm(problem, contact_forces)
+    scale = loads + pushes + _global_norm(problem, np.where(free, 0.0, residual))
+    # Supports that move an untouched body rigidly leave rounding, in the reactions as well.
+    least = _least_force(problem)
+    if loads == 0 and pushes <= 1e-6 * least:
+        scale = max(scale, least)
     equilibrium = _global_norm(problem, np.where(free, residual, 0.0)) / (scale or 1.0)
     bound = bound_of(problem, nodal, forces)
     return KKT(equilibrium, *interface_residuals(problem, nodal, forces, bound))

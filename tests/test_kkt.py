@@ -4,12 +4,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from helpers import attempt, bar, constant, contact_data, flat, leaning_block, solve
+from helpers import attempt, bar, constant, contact_data, flat, leaning_block, solve, turn
 from mpi4py import MPI
 
+from contact.case import parse_case
 from contact.domain import rectangle
 from contact.kkt import KKT, evaluate
 from contact.problem import Body, Contact, ContactProblem, Fixed, Friction, Load
+from contact.solving import solve as solve_case
 from contact.state import Multipliers, bound_of, nodal_iterate
 from forms.hencky import Log
 from forms.laws import SlipCoefficient
@@ -186,3 +188,30 @@ def test_what_is_no_number_has_not_converged():
     assert KKT(0.0, float("nan"), 0.0).largest == np.inf
     assert KKT(float("inf"), 0.0, 0.0).largest == np.inf
     assert KKT(1e-9, 3e-9, 2e-9).largest == 3e-9
+
+
+@pytest.mark.parallel
+@pytest.mark.parametrize("dim", [2, 3])
+@pytest.mark.parametrize("degree", [1, 2])
+@pytest.mark.parametrize("method", ["newton", "uzawa", "penalty"])
+def test_a_body_moved_without_touching_is_in_equilibrium(method, degree, dim):
+    """All its forces are rounding, the reactions as well: that is no residual."""
+    for rotation, move in ((0.0, 0.02), (30.0, -0.005)):
+        normal = turn(dim, rotation) @ np.eye(dim)[-1]
+        section = {
+            "mesh": {
+                "generator": "rectangle" if dim == 2 else "box",
+                "size": [1.0] * dim,
+                "cells": [12 // dim] * dim,
+                "rotation": rotation,
+            },
+            "space": {"degree": degree},
+            "material": {"young": 210e9, "poisson": 0.3},
+            "fixed": [{"on": "top", "displacement": (move * normal).tolist()}],
+            "contact": {"on": "bottom", "gap": 0.01},
+            "friction": {"law": "coulomb", "mu": 0.3},
+            "solver": {"method": method},
+        }
+        solution = solve_case(parse_case(section))
+        assert solution.outcome.converged, solution.outcome
+        assert solution.outcome.kkt.equilibrium < 1e-8
