@@ -161,7 +161,10 @@ def _solve(case: Case, options: argparse.Namespace, comm: MPI.Intracomm) -> int:
 def _check(case: Case, options: argparse.Namespace, comm: MPI.Intracomm) -> int:
     from contact.build import build_problem
     from contact.describe import describe
+    from contact.nested import coarser_cases
 
+    if case.solver.nested:
+        coarser_cases(case, case.solver.nested_levels)
     text = describe(case, build_problem(case, comm))
     if comm.rank == 0:
         print(text)

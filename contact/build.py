@@ -217,8 +217,11 @@ def _field(
 def _foundation(section: sections.Contact, domain: Domain) -> Foundation:
     match section.foundation:
         case sections.Plane() as plane:
+            _check_range("contact.foundation.point", max(map(abs, plane.point)), least=0.0)
             return Plane(plane.point, plane.normal, section.direction)
         case sections.Sphere() as sphere:
+            _check_range("contact.foundation.centre", max(map(abs, sphere.centre)), least=0.0)
+            _check_range("contact.foundation.radius", sphere.radius)
             return Sphere(sphere.centre, sphere.radius, sphere.inside, section.direction)
     assert section.gap is not None  # filled in by the section
     rounding = -1e-12 * domain.size

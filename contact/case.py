@@ -159,7 +159,7 @@ def load_case(path: str | Path, overrides: Mapping[str, str] | Iterable[str] = (
     """
     path = Path(path)
     try:
-        data = tomllib.loads(path.read_bytes().decode())
+        data = tomllib.loads(path.read_bytes().decode("utf-8-sig"))
     except OSError as error:
         reason = error.strerror or "not readable"
         raise InputError(f"{path}: {reason}; accepted: a case file (TOML)") from None

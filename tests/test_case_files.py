@@ -161,6 +161,22 @@ WRONG = {
         'foundation = { shape = "sphere", centre = [1.0, 0.5], radius = 0.9, inside = true }',
         ["contact.foundation", "cuts it at rest"],
     ),
+    "a sphere that overflows": (
+        "gap = 0.0",
+        'direction = "body"\n'
+        'foundation = { shape = "sphere", centre = [0.0, -1e200], radius = 1e200 }',
+        ["contact.foundation.centre", "1e+200", "overflow"],
+    ),
+    "a plane that overflows": (
+        "gap = 0.0",
+        'foundation = { shape = "plane", point = [0.0, -1e300], normal = [0.0, 1.0] }',
+        ["contact.foundation.point", "overflow"],
+    ),
+    "nested meshes of too few cells": (
+        "[friction]",
+        "[solver]\nnested = true\n[friction]",
+        ["solver.nested", "cells that can be halved"],
+    ),
     "friction negative somewhere": ("mu = 0.3", 'mu = "0.3-x"', ["friction.mu", "0.3-x"]),
     "Coulomb without mu": ("mu = 0.3", "", ["friction.mu", "missing"]),
     "charge without piezoelectricity": (
@@ -258,6 +274,18 @@ def test_wrong_case_file(
     old, new, words = WRONG[name]
     assert old in BAR
     refuse(write(shared_tmp_path, BAR.replace(old, new, 1)), words, capfd)
+
+
+def test_check_refuses_what_solve_does(
+    shared_tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    """All but what only the numbers of a solve can tell."""
+    for name, (old, new, words) in WRONG.items():
+        case = write(shared_tmp_path, BAR.replace(old, new, 1))
+        assert main(["check", str(case)]) == BAD_INPUT, name
+        lines = capfd.readouterr().err.splitlines()
+        assert len(lines) == 1, lines
+        assert all(word in lines[0] for word in words), lines
 
 
 @pytest.mark.parametrize("name", MESHES)
