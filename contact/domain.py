@@ -3,6 +3,7 @@
 import math
 import os
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -172,4 +173,4 @@ def refined(domain: Domain) -> Domain:
     values[domain.facet_tags.indices] = domain.facet_tags.values
     masks = values[owner[facets]]
     marks = {name: np.isin(masks, domain.parts[name]) for name in domain.parts}
-    return tagged(fine, facets, marks, domain.size)
+    return replace(tagged(fine, facets, marks, domain.size), levels=domain.levels + 1)

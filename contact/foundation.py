@@ -106,6 +106,22 @@ class Sphere:
         away = (along > 0) & (distance > self.radius) & (not self.inside)
         return body_normal, np.where((root >= 0) & ~away, gap, np.inf)
 
+    def chord_depth(self, length: float) -> float:
+        """Return how deep straight facets reach into a ball that their corners touch.
+
+        Parameters
+        ----------
+        length
+            Longest edge of the facets.
+        """
+        if self.inside:
+            return 0.0
+        # A facet lies in a ball of this radius (Jung's theorem). Facets of a curve that are
+        # longer than its radius do not represent it.
+        dim = len(self.centre)
+        sine = min(length / self.radius * np.sqrt((dim - 1) / (2 * dim)), 0.5)
+        return float(self.radius * sine**2 / (1 + np.sqrt(1 - sine**2)))
+
 
 def _along_ray(distance: Array, cosine: Array) -> Array:
     """Return the distance along a ray; infinite where it does not lead to the foundation."""

@@ -37,12 +37,16 @@ class Domain:
     size
         Largest extent of the bounding box of the whole mesh (of a generated one: before its
         rotation, so that lengths derived from it do not depend on the rotation).
+    levels
+        How often the mesh has been refined: 2**levels of its edges make up one straight edge of
+        the mesh that met a curved boundary.
     """
 
     mesh: dmesh.Mesh
     facet_tags: dmesh.MeshTags
     parts: Mapping[str, tuple[int, ...]]
     size: float
+    levels: int = 0
 
     @property
     def comm(self) -> MPI.Intracomm:

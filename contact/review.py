@@ -17,6 +17,7 @@ def review(solution: Solution) -> None:
     for text, good in (
         _monotonicity(solution),
         _uniqueness(solution),
+        _chords(solution),
         _preload(solution),
         _falling(solution),
     ):
@@ -66,6 +67,18 @@ def _uniqueness(solution: Solution) -> tuple[str, bool]:
         return text, True
     several = f"several solutions may exist, and this is one reached from {solution.start}"
     return f"{text}: {several}", False
+
+
+def _chords(solution: Solution) -> tuple[str, bool]:
+    """Say where nodes on straight facets were found in the foundation, and put on it."""
+    cut = solution.problem.trace.cut
+    if cut == 0:
+        return "", True
+    return (
+        f"straight facets of the curved contact part reach {cut:.3g} into the foundation at rest: "
+        "the gap there is taken as 0; a mesh that is finer from the beginning has less of it",
+        False,
+    )
 
 
 def _preload(solution: Solution) -> tuple[str, bool]:

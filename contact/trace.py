@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from contact.domain import Domain
 from contact.errors import InputError
-from contact.foundation import Foundation, GapFunction
+from contact.foundation import Foundation, GapFunction, Plane, Sphere
 from contact.projections import Array
 
 
@@ -46,6 +46,9 @@ class ContactTrace:
         Distance to the foundation along the contact direction, shape (n,).
     block_size
         Unknowns a node: d, or d + 1 with the potential.
+    cut
+        Largest depth in the foundation, at rest, of a node on a straight facet of a curved
+        part; the gap of these nodes is 0 (length).
     """
 
     comm: MPI.Comm
@@ -56,6 +59,7 @@ class ContactTrace:
     tangent: Array
     gap: Array
     block_size: int
+    cut: float = 0.0
 
     @property
     def dim(self) -> int:
@@ -164,12 +168,41 @@ def candidates(domain: Domain, space: fem.FunctionSpace, part: str) -> Candidate
     return Candidates(nodes, points, weight[nodes], normal)
 
 
-def _check_place(
-    domain: Domain, space: fem.FunctionSpace, found: Candidates, direction: Array, gap: Array
-) -> None:
+def _corners(space: fem.FunctionSpace) -> NDArray[np.int32]:
+    """Return the local nodes at vertices of the mesh."""
+    layout, cells = space.dofmap.dof_layout, space.dofmap.list
+    corners = [layout.entity_dofs(0, i) for i in range(space.mesh.topology.dim + 1)]
+    return np.unique(cells[:, np.concatenate(corners)])
+
+
+def _chord_depth(domain: Domain, part: str, foundation: Foundation) -> float:
+    """Return how deep nodes on straight facets of a curved part may lie in the foundation."""
+    facets = domain.facets(part)
+    longest = np.max(domain.mesh.h(domain.dim - 1, facets), initial=0.0) if facets.size else 0.0
+    length = 2**domain.levels * float(domain.comm.allreduce(longest, op=MPI.MAX))
+    if isinstance(foundation, Sphere):
+        # The contact direction may be the body's, a little aside.
+        return 1.1 * foundation.chord_depth(length)
+    return 0.0 if isinstance(foundation, Plane) else 1e-3 * domain.size
+
+
+def _place(
+    domain: Domain,
+    space: fem.FunctionSpace,
+    contact: tuple[str, Foundation],
+    found: Candidates,
+    direction: Array,
+    gap: Array,
+) -> tuple[Array, float]:
     """Refuse a foundation behind the contact part, or one that the body cuts at rest.
 
-    Nodes that face away are not looked at: all of a disc may be the contact part.
+    Nodes that face away are not looked at: all of a disc may be the contact part. Nodes on
+    straight facets of a curved part may lie in a ball that the facets' corners touch: they
+    would be on its surface if the facets were curved, and their gap is 0.
+
+    Returns
+    -------
+    The gap, and the largest depth that was taken for 0.
     """
     facing = np.einsum("ni,ni->n", direction, found.normal)
     # Where no ray meets the foundation the gap is infinite, and `build_trace` has its message.
@@ -181,14 +214,21 @@ def _check_place(
             "into the body at every node; accepted: a normal towards the body, a sphere in front "
             "of it, or inside = true for a body within"
         )
-    # Degree 2 has nodes on the chords of curved boundaries, and mesh files round.
-    tolerance = (1e-5 if space.ufl_element().embedded_superdegree == 1 else 1e-3) * domain.size
-    depth = domain.comm.allreduce(np.max(-gap[facing > 0], initial=0.0), op=MPI.MAX)
-    if depth > tolerance:
+    rounding = 1e-5 * domain.size  # that of mesh files
+    tolerance = np.full_like(gap, rounding)
+    chord = max(rounding, _chord_depth(domain, *contact))
+    if domain.levels > 0:
+        tolerance[:] = chord
+    elif space.ufl_element().embedded_superdegree > 1:
+        tolerance[~np.isin(found.nodes, _corners(space))] = chord
+    depth = np.where(facing > 0, -gap, 0.0)
+    cut = domain.comm.allreduce(np.max(depth, initial=0.0), op=MPI.MAX)
+    if domain.comm.allreduce(bool(np.any(depth > tolerance)), op=MPI.LOR):
         raise InputError(
-            f"contact.foundation: the body cuts it at rest, by up to {depth:.3g}; accepted: gaps "
-            f">= 0 but for {tolerance:.1g} (rounding)"
+            f"contact.foundation: the body cuts it at rest, by up to {cut:.3g}; accepted: gaps "
+            f">= 0 but for {rounding:.1g} (rounding), and what straight facets take off a curve"
         )
+    return np.where(facing > 0, np.maximum(gap, 0.0), gap), float(cut)
 
 
 def build_trace(
@@ -220,8 +260,9 @@ def build_trace(
             "contact.foundation: a contact node has no contact direction "
             "(it is the sphere's centre)"
         )
+    cut = 0.0
     if not isinstance(foundation, GapFunction):  # whose values are what was asked for
-        _check_place(domain, space, found, direction, gap)
+        gap, cut = _place(domain, space, (part, foundation), found, direction, gap)
 
     free = free_components(space, bcs)[nodes, :d]
     gap = gap - np.einsum("ni,ni->n", direction, _prescribed(space, bcs)[nodes, :d])
@@ -244,6 +285,7 @@ def build_trace(
         tangent,
         gap,
         space.dofmap.index_map_bs,
+        cut if cut > 1e-5 * domain.size else 0.0,
     )
     if trace.size == 0:
         raise InputError(

@@ -6,7 +6,8 @@ from dolfinx import mesh
 from helpers import bar, constant, contact_data, flat, leaning_block, solve, turn
 from mpi4py import MPI
 
-from contact.domain import from_mesh, rectangle
+from contact.domain import from_mesh, rectangle, refined
+from contact.errors import InputError
 from contact.foundation import GapFunction, Plane, Sphere
 from contact.problem import Body, Contact, ContactProblem, Fixed, Friction, Load
 from forms.hencky import Linear
@@ -146,3 +147,39 @@ def test_two_bodies_that_differ_by_a_rotation_have_the_same_contact():
         assert np.abs(ours[name][order] - expected[name]).max() < 1e-9
     assert np.abs(ours["friction"][order] @ q - expected["friction"]).max() < 1e-9
     assert np.abs(ours["u_t"][order] @ q - expected["u_t"]).max() < 1e-9
+
+
+def around_a_circle(radius, degree=1, levels=0, cells=24, direction="foundation"):
+    """Return the trace of the arch's upper side, a concave arc of radius 1, on a circle."""
+    domain = arch(cells)
+    for _ in range(levels):
+        domain = refined(domain)
+    body = Body(LAW, [Fixed("arc", (ZERO, ZERO))])
+    circle = Sphere((0.0, 2.0), radius, direction=direction)
+    return ContactProblem(domain, body, Contact("top", circle), degree=degree).trace
+
+
+@pytest.mark.parametrize("direction", ["foundation", "body"])
+@pytest.mark.parametrize(("degree", "levels"), [(1, 0), (1, 1), (1, 2), (2, 0), (2, 1)])
+def test_straight_facets_around_a_circle_touch_it(degree, levels, direction):
+    """The corners lie on the circle, all other nodes in it by the depth of the chords."""
+    cells = 6
+    trace = around_a_circle(1.0, degree, levels, cells, direction)
+    depth = 1 - np.cos(np.pi / 6 / cells)
+    assert np.abs(trace.gap).max() < 1e-12
+    assert trace.cut == pytest.approx(depth if (degree, levels) != (1, 0) else 0.0)
+    loose = around_a_circle(1.0 - 0.5 * depth, degree, levels, cells, direction)
+    assert loose.gap.min() == pytest.approx(0.5 * depth if (degree, levels) == (1, 0) else 0.0)
+    assert loose.gap.max() == pytest.approx(0.5 * depth, rel=0.01)
+
+
+@pytest.mark.parametrize(("degree", "levels"), [(1, 0), (1, 1), (2, 0), (2, 1)])
+def test_a_circle_larger_than_its_hole_is_refused(degree, levels):
+    with pytest.raises(InputError, match="cuts it at rest"):
+        around_a_circle(1.01, degree, levels)
+
+
+def test_chords_do_not_reach_into_a_sphere_around_the_body():
+    assert Sphere((0.0, 0.0), 1.0).chord_depth(0.2) == pytest.approx(1 - np.sqrt(1 - 0.01))
+    assert Sphere((0.0, 0.0, 0.0), 1.0).chord_depth(0.3) == pytest.approx(1 - np.sqrt(1 - 0.03))
+    assert Sphere((0.0, 0.0), 1.0, inside=True).chord_depth(0.2) == 0.0
