@@ -143,6 +143,8 @@ def main() -> None:
                 "unknowns": int(problem.nbdof()),
                 "max_displacement": float(np.linalg.norm(u, axis=1).max()),
             }
+        if not converged:
+            break
     print(json.dumps(best))
 
 
