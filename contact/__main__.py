@@ -130,6 +130,8 @@ def _check_folder(folder: Path) -> None:
 
 
 def _solve(case: Case, options: argparse.Namespace, comm: MPI.Intracomm) -> int:
+    if not options.out:  # the present folder is "."; this is rather a variable that is not set
+        raise InputError('--out "": no folder; accepted: a folder to write to')
     out = Path(options.out)
     _shared(comm, lambda: _check_folder(out))
 

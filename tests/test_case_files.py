@@ -308,6 +308,7 @@ def test_missing_files(shared_tmp_path: Path, capfd: pytest.CaptureFixture[str])
         (["--set", "material.young=-1"], ["material.young", "-1"]),
         (["--set", "load.3.on=top"], ["load", "3"]),
         (["--outt", "x"], ["--outt", "--out"]),
+        (["--out", ""], ["--out", "no folder"]),
     ],
 )
 def test_wrong_command_line(
