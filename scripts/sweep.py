@@ -218,7 +218,9 @@ def main(arguments: Sequence[str] | None = None) -> None:
             begin = time.perf_counter()
             settings = case.solver.model_copy(update={"method": method})
             solution = solve_problem(problem, settings)
-            notes = {r.note.removesuffix("tangent").strip() for r in solution.history.records}
+            notes = {r.note for r in solution.history.records}
+            for word in ("tangent", "taken back"):  # steps of the method itself
+                notes = {note.replace(word, "").strip() for note in notes}
             fallback = ", ".join(sorted(notes - {""}))
             row = (
                 case.source,
