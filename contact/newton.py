@@ -275,8 +275,9 @@ class Newton:
             trace.weight[:, None, None] * blocks,
             constant=problem.linear_material,
         )
-        # An iterative solver need not be more accurate than the step itself.
-        rtol = min(1e-3, max(1e-2 * reached, 1e-2 * self.options.tolerance))
+        # An iterative solver need be neither more accurate than the step nor than the end asks for.
+        enough = 0.1 * self.options.tolerance / max(reached, self.options.tolerance)
+        rtol = min(1e-3, max(1e-2 * reached, enough))
         residual = residual_forces(problem, contact.forces)
         trace.add(residual, (trace.weight * shift)[:, None] * trace.normal)
         increment = self.operator.solve(-residual, rtol)
