@@ -267,7 +267,9 @@ class Newton:
         if problem.response.active:
             pressure = total_pressure(problem, nodal, contact.forces)
             response = problem.response
-            follow = self._following(reached, contact.settled or reached < NEAR)
+            follow = contact.settled or reached < NEAR
+            if response.follows_gap:
+                follow = self._following(reached, follow)
             current = response.current_jacobian if follow else response.current_block
             blocks = blocks + layer + current(nodal, pressure)
         self.operator.update(

@@ -62,17 +62,12 @@ def test_independent_values(mu):
 
 
 @pytest.mark.parametrize("law", [None, hencky()], ids=["8.1", "8.2"])
-@pytest.mark.parametrize("k_e", K_E)
-def test_series_of_conductivities(k_e, law):
-    problem = example(COMM, (64, 32), friction=SLIP, k_e=k_e, law=law)
-    solver = solve(problem)
-    assert charge_balance(problem, solver.forces).imbalance < 1e-8
-
-
-@pytest.mark.parametrize("law", [None, hencky()], ids=["8.1", "8.2"])
-@pytest.mark.parametrize("phi_f", PHI_F)
-def test_series_of_potentials(phi_f, law):
-    problem = example(COMM, (64, 32), friction=SLIP, phi_f=phi_f, law=law)
+@pytest.mark.parametrize(
+    "changes", [*({"k_e": k_e} for k_e in K_E), *({"phi_f": phi_f} for phi_f in PHI_F)], ids=str
+)
+def test_series(changes, law):
+    """Those of the conductivity and of the foundation's potential."""
+    problem = example(COMM, (64, 32), friction=SLIP, law=law, **changes)
     solver = solve(problem)
     assert charge_balance(problem, solver.forces).imbalance < 1e-8
 
