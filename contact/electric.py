@@ -157,7 +157,7 @@ def _foundation_charges(problem: ContactProblem, forces: Multipliers) -> Array:
     charges = problem.trace.weight * density
     if problem.held is None:
         return charges
-    held = problem.held.weight * problem.held.charge(problem.x.x.array)
+    held = problem.held.weight * problem.held.charge(problem.unknowns)
     return np.concatenate([charges, held])
 
 

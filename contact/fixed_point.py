@@ -23,9 +23,10 @@ import numpy as np
 
 from contact.case_solver import MAX_INNER
 from contact.case_types import PRECISION
+from contact.condensed import operator
 from contact.following import Following
 from contact.kkt import KKT, evaluate, residual_forces
-from contact.linear import Counters, LinearOperator
+from contact.linear import Counters
 from contact.norms import domain_norm
 from contact.problem import ContactProblem
 from contact.projections import Array
@@ -111,9 +112,7 @@ class FixedPoint:
     def __post_init__(self) -> None:
         """Choose r and set up the operator."""
         self.r = self.options.r or automatic_r(self.problem)
-        self.operator = LinearOperator(
-            self.problem, counters=self.counters, kind=self.options.linear
-        )
+        self.operator = operator(self.problem, counters=self.counters, kind=self.options.linear)
         self.history = History(self.monitor)
         self.forces = Multipliers.zero(self.problem)
         thesis = self.options.stopping == "thesis"
@@ -147,7 +146,7 @@ class FixedPoint:
             if friction and iteration == 1:
                 # The slip without friction is a bad guess, and so is the contact that goes with it.
                 z = np.zeros_like(z)
-            previous = problem.x.x.array[: problem.owned].copy()
+            previous = problem.unknowns[: problem.owned].copy()
             # Newton's tangent of a zero strain is the secant, and cheaper.
             inner, z = self._step(bound, z, friction, tangent and iteration > first)
             residuals = evaluate(problem, self.forces)
@@ -204,7 +203,7 @@ class FixedPoint:
         if not response.follows_gap or not self._following(residual):
             return response.current_block(nodal, pressure)
         if self.operator.symmetric:
-            self.operator = LinearOperator(
+            self.operator = operator(
                 self.problem, symmetric=False, counters=self.counters, kind=self.options.linear
             )
         return response.current_jacobian(nodal, pressure)
@@ -246,7 +245,7 @@ class FixedPoint:
         if self.problem.frictional:
             return change < self.options.eps_fp
         assert self._norm is not None
-        now = self.problem.x.x.array[: self.problem.owned]
+        now = self.problem.unknowns[: self.problem.owned]
         return self._norm(now - previous) < self.options.eps_fp * self._norm(now)
 
     def _outcome(self, residuals: KKT, words: str) -> Outcome:

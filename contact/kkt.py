@@ -58,7 +58,7 @@ def residual_forces(problem: ContactProblem, forces: Multipliers) -> Array:
     pressure = total_pressure(problem, nodal, forces)
     trace.add(residual, trace.weight[:, None] * problem.response.force(nodal, pressure))
     if problem.held is not None:
-        problem.held.add_force(residual, problem.x.x.array)
+        problem.held.add_force(residual, problem.unknowns)
     return residual
 
 
@@ -77,17 +77,13 @@ def interface_residuals(
     return trace.norm(contact) / scale, trace.norm(friction) / scale
 
 
-def _global_norm(problem: ContactProblem, values: Array) -> float:
-    return float(np.sqrt(problem.comm.allreduce(np.dot(values, values), op=MPI.SUM)))
-
-
 def _least_force(problem: ContactProblem) -> float:
     """Return 1e-6 of the forces that would hold each node alone at the prescribed displacement.
 
     Rounding is some 1e-15 of those, so that it passes for nothing at any sensible tolerance.
     """
     law, dim, comm = problem.body.law, problem.dim, problem.comm
-    prescribed = problem.x.x.array[: problem.owned][~problem.free.ravel()]
+    prescribed = problem.unknowns[: problem.owned][~problem.free.ravel()]
     largest = comm.allreduce(float(np.abs(prescribed).max(initial=0.0)), op=MPI.MAX)
     nodes = comm.allreduce(problem.free.shape[0], op=MPI.SUM)
     spacing = problem.domain.size / nodes ** (1 / dim)
@@ -104,12 +100,12 @@ def evaluate(problem: ContactProblem, forces: Multipliers) -> KKT:
     contact_forces = np.zeros_like(residual)
     vectors = total_pressure(problem, nodal, forces)[:, None] * trace.normal + forces.friction
     trace.add(contact_forces, trace.weight[:, None] * vectors)
-    loads, pushes = _global_norm(problem, problem.external), _global_norm(problem, contact_forces)
-    scale = loads + pushes + _global_norm(problem, np.where(free, 0.0, residual))
+    loads, pushes = problem.load_size, problem.norm(contact_forces)
+    scale = loads + pushes + problem.norm(np.where(free, 0.0, residual))
     # Supports that move an untouched body rigidly leave rounding, in the reactions as well.
     least = _least_force(problem)
     if loads == 0 and pushes <= 1e-6 * least:
         scale = max(scale, least)
-    equilibrium = _global_norm(problem, np.where(free, residual, 0.0)) / (scale or 1.0)
+    equilibrium = problem.norm(np.where(free, residual, 0.0)) / (scale or 1.0)
     bound = bound_of(problem, nodal, forces)
     return KKT(equilibrium, *interface_residuals(problem, nodal, forces, bound))

@@ -44,11 +44,13 @@ class Counters:
     """How often the expensive steps were taken.
 
     `linear_iterations` are those of iterative solvers; a direct one counts one a solve.
+    `contact_solves` are dense ones at the contact nodes, with the body condensed onto these.
     """
 
     factorizations: int = 0
     linear_solves: int = 0
     linear_iterations: int = 0
+    contact_solves: int = 0
 
 
 class LinearOperator:
@@ -118,7 +120,7 @@ class LinearOperator:
         """
         nodes = self.problem.trace.nodes
         if self.problem.held is not None:
-            held = self.problem.held.block(self.problem.x.x.array)
+            held = self.problem.held.block(self.problem.unknowns)
             nodes = np.concatenate([nodes, self.problem.held.nodes])
             blocks = np.concatenate([blocks, held])
         last, same = self._blocks, constant and form is self._form

@@ -1,9 +1,12 @@
 """Semismooth Newton: contact, friction, material and foundation in one loop.
 
 The nodal multipliers are condensed onto the displacement, so that the linear systems keep
-the size and the pattern of the elastic ones. Where the loop cycles, friction is frozen and
-updated outside (Algorithm 1 with Newton inside); where that fails too, the block relaxation
-takes over, and at last the load is applied in steps. The history says which.
+the size and the pattern of the elastic ones. Where the contact nodes are few, the linearised
+body is condensed onto them in turn: the loop over contact and friction then takes place there,
+in small dense steps, and the one around it follows the material alone. Where a loop cycles,
+friction is frozen and updated outside (Algorithm 1 with Newton inside); where that fails too,
+the block relaxation takes over, and at last the load is applied in steps. The history says
+which.
 
 References
 ----------
@@ -13,12 +16,21 @@ Hueeber, Stadler and Wohlmuth, SIAM J. Sci. Comput. 30 (2008).
 
 from __future__ import annotations
 
+import logging
 import time
-from dataclasses import dataclass, field
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from contact.condensed import (
+    Condensation,
+    CondensedProblem,
+    DenseOperator,
+    condensation,
+    operator,
+)
 from contact.fixed_point import FixedPoint, FixedPointOptions
 from contact.following import Following
 from contact.kkt import KKT, evaluate, interface_residuals, residual_forces
@@ -26,13 +38,16 @@ from contact.linear import Counters, LinearOperator
 from contact.newton_laws import Moduli, linearise, node_status
 from contact.problem import ContactProblem
 from contact.projections import Array
-from contact.report import History, Monitor, Outcome, Record
+from contact.report import History, Monitor, Outcome, Quiet, Record
 from contact.state import Multipliers, bound_of, nodal_iterate, total_pressure
 from contact.uzawa import automatic_r
 
 #: Residual from which on the foundation's conductivity is followed although nodes still change
 #: their status.
 NEAR = 0.05
+
+#: How much more accurately than the material is linearised the contact problem is solved.
+CONTACT_PART = 1e-3
 
 #: Iterate, contact forces, status and layer pressure.
 _State = tuple[Array, Multipliers, NDArray[np.int8] | None, Array | None]
@@ -58,6 +73,9 @@ class NewtonOptions:
         Steps without progress after which the stage is given up.
     linear
         Kind of linear solver, see `linear.LinearOperator`.
+    condense
+        Whether to condense the linearised body onto the contact nodes where that pays: one
+        step then solves the whole contact problem for a linear body.
     """
 
     tolerance: float = 1e-8
@@ -67,6 +85,7 @@ class NewtonOptions:
     secant_until: float = 1e-2
     patience: int = 12
     linear: str = "auto"
+    condense: bool = True
 
 
 @dataclass
@@ -81,24 +100,19 @@ class Newton:
         Options of the method.
     monitor
         Told of every step.
+    given
+        Stiffnesses of the linearised laws; chosen from those of the body by default.
     """
 
     problem: ContactProblem
     options: NewtonOptions = field(default_factory=NewtonOptions)
     monitor: Monitor | None = None
     counters: Counters = field(default_factory=Counters)
+    given: Moduli | None = None
 
     def __post_init__(self) -> None:
-        """Choose the moduli and set up the operator."""
-        middle = automatic_r(self.problem)
-        nodal = middle**2 / float(self.problem.body.law.young)
-        self.moduli = Moduli(middle, nodal, self.options.gamma * max(middle, nodal))
-        self.operator = LinearOperator(
-            self.problem,
-            symmetric=not self._asymmetric,
-            counters=self.counters,
-            kind=self.options.linear,
-        )
+        """Choose the moduli, and condense the body where that pays."""
+        self.moduli = self.given or self._moduli()
         self.history = History(self.monitor)
         self.forces = Multipliers.zero(self.problem)
         self._status: NDArray[np.int8] | None = None
@@ -106,17 +120,41 @@ class Newton:
         self._following = Following()
         self._calm = 0  # steps in which no node has changed its status
         self._begin = 0.0
+        self._operator: LinearOperator | DenseOperator | None = None
+        self._body: Condensation | None = None
+        if self.options.condense:
+            self._body = condensation(self.problem, self.counters, self.options.linear)
+        if self._body is not None:
+            options = replace(self.options, condense=False, limit=NewtonOptions.limit)
+            quiet = Quiet(self.history.poll)
+            self._at_contact = Newton(self._body.problem, options, quiet, given=self.moduli)
+            self._at_contact.history.level = logging.DEBUG
+
+    def _moduli(self) -> Moduli:
+        """Return stiffnesses that fit the body and its mesh."""
+        middle = automatic_r(self.problem)
+        nodal = middle**2 / float(self.problem.body.law.young)
+        return Moduli(middle, nodal, self.options.gamma * max(middle, nodal))
 
     @property
-    def _asymmetric(self) -> bool:
-        return self.problem.frictional or self.problem.response.active
+    def operator(self) -> LinearOperator | DenseOperator:
+        """The operator of the linear systems."""
+        if self._operator is None:
+            asymmetric = self.problem.frictional or self.problem.response.active
+            self._operator = operator(
+                self.problem,
+                symmetric=not asymmetric,
+                counters=self.counters,
+                kind=self.options.linear,
+            )
+        return self._operator
 
     def solve(self) -> Outcome:
         """Iterate from zero displacement until convergence or the limit. Collective."""
         self.problem.reset()
         self.forces = Multipliers.zero(self.problem)
         self._status = self._layer_pressure = None
-        return self._solve()
+        return self.resume()
 
     def solve_from(self, forces: Multipliers) -> Outcome:
         """Iterate from the problem's present iterate and given contact forces. Collective."""
@@ -125,17 +163,23 @@ class Newton:
         self.forces = forces
         self._status = node_status(problem, nodal, forces, bound, self.moduli.status)
         self._layer_pressure = None
-        return self._solve()
+        return self.resume()
 
-    def _solve(self) -> Outcome:
-        """Iterate, and fall back on slower methods where that fails."""
+    def resume(self) -> Outcome:
+        """Iterate from where the method is, and fall back on slower ones where that fails."""
         self._begin = time.perf_counter()
+        if self._body is not None:
+            outcome = self._newton("", self._condensed_step)
+            if outcome.converged:
+                return outcome
         outcome = self._newton("")
         if not outcome.converged and self.problem.frictional and self._left > 0:
             outcome = self._frozen_friction()
         if not outcome.converged and self._left > 0:
             outcome = self._block_relaxation()
-        if not outcome.converged and self._left > 0:
+        # A condensed body has been linearised at the whole load.
+        condensed = isinstance(self.problem, CondensedProblem)
+        if not outcome.converged and self._left > 0 and not condensed:
             outcome = self._load_steps()
         return outcome
 
@@ -161,10 +205,17 @@ class Newton:
         finally:
             self.forces, self._status, self._layer_pressure = relaxed.forces, None, None
 
-    def _newton(self, note: str, frozen: Array | None = None, goal: float = 0.0) -> Outcome:
+    def _newton(
+        self,
+        note: str,
+        step: Callable[[bool, float], str | None] | None = None,
+        frozen: Array | None = None,
+        goal: float = 0.0,
+    ) -> Outcome:
         """Iterate on the full problem, or on the one with a frozen friction bound.
 
-        With a frozen bound the residual of that bound has to fall below `goal`.
+        With a frozen bound the residual of that bound has to fall below `goal`. `step` takes
+        the place of `_step`.
         """
         problem, options = self.problem, self.options
         goal = max(goal, options.tolerance)
@@ -176,10 +227,15 @@ class Newton:
         steps = min(options.max_iterations, self._left)
         for _ in range(steps):
             before, kept = residuals, self._state()
-            self._step(tangent, frozen, residuals.largest)
+            if step is None:
+                said: str | None = self._step(tangent, residuals.largest, frozen)
+            else:
+                said = step(tangent, residuals.largest)
+            if said is None:
+                return Outcome(False, "the condensed contact problem is not solved", residuals)
             residuals = evaluate(problem, self.forces)
             worse = self._following.worsened(residuals.largest)
-            words = (note, "tangent" * tangent, "taken back" * worse)
+            words = (note, said, "tangent" * tangent, "taken back" * worse)
             self._record(residuals, " ".join(word for word in words if word))
             if worse:
                 self._return_to(kept)
@@ -214,7 +270,7 @@ class Newton:
         bound = bound_of(self.problem, nodal_iterate(self.problem), self.forces)
         outcome, goal = None, 1e-2
         for _ in range(40):
-            outcome = self._newton("frozen friction", bound, goal)
+            outcome = self._newton("frozen friction", frozen=bound, goal=goal)
             if outcome.converged or outcome.reason != "friction bound to be updated":
                 break
             new = bound_of(self.problem, nodal_iterate(self.problem), self.forces)
@@ -248,13 +304,13 @@ class Newton:
 
     def _state(self) -> _State:
         """Return what `_return_to` needs to take steps back."""
-        return self.problem.x.x.array.copy(), self.forces, self._status, self._layer_pressure
+        return self.problem.unknowns.copy(), self.forces, self._status, self._layer_pressure
 
     def _return_to(self, kept: _State) -> None:
         """Go back to a state before."""
-        self.problem.x.x.array[:], self.forces, self._status, self._layer_pressure = kept
+        self.problem.unknowns[:], self.forces, self._status, self._layer_pressure = kept
 
-    def _step(self, tangent: bool, frozen: Array | None, reached: float) -> None:
+    def _step(self, tangent: bool, reached: float, frozen: Array | None) -> str:
         """Take one Newton step: one assembly, one factorisation, one solve."""
         problem, trace = self.problem, self.problem.trace
         nodal = nodal_iterate(problem)
@@ -293,6 +349,37 @@ class Newton:
         self._status = contact.status
         pressed = trace.normal_component(np.einsum("nij,nj->ni", layer, moved))
         self._layer_pressure = problem.response.layer_pressure(nodal) + shift + pressed
+        return ""
+
+    def _condensed_step(self, tangent: bool, reached: float) -> str | None:
+        """Linearise the material alone, and solve the contact problem that is left.
+
+        Returns what is to be said of it, or None if it could not be solved.
+        """
+        problem, body, inner = self.problem, self._body, self._at_contact
+        assert body is not None
+        if not body.linearise(problem.tangent if tangent else problem.secant):
+            return None
+        # No more accurate than the material is linearised, nor than the end asks for.
+        enough = 0.1 * self.options.tolerance
+        if not problem.linear_material:
+            enough = max(enough, CONTACT_PART * min(reached, 1.0))
+        inner.options = replace(inner.options, tolerance=enough)
+        inner.take(self)
+        inner.history.records.clear()
+        outcome = inner.resume()
+        steps = sum(record.inner for record in inner.history.records)
+        self.counters.contact_solves += steps
+        if outcome.kkt.largest > max(enough, NEAR * reached):
+            return None
+        self.take(inner)
+        problem.add(body.expand())
+        return f"{steps} contact steps"
+
+    def take(self, other: Newton) -> None:
+        """Go on from where another Newton method on the same contact nodes is."""
+        self.forces, self._status = other.forces, other._status
+        self._layer_pressure = other._layer_pressure
 
     def _layer(self, nodal: Array, full: bool) -> tuple[Array, Array]:
         """Linearise the layer; return its block, and how it differs from the layer's force.

@@ -108,6 +108,7 @@ def summarise(solution: Solution, table: Table | None) -> dict[str, Any]:
         "linear_solves": counters.linear_solves,
         "linear_iterations": counters.linear_iterations,
         "factorizations": counters.factorizations,
+        "contact_solves": counters.contact_solves,
         "kkt": {"equilibrium": kkt.equilibrium, "contact": kkt.contact, "friction": kkt.friction},
         "max_pressure": problem.trace.maximum(solution.pressure),
         "contact_force": solution.contact_force.tolist(),

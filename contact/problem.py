@@ -213,10 +213,24 @@ class ContactProblem:
         """Whether the bulk operator is constant."""
         return isinstance(self.body.law, Linear)
 
+    def norm(self, values: Array) -> float:
+        """Return the Euclidean norm of owned values. Collective."""
+        return float(np.sqrt(self.comm.allreduce(np.dot(values, values), op=MPI.SUM)))
+
     @property
     def frictional(self) -> bool:
         """Whether a tangential force can act."""
         return self.friction.coefficient is not None or self.tresca is not None
+
+    @property
+    def unknowns(self) -> Array:
+        """The iterate: nodal unknowns of this rank, those of the ghosts behind its own."""
+        return self.x.x.array
+
+    @property
+    def load_size(self) -> float:
+        """Euclidean norm of the nodal loads. Collective."""
+        return self.norm(self.external)
 
     @property
     def owned(self) -> int:

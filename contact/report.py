@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Protocol, runtime_checkable
 
@@ -54,17 +55,40 @@ class Poll(Protocol):
         """Raise on all ranks if the solve is to end. Collective."""
 
 
+@dataclass(frozen=True)
+class Quiet:
+    """A monitor of a loop within another one: it only looks whether the solve is to end."""
+
+    poll: Callable[[], None]
+
+    def __call__(self, record: Record) -> None:
+        """Look whether the solve is to end. Collective."""
+        self.poll()
+
+
 @dataclass
 class History:
-    """The outer iterations so far, handed to a monitor as they come."""
+    """The outer iterations so far, handed to a monitor as they come.
+
+    Attributes
+    ----------
+    monitor
+        Told of every iteration.
+    records
+        The iterations.
+    level
+        Level at which they are logged.
+    """
 
     monitor: Monitor | None = None
     records: list[Record] = field(default_factory=list)
+    level: int = logging.INFO
 
     def add(self, record: Record) -> None:
         """Append a record."""
         self.records.append(record)
-        logger.info(
+        logger.log(
+            self.level,
             "iteration %d: %d solves, residuals %.2e %.2e %.2e %s",
             record.iteration,
             record.inner,

@@ -70,7 +70,7 @@ def check_potential(problem: ContactProblem, forces: Multipliers) -> None:
     slopes = problem.response.jacobian(nodal, total_pressure(problem, nodal, forces))[:, -1, -1]
     known = bool(np.any(slopes != 0)) or not np.all(problem.free[:, -1])
     if problem.held is not None:
-        known = known or bool(np.any(problem.held.slope(problem.x.x.array) != 0))
+        known = known or bool(np.any(problem.held.slope(problem.unknowns) != 0))
     if not comm.allreduce(known, op=MPI.LOR):
         raise InputError(
             "the potential is not determined: it is prescribed nowhere, and the foundation "

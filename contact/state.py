@@ -38,7 +38,7 @@ class Multipliers:
 
 def nodal_iterate(problem: ContactProblem) -> Array:
     """Return the iterate at the owned contact nodes, shape (n, block size)."""
-    return problem.trace.values(problem.x.x.array[: problem.owned])
+    return problem.trace.values(problem.unknowns[: problem.owned])
 
 
 def slip_of(problem: ContactProblem, nodal: Array) -> Array:

@@ -15,6 +15,7 @@ import numpy as np
 from mpi4py import MPI
 
 from contact.acceleration import ResidualMinimiser
+from contact.condensed import DenseOperator
 from contact.kkt import interface_residuals
 from contact.linear import LinearOperator
 from contact.problem import ContactProblem
@@ -80,7 +81,7 @@ class Linearised:
         Whether tangential forces act; the operator is augmented tangentially only then.
     """
 
-    operator: LinearOperator
+    operator: LinearOperator | DenseOperator
     residual: Array
     nodal: Array
     bound: Array
@@ -267,7 +268,7 @@ def block_relaxation(
             if old_phi is not None and old_increment is not None:
                 moved, projected = increment - old_increment, phi - old_phi
                 change = domain_norm(moved) ** 2 + trace.norm(projected) ** 2
-                size = domain_norm(problem.x.x.array[: problem.owned] + increment) ** 2
+                size = domain_norm(problem.unknowns[: problem.owned] + increment) ** 2
                 size += trace.norm(phi) ** 2
                 if change < parameters.thesis_tolerance**2 * size:
                     return RelaxationResult(increment, forces, image, iteration, residual)

@@ -1,0 +1,189 @@
+"""The body seen from a few of its nodes: a dense Schur complement by static substructuring.
+
+Each rank eliminates the nodes that are coupled to its own and to kept ones only, by a sparse
+factorisation; what is left is dense, small, and the same on all ranks. In the plane the kept
+nodes are so few that the dense matrix has about as many entries as the mesh has nodes.
+"""
+
+from __future__ import annotations
+
+import ctypes
+
+import numpy as np
+from mpi4py import MPI
+from numpy.typing import NDArray
+from petsc4py import PETSc
+from scipy.linalg import lu_factor, lu_solve
+
+from contact.projections import Array
+
+#: MUMPS's ICNTL(26): 0 solves with the eliminated unknowns, the kept ones being 0.
+INTERIOR_SOLVE = (26, 0)
+
+# petsc4py has no Schur complements of factorisations.
+_petsc = ctypes.CDLL(PETSc.__file__)
+
+
+def _check(code: int) -> None:
+    if code != 0:
+        raise PETSc.Error(code)
+
+
+def _set_kept(factor: PETSc.Mat, kept: PETSc.IS) -> None:
+    _check(_petsc.MatFactorSetSchurIS(ctypes.c_void_p(factor.handle), ctypes.c_void_p(kept.handle)))
+
+
+def _complement(factor: PETSc.Mat, size: int) -> Array:
+    """Return a copy of the Schur complement that a factorisation holds."""
+    handle, values = ctypes.c_void_p(), ctypes.c_void_p()
+    _check(
+        _petsc.MatFactorCreateSchurComplement(
+            ctypes.c_void_p(factor.handle), ctypes.byref(handle), None
+        )
+    )
+    _check(_petsc.MatDenseGetArrayRead(handle, ctypes.byref(values)))
+    pointer = ctypes.cast(values, ctypes.POINTER(ctypes.c_double))
+    # PETSc stores it by columns.
+    matrix = np.ctypeslib.as_array(pointer, (size, size)).T.copy() if size else np.zeros((0, 0))
+    _check(_petsc.MatDenseRestoreArrayRead(handle, ctypes.byref(values)))
+    _check(_petsc.MatDestroy(ctypes.byref(handle)))
+    return matrix
+
+
+class SchurComplement:
+    """A symmetric matrix reduced to kept unknowns.
+
+    Parameters
+    ----------
+    matrix
+        The assembled matrix, for its pattern; `factorise` takes its values.
+    kept
+        Owned unknowns that are kept, local numbers; the result has them in rank order.
+    prefix
+        Prefix of PETSc options of the factorisation.
+    """
+
+    def __init__(self, matrix: PETSc.Mat, kept: NDArray[np.int32], prefix: str) -> None:
+        self.comm = matrix.getComm().tompi4py()
+        begin, end = matrix.getOwnershipRange()
+        starts, columns, _ = matrix.getValuesCSR()
+        shared = np.zeros(end - begin, dtype=bool)
+        # Of two coupled unknowns of different ranks one has to stay: that of the higher rank.
+        rows = np.repeat(np.arange(end - begin), np.diff(starts))
+        shared[rows[columns < begin]] = True
+        shared[kept] = False
+        self._inside = np.ones(end - begin, dtype=bool)
+        self._inside[kept] = self._inside[shared] = False
+        # The kept ones first, then those between the ranks, each in rank order.
+        self._kept, self._shared = kept, np.flatnonzero(shared)
+        mine = [(part + begin).astype(PETSc.IntType) for part in (kept, self._shared)]
+        gathered = [self.comm.allgather(part) for part in mine]
+        self.offset = sum(part.size for part in gathered[0][: self.comm.rank])
+        self.size = sum(part.size for part in gathered[0])
+        self._between = sum(part.size for part in gathered[1])
+        offset = sum(part.size for part in gathered[1][: self.comm.rank])
+        self._rows = np.concatenate(
+            [
+                self.offset + np.arange(kept.size),
+                self.size + offset + np.arange(self._shared.size),
+            ]
+        )
+        left = np.concatenate([part for parts in gathered for part in parts])
+        eliminated = (np.flatnonzero(self._inside) + begin).astype(PETSc.IntType)
+        self._left = PETSc.IS().createGeneral(left, PETSc.COMM_SELF)
+        self._local = PETSc.IS().createGeneral(np.concatenate([eliminated, left]), PETSc.COMM_SELF)
+        self._eliminated, self._prefix = eliminated.size, prefix
+        self._factor: PETSc.PC | None = None
+        self._part: PETSc.Mat | None = None
+
+    @property
+    def dense_size(self) -> int:
+        """Number of unknowns that no rank eliminates by itself."""
+        return self.size + self._between
+
+    def factorise(self, matrix: PETSc.Mat) -> Array:
+        """Eliminate; return the Schur complement on all ranks, (size, size). Collective."""
+        if self._part is None or self._factor is None:
+            (self._part,) = matrix.createSubMatrices([self._local], [self._local])
+            self._factor = self._analysed(self._part)
+        else:
+            matrix.createSubMatrices([self._local], [self._local], submats=[self._part])
+            self._factor.setOperators(self._part)
+        self._factor.setUp()
+        factor, n = self._factor.getFactorMatrix(), self.dense_size
+        factor.setMumpsIcntl(*INTERIOR_SOLVE)
+        total = _complement(factor, n)
+        if self.comm.size > 1:
+            total = self._assembled(matrix, total)
+        k = self.size
+        if self._between == 0:
+            return total
+        self._coupling = total[:k, k:]
+        self._lu = lu_factor(total[k:, k:], check_finite=False)
+        return total[:k, :k] - self._coupling @ lu_solve(self._lu, total[k:, :k])
+
+    def _analysed(self, part: PETSc.Mat) -> PETSc.PC:
+        """Return a factorisation that keeps the last unknowns of a local matrix."""
+        part.setOption(PETSc.Mat.Option.SYMMETRIC, True)
+        pc = PETSc.PC().create(PETSc.COMM_SELF)
+        pc.setOptionsPrefix(self._prefix)
+        pc.setOperators(part)
+        pc.setType("cholesky")
+        pc.setFactorSolverType("mumps")
+        pc.setFromOptions()
+        pc.setFactorSetUpSolverType()
+        end = self._eliminated + self.dense_size
+        kept = np.arange(self._eliminated, end, dtype=PETSc.IntType)
+        _set_kept(pc.getFactorMatrix(), PETSc.IS().createGeneral(kept, PETSc.COMM_SELF))
+        return pc
+
+    def _assembled(self, matrix: PETSc.Mat, own: Array) -> Array:
+        """Add up what the ranks have eliminated, and what they have left."""
+        (left,) = matrix.createSubMatrices([self._left], [self._left])
+        own = own - left.convert("dense").getDenseArray()
+        self.comm.Allreduce(MPI.IN_PLACE, own, op=MPI.SUM)
+        return own + left.getDenseArray()
+
+    def _solve_inside(self, values: Array) -> Array:
+        """Solve with the eliminated unknowns alone, the others being 0."""
+        assert self._factor is not None and self._part is not None
+        solution, rhs = self._part.createVecs()
+        rhs.array[: self._eliminated] = values
+        self._factor.getFactorMatrix().solve(rhs, solution)
+        return solution.array[: self._eliminated].copy()
+
+    def _times(self, inside: Array, left: Array) -> Array:
+        """Return the local part of the matrix times values of all its unknowns."""
+        assert self._part is not None
+        vector, image = self._part.createVecs()
+        vector.array[:] = np.concatenate([inside, left])
+        self._part.mult(vector, image)
+        return image.array
+
+    def condense(self, rhs: Array) -> Array:
+        """Return what an owned right-hand side becomes on the kept unknowns, on all ranks.
+
+        It is remembered for `expand`. Collective.
+        """
+        self._rhs = rhs
+        total = np.zeros(self.dense_size)
+        total[self._rows] = rhs[np.concatenate([self._kept, self._shared])]
+        inside = self._solve_inside(rhs[self._inside])
+        total -= self._times(inside, np.zeros(self.dense_size))[self._eliminated :]
+        self.comm.Allreduce(MPI.IN_PLACE, total, op=MPI.SUM)
+        if self._between == 0:
+            return total
+        self._rhs_between = total[self.size :]
+        return total[: self.size] - self._coupling @ lu_solve(self._lu, self._rhs_between)
+
+    def expand(self, kept: Array) -> Array:
+        """Return the owned solution that goes with values of the kept unknowns on all ranks."""
+        left = kept
+        if self._between > 0:
+            between = lu_solve(self._lu, self._rhs_between - self._coupling.T @ kept)
+            left = np.concatenate([kept, between])
+        coupled = self._times(np.zeros(self._eliminated), left)[: self._eliminated]
+        solution = np.zeros(self._inside.size)
+        solution[self._inside] = self._solve_inside(self._rhs[self._inside] - coupled)
+        solution[np.concatenate([self._kept, self._shared])] = left[self._rows]
+        return solution
