@@ -16,7 +16,7 @@ from petsc4py import PETSc
 from scipy.linalg.lapack import dgetrf, dgetrs
 
 from contact import linear_amg
-from contact.linear import Counters, LinearOperator, petsc_options
+from contact.linear import Counters, LinearOperator, check_overflow, petsc_options
 from contact.problem import ContactProblem
 from contact.projections import Array
 from contact.schur import SchurComplement
@@ -147,6 +147,11 @@ class Condensation:
         Returns
         -------
         Whether it can be: few unknowns are kept, and these hold the others.
+
+        Raises
+        ------
+        InputError
+            If numbers overflow.
         """
         full, problem = self.full, self.problem
         if self._schur is None or form is not self._form or not full.linear_material:
@@ -164,6 +169,7 @@ class Condensation:
             self._form = form
             self.counters.factorizations += 1
         residual, free = full.internal_forces() - full.external, full.free.ravel()
+        check_overflow(full, self._matrix.norm(), full.norm(residual))
         reactions = full.norm(np.where(free, 0.0, residual))
         forces = -self._schur.condense(np.where(free, -residual, 0.0))
         problem.linearise(

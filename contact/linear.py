@@ -39,6 +39,23 @@ def petsc_options(prefix: str) -> Iterator[None]:
         ) from error
 
 
+def check_overflow(problem: ContactProblem, operator: float, rhs: float) -> None:
+    """Refuse a linear system whose numbers overflow, given its norms.
+
+    Raises
+    ------
+    InputError
+        If they do.
+    """
+    young = float(problem.body.law.young)
+    if not (operator < HUGE and rhs < HUGE and rhs < HUGE * young):
+        raise InputError(
+            f"numbers overflow: Young's modulus is {young:.3g}, the linear operator of the "
+            f"size {operator:.3g}, its right-hand side {rhs:.3g}; accepted: constants, loads "
+            "and prescribed values in units that bring them nearer to 1"
+        )
+
+
 @dataclass
 class Counters:
     """How often the expensive steps were taken.
@@ -191,14 +208,7 @@ class LinearOperator:
 
     def _fault(self) -> InputError:
         """Say why there is no solution. Collective."""
-        operator, rhs = self.matrix.norm(), self._rhs.norm()
-        young = float(self.problem.body.law.young)
-        if not (operator < HUGE and rhs < HUGE and rhs < HUGE * young):
-            return InputError(
-                f"numbers overflow: Young's modulus is {young:.3g}, the linear operator of the "
-                f"size {operator:.3g}, its right-hand side {rhs:.3g}; accepted: constants, loads "
-                "and prescribed values in units that bring them nearer to 1"
-            )
+        check_overflow(self.problem, self.matrix.norm(), self._rhs.norm())
         return InputError(
             "the linear system is singular: the body can move freely; fix enough "
             "displacement components (or, for a piezoelectric body, a potential)"

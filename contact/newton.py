@@ -49,6 +49,9 @@ NEAR = 0.05
 #: How much more accurately than the material is linearised the contact problem is solved.
 CONTACT_PART = 1e-3
 
+#: What the history says of the slower methods.
+SLOWER = FROZEN_FRICTION, BLOCK_RELAXATION = "frozen friction", "block relaxation"
+
 #: Iterate, contact forces, status and layer pressure.
 _State = tuple[Array, Multipliers, NDArray[np.int8] | None, Array | None]
 
@@ -192,7 +195,7 @@ class Newton:
         """Solve by the fixed point over block relaxation, which damps what Newton lets cycle."""
 
         def note(record: Record) -> None:
-            self._record(record.kkt, "block relaxation", record.inner)
+            self._record(record.kkt, BLOCK_RELAXATION, record.inner)
 
         options = FixedPointOptions(
             tolerance=self.options.tolerance,
@@ -208,7 +211,7 @@ class Newton:
     def _newton(
         self,
         note: str,
-        step: Callable[[bool, float], str | None] | None = None,
+        step: Callable[[bool, float], tuple[str, int] | None] | None = None,
         frozen: Array | None = None,
         goal: float = 0.0,
     ) -> Outcome:
@@ -227,16 +230,18 @@ class Newton:
         steps = min(options.max_iterations, self._left)
         for _ in range(steps):
             before, kept = residuals, self._state()
-            if step is None:
-                said: str | None = self._step(tangent, residuals.largest, frozen)
+            if step is not None:
+                at_contact = step(tangent, residuals.largest)
+                if at_contact is None:
+                    return Outcome(False, "the condensed contact problem is not solved", residuals)
+                said, solves = at_contact
             else:
-                said = step(tangent, residuals.largest)
-            if said is None:
-                return Outcome(False, "the condensed contact problem is not solved", residuals)
+                said, solves = "", 0
+                self._step(tangent, residuals.largest, frozen)
             residuals = evaluate(problem, self.forces)
             worse = self._following.worsened(residuals.largest)
             words = (note, said, "tangent" * tangent, "taken back" * worse)
-            self._record(residuals, " ".join(word for word in words if word))
+            self._record(residuals, " ".join(word for word in words if word), contact=solves)
             if worse:
                 self._return_to(kept)
                 residuals = evaluate(problem, self.forces)
@@ -270,7 +275,7 @@ class Newton:
         bound = bound_of(self.problem, nodal_iterate(self.problem), self.forces)
         outcome, goal = None, 1e-2
         for _ in range(40):
-            outcome = self._newton("frozen friction", frozen=bound, goal=goal)
+            outcome = self._newton(FROZEN_FRICTION, frozen=bound, goal=goal)
             if outcome.converged or outcome.reason != "friction bound to be updated":
                 break
             new = bound_of(self.problem, nodal_iterate(self.problem), self.forces)
@@ -310,7 +315,7 @@ class Newton:
         """Go back to a state before."""
         self.problem.unknowns[:], self.forces, self._status, self._layer_pressure = kept
 
-    def _step(self, tangent: bool, reached: float, frozen: Array | None) -> str:
+    def _step(self, tangent: bool, reached: float, frozen: Array | None) -> None:
         """Take one Newton step: one assembly, one factorisation, one solve."""
         problem, trace = self.problem, self.problem.trace
         nodal = nodal_iterate(problem)
@@ -349,12 +354,12 @@ class Newton:
         self._status = contact.status
         pressed = trace.normal_component(np.einsum("nij,nj->ni", layer, moved))
         self._layer_pressure = problem.response.layer_pressure(nodal) + shift + pressed
-        return ""
 
-    def _condensed_step(self, tangent: bool, reached: float) -> str | None:
+    def _condensed_step(self, tangent: bool, reached: float) -> tuple[str, int] | None:
         """Linearise the material alone, and solve the contact problem that is left.
 
-        Returns what is to be said of it, or None if it could not be solved.
+        Returns the slower methods that this took, in words, and the number of dense solves, or
+        None if it could not be solved.
         """
         problem, body, inner = self.problem, self._body, self._at_contact
         assert body is not None
@@ -368,13 +373,15 @@ class Newton:
         inner.take(self)
         inner.history.records.clear()
         outcome = inner.resume()
-        steps = sum(record.inner for record in inner.history.records)
-        self.counters.contact_solves += steps
+        records = inner.history.records
+        solves = sum(record.inner for record in records)
+        self.counters.contact_solves += solves
         if outcome.kkt.largest > max(enough, NEAR * reached):
             return None
         self.take(inner)
         problem.add(body.expand())
-        return f"{steps} contact steps"
+        slower = [word for word in SLOWER if any(word in record.note for record in records)]
+        return ", ".join(slower), solves
 
     def take(self, other: Newton) -> None:
         """Go on from where another Newton method on the same contact nodes is."""
@@ -403,7 +410,7 @@ class Newton:
         back = trace.normal_component(np.einsum("nij,nj->ni", block, nodal - about))
         return block, response.layer_pressure(about) + back - layer
 
-    def _record(self, residuals: KKT, note: str, solves: int = 1) -> None:
+    def _record(self, residuals: KKT, note: str, solves: int = 1, contact: int = 0) -> None:
         seconds = time.perf_counter() - self._begin
         number = len(self.history.records) + 1
-        self.history.add(Record(number, solves, residuals, np.nan, seconds, note))
+        self.history.add(Record(number, solves, residuals, np.nan, seconds, note, contact))

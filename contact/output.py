@@ -27,7 +27,17 @@ from contact.fields import DerivedFields, linear, unknowns
 from contact.solution import Solution
 from contact.table import Table, contact_table, csv_columns
 
-HISTORY = ("iteration", "inner", "equilibrium", "contact", "friction", "change", "seconds", "note")
+HISTORY = (
+    "iteration",
+    "inner",
+    "equilibrium",
+    "contact",
+    "friction",
+    "change",
+    "seconds",
+    "note",
+    "contact_solves",
+)
 
 
 def write_outputs(solution: Solution, folder: str | Path) -> None:
@@ -158,6 +168,7 @@ def _history(solution: Solution) -> Iterable[tuple[Any, ...]]:
             r.change,
             r.seconds,
             r.note,
+            r.contact,
         )
 
 

@@ -30,6 +30,8 @@ class Record:
         Since the start of the solve.
     note
         What was special about it, for instance "tangent".
+    contact
+        Dense solves at the contact nodes that it took, with the body condensed onto these.
     """
 
     iteration: int
@@ -38,6 +40,7 @@ class Record:
     change: float
     seconds: float
     note: str = ""
+    contact: int = 0
 
 
 class Monitor(Protocol):

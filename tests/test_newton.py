@@ -151,7 +151,9 @@ def test_nested_levels_halve_the_cells():
 
 
 def test_a_linear_material_is_assembled_once_and_solved_exactly():
-    problem = helpers.bar(SELF, 8, law=Linear(1.0, 0.3), friction=Friction(ConstantCoefficient(0.5)))
+    problem = helpers.bar(
+        SELF, 8, law=Linear(1.0, 0.3), friction=Friction(ConstantCoefficient(0.5))
+    )
     method = newton(problem)
     assert method.counters.factorizations == 1
     assert method.counters.linear_solves <= 2
