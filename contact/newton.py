@@ -35,7 +35,7 @@ from contact.fixed_point import FixedPoint, FixedPointOptions
 from contact.following import Following
 from contact.kkt import KKT, evaluate, interface_residuals, residual_forces
 from contact.linear import Counters, LinearOperator
-from contact.newton_laws import Moduli, linearise, node_status
+from contact.newton_laws import Moduli, linearise, node_status, touching
 from contact.problem import ContactProblem
 from contact.projections import Array
 from contact.report import History, Monitor, Outcome, Quiet, Record
@@ -162,9 +162,12 @@ class Newton:
     def solve_from(self, forces: Multipliers) -> Outcome:
         """Iterate from the problem's present iterate and given contact forces. Collective."""
         problem, nodal = self.problem, nodal_iterate(self.problem)
-        bound = bound_of(problem, nodal, forces)
-        self.forces = forces
-        self._status = node_status(problem, nodal, forces, bound, self.moduli.status)
+        # What is left of a pressure where a node is open would give it a friction bound: one of
+        # the size of rounding, with friction of any direction, on which the node would stick.
+        closed = touching(problem, nodal, forces.pressure, self.moduli.status)
+        self.forces = Multipliers(np.where(closed, forces.pressure, 0.0), forces.friction)
+        bound = bound_of(problem, nodal, self.forces)
+        self._status = node_status(problem, nodal, self.forces, bound, self.moduli.status)
         self._layer_pressure = None
         return self.resume()
 

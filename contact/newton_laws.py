@@ -68,13 +68,21 @@ class LinearisedContact:
     settled: bool
 
 
+def touching(
+    problem: ContactProblem, nodal: Array, pressure: Array, c: float
+) -> NDArray[np.bool_]:
+    """Tell which nodes the rigid part presses, p + c (u_nu - rho) > 0, shape (n,)."""
+    trace = problem.trace
+    return np.asarray(pressure + c * (trace.normal_component(nodal) - trace.gap) > 0)
+
+
 def node_status(
     problem: ContactProblem, nodal: Array, forces: Multipliers, bound: Array, c: float
 ) -> NDArray[np.int8]:
     """Return the states of the nodes at nodal unknowns, contact forces and bounds."""
-    trace = problem.trace
-    closed = forces.pressure + c * (trace.normal_component(nodal) - trace.gap) > 0
-    size = np.linalg.norm(forces.friction + c * trace.tangential_component(nodal), axis=1)
+    closed = touching(problem, nodal, forces.pressure, c)
+    tangential = problem.trace.tangential_component(nodal)
+    size = np.linalg.norm(forces.friction + c * tangential, axis=1)
     state = np.where(size <= bound, STICKS, SLIDES)
     state[(bound <= 0) & ~closed] = FREE
     return (state * problem.frictional + CLOSED * closed).astype(np.int8)

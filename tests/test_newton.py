@@ -15,7 +15,7 @@ from contact.problem import ContactProblem, Friction
 from contact.solving import solve
 from contact.state import Multipliers, nodal_iterate
 from forms.hencky import Linear, Log
-from forms.laws import ConstantCoefficient
+from forms.laws import ConstantCoefficient, SlipCoefficient
 from tests import helpers
 
 SELF = MPI.COMM_SELF
@@ -64,6 +64,27 @@ def test_they_agree_with_tresca_friction():
     friction = Friction(tresca=helpers.constant(0.002, 2))
     pair = [helpers.bar(SELF, 8, friction=friction) for _ in range(2)]
     compare(*pair, 1e-7)
+
+
+@pytest.mark.parametrize("rho", [0.0, 1e5])
+@pytest.mark.parametrize("radius", [0.0, 0.1])
+def test_newton_stays_at_a_solution_that_rounding_has_touched(rho, radius):
+    """Block relaxation leaves small pressures on open nodes, and friction of any direction."""
+    friction = Friction(SlipCoefficient(0.5, 0.2, rho), radius=radius)
+    problem = helpers.bar(SELF, 16, -0.05, friction=friction)
+    slow = FixedPoint(problem, FixedPointOptions(tolerance=1e-10))
+    assert slow.solve().converged
+    x, forces = problem.x.x.array.copy(), slow.forces
+    slip = problem.trace.tangential_component(nodal_iterate(problem))
+    rounding = 1e-11 * forces.pressure.max()
+    is_open = forces.pressure < 1e3 * rounding
+    assert is_open.any()
+    pressure = np.where(is_open, rounding, forces.pressure)
+    against = np.where(is_open[:, None], -rounding * np.sign(slip), 0.0)
+    fast = Newton(problem, NewtonOptions(tolerance=1e-9))
+    assert fast.solve_from(Multipliers(pressure, forces.friction + against)).converged
+    assert len(fast.history.records) == 1
+    assert np.allclose(problem.x.x.array, x, rtol=0, atol=1e-8 * np.abs(x).max())
 
 
 def test_the_last_steps_square_the_residual():
