@@ -38,6 +38,7 @@ from contact.uzawa import (
     augmentation,
     automatic_r,
     block_relaxation,
+    split,
 )
 
 #: Outer iterations without progress after which the loop is given up, and how many where the
@@ -131,19 +132,34 @@ class FixedPoint:
         self._norm = domain_norm(self.problem) if thesis else None
 
     def solve(self) -> Outcome:
-        """Iterate from zero displacement until convergence, stagnation or the limit."""
-        begin, problem, options = time.perf_counter(), self.problem, self.options
+        """Iterate from zero displacement until convergence, stagnation or the limit. Collective."""
+        problem = self.problem
         problem.reset()
-        z: Array = np.zeros((problem.trace.nodes.size, 1 + problem.dim))
-        bound: Array = np.zeros(problem.trace.nodes.size)
-        tangent = options.material_step == "tangent"
-        best, since = np.inf, 0
+        n = problem.trace.nodes.size
         # Iteration 0 is the pure contact problem that the thesis starts from. A bound that is
         # updated in the block relaxation needs none.
-        first = 0 if problem.frictional and not options.single_loop else 1
+        first = 0 if problem.frictional and not self.options.single_loop else 1
+        return self._solve(np.zeros((n, 1 + problem.dim)), np.zeros(n), first)
+
+    def solve_from(self, forces: Multipliers) -> Outcome:
+        """Iterate from the problem's present iterate and given contact forces. Collective."""
+        problem, nodal = self.problem, nodal_iterate(self.problem)
+        self.forces = forces
+        pressure = forces.pressure
+        if problem.response.normal_law(nodal) is not None:
+            pressure = total_pressure(problem, nodal, forces)
+        z = np.column_stack([pressure, forces.friction])
+        z = z + self.r * split(problem, nodal, problem.frictional)
+        return self._solve(z, bound_of(problem, nodal, forces), 1)
+
+    def _solve(self, z: Array, bound: Array, first: int) -> Outcome:
+        """Iterate from the iterate, a state of the relaxation and a friction bound."""
+        begin, problem, options = time.perf_counter(), self.problem, self.options
+        tangent = options.material_step == "tangent"
+        best, since = np.inf, 0
         for iteration in range(first, options.max_outer + 1):
             friction = problem.frictional and iteration > 0
-            if friction and iteration == 1:
+            if friction and first == 0 and iteration == 1:
                 # The slip without friction is a bad guess, and so is the contact that goes with it.
                 z = np.zeros_like(z)
             previous = problem.unknowns[: problem.owned].copy()

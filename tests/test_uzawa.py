@@ -6,6 +6,7 @@ from helpers import Affine, attempt, bar, contact_data, flat, pressed_block, sol
 from mpi4py import MPI
 
 from contact.acceleration import ResidualMinimiser
+from contact.fixed_point import FixedPoint, FixedPointOptions
 from contact.problem import Body, Contact, ContactProblem, Friction
 from contact.projections import disc_derivative, project_disc, project_half_line
 from contact.uzawa import automatic_r
@@ -175,6 +176,19 @@ def test_starting_again_gives_the_same_iterations():
     first, second = solve(problem), solve(problem)
     assert [r.inner for r in first.history.records] == [r.inner for r in second.history.records]
     assert np.array_equal(first.forces.pressure, second.forces.pressure)
+
+
+def test_a_start_from_the_solution_takes_one_step():
+    """And few from a disturbed one."""
+    problem = bar(MPI.COMM_SELF, 8)
+    forces = solve(problem).forces
+    x = problem.x.x.array.copy()
+    for disturbance, most in ((0.0, 1), (1e-3, 15)):
+        problem.x.x.array[:] = (1 + disturbance) * x
+        loop = FixedPoint(problem, FixedPointOptions(tolerance=1e-9))
+        assert loop.solve_from(forces).converged
+        assert len(loop.history.records) <= most
+        assert np.allclose(problem.x.x.array, x, rtol=0, atol=1e-7 * np.abs(x).max())
 
 
 def test_nothing_to_do():
