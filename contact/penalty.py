@@ -113,21 +113,34 @@ class Penalty:
         self._norm = domain_norm(self.problem) if self.options.stopping == "thesis" else None
 
     def solve(self) -> Outcome:
-        """Iterate from zero displacement until convergence, stagnation or the limit."""
+        """Iterate from zero displacement until convergence, stagnation or the limit. Collective."""
+        self.problem.reset()
+        return self._solve(implicit=False)
+
+    def solve_from(self, forces: Multipliers) -> Outcome:
+        """Iterate from the problem's present iterate and given contact forces. Collective.
+
+        From the solution of a somewhat larger eps, small ones are reached that are too hard from
+        zero displacement.
+        """
+        self.forces = forces
+        return self._solve(implicit=self.options.material_step != "secant")
+
+    def _solve(self, implicit: bool) -> Outcome:
+        """Iterate from the problem's iterate; the first time with implicit laws or not."""
         begin, problem, options = time.perf_counter(), self.problem, self.options
-        problem.reset()
-        implicit, best, mark, since = False, np.inf, np.inf, 0
+        best, mark, since = np.inf, np.inf, 0
         # The residual below which material and friction become implicit.
         switch = {"secant": 0.0, "auto": 1e-2, "tangent": np.inf}[options.material_step]
         bound: Array = np.zeros(problem.trace.nodes.size)
         for iteration in range(1, options.max_outer + 1):
             previous = problem.x.x.array[: problem.owned].copy()
             inner, note = self._step(implicit)
-            if implicit and note:
+            failed = implicit and bool(note)
+            if failed:
                 # Newton's method failed: give its step up, and go on with Algorithm 3 for a while.
                 problem.x.x.array[: problem.owned] = previous
                 problem.x.x.scatter_forward()
-                switch = best / 10
             nodal = nodal_iterate(problem)
             self.forces = penalised_forces(problem, nodal, self._eps)
             residuals = evaluate(problem, self.forces)
@@ -150,6 +163,7 @@ class Penalty:
             elif residual <= options.tolerance:
                 return self._outcome(residuals, "")
             best = min(best, residual)
+            switch = best / 10 if failed else switch
             # The lagged friction modulus can creep: what counts is the last hundred iterations.
             since, mark = (0, residual) if residual < 0.99 * mark else (since + 1, mark)
             if since >= 100 and options.stopping == "residual":
@@ -228,12 +242,13 @@ class _Inner:
         # Full steps: the active set of the pressure settles in a few of them, while a line
         # search on the residual, which has kinks of the size 1/eps, takes tiny ones. A layer that
         # saturates needs the search: full steps cycle between its open and its saturated state.
+        # So do implicit friction and material: full steps jump between sticking and sliding.
         given = PETSc.Options()
         name = "penalty_snes_linesearch_type"
         default = not given.hasName(name)
         if default:
             layer = problem.contact.layer
-            given[name] = "basic" if layer is None or layer.lagged else "bt"
+            given[name] = "basic" if symmetric and (layer is None or layer.lagged) else "bt"
         try:
             with petsc_options("penalty_"):
                 self.snes.setFromOptions()

@@ -92,6 +92,32 @@ def test_all_ways_lead_to_the_same_solution(material_step):
     assert relative(problem, solutions[1], solutions[0]) < 1e-8
 
 
+def test_implicit_steps_take_over_early():
+    """Full steps jumped between sticking and sliding nodes there, and were given up."""
+    penalty = Penalty(
+        bar(coefficient=SlipCoefficient(0.5, 0.2, 1e3)), PenaltyOptions(eps_contact=1e-7)
+    )
+    assert penalty.solve().converged
+    assert len(penalty.history.records) <= 25
+
+
+def test_small_eps_are_reached_from_larger_ones():
+    """From zero, Algorithm 3 creeps and stalls there."""
+    problem = bar(coefficient=SlipCoefficient(0.5, 0.2, 1e5))
+    larger = Penalty(problem, PenaltyOptions(eps_contact=1e-8))
+    assert larger.solve().converged
+    iterates = [problem.x.x.array.copy()]
+    penalty = Penalty(problem, PenaltyOptions(eps_contact=1e-9))
+    outcome = penalty.solve_from(larger.forces)
+    assert outcome.converged, outcome.reason
+    assert len(penalty.history.records) <= 5
+    iterates.append(problem.x.x.array.copy())
+    limit = FixedPoint(problem, FixedPointOptions(tolerance=1e-11))
+    assert limit.solve_from(penalty.forces).converged
+    errors = [relative(problem, x, problem.x.x.array) for x in iterates]
+    assert errors[1] < 0.2 * errors[0]
+
+
 def test_the_two_parameters_are_separate():
     problem = bar(coefficient=ConstantCoefficient(0.5))
     solutions = {}
