@@ -10,7 +10,7 @@ from contact.problem import ContactProblem
 from contact.rigid import rigid_motions
 
 #: Unknowns from which an iterative solver pays, by dimension (seen in `make bench`).
-LARGE = {2: 1_500_000, 3: 60_000}
+LARGE = {2: 2_500_000, 3: 60_000}
 
 #: Options of GAMG where the user gives none.
 DEFAULTS = {
