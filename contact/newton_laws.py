@@ -68,9 +68,7 @@ class LinearisedContact:
     settled: bool
 
 
-def touching(
-    problem: ContactProblem, nodal: Array, pressure: Array, c: float
-) -> NDArray[np.bool_]:
+def touching(problem: ContactProblem, nodal: Array, pressure: Array, c: float) -> NDArray[np.bool_]:
     """Tell which nodes the rigid part presses, p + c (u_nu - rho) > 0, shape (n,)."""
     trace = problem.trace
     return np.asarray(pressure + c * (trace.normal_component(nodal) - trace.gap) > 0)

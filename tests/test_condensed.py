@@ -1,0 +1,96 @@
+"""The body condensed onto the contact nodes: against the whole one, on any number of ranks."""
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+from petsc4py import PETSc
+
+from contact import condensed
+from contact.kkt import evaluate
+from contact.linear import Counters, LinearOperator
+from contact.newton import Newton, NewtonOptions
+from contact.problem import ContactProblem, Friction
+from contact.schur import SchurComplement
+from forms.hencky import Linear
+from forms.laws import ConstantCoefficient
+from tests import helpers
+
+WORLD, SELF = MPI.COMM_WORLD, MPI.COMM_SELF
+
+
+def bar(comm: MPI.Intracomm, **options) -> ContactProblem:
+    return helpers.bar(comm, 8, friction=Friction(ConstantCoefficient(0.5)), **options)
+
+
+@pytest.mark.parallel
+def test_condensing_and_expanding_solves_the_whole_system():
+    problem = bar(WORLD, law=Linear(1.0, 0.3))
+    problem.reset()
+    operator = LinearOperator(problem)
+    size = problem.block_size
+    operator.update(problem.secant, np.zeros((problem.trace.nodes.size, size, size)))
+    whole = operator.solve(problem.external)
+
+    kept = (problem.trace.nodes[:, None] * size + np.arange(size, dtype=np.int32)).ravel()
+    schur = SchurComplement(operator.matrix, kept, "contact_")
+    stiffness = schur.factorise(operator.matrix)
+    assert stiffness.shape == (problem.trace.size * size,) * 2
+    assert np.allclose(stiffness, stiffness.T, rtol=0, atol=1e-13)
+    forces = schur.condense(np.where(problem.free.ravel(), problem.external, 0.0))
+    found = schur.expand(np.linalg.solve(stiffness, forces))
+    largest = WORLD.allreduce(np.abs(whole).max(initial=0.0), op=MPI.MAX)
+    assert np.allclose(found, whole, rtol=0, atol=1e-9 * largest)
+
+
+@pytest.mark.parallel
+def test_what_is_left_of_a_problem_has_the_same_residuals():
+    """The trace of a state of equilibrium is one of the condensed problem, and no other."""
+    problem = bar(WORLD, law=Linear(1.0, 0.3))
+    method = Newton(problem, NewtonOptions(tolerance=1e-10))
+    assert method.solve().converged
+    body = condensed.Condensation(problem, Counters())
+    evaluate(problem, method.forces)
+    assert body.linearise(problem.secant)
+    assert evaluate(body.problem, method.forces).largest < 1e-10
+    body.problem.add(1e-3 * np.where(body.problem.free.ravel(), body.problem.unknowns, 0.0))
+    moved = evaluate(body.problem, method.forces)
+    problem.add(body.expand())
+    assert np.isclose(moved.equilibrium, evaluate(problem, method.forces).equilibrium, rtol=1e-3)
+    assert moved.equilibrium > 1e-6
+
+
+def test_slower_methods_work_at_the_contact_nodes_too():
+    problem = bar(SELF, law=Linear(1.0, 0.3))
+    reference = Newton(problem, NewtonOptions(tolerance=1e-10))
+    assert reference.solve().converged
+    method = Newton(problem, NewtonOptions(tolerance=1e-10, max_iterations=2))
+    assert method.solve().converged
+    assert method.counters.factorizations == 1
+    assert "frozen friction" in method.history.records[0].note
+    assert np.allclose(method.forces.friction, reference.forces.friction, rtol=0, atol=1e-9)
+
+
+def condenses(problem: ContactProblem, kind: str = "auto") -> bool:
+    return condensed.condensation(problem, Counters(), kind) is not None
+
+
+def test_where_the_body_is_condensed(monkeypatch):
+    problem = bar(SELF)
+    assert condenses(problem)
+    assert condenses(problem, "lu")
+    assert not condenses(problem, "iterative")
+    options = PETSc.Options()
+    options["contact_ksp_type"] = "gmres"
+    try:
+        assert not condenses(problem)
+    finally:
+        options.delValue("contact_ksp_type")
+    monkeypatch.setattr(condensed, "LARGEST", 10)
+    assert not condenses(problem)
+
+
+def test_a_body_that_cannot_be_condensed_is_solved_whole(monkeypatch):
+    monkeypatch.setattr(condensed.Condensation, "linearise", lambda self, form: False)
+    method = Newton(bar(SELF), NewtonOptions(tolerance=1e-10))
+    assert method.solve().converged
+    assert method.counters.contact_solves == 0
