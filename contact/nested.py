@@ -10,6 +10,7 @@ from scipy.spatial import cKDTree
 
 from contact.build import build_problem
 from contact.case import Case
+from contact.case_mesh import Mesh
 from contact.errors import InputError
 from contact.interpolate import carry
 from contact.newton import Newton, NewtonOptions
@@ -20,8 +21,11 @@ from contact.state import Multipliers
 #: Tolerance on the coarser levels: their discretisation error is larger by far.
 COARSE_TOLERANCE = 1e-5
 
-#: Levels below this number of cells along the shortest edge do not pay.
+#: Meshes with fewer cells along the shortest edge do not tell much of the solution.
 COARSEST = 4
+
+#: Meshes with fewer nodes than this take longer to be set up than they save.
+SMALL = 1000
 
 
 def coarser_cases(case: Case, levels: int | None = None) -> list[Case]:
@@ -35,7 +39,7 @@ def coarser_cases(case: Case, levels: int | None = None) -> list[Case]:
     case
         The case on the finest mesh.
     levels
-        Number of meshes, with the finest; None for as many as there can be.
+        Number of meshes, with the finest; None for all that pay.
 
     Raises
     ------
@@ -53,6 +57,8 @@ def coarser_cases(case: Case, levels: int | None = None) -> list[Case]:
         else:
             break
         mesh = mesh.model_copy(update=update)
+        if levels is None and found and _nodes(mesh) < SMALL:
+            break
         found.insert(0, case.model_copy(update={"mesh": mesh}))
     if not found or (levels is not None and len(found) < levels - 1):
         raise InputError(
@@ -60,6 +66,11 @@ def coarser_cases(case: Case, levels: int | None = None) -> list[Case]:
             "accepted: numbers of cells that can be halved, or mesh.refine > 0"
         )
     return found
+
+
+def _nodes(mesh: Mesh) -> float:
+    """Return the number of vertices of a generated mesh; infinity if it is not known."""
+    return np.inf if mesh.cells is None else float(np.prod([n + 1 for n in mesh.cells]))
 
 
 def coarse_solution(

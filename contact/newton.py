@@ -49,6 +49,9 @@ NEAR = 0.05
 #: How much more accurately than the material is linearised the contact problem is solved.
 CONTACT_PART = 1e-3
 
+#: Equilibrium residual below which the tangent replaces the secant of a condensed body.
+CONDENSED_SECANT_UNTIL = 0.3
+
 #: What the history says of the slower methods.
 SLOWER = FROZEN_FRICTION, BLOCK_RELAXATION = "frozen friction", "block relaxation"
 
@@ -71,7 +74,8 @@ class NewtonOptions:
     gamma
         Stiffness of the condensed constraints over that of the body.
     secant_until
-        Equilibrium residual below which the material's tangent replaces its secant.
+        Equilibrium residual below which the material's tangent replaces its secant, where the
+        body is not condensed.
     patience
         Steps without progress after which the stage is given up.
     linear
@@ -228,6 +232,8 @@ class Newton:
         residuals = evaluate(problem, self.forces)
         best, since = np.inf, 0
         self._following, self._calm = Following(), 0
+        # Where contact is solved exactly in each step, the tangent does not fear what it changes.
+        until = options.secant_until if step is None else CONDENSED_SECANT_UNTIL
         # A start from elsewhere is near the solution; zero displacement has no better tangent.
         tangent = self._status is not None and not problem.linear_material
         steps = min(options.max_iterations, self._left)
@@ -257,7 +263,7 @@ class Newton:
                 return Outcome(False, "Newton's method diverged", residuals)
             if not problem.linear_material:
                 falls = residuals.equilibrium < max(before.equilibrium, options.tolerance)
-                tangent = residuals.equilibrium < options.secant_until and (falls or not tangent)
+                tangent = residuals.equilibrium < until and (falls or not tangent)
             since = 0 if measured < 0.9 * best else since + 1
             best = min(best, measured)
             # A node that opens along the ramp of psi, frozen from step to step, takes its time.
