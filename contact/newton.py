@@ -35,7 +35,14 @@ from contact.fixed_point import FixedPoint, FixedPointOptions
 from contact.following import Following
 from contact.kkt import KKT, evaluate, interface_residuals, residual_forces
 from contact.linear import Counters, LinearOperator
-from contact.newton_laws import Moduli, linearise, node_status, touching
+from contact.newton_laws import (
+    MORE_SOFTENING,
+    SOFTENING,
+    Moduli,
+    linearise,
+    node_status,
+    touching,
+)
 from contact.problem import ContactProblem
 from contact.projections import Array
 from contact.report import History, Monitor, Outcome, Quiet, Record
@@ -78,6 +85,10 @@ class NewtonOptions:
         body is not condensed.
     patience
         Steps without progress after which the stage is given up.
+    softening
+        Part of a node's own stiffness that a falling friction coefficient may take away in the
+        first step. Infinity for the exact derivative: from nearby, it also leads to solutions
+        on the falling part of the law, which are unstable.
     linear
         Kind of linear solver, see `linear.LinearOperator`.
     condense
@@ -91,6 +102,7 @@ class NewtonOptions:
     gamma: float = 1e4
     secant_until: float = 1e-2
     patience: int = 12
+    softening: float = SOFTENING
     linear: str = "auto"
     condense: bool = True
 
@@ -328,8 +340,9 @@ class Newton:
         """Take one Newton step: one assembly, one factorisation, one solve."""
         problem, trace = self.problem, self.problem.trace
         nodal = nodal_iterate(problem)
+        softening = self.options.softening + MORE_SOFTENING * self._calm
         contact = linearise(
-            problem, nodal, self.forces, self.moduli, self._status, frozen, self._calm
+            problem, nodal, self.forces, self.moduli, self._status, frozen, softening
         )
         self._calm = self._calm + 1 if contact.settled else 0
         blocks = contact.blocks

@@ -93,7 +93,7 @@ def linearise(
     moduli: Moduli,
     before: NDArray[np.int8] | None,
     frozen_bound: Array | None = None,
-    calm: int = 0,
+    softening: float = SOFTENING,
 ) -> LinearisedContact:
     """Linearise the contact laws at an iterate. Collective.
 
@@ -107,8 +107,8 @@ def linearise(
         Status in the step before; None in the first one, where closed nodes stick.
     frozen_bound
         A given friction bound: Tresca's law instead of Coulomb's.
-    calm
-        Number of steps up to now in which no node has changed its status.
+    softening
+        Part of a node's own stiffness that a falling friction coefficient may take away.
     """
     trace, d, c = problem.trace, problem.dim, moduli.status
     p, lam, n = forces.pressure, forces.friction, trace.normal
@@ -152,7 +152,7 @@ def linearise(
         sliding = turning[:, None, None] * across
         friction[slides] = (bound[:, None] * along + np.einsum("nij,nj->ni", sliding, slip))[slides]
         if frozen_bound is None:
-            limit = (SOFTENING + MORE_SOFTENING * calm) * moduli.nodal if settled else None
+            limit = softening * moduli.nodal if settled else None
             rate = _bound_gradient(problem, total, slip, length, limit)
             ahead, follows = _follow_pressure(
                 problem, nodal, length, slope, opening, moduli, closed

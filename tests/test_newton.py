@@ -140,6 +140,27 @@ def test_blocks_are_the_derivative_of_the_contact_forces(dimension):
     assert np.allclose(normal, trace.normal_component(predicted), rtol=1e-6, atol=1e-12)
 
 
+@pytest.mark.parametrize("softening", [0.25, np.inf])
+def test_falling_friction_is_followed_as_far_as_allowed(softening):
+    """With no limit, the block is the derivative of mu(|u_tau|) p along the slip."""
+    problem = helpers.bar(SELF, 4, friction=Friction(SlipCoefficient(0.5, 0.2, 1e3)))
+    trace = problem.trace
+    nodal = np.zeros((trace.nodes.size, 2))
+    nodal[:, 0] = 1e-3
+    pressure = np.full(trace.nodes.size, 0.5)
+    forces = Multipliers(pressure, 0.3 * pressure[:, None] * [1.0, 0.0])
+    moduli = Moduli(200.0, 20.0, 1e6)
+    before = np.full(trace.nodes.size, CLOSED + SLIDES, dtype=np.int8)
+    base = linearise(problem, nodal, forces, moduli, before, softening=softening)
+    assert base.settled
+    step = np.array([1e-8, 0.0])
+    moved = linearise(problem, nodal + step, forces, moduli, before, softening=softening)
+    change = (moved.forces.friction - base.forces.friction)[:, 0] / step[0]
+    assert np.all(change < -0.25 * 20.0)
+    expected = np.maximum(change, -softening * moduli.nodal)
+    assert np.allclose(base.blocks[:, 0, 0], expected, rtol=1e-4)
+
+
 def bar_case(cells: list[int], **solver) -> dict:
     return {
         "mesh": {
