@@ -37,7 +37,10 @@ class Method(Protocol):
     counters: Counters
 
     def solve(self) -> Outcome:
-        """Iterate until convergence or a limit. Collective."""
+        """Iterate from zero displacement until convergence or a limit. Collective."""
+
+    def solve_from(self, forces: Multipliers) -> Outcome:
+        """Iterate from the problem's present iterate and given contact forces. Collective."""
 
 
 def fixed_point(problem: ContactProblem, settings: Solver, monitor: Monitor | None) -> FixedPoint:

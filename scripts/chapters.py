@@ -44,6 +44,7 @@ PARTS = (
     Part("tables_compliance", "Examples 8.3 and 8.4: Table 8.4", figures=False),
     Part("figures_compliance", "Examples 8.3 and 8.4: figures", tables=False),
     Part("limit_theorem", "Theorems 6.3 to 6.5: limits of the compliant foundation"),
+    Part("agreement", "Do the methods agree? All examples", figures=False),
 )
 
 
