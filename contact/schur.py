@@ -50,6 +50,12 @@ def _complement(factor: PETSc.Mat, size: int) -> Array:
     return matrix
 
 
+def _dense(matrix: PETSc.Mat) -> Array:
+    """Return a small local matrix as an array."""
+    dense = matrix.convert("dense", out=PETSc.Mat())
+    return np.array(dense.getDenseArray(), order="C")
+
+
 class SchurComplement:
     """A symmetric matrix reduced to kept unknowns.
 
@@ -102,17 +108,16 @@ class SchurComplement:
         return self.size + self._between
 
     def factorise(self, matrix: PETSc.Mat) -> Array:
-        """Eliminate; return the Schur complement on all ranks, (size, size). Collective."""
-        if self._part is None or self._factor is None:
+        """Eliminate; return the Schur complement on all ranks, (size, size). Collective.
+
+        It is not a number where what is to be eliminated is singular.
+        """
+        if self._part is None:
             (self._part,) = matrix.createSubMatrices([self._local], [self._local])
-            self._factor = self._analysed(self._part)
+            self._part.setOption(PETSc.Mat.Option.SYMMETRIC, True)
         else:
             matrix.createSubMatrices([self._local], [self._local], submats=[self._part])
-            self._factor.setOperators(self._part)
-        self._factor.setUp()
-        factor, n = self._factor.getFactorMatrix(), self.dense_size
-        factor.setMumpsIcntl(*INTERIOR_SOLVE)
-        total = _complement(factor, n)
+        total = self._eliminate(self._part)
         if self.comm.size > 1:
             total = self._assembled(matrix, total)
         k = self.size
@@ -122,9 +127,21 @@ class SchurComplement:
         self._lu = lu_factor(total[k:, k:], check_finite=False)
         return total[:k, :k] - self._coupling @ lu_solve(self._lu, total[k:, :k])
 
+    def _eliminate(self, part: PETSc.Mat) -> Array:
+        """Eliminate the first unknowns of the local matrix; return what is left."""
+        if self._eliminated == 0:
+            return _dense(part)
+        if self._factor is None:
+            self._factor = self._analysed(part)
+        self._factor.setOperators(part)
+        self._factor.setUp()
+        factor = self._factor.getFactorMatrix()
+        factor.setMumpsIcntl(*INTERIOR_SOLVE)
+        left = _complement(factor, self.dense_size)
+        return left if factor.getMumpsInfog(1) >= 0 else np.full_like(left, np.nan)
+
     def _analysed(self, part: PETSc.Mat) -> PETSc.PC:
         """Return a factorisation that keeps the last unknowns of a local matrix."""
-        part.setOption(PETSc.Mat.Option.SYMMETRIC, True)
         pc = PETSc.PC().create(PETSc.COMM_SELF)
         pc.setOptionsPrefix(self._prefix)
         pc.setOperators(part)
@@ -140,12 +157,15 @@ class SchurComplement:
     def _assembled(self, matrix: PETSc.Mat, own: Array) -> Array:
         """Add up what the ranks have eliminated, and what they have left."""
         (left,) = matrix.createSubMatrices([self._left], [self._left])
-        own = own - left.convert("dense").getDenseArray()
+        remaining = _dense(left)
+        own = own - remaining
         self.comm.Allreduce(MPI.IN_PLACE, own, op=MPI.SUM)
-        return own + left.getDenseArray()
+        return own + remaining
 
     def _solve_inside(self, values: Array) -> Array:
         """Solve with the eliminated unknowns alone, the others being 0."""
+        if self._eliminated == 0:
+            return values
         assert self._factor is not None and self._part is not None
         solution, rhs = self._part.createVecs()
         rhs.array[: self._eliminated] = values

@@ -76,6 +76,7 @@ def described(solution: Solution) -> dict[str, Any]:
         "solves": solution.counters.linear_solves,
         "factorizations": solution.counters.factorizations,
         "linear_iterations": solution.counters.linear_iterations,
+        "contact_solves": solution.counters.contact_solves,
         "solve": solution.seconds["solve"],
         "max_displacement": COMM.allreduce(largest, op=MPI.MAX),
     }
@@ -136,6 +137,7 @@ def ratio(dimension: str, n: str, start: str) -> dict[str, Any]:
         "dofs": result["dofs"],
         "converged": result["converged"],
         "solves": result["solves"],
+        "contact_solves": result["contact_solves"],
         "linear_iterations": result["linear_iterations"] / result["solves"],
         "one_iterations": iterations,
         "solve": total,

@@ -23,8 +23,9 @@ def bar(comm: MPI.Intracomm, **options) -> ContactProblem:
 
 
 @pytest.mark.parallel
-def test_condensing_and_expanding_solves_the_whole_system():
-    problem = bar(WORLD, law=Linear(1.0, 0.3))
+@pytest.mark.parametrize("cells", [8, 1])  # with 1 some ranks have nothing to eliminate
+def test_condensing_and_expanding_solves_the_whole_system(cells):
+    problem = helpers.bar(WORLD, cells, law=Linear(1.0, 0.3))
     problem.reset()
     operator = LinearOperator(problem)
     size = problem.block_size
@@ -33,6 +34,8 @@ def test_condensing_and_expanding_solves_the_whole_system():
 
     kept = (problem.trace.nodes[:, None] * size + np.arange(size, dtype=np.int32)).ravel()
     schur = SchurComplement(operator.matrix, kept, "contact_")
+    # The second time the analysis and the local matrices are used again.
+    assert np.array_equal(schur.factorise(operator.matrix), schur.factorise(operator.matrix))
     stiffness = schur.factorise(operator.matrix)
     assert stiffness.shape == (problem.trace.size * size,) * 2
     assert np.allclose(stiffness, stiffness.T, rtol=0, atol=1e-13)
@@ -40,6 +43,19 @@ def test_condensing_and_expanding_solves_the_whole_system():
     found = schur.expand(np.linalg.solve(stiffness, forces))
     largest = WORLD.allreduce(np.abs(whole).max(initial=0.0), op=MPI.MAX)
     assert np.allclose(found, whole, rtol=0, atol=1e-9 * largest)
+
+
+@pytest.mark.parallel
+def test_a_mesh_of_few_cells_is_solved_on_any_number_of_ranks():
+    found = []
+    for comm in (WORLD, SELF):
+        problem = helpers.bar(comm, 1, -0.05, friction=Friction(ConstantCoefficient(0.5)))
+        method = Newton(problem, NewtonOptions(tolerance=1e-10))
+        assert method.solve().converged
+        counters = method.counters
+        found.append((problem.trace.norm(method.forces.pressure), counters.linear_solves))
+    assert np.isclose(found[0][0], found[1][0], rtol=1e-9)
+    assert found[0][1] == found[1][1]
 
 
 @pytest.mark.parallel
