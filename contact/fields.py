@@ -140,9 +140,10 @@ class DerivedFields:
         """Yield owned cells and the values there, shape (cells, points, components)."""
         mesh = self.problem.domain.mesh
         cells = np.arange(mesh.topology.index_map(mesh.topology.dim).size_local, dtype=np.int32)
+        components = sum(math.prod(shape) for shape in self.shapes.values())
         for chosen in np.array_split(cells, cells.size // CHUNK + 1):
             values = self.expression.eval(mesh, chosen)
-            yield chosen, values.reshape(chosen.size, len(self.points), -1)
+            yield chosen, values.reshape(chosen.size, len(self.points), components)
 
     def largest_strain(self) -> float:
         """Return the largest |dev eps| over the cells (their nodes, for degree 2)."""

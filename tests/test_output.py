@@ -18,6 +18,7 @@ from contact.fields import DerivedFields
 from contact.kkt import evaluate
 from contact.linear import LinearOperator
 from contact.output import write_outputs
+from contact.plots import write_figures
 from contact.report import Record
 from contact.solution import Solution
 from contact.solving import solve, solve_problem
@@ -407,3 +408,18 @@ def test_an_interrupted_load_step_is_judged_by_the_full_load() -> None:
     np.testing.assert_array_equal(problem.external, kept[0])
     np.testing.assert_array_equal(problem.x.x.array, kept[1])
     assert solution.outcome.kkt == evaluate(problem, solution.forces)
+
+
+@pytest.mark.parallel
+@pytest.mark.parametrize("method", ["newton", "uzawa"])
+def test_ranks_without_cells_write_and_draw_too(method: str, shared_tmp_path: Path) -> None:
+    """Two triangles: with three ranks one has none."""
+    case = block(2, mesh={"generator": "rectangle", "size": [1.0, 1.0], "cells": [1, 1]})
+    solution = solve(case, case.solver.model_copy(update={"method": method}))
+    assert solution.converged
+    summary, rows = written(solution, shared_tmp_path)
+    assert summary["cells"] == 2
+    assert summary["contact_nodes"] == len(rows)
+    write_figures(solution, shared_tmp_path)
+    if MPI.COMM_WORLD.rank == 0:
+        assert len(list(shared_tmp_path.glob("figure-*.png"))) == 2
