@@ -1,8 +1,9 @@
-"""Differences between dolfinx 0.9, 0.10 and 0.11."""
+"""Differences between dolfinx 0.9, 0.10 and 0.11, and between their PETSc."""
 
 import numpy as np
 import numpy.typing as npt
 from dolfinx.mesh import Mesh
+from petsc4py import PETSc
 
 
 def geometry_degree(mesh: Mesh) -> int:
@@ -24,3 +25,12 @@ def original_cells(mesh: Mesh) -> npt.NDArray[np.int64]:
     original = mesh.topology.original_cell_index
     # One array a cell type since 0.10.
     return np.asarray(original[0] if isinstance(original, list) else original)
+
+
+def keeps_inverted_blocks() -> bool:
+    """Whether PETSc takes a matrix's inverted nodal blocks for valid when its values change.
+
+    Since 3.25 MatInvertBlockDiagonal, and with it the preconditioner pbjacobi, forgets to renew
+    them.
+    """
+    return bool(PETSc.Sys.getVersion() >= (3, 25))
