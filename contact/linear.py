@@ -19,6 +19,7 @@ from petsc4py import PETSc
 from contact import linear_amg
 from contact.errors import InputError
 from contact.linear_block import BlockPreconditioner
+from contact.linear_contact import TOUCH, StiffNodes
 from contact.problem import ContactProblem
 from contact.projections import Array
 
@@ -108,6 +109,7 @@ class LinearOperator:
         self.ksp.setOptionsPrefix(prefix)
         self.iterative = kind == "iterative" or (kind == "auto" and linear_amg.is_large(problem))
         self._split: BlockPreconditioner | None = None
+        self._stiff: StiffNodes | None = None
         self._prefix = prefix
         if self.iterative and problem.piezoelectric:
             self._split = BlockPreconditioner(self.ksp, problem, symmetric)
@@ -151,27 +153,51 @@ class LinearOperator:
             self.matrix.assemble()
             if constant:
                 self._bulk = self.matrix.copy()
-        self._add(nodes, blocks)
-        self.matrix.assemble()
-        self.matrix.setOption(PETSc.Mat.Option.SYMMETRIC, self.symmetric)
+        rest = self._masked(nodes, blocks)
+        if self._multigrid and self._stiff is None:
+            touch = TOUCH * rest
+            self._add(nodes, touch)
+            self._set_up(symmetric=True)
+            self._stiff = StiffNodes(self.ksp.getPC(), nodes)
+            rest = rest - touch
+        self._add(nodes, rest)
+        if self._stiff is not None:
+            self._stiff.follow(self.matrix, self._masked(nodes, blocks))
+        self._set_up(self.symmetric)
         self._form, self._blocks = form, blocks.copy()
-        split = self._split
-        self.ksp.setOperators(self.matrix, split.matrix(self.matrix) if split else self.matrix)
-        with petsc_options(self._prefix):
-            self.ksp.setUp()
         self.counters.factorizations += 1
+
+    @property
+    def _multigrid(self) -> bool:
+        """Whether the solver is algebraic multigrid for the displacement alone."""
+        return self._split is None and self.ksp.getPC().getType() == "gamg"
 
     def _all(self, flag: bool) -> bool:
         return bool(self.problem.comm.allreduce(int(flag)) == self.problem.comm.size)
 
-    def _add(self, at: NDArray[np.int32], blocks: Array) -> None:
+    def _set_up(self, symmetric: bool) -> None:
+        """Set up the solver for the matrix as it is."""
+        self.matrix.setOption(PETSc.Mat.Option.SYMMETRIC, symmetric)
+        split = self._split
+        self.ksp.setOperators(self.matrix, split.matrix(self.matrix) if split else self.matrix)
+        with petsc_options(self._prefix):
+            self.ksp.setUp()
+
+    def _masked(self, at: NDArray[np.int32], blocks: Array) -> Array:
+        """Return blocks at nodes, zero where an unknown is fixed."""
         free = self.problem.free[at].astype(float)
-        masked = blocks * free[:, :, None] * free[:, None, :]
+        return blocks * free[:, :, None] * free[:, None, :]
+
+    def _add(self, at: NDArray[np.int32], blocks: Array) -> None:
+        """Add blocks at nodes; none at all would be a reason to set the solver up again."""
+        if self._all(not blocks.any()):
+            return
         rows = np.arange(at.size + 1, dtype=PETSc.IntType)
         nodes = at.astype(PETSc.IntType)
         self.matrix.setValuesBlockedLocalIJV(
-            rows, nodes, masked, addv=PETSc.InsertMode.ADD_VALUES, rowmap=nodes
+            rows, nodes, blocks, addv=PETSc.InsertMode.ADD_VALUES, rowmap=nodes
         )
+        self.matrix.assemble()
 
     def solve(self, rhs: Array, rtol: float | None = None, guess: Array | None = None) -> Array:
         """Solve with the owned part of a right-hand side; fixed unknowns stay 0. Collective.
@@ -197,7 +223,13 @@ class LinearOperator:
             self.ksp.setInitialGuessNonzero(guess is not None)
             if guess is not None:
                 self._solution.array[:] = guess
+        jump = self._stiff.jump(self._rhs) if self._stiff else None
+        if jump is not None:
+            self._rhs.axpy(-1.0, self.matrix * jump)
+            self._solution.axpy(-1.0, jump)
         self.ksp.solve(self._rhs, self._solution)
+        if jump is not None:
+            self._solution.axpy(1.0, jump)
         self.counters.linear_solves += 1
         self.counters.linear_iterations += self.ksp.getIterationNumber()
         reason = self.ksp.getConvergedReason()
