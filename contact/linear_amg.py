@@ -10,8 +10,9 @@ from contact._compat import keeps_inverted_blocks
 from contact.problem import ContactProblem
 from contact.rigid import rigid_motions
 
-#: Unknowns from which an iterative solver pays, by dimension (seen in `make bench`).
-LARGE = {2: 2_500_000, 3: 60_000}
+#: Unknowns from which an iterative solver pays, by dimension and whether the body is piezoelectric
+#: (seen in `make bench`).
+LARGE = {(2, False): 2_500_000, (2, True): 2_500_000, (3, False): 10_000, (3, True): 60_000}
 
 #: A node in contact couples its components through the large gamma of the constraint: the smoother
 #: has to invert the nodal blocks. SOR does so too, but takes longer.
@@ -39,7 +40,7 @@ DEFAULTS = {
 def is_large(problem: ContactProblem) -> bool:
     """Tell whether an iterative solver pays for a problem of this size."""
     unknowns = problem.space.dofmap.index_map.size_global * problem.block_size
-    return unknowns >= LARGE[problem.dim]
+    return unknowns >= LARGE[problem.dim, problem.piezoelectric]
 
 
 def near_nullspace(problem: ContactProblem) -> PETSc.NullSpace:
