@@ -117,9 +117,7 @@ class Solver(Section):
     )
     nested_levels: Annotated[int, Field(ge=2, le=20), Accepted("a whole number from 2 to 20")] | (
         None
-    ) = Field(
-        default=None, description="Number of nested meshes. Default: all that save time."
-    )
+    ) = Field(default=None, description="Number of nested meshes. Default: all that save time.")
     linear: Literal["auto", "lu", "iterative"] = Field(
         default="auto", description="Linear solver: `auto` chooses by size."
     )

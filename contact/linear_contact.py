@@ -68,9 +68,7 @@ class StiffNodes:
         self._inverse /= root[:, :, None] * root[:, None, :]
         if self._interpolation is not None:
             values = self._mixed(yielding * root[:, None, :] / root[:, :, None])
-            self._interpolation.setValuesIJV(
-                self._starts, self._columns, values, rowmap=self._rows
-            )
+            self._interpolation.setValuesIJV(self._starts, self._columns, values, rowmap=self._rows)
             self._interpolation.assemble()
 
     def _mixed(self, factor: Array) -> Array:
