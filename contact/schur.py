@@ -20,6 +20,12 @@ from contact.projections import Array
 #: MUMPS's ICNTL(26): 0 solves with the eliminated unknowns, the kept ones being 0.
 INTERIOR_SOLVE = (26, 0)
 
+#: MUMPS's INFOG(1) where its workspace was too small: that of integers, and that of numbers.
+TOO_SMALL = (-8, -9)
+
+#: MUMPS's ICNTL(14): by how many percent its workspace exceeds the estimate, at most.
+MOST_WORKSPACE = 50_000
+
 # petsc4py has no Schur complements of factorisations.
 _petsc = ctypes.CDLL(PETSc.__file__)
 
@@ -125,20 +131,35 @@ class SchurComplement:
             return total
         self._coupling = total[:k, k:]
         self._lu = lu_factor(total[k:, k:], check_finite=False)
-        return total[:k, :k] - self._coupling @ lu_solve(self._lu, total[k:, :k])
+        return total[:k, :k] - self._coupling @ self._solve_between(total[k:, :k])
 
     def _eliminate(self, part: PETSc.Mat) -> Array:
         """Eliminate the first unknowns of the local matrix; return what is left."""
         if self._eliminated == 0:
             return _dense(part)
-        if self._factor is None:
-            self._factor = self._analysed(part)
-        self._factor.setOperators(part)
-        self._factor.setUp()
-        factor = self._factor.getFactorMatrix()
+        factor = self._factorised(part)
         factor.setMumpsIcntl(*INTERIOR_SOLVE)
         left = _complement(factor, self.dense_size)
         return left if factor.getMumpsInfog(1) >= 0 else np.full_like(left, np.nan)
+
+    def _factorised(self, part: PETSc.Mat) -> PETSc.Mat:
+        """Factorise the local matrix with as much workspace as it takes.
+
+        MUMPS's estimate is far too low where few unknowns are eliminated and many kept.
+        """
+        if self._factor is None:
+            self._factor = self._analysed(part)
+        workspace = 10
+        while True:
+            self._factor.setOperators(part)
+            self._factor.setUp()
+            factor = self._factor.getFactorMatrix()
+            workspace = 4 * max(workspace, factor.getMumpsIcntl(14))
+            if factor.getMumpsInfog(1) not in TOO_SMALL or workspace > MOST_WORKSPACE:
+                return factor
+            # PETSc does not factorise again with one that has failed for want of memory.
+            self._factor = self._analysed(part)
+            self._factor.getFactorMatrix().setMumpsIcntl(14, workspace)
 
     def _analysed(self, part: PETSc.Mat) -> PETSc.PC:
         """Return a factorisation that keeps the last unknowns of a local matrix."""
@@ -172,6 +193,10 @@ class SchurComplement:
         self._factor.getFactorMatrix().solve(rhs, solution)
         return solution.array[: self._eliminated].copy()
 
+    def _solve_between(self, values: Array) -> Array:
+        """Solve with the unknowns between the ranks; what is no number remains none."""
+        return np.asarray(lu_solve(self._lu, values, check_finite=False))
+
     def _times(self, inside: Array, left: Array) -> Array:
         """Return the local part of the matrix times values of all its unknowns."""
         assert self._part is not None
@@ -194,13 +219,13 @@ class SchurComplement:
         if self._between == 0:
             return total
         self._rhs_between = total[self.size :]
-        return total[: self.size] - self._coupling @ lu_solve(self._lu, self._rhs_between)
+        return total[: self.size] - self._coupling @ self._solve_between(self._rhs_between)
 
     def expand(self, kept: Array) -> Array:
         """Return the owned solution that goes with values of the kept unknowns on all ranks."""
         left = kept
         if self._between > 0:
-            between = lu_solve(self._lu, self._rhs_between - self._coupling.T @ kept)
+            between = self._solve_between(self._rhs_between - self._coupling.T @ kept)
             left = np.concatenate([kept, between])
         coupled = self._times(np.zeros(self._eliminated), left)[: self._eliminated]
         solution = np.zeros(self._inside.size)

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from dolfinx.fem.petsc import assemble_matrix, create_matrix
 from mpi4py import MPI
 from petsc4py import PETSc
 
@@ -43,6 +44,37 @@ def test_condensing_and_expanding_solves_the_whole_system(cells):
     found = schur.expand(np.linalg.solve(stiffness, forces))
     largest = WORLD.allreduce(np.abs(whole).max(initial=0.0), op=MPI.MAX)
     assert np.allclose(found, whole, rtol=0, atol=1e-9 * largest)
+
+
+@pytest.mark.parametrize("few", [1, 5, 10])
+def test_few_unknowns_are_eliminated_beside_many_that_are_kept(few):
+    """MUMPS's own estimate of its workspace is too small there."""
+    problem = helpers.bar(SELF, 8, law=Linear(1.0, 0.3))
+    matrix = create_matrix(problem.secant)
+    assemble_matrix(matrix, problem.secant, bcs=problem.bcs)
+    matrix.assemble()
+    order = np.random.default_rng(1).permutation(problem.owned).astype(np.int32)
+    kept, eliminated = np.sort(order[few:]), np.sort(order[:few])
+    found = SchurComplement(matrix, kept, "contact_").factorise(matrix)
+    dense = matrix[:, :]
+    coupling = dense[np.ix_(eliminated, kept)]
+    inside = dense[np.ix_(eliminated, eliminated)]
+    expected = dense[np.ix_(kept, kept)] - coupling.T @ np.linalg.solve(inside, coupling)
+    assert np.allclose(found, expected, rtol=0, atol=1e-12)
+
+
+@pytest.mark.parallel
+def test_a_small_block_is_condensed_on_any_number_of_ranks():
+    """On three ranks one of them eliminates next to nothing."""
+    found = []
+    for comm in (WORLD, SELF):
+        problem = helpers.leaning_block(comm, 4)
+        method = Newton(problem, NewtonOptions(tolerance=1e-10))
+        assert method.solve().converged
+        counters = method.counters
+        found.append((problem.trace.norm(method.forces.pressure), counters.linear_solves))
+    assert np.isclose(found[0][0], found[1][0], rtol=1e-9)
+    assert found[0][1] == found[1][1] < 10
 
 
 @pytest.mark.parallel
