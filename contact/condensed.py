@@ -191,7 +191,8 @@ def condensation(problem: ContactProblem, counters: Counters, kind: str) -> Cond
     for a solver of the user's.
     """
     options = PETSc.Options(PREFIX)
-    chosen = any(options.hasName(name) for name in ("ksp_type", "pc_type"))
+    names = ("ksp_type", "pc_type", "pc_factor_mat_solver_type")
+    chosen = any(options.hasName(name) for name in names)
     iterative = kind == "iterative" or (kind == "auto" and linear_amg.is_large(problem))
     if chosen or iterative or problem.trace.size * problem.block_size > LARGEST:
         return None

@@ -192,7 +192,7 @@ class Newton:
         self._begin = time.perf_counter()
         if self._body is not None:
             outcome = self._newton("", self._condensed_step)
-            if outcome.converged:
+            if outcome.converged or self._left <= 0:
                 return outcome
         outcome = self._newton("")
         if not outcome.converged and self.problem.frictional and self._left > 0:

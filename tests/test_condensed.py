@@ -127,14 +127,29 @@ def test_where_the_body_is_condensed(monkeypatch):
     assert condenses(problem)
     assert condenses(problem, "lu")
     assert not condenses(problem, "iterative")
-    options = PETSc.Options()
-    options["contact_ksp_type"] = "gmres"
-    try:
-        assert not condenses(problem)
-    finally:
-        options.delValue("contact_ksp_type")
     monkeypatch.setattr(condensed, "LARGEST", 10)
     assert not condenses(problem)
+
+
+@pytest.mark.parametrize(
+    ("option", "value"), [("ksp_type", "gmres"), ("pc_factor_mat_solver_type", "petsc")]
+)
+def test_a_solver_of_the_users_takes_the_whole_body(option, value):
+    problem, options = bar(SELF, law=Linear(1.0, 0.3)), PETSc.Options()
+    options[f"contact_{option}"] = value
+    try:
+        assert not condenses(problem)
+        method = Newton(problem, NewtonOptions(tolerance=1e-10))
+        assert method.solve().converged
+    finally:
+        options.delValue(f"contact_{option}")
+
+
+def test_steps_run_out_where_the_body_is_condensed():
+    method = Newton(bar(SELF), NewtonOptions(tolerance=1e-14, limit=1))
+    outcome = method.solve()
+    assert not outcome.converged
+    assert outcome.reason == "not converged in 1 steps"
 
 
 def test_a_body_that_cannot_be_condensed_is_solved_whole(monkeypatch):
