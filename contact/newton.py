@@ -248,8 +248,7 @@ class Newton:
         until = options.secant_until if step is None else CONDENSED_SECANT_UNTIL
         # A start from elsewhere is near the solution; zero displacement has no better tangent.
         tangent = self._status is not None and not problem.linear_material
-        steps = min(options.max_iterations, self._left)
-        for _ in range(steps):
+        for _ in range(min(options.max_iterations, self._left)):
             before, kept = residuals, self._state()
             if step is not None:
                 at_contact = step(tangent, residuals.largest)
@@ -281,6 +280,7 @@ class Newton:
             # A node that opens along the ramp of psi, frozen from step to step, takes its time.
             if since >= options.patience * (3 if self._following.frozen else 1):
                 return Outcome(False, f"Newton's method stalled at {best:.1e}", residuals)
+        steps = len(self.history.records)
         return Outcome(False, f"not converged in {steps} steps", residuals)
 
     def _measure(self, residuals: KKT, frozen: Array | None) -> float:
