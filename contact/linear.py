@@ -241,6 +241,12 @@ class LinearOperator:
     def _fault(self) -> InputError:
         """Say why there is no solution. Collective."""
         check_overflow(self.problem, self.matrix.norm(), self._rhs.norm())
+        if self.ksp.getPC().getFailedReason() == PETSc.PC.FailedReason.FACTOR_OUTMEMORY:
+            return InputError(
+                "the factorisation needs more memory than it was given; accepted: a smaller mesh, "
+                f"a larger -{self._prefix}mat_mumps_icntl_14 (percent of workspace beyond the "
+                'estimate), or linear = "iterative" in [solver]'
+            )
         return InputError(
             "the linear system is singular: the body can move freely; fix enough "
             "displacement components (or, for a piezoelectric body, a potential)"

@@ -49,6 +49,8 @@ from contact.report import History, Monitor, Outcome, Quiet, Record
 from contact.state import Multipliers, bound_of, nodal_iterate, total_pressure
 from contact.uzawa import automatic_r
 
+logger = logging.getLogger("contact.solver")
+
 #: Residual from which on the foundation's conductivity is followed although nodes still change
 #: their status.
 NEAR = 0.05
@@ -194,6 +196,7 @@ class Newton:
             outcome = self._newton("", self._condensed_step)
             if outcome.converged or self._left <= 0:
                 return outcome
+            logger.info("%s; going on with the whole body", outcome.reason)
         outcome = self._newton("")
         if not outcome.converged and self.problem.frictional and self._left > 0:
             outcome = self._frozen_friction()

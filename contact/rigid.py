@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from scipy.optimize import linprog
 
 from contact.errors import InputError
+from contact.pieces import connected_pieces
 from contact.problem import ContactProblem
 from contact.projections import Array
 from contact.state import Multipliers, nodal_iterate, total_pressure
@@ -21,24 +22,34 @@ def check_held(problem: ContactProblem) -> None:
 
     Two things are asked for: supports and contact (in the tangential directions too if there
     is friction) leave no rigid motion at all, and the loads do not pull the body off the
-    foundation where that alone holds it.
+    foundation where that alone holds it. Pieces that are not connected are checked one by one.
 
     Raises
     ------
     InputError
         If the body can move freely or is pulled off.
     """
+    piece, count = connected_pieces(problem.space)
+    for k in range(count):
+        _check_piece(problem, piece == k, count)
+
+
+def _check_piece(problem: ContactProblem, inside: NDArray[np.bool_], count: int) -> None:
+    """Check one piece, of which there are `count`, given its owned nodes."""
     trace, d = problem.trace, problem.dim
     points = problem.space.tabulate_dof_coordinates()[: problem.free.shape[0], :d]
+    touching_here = inside[trace.nodes]
     centre, size = _centre(problem), problem.domain.size
+    if count > 1:
+        centre, size = _middle(problem, points[inside])
     fixed = ~problem.free[:, :d]
-    held = np.flatnonzero(fixed.any(axis=1))
+    held = np.flatnonzero(fixed.any(axis=1) & inside)
     motions = rigid_motions((points[held] - centre) / size) * fixed[held][:, :, None]
     supports = _gram(problem, motions)
     free = _null_space(supports)
     if free.shape[1] == 0:
         return
-    at_contact = rigid_motions((trace.points - centre) / size)
+    at_contact = rigid_motions((trace.points - centre) / size) * touching_here[:, None, None]
     normal = np.einsum("ni,nim->nm", trace.normal, at_contact)
     touching = _gram(problem, normal[:, None, :])
     tangential = np.einsum("nij,njm->nim", trace.tangent, at_contact)
@@ -46,11 +57,17 @@ def check_held(problem: ContactProblem) -> None:
         touching = touching + _gram(problem, tangential)
     loose = _null_space(supports + touching)
     if loose.shape[1] > 0:
+        whole = "the body"
+        if count > 1:
+            where = ", ".join(f"{x:.4g}" for x in centre)
+            whole = f"the mesh has {count} pieces that share no nodes, and the one about ({where})"
         raise InputError(
-            f"the body is not held: it can move as a rigid body ({_describe(loose, d)}); "
+            f"{whole} is not held: it can move as a rigid body ({_describe(loose, d)}); "
             "accepted: displacement components fixed so that it cannot"
+            + (", or regions that share the nodes between them" if count > 1 else "")
         )
-    _check_loads(problem, free, normal, tangential, (points - centre) / size)
+    loads = problem.external.reshape(-1, problem.block_size)[:, :d] * inside[:, None]
+    _check_loads(problem, loads, free, normal, tangential, (points - centre) / size)
 
 
 def check_potential(problem: ContactProblem, forces: Multipliers) -> None:
@@ -99,6 +116,14 @@ def _centre(problem: ContactProblem) -> Array:
     return np.array([trace.sum(x) for x in trace.points.T]) / weight
 
 
+def _middle(problem: ContactProblem, points: Array) -> tuple[Array, float]:
+    """Return the middle of the box around points of all ranks, and its diagonal."""
+    low, high = points.min(axis=0, initial=np.inf), points.max(axis=0, initial=-np.inf)
+    problem.comm.Allreduce(MPI.IN_PLACE, low, op=MPI.MIN)
+    problem.comm.Allreduce(MPI.IN_PLACE, high, op=MPI.MAX)
+    return (low + high) / 2, float(np.linalg.norm(high - low))
+
+
 def _gram(problem: ContactProblem, rows: Array) -> Array:
     """Return the sum over all ranks of the products of rows (n, k, m), scaled to about 1."""
     total = problem.comm.allreduce(np.einsum("nkm,nkl->ml", rows, rows), op=MPI.SUM)
@@ -123,7 +148,12 @@ def _describe(motions: Array, d: int) -> str:
 
 
 def _check_loads(
-    problem: ContactProblem, free: Array, normal: Array, tangential: Array, points: Array
+    problem: ContactProblem,
+    external: Array,
+    free: Array,
+    normal: Array,
+    tangential: Array,
+    points: Array,
 ) -> None:
     """Refuse loads that no contact force can balance.
 
@@ -137,7 +167,6 @@ def _check_loads(
     mu = 0.0 if coefficient is None else coefficient.maximum
     mu = problem.comm.allreduce(mu, op=MPI.MAX)
     d, comm = problem.dim, problem.comm
-    external = problem.external.reshape(-1, problem.block_size)[:, :d]
     local = np.einsum("ni,nim->m", external, rigid_motions(points))
     work = comm.allreduce(local, op=MPI.SUM) @ free
     scale = comm.allreduce(float(np.abs(external).sum()), op=MPI.SUM)
