@@ -19,7 +19,7 @@ from contact.projections import Array, project_half_line
 from contact.state import Multipliers
 
 #: Tolerance on the coarser levels: their discretisation error is larger by far.
-COARSE_TOLERANCE = 1e-5
+COARSE_TOLERANCE = 1e-3
 
 #: Meshes with fewer cells along the shortest edge do not tell much of the solution.
 COARSEST = 4
