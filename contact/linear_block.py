@@ -26,7 +26,6 @@ MECHANICAL = {
     "pc_type": "gamg",
     **linear_amg.DEFAULTS,
     "pc_mg_cycle_type": "w",
-    "mg_levels_ksp_max_it": "4",
 }
 
 #: The same for the potential's block, under ``fieldsplit_phi_``, where PETSc has no hypre.
