@@ -173,6 +173,16 @@ def _check(case: Case, options: argparse.Namespace, comm: MPI.Intracomm) -> int:
     return CONVERGED
 
 
+def _own_options() -> list[str]:
+    """Return options that keep PETSc from a .petscrc that lies in the working folder.
+
+    It may hold anything, libraries to be loaded among it, and comes with a folder of somebody
+    else's. The user's own, in his home, is read; any other by ``-options_file``.
+    """
+    own = Path.home() / ".petscrc"
+    return ["-skip_petscrc", *(["-options_file", str(own)] if own.is_file() else [])]
+
+
 def _abort_on_crash(
     kind: type[BaseException], error: BaseException, trace: TracebackType | None
 ) -> None:
@@ -193,7 +203,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
                 options, petsc = parse(sys.argv[1:] if arguments is None else arguments)
                 import petsc4py
 
-                petsc4py.init([sys.argv[0], *petsc])
+                petsc4py.init([sys.argv[0], *_own_options(), *petsc])
                 case = _shared(comm, lambda: load_case(options.case, options.set))
                 import_module("contact.solving")  # after PETSc's options
             return {"solve": _solve, "check": _check}[options.command](case, options, comm)

@@ -4,8 +4,12 @@ Gmsh runs on rank 0 alone. What it finds is checked there, the verdict is broadc
 all ranks go on or raise together.
 """
 
+import codecs
 import re
-from collections.abc import Callable
+import shutil
+import tempfile
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -22,6 +26,9 @@ from contact.errors import InputError
 from contact.parts import MAX_PARTS, Domain, exterior_facets, tagged
 
 Ints = npt.NDArray[np.int64]
+
+#: Byte order mark, with which some editors begin a file.
+BOM = codecs.BOM_UTF8
 
 #: Gmsh's element types of first order, by dimension.
 SIMPLEX = {1: 1, 2: 2, 3: 4}
@@ -45,27 +52,57 @@ def from_msh(comm: MPI.Intracomm, path: str | Path) -> Domain:
 
     def fill(gmsh: Any) -> bool:
         file = Path(path)
-        if not file.is_file():
-            raise InputError("no such file")
-        try:
-            with file.open("rb") as stream:
-                start = stream.read(4096)
-        except OSError as error:
-            raise InputError(f"it cannot be read ({error.strerror})") from error
-        version = re.search(rb"\$MeshFormat\s+(\d+)", start)
-        if version is None:
-            raise InputError("this is no Gmsh .msh file of format 2.2 or 4.1")
+        version = _format(file)
         # Format 2 names the group of each element, but Gmsh keeps one set of groups an entity.
         # With the two tags of an element switched, the entities are the groups.
-        switch = version[1] < b"4"
+        switch = version < 4
         gmsh.option.setNumber("Mesh.SwitchElementTags", switch)
         try:
-            gmsh.merge(str(file))
+            with _plain_name(file) as plain:
+                gmsh.merge(str(plain))
         finally:
             gmsh.option.setNumber("Mesh.SwitchElementTags", 0)
         return switch
 
     return _from_gmsh(comm, fill, f"mesh file {path}")
+
+
+def _format(file: Path) -> int:
+    """Return the major version of a mesh file's format.
+
+    Gmsh takes a file for a mesh by how it begins, and anything else for a script, whose commands
+    it executes: nothing may come before ``$MeshFormat``.
+    """
+    if not file.is_file():
+        raise InputError("no such file")
+    try:
+        with file.open("rb") as stream:
+            start = stream.read(200)
+    except OSError as error:
+        raise InputError(f"it cannot be read ({error.strerror})") from error
+    found = re.match(rb"\$MeshFormat[ \t]*\r?\n\s*(2|4)(\.\d+)?[ \t]", start.removeprefix(BOM))
+    if found is None:
+        raise InputError("this is no Gmsh .msh file of format 2.2 or 4.1 (it begins otherwise)")
+    return int(found[1])
+
+
+@contextmanager
+def _plain_name(file: Path) -> Iterator[Path]:
+    """Yield a name by which Gmsh reads a file as what it begins with.
+
+    Some suffixes have readers of their own, or programs that unpack the file first; and after a
+    byte order mark Gmsh finds no beginning at all.
+    """
+    with tempfile.TemporaryDirectory() as folder:
+        plain = Path(folder) / "mesh.msh"
+        with file.open("rb") as stream:
+            marked = stream.read(len(BOM)) == BOM
+            if not marked:
+                plain.symlink_to(file.resolve())
+            else:
+                with plain.open("wb") as copy:
+                    shutil.copyfileobj(stream, copy)
+        yield plain
 
 
 def from_recipe(comm: MPI.Intracomm, name: str, **parameters: Any) -> Domain:

@@ -1,5 +1,8 @@
 """Wrong case files and meshes, through the command line: one message each, exit status 2."""
 
+import os
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -419,3 +422,21 @@ def test_not_converged_writes_outputs(
     summary = (shared_tmp_path / "out" / "summary.json").read_text()
     assert '"converged": false' in summary
     assert "not converged in 1 outer iterations" in summary
+
+
+@pytest.mark.parametrize(("asked", "status"), [(False, CONVERGED), (True, BAD_INPUT)])
+def test_petsc_obeys_no_file_that_lies_in_the_folder(asked, status, tmp_path):
+    """It comes with a case of somebody else's, and may name libraries to be loaded."""
+    (tmp_path / "case.toml").write_text(BAR)
+    for name in (".petscrc", "petscrc"):
+        (tmp_path / name).write_text("-contact_pc_factor_mat_solver_type nonsense\n")
+    options = ["-options_file", ".petscrc"] if asked else []
+    command = [sys.executable, "-m", "contact", "solve", "case.toml", "--out", "out", *options]
+    done = subprocess.run(
+        command,
+        cwd=tmp_path,
+        env={**os.environ, "PYTHONPATH": str(FIXTURES.parents[1])},
+        capture_output=True,
+        text=True,
+    )
+    assert done.returncode == status, done.stderr

@@ -1,5 +1,6 @@
 """Gmsh files and recipes: what is read, what is refused, what the recipes make."""
 
+import codecs
 from pathlib import Path
 
 import gmsh
@@ -82,6 +83,36 @@ def test_mesh_files_are_read_with_their_parts(name):
 def test_bad_mesh_files_are_refused_on_all_ranks(name):
     with pytest.raises(InputError, match=f"mesh file .*{name}: .*{BAD[name]}"):
         from_msh(COMM, FIXTURES / "bad" / name)
+
+
+@pytest.mark.parametrize(
+    "start",
+    [
+        "// $MeshFormat 2.2\n",
+        "// $MeshFormat\n// 4.1 0 8\n",
+        "\n$MeshFormat\n4.1 0 8\n",
+        " $MeshFormat\n2.2 0 8\n",
+        "\ufeff// $MeshFormat\n",
+        "$MeshFormat;\n2.2 0 8\n",
+        "/*\n$MeshFormat\n2.2 0 8\n*/\n",
+    ],
+)
+@pytest.mark.parametrize("name", ["body.msh", "body.geo", "body"])
+def test_a_mesh_file_is_never_executed(start, name, tmp_path):
+    mark = tmp_path / "executed"
+    command = f'SystemCall "touch {mark}";\nPrintf("x") > "{mark}";\n'
+    (tmp_path / name).write_text(start + command, encoding="utf-8")
+    with pytest.raises(InputError, match=r"no Gmsh .msh file"):
+        from_msh(MPI.COMM_SELF, tmp_path / name)
+    assert not mark.exists()
+
+
+@pytest.mark.parametrize("fixture", ["bar.msh", "bar-2.2.msh"])
+@pytest.mark.parametrize("mark", [b"", codecs.BOM_UTF8])
+@pytest.mark.parametrize("name", ["body.msh", "body.msh.gz", "a b; touch x.geo", "mesh"])
+def test_a_mesh_file_is_read_whatever_its_name(fixture, mark, name, tmp_path):
+    (tmp_path / name).write_bytes(mark + (FIXTURES / fixture).read_bytes())
+    assert measures(from_msh(MPI.COMM_SELF, tmp_path / name)) == pytest.approx(BAR)
 
 
 def test_every_bad_fixture_is_in_the_table_and_all_are_small():
