@@ -105,11 +105,15 @@ class Solver(Section):
         description="Linearisation of the material: `secant` (Kacanov), `tangent`, or secant "
         "first and tangent near the solution. `uzawa` and `penalty` only.",
     )
-    eps_contact: Positive = Field(
-        default=1e-4, description="Penalty method: 1/eps_contact is the stiffness of the contact."
+    eps_contact: Positive | None = Field(
+        default=None,
+        description="Penalty method: 1/eps_contact is the stiffness of the contact. Default: "
+        "0.01 h/E, h the spacing of the contact nodes.",
     )
     eps_slip: Positive | None = Field(
-        default=None, description="Penalty method: slip length. Default: `eps_contact`."
+        default=None,
+        description="Penalty method: slip length. Default: the number `eps_contact` where that is "
+        "given, else a hundredth of the displacement that the loads give.",
     )
     nested: Switch = Field(
         default=False,

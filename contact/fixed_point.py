@@ -30,7 +30,7 @@ from contact.linear import Counters
 from contact.norms import domain_norm
 from contact.problem import ContactProblem
 from contact.projections import Array
-from contact.report import History, Monitor, Outcome, Record
+from contact.report import History, Monitor, Outcome, Record, all_within
 from contact.state import Multipliers, bound_of, nodal_iterate, total_pressure
 from contact.uzawa import (
     Linearised,
@@ -85,6 +85,11 @@ class FixedPointOptions:
     linear: str = "auto"
     max_outer: int = 200
     max_inner: int = MAX_INNER
+
+    @property
+    def allowed(self) -> KKT:
+        """How large each residual may be at the end."""
+        return all_within(self.tolerance)
 
 
 @dataclass
@@ -175,9 +180,9 @@ class FixedPoint:
                 if iteration > first and self._thesis_criterion(change, previous):
                     return self._outcome(residuals, "the thesis's criterion is met")
             elif residuals.largest <= options.tolerance:
-                return self._outcome(residuals, "")
+                return self._outcome(residuals)
             if not np.isfinite(residuals.largest):
-                return Outcome(False, "the iteration diverged", residuals)
+                return self._outcome(residuals, "the iteration diverged")
             if options.material_step == "auto" and not problem.linear_material:
                 # Far from the solution the tangent is too soft and overshoots.
                 tangent = residuals.largest < (NEAR if not tangent else 2 * best)
@@ -185,8 +190,8 @@ class FixedPoint:
             best = min(best, residuals.largest)
             patience = PATIENCE_STALLED if self._stalled else PATIENCE
             if since >= patience and options.stopping == "residual":
-                return Outcome(False, f"the residual stalled at {best:.2e}", residuals)
-        return Outcome(False, f"not converged in {options.max_outer} outer iterations", residuals)
+                return self._outcome(residuals, f"the residual stalled at {best:.2e}")
+        return self._outcome(residuals, f"not converged in {options.max_outer} outer iterations")
 
     def _step(self, bound: Array, z: Array, friction: bool, tangent: bool) -> tuple[int, Array]:
         """Freeze, solve the frozen problem, and move the iterate."""
@@ -264,12 +269,5 @@ class FixedPoint:
         now = self.problem.unknowns[: self.problem.owned]
         return self._norm(now - previous) < self.options.eps_fp * self._norm(now)
 
-    def _outcome(self, residuals: KKT, words: str) -> Outcome:
-        tolerance = self.options.tolerance
-        if residuals.largest <= tolerance:
-            return Outcome(True, words or f"all residuals <= {tolerance:g}", residuals)
-        return Outcome(
-            False,
-            f"{words}, but a residual is {residuals.largest:.2e}, above {tolerance:g}",
-            residuals,
-        )
+    def _outcome(self, residuals: KKT, ended: str = "") -> Outcome:
+        return Outcome(residuals, self.options.allowed, ended)

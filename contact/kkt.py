@@ -41,6 +41,19 @@ class KKT:
         values = (self.equilibrium, self.contact, self.friction)
         return max(values) if np.all(np.isfinite(values)) else np.inf
 
+    def excess(self, allowed: KKT) -> str:
+        """Name the residual that is farthest above what is allowed; nothing if none is."""
+        ratios = {
+            name: getattr(self, name) / getattr(allowed, name)
+            for name in ("equilibrium", "contact", "friction")
+        }
+        # What is no number is above everything.
+        worst = max(ratios, key=lambda name: np.nan_to_num(ratios[name], nan=np.inf))
+        if ratios[worst] <= 1:
+            return ""
+        value, limit = getattr(self, worst), getattr(allowed, worst)
+        return f"the {worst} residual is {value:.2e}, above {limit:g}"
+
 
 def stiffness_scale(problem: ContactProblem) -> float:
     """Return c = E / (size of the body): the scale between displacements and stresses."""

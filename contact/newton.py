@@ -45,7 +45,7 @@ from contact.newton_laws import (
 )
 from contact.problem import ContactProblem
 from contact.projections import Array
-from contact.report import History, Monitor, Outcome, Quiet, Record
+from contact.report import History, Monitor, Outcome, Quiet, Record, all_within
 from contact.state import Multipliers, bound_of, nodal_iterate, total_pressure
 from contact.uzawa import automatic_r
 
@@ -63,6 +63,9 @@ CONDENSED_SECANT_UNTIL = 0.3
 
 #: What the history says of the slower methods.
 SLOWER = FROZEN_FRICTION, BLOCK_RELAXATION = "frozen friction", "block relaxation"
+
+#: Why Newton's method with a frozen friction bound ends.
+UPDATE = "friction bound to be updated"
 
 #: Iterate, contact forces, status and layer pressure.
 _State = tuple[Array, Multipliers, NDArray[np.int8] | None, Array | None]
@@ -108,6 +111,11 @@ class NewtonOptions:
     linear: str = "auto"
     condense: bool = True
 
+    @property
+    def allowed(self) -> KKT:
+        """How large each residual may be at the end."""
+        return all_within(self.tolerance)
+
 
 @dataclass
 class Newton:
@@ -141,6 +149,9 @@ class Newton:
         self._following = Following()
         self._calm = 0  # steps in which no node has changed its status
         self._begin = 0.0
+        self._load = 1.0  # part of the loads and prescribed displacements that is applied
+        self._best: _State | None = None
+        self._least = np.inf
         self._operator: LinearOperator | DenseOperator | None = None
         self._body: Condensation | None = None
         if self.options.condense:
@@ -192,6 +203,14 @@ class Newton:
     def resume(self) -> Outcome:
         """Iterate from where the method is, and fall back on slower ones where that fails."""
         self._begin = time.perf_counter()
+        self._best, self._least = None, np.inf
+        outcome = self._resume()
+        if not outcome.converged and self._best is not None:
+            self._return_to(self._best)
+            outcome = replace(outcome, kkt=evaluate(self.problem, self.forces))
+        return outcome
+
+    def _resume(self) -> Outcome:
         if self._body is not None:
             outcome = self._newton("", self._condensed_step)
             if outcome.converged or self._left <= 0:
@@ -226,9 +245,11 @@ class Newton:
         )
         relaxed = FixedPoint(self.problem, options, note, self.counters, self.history.poll)
         try:
-            return relaxed.solve()
+            outcome = relaxed.solve()
         finally:
             self.forces, self._status, self._layer_pressure = relaxed.forces, None, None
+        self._keep_best(outcome.kkt)
+        return outcome
 
     def _newton(
         self,
@@ -256,7 +277,7 @@ class Newton:
             if step is not None:
                 at_contact = step(tangent, residuals.largest)
                 if at_contact is None:
-                    return Outcome(False, "the condensed contact problem is not solved", residuals)
+                    return self._outcome(residuals, "the condensed contact problem is not solved")
                 said, solves = at_contact
             else:
                 said, solves = "", 0
@@ -268,13 +289,14 @@ class Newton:
             if worse:
                 self._return_to(kept)
                 residuals = evaluate(problem, self.forces)
+            self._keep_best(residuals)
             measured = self._measure(residuals, frozen)
             if residuals.largest <= options.tolerance:
-                return Outcome(True, f"all residuals <= {options.tolerance:g}", residuals)
+                return self._outcome(residuals)
             if frozen is not None and measured <= goal:
-                return Outcome(False, "friction bound to be updated", residuals)
+                return self._outcome(residuals, UPDATE)
             if not np.isfinite(measured):
-                return Outcome(False, "Newton's method diverged", residuals)
+                return self._outcome(residuals, "Newton's method diverged")
             if not problem.linear_material:
                 falls = residuals.equilibrium < max(before.equilibrium, options.tolerance)
                 tangent = residuals.equilibrium < until and (falls or not tangent)
@@ -282,9 +304,17 @@ class Newton:
             best = min(best, measured)
             # A node that opens along the ramp of psi, frozen from step to step, takes its time.
             if since >= options.patience * (3 if self._following.frozen else 1):
-                return Outcome(False, f"Newton's method stalled at {best:.1e}", residuals)
+                return self._outcome(residuals, f"Newton's method stalled at {best:.1e}")
         steps = len(self.history.records)
-        return Outcome(False, f"not converged in {steps} steps", residuals)
+        return self._outcome(residuals, f"not converged in {steps} steps")
+
+    def _outcome(self, residuals: KKT, ended: str = "") -> Outcome:
+        return Outcome(residuals, self.options.allowed, ended)
+
+    def _keep_best(self, residuals: KKT) -> None:
+        """Remember the iterate that meets the problem at its whole load best."""
+        if self._load == 1.0 and residuals.largest < self._least:
+            self._least, self._best = residuals.largest, self._state()
 
     def _measure(self, residuals: KKT, frozen: Array | None) -> float:
         """Return the largest residual, with the frozen friction bound if there is one."""
@@ -300,7 +330,7 @@ class Newton:
         outcome, goal = None, 1e-2
         for _ in range(40):
             outcome = self._newton(FROZEN_FRICTION, frozen=bound, goal=goal)
-            if outcome.converged or outcome.reason != "friction bound to be updated":
+            if outcome.converged or outcome.ended != UPDATE:
                 break
             new = bound_of(self.problem, nodal_iterate(self.problem), self.forces)
             goal = 0.1 * outcome.kkt.largest
@@ -314,22 +344,25 @@ class Newton:
         problem.reset()
         self.forces = Multipliers.zero(problem)
         self._status = self._layer_pressure = None
-        outcome = None
         while reached < 1.0 and step > 1e-2 and self._left > 0:
             kept = self._state()
-            factor = min(1.0, reached + step)
-            problem.apply_load(factor)
-            outcome = self._newton(f"load {factor:.3g}")
+            self._load = min(1.0, reached + step)
+            problem.apply_load(self._load)
+            outcome = self._newton(f"load {self._load:.3g}")
             if not outcome.converged and problem.frictional:
                 outcome = self._frozen_friction()
             if outcome.converged:
-                reached = factor
+                reached = self._load
                 continue
             self._return_to(kept)
             step /= 2
+        self._load = 1.0
         problem.apply_load(1.0)
-        assert outcome is not None
-        return Outcome(outcome.converged, outcome.reason, evaluate(problem, self.forces))
+        residuals = evaluate(problem, self.forces)
+        self._keep_best(residuals)
+        if reached < 1.0:
+            return self._outcome(residuals, f"load steps ended at {reached:.3g} of the load")
+        return self._outcome(residuals)
 
     def _state(self) -> _State:
         """Return what `_return_to` needs to take steps back."""

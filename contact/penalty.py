@@ -11,7 +11,8 @@ Convergence. A penalty run solves the penalised problem: it has converged when t
 residual with the forces of the regularised laws at the final displacement is below the
 tolerance (those laws then hold by construction). The residuals `contact` and `friction` of the
 reported KKT are those of the Signorini-Coulomb laws themselves; they measure how far the
-penalised solution is from the limit, fall like eps, and do not decide.
+penalised solution is from the limit, and fall like eps. Where they are above `LAWS_HOLD`, what
+has been solved says nothing of contact, and the run has not converged.
 """
 
 from __future__ import annotations
@@ -41,6 +42,9 @@ from contact.regularised import (
 from contact.report import History, Monitor, Outcome, Record
 from contact.state import Multipliers, bound_of, nodal_iterate, total_pressure
 
+#: Residual of contact and friction above which a penalised solution approximates nothing.
+LAWS_HOLD = 0.1
+
 #: What to do about an end without convergence.
 HARDER = "the larger eps_contact and eps_slip, the easier the problem"
 
@@ -52,10 +56,10 @@ class PenaltyOptions:
     Attributes
     ----------
     eps_contact
-        1/stiffness of the foundation (length^3/force).
+        1/stiffness of the foundation (length^3/force); None for `automatic_eps`.
     eps_slip
         Slip length of the regularised friction; None for the number `eps_contact`, as in the
-        thesis.
+        thesis, or where that is None too for `automatic_eps`.
     tolerance
         On the equilibrium residual of the penalised problem.
     stopping
@@ -70,7 +74,7 @@ class PenaltyOptions:
         Kind of linear solver, see `linear.LinearOperator`.
     """
 
-    eps_contact: float = 1e-4
+    eps_contact: float | None = None
     eps_slip: float | None = None
     tolerance: float = 1e-8
     stopping: str = "residual"
@@ -81,10 +85,35 @@ class PenaltyOptions:
     linear: str = "auto"
 
     @property
-    def regularisation(self) -> Regularisation:
-        """Parameters of the penalised laws."""
-        slip = self.eps_contact if self.eps_slip is None else self.eps_slip
-        return Regularisation(self.eps_contact, slip)
+    def allowed(self) -> KKT:
+        """How large each residual may be at the end."""
+        return KKT(self.tolerance, LAWS_HOLD, LAWS_HOLD)
+
+    def regularisation(self, problem: ContactProblem) -> Regularisation:
+        """Return the parameters of the penalised laws. Collective."""
+        automatic = automatic_eps(problem)
+        if self.eps_contact is None:
+            contact, slip = automatic.contact, automatic.slip
+        else:
+            contact = slip = self.eps_contact
+        return Regularisation(contact, slip if self.eps_slip is None else self.eps_slip)
+
+
+def automatic_eps(problem: ContactProblem) -> Regularisation:
+    """Return parameters that fit the body, its mesh and its loads, in any units. Collective.
+
+    The foundation is a hundred times stiffer than a layer of elements, E/h. The slip length is a
+    hundredth of the displacement that the loads, as a stress on Gamma_3, give a block of the
+    body's size.
+    """
+    young, trace = float(problem.body.law.young), problem.trace
+    area = trace.sum(np.ones_like(trace.weight))
+    spacing = (area / trace.size) ** (1 / (problem.dim - 1))
+    local = np.abs(problem.external.reshape(-1, problem.block_size)[:, : problem.dim]).sum()
+    stress = problem.comm.allreduce(float(local), op=MPI.SUM) / area
+    displacement = max(stress / young * problem.domain.size, problem.largest_prescribed)
+    slip = 1e-2 * displacement or 1e-6 * problem.domain.size
+    return Regularisation(1e-2 * spacing / young, slip)
 
 
 @dataclass
@@ -108,7 +137,7 @@ class Penalty:
         """Start with zero forces and an empty history."""
         self.history = History(self.monitor)
         self.forces = Multipliers.zero(self.problem)
-        self._eps = self.options.regularisation
+        self._eps = self.options.regularisation(self.problem)
         self._solvers: dict[bool, _Inner] = {}
         self._norm = domain_norm(self.problem) if self.options.stopping == "thesis" else None
 
@@ -156,22 +185,22 @@ class Penalty:
             self.history.add(record)
             residual = residuals.equilibrium
             if not np.isfinite(residual):
-                return Outcome(False, "the iteration diverged", residuals)
+                return self._outcome(residuals, "the iteration diverged")
             if options.stopping == "thesis":
                 if self._thesis_criterion(previous):
                     return self._outcome(residuals, "the thesis's criterion is met")
             elif residual <= options.tolerance:
-                return self._outcome(residuals, "")
+                return self._outcome(residuals)
             best = min(best, residual)
             switch = best / 10 if failed else switch
             # The lagged friction modulus can creep: what counts is the last hundred iterations.
             since, mark = (0, residual) if residual < 0.99 * mark else (since + 1, mark)
             if since >= 100 and options.stopping == "residual":
                 words = f"the residual stalled at {best:.2e}; {HARDER}"
-                return Outcome(False, words, residuals)
+                return self._outcome(residuals, words)
             implicit = residual < switch
         words = f"not converged in {options.max_outer} outer iterations; {HARDER}"
-        return Outcome(False, words, residuals)
+        return self._outcome(residuals, words)
 
     def _step(self, implicit: bool) -> tuple[int, str]:
         """Solve (4.32), or the penalised problem itself, by SNES from the iterate."""
@@ -183,7 +212,9 @@ class Penalty:
             law = Implicit(problem, self._eps)
         symmetric = not (implicit and problem.frictional)
         if symmetric not in self._solvers:
-            self._solvers[symmetric] = _Inner(problem, self.options, self.counters, symmetric)
+            self._solvers[symmetric] = _Inner(
+                problem, self.options, self._eps, self.counters, symmetric
+            )
         return self._solvers[symmetric].solve(law, nodal, implicit, self.forces)
 
     def _change(self, old: Array, new: Array) -> float:
@@ -199,17 +230,14 @@ class Penalty:
         now = self.problem.x.x.array[: self.problem.owned]
         return self._norm(now - previous) < self.options.eps_fp * self._norm(now)
 
-    def _outcome(self, residuals: KKT, words: str) -> Outcome:
-        tolerance, limit = self.options.tolerance, max(residuals.contact, residuals.friction)
-        if residuals.equilibrium <= tolerance:
-            words = words or f"the residual of the penalised problem is <= {tolerance:g}"
-            return Outcome(True, f"{words}; the contact laws hold to {limit:.1e}", residuals)
-        return Outcome(
-            False,
-            f"{words}, but the residual of the penalised problem is "
-            f"{residuals.equilibrium:.2e}, above {tolerance:g}",
-            residuals,
-        )
+    def _outcome(self, residuals: KKT, words: str = "") -> Outcome:
+        options, limit = self.options, max(residuals.contact, residuals.friction)
+        words = words or f"the residual of the penalised problem is <= {options.tolerance:g}"
+        if residuals.equilibrium <= options.tolerance:
+            words += f"; the contact laws hold to {limit:.1e}"
+        if limit > LAWS_HOLD:
+            words += "; a smaller eps_contact or eps_slip brings them nearer"
+        return Outcome(residuals, options.allowed, words)
 
 
 class _Inner:
@@ -220,9 +248,14 @@ class _Inner:
     """
 
     def __init__(
-        self, problem: ContactProblem, options: PenaltyOptions, counters: Counters, symmetric: bool
+        self,
+        problem: ContactProblem,
+        options: PenaltyOptions,
+        eps: Regularisation,
+        counters: Counters,
+        symmetric: bool,
     ) -> None:
-        self._problem, self._options = problem, options
+        self._problem, self._options, self._eps = problem, options, eps
         self._error: InputError | None = None
         self.operator = LinearOperator(
             problem, symmetric=symmetric, counters=counters, kind=options.linear
@@ -309,7 +342,7 @@ class _Inner:
         closest = trace.maximum(opening, -np.inf)
         if closest >= 0:
             return np.zeros(problem.owned)
-        spring = (opening >= closest - 1e-9 * problem.domain.size) / self._options.eps_contact
+        spring = (opening >= closest - 1e-9 * problem.domain.size) / self._eps.contact
         spring = spring * trace.weight
         blocks = np.zeros((trace.nodes.size, trace.block_size, trace.block_size))
         blocks[:, : trace.dim, : trace.dim] = np.einsum(

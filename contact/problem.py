@@ -237,6 +237,16 @@ class ContactProblem:
         """Number of unknowns that this rank owns."""
         return self.free.size
 
+    @property
+    def largest_prescribed(self) -> float:
+        """Largest component of a prescribed displacement, at the whole load. Collective."""
+        values = np.zeros_like(self.x.x.array)
+        for bc in self.bcs:
+            bc.set(values)
+        displacements = values.reshape(-1, self.block_size)[:, : self.dim]
+        largest = float(np.abs(displacements).max(initial=0.0))
+        return float(self.comm.allreduce(largest, op=MPI.MAX))
+
     def parts_of(self, x: Any) -> tuple[Expr, Expr | None]:
         """Split a function or argument into displacement and scaled-back potential."""
         u = ufl.as_vector([x[i] for i in range(self.dim)])

@@ -111,21 +111,41 @@ class History:
 
 @dataclass(frozen=True)
 class Outcome:
-    """How a solver ended.
+    """How a solver ended. The residuals decide whether it has converged, and nothing else can.
 
     Attributes
     ----------
-    converged
-        Whether all residuals are below the tolerance.
-    reason
-        In words, also when it has converged.
     kkt
-        The final residuals.
+        The final residuals, of the problem at its whole load.
+    allowed
+        How large each of them may be.
+    ended
+        Why the method ended, in words; nothing where it met what is allowed.
     signal
         Number of the signal that ended it; 0 for none.
     """
 
-    converged: bool
-    reason: str
     kkt: KKT
+    allowed: KKT
+    ended: str = ""
     signal: int = 0
+
+    @property
+    def converged(self) -> bool:
+        """Whether every residual is within what is allowed, and nothing has interrupted."""
+        return not self.signal and not self.kkt.excess(self.allowed)
+
+    @property
+    def reason(self) -> str:
+        """Why the method ended and what the residuals say of it, in words."""
+        if self.signal:
+            return self.ended
+        excess = self.kkt.excess(self.allowed)
+        if excess:
+            return f"{self.ended}, but {excess}" if self.ended else excess
+        return self.ended or f"all residuals <= {self.allowed.largest:g}"
+
+
+def all_within(tolerance: float) -> KKT:
+    """Return one bound for every residual."""
+    return KKT(tolerance, tolerance, tolerance)

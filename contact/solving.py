@@ -5,16 +5,18 @@ from __future__ import annotations
 import logging
 import time
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, Protocol
 
+import numpy as np
 from mpi4py import MPI
 
 from contact.build import build_problem, named
 from contact.case import Case, Solver, load_case
 from contact.fixed_point import FixedPoint, FixedPointOptions
 from contact.interrupt import Interrupted, stop_on_signal
-from contact.kkt import evaluate
+from contact.kkt import KKT, evaluate
 from contact.linear import Counters
 from contact.nested import coarse_solution, prolong
 from contact.newton import Newton, NewtonOptions
@@ -28,9 +30,24 @@ from contact.state import Multipliers
 
 logger = logging.getLogger("contact.solve")
 
+#: Stands for residuals until they are measured.
+NOTHING = KKT(np.inf, np.inf, np.inf)
+
+
+class MethodOptions(Protocol):
+    """What every method is told."""
+
+    @property
+    def allowed(self) -> KKT:
+        """How large each residual may be where the method has converged."""
+
 
 class Method(Protocol):
     """A solver: it moves the problem's iterate and can be asked at any time where it is."""
+
+    @property
+    def options(self) -> MethodOptions:
+        """Options of the method."""
 
     forces: Multipliers
     history: History
@@ -169,9 +186,10 @@ def solve_problem(
             else:
                 outcome = method.solve()
         except Interrupted as interrupt:
-            problem.apply_load(1.0)  # it may have come in a load step
-            residuals = evaluate(problem, method.forces)
-            outcome = Outcome(False, str(interrupt), residuals, interrupt.number)
+            outcome = Outcome(NOTHING, NOTHING, str(interrupt), interrupt.number)
+    # From scratch and at the whole load, whatever the method says and wherever it has stopped.
+    problem.apply_load(1.0)
+    outcome = replace(outcome, kkt=evaluate(problem, method.forces), allowed=method.options.allowed)
     check_potential(problem, method.forces)
     solution = Solution(
         problem=problem,

@@ -150,7 +150,7 @@ def test_steps_run_out_where_the_body_is_condensed():
     # The second time none is left: what has been taken is told.
     for outcome in (method.solve(), method.resume()):
         assert not outcome.converged
-        assert outcome.reason == "not converged in 1 steps"
+        assert outcome.ended == "not converged in 1 steps"
 
 
 def test_a_body_that_cannot_be_condensed_is_solved_whole(monkeypatch):

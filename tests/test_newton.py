@@ -1,5 +1,7 @@
 """Semismooth Newton: against the block relaxation, its rate, its fall-backs, nested meshes."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from mpi4py import MPI
@@ -8,10 +10,12 @@ from contact.build import build_problem
 from contact.case import parse_case
 from contact.errors import InputError
 from contact.fixed_point import FixedPoint, FixedPointOptions
+from contact.kkt import KKT, evaluate
 from contact.nested import coarser_cases
 from contact.newton import Newton, NewtonOptions
 from contact.newton_laws import CLOSED, FREE, SLIDES, STICKS, Moduli, linearise
 from contact.problem import ContactProblem, Friction
+from contact.report import Outcome
 from contact.solving import solve
 from contact.state import Multipliers, nodal_iterate
 from forms.hencky import Linear, Log
@@ -224,6 +228,62 @@ def test_the_number_of_outer_iterations_is_limited(method):
     assert not solution.outcome.converged
     # the frictionless start of the fixed point is its iteration 0
     assert len(solution.history.records) <= 3
+
+
+def test_load_steps_that_end_early_have_not_converged():
+    """The last step's convergence was taken for that of the whole load."""
+    case = {
+        "mesh": {"generator": "rectangle", "size": [40.0, 1.0], "cells": [80, 2]},
+        "material": {"young": 1.0, "poisson": 0.3},
+        "fixed": [{"on": side, "displacement": [0.0, 0.0]} for side in ("left", "right")],
+        "load": [{"on": "top", "traction": [0.0, -3.90625e-5]}],
+        "contact": {"on": "bottom", "gap": 0.3},
+        "friction": {"law": "coulomb", "mu": 0.3},
+    }
+    problem = build_problem(parse_case(case), SELF)
+    method = Newton(problem, NewtonOptions())
+    # Two steps of load, the second of which fails.
+    newton = method._newton
+    loads: list[float] = []
+
+    def fails_late(note: str, *args: object, **options: object):
+        loads.append(method._load)
+        outcome = newton(note, *args, **options)
+        if method._load <= 0.25:
+            return replace(outcome, kkt=KKT(0.0, 0.0, 0.0))
+        return replace(outcome, kkt=KKT(1.0, 1.0, 1.0))
+
+    method._newton = fails_late
+    outcome = method._load_steps()
+    assert max(loads) > 0.25
+    assert not outcome.converged
+    assert "load steps ended at 0.25 of the load" in outcome.reason
+    assert outcome.kkt == evaluate(problem, method.forces)
+
+
+def test_a_method_cannot_call_itself_converged(monkeypatch):
+    """What it says of its end is one thing, the residuals of the whole problem another."""
+
+    def boast(method: Newton):
+        method.problem.reset()
+        method.problem.apply_load(0.1)
+        return Outcome(KKT(0.0, 0.0, 0.0), KKT(1.0, 1.0, 1.0), "all is well")
+
+    monkeypatch.setattr(Newton, "solve", boast)
+    solution = solve(parse_case(bar_case([16, 4])), comm=SELF)
+    assert not solution.converged
+    assert solution.outcome.kkt == evaluate(solution.problem, solution.forces)
+    assert "all is well, but the equilibrium residual is 1.00e+00" in solution.outcome.reason
+
+
+def test_the_best_iterate_is_what_is_left_of_a_failure():
+    """Where the limit ends the fall-backs, what they were left at may be far from anything."""
+    problem = helpers.bar(SELF, 8, -0.05, friction=Friction(ConstantCoefficient(0.5)))
+    method = Newton(problem, NewtonOptions(tolerance=1e-18, limit=9, max_iterations=5))
+    outcome = method.solve()
+    assert not outcome.converged
+    assert outcome.kkt == evaluate(problem, method.forces)
+    assert outcome.kkt.largest == min(record.kkt.largest for record in method.history.records)
 
 
 def pushed_block(push: float) -> dict:

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from contact import domain
+from contact import domain, solve
+from contact.case import parse_case
 from contact.errors import InputError
 from contact.expressions import Expression
 from contact.fixed_point import FixedPoint, FixedPointOptions
@@ -148,7 +149,7 @@ def test_a_stop_by_small_change_is_not_convergence():
     options = PenaltyOptions(eps_contact=1e-6, stopping="thesis", material_step="secant")
     outcome = Penalty(problem, options).solve()
     assert not outcome.converged
-    assert "criterion is met, but the residual" in outcome.reason
+    assert "criterion is met, but the equilibrium residual" in outcome.reason
 
 
 @pytest.mark.parametrize("radius", [0.0, 0.3])
@@ -211,6 +212,34 @@ def test_a_body_that_nothing_holds_does_not_converge():
         assert "singular" in str(error)
     else:
         assert not outcome.converged
+
+
+def steel(**solver) -> dict:
+    """Return a steel bar of 4 m by 1 m under 1 MPa, in SI units."""
+    return {
+        "mesh": {"generator": "rectangle", "size": [4.0, 1.0], "cells": [32, 8]},
+        "material": {"young": 210e9, "poisson": 0.3},
+        "fixed": [{"on": "left", "displacement": [0.0, 0.0]}],
+        "load": [{"on": "top", "traction": [0.0, -1e6]}],
+        "contact": {"on": "bottom"},
+        "friction": {"law": "coulomb", "mu": 0.3},
+        "solver": {"method": "penalty", **solver},
+    }
+
+
+def test_the_defaults_fit_any_units():
+    """With an absolute compliance of 1e-4 the foundation carried 28 N of 3.6 MN."""
+    solution = solve(parse_case(steel()))
+    assert solution.converged, solution.outcome.reason
+    exact = solve(parse_case({**steel(), "solver": {"method": "newton"}}))
+    assert np.allclose(solution.contact_force, exact.contact_force, rtol=0, atol=3e-2 * 4e6)
+
+
+def test_a_foundation_that_is_too_soft_is_no_convergence():
+    solution = solve(parse_case(steel(eps_contact=1e-4)))
+    assert not solution.converged
+    assert solution.outcome.kkt.equilibrium < 1e-8
+    assert "the contact residual is 1.00e+04" in solution.outcome.reason
 
 
 def test_rounding_ends_the_inner_iterations():
