@@ -15,22 +15,22 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from contact.build import build_problem
-    from contact.case import Case, load_case, parse_case
+    from contact.case.file import Case, load_case, parse_case
     from contact.errors import InputError
-    from contact.output import write_outputs
-    from contact.solution import Solution
+    from contact.output.files import write_outputs
+    from contact.output.solution import Solution
     from contact.solving import solve, solve_problem
 
 _HOMES = {
-    "Case": "case",
+    "Case": "case.file",
     "InputError": "errors",
-    "Solution": "solution",
+    "Solution": "output.solution",
     "build_problem": "build",
-    "load_case": "case",
-    "parse_case": "case",
+    "load_case": "case.file",
+    "parse_case": "case.file",
     "solve": "solving",
     "solve_problem": "solving",
-    "write_outputs": "output",
+    "write_outputs": "output.files",
 }
 
 __all__ = [

@@ -10,17 +10,17 @@ import numpy as np
 from mpi4py import MPI
 from ufl.core.expr import Expr
 
-from contact import case as sections
-from contact import problem as parts
-from contact.domain import Domain, make_domain
+from contact.case import file as sections
+from contact.case.formula import Expression
 from contact.errors import InputError
-from contact.expressions import Expression
-from contact.foundation import Foundation, GapFunction, Plane, Sphere
-from contact.linear import HUGE
-from contact.problem import ContactProblem
-from contact.projections import Array
-from contact.response import Conductor, Layer
-from contact.rigid import check_held
+from contact.interface.obstacle import Foundation, GapFunction, Plane, Sphere
+from contact.interface.response import Conductor, Layer
+from contact.mesh.make import Domain, make_domain
+from contact.problem import problem as parts
+from contact.problem.held import check_held
+from contact.problem.problem import ContactProblem
+from contact.tolerances import HUGE
+from contact.typing import Array
 from forms.hencky import Hencky, Linear, Log
 from forms.laws import (
     Compliance,

@@ -13,20 +13,21 @@ import numpy as np
 from mpi4py import MPI
 
 from contact.build import build_problem, named
-from contact.case import Case, Solver, load_case
-from contact.fixed_point import FixedPoint, FixedPointOptions
-from contact.interrupt import Interrupted, stop_on_signal
-from contact.kkt import KKT, evaluate
-from contact.linear import Counters
-from contact.nested import coarse_solution, prolong
-from contact.newton import Newton, NewtonOptions
-from contact.penalty import Penalty, PenaltyOptions
-from contact.problem import ContactProblem
-from contact.report import History, Monitor, Outcome
-from contact.review import review
-from contact.rigid import check_potential
-from contact.solution import Solution
-from contact.state import Multipliers
+from contact.case.file import Case, Solver, load_case
+from contact.linear.operator import Counters
+from contact.methods.fixed_point import FixedPoint
+from contact.methods.interrupt import Interrupted, stop_on_signal
+from contact.methods.nested import coarse_solution, prolong
+from contact.methods.newton import Newton
+from contact.methods.options import FixedPointOptions, NewtonOptions, PenaltyOptions
+from contact.methods.penalty import Penalty
+from contact.methods.report import History, Monitor, Outcome
+from contact.output.review import review
+from contact.output.solution import Solution
+from contact.problem.held import check_potential
+from contact.problem.kkt import KKT, evaluate
+from contact.problem.problem import ContactProblem
+from contact.problem.state import Multipliers
 
 logger = logging.getLogger("contact.solve")
 

@@ -17,7 +17,7 @@ from branches import AGREE, DISTURBANCE, Branches, Found
 from reporting import CASES, Report, observed_orders, parser
 
 from contact import Case, build_problem, load_case
-from contact.case import Solver
+from contact.case.file import Solver
 
 #: Tolerance on the residuals of `newton` and `uzawa`.
 TOLERANCE = 1e-10

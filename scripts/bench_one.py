@@ -25,12 +25,12 @@ from mpi4py import MPI
 from reporting import CASES, bar
 
 from contact import Case, build_problem, load_case, solve_problem
-from contact.case import parse_case
-from contact.case_mesh import Mesh
-from contact.linear import LinearOperator
-from contact.nested import coarse_solution
-from contact.problem import ContactProblem
-from contact.solution import Solution
+from contact.case.file import parse_case
+from contact.case.mesh import Mesh
+from contact.linear.operator import LinearOperator
+from contact.methods.nested import coarse_solution
+from contact.output.solution import Solution
+from contact.problem.problem import ContactProblem
 
 COMM = MPI.COMM_WORLD
 
@@ -149,10 +149,10 @@ def ratio(dimension: str, n: str, start: str) -> dict[str, Any]:
 
 def phases(dimension: str, n: str) -> dict[str, Any]:
     """Measure mesh and forms, assembly, factorisation, one solve, everything, and output."""
-    from contact.domain import make_domain
-    from contact.kkt import evaluate, residual_forces
-    from contact.output import write_outputs
-    from contact.state import Multipliers
+    from contact.mesh.make import make_domain
+    from contact.output.files import write_outputs
+    from contact.problem.kkt import evaluate, residual_forces
+    from contact.problem.state import Multipliers
 
     case = problem_case(int(dimension), int(n))
     warm(case, lambda: problem_case(int(dimension), 4))

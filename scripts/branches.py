@@ -10,16 +10,17 @@ from mpi4py import MPI
 from reporting import iterate
 
 from contact import Case, InputError, Solution
-from contact.case import Solver
-from contact.kkt import KKT, evaluate
-from contact.nested import coarse_solution, coarser_cases, prolong
-from contact.newton import Newton, NewtonOptions
-from contact.problem import ContactProblem
-from contact.projections import Array
-from contact.report import Outcome
-from contact.review import review
+from contact.case.file import Solver
+from contact.methods.nested import coarse_solution, coarser_cases, prolong
+from contact.methods.newton import Newton
+from contact.methods.options import NewtonOptions
+from contact.methods.report import Outcome
+from contact.output.review import review
+from contact.problem.kkt import KKT, evaluate
+from contact.problem.problem import ContactProblem
+from contact.problem.state import Multipliers
 from contact.solving import METHODS, Method
-from contact.state import Multipliers
+from contact.typing import Array
 
 #: Relative difference up to which two solutions are the same.
 AGREE = 1e-7

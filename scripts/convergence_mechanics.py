@@ -16,15 +16,16 @@ from matplotlib.ticker import NullFormatter
 from reporting import Report, bar, iterate, observed_orders, options, solved, subplots
 
 from contact import InputError, build_problem
-from contact.case import Case, Friction
-from contact.fields import DerivedFields
-from contact.fixed_point import FixedPoint, FixedPointOptions
-from contact.interpolate import carry, errors, errors_to
-from contact.newton import Newton, NewtonOptions
-from contact.penalty import Penalty, PenaltyOptions
-from contact.problem import ContactProblem
-from contact.projections import Array
-from contact.report import Monitor, Outcome, Record
+from contact.body.transfer import carry, errors, errors_to
+from contact.case.file import Case, Friction
+from contact.methods.fixed_point import FixedPoint
+from contact.methods.newton import Newton
+from contact.methods.options import FixedPointOptions, NewtonOptions, PenaltyOptions
+from contact.methods.penalty import Penalty
+from contact.methods.report import Monitor, Outcome, Record
+from contact.output.fields import DerivedFields
+from contact.problem.problem import ContactProblem
+from contact.typing import Array
 
 RHO = 1e4
 NORMS = ("L2", "H1", "energy")

@@ -12,11 +12,11 @@ import ufl
 from dolfinx import fem
 from mpi4py import MPI
 
-from contact.domain import box, rectangle
-from contact.foundation import GapFunction
-from contact.interpolate import Errors, errors_to
-from contact.problem import Body, Contact, ContactProblem, Fixed, Load
-from contact.projections import Array
+from contact.body.transfer import Errors, errors_to
+from contact.interface.obstacle import GapFunction
+from contact.mesh.make import box, rectangle
+from contact.problem.problem import Body, Contact, ContactProblem, Fixed, Load
+from contact.typing import Array
 from forms.hencky import Hencky, Linear, Log, stress
 from forms.kinematics import strain
 from forms.ops import cos, sin

@@ -13,11 +13,12 @@ from mpi4py import MPI
 from reporting import CASES, Report, options, solved, subplots, yielded_share
 
 from contact import Solution, build_problem, load_case
-from contact.plots_contact import draw_line
-from contact.plots_fields import Picture, draw_plane, picture
-from contact.projections import Array, project_disc
-from contact.response import NormalLaw
-from contact.table import Table, contact_table, csv_columns, tangent_of
+from contact.interface.projections import project_disc
+from contact.interface.response import NormalLaw
+from contact.output.figures.body import Picture, draw_plane, picture
+from contact.output.figures.contact import draw_line
+from contact.output.table import Table, contact_table, csv_columns, tangent_of
+from contact.typing import Array
 from forms.foundation import contact_multiplier
 from forms.laws import Compliance, PotentialFactor, RampConductivity, ShiftedConductivity
 

@@ -14,9 +14,9 @@ from mpi4py import MPI
 from reporting import Report, bar, options, solved, subplots
 
 from contact import Case, Solution
-from contact.plots_contact import draw_line
-from contact.plots_fields import draw_plane, picture
-from contact.table import Table, contact_table, csv_columns
+from contact.output.figures.body import draw_plane, picture
+from contact.output.figures.contact import draw_line
+from contact.output.table import Table, contact_table, csv_columns
 
 RHO = 1e4
 EPS = 1.05e-5

@@ -17,11 +17,11 @@ from matplotlib.figure import Figure
 from mpi4py import MPI
 from reporting import Report, observed_orders, options, subplots
 
-from contact.interpolate import carry
-from contact.plots_fields import draw_plane, picture
-from contact.problem import ContactProblem
-from contact.projections import Array
-from contact.table import contact_table
+from contact.body.transfer import carry
+from contact.output.figures.body import draw_plane, picture
+from contact.output.table import contact_table
+from contact.problem.problem import ContactProblem
+from contact.typing import Array
 from forms.kinematics import strain
 
 MU = (0.0, 0.2, 1.0)

@@ -13,11 +13,11 @@ from mpi4py import MPI
 from reporting import CASES, Report, options, solved, subplots
 
 from contact import Case, Solution, build_problem, load_case
-from contact.domain import make_domain
-from contact.norms import volume
-from contact.plots_fields import draw_plane, picture
-from contact.projections import Array
-from contact.table import contact_table
+from contact.body.norms import volume
+from contact.mesh.make import make_domain
+from contact.output.figures.body import draw_plane, picture
+from contact.output.table import contact_table
+from contact.typing import Array
 
 
 @dataclass(frozen=True)

@@ -16,10 +16,11 @@ from limit_theorem import ProductNorm
 from reporting import CASES, Report, iterate, options, subplots
 
 from contact import Case, InputError, build_problem, load_case
-from contact.fixed_point import FixedPoint, FixedPointOptions
-from contact.problem import ContactProblem
-from contact.projections import Array
-from contact.report import Record
+from contact.methods.fixed_point import FixedPoint
+from contact.methods.options import FixedPointOptions
+from contact.methods.report import Record
+from contact.problem.problem import ContactProblem
+from contact.typing import Array
 
 #: k_e of the figure.
 SHOWN = (0.1, 0.5, 1.0, 2.0)

@@ -20,11 +20,11 @@ from matplotlib.figure import Figure
 from reporting import CASES, Report, iterate, observed_orders, options, solved, subplots
 
 from contact import Case, InputError, build_problem, load_case, solve_problem
-from contact.foundation import GapFunction
-from contact.problem import Contact, ContactProblem
-from contact.projections import Array
-from contact.report import Record
-from contact.response import Layer
+from contact.interface.obstacle import GapFunction
+from contact.interface.response import Layer
+from contact.methods.report import Record
+from contact.problem.problem import Contact, ContactProblem
+from contact.typing import Array
 from forms.kinematics import strain
 from forms.laws import Compliance, PotentialFactor
 

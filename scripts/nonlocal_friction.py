@@ -12,8 +12,8 @@ from mpi4py import MPI
 from reporting import Report, bar, options, solved, subplots
 
 from contact import Solution
-from contact.interpolate import errors
-from contact.table import Table, contact_table
+from contact.body.transfer import errors
+from contact.output.table import Table, contact_table
 
 RHO = 1e4
 LOADS = (-0.005, -0.05)

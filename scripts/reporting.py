@@ -22,9 +22,9 @@ from matplotlib.figure import Figure
 from mpi4py import MPI
 
 from contact import Case, InputError, Solution, load_case, solve, solve_problem
-from contact.norms import volume
-from contact.plots import STYLE
-from contact.problem import ContactProblem
+from contact.body.norms import volume
+from contact.output.figures.figures import STYLE
+from contact.problem.problem import ContactProblem
 from forms.hencky import Log
 from forms.kinematics import deviator_squared, strain
 
@@ -121,7 +121,7 @@ def text(value: Any) -> str:
 def subplots(
     rows: int = 1, columns: int = 1, size: tuple[float, float] = (6.6, 3.0), **shared: Any
 ) -> tuple[Figure, Any]:
-    """Return a figure and its axes, in the style of `contact.plots`."""
+    """Return a figure and its axes, in the style of `contact.output.figures`."""
     figure = Figure(figsize=size)
     return figure, figure.subplots(rows, columns, **shared)
 

@@ -16,7 +16,7 @@ from pathlib import Path
 from chapters import PARTS, Part, run
 from mpi4py import MPI
 
-from contact.environment import versions
+from contact.output.environment import versions
 
 #: Longest table that is shown; longer ones are in their CSV file.
 MOST_ROWS = 45

@@ -17,9 +17,9 @@ import numpy as np
 from reporting import CASES, Report, parser, solved, subplots
 
 from contact import Case, build_problem, load_case
-from contact.electric import Reading, sensor
-from contact.problem import ContactProblem, Field, Load
-from contact.projections import Array
+from contact.output.balances import Reading, sensor
+from contact.problem.problem import ContactProblem, Field, Load
+from contact.typing import Array
 
 #: Multiples of the case's load.
 FACTORS = (0.25, 0.5, 0.75, 1.0, 1.5, 2.0, 2.5, 3.0)

@@ -15,7 +15,7 @@ from mpi4py import MPI
 from reporting import Report, parser
 
 from contact import build_problem, solve_problem
-from contact.case import Case, parse_case
+from contact.case.file import Case, parse_case
 
 METHODS = ("newton", "uzawa")
 #: How many problems of each family; --coarse takes a tenth.

@@ -12,10 +12,10 @@ import numpy as np
 from reporting import Report, bar, iterate, observed_orders, options, solved, subplots
 
 from contact import Case, InputError, build_problem, solve_problem
-from contact.case import Friction
-from contact.interpolate import errors
-from contact.problem import ContactProblem
-from contact.solution import Solution
+from contact.body.transfer import errors
+from contact.case.file import Friction
+from contact.output.solution import Solution
+from contact.problem.problem import ContactProblem
 
 LOADS = (-0.005, -0.05)
 EPS = (1e-2, 1e-3, 1e-4, 1e-5)

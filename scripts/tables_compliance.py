@@ -11,8 +11,8 @@ import numpy as np
 from reporting import CASES, Report, options
 
 from contact import Case, Solution, build_problem, load_case, solve_problem
-from contact.domain import Domain
-from contact.problem import ContactProblem
+from contact.mesh.make import Domain
+from contact.problem.problem import ContactProblem
 
 #: mu = k_e -> iterations of the thesis.
 THESIS: Mapping[float, int] = {

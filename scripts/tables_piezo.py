@@ -12,12 +12,12 @@ from reporting import CASES, Report, options, yielded_share
 from tables_compliance import difference, iterations, run
 
 from contact import Case, Solution, build_problem, load_case
-from contact.electric import charge_balance, force_balance
-from contact.kkt import residual_forces
-from contact.linear import LinearOperator
-from contact.problem import ContactProblem
-from contact.state import Multipliers, nodal_iterate
-from contact.uzawa import augmentation, automatic_r
+from contact.linear.operator import LinearOperator
+from contact.methods.uzawa import augmentation, automatic_r
+from contact.output.balances import charge_balance, force_balance
+from contact.problem.kkt import residual_forces
+from contact.problem.problem import ContactProblem
+from contact.problem.state import Multipliers, nodal_iterate
 
 PHI_F = (0, 1, 2, 4, 8, 16, 32)
 K_E = (0.0, 1e-3, 1e-2, 1e-1, 1.0)

@@ -7,9 +7,9 @@ from helpers import constant, flat
 from mpi4py import MPI
 from scipy.optimize import brentq
 
-from contact.domain import box, rectangle
-from contact.problem import Body, Contact, ContactProblem, Fixed, Load
-from contact.response import Conductor, Layer
+from contact.interface.response import Conductor, Layer
+from contact.mesh.make import box, rectangle
+from contact.problem.problem import Body, Contact, ContactProblem, Fixed, Load
 from forms.hencky import Linear
 from forms.laws import (
     Compliance,

@@ -7,13 +7,14 @@ import numpy as np
 import ufl
 from mpi4py import MPI
 
-from contact.domain import Domain, Piece, box, rectangle
-from contact.fixed_point import FixedPoint, FixedPointOptions
-from contact.foundation import GapFunction, Plane
-from contact.problem import Body, Contact, ContactProblem, Fixed, Friction, Load
-from contact.projections import Array
-from contact.report import Outcome
-from contact.state import nodal_iterate
+from contact.interface.obstacle import GapFunction, Plane
+from contact.mesh.make import Domain, Piece, box, rectangle
+from contact.methods.fixed_point import FixedPoint
+from contact.methods.options import FixedPointOptions
+from contact.methods.report import Outcome
+from contact.problem.problem import Body, Contact, ContactProblem, Fixed, Friction, Load
+from contact.problem.state import nodal_iterate
+from contact.typing import Array
 from forms.hencky import Hencky, Linear, Log
 from forms.laws import FrictionCoefficient, SlipCoefficient
 

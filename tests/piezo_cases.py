@@ -7,10 +7,10 @@ import numpy as np
 from helpers import Affine, affine_vector, constant, flat, turn
 from mpi4py import MPI
 
-from contact.domain import box, rectangle
-from contact.problem import Body, Contact, ContactProblem, Fixed, Friction, Load
-from contact.projections import Array
-from contact.response import Conductor
+from contact.interface.response import Conductor
+from contact.mesh.make import box, rectangle
+from contact.problem.problem import Body, Contact, ContactProblem, Fixed, Friction, Load
+from contact.typing import Array
 from forms.hencky import Hencky, Linear, Log
 from forms.laws import (
     ConstantCoefficient,

@@ -11,15 +11,15 @@ import types
 import numpy as np
 import pytest
 
-from contact import reference
-from contact.__main__ import main, parse
-from contact.case import Case, SlipLaw, Sphere, load_case, parse_case
-from contact.case_messages import keys_of
-from contact.case_text import to_toml
-from contact.case_types import sections_of
-from contact.environment import identify
+from contact.case import reference
+from contact.case.file import Case, SlipLaw, Sphere, load_case, parse_case
+from contact.case.formula import Expression
+from contact.case.messages import keys_of
+from contact.case.text import to_toml
+from contact.case.types import sections_of
+from contact.cli.main import main, parse
 from contact.errors import InputError
-from contact.expressions import Expression
+from contact.output.environment import identify
 
 BAR = """\
 title = "Bar on a rigid foundation"
@@ -448,7 +448,7 @@ def test_every_key_is_described():
 
 
 def test_the_reference_page_is_up_to_date():
-    assert reference.PAGE.read_text() == reference.page(), "run python3 -m contact.reference"
+    assert reference.PAGE.read_text() == reference.page(), "run python3 -m contact.case.reference"
 
 
 def test_petsc_options_are_told_from_ours():
@@ -493,9 +493,9 @@ def test_bad_command_lines_leave_with_status_2(bar, capsys, monkeypatch, line, f
 @pytest.mark.parametrize(("limit", "status"), [(100, 0), (1, 1)])
 def test_exit_status_and_outputs_of_a_solve(bar, capsys, monkeypatch, limit, status):
     written = []
-    output = types.ModuleType("contact.output")
+    output = types.ModuleType("contact.output.files")
     output.write_outputs = lambda solution, out: written.append((solution.converged, out))
-    monkeypatch.setitem(sys.modules, "contact.output", output)
+    monkeypatch.setitem(sys.modules, "contact.output.files", output)
     changes = ["--set", "solver.method=uzawa", "--set", f"solver.max_outer={limit}"]
     assert main(["solve", str(bar), "--out", str(bar.parent / "out"), *changes]) == status
     assert written == [(status == 0, bar.parent / "out")]
@@ -509,11 +509,11 @@ def test_exit_status_and_outputs_of_a_solve(bar, capsys, monkeypatch, limit, sta
 def test_a_signal_before_the_solve_ends_the_run_in_words(
     bar, capsys, monkeypatch, stage, number, status
 ):
-    import contact.nested
+    import contact.methods.nested
     import contact.solving
 
     before = [signal.getsignal(ending) for ending in (signal.SIGINT, signal.SIGTERM)]
-    where = contact.solving if stage == "setup" else contact.nested
+    where = contact.solving if stage == "setup" else contact.methods.nested
     monkeypatch.setattr(where, "build_problem", lambda *_, **__: signal.raise_signal(number))
     out = bar.parent / "out"
     nested = ["--set", "solver.nested=true", "--set", "mesh.cells=[32, 8]"]
@@ -526,7 +526,7 @@ def test_a_signal_before_the_solve_ends_the_run_in_words(
 @pytest.mark.parametrize("place", ["swallowed", "held"])
 def test_no_signal_is_lost(bar, capsys, monkeypatch, place):
     """Libraries may swallow an exception, and those that are being loaded would not survive one."""
-    import contact.__main__ as command
+    import contact.cli.main as command
     import contact.solving
 
     load, build = command.load_case, contact.solving.build_problem
@@ -565,7 +565,7 @@ def test_too_little_memory_is_said_in_words(bar, capsys, monkeypatch):
 
 @pytest.mark.parametrize(("number", "status"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
 def test_a_signal_in_a_solve_keeps_what_there_is(bar, capsys, monkeypatch, number, status):
-    from contact.report import History
+    from contact.methods.report import History
 
     add = History.add
 

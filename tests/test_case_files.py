@@ -9,7 +9,7 @@ import pytest
 from mpi4py import MPI
 from petsc4py import PETSc
 
-from contact.__main__ import BAD_INPUT, CONVERGED, NOT_CONVERGED, main
+from contact.cli.main import BAD_INPUT, CONVERGED, NOT_CONVERGED, main
 
 FIXTURES = Path(__file__).parent.parent / "meshes" / "fixtures"
 

@@ -15,14 +15,15 @@ from mpi4py import MPI
 
 from contact import InputError
 from contact import solve as solve_case
-from contact.case import Solver
-from contact.domain import box, rectangle
-from contact.fixed_point import FixedPoint
-from contact.newton import Newton, NewtonOptions
-from contact.problem import Body, Contact, ContactProblem, Fixed, Friction
-from contact.response import Conductor, FoundationResponse, Layer
-from contact.state import nodal_iterate
-from contact.trace import ContactTrace
+from contact.case.file import Solver
+from contact.interface.nodes import ContactTrace
+from contact.interface.response import Conductor, FoundationResponse, Layer
+from contact.mesh.make import box, rectangle
+from contact.methods.fixed_point import FixedPoint
+from contact.methods.newton import Newton
+from contact.methods.options import NewtonOptions
+from contact.problem.problem import Body, Contact, ContactProblem, Fixed, Friction
+from contact.problem.state import nodal_iterate
 from forms.foundation import compliance
 from forms.hencky import Linear
 from forms.laws import (

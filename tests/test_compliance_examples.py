@@ -11,10 +11,10 @@ import pytest
 from mpi4py import MPI
 
 from contact import InputError, Solution, build_problem, load_case, solve, solve_problem
-from contact.expressions import Expression
-from contact.problem import ContactProblem, Friction
-from contact.response import Layer
-from contact.table import contact_table
+from contact.case.formula import Expression
+from contact.interface.response import Layer
+from contact.output.table import contact_table
+from contact.problem.problem import ContactProblem, Friction
 from forms.laws import Compliance, PotentialFactor, SlipCoefficient
 
 CASES = Path(__file__).parents[1] / "scripts/cases"

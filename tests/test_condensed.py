@@ -6,12 +6,13 @@ from dolfinx.fem.petsc import assemble_matrix, create_matrix
 from mpi4py import MPI
 from petsc4py import PETSc
 
-from contact import condensed
-from contact.kkt import evaluate
-from contact.linear import Counters, LinearOperator
-from contact.newton import Newton, NewtonOptions
-from contact.problem import ContactProblem, Friction
-from contact.schur import SchurComplement
+from contact.linear.operator import Counters, LinearOperator
+from contact.linear.schur import SchurComplement
+from contact.methods.newton import Newton
+from contact.methods.options import NewtonOptions
+from contact.problem import condensed
+from contact.problem.kkt import evaluate
+from contact.problem.problem import ContactProblem, Friction
 from forms.hencky import Linear
 from forms.laws import ConstantCoefficient
 from tests import helpers

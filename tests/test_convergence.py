@@ -19,8 +19,8 @@ import table_7_2
 from helpers import bar
 from reporting import Report, subplots
 
-from contact.domain import rectangle, refined
-from contact.interpolate import carry, errors
+from contact.body.transfer import carry, errors
+from contact.mesh.make import rectangle, refined
 from forms.hencky import energy_density
 from forms.kinematics import strain
 

@@ -7,9 +7,9 @@ from dolfinx import fem
 from dolfinx import mesh as dmesh
 from mpi4py import MPI
 
-from contact.case_mesh import Mesh as MeshSection
-from contact.domain import Piece, box, from_mesh, make_domain, rectangle, refined
+from contact.case.mesh import Mesh as MeshSection
 from contact.errors import InputError
+from contact.mesh.make import Piece, box, from_mesh, make_domain, rectangle, refined
 
 COMM = MPI.COMM_WORLD
 

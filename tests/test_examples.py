@@ -6,8 +6,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from contact.__main__ import CONVERGED, main
-from contact.case import load_case
+from contact.case.file import load_case
+from contact.cli.main import CONVERGED, main
 from contact.solving import solve
 
 CASES = Path(__file__).parent.parent / "scripts" / "cases"

@@ -4,10 +4,11 @@ import numpy as np
 from mpi4py import MPI
 from piezo_cases import example, potential
 
-from contact.fixed_point import FixedPoint, FixedPointOptions
-from contact.following import Following
-from contact.newton import Newton, NewtonOptions
-from contact.problem import Friction
+from contact.methods.fixed_point import FixedPoint
+from contact.methods.following import Following
+from contact.methods.newton import Newton
+from contact.methods.options import FixedPointOptions, NewtonOptions
+from contact.problem.problem import Friction
 from forms.laws import SlipCoefficient
 
 

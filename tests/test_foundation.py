@@ -7,13 +7,13 @@ from dolfinx import fem
 from helpers import bar, flat, leaning_block
 from mpi4py import MPI
 
-from contact.domain import box, rectangle
 from contact.errors import InputError
-from contact.foundation import GapFunction, Plane, Sphere
-from contact.problem import Contact, ContactProblem, Friction
-from contact.regularised import Lagged, Regularisation
-from contact.state import nodal_iterate
-from contact.uzawa import augmentation
+from contact.interface.obstacle import GapFunction, Plane, Sphere
+from contact.interface.penalised import Lagged, Regularisation
+from contact.mesh.make import box, rectangle
+from contact.methods.uzawa import augmentation
+from contact.problem.problem import Contact, ContactProblem, Friction
+from contact.problem.state import nodal_iterate
 from forms import foundation as forms
 from forms.laws import ConstantCoefficient
 

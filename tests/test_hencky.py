@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 from mpi4py import MPI
 from scipy.integrate import quad
 
-from contact.linear import LinearOperator
-from contact.problem import Body, Contact, ContactProblem, Fixed
+from contact.linear.operator import LinearOperator
+from contact.problem.problem import Body, Contact, ContactProblem, Fixed
 from forms.hencky import (
     Linear,
     Log,

@@ -13,7 +13,7 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "scripts"))
 
 import hertz
 
-from contact.case_contact import Sphere
+from contact.case.interface import Sphere
 
 
 @pytest.mark.parallel

@@ -7,12 +7,12 @@ import pytest
 from helpers import attempt, bar, constant, contact_data, flat, leaning_block, solve, turn
 from mpi4py import MPI
 
-from contact.case import parse_case
-from contact.domain import rectangle
-from contact.kkt import KKT, evaluate
-from contact.problem import Body, Contact, ContactProblem, Fixed, Friction, Load
+from contact.case.file import parse_case
+from contact.mesh.make import rectangle
+from contact.problem.kkt import KKT, evaluate
+from contact.problem.problem import Body, Contact, ContactProblem, Fixed, Friction, Load
+from contact.problem.state import Multipliers, bound_of, nodal_iterate
 from contact.solving import solve as solve_case
-from contact.state import Multipliers, bound_of, nodal_iterate
 from forms.hencky import Log
 from forms.laws import SlipCoefficient
 

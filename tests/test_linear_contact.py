@@ -7,10 +7,11 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from contact.linear import LinearOperator
-from contact.newton import Newton, NewtonOptions
-from contact.problem import ContactProblem
-from contact.projections import Array
+from contact.linear.operator import LinearOperator
+from contact.methods.newton import Newton
+from contact.methods.options import NewtonOptions
+from contact.problem.problem import ContactProblem
+from contact.typing import Array
 
 SELF, WORLD = MPI.COMM_SELF, MPI.COMM_WORLD
 GAMMA, MU = 1e4, 0.4

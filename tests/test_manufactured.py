@@ -12,9 +12,10 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "scripts"))
 
 from exact_solutions import HENCKY, Singular, exact, manufactured
 
-from contact.fields import DerivedFields
-from contact.interpolate import errors_to
-from contact.newton import Newton, NewtonOptions
+from contact.body.transfer import errors_to
+from contact.methods.newton import Newton
+from contact.methods.options import NewtonOptions
+from contact.output.fields import DerivedFields
 
 
 def solve(problem):

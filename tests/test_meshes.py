@@ -12,8 +12,8 @@ from dolfinx import mesh as dmesh
 from mpi4py import MPI
 
 import meshes
-from contact.domain import from_msh, from_recipe
 from contact.errors import InputError
+from contact.mesh.make import from_msh, from_recipe
 from meshes.__main__ import main
 
 COMM = MPI.COMM_WORLD

@@ -7,17 +7,18 @@ import pytest
 from mpi4py import MPI
 
 from contact.build import build_problem
-from contact.case import parse_case
+from contact.case.file import parse_case
 from contact.errors import InputError
-from contact.fixed_point import FixedPoint, FixedPointOptions
-from contact.kkt import KKT, evaluate
-from contact.nested import coarser_cases
-from contact.newton import Newton, NewtonOptions
-from contact.newton_laws import CLOSED, FREE, SLIDES, STICKS, Moduli, linearise
-from contact.problem import ContactProblem, Friction
-from contact.report import Outcome
+from contact.interface.linearised import CLOSED, FREE, SLIDES, STICKS, Moduli, linearise
+from contact.methods.fixed_point import FixedPoint
+from contact.methods.nested import coarser_cases
+from contact.methods.newton import Newton
+from contact.methods.options import FixedPointOptions, NewtonOptions
+from contact.methods.report import Outcome
+from contact.problem.kkt import KKT, evaluate
+from contact.problem.problem import ContactProblem, Friction
+from contact.problem.state import Multipliers, nodal_iterate
 from contact.solving import solve
-from contact.state import Multipliers, nodal_iterate
 from forms.hencky import Linear, Log
 from forms.laws import ConstantCoefficient, SlipCoefficient
 from tests import helpers

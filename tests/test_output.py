@@ -12,17 +12,17 @@ import pytest
 from mpi4py import MPI
 
 from contact.build import build_problem
-from contact.case import Case, parse_case
-from contact.case_solver import Output, Solver
-from contact.fields import DerivedFields
-from contact.kkt import evaluate
-from contact.linear import LinearOperator
-from contact.output import write_outputs
-from contact.plots import write_figures
-from contact.report import Record
-from contact.solution import Solution
+from contact.case.file import Case, parse_case
+from contact.case.solver import Output, Solver
+from contact.linear.operator import LinearOperator
+from contact.methods.report import Record
+from contact.output.fields import DerivedFields
+from contact.output.figures.figures import write_figures
+from contact.output.files import write_outputs
+from contact.output.solution import Solution
+from contact.output.table import contact_table, csv_columns, held_points, tangent_of
+from contact.problem.kkt import evaluate
 from contact.solving import solve, solve_problem
-from contact.table import contact_table, csv_columns, held_points, tangent_of
 
 # Debian's adios2 would take its serial library in a run without mpirun.
 os.environ.setdefault("ADIOS2_ALWAYS_USE_MPI", "1")
@@ -268,7 +268,7 @@ def test_derived_fields_of_a_known_strain(degree: int) -> None:
 def test_checkpoint(kind: str, shared_tmp_path: Path) -> None:
     """A problem built on a checkpoint and restored from it is solved already."""
     pytest.importorskip("adios4dolfinx", exc_type=ImportError)
-    from contact.checkpoint import read_checkpoint
+    from contact.output.checkpoint import read_checkpoint
 
     case = electric(2) if kind == "piezoelectric" else block(2, int(kind[1]))
     solution = solve(case)
@@ -283,7 +283,7 @@ def test_checkpoint(kind: str, shared_tmp_path: Path) -> None:
 
 def test_outputs_are_replaced(shared_tmp_path: Path) -> None:
     """A second run into the same folder leaves its own files alone, and what is not ours."""
-    from contact.plots import write_figures
+    from contact.output.figures.figures import write_figures
 
     first, second = solve(block(2)), solve(block(2, 2))
     first.output = Output(fields="xdmf")
@@ -306,7 +306,7 @@ def test_outputs_are_replaced(shared_tmp_path: Path) -> None:
 @pytest.mark.parametrize("dim", [2, 3])
 def test_figures(dim: int, shared_tmp_path: Path) -> None:
     """All figures are drawn."""
-    from contact.plots import write_figures
+    from contact.output.figures.figures import write_figures
 
     if dim == 3:
         pytest.importorskip("pyvista")
@@ -321,8 +321,8 @@ def test_figures(dim: int, shared_tmp_path: Path) -> None:
 
 def test_figures_begin_at_the_edge_of_the_body() -> None:
     """The clamped corner is no contact node, but the axis and the foundation reach it."""
-    from contact.plots_contact import draw_line
-    from contact.plots_fields import draw_plane, picture
+    from contact.output.figures.body import draw_plane, picture
+    from contact.output.figures.contact import draw_line
 
     case = block(
         2,

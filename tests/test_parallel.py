@@ -7,9 +7,9 @@ from helpers import bar, constant, contact_data, flat, leaning_block, pressed_bl
 from mpi4py import MPI
 
 from contact._compat import geometry_dofmap
-from contact.domain import Piece, from_mesh, rectangle
-from contact.problem import Body, Contact, ContactProblem, Fixed, Friction, Load
-from contact.smoothing import Smoothing
+from contact.interface.smoothing import Smoothing
+from contact.mesh.make import Piece, from_mesh, rectangle
+from contact.problem.problem import Body, Contact, ContactProblem, Fixed, Friction, Load
 from forms.hencky import Log
 from forms.laws import SlipCoefficient
 

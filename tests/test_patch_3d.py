@@ -5,8 +5,8 @@ import pytest
 from helpers import SlidingBlock, contact_data, flat, pressed_block, solve
 from mpi4py import MPI
 
-from contact.domain import rectangle
-from contact.problem import Body, Contact, ContactProblem, Fixed
+from contact.mesh.make import rectangle
+from contact.problem.problem import Body, Contact, ContactProblem, Fixed
 from forms.hencky import Linear
 from forms.laws import ConstantCoefficient
 

@@ -6,16 +6,18 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from contact import domain, solve
-from contact.case import parse_case
+from contact import solve
+from contact.case.file import parse_case
+from contact.case.formula import Expression
 from contact.errors import InputError
-from contact.expressions import Expression
-from contact.fixed_point import FixedPoint, FixedPointOptions
-from contact.foundation import GapFunction, Plane
-from contact.penalty import Penalty, PenaltyOptions
-from contact.problem import Body, Contact, ContactProblem, Fixed, Friction, Load
-from contact.regularised import Implicit, Lagged, Regularisation
-from contact.state import nodal_iterate
+from contact.interface.obstacle import GapFunction, Plane
+from contact.interface.penalised import Implicit, Lagged, Regularisation
+from contact.mesh import make as domain
+from contact.methods.fixed_point import FixedPoint
+from contact.methods.options import FixedPointOptions, PenaltyOptions
+from contact.methods.penalty import Penalty
+from contact.problem.problem import Body, Contact, ContactProblem, Fixed, Friction, Load
+from contact.problem.state import nodal_iterate
 from forms.hencky import Linear, Log
 from forms.laws import ConstantCoefficient, SlipCoefficient
 

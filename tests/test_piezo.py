@@ -17,12 +17,13 @@ from piezo_cases import (
 )
 
 from contact.build import piezo
-from contact.case_body import Piezo as PiezoSection
-from contact.electric import charge_balance, force_balance, mean_potential, sensor
+from contact.case.body import Piezo as PiezoSection
 from contact.errors import InputError
-from contact.fixed_point import FixedPoint, FixedPointOptions
-from contact.newton import Newton, NewtonOptions
-from contact.problem import Friction
+from contact.methods.fixed_point import FixedPoint
+from contact.methods.newton import Newton
+from contact.methods.options import FixedPointOptions, NewtonOptions
+from contact.output.balances import charge_balance, force_balance, mean_potential, sensor
+from contact.problem.problem import Friction
 from forms.laws import (
     PerfectConductivity,
     RampConductivity,
@@ -357,7 +358,7 @@ def test_global_balances(cells, law):
 def test_given_charges_balance():
     from helpers import constant
 
-    from contact.problem import Load
+    from contact.problem.problem import Load
 
     problem = example(COMM, (8, 4), k_e=0.5)
     problem.body.loads.append(Load("right", charge=constant(0.7, 2)))

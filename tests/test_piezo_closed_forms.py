@@ -5,8 +5,9 @@ import pytest
 from mpi4py import MPI
 from piezo_cases import PERMITTIVITY, SCALED, SI, Column, potential
 
-from contact.fixed_point import FixedPoint, FixedPointOptions
-from contact.problem import ContactProblem
+from contact.methods.fixed_point import FixedPoint
+from contact.methods.options import FixedPointOptions
+from contact.problem.problem import ContactProblem
 
 COMM = MPI.COMM_WORLD
 TIGHT = FixedPointOptions(tolerance=1e-12)

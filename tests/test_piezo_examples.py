@@ -7,13 +7,14 @@ import pytest
 from mpi4py import MPI
 from piezo_cases import SCALED, SI, Column, example, hencky, potential
 
-from contact.electric import charge_balance
-from contact.fixed_point import FixedPoint, FixedPointOptions
-from contact.kkt import residual_forces
-from contact.linear import LinearOperator
-from contact.problem import Friction
-from contact.state import Multipliers, nodal_iterate
-from contact.uzawa import augmentation, automatic_r
+from contact.linear.operator import LinearOperator
+from contact.methods.fixed_point import FixedPoint
+from contact.methods.options import FixedPointOptions
+from contact.methods.uzawa import augmentation, automatic_r
+from contact.output.balances import charge_balance
+from contact.problem.kkt import residual_forces
+from contact.problem.problem import Friction
+from contact.problem.state import Multipliers, nodal_iterate
 from forms.laws import ConstantCoefficient, SlipCoefficient
 
 COMM = MPI.COMM_WORLD

@@ -12,9 +12,10 @@ from helpers import flat
 from mpi4py import MPI
 from piezo_cases import POISSON, SCALED, YOUNG, pzt
 
-from contact.domain import box, rectangle
-from contact.fixed_point import FixedPoint, FixedPointOptions
-from contact.problem import Body, Contact, ContactProblem, Fixed, Load
+from contact.mesh.make import box, rectangle
+from contact.methods.fixed_point import FixedPoint
+from contact.methods.options import FixedPointOptions
+from contact.problem.problem import Body, Contact, ContactProblem, Fixed, Load
 from forms.hencky import Hencky, Log, stress
 from forms.kinematics import strain
 from forms.ops import cos, sin

@@ -7,9 +7,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from mpi4py import MPI
 
-from contact.domain import rectangle
-from contact.problem import Body, Contact, ContactProblem, Fixed, Friction
-from contact.smoothing import Smoothing
+from contact.interface.smoothing import Smoothing
+from contact.mesh.make import rectangle
+from contact.problem.problem import Body, Contact, ContactProblem, Fixed, Friction
 from forms.hencky import Linear
 from forms.laws import ConstantCoefficient
 

@@ -6,10 +6,10 @@ from dolfinx import mesh
 from helpers import bar, constant, contact_data, flat, leaning_block, solve, turn
 from mpi4py import MPI
 
-from contact.domain import from_mesh, rectangle, refined
 from contact.errors import InputError
-from contact.foundation import GapFunction, Plane, Sphere
-from contact.problem import Body, Contact, ContactProblem, Fixed, Friction, Load
+from contact.interface.obstacle import GapFunction, Plane, Sphere
+from contact.mesh.make import from_mesh, rectangle, refined
+from contact.problem.problem import Body, Contact, ContactProblem, Fixed, Friction, Load
 from forms.hencky import Linear
 from forms.laws import ConstantCoefficient
 

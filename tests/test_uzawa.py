@@ -5,11 +5,12 @@ import pytest
 from helpers import Affine, attempt, bar, contact_data, flat, pressed_block, solve
 from mpi4py import MPI
 
-from contact.acceleration import ResidualMinimiser
-from contact.fixed_point import FixedPoint, FixedPointOptions
-from contact.problem import Body, Contact, ContactProblem, Friction
-from contact.projections import disc_derivative, project_disc, project_half_line
-from contact.uzawa import automatic_r
+from contact.interface.projections import disc_derivative, project_disc, project_half_line
+from contact.methods.acceleration import ResidualMinimiser
+from contact.methods.fixed_point import FixedPoint
+from contact.methods.options import FixedPointOptions
+from contact.methods.uzawa import automatic_r
+from contact.problem.problem import Body, Contact, ContactProblem, Friction
 from forms.hencky import Linear, Log
 from forms.laws import ConstantCoefficient
 

@@ -1,0 +1,4 @@
+"""The case file: models of its tables, what they accept, messages, and the reference page.
+
+Imports: the options of `contact.methods` and of `contact.output`; nothing is built or solved here.
+"""

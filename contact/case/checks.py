@@ -1,0 +1,150 @@
+"""Checks of a case that concern several sections, with and without the mesh."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterable, Iterator
+from typing import TYPE_CHECKING, Any
+
+from contact.case.body import Piezo
+from contact.case.formula import Expression
+from contact.case.interface import Plane, Sphere
+from contact.case.types import Words, fault
+
+if TYPE_CHECKING:
+    from contact.case.file import Case
+
+
+def check_sections(case: Case) -> None:
+    """Raise a fault if sections contradict each other."""
+    if case.material.piezo is None:
+        _check_mechanical(case)
+    else:
+        _check_potential(case)
+    if not any(
+        component != "free" for fixed in case.fixed for component in fixed.displacement or ()
+    ):
+        raise fault("fixed", Words("no displacement fixed"), "at least one component on a part")
+    _check_contradictions(case)
+    _check_lagged(case)
+    for i, fixed in enumerate(case.fixed):
+        if fixed.on == case.contact.on and fixed.is_clamped:
+            raise fault("contact.on", case.contact.on, f"a part that fixed.{i} does not fix wholly")
+    if case.mesh.dimension is not None:
+        _check_vectors(case, case.mesh.dimension)
+        _check_parts(case, [*case.mesh.sides, *case.mesh.parts])
+
+
+def check_mesh(case: Case, dimension: int, parts: Iterable[str]) -> None:
+    """Raise a fault if a case does not fit its mesh."""
+    _check_vectors(case, dimension)
+    _check_parts(case, list(parts))
+
+
+def _check_mechanical(case: Case) -> None:
+    """Nothing electric without piezoelectric constants."""
+    accepted = "electric quantities with [material.piezo] only"
+    for i, fixed in enumerate(case.fixed):
+        if fixed.potential is not None:
+            raise fault(f"fixed.{i}.potential", fixed.potential.source, accepted)
+    for i, load in enumerate(case.load):
+        for key in ("charge", "body_charge"):
+            if getattr(load, key) is not None:
+                raise fault(f"load.{i}.{key}", getattr(load, key).source, accepted)
+    if case.electric is not None:
+        raise fault("electric", Words("given a table"), accepted)
+
+
+def _check_lagged(case: Case) -> None:
+    """Newton's method linearises layer and current; it has no previous outer iteration."""
+    for key, section in (("contact", case.contact), ("electric", case.electric)):
+        if section is not None and section.lagged and case.solver.method == "newton":
+            accepted = 'lagged with solver.method = "uzawa" or "penalty"'
+            raise fault(f"{key}.lagged", section.lagged, accepted)
+
+
+def _check_potential(case: Case) -> None:
+    """Without a fixed value the potential is known but for a constant."""
+    grounded = any(fixed.potential is not None for fixed in case.fixed)
+    conductive = case.electric is not None and case.electric.k_e > 0
+    if not grounded and not conductive:
+        raise fault(
+            "fixed",
+            Words("no potential fixed"),
+            "a potential on at least one part, or [electric] with k_e > 0",
+        )
+
+
+def _check_contradictions(case: Case) -> None:
+    """Two tables may not prescribe different values for one quantity of a part."""
+    seen: dict[tuple[str, Any], tuple[int, Expression]] = {}
+    for i, fixed in enumerate(case.fixed):
+        given: list[tuple[Any, str, Any]] = [
+            (k, f"displacement.{k}", c) for k, c in enumerate(fixed.displacement or ())
+        ]
+        given.append(("potential", "potential", fixed.potential))
+        for quantity, path, value in given:
+            if value is None or value == "free":
+                continue
+            first, other = seen.setdefault((fixed.on, quantity), (i, value))
+            if other != value:
+                raise fault(
+                    f"fixed.{i}.{path}",
+                    value.source,
+                    f"{other}, as fixed.{first} has on the same part {fixed.on}",
+                )
+
+
+def _vectors(case: Case) -> Iterator[tuple[str, tuple[Any, ...] | None]]:
+    for i, fixed in enumerate(case.fixed):
+        yield f"fixed.{i}.displacement", fixed.displacement
+    for i, load in enumerate(case.load):
+        yield f"load.{i}.traction", load.traction
+        yield f"load.{i}.body_force", load.body_force
+    match case.contact.foundation:
+        case Plane() as plane:
+            yield "contact.foundation.point", plane.point
+            yield "contact.foundation.normal", plane.normal
+        case Sphere() as sphere:
+            yield "contact.foundation.centre", sphere.centre
+
+
+def _formulas(case: Case) -> Iterator[tuple[str, Any]]:
+    for path, vector in _vectors(case):
+        yield from ((f"{path}.{k}", component) for k, component in enumerate(vector or ()))
+    for i, fixed in enumerate(case.fixed):
+        yield f"fixed.{i}.potential", fixed.potential
+    for i, load in enumerate(case.load):
+        for key in ("pressure", "charge", "body_charge"):
+            yield f"load.{i}.{key}", getattr(load, key)
+    yield "contact.gap", case.contact.gap
+    yield "friction.bound", case.friction.bound
+    yield "friction.mu", case.friction.mu
+
+
+def _check_vectors(case: Case, dimension: int) -> None:
+    """Vectors have as many components as space, and the plane has no z."""
+    for path, vector in _vectors(case):
+        if vector is not None and len(vector) != dimension:
+            given = [v.source if isinstance(v, Expression) else v for v in vector]
+            raise fault(path, given, f"{dimension} components in {dimension}-D")
+    for path, formula in _formulas(case):
+        if isinstance(formula, Expression) and dimension == 2 and "z" in formula.names:
+            raise fault(path, formula.source, "formulas in x and y in the plane")
+    if dimension == 2 and case.mesh.axis is not None:
+        raise fault("mesh.axis", case.mesh.axis, "no axis in the plane")
+    piezo = case.material.piezo
+    if isinstance(piezo, Piezo) and piezo.poling is not None:
+        if isinstance(piezo.poling, tuple) != (dimension == 3):
+            accepted = "an angle in the plane" if dimension == 2 else "3 numbers in space"
+            raise fault("material.piezo.poling", piezo.poling, accepted)
+
+
+def _check_parts(case: Case, parts: list[str]) -> None:
+    used = [(f"fixed.{i}.on", fixed.on) for i, fixed in enumerate(case.fixed)]
+    used += [(f"load.{i}.on", load.on) for i, load in enumerate(case.load) if load.on is not None]
+    for path, name in [*used, ("contact.on", case.contact.on)]:
+        if name not in parts:
+            near = difflib.get_close_matches(name, parts, n=1)
+            hint = f" (did you mean {near[0]}?)" if near else ""
+            raise fault(path, name, f"a part of the mesh: {', '.join(sorted(parts))}{hint}")

@@ -1,0 +1,171 @@
+"""The case file: one TOML file that says all about a problem and how to solve it.
+
+`load_case` reads a file, `parse_case` a dictionary. Every mistake is reported as one
+`contact.errors.InputError` that names the file, the key, what was given and what is accepted.
+"""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import Annotated, Any
+
+from pydantic import Field, PrivateAttr, ValidationError, model_validator
+from pydantic_core import PydanticCustomError
+
+from contact.case.body import Fixed, Load, Material, Piezo, Space
+from contact.case.checks import check_mesh, check_sections
+from contact.case.formula import Expression
+from contact.case.interface import Contact, Electric, Friction, Plane, SlipLaw, Sphere
+from contact.case.mesh import Mesh, Piece
+from contact.case.messages import describe, describe_fault
+from contact.case.overrides import override
+from contact.case.solver import DEFAULT_METHOD, Output, Solver
+from contact.case.types import Accepted, Section, Text, as_tuple
+from contact.errors import InputError
+
+__all__ = [
+    "DEFAULT_METHOD",
+    "Case",
+    "Contact",
+    "Electric",
+    "Expression",
+    "Fixed",
+    "Friction",
+    "Load",
+    "Material",
+    "Mesh",
+    "Output",
+    "Piece",
+    "Piezo",
+    "Plane",
+    "SlipLaw",
+    "Solver",
+    "Space",
+    "Sphere",
+    "load_case",
+    "parse_case",
+]
+
+
+class Case(Section):
+    """A case file."""
+
+    title: Text = Field(default="", description="Title, for reports and figures.")
+    mesh: Mesh = Field(description="The body: `[mesh]`.")
+    space: Space = Field(default=Space(), description="Finite elements: `[space]`.")
+    material: Material = Field(description="The material: `[material]`.")
+    fixed: Annotated[
+        tuple[Fixed, ...],
+        Field(min_length=1),
+        as_tuple,
+        Accepted("one or more tables [[fixed]]"),
+    ] = Field(description="Supports and electrodes: one or more `[[fixed]]`.")
+    load: Annotated[tuple[Load, ...], as_tuple, Accepted("tables [[load]]")] = Field(
+        default=(), description="Forces and charges: any number of `[[load]]`."
+    )
+    contact: Contact = Field(description="The foundation: `[contact]`.")
+    friction: Friction = Field(
+        default=Friction(), description="Friction: `[friction]`. Default: none."
+    )
+    electric: Electric | None = Field(
+        default=None, description="Conductive foundation: `[electric]`. Absent: insulated."
+    )
+    solver: Solver = Field(default=Solver(), description="Method and tolerances: `[solver]`.")
+    output: Output = Field(default=Output(), description="What is written: `[output]`.")
+
+    _source: str = PrivateAttr("case")
+
+    @property
+    def source(self) -> str:
+        """Name of the file that the case was read from, for messages."""
+        return self._source
+
+    @model_validator(mode="after")
+    def _check(self) -> Case:
+        check_sections(self)
+        return self
+
+    def check_mesh(self, dimension: int, parts: Iterable[str]) -> None:
+        """Check what only the mesh can tell: names of parts, lengths of vectors, use of z.
+
+        Parameters
+        ----------
+        dimension
+            Space dimension of the mesh, 2 or 3.
+        parts
+            Names of the parts of its boundary.
+
+        Raises
+        ------
+        InputError
+            If something does not fit, as in `load_case`.
+        """
+        try:
+            check_mesh(self, dimension, parts)
+        except PydanticCustomError as error:
+            raise InputError(f"{self._source}: {describe_fault(error)}") from None
+
+
+def parse_case(data: Mapping[str, Any], folder: str | Path = ".", source: str = "case") -> Case:
+    """Make a case of a dictionary with the keys of the case file.
+
+    Parameters
+    ----------
+    data
+        Tables of the case file; it is not changed.
+    folder
+        Folder that a relative name of a mesh file belongs to.
+    source
+        What messages call the case.
+
+    Raises
+    ------
+    InputError
+        On the first mistake; the message is one line.
+    """
+    try:
+        case = Case.model_validate(dict(data))
+    except ValidationError as error:
+        raise InputError(describe(error, Case, source)) from None
+    if case.mesh.file is not None:
+        path = Path(folder) / case.mesh.file
+        if not path.is_file():
+            raise InputError(f"{source}: mesh.file: no file {path}; accepted: a Gmsh file (.msh)")
+        mesh = case.mesh.model_copy(update={"file": str(path)})
+        case = case.model_copy(update={"mesh": mesh})
+    case._source = source
+    return case
+
+
+def load_case(path: str | Path, overrides: Mapping[str, str] | Iterable[str] = ()) -> Case:
+    """Read a case file.
+
+    Parameters
+    ----------
+    path
+        TOML file.
+    overrides
+        Values that replace those of the file: ``"material.young=2.0"``, or a mapping of keys
+        to texts. Keys are dotted paths, with numbers for list entries (``load.0.traction``);
+        values are TOML, bare words are texts.
+
+    Raises
+    ------
+    InputError
+        On the first mistake; the message is one line and names the file, the key, what was
+        given and what is accepted.
+    """
+    path = Path(path)
+    try:
+        data = tomllib.loads(path.read_bytes().decode("utf-8-sig"))
+    except OSError as error:
+        reason = error.strerror or "not readable"
+        raise InputError(f"{path}: {reason}; accepted: a case file (TOML)") from None
+    except UnicodeDecodeError:
+        raise InputError(f"{path}: not a text in UTF-8; accepted: a case file (TOML)") from None
+    except (tomllib.TOMLDecodeError, RecursionError) as error:
+        raise InputError(f"{path}: not a TOML file: {error}") from None
+    override(data, overrides, str(path))
+    return parse_case(data, path.parent, str(path))

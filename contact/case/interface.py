@@ -1,0 +1,235 @@
+"""Sections of the case file about the foundation: contact, friction and electric contact."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Annotated, Any, Literal, TypeAlias
+
+from pydantic import Discriminator, Field, Tag, model_validator
+
+from contact.case.formula import Expression
+from contact.case.types import (
+    Accepted,
+    Name,
+    NonNegative,
+    NonNegativeFormula,
+    Number,
+    Positive,
+    Section,
+    Switch,
+    Vector,
+    Words,
+    fault,
+)
+
+SHAPES = Accepted('"plane" or "sphere"')
+
+
+class Plane(Section):
+    """`foundation = { shape = "plane", ... }`: rigid half space."""
+
+    shape: Annotated[Literal["plane"], SHAPES] = Field(description="A plane.")
+    point: Vector = Field(description="A point of the plane.")
+    normal: Vector = Field(description="Normal towards the body, of any length.")
+
+    @model_validator(mode="after")
+    def _check(self) -> Plane:
+        if not any(self.normal):
+            raise fault("normal", self.normal, "a vector that is not zero")
+        if len(self.normal) != len(self.point):
+            raise fault("normal", self.normal, f"{len(self.point)} numbers, as point has")
+        return self
+
+
+class Sphere(Section):
+    """`foundation = { shape = "sphere", ... }`: rigid sphere, in the plane a circle."""
+
+    shape: Annotated[Literal["sphere"], SHAPES] = Field(description="A sphere or circle.")
+    centre: Vector = Field(description="Centre.")
+    radius: Positive = Field(description="Radius.")
+    inside: Switch = Field(default=False, description="`true`: the body lies inside the sphere.")
+
+
+def _shape(given: Any) -> str:
+    shape = given.get("shape") if isinstance(given, Mapping) else getattr(given, "shape", None)
+    # Anything else is refused by Plane, in words.
+    return "Sphere" if shape == "sphere" else "Plane"
+
+
+Foundation: TypeAlias = Annotated[
+    Annotated[Plane, Tag("Plane")] | Annotated[Sphere, Tag("Sphere")],
+    Discriminator(_shape),
+    Accepted(
+        'a table { shape = "plane", point, normal } or { shape = "sphere", centre, radius, inside }'
+    ),
+]
+
+#: Constants of the compliant layer that the thesis does not give (section 8.1.2).
+LAYER = {
+    "layer": 0.0,
+    "stiffness": 10.0,
+    "limit": 0.1,
+    "potential_factor": 2.0,
+    "potential_range": 128.0,
+}
+
+
+class Contact(Section):
+    """`[contact]`: where and on what the body may rest."""
+
+    on: Name = Field(description="Part of the boundary that may touch the foundation.")
+    law: Literal["signorini", "compliance"] = Field(
+        default="signorini",
+        description="`signorini`: rigid foundation; `compliance`: with a compliant layer in front.",
+    )
+    gap: NonNegativeFormula | None = Field(
+        default=None,
+        description="Gap rho to the rigid foundation along the body's normal. Default: 0 without "
+        "`foundation`.",
+    )
+    foundation: Foundation | None = Field(
+        default=None, description="Rigid shape, instead of a gap: `[contact.foundation]`."
+    )
+    direction: Literal["foundation", "body"] = Field(
+        default="foundation",
+        description="Contact direction on a rigid shape: normal of the foundation or of the body. "
+        "With a gap it is the body's.",
+    )
+    layer: (
+        Annotated[float, Field(ge=0, allow_inf_nan=True), Accepted("a number >= 0, or inf")] | None
+    ) = Field(
+        default=None,
+        description="Thickness of the layer: first touch at gap - layer; one thicker than the gap "
+        "presses on the body at rest. `inf`: no rigid part, first touch at gap, law (1.27). "
+        f"Compliance only, default {LAYER['layer']}.",
+    )
+    stiffness: NonNegative | None = Field(
+        default=None, description=f"c_nu. Compliance only, default {LAYER['stiffness']}."
+    )
+    limit: (
+        Annotated[float, Field(gt=0, allow_inf_nan=True), Accepted("a number > 0, or inf")] | None
+    ) = Field(
+        default=None,
+        description="n_nu: depth at which the layer's pressure saturates; `inf`: never, (1.28). "
+        f"Compliance only, default {LAYER['limit']}.",
+    )
+    potential_factor: Annotated[float, Field(ge=1), Accepted("a number >= 1")] | None = Field(
+        default=None,
+        description="alpha_nu: growth of the layer's stiffness with the potential difference; 1: "
+        f"none. Compliance only, default {LAYER['potential_factor']}.",
+    )
+    potential_range: Positive | None = Field(
+        default=None,
+        description="Potential difference at which the growth ends. Compliance only, default "
+        f"{LAYER['potential_range']}.",
+    )
+    lagged: Switch = Field(
+        default=False,
+        description="`true`: the layer's force is taken from the previous outer iteration, as in "
+        "Algorithms 6 and 8; not with method `newton`.",
+    )
+
+    @model_validator(mode="before")
+    @classmethod
+    def _fill_in(cls, given: Any) -> Any:
+        """Fill in the defaults that depend on other keys."""
+        if not isinstance(given, Mapping):
+            return given
+        defaults: dict[str, Any] = dict(LAYER) if given.get("law") == "compliance" else {}
+        if "foundation" not in given:
+            defaults["gap"] = Expression(0.0)
+        return {**defaults, **given}
+
+    @model_validator(mode="after")
+    def _check(self) -> Contact:
+        if self.gap is not None and self.foundation is not None:
+            raise fault("gap", Words("both gap and foundation"), "one of them")
+        for key in (*LAYER, "lagged") if self.law == "signorini" else ():
+            value = getattr(self, key)
+            if value is not None and value is not False:
+                raise fault(key, value, f'{key} with law = "compliance" only')
+        return self
+
+
+class SlipLaw(Section):
+    """`mu = { law = "slip", ... }`: coefficient a + b/(rho s + 2) at the slip s, (7.16)."""
+
+    law: Literal["slip"] = Field(description="The slip-dependent law.")
+    a: NonNegative = Field(default=0.5, description="Coefficient at large slip.")
+    b: NonNegative = Field(default=0.2, description="Twice the excess at rest.")
+    rho: NonNegative = Field(description="Decay rate (1/length).")
+
+
+def _mu(given: Any) -> str:
+    return "SlipLaw" if isinstance(given, Mapping | SlipLaw) else "Formula"
+
+
+class Friction(Section):
+    """`[friction]`: friction on the contact part. Absent: none."""
+
+    law: Literal["none", "tresca", "coulomb"] = Field(
+        default="none",
+        description="`tresca`: fixed bound; `coulomb`: mu times the smoothed pressure.",
+    )
+    bound: NonNegativeFormula | None = Field(
+        default=None, description="Bound S of the tangential stress. Tresca only, required there."
+    )
+    mu: (
+        Annotated[
+            Annotated[NonNegativeFormula, Tag("Formula")] | Annotated[SlipLaw, Tag("SlipLaw")],
+            Discriminator(_mu),
+            Accepted(
+                'a number >= 0, a formula, or a table { law = "slip", a, b, rho }',
+            ),
+        ]
+        | None
+    ) = Field(default=None, description="Coefficient of friction. Coulomb only, required there.")
+    radius: NonNegative = Field(
+        default=0.0,
+        description="Radius of the smoothing operator R; 0: the pressure itself. Coulomb only.",
+    )
+
+    @model_validator(mode="after")
+    def _check(self) -> Friction:
+        owner = {"bound": "tresca", "mu": "coulomb"}
+        for key, law in owner.items():
+            value = getattr(self, key)
+            if self.law == law and value is None:
+                accepted = f'{key} with law = "{law}"'
+                raise fault(key, Words("missing"), accepted)
+            if self.law != law and value is not None:
+                raise fault(key, Words(f'given with law = "{self.law}"'), f'law = "{law}"')
+        if self.radius > 0 and self.law != "coulomb":
+            raise fault("radius", self.radius, 'a radius with law = "coulomb" only')
+        return self
+
+
+class Electric(Section):
+    """`[electric]`: a conductive foundation, D.nu = psi(u_nu - rho) phi_L(phi - phi_f)."""
+
+    law: Literal["shifted", "perfect", "ramp"] = Field(
+        default="shifted",
+        description="psi: `shifted`, k_e clip(1 + delta (u_nu - rho), 0, 1); `perfect`, k_e in "
+        "contact, (1.33); `ramp`, (1.34) as printed, zero where u_nu <= rho.",
+    )
+    k_e: NonNegative = Field(description="Conductivity k_e of the foundation.")
+    phi_f: Number = Field(default=0.0, description="Potential phi_F of the foundation.")
+    delta: Positive | None = Field(
+        default=None,
+        description="Slope of psi (1/length), `shifted` and `ramp` only. Default: 1000 / size of "
+        "the body.",
+    )
+    limit: Positive | None = Field(
+        default=None, description="Limit L of the truncation phi_L. Default: no truncation."
+    )
+    lagged: Switch = Field(
+        default=False,
+        description="`true`: the charge is taken from the previous outer iteration, as in "
+        "Algorithm 4; converges for small k_e only; not with method `newton`.",
+    )
+
+    @model_validator(mode="after")
+    def _check(self) -> Electric:
+        if self.delta is not None and self.law == "perfect":
+            raise fault("delta", self.delta, 'delta with law = "shifted" or "ramp"')
+        return self

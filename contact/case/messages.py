@@ -1,0 +1,105 @@
+"""One message for a wrong case file: the file, the key, what was given, what is accepted."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterable, Mapping
+from typing import Any, get_origin
+
+from pydantic import ValidationError
+from pydantic.fields import FieldInfo
+from pydantic_core import ErrorDetails, PydanticCustomError
+
+from contact.case.grammar import shown
+from contact.case.types import UNKNOWN, Section, Words, accepted_by, sections_of
+
+
+def keys_of(section: type[Section]) -> dict[str, FieldInfo]:
+    """Return the fields of a section by the names that they have in the case file."""
+    return {field.alias or name: field for name, field in section.model_fields.items()}
+
+
+def describe(error: ValidationError, root: type[Section], source: str) -> str:
+    """Return the one-line message for the first mistake of a case.
+
+    An unknown key comes before all else: what is missing or wrong elsewhere is often but its
+    consequence.
+    """
+    errors = sorted(error.errors(), key=lambda e: e["type"] != "extra_forbidden")
+    return f"{source}: {_message(errors[0], root)}"
+
+
+def describe_fault(error: PydanticCustomError) -> str:
+    """Return the message for a fault that was raised outside of pydantic's validation."""
+    return _fault([], **(error.context or {}))
+
+
+def _fault(keys: list[str], key: str, given: Any, accepted: str) -> str:
+    keys = [*keys, key]
+    if given is UNKNOWN:
+        return _unknown(keys, accepted.split(", "))
+    return f"{'.'.join(keys)}: {_given(given)}; accepted: {accepted}"
+
+
+def _message(error: ErrorDetails, root: type[Section]) -> str:
+    keys, sections, accepted = _locate(error["loc"], root)
+    kind, context = error["type"], error.get("ctx", {})
+    given = _given(error["input"])
+    if kind == "fault":
+        return _fault(keys, **context)
+    if kind == "extra_forbidden":
+        options = dict.fromkeys(key for section in sections for key in keys_of(section))
+        return _unknown([*keys, str(error["loc"][-1])], options)
+    if kind == "value_error":
+        # Raised by a formula, whose message is complete.
+        return f"{'.'.join(keys)}: {context['error']}"
+    if kind == "missing":
+        given = "missing"
+    return f"{'.'.join(keys)}: {given}; accepted: {accepted}"
+
+
+def _given(value: Any) -> str:
+    if isinstance(value, Words):
+        return str(value)
+    if isinstance(value, Mapping | Section):
+        return "given a table"
+    return f"given {shown(value)}"
+
+
+def _unknown(keys: list[str], accepted: Iterable[str]) -> str:
+    options = list(accepted)
+    near = difflib.get_close_matches(keys[-1], options, n=1)
+    hint = f", did you mean {near[0]}?" if near else ""
+    return f"{'.'.join(keys)}: unknown key{hint}; accepted: {', '.join(options)}"
+
+
+def _locate(
+    location: tuple[int | str, ...], root: type[Section]
+) -> tuple[list[str], list[type[Section]], str]:
+    """Follow a location of pydantic's through the sections.
+
+    Returns
+    -------
+    The keys as in the case file (without pydantic's tags of unions), the sections that can
+    stand there, and what is accepted there, in words.
+    """
+    keys: list[str] = []
+    options: Mapping[str, type[Section]] = {root.__name__: root}
+    accepted = "tables"
+    named = False  # the next item is a name chosen by the user
+    for item in location:
+        if isinstance(item, int) or named:
+            keys.append(str(item))
+            named = False
+        elif item in options:
+            options = {item: options[item]}
+        else:
+            fields = {k: f for s in options.values() for k, f in keys_of(s).items()}
+            if item not in fields:
+                continue
+            field = fields[item]
+            keys.append(item)
+            options = sections_of(field.annotation)
+            accepted = accepted_by(field.annotation, field.metadata)
+            named = get_origin(field.annotation) is dict
+    return keys, list(options.values()), accepted

@@ -1,0 +1,57 @@
+"""A case as text: the TOML file that says the same with the defaults written out."""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+from contact.case.file import Case
+
+_BARE = re.compile(r"[A-Za-z0-9_-]+")
+
+
+def to_toml(case: Case) -> str:
+    """Return a case file that gives the same case again, without what its method ignores."""
+    ignored = {"solver": set(case.solver.unread)}
+    data = case.model_dump(by_alias=True, exclude_none=True, exclude=ignored)
+    return "\n".join(_table(data, ())).strip() + "\n"
+
+
+def _table(table: Mapping[str, Any], path: tuple[str, ...]) -> Iterator[str]:
+    """Write the values of a table, then the tables in it."""
+    inner = {key: value for key, value in table.items() if _holds_tables(value)}
+    for key, value in table.items():
+        if key not in inner and value != {} and not (value == () and not path):
+            yield f"{_key(key)} = {literal(value)}"
+    for key, value in inner.items():
+        place = (*path, key)
+        name = ".".join(_key(part) for part in place)
+        many = not isinstance(value, Mapping)
+        for entry in value if many else (value,):
+            # A table that holds nothing but tables needs no heading of its own.
+            if many or not all(_holds_tables(item) for item in entry.values()):
+                yield f"\n[[{name}]]" if many else f"\n[{name}]"
+            yield from _table(entry, place)
+
+
+def _holds_tables(value: Any) -> bool:
+    if isinstance(value, Mapping):
+        return bool(value)
+    return isinstance(value, list | tuple) and any(isinstance(item, Mapping) for item in value)
+
+
+def _key(key: str) -> str:
+    return key if _BARE.fullmatch(key) else literal(key)
+
+
+def literal(value: Any) -> str:
+    """Return a number, text, switch or list of these as TOML."""
+    if isinstance(value, str):
+        return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
+    if isinstance(value, bool):
+        return str(value).lower()
+    if isinstance(value, list | tuple):
+        return f"[{', '.join(literal(item) for item in value)}]"
+    return str(value)

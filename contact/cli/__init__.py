@@ -1,0 +1,1 @@
+"""The command line: ``contact solve`` and ``contact check``, progress, exit status."""

@@ -1,0 +1,222 @@
+"""The command line: ``python3 -m contact solve CASE.toml --out DIR`` and ``... check CASE.toml``.
+
+Exit status: 0 converged, 1 not converged (outputs are written), 2 bad input (one message,
+nothing is written), 130 stopped by Ctrl-C, 143 by SIGTERM (what a solve had reached is written).
+"""
+
+from __future__ import annotations
+
+import argparse
+import difflib
+import signal
+import sys
+import tempfile
+import traceback
+from collections.abc import Callable, Sequence
+from importlib import import_module
+from pathlib import Path
+from types import TracebackType
+from typing import Any, NoReturn, TypeVar
+
+from mpi4py import MPI
+
+from contact.case.file import Case, load_case
+from contact.errors import InputError
+from contact.methods.interrupt import Terminated, ending_on_signal
+
+CONVERGED, NOT_CONVERGED, BAD_INPUT = 0, 1, 2
+#: Added to the number of the signal that ended a run.
+SIGNALLED = 128
+
+T = TypeVar("T")
+
+
+class _Parser(argparse.ArgumentParser):
+    """A parser that raises InputError, and prints its help on one rank alone."""
+
+    def error(self, message: str) -> NoReturn:
+        raise InputError(f"{message}; accepted: {' '.join(self.format_usage().split())}")
+
+    def _print_message(self, message: str, file: Any = None) -> None:
+        if MPI.COMM_WORLD.rank == 0:
+            super()._print_message(message, file)
+
+
+def _parser() -> _Parser:
+    # PETSc's options begin with one dash and any letter, -h among them.
+    common: dict[str, Any] = {"add_help": False, "allow_abbrev": False}
+    parser = _Parser(prog="contact", description=__doc__, **common)
+    parser.add_argument("--help", action="help", help="show this help and leave")
+    commands = parser.add_subparsers(dest="command", required=True, metavar="solve|check")
+    for name, text in (
+        ("solve", "solve a case and write the results"),
+        ("check", "validate a case and print it with its mesh parts and unknowns"),
+    ):
+        command = commands.add_parser(name, help=text, description=text, **common)
+        command.usage = f"contact {name} CASE.toml [options] [PETSc options]"
+        command.add_argument("case", metavar="CASE.toml", help="case file")
+        command.add_argument(
+            "--set",
+            action="append",
+            default=[],
+            metavar="KEY=VALUE",
+            help="replace a value of the case file; may be repeated",
+        )
+        command.add_argument("--help", action="help", help="show this help and leave")
+        if name == "solve":
+            command.usage = f"contact {name} CASE.toml --out DIR [options] [PETSc options]"
+            command.add_argument("--out", required=True, metavar="DIR", help="folder for results")
+            command.add_argument("--plot", action="store_true", help="draw the figures too")
+            command.add_argument("--quiet", action="store_true", help="show no progress")
+    return parser
+
+
+def parse(arguments: Sequence[str]) -> tuple[argparse.Namespace, list[str]]:
+    """Split a command line into ours and PETSc's.
+
+    Raises
+    ------
+    InputError
+        If it is not understood.
+    """
+    if "-h" in arguments:
+        arguments = ["--help" if argument == "-h" else argument for argument in arguments]
+    options, rest = _parser().parse_known_args(arguments)
+    known = ["--set", "--out", "--plot", "--quiet", "--help"]
+    for i, argument in enumerate(rest):
+        follows = i > 0 and rest[i - 1].startswith("-")
+        if argument.startswith("--"):
+            near = difflib.get_close_matches(argument.partition("=")[0], known, n=1)
+            hint = f", did you mean {near[0]}?" if near else ""
+            raise InputError(f"{argument}: unknown option{hint}; accepted: {', '.join(known)}")
+        if not argument.startswith("-") and not follows:
+            raise InputError(f"{argument}: one argument too many; accepted: one case file")
+    return options, rest
+
+
+def _shared(comm: MPI.Intracomm, action: Callable[[], T]) -> T:
+    """Do something on rank 0; its result, or its InputError, is that of all ranks."""
+    result: Any = None
+    if comm.rank == 0:
+        try:
+            result = action()
+        except InputError as error:
+            result = error
+    result = comm.bcast(result)
+    if isinstance(result, InputError):
+        raise result
+    return result
+
+
+def _check_folder(folder: Path) -> None:
+    """Raise an InputError if a folder cannot be written to; nothing is left of the attempt."""
+    missing = [place for place in (folder, *folder.parents) if not place.exists()]
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryFile(dir=folder):
+            pass
+    except OSError as error:
+        reason = error.strerror or "not writable"
+        raise InputError(f"--out {folder}: {reason}; accepted: a folder to write to") from None
+    finally:
+        for place in missing:
+            if place.is_dir():
+                place.rmdir()
+
+
+def _solve(case: Case, options: argparse.Namespace, comm: MPI.Intracomm) -> int:
+    if not options.out:  # the present folder is "."; this is rather a variable that is not set
+        raise InputError('--out "": no folder; accepted: a folder to write to')
+    out = Path(options.out)
+    _shared(comm, lambda: _check_folder(out))
+
+    # Not earlier: these load dolfinx, which PETSc's options have to precede.
+    from contact.cli.progress import progress
+    from contact.output.files import write_outputs
+    from contact.solving import solve
+
+    with progress(comm, options.quiet) as monitor:
+        solution = solve(case, monitor=monitor, comm=comm)
+    write_outputs(solution, out)
+    if options.plot:
+        from contact.output.figures.figures import write_figures
+
+        write_figures(solution, out)
+    outcome = solution.outcome
+    if comm.rank == 0 and not (options.quiet and outcome.converged):
+        state = "converged" if outcome.converged else "stopped"
+        text = f"{state}: {outcome.reason}; results in {out}"
+        print(
+            f"contact: {text}" if options.quiet else text,
+            file=sys.stderr if options.quiet else None,
+        )
+    if outcome.signal:
+        return SIGNALLED + outcome.signal
+    return CONVERGED if outcome.converged else NOT_CONVERGED
+
+
+def _check(case: Case, options: argparse.Namespace, comm: MPI.Intracomm) -> int:
+    from contact.build import build_problem
+    from contact.cli.describe import describe
+    from contact.methods.nested import coarser_cases
+
+    if case.solver.nested:
+        coarser_cases(case, case.solver.nested_levels)
+    text = describe(case, build_problem(case, comm))
+    if comm.rank == 0:
+        print(text)
+    return CONVERGED
+
+
+def _own_options() -> list[str]:
+    """Return options that keep PETSc from a .petscrc that lies in the working folder.
+
+    It may hold anything, libraries to be loaded among it, and comes with a folder of somebody
+    else's. The user's own, in his home, is read; any other by ``-options_file``.
+    """
+    own = Path.home() / ".petscrc"
+    return ["-skip_petscrc", *(["-options_file", str(own)] if own.is_file() else [])]
+
+
+def _abort_on_crash(
+    kind: type[BaseException], error: BaseException, trace: TracebackType | None
+) -> None:
+    """Show the traceback and end all ranks: the others may wait for this one for ever."""
+    traceback.print_exception(kind, error, trace)
+    sys.stderr.flush()
+    MPI.COMM_WORLD.Abort(NOT_CONVERGED)
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the command line and return its exit status."""
+    comm = MPI.COMM_WORLD
+    if comm.size > 1:
+        sys.excepthook = _abort_on_crash
+    try:
+        with ending_on_signal() as ending:
+            with ending.held():
+                options, petsc = parse(sys.argv[1:] if arguments is None else arguments)
+                import petsc4py
+
+                petsc4py.init([sys.argv[0], *_own_options(), *petsc])
+                case = _shared(comm, lambda: load_case(options.case, options.set))
+                import_module("contact.solving")  # after PETSc's options
+            return {"solve": _solve, "check": _check}[options.command](case, options, comm)
+    except InputError as error:
+        if comm.rank == 0:
+            print(f"contact: {error}", file=sys.stderr)
+        return BAD_INPUT
+    except MemoryError:
+        text = "not enough memory; accepted: fewer cells, or more ranks on more machines"
+        return _end(comm, text, BAD_INPUT)
+    except KeyboardInterrupt as interrupt:
+        number = signal.SIGTERM if isinstance(interrupt, Terminated) else signal.SIGINT
+        return _end(comm, f"interrupted ({number.name})", SIGNALLED + number)
+
+
+def _end(comm: MPI.Intracomm, text: str, status: int) -> int:
+    """Say what has ended the run on this rank, and end the other ranks too."""
+    print(f"contact: {text}", file=sys.stderr, flush=True)
+    if comm.size > 1:
+        comm.Abort(status)
+    return status

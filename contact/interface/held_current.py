@@ -1,0 +1,114 @@
+"""The current through contact nodes that cannot move.
+
+A node of Gamma_3 whose displacement is prescribed carries no contact force, but where its
+potential is free it lets the current through like any other. Leaving it out would take its
+share of Gamma_3 from the electric contact.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from contact.interface.nodes import Candidates, ContactTrace
+from contact.interface.obstacle import Foundation
+from contact.interface.response import Conductor
+from contact.typing import Array
+from forms.laws import PerfectConductivity
+
+
+@dataclass(frozen=True)
+class HeldCurrent:
+    """Owned nodes of Gamma_3 with prescribed displacement and free potential.
+
+    Attributes
+    ----------
+    nodes, weight
+        Local node numbers and lumped areas, shape (n,).
+    direction, gap
+        Contact direction, shape (n, d), and gap, shape (n,).
+    conductor
+        The conductive foundation.
+    phi_scale
+        Unit of the potential in the unknowns.
+    block_size
+        Unknowns a node, the last of which is the potential.
+    """
+
+    nodes: NDArray[np.int32]
+    weight: Array
+    direction: Array
+    gap: Array
+    conductor: Conductor
+    phi_scale: float
+    block_size: int
+
+    def _at_nodes(self, x: Array) -> tuple[Array, Array]:
+        """Return psi and phi - phi_F for a local dof array."""
+        size = self.block_size
+        nodal = x[: x.size // size * size].reshape(-1, size)[self.nodes]
+        opening = np.einsum("ni,ni->n", nodal[:, :-1], self.direction) - self.gap
+        # Closed up to the rounding of the prescribed displacement.
+        reach = np.abs(self.gap) + np.linalg.norm(nodal[:, :-1], axis=1)
+        closed = opening >= -1e-12 * reach
+        psi = self.conductor.psi
+        conductivity = psi(closed if isinstance(psi, PerfectConductivity) else opening)
+        return conductivity, self.phi_scale * nodal[:, -1] - self.conductor.phi_f
+
+    def charge(self, x: Array) -> Array:
+        """Return D.nu = psi phi_L(phi - phi_F) at the nodes, shape (n,)."""
+        psi, difference = self._at_nodes(x)
+        return np.asarray(psi * self.conductor.phi_l(difference))
+
+    def add_force(self, residual: Array, x: Array) -> None:
+        """Add the nodal residuals of the current to a dof array."""
+        rows = self.nodes * self.block_size + self.block_size - 1
+        residual[rows] -= self.phi_scale * self.weight * self.charge(x)
+
+    def slope(self, x: Array) -> Array:
+        """Return the derivative of D.nu by the potential at the nodes, psi frozen, shape (n,)."""
+        psi, difference = self._at_nodes(x)
+        return np.asarray(psi * self.conductor.phi_l.derivative(difference))
+
+    def block(self, x: Array) -> Array:
+        """Return the weighted linearisation, (n, block size, block size); 0 if lagged."""
+        total = np.zeros((self.nodes.size, self.block_size, self.block_size))
+        if not self.conductor.lagged:
+            total[:, -1, -1] = -(self.phi_scale**2) * self.weight * self.slope(x)
+        return total
+
+
+def held_current(
+    candidates: Candidates,
+    foundation: Foundation,
+    free: NDArray[np.bool_],
+    trace: ContactTrace,
+    conductor: Conductor,
+    phi_scale: float,
+) -> HeldCurrent:
+    """Find the nodes of Gamma_3 that are no contact nodes and whose potential is free.
+
+    Parameters
+    ----------
+    candidates
+        All owned nodes of Gamma_3.
+    foundation
+        Gives their contact direction and gap.
+    free
+        Which components of the owned nodes are not fixed, shape (nodes, block size).
+    trace, conductor, phi_scale
+        The contact nodes, the conductive foundation and the unit of the potential.
+    """
+    direction, gap = foundation.measure(candidates.points, candidates.normal)
+    keep = ~np.isin(candidates.nodes, trace.nodes) & free[candidates.nodes, -1] & np.isfinite(gap)
+    return HeldCurrent(
+        candidates.nodes[keep],
+        candidates.weight[keep],
+        direction[keep],
+        gap[keep],
+        conductor,
+        phi_scale,
+        trace.block_size,
+    )

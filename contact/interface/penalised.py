@@ -1,0 +1,142 @@
+"""The contact laws of the penalised problem (PV_eps), node by node.
+
+Pressure and friction are functions of the displacement here: [u_nu - rho]^+/eps_contact, and
+s u_tau/(|u_tau| + eps_slip), (4.1)-(4.3). `Lagged` keeps the friction modulus of (4.33) from
+an earlier iterate, `Implicit` takes everything at the present one.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from contact.problem.problem import ContactProblem
+from contact.problem.state import Multipliers, bound_of, slip_of
+from contact.typing import Array
+from forms.foundation import penalty_friction_modulus, penalty_pressure
+
+
+@dataclass(frozen=True)
+class Regularisation:
+    """Parameters of the penalised laws.
+
+    Attributes
+    ----------
+    contact
+        eps of [u_nu - rho]^+/eps (length^3/force).
+    slip
+        eps of u_tau/(|u_tau| + eps) (length).
+    """
+
+    contact: float
+    slip: float
+
+
+def penalised_forces(problem: ContactProblem, nodal: Array, eps: Regularisation) -> Multipliers:
+    """Return the contact forces of (4.3) at nodal unknowns of shape (n, bs). Collective."""
+    return Implicit(problem, eps).forces(nodal)
+
+
+class NodalLaw(Protocol):
+    """Contact forces as a function of the nodal unknowns, with their derivative."""
+
+    def forces(self, nodal: Array) -> Multipliers:
+        """Return the forces. Collective."""
+
+    def block(self, nodal: Array) -> Array:
+        """Return their derivative, shape (n, d, d). Collective."""
+
+
+def _pressure(problem: ContactProblem, nodal: Array, eps: Regularisation) -> tuple[Array, Array]:
+    """Return the penalty pressure and its derivative in u_nu: 1/eps also at first touch."""
+    trace = problem.trace
+    normal = trace.normal_component(nodal)
+    pressure = penalty_pressure(normal, trace.gap, eps.contact)
+    return pressure, (normal >= trace.gap) / eps.contact
+
+
+def outer(a: Array, b: Array) -> Array:
+    """Return a b^T node by node, shape (n, d, d)."""
+    return a[:, :, None] * b[:, None, :]
+
+
+class Lagged:
+    """The laws of (4.32)-(4.33), with the friction modulus s/(|u_tau| + eps) of an iterate.
+
+    Parameters
+    ----------
+    problem
+        The contact problem.
+    eps
+        Parameters of the laws.
+    iterate
+        Nodal unknowns at which the modulus is taken, shape (n, block size).
+    """
+
+    def __init__(self, problem: ContactProblem, eps: Regularisation, iterate: Array) -> None:
+        self._problem, self._eps = problem, eps
+        pressure, _ = _pressure(problem, iterate, eps)
+        forces = Multipliers(pressure, np.zeros((iterate.shape[0], problem.dim)))
+        bound = bound_of(problem, iterate, forces)
+        self._modulus = penalty_friction_modulus(bound, slip_of(problem, iterate), eps.slip)
+
+    def forces(self, nodal: Array) -> Multipliers:
+        """Return the forces."""
+        pressure, _ = _pressure(self._problem, nodal, self._eps)
+        tangential = self._problem.trace.tangential_component(nodal)
+        return Multipliers(pressure, self._modulus[:, None] * tangential)
+
+    def block(self, nodal: Array) -> Array:
+        """Return the derivative: only the active set of the normal part depends on `nodal`."""
+        trace = self._problem.trace
+        _, slope = _pressure(self._problem, nodal, self._eps)
+        normal = slope[:, None, None] * outer(trace.normal, trace.normal)
+        return normal + self._modulus[:, None, None] * trace.tangent
+
+
+class Implicit:
+    """The laws of (4.3) themselves.
+
+    With a smoothing radius > 0 the derivative leaves out what the smoothed pressure adds: it
+    would couple the nodes.
+    """
+
+    def __init__(self, problem: ContactProblem, eps: Regularisation) -> None:
+        self._problem, self._eps = problem, eps
+
+    def forces(self, nodal: Array) -> Multipliers:
+        """Return the forces. Collective."""
+        problem = self._problem
+        pressure, _ = _pressure(problem, nodal, self._eps)
+        tangential = problem.trace.tangential_component(nodal)
+        forces = Multipliers(pressure, np.zeros_like(tangential))
+        slip = slip_of(problem, nodal)
+        modulus = penalty_friction_modulus(bound_of(problem, nodal, forces), slip, self._eps.slip)
+        return Multipliers(pressure, modulus[:, None] * tangential)
+
+    def block(self, nodal: Array) -> Array:
+        """Return the derivative. Collective."""
+        problem, trace, eps = self._problem, self._problem.trace, self._eps.slip
+        pressure, slope = _pressure(problem, nodal, self._eps)
+        forces = Multipliers(pressure, np.zeros((nodal.shape[0], problem.dim)))
+        bound = bound_of(problem, nodal, forces)
+        slip = slip_of(problem, nodal)
+        modulus = penalty_friction_modulus(bound, slip, eps)
+        # Unit vectors of the slip; zero where there is none, as are the terms with it.
+        tangential = trace.tangential_component(nodal)
+        unit = tangential / np.where(slip > 0, slip, 1.0)[:, None]
+        along = -modulus * slip / (slip + eps)
+        across = np.zeros_like(slip)
+        coefficient = problem.friction.coefficient
+        if problem.tresca is None and coefficient is not None:
+            at_rest = np.asarray(coefficient(slip))
+            ratio = np.divide(bound, at_rest, out=np.zeros_like(bound), where=at_rest > 0)
+            along += np.asarray(coefficient.derivative(slip)) * ratio * slip / (slip + eps)
+            if problem.friction.radius == 0:
+                across = at_rest * slope * slip / (slip + eps)
+        block = slope[:, None, None] * outer(trace.normal, trace.normal)
+        block = block + modulus[:, None, None] * trace.tangent
+        block = block + along[:, None, None] * outer(unit, unit)
+        return block + across[:, None, None] * outer(unit, trace.normal)

@@ -1,0 +1,127 @@
+"""Iterative solver of the piezoelectric operator: MINRES with a block-diagonal preconditioner.
+
+The symmetrised operator [[K, E^T], [E, -L]] is indefinite. With L the permittivity's Laplacian,
+diag(K, L) is positive definite and bounds the preconditioned spectrum by
++-[1, sqrt(1 + kappa)], kappa < 1 for PZT-5A (`forms.piezo.coupling_number`), whatever the mesh
+and the units. K and L are replaced by one V-cycle each: GAMG with the rigid-body motions for
+the displacement, hypre (or GAMG) for the potential.
+
+The preconditioner is assembled from a copy of the operator whose electric rows are negated:
+its diagonal blocks are K and L, and PETSc's fieldsplit looks at nothing else.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from petsc4py import PETSc
+
+from contact.linear import multigrid as linear_amg
+from contact.problem.held import rigid_motions
+from contact.problem.problem import ContactProblem
+
+#: Options of the displacement's block where the user gives none, under ``fieldsplit_u_``. The
+#: W-cycle keeps the counts flat at a small price: coarse levels have few unknowns.
+MECHANICAL = {
+    "pc_type": "gamg",
+    **linear_amg.DEFAULTS,
+    "pc_mg_cycle_type": "w",
+}
+
+#: The same for the potential's block, under ``fieldsplit_phi_``, where PETSc has no hypre.
+ELECTRIC = {
+    "pc_type": "gamg",
+    "pc_gamg_agg_nsmooths": "1",
+    "pc_gamg_aggressive_coarsening": "0",
+    "pc_mg_cycle_type": "w",
+    "mg_levels_ksp_type": "chebyshev",
+    "mg_levels_ksp_max_it": "2",
+    "mg_levels_pc_type": "sor",
+}
+
+#: Relative tolerance of a linear solve, in the norm of the preconditioner.
+TOLERANCE = 1e-10
+
+
+class BlockPreconditioner:
+    """The block-diagonal preconditioner of one linear operator.
+
+    Parameters
+    ----------
+    ksp
+        The solver, which is set up for fieldsplit. Options under its prefix come first, for
+        instance ``-contact_fieldsplit_phi_pc_type gamg``.
+    problem
+        A piezoelectric problem.
+    symmetric
+        Whether the operator is symmetric: MINRES, else GMRES.
+    """
+
+    def __init__(self, ksp: PETSc.KSP, problem: ContactProblem, symmetric: bool) -> None:
+        self._problem = problem
+        self._matrix: PETSc.Mat | None = None
+        self._signs: PETSc.Vec | None = None
+        ksp.setType("minres" if symmetric else "gmres")
+        if not symmetric:
+            ksp.setGMRESRestart(80)
+        ksp.setTolerances(rtol=TOLERANCE, max_it=500)
+        pc = ksp.getPC()
+        pc.setType("fieldsplit")
+        mechanical, electric = _fields(problem)
+        mechanical.compose("nearnullspace", _rigid_motions(problem))
+        pc.setFieldSplitIS(("u", mechanical), ("phi", electric))
+        pc.setFieldSplitType(PETSc.PC.CompositeType.ADDITIVE)
+        prefix = ksp.getOptionsPrefix() or ""
+        _default(f"{prefix}fieldsplit_u_", MECHANICAL)
+        hypre = PETSc.Sys.hasExternalPackage("hypre")
+        _default(f"{prefix}fieldsplit_phi_", {"pc_type": "hypre"} if hypre else ELECTRIC)
+
+    def matrix(self, operator: PETSc.Mat) -> PETSc.Mat:
+        """Return the matrix that preconditions an operator. Collective."""
+        if self._matrix is None:
+            self._matrix = operator.copy()
+            # Fixed unknowns have a unit diagonal, which stays positive.
+            sign = np.ones(self._problem.free.shape)
+            sign[self._problem.free[:, -1], -1] = -1.0
+            self._signs = operator.createVecLeft()
+            self._signs.array[:] = sign.ravel()
+        else:
+            operator.copy(self._matrix, PETSc.Mat.Structure.SAME_NONZERO_PATTERN)
+        self._matrix.diagonalScale(L=self._signs)
+        return self._matrix
+
+
+def _default(prefix: str, values: dict[str, str]) -> None:
+    options = PETSc.Options(prefix)
+    for name, value in values.items():
+        if not options.hasName(name):
+            options[name] = value
+
+
+def _fields(problem: ContactProblem) -> tuple[PETSc.IS, PETSc.IS]:
+    """Return the global numbers of the owned mechanical and electric unknowns."""
+    d, bs = problem.dim, problem.block_size
+    start, end = problem.space.dofmap.index_map.local_range
+    numbers: NDArray[np.integer] = np.arange(start * bs, end * bs, dtype=PETSc.IntType)
+    nodes = numbers.reshape(-1, bs)
+    mechanical = PETSc.IS().createGeneral(nodes[:, :d].ravel(), problem.comm)
+    mechanical.setBlockSize(d)
+    electric = PETSc.IS().createGeneral(nodes[:, d].copy(), problem.comm)
+    return mechanical, electric
+
+
+def _rigid_motions(problem: ContactProblem) -> PETSc.NullSpace:
+    """Return the rigid motions of the displacement block, orthonormalised. Collective."""
+    d, index_map = problem.dim, problem.space.dofmap.index_map
+    points = problem.space.tabulate_dof_coordinates()[: index_map.size_local, :d]
+    motions = rigid_motions(points / problem.domain.size)
+    size = (index_map.size_local * d, index_map.size_global * d)
+    vectors: list[PETSc.Vec] = []
+    for k in range(motions.shape[2]):
+        vector = PETSc.Vec().createMPI(size, d, problem.comm)
+        vector.array[:] = motions[:, :, k].ravel()
+        for other in vectors:
+            vector.axpy(-vector.dot(other), other)
+        vector.normalize()
+        vectors.append(vector)
+    return PETSc.NullSpace().create(vectors=vectors, comm=problem.comm)

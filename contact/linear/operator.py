@@ -1,0 +1,251 @@
+"""A linear operator that is assembled and factorised once and then solves many times.
+
+The operator is a bulk form plus a small dense block at each contact node: the augmentation
+r I of Algorithm 2, a compliant layer, a current, or Newton's linearised contact laws.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+
+import numpy as np
+from dolfinx import fem
+from dolfinx.fem.petsc import assemble_matrix, create_matrix
+from numpy.typing import NDArray
+from petsc4py import PETSc
+
+from contact.errors import InputError
+from contact.linear import multigrid as linear_amg
+from contact.linear.block import BlockPreconditioner
+from contact.linear.stiff_nodes import TOUCH, StiffNodes
+from contact.problem.problem import ContactProblem
+from contact.tolerances import HUGE
+from contact.typing import Array
+
+
+@contextmanager
+def petsc_options(prefix: str) -> Iterator[None]:
+    """Turn what PETSc says of its options while a solver is set up into an InputError."""
+    try:
+        yield
+    except PETSc.Error as error:
+        words = str(error).strip().splitlines()[-1].removeprefix("[0] ")
+        raise InputError(
+            f"PETSc cannot set up its solver: {words}; accepted: options of PETSc with the prefix "
+            f"-{prefix} that it knows, or none"
+        ) from error
+
+
+def check_overflow(problem: ContactProblem, operator: float, rhs: float) -> None:
+    """Refuse a linear system whose numbers overflow, given its norms.
+
+    Raises
+    ------
+    InputError
+        If they do.
+    """
+    young = float(problem.body.law.young)
+    if not (operator < HUGE and rhs < HUGE and rhs < HUGE * young):
+        raise InputError(
+            f"numbers overflow: Young's modulus is {young:.3g}, the linear operator of the "
+            f"size {operator:.3g}, its right-hand side {rhs:.3g}; accepted: constants, loads "
+            "and prescribed values in units that bring them nearer to 1"
+        )
+
+
+@dataclass
+class Counters:
+    """How often the expensive steps were taken.
+
+    `linear_iterations` are those of iterative solvers; a direct one counts one a solve.
+    `contact_solves` are dense ones at the contact nodes, with the body condensed onto these.
+    """
+
+    factorizations: int = 0
+    linear_solves: int = 0
+    linear_iterations: int = 0
+    contact_solves: int = 0
+
+
+class LinearOperator:
+    """Bulk operator plus nodal contact blocks, with one factorisation until either changes.
+
+    Parameters
+    ----------
+    problem
+        The problem whose secant or tangent form is assembled.
+    symmetric
+        Whether the blocks are symmetric too: LDL^T instead of LU.
+    prefix
+        Prefix of PETSc options, for instance ``-contact_ksp_type cg``.
+    counters
+        Where factorisations and solves are counted.
+    kind
+        "lu", "iterative", or "auto": iterative for large problems.
+    """
+
+    def __init__(
+        self,
+        problem: ContactProblem,
+        *,
+        symmetric: bool = True,
+        prefix: str = "contact_",
+        counters: Counters | None = None,
+        kind: str = "auto",
+    ) -> None:
+        self.problem = problem
+        self.counters = counters or Counters()
+        self.symmetric = symmetric
+        self.matrix = create_matrix(problem.secant)
+        self._form: fem.Form | None = None
+        self._blocks: Array | None = None
+        self._bulk: PETSc.Mat | None = None
+        self._rhs, self._solution = self.matrix.createVecs()
+        self.ksp = PETSc.KSP().create(problem.comm)
+        self.ksp.setOptionsPrefix(prefix)
+        self.iterative = kind == "iterative" or (kind == "auto" and linear_amg.is_large(problem))
+        self._split: BlockPreconditioner | None = None
+        self._stiff: StiffNodes | None = None
+        self._prefix = prefix
+        if self.iterative and problem.piezoelectric:
+            self._split = BlockPreconditioner(self.ksp, problem, symmetric)
+        elif self.iterative:
+            self.matrix.setNearNullSpace(linear_amg.near_nullspace(problem))
+            linear_amg.configure(self.ksp, problem, symmetric)
+        else:
+            self.ksp.setType("preonly")
+            pc = self.ksp.getPC()
+            pc.setType("cholesky" if symmetric else "lu")
+            pc.setFactorSolverType("mumps")
+        with petsc_options(prefix):
+            self.ksp.setFromOptions()
+
+    def update(self, form: fem.Form, blocks: Array, *, constant: bool = False) -> None:
+        """Assemble the operator at the problem's iterate. Collective.
+
+        Parameters
+        ----------
+        form
+            `problem.secant` or `problem.tangent`.
+        blocks
+            Weighted nodal blocks, shape (n, block size, block size).
+        constant
+            Whether the bulk form has not changed since the last call with the same form:
+            nothing is done when the blocks are the same too.
+        """
+        nodes = self.problem.trace.nodes
+        if self.problem.held is not None:
+            held = self.problem.held.block(self.problem.unknowns)
+            nodes = np.concatenate([nodes, self.problem.held.nodes])
+            blocks = np.concatenate([blocks, held])
+        last, same = self._blocks, constant and form is self._form
+        if same and last is not None and self._all(np.array_equal(blocks, last)):
+            return
+        if same and self._bulk is not None:
+            self._bulk.copy(self.matrix, PETSc.Mat.Structure.SAME_NONZERO_PATTERN)
+        else:
+            self.matrix.zeroEntries()
+            assemble_matrix(self.matrix, form, bcs=self.problem.bcs)
+            self.matrix.assemble()
+            if constant:
+                self._bulk = self.matrix.copy()
+        rest = self._masked(nodes, blocks)
+        if self._multigrid and self._stiff is None:
+            touch = TOUCH * rest
+            self._add(nodes, touch)
+            self._set_up(symmetric=True)
+            self._stiff = StiffNodes(self.ksp.getPC(), nodes)
+            rest = rest - touch
+        self._add(nodes, rest)
+        if self._stiff is not None:
+            self._stiff.follow(self.matrix, self._masked(nodes, blocks))
+        self._set_up(self.symmetric)
+        self._form, self._blocks = form, blocks.copy()
+        self.counters.factorizations += 1
+
+    @property
+    def _multigrid(self) -> bool:
+        """Whether the solver is algebraic multigrid for the displacement alone."""
+        return self._split is None and self.ksp.getPC().getType() == "gamg"
+
+    def _all(self, flag: bool) -> bool:
+        return bool(self.problem.comm.allreduce(int(flag)) == self.problem.comm.size)
+
+    def _set_up(self, symmetric: bool) -> None:
+        """Set up the solver for the matrix as it is."""
+        self.matrix.setOption(PETSc.Mat.Option.SYMMETRIC, symmetric)
+        split = self._split
+        self.ksp.setOperators(self.matrix, split.matrix(self.matrix) if split else self.matrix)
+        with petsc_options(self._prefix):
+            self.ksp.setUp()
+
+    def _masked(self, at: NDArray[np.int32], blocks: Array) -> Array:
+        """Return blocks at nodes, zero where an unknown is fixed."""
+        free = self.problem.free[at].astype(float)
+        return blocks * free[:, :, None] * free[:, None, :]
+
+    def _add(self, at: NDArray[np.int32], blocks: Array) -> None:
+        """Add blocks at nodes; none at all would be a reason to set the solver up again."""
+        if self._all(not blocks.any()):
+            return
+        rows = np.arange(at.size + 1, dtype=PETSc.IntType)
+        nodes = at.astype(PETSc.IntType)
+        self.matrix.setValuesBlockedLocalIJV(
+            rows, nodes, blocks, addv=PETSc.InsertMode.ADD_VALUES, rowmap=nodes
+        )
+        self.matrix.assemble()
+
+    def solve(self, rhs: Array, rtol: float | None = None, guess: Array | None = None) -> Array:
+        """Solve with the owned part of a right-hand side; fixed unknowns stay 0. Collective.
+
+        Parameters
+        ----------
+        rhs
+            Owned right-hand side.
+        rtol
+            Relative tolerance of an iterative solver; a direct one ignores it.
+        guess
+            Where an iterative solver starts, of the owned unknowns; zero by default.
+
+        Raises
+        ------
+        InputError
+            If the operator is singular, for the body is not held, or its numbers overflow.
+        """
+        self._rhs.array[:] = np.where(self.problem.free.ravel(), rhs, 0.0)
+        if rtol is not None:
+            self.ksp.setTolerances(rtol=rtol)
+        if self.iterative:
+            self.ksp.setInitialGuessNonzero(guess is not None)
+            if guess is not None:
+                self._solution.array[:] = guess
+        jump = self._stiff.jump(self._rhs) if self._stiff else None
+        if jump is not None:
+            self._rhs.axpy(-1.0, self.matrix * jump)
+            self._solution.axpy(-1.0, jump)
+        self.ksp.solve(self._rhs, self._solution)
+        if jump is not None:
+            self._solution.axpy(1.0, jump)
+        self.counters.linear_solves += 1
+        self.counters.linear_iterations += self.ksp.getIterationNumber()
+        reason = self.ksp.getConvergedReason()
+        finite = bool(np.isfinite(self._solution.norm()))
+        if reason == PETSc.KSP.ConvergedReason.DIVERGED_PCSETUP_FAILED or not finite:
+            raise self._fault()
+        return self._solution.array.copy()
+
+    def _fault(self) -> InputError:
+        """Say why there is no solution. Collective."""
+        check_overflow(self.problem, self.matrix.norm(), self._rhs.norm())
+        if self.ksp.getPC().getFailedReason() == PETSc.PC.FailedReason.FACTOR_OUTMEMORY:
+            return InputError(
+                "the factorisation needs more memory than it was given; accepted: a smaller mesh, "
+                f"a larger -{self._prefix}mat_mumps_icntl_14 (percent of workspace beyond the "
+                'estimate), or linear = "iterative" in [solver]'
+            )
+        return InputError(
+            "the linear system is singular: the body can move freely; fix enough "
+            "displacement components (or, for a piezoelectric body, a potential)"
+        )

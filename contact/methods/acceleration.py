@@ -1,0 +1,164 @@
+"""Acceleration of the block relaxation by minimising the residual over all solves so far.
+
+Every solve leaves a pair of contact forces and displacements that are in equilibrium, and so
+is every affine combination of such pairs: only the contact laws are nonlinear. The method
+therefore looks for the combination that meets the contact laws best, which costs no linear
+solve, and takes the next step of the block relaxation from there. Once the nodes in contact
+are the right ones this is GMRES with all solves as its Krylov space, also those that were
+made while the nodes were still wrong.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from contact.typing import Array
+
+#: Trial lengths of a Gauss-Newton step, between two points, and beyond the newest one.
+DAMPED = 0.5 ** np.arange(5)
+BETWEEN = np.linspace(0, 1, 5)
+BEYOND = 2.0 ** np.arange(1, 21)
+
+
+class ResidualMinimiser:
+    """Nonlinear GMRES for lambda = P(z), z = lambda + r u, with u affine in lambda.
+
+    Points are pairs (lambda, z), arrays of shape (2, m) with m values on this rank.
+
+    Parameters
+    ----------
+    inner
+        Global inner products: maps two matrices (m, k) and (m, l) of local values to the
+        (k, l) matrix of sums over all ranks.
+    project
+        P: the contact forces that the contact laws give for z, shape (m,).
+    derivative
+        Maps z and directions, shape (m, k), to the directional derivatives of P, (m, k).
+    depth
+        Number of directions kept.
+    sweeps
+        Most Gauss-Newton steps in one search.
+
+    References
+    ----------
+    Washio and Oosterlee, Krylov subspace acceleration for nonlinear multigrid schemes,
+    Electron. Trans. Numer. Anal. 6 (1997); Walker and Ni, Anderson acceleration for
+    fixed-point iterations, SIAM J. Numer. Anal. 49 (2011).
+    """
+
+    def __init__(
+        self,
+        inner: Callable[[Array, Array], Array],
+        project: Callable[[Array], Array],
+        derivative: Callable[[Array, Array], Array],
+        depth: int,
+        sweeps: int = 20,
+    ) -> None:
+        self._inner, self._project, self._derivative = inner, project, derivative
+        self._sweeps = sweeps
+        self._directions: deque[Array] = deque(maxlen=depth)
+        self._best: Array | None = None
+
+    def next(self, force: Array, z: Array, image: Array) -> Array:
+        """Return the z to go on from. Collective.
+
+        Parameters
+        ----------
+        force, z
+            The newest lambda and lambda + r u, shape (m,).
+        image
+            The z with which the plain block relaxation would go on.
+        """
+        new, old = np.stack([force, z]), self._best
+        if old is None:
+            self._best = new
+            return z
+        self._append(new - old)
+        # Where nothing touches there is no slope to follow: look between the points as well.
+        starts = [old + t * (new - old) for t in BETWEEN]
+        sizes = self._sizes(starts)
+        first = int(np.argmin(sizes))
+        point, size = self._descend(starts[first], float(sizes[first]))
+        if size < (1 - 1e-9) * sizes[0]:
+            self._best = point
+            return point[1]
+        beyond = self._beyond(old, new)
+        if beyond is not None:
+            self._best = beyond
+            return beyond[1]
+        # No way down from here: a plain step, which always gets closer.
+        self._directions.clear()
+        self._best = new
+        return image
+
+    def _defect(self, point: Array) -> Array:
+        return point[0] - self._project(point[1])
+
+    def _sizes(self, points: Sequence[Array]) -> Array:
+        """Return the norms of lambda - P(z) at several points."""
+        defects = np.column_stack([self._defect(point) for point in points])
+        return np.sqrt(np.maximum(np.diag(self._inner(defects, defects)), 0.0))
+
+    def _append(self, direction: Array) -> None:
+        """Add a direction, orthonormal in z to the others; nothing if it depends on them."""
+        length = self._length(direction)
+        for _ in range(2):  # twice is enough, in spite of cancellation
+            if self._directions:
+                basis = np.stack(self._directions, axis=-1)
+                direction = direction - basis @ self._inner(basis[1], direction[1][:, None])[:, 0]
+        rest = self._length(direction)
+        if rest > 1e-10 * length:
+            self._directions.append(direction * (1 / rest))
+
+    def _length(self, direction: Array) -> float:
+        column = direction[1][:, None]
+        return float(np.sqrt(self._inner(column, column)[0, 0]))
+
+    def _descend(self, point: Array, size: float) -> tuple[Array, float]:
+        """Minimise the residual over the directions by damped Gauss-Newton steps."""
+        if not self._directions:
+            return point, size
+        basis = np.stack(self._directions, axis=-1)
+        for _ in range(self._sweeps):
+            slopes = basis[0] - self._derivative(point[1], basis[1])
+            load = self._inner(slopes, self._defect(point)[:, None])[:, 0]
+            step = -basis @ _least_squares(self._inner(slopes, slopes), load)
+            trials = [point + t * step for t in DAMPED]
+            sizes = self._sizes(trials)
+            k = int(np.argmin(sizes))
+            if not sizes[k] < (1 - 1e-6) * size:
+                break
+            point, size, old = trials[k], float(sizes[k]), size
+            if size > 0.99 * old:
+                break
+        return point, size
+
+    def _beyond(self, old: Array, new: Array) -> Array | None:
+        """Go on from a step that changed nothing as far as nothing gets worse; None if it did.
+
+        A body that is held by the foundation alone moves freely until it touches: the forces
+        do not change, and nothing tells how far it is but to go there.
+        """
+        before, after = self._defect(old), self._defect(new)
+        changes = np.column_stack([after - before, after])
+        change, size = np.sqrt(np.maximum(np.diag(self._inner(changes, changes)), 0.0))
+        if change > 1e-6 * size:
+            return None
+        trials = [new, *(new + t * (new - old) for t in BEYOND)]
+        sizes = self._sizes(trials)
+        level = (1 + 1e-6) * np.min(sizes)
+        return trials[int(np.flatnonzero(sizes <= level)[-1])]
+
+
+def _least_squares(gram: Array, load: Array) -> Array:
+    """Solve the normal equations of directions of length 1.
+
+    Combinations that change the residual less than a millionth of their length are left out:
+    what they do is rounding, as where a body moves that touches nothing.
+    """
+    values, vectors = np.linalg.eigh(gram)
+    kept = values > 1e-12
+    return vectors[:, kept] @ ((vectors[:, kept].T @ load) / values[kept])

@@ -1,0 +1,168 @@
+"""Stop a solve between its iterations, on all ranks together, and a run anywhere else."""
+
+from __future__ import annotations
+
+import signal
+import threading
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from types import FrameType
+from typing import TYPE_CHECKING
+
+from mpi4py import MPI
+
+if TYPE_CHECKING:  # it loads dolfinx, which PETSc's options have to precede
+    from contact.methods.report import Monitor, Record
+
+#: Seconds in which a second signal is taken for an echo of the first.
+REPEAT = 2.0
+
+
+class Interrupted(Exception):
+    """A signal asked for the end of the solve.
+
+    Parameters
+    ----------
+    number
+        Of the signal.
+    """
+
+    def __init__(self, number: int) -> None:
+        super().__init__(f"interrupted ({signal.Signals(number).name})")
+        self.number = number
+
+
+class Terminated(KeyboardInterrupt):
+    """SIGTERM, where SIGINT would raise KeyboardInterrupt."""
+
+
+@dataclass
+class Stop:
+    """A monitor that raises `Interrupted` on all ranks after a signal on any.
+
+    Attributes
+    ----------
+    comm
+        Communicator of the problem.
+    monitor
+        Told of every outer iteration first.
+    caught
+        The first signal on this rank, or nothing.
+    """
+
+    comm: MPI.Intracomm
+    monitor: Monitor | None
+    caught: list[int] = field(default_factory=list)
+
+    def __call__(self, record: Record) -> None:
+        """Pass an outer iteration on, and look for signals. Collective."""
+        if self.monitor is not None:
+            self.monitor(record)
+        self.poll()
+
+    def poll(self) -> None:
+        """Look for signals, once an inner iteration. Collective."""
+        number = self.comm.allreduce(self.caught[0] if self.caught else 0, op=MPI.MAX)
+        if number:
+            raise Interrupted(number)
+
+
+@contextmanager
+def stop_on_signal(comm: MPI.Intracomm, monitor: Monitor | None) -> Iterator[Stop]:
+    """Yield a monitor that raises `Interrupted` on all ranks after a SIGINT or SIGTERM on any.
+
+    Parameters
+    ----------
+    comm
+        Communicator of the problem.
+    monitor
+        Told of every iteration first.
+
+    Notes
+    -----
+    The first signal is noted; one that comes more than `REPEAT` seconds later has its usual
+    effect (a launcher and its process group may both deliver the same one). Signals can be
+    caught in the main thread alone; in others nothing is changed.
+    """
+    stop = Stop(comm, monitor)
+    since: list[float] = []
+    before: dict[int, Callable[[int, FrameType | None], object] | int] = {}
+
+    def note(number: int, frame: FrameType | None) -> None:
+        if stop.caught and time.monotonic() - since[0] > REPEAT:
+            for ending, handler in before.items():
+                signal.signal(ending, handler)
+            signal.raise_signal(number)
+        if not stop.caught:
+            stop.caught.append(number)
+            since.append(time.monotonic())
+
+    try:
+        if threading.current_thread() is threading.main_thread():
+            for ending in (signal.SIGINT, signal.SIGTERM):
+                handler = signal.getsignal(ending)
+                if handler is not None:  # None: not installed from Python, left alone
+                    before[ending] = handler
+                    signal.signal(ending, note)
+                if isinstance(handler, Ending) and handler.caught and not stop.caught:
+                    note(handler.caught[0], None)
+        yield stop
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+
+
+@dataclass
+class Ending:
+    """Handler of SIGINT and SIGTERM outside of a solve: ends the run by an exception.
+
+    Attributes
+    ----------
+    caught
+        The signals so far. Where the exception is lost, in a library that swallows it, the next
+        solve stops for them.
+    """
+
+    caught: list[int] = field(default_factory=list)
+    _held: bool = False
+
+    def __call__(self, number: int, frame: FrameType | None) -> None:
+        """Note a signal, and raise KeyboardInterrupt or `Terminated`, now or later."""
+        self.caught.append(number)
+        if not self._held:
+            self.check()
+
+    def check(self) -> None:
+        """Raise for the first signal, if there was one."""
+        if self.caught:
+            raise Terminated if self.caught[0] == signal.SIGTERM else KeyboardInterrupt
+
+    @contextmanager
+    def held(self) -> Iterator[None]:
+        """Let signals wait: C++ libraries that are being loaded take no exceptions."""
+        self._held = True
+        try:
+            yield
+        finally:
+            self._held = False
+        self.check()
+
+
+@contextmanager
+def ending_on_signal() -> Iterator[Ending]:
+    """Let SIGINT and SIGTERM end a run in words, where Python's own handlers stand."""
+    ending = Ending()
+    before: dict[int, Callable[[int, FrameType | None], object] | int | None] = {}
+    if threading.current_thread() is threading.main_thread():
+        for kind in (signal.SIGINT, signal.SIGTERM):
+            handler = signal.getsignal(kind)
+            if handler in (signal.SIG_DFL, signal.default_int_handler):
+                before[kind] = handler
+                signal.signal(kind, ending)
+    try:
+        yield ending
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)

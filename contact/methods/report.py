@@ -1,0 +1,146 @@
+"""What a solver tells while it works and when it is done."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Protocol, runtime_checkable
+
+from contact.problem.kkt import KKT
+
+logger = logging.getLogger("contact.solver")
+
+
+@dataclass(frozen=True)
+class Record:
+    """One outer iteration.
+
+    Attributes
+    ----------
+    iteration
+        Number of the iteration; 0 is the frictionless start of the fixed point.
+    inner
+        Linear solves that it took.
+    kkt
+        Residuals after it.
+    change
+        Relative change of the friction bound, (3.46); NaN where there is none.
+    seconds
+        Since the start of the solve.
+    note
+        What was special about it, for instance "tangent".
+    contact
+        Dense solves at the contact nodes that it took, with the body condensed onto these.
+    """
+
+    iteration: int
+    inner: int
+    kkt: KKT
+    change: float
+    seconds: float
+    note: str = ""
+    contact: int = 0
+
+
+class Monitor(Protocol):
+    """Told of every outer iteration, on all ranks."""
+
+    def __call__(self, record: Record) -> None:
+        """Take note of an iteration."""
+
+
+@runtime_checkable
+class Poll(Protocol):
+    """A monitor that can stop the solve within an outer iteration too."""
+
+    def poll(self) -> None:
+        """Raise on all ranks if the solve is to end. Collective."""
+
+
+@dataclass(frozen=True)
+class Quiet:
+    """A monitor of a loop within another one: it only looks whether the solve is to end."""
+
+    poll: Callable[[], None]
+
+    def __call__(self, record: Record) -> None:
+        """Look whether the solve is to end. Collective."""
+        self.poll()
+
+
+@dataclass
+class History:
+    """The outer iterations so far, handed to a monitor as they come.
+
+    Attributes
+    ----------
+    monitor
+        Told of every iteration.
+    records
+        The iterations.
+    level
+        Level at which they are logged.
+    """
+
+    monitor: Monitor | None = None
+    records: list[Record] = field(default_factory=list)
+    level: int = logging.INFO
+
+    def add(self, record: Record) -> None:
+        """Append a record."""
+        self.records.append(record)
+        logger.log(
+            self.level,
+            "iteration %d: %d solves, residuals %.2e %.2e %.2e %s",
+            record.iteration,
+            record.inner,
+            record.kkt.equilibrium,
+            record.kkt.contact,
+            record.kkt.friction,
+            record.note,
+        )
+        if self.monitor is not None:
+            self.monitor(record)
+
+    def poll(self) -> None:
+        """Let the monitor end the solve between two inner iterations. Collective."""
+        if isinstance(self.monitor, Poll):
+            self.monitor.poll()
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """How a solver ended. The residuals decide whether it has converged, and nothing else can.
+
+    Attributes
+    ----------
+    kkt
+        The final residuals, of the problem at its whole load.
+    allowed
+        How large each of them may be.
+    ended
+        Why the method ended, in words; nothing where it met what is allowed.
+    signal
+        Number of the signal that ended it; 0 for none.
+    """
+
+    kkt: KKT
+    allowed: KKT
+    ended: str = ""
+    signal: int = 0
+
+    @property
+    def converged(self) -> bool:
+        """Whether every residual is within what is allowed, and nothing has interrupted."""
+        return not self.signal and not self.kkt.excess(self.allowed)
+
+    @property
+    def reason(self) -> str:
+        """Why the method ended and what the residuals say of it, in words."""
+        if self.signal:
+            return self.ended
+        excess = self.kkt.excess(self.allowed)
+        if excess:
+            return f"{self.ended}, but {excess}" if self.ended else excess
+        return self.ended or f"all residuals <= {self.allowed.largest:g}"

@@ -1,0 +1,4 @@
+"""What a solution says and leaves: fields, balances, tables, files, figures, warnings.
+
+Imports: `contact.methods` and what that may import.
+"""

@@ -1,0 +1,223 @@
+"""Electric output: charges by part, global balances, and what a sensor's electrode reads.
+
+All charges are integrals of D.nu over a part, nu pointing out of the body, in the sign of the
+given charges q_2 = D.nu. They are not integrals of a discrete D, which converges slowly at
+electrodes, but the reactions of the discrete equations. These balance to the tolerance of the
+solver on any mesh.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+import ufl
+from dolfinx import fem
+from dolfinx.la import InsertMode
+from mpi4py import MPI
+
+from contact.errors import InputError
+from contact.problem.kkt import residual_forces
+from contact.problem.problem import ContactProblem
+from contact.problem.state import Multipliers, nodal_iterate, total_pressure
+from contact.typing import Array
+
+
+@dataclass(frozen=True)
+class ChargeBalance:
+    """Free charges of a body.
+
+    Attributes
+    ----------
+    electrodes
+        Part with a prescribed potential -> its charge. A node of two such parts counts for
+        the one that is fixed first.
+    given
+        Part -> prescribed surface charge.
+    foundation
+        Charge that passes through the contact part.
+    body
+        Prescribed volume charge: the sum of all the others, by Gauss's law.
+    magnitude
+        The sum of the absolute nodal charges: with an insulator and one electrode all parts
+        are neutral, though not free of charge everywhere.
+    """
+
+    electrodes: Mapping[str, float]
+    given: Mapping[str, float]
+    foundation: float
+    body: float
+    magnitude: float
+
+    @property
+    def total(self) -> float:
+        """All surface charges less the volume charge: 0 up to the solver's tolerance."""
+        surface = sum(self.electrodes.values()) + sum(self.given.values()) + self.foundation
+        return surface - self.body
+
+    @property
+    def imbalance(self) -> float:
+        """|total| / magnitude, or 0 without charges."""
+        return abs(self.total) / self.magnitude if self.magnitude > 0 else 0.0
+
+
+@dataclass(frozen=True)
+class ForceBalance:
+    """Resultants of the forces on a body, each of shape (d,).
+
+    Attributes
+    ----------
+    applied
+        Given tractions and body forces.
+    supports
+        Reactions of the prescribed displacements.
+    contact
+        What the foundation exerts on the body.
+    """
+
+    applied: Array
+    supports: Array
+    contact: Array
+
+    @property
+    def imbalance(self) -> float:
+        """The norm of the sum over the sum of the norms."""
+        parts = (self.applied, self.supports, self.contact)
+        scale = sum(float(np.linalg.norm(part)) for part in parts)
+        return float(np.linalg.norm(sum(parts))) / scale if scale > 0 else 0.0
+
+
+@dataclass(frozen=True)
+class Reading:
+    """What a sensor's electrode shows.
+
+    Attributes
+    ----------
+    charge
+        Free charge of the part; None where its potential is not prescribed.
+    potential
+        Mean potential over the part.
+    """
+
+    charge: float | None
+    potential: float
+
+
+def charge_balance(problem: ContactProblem, forces: Multipliers) -> ChargeBalance:
+    """Return the charges by part at the iterate and contact forces. Collective.
+
+    Raises
+    ------
+    InputError
+        If the body is not piezoelectric.
+    """
+    _demand_potential(problem)
+    problem.freeze()
+    d, bs = problem.dim, problem.block_size
+    residual = residual_forces(problem, forces) / problem.phi_scale
+    electrodes: dict[str, float] = {}
+    magnitude = 0.0
+    taken = np.zeros(problem.owned, dtype=bool)
+    for fixed in problem.body.fixed:
+        if fixed.potential is None:
+            continue
+        dofs = _electric_dofs(problem, fixed.on)
+        new = dofs[~taken[dofs]]
+        taken[new] = True
+        charge = electrodes.get(fixed.on, 0.0) + _sum(problem, residual[new])
+        electrodes[fixed.on] = charge
+        magnitude += _sum(problem, np.abs(residual[new]))
+    given: dict[str, float] = {}
+    body = 0.0
+    x, test = ufl.SpatialCoordinate(problem.domain.mesh), ufl.TestFunction(problem.space)
+    for load in problem.body.loads:
+        if load.charge is None:
+            continue
+        measure = problem.domain.dx if load.on is None else problem.domain.ds(load.on)
+        density = problem.expression(load.charge, x)
+        vector = fem.assemble_vector(fem.form(density * test[d] * measure))
+        vector.scatter_reverse(InsertMode.add)
+        nodal = vector.array[: problem.owned].reshape(-1, bs)[:, d]
+        charge = _sum(problem, nodal)
+        magnitude += _sum(problem, np.abs(nodal))
+        if load.on is None:
+            body += charge
+        else:
+            given[load.on] = given.get(load.on, 0.0) + charge
+    passed = _foundation_charges(problem, forces)
+    magnitude += _sum(problem, np.abs(passed))
+    return ChargeBalance(electrodes, given, _sum(problem, passed), body, magnitude)
+
+
+def _foundation_charges(problem: ContactProblem, forces: Multipliers) -> Array:
+    """Return the charges that pass through the owned nodes of the contact part."""
+    nodal = nodal_iterate(problem)
+    density = problem.response.charge(nodal, total_pressure(problem, nodal, forces))
+    charges = problem.trace.weight * density
+    if problem.held is None:
+        return charges
+    held = problem.held.weight * problem.held.charge(problem.unknowns)
+    return np.concatenate([charges, held])
+
+
+def force_balance(problem: ContactProblem, forces: Multipliers) -> ForceBalance:
+    """Return the resultant forces at the iterate and contact forces. Collective."""
+    problem.freeze()
+    d, bs, trace = problem.dim, problem.block_size, problem.trace
+    residual = residual_forces(problem, forces).reshape(-1, bs)[:, :d]
+    supports = np.where(problem.free[:, :d], 0.0, residual).sum(axis=0)
+    vectors = total_pressure(problem, nodal_iterate(problem), forces)[:, None] * trace.normal
+    vectors = vectors + forces.friction
+    local = np.stack(
+        [problem.external.reshape(-1, bs)[:, :d].sum(axis=0), supports, -trace.weight @ vectors]
+    )
+    applied, supports, contact = problem.comm.allreduce(local, op=MPI.SUM)
+    return ForceBalance(applied, supports, contact)
+
+
+def mean_potential(problem: ContactProblem, part: str) -> float:
+    """Return the mean potential over a part of the boundary. Collective.
+
+    Raises
+    ------
+    InputError
+        If the body is not piezoelectric or has no such part.
+    """
+    _demand_potential(problem)
+    _, phi = problem.parts_of(problem.x)
+    ds = problem.domain.ds(part)
+    local = [
+        fem.assemble_scalar(fem.form(phi * ds)),
+        fem.assemble_scalar(fem.form(problem.constant(1.0) * ds)),
+    ]
+    integral, area = problem.comm.allreduce(np.array(local), op=MPI.SUM)
+    return float(integral / area)
+
+
+def sensor(problem: ContactProblem, forces: Multipliers, electrode: str) -> Reading:
+    """Return what an electrode reads: its charge where it is held at a potential. Collective.
+
+    A short-circuited electrode (prescribed potential) is read by its charge, one that is left
+    open by its mean potential; it is then no conductor, but a strip of the free surface.
+    """
+    charges = charge_balance(problem, forces).electrodes
+    return Reading(charges.get(electrode), mean_potential(problem, electrode))
+
+
+def _demand_potential(problem: ContactProblem) -> None:
+    if not problem.piezoelectric:
+        raise InputError("charges and potentials need a piezoelectric material")
+
+
+def _electric_dofs(problem: ContactProblem, part: str) -> Array:
+    """Return the owned electric unknowns on a part."""
+    subspace = problem.space.sub(problem.dim)
+    scalar, _ = subspace.collapse()
+    facets = problem.domain.facets(part)
+    dofs = fem.locate_dofs_topological((subspace, scalar), problem.dim - 1, facets)[0]
+    return dofs[dofs < problem.owned]
+
+
+def _sum(problem: ContactProblem, values: Array) -> float:
+    return float(problem.comm.allreduce(float(np.sum(values)), op=MPI.SUM))

@@ -1,0 +1,197 @@
+"""Fields of a solution: displacement, stress, von Mises, |dev eps|, electric quantities."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping
+from functools import cached_property
+from itertools import accumulate
+
+import basix.ufl
+import numpy as np
+import ufl
+from dolfinx import fem
+from dolfinx.la import InsertMode
+from mpi4py import MPI
+from numpy.typing import NDArray
+
+from contact import _compat
+from contact.problem.problem import ContactProblem, with_constants
+from contact.typing import Array
+from forms.hencky import stress
+from forms.kinematics import deviator_squared, strain, von_mises
+from forms.ops import maximum, sqrt
+from forms.piezo import Piezo, coupling_stress, electric_displacement
+
+#: Cells that are evaluated at once: bounds the memory that large meshes need.
+CHUNK = 100_000
+
+
+def nodal_function(
+    name: str, source: fem.FunctionSpace, values: Array, shape: tuple[int, ...]
+) -> fem.Function:
+    """Return a Lagrange function on the nodes of another Lagrange space.
+
+    Parameters
+    ----------
+    name
+        Name of the function.
+    source
+        Lagrange space, blocked or not, whose degree the function gets.
+    values
+        Values at the local nodes of `source`, shape (nodes, components).
+    shape
+        Shape of the function's value, with as many components.
+    """
+    mesh, degree = source.mesh, source.ufl_element().embedded_superdegree
+    function = fem.Function(fem.functionspace(mesh, ("Lagrange", degree, shape)), name=name)
+    # Two spaces of one mesh need not number their nodes alike.
+    target = function.function_space.dofmap.list
+    function.x.array.reshape(-1, values.shape[1])[target] = values[source.dofmap.list]
+    function.x.scatter_forward()
+    return function
+
+
+def linear(function: fem.Function) -> fem.Function:
+    """Return the Lagrange interpolant of degree 1 of a function. Collective."""
+    space = function.function_space
+    if space.ufl_element().embedded_superdegree == 1:
+        return function
+    shape = space.ufl_element().reference_value_shape
+    made = fem.Function(fem.functionspace(space.mesh, ("Lagrange", 1, shape)), name=function.name)
+    made.interpolate(function)
+    return made
+
+
+def unknowns(problem: ContactProblem) -> dict[str, fem.Function]:
+    """Return the displacement and, for a piezoelectric body, the potential. Collective."""
+    values, d = problem.x.x.array.reshape(-1, problem.block_size), problem.dim
+    made = {"displacement": nodal_function("displacement", problem.space, values[:, :d], (d,))}
+    if problem.piezoelectric:
+        potential = problem.phi_scale * values[:, d:]
+        made["potential"] = nodal_function("potential", problem.space, potential, ())
+    return made
+
+
+class DerivedFields:
+    """Fields derived from the iterate of a problem. The methods are collective.
+
+    Attributes
+    ----------
+    shapes
+        Name -> shape of the value: stress (3, 3), von_mises (), dev_strain () and, for a
+        piezoelectric body, electric_displacement (d,) and electric_field (d,).
+    """
+
+    def __init__(self, problem: ContactProblem) -> None:
+        self.problem = problem
+        self.shapes: dict[str, tuple[int, ...]] = {
+            "stress": (3, 3),
+            "von_mises": (),
+            "dev_strain": (),
+        }
+        if problem.piezoelectric:
+            self.shapes["electric_displacement"] = (problem.dim,)
+            self.shapes["electric_field"] = (problem.dim,)
+
+    @property
+    def columns(self) -> Mapping[str, slice]:
+        """Where the components of each field are in the rows of values."""
+        sizes = [math.prod(shape) for shape in self.shapes.values()]
+        ends = accumulate(sizes)
+        return {
+            name: slice(end - size, end)
+            for name, size, end in zip(self.shapes, sizes, ends, strict=True)
+        }
+
+    @cached_property
+    def points(self) -> Array:
+        """Reference points of a cell: its nodes, or its middle, for P1 strains are constant."""
+        mesh, d = self.problem.domain.mesh, self.problem.dim
+        if self.problem.degree == 1:
+            return np.full((1, d), 1 / (d + 1))
+        element = basix.ufl.element("Lagrange", mesh.topology.cell_name(), self.problem.degree)
+        return np.asarray(element.basix_element.points)
+
+    @cached_property
+    def expression(self) -> fem.Expression:
+        """All components, one after the other."""
+        problem, piezo = self.problem, self.problem.body.piezo
+        u, phi = problem.parts_of(problem.x)
+        eps = strain(u)
+        sigma = stress(with_constants(problem.body.law, problem.constant), eps)
+        induced: list[ufl.core.expr.Expr] = []
+        if piezo is not None:
+            mesh = problem.domain.mesh
+            constants = Piezo(
+                fem.Constant(mesh, np.asarray(piezo.e, dtype=float)),
+                fem.Constant(mesh, np.asarray(piezo.beta, dtype=float)),
+            )
+            sigma = sigma + coupling_stress(constants, phi)
+            d = electric_displacement(constants, eps, phi)
+            induced = [d[i] for i in range(problem.dim)]
+            induced += [-ufl.grad(phi)[i] for i in range(problem.dim)]
+        values = [sigma[i, j] for i in range(3) for j in range(3)]
+        # Rounding can make |dev eps|^2 slightly negative.
+        values += [von_mises(sigma), sqrt(maximum(deviator_squared(eps), 0.0))]
+        return fem.Expression(ufl.as_vector(values + induced), self.points)
+
+    def _chunks(self) -> Iterator[tuple[NDArray[np.int32], Array]]:
+        """Yield owned cells and the values there, shape (cells, points, components)."""
+        mesh = self.problem.domain.mesh
+        cells = np.arange(mesh.topology.index_map(mesh.topology.dim).size_local, dtype=np.int32)
+        components = sum(math.prod(shape) for shape in self.shapes.values())
+        for chosen in np.array_split(cells, cells.size // CHUNK + 1):
+            values = self.expression.eval(mesh, chosen)
+            yield chosen, values.reshape(chosen.size, len(self.points), components)
+
+    def largest_strain(self) -> float:
+        """Return the largest |dev eps| over the cells (their nodes, for degree 2)."""
+        column = self.columns["dev_strain"]
+        largest = max(float(v[..., column].max(initial=0.0)) for _, v in self._chunks())
+        return float(self.problem.comm.allreduce(largest, op=MPI.MAX))
+
+    def cells(self) -> dict[str, fem.Function]:
+        """Return the fields as they are: discontinuous, of degree 0 for P1 and 1 for P2."""
+        mesh, degree = self.problem.domain.mesh, self.problem.degree - 1
+        made = {
+            name: fem.Function(fem.functionspace(mesh, ("DG", degree, shape)), name=name)
+            for name, shape in self.shapes.items()
+        }
+        corners = 1 if degree == 0 else self.problem.dim + 1
+        for chosen, values in self._chunks():
+            for name, columns in self.columns.items():
+                dofs = made[name].function_space.dofmap.list[chosen]
+                array = made[name].x.array.reshape(-1, columns.stop - columns.start)
+                array[dofs] = values[:, :corners, columns]
+        for function in made.values():
+            function.x.scatter_forward()
+        return made
+
+    def nodes(self) -> dict[str, fem.Function]:
+        """Return the fields at the nodes: the cells' values, averaged by volume."""
+        space, volume = self.problem.space, self._volumes()
+        count = sum(math.prod(shape) for shape in self.shapes.values())
+        total = fem.Function(
+            fem.functionspace(space.mesh, ("Lagrange", self.problem.degree, (count + 1,)))
+        )
+        sums = total.x.array.reshape(-1, count + 1)
+        for chosen, values in self._chunks():
+            dofs = total.function_space.dofmap.list[chosen]
+            weight = np.broadcast_to(volume[chosen, None, None], (*dofs.shape, 1))
+            at_nodes = np.broadcast_to(values, (*dofs.shape, count)) * weight
+            np.add.at(sums, dofs, np.concatenate([at_nodes, weight], axis=2))
+        total.x.scatter_reverse(InsertMode.add)
+        total.x.scatter_forward()
+        means = sums[:, :-1] / sums[:, -1:]
+        return {
+            name: nodal_function(name, total.function_space, means[:, columns], self.shapes[name])
+            for name, columns in self.columns.items()
+        }
+
+    def _volumes(self) -> Array:
+        """Return the volumes of the local cells, which are straight simplices."""
+        mesh, d = self.problem.domain.mesh, self.problem.dim
+        corners = mesh.geometry.x[_compat.geometry_dofmap(mesh)][:, : d + 1, :d]
+        edges = corners[:, 1:] - corners[:, :1]
+        return np.asarray(np.abs(np.linalg.det(edges)) / math.factorial(d))

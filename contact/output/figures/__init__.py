@@ -1,0 +1,1 @@
+"""Figures of a solution: contact, deformed body, potential."""

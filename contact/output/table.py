@@ -1,0 +1,146 @@
+"""The contact nodes of all ranks in one table, sorted along Gamma_3."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+from scipy.sparse import csgraph
+
+from contact.interface.nodes import candidates
+from contact.output.solution import Solution
+from contact.problem.problem import ContactProblem
+from contact.typing import Array
+
+Table = Mapping[str, NDArray[Any]]
+
+
+def tangent_of(normal: Array) -> Array:
+    """Return the unit tangents t of contact directions nu in the plane, shape (n, 2).
+
+    t is nu turned counter-clockwise by 90 degrees: on the bottom of a body, where
+    nu = (0, -1), t points along x.
+    """
+    return np.column_stack([-normal[:, 1], normal[:, 0]])
+
+
+def contact_table(solution: Solution) -> Table | None:
+    """Return a column a quantity on rank 0 and None elsewhere. Collective.
+
+    These are the columns of ``contact.csv`` (`csv_columns`) and the contact direction ``nu_x``...
+
+    In the plane the rows follow Gamma_3 from node to node, each connected piece from its end
+    with the smaller x (then y), and ``u_t`` and ``tau`` are the components of u_tau and
+    lambda_f = -sigma_tau along `tangent_of` the contact direction. In space they are vectors
+    and the rows are sorted by x, then y, then z. ``u_n`` and ``gap`` are taken along the
+    contact direction; ``pressure`` and ``bound`` are -sigma_nu and the friction bound;
+    ``d_n`` is the charge D.nu that leaves through the foundation.
+    """
+    problem, trace = solution.problem, solution.problem.trace
+    nodal, pressure = solution.nodal, solution.pressure
+    # Mesh generators leave coordinates such as -3e-19.
+    points = np.where(np.abs(trace.points) < 1e-15 * problem.domain.size, 0.0, trace.points)
+    columns: dict[str, NDArray[Any]] = dict(zip("xyz", points.T, strict=False))
+    # The gap without a rigid part is that of the layer's first touch.
+    gap = problem.response.trace.gap
+    columns |= {"weight": trace.weight, "gap": gap, "u_n": solution.normal_displacement}
+    slip, friction = solution.slip, solution.friction
+    if problem.dim == 2:
+        tangent = tangent_of(trace.normal)
+        columns |= {
+            "u_t": np.einsum("ni,ni->n", slip, tangent),
+            "pressure": pressure,
+            "tau": np.einsum("ni,ni->n", friction, tangent),
+        }
+    else:
+        columns |= {f"u_t{axis}": slip[:, i] for i, axis in enumerate("xyz")}
+        columns["pressure"] = pressure
+        columns |= {f"tau_{axis}": friction[:, i] for i, axis in enumerate("xyz")}
+    columns |= {"bound": solution.friction_bound, "status": solution.status}
+    if problem.piezoelectric:
+        columns["phi"] = problem.phi_scale * nodal[:, -1]
+        columns["d_n"] = problem.response.charge(nodal, pressure)
+    columns |= {f"nu_{axis}": trace.normal[:, i] for i, axis in enumerate("xyz"[: problem.dim])}
+    order = _order(problem)
+    gathered = {name: problem.comm.gather(values) for name, values in columns.items()}
+    if order is None:
+        return None
+    return {name: np.concatenate(values)[order] for name, values in gathered.items()}
+
+
+def csv_columns(table: Table) -> Table:
+    """Return the columns of ``contact.csv``: all but the contact direction."""
+    return {name: values for name, values in table.items() if not name.startswith("nu_")}
+
+
+def held_points(problem: ContactProblem) -> Array:
+    """Return the nodes of Gamma_3 that are no contact nodes, (n, d), from all ranks. Collective."""
+    found = candidates(problem.domain, problem.space, problem.contact.on)
+    points = found.points[~np.isin(found.nodes, problem.trace.nodes)]
+    return np.concatenate(problem.comm.allgather(points))
+
+
+def _order(problem: ContactProblem) -> NDArray[np.intp] | None:
+    """Return the order of the gathered contact nodes, on rank 0."""
+    trace, comm = problem.trace, problem.comm
+    index_map = problem.space.dofmap.index_map
+    names = comm.gather(index_map.local_to_global(trace.nodes))
+    points = comm.gather(trace.points)
+    links = comm.gather(_links(problem)) if problem.dim == 2 else None
+    if names is None or points is None:
+        return None
+    where = np.concatenate(points)
+    # Coordinates that differ by rounding alone must not change the order.
+    rounded = np.round(where / (1e-9 * problem.domain.size))
+    sorted_points = np.lexsort(rounded.T[::-1])
+    if links is None:
+        return sorted_points
+    return _along_chain(np.concatenate(names), sorted_points, np.concatenate(links))
+
+
+def _links(problem: ContactProblem) -> NDArray[np.int64]:
+    """Return the global numbers of neighbours on the owned facets of Gamma_3, shape (m, 2)."""
+    mesh, space = problem.domain.mesh, problem.space
+    facets = problem.domain.facets(problem.contact.on)
+    topology = mesh.topology
+    topology.create_connectivity(1, 2)
+    topology.create_connectivity(2, 1)
+    to_cell, to_facet = topology.connectivity(1, 2), topology.connectivity(2, 1)
+    cells = to_cell.array[to_cell.offsets[facets]]
+    place = np.argmax(to_facet.array.reshape(-1, 3)[cells] == facets[:, None], axis=1)
+    layout = space.dofmap.dof_layout
+    closure = np.array([layout.entity_closure_dofs(1, i) for i in range(3)])
+    # Both ends, then the middle node if there is one.
+    chain = closure[:, [0, 1]] if closure.shape[1] == 2 else closure[:, [0, 2, 1]]
+    nodes = np.take_along_axis(space.dofmap.list[cells], chain[place], axis=1)
+    pairs = np.concatenate([nodes[:, k : k + 2] for k in range(nodes.shape[1] - 1)])
+    flat = space.dofmap.index_map.local_to_global(pairs.ravel().astype(np.int32))
+    return np.asarray(flat).reshape(-1, 2)
+
+
+def _along_chain(
+    names: NDArray[np.int64], by_position: NDArray[np.intp], links: NDArray[np.int64]
+) -> NDArray[np.intp]:
+    """Follow the links from node to node; pieces come in the order of their first ends."""
+    both = np.isin(links, names).all(axis=1)
+    # Number the nodes by position, so that every choice below is one of position.
+    rank = np.empty_like(by_position)
+    rank[by_position] = np.arange(by_position.size)
+    sorter = np.argsort(names)
+    edges = rank[sorter[np.searchsorted(names, links[both], sorter=sorter)]]
+    n = names.size
+    graph = sparse.coo_array((np.ones(len(edges)), edges.T), shape=(n, n)).tocsr()
+    graph = graph + graph.T
+    degree = np.diff(graph.indptr)
+    count, piece = csgraph.connected_components(graph, directed=False)
+    # The end of a piece; a closed curve has none and begins at its first node.
+    first = np.lexsort((np.arange(n), degree > 1, piece))
+    starts = first[np.searchsorted(piece[first], np.arange(count))]
+    chains = [
+        csgraph.depth_first_order(graph, start, directed=False, return_predecessors=False)
+        for start in np.sort(starts)
+    ]
+    return np.asarray(by_position[np.concatenate(chains)])

@@ -1,0 +1,10 @@
+"""Tolerances and limits that more than one place needs."""
+
+#: Residual of contact and friction above which a penalised solution approximates nothing.
+LAWS_HOLD = 0.1
+
+#: The least tolerance: rounding keeps relative residuals from falling below.
+PRECISION = 1e-15
+
+#: Numbers beyond this one, or below its inverse, are too near to those whose squares overflow.
+HUGE = 1e150
