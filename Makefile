@@ -1,10 +1,12 @@
 # Every target works on a fresh machine: scripts/fx finds FEniCSx or makes a place for it, once.
 FX := scripts/fx
+SCRIPTS := $(shell grep -ls __main__ scripts/*/*.py) scripts/examples/explore_forms.py
+NAMES := $(notdir $(basename $(SCRIPTS)))
 # a test that hangs on some ranks is ended, and fails
 MPI_TESTS = timeout --foreground 1200 $(FX) mpirun -n $(1) \
 	python3 -m mpi4py -m pytest tests -m parallel -q --color=no -p no:cacheprovider
 
-.PHONY: help demo test test-serial lint format clean
+.PHONY: help demo test test-serial lint format clean $(NAMES)
 .DEFAULT_GOAL := help
 
 help:
@@ -12,7 +14,7 @@ help:
 	@echo "make test     all tests: on 2 and 3 ranks, then the serial ones"
 	@echo "make lint     ruff and mypy"
 	@echo "make format   let ruff format the sources"
-	@echo "make NAME     run scripts/NAME.py ($(patsubst scripts/%.py,%,$(wildcard scripts/*.py)))"
+	@echo "make NAME     run a script: $(sort $(NAMES))"
 	@echo "make clean    remove results and caches in this folder"
 	@echo "FENICSX_SUITE=sid make test   the same on dolfinx 0.11"
 
@@ -47,5 +49,5 @@ clean:
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +
 
 # tables, figures, benchmarks, ...
-%: scripts/%.py
-	$(FX) python3 $< $(ARGS)
+$(NAMES):
+	$(FX) python3 -m $(subst /,.,$(basename $(filter %/$@.py,$(SCRIPTS)))) $(ARGS)

@@ -1,0 +1,1 @@
+"""Examples, the thesis's tables and figures, studies and benchmarks: `make NAME`."""

@@ -1,0 +1,1 @@
+"""Times, and another code on the same problems."""

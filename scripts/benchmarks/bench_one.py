@@ -1,0 +1,214 @@
+"""One measurement of the benchmark, in a process of its own; prints one line of JSON.
+
+Start it as `python3 -m scripts.benchmarks.bench_one` with one of::
+
+    CASE.toml [key=value ...]      a case file of scripts/cases
+    bar N MU                       Example 7.2, linear material, constant mu
+    hertz DISC.msh MU              Example 7.1 on a mesh file, constant mu
+    ratio DIM N cold|nested        a nonlinear solve and one linear solve
+    phases DIM N                   seconds by phase
+"""
+
+from __future__ import annotations
+
+import json
+import resource
+import sys
+import tempfile
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from mpi4py import MPI
+
+from contact import Case, build_problem, load_case, solve_problem
+from contact.case.file import parse_case
+from contact.case.mesh import Mesh
+from contact.linear.operator import LinearOperator
+from contact.methods.nested import coarse_solution
+from contact.output.solution import Solution
+from contact.problem.problem import ContactProblem
+from scripts.reporting import CASES, bar
+
+COMM = MPI.COMM_WORLD
+
+
+def block(n: int, **solver: Any) -> Case:
+    """Return a block of 2 x 1 x 1 with Coulomb friction and Hencky material in space."""
+    return parse_case(
+        {
+            "title": "block",
+            "mesh": {"generator": "box", "size": [2.0, 1.0, 1.0], "cells": [2 * n, n, n]},
+            "material": {"law": "log", "young": 1.0, "poisson": 0.3, "yield_strain": 0.02},
+            "fixed": [{"on": "left", "displacement": [0.0, 0.0, 0.0]}],
+            "load": [{"on": "top", "traction": [0.0, 0.005, -0.02]}],
+            "contact": {"on": "bottom"},
+            "friction": {"law": "coulomb", "mu": 0.3},
+            "solver": {"method": "newton", **solver},
+        }
+    )
+
+
+def problem_case(dimension: int, n: int, *changes: str) -> Case:
+    """Return the bar of Example 7.2 in the plane, the block in space."""
+    if dimension == 3:
+        return block(n)
+    return bar(n, -0.05, 1e5, "friction.mu=0.5", *changes)
+
+
+def memory() -> float:
+    """Return the peak memory of all ranks (bytes)."""
+    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024.0
+    return float(COMM.allreduce(peak, op=MPI.SUM))
+
+
+def described(solution: Solution) -> dict[str, Any]:
+    """Return what the tables show of a solution."""
+    problem = solution.problem
+    u = problem.x.x.array[: problem.owned].reshape(-1, problem.block_size)[:, : problem.dim]
+    largest = float(np.linalg.norm(u, axis=1).max(initial=0.0))
+    return {
+        "dofs": problem.space.dofmap.index_map.size_global * problem.block_size,
+        "converged": solution.converged,
+        "outer": len(solution.history.records),
+        "solves": solution.counters.linear_solves,
+        "factorizations": solution.counters.factorizations,
+        "linear_iterations": solution.counters.linear_iterations,
+        "contact_solves": solution.counters.contact_solves,
+        "solve": solution.seconds["solve"],
+        "max_displacement": COMM.allreduce(largest, op=MPI.MAX),
+    }
+
+
+def warm(case: Case, coarse: Callable[[], Case]) -> None:
+    """Compile the forms of a case on a small mesh."""
+    solve_problem(build_problem(coarse()), case.solver.model_copy(update={"nested": False}))
+
+
+def from_file(name: str, *changes: str) -> dict[str, Any]:
+    """Measure a case file."""
+    case = load_case(CASES / name, changes)
+    warm(case, lambda: case)
+    start = coarse_solution(case, COMM) if case.solver.nested else None
+    return described(solve_problem(build_problem(case), case.solver, start=start))
+
+
+def bar_with_constant_friction(n: str, mu: str) -> dict[str, Any]:
+    """Measure the problem that GetFEM solves too."""
+    case = bar(int(n), -0.005, 1.0, "material.law=linear", f"friction.mu={mu}")
+    warm(case, lambda: bar(4, -0.005, 1.0, "material.law=linear", f"friction.mu={mu}"))
+    return described(solve_problem(build_problem(case), case.solver))
+
+
+def hertz_with_constant_friction(path: str, mu: str) -> dict[str, Any]:
+    """Measure Hertz's problem that GetFEM solves too."""
+    case = load_case(CASES / "hertz.toml", [f"friction.mu={mu}"])
+    case = case.model_copy(update={"mesh": Mesh(file=path)})
+    warm(case, lambda: load_case(CASES / "hertz.toml", [f"friction.mu={mu}"]))
+    return described(solve_problem(build_problem(case), case.solver))
+
+
+def one_linear_solve(problem: ContactProblem) -> tuple[float, int]:
+    """Return the seconds and iterations of one linear elasticity solve, setup included."""
+    problem.reset()
+    COMM.Barrier()
+    begin = time.perf_counter()
+    operator = LinearOperator(problem)
+    n, bs = problem.trace.nodes.size, problem.block_size
+    operator.update(problem.secant, np.zeros((n, bs, bs)), constant=True)
+    operator.solve(problem.external, 1e-8)
+    return time.perf_counter() - begin, operator.counters.linear_iterations
+
+
+def ratio(dimension: str, n: str, start: str) -> dict[str, Any]:
+    """Measure a nonlinear solve in units of one linear solve on the same mesh."""
+    case = problem_case(int(dimension), int(n))
+    warm(case, lambda: problem_case(int(dimension), 4))
+    problem = build_problem(case)
+    linear, iterations = one_linear_solve(problem)
+    begin = time.perf_counter()
+    levels = coarse_solution(case, COMM) if start == "nested" else None
+    coarse = time.perf_counter() - begin
+    result = described(solve_problem(problem, case.solver, start=levels))
+    total = result["solve"] + coarse
+    return {
+        "dofs": result["dofs"],
+        "converged": result["converged"],
+        "solves": result["solves"],
+        "contact_solves": result["contact_solves"],
+        "linear_iterations": result["linear_iterations"] / result["solves"],
+        "one_iterations": iterations,
+        "solve": total,
+        "one": linear,
+        "ratio": total / linear,
+        "bytes_per_dof": memory() / result["dofs"],
+    }
+
+
+def phases(dimension: str, n: str) -> dict[str, Any]:
+    """Measure mesh and forms, assembly, factorisation, one solve, everything, and output."""
+    from contact.mesh.make import make_domain
+    from contact.output.files import write_outputs
+    from contact.problem.kkt import evaluate, residual_forces
+    from contact.problem.state import Multipliers
+
+    case = problem_case(int(dimension), int(n))
+    warm(case, lambda: problem_case(int(dimension), 4))
+    clock = {"dofs": 0.0}
+    last = time.perf_counter()
+
+    def lap(name: str) -> None:
+        nonlocal last
+        COMM.Barrier()
+        now = time.perf_counter()
+        clock[name] = now - last
+        last = now
+
+    domain = make_domain(case.mesh, COMM)
+    lap("mesh")
+    problem = build_problem(case, domain=domain)
+    problem.reset()
+    lap("forms and contact nodes")
+    forces = Multipliers.zero(problem)
+    residual = residual_forces(problem, forces)
+    lap("residual")
+    operator = LinearOperator(problem)
+    size, bs = problem.trace.nodes.size, problem.block_size
+    operator.update(problem.secant, np.zeros((size, bs, bs)))
+    lap("assembly and factorisation")
+    operator.solve(-residual, 1e-8)
+    lap("one solve")
+    evaluate(problem, forces)
+    lap("KKT residuals")
+    solution = solve_problem(problem, case.solver)
+    lap("all Newton steps")
+    with tempfile.TemporaryDirectory() as folder:
+        write_outputs(solution, Path(COMM.bcast(folder)) / "out")
+        lap("output")
+    clock["dofs"] = problem.space.dofmap.index_map.size_global * bs
+    return {**clock, "solve": clock["all Newton steps"], "steps": solution.counters.linear_solves}
+
+
+MEASUREMENTS = {
+    "bar": bar_with_constant_friction,
+    "hertz": hertz_with_constant_friction,
+    "ratio": ratio,
+    "phases": phases,
+}
+
+
+def main() -> None:
+    """Measure what the command line names."""
+    import logging
+
+    logging.getLogger("contact").setLevel(logging.ERROR)
+    first, *rest = sys.argv[1:]
+    result = MEASUREMENTS[first](*rest) if first in MEASUREMENTS else from_file(first, *rest)
+    if COMM.rank == 0:
+        print(json.dumps(result))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,152 @@
+"""The peer of the benchmark: GetFEM on the bar of Example 7.2, and on Hertz's cylinder.
+
+Start it as `python3 -m scripts.benchmarks.peer_getfem` with `bar N MU [--rounds K]`, linear
+material, N cells per unit length, the same triangles as ours; or with `hertz DISC.msh MU`,
+Example 7.1 on a mesh file of format 2.2. Prints one line of JSON: seconds of assembly and of the
+whole Newton solve (the fastest of K rounds in one warm process), steps, and values to compare
+with. Integral contact brick with an augmented Lagrangian, r = E, MUMPS.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import time
+from dataclasses import dataclass
+
+import getfem as gf
+import numpy as np
+
+#: Regions of the boundary.
+HELD, CONTACT, LOADED = 1, 2, 3
+
+
+@dataclass(frozen=True)
+class Setting:
+    """A mesh with its regions, and what it is made of and loaded with.
+
+    Attributes
+    ----------
+    held
+        Diagonal of the matrix that picks the components held on HELD.
+    traction
+        Vertical, on LOADED.
+    """
+
+    mesh: gf.Mesh
+    young: float
+    held: tuple[float, float]
+    traction: float
+
+
+def triangles(n: int) -> np.ndarray:
+    """Return the corners of the triangles, shape (2, 3, cells): squares cut to the right."""
+    x, y = np.meshgrid(np.arange(4 * n) / n, np.arange(n) / n, indexing="ij")
+    low = np.stack([x.ravel(), y.ravel()])
+    east, north = np.array([[1 / n], [0.0]]), np.array([[0.0], [1 / n]])
+    one = np.stack([low, low + east, low + east + north], axis=1)
+    two = np.stack([low, low + east + north, low + north], axis=1)
+    return np.concatenate([one, two], axis=2)
+
+
+def outer_faces(mesh: gf.Mesh) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return the faces of the boundary, their normals and their middles."""
+    faces = mesh.outer_faces()
+    points = [mesh.pts_from_cvid([int(cell)])[0] for cell in faces[0]]
+    # Face k of a triangle lies opposite its point k.
+    middles = [
+        np.delete(p, face, axis=1).mean(axis=1) for p, face in zip(points, faces[1], strict=True)
+    ]
+    return faces, mesh.normal_of_faces(faces), np.array(middles).T
+
+
+def bar(n: int) -> Setting:
+    """Return the bar of Example 7.2 with a linear material."""
+    mesh = gf.Mesh("empty", 2)
+    mesh.add_convex(gf.GeoTrans("GT_PK(2,1)"), triangles(n))
+    faces, normals, middles = outer_faces(mesh)
+    mesh.set_region(HELD, faces[:, normals[0] < -0.5])
+    mesh.set_region(CONTACT, faces[:, normals[1] < -0.5])
+    mesh.set_region(LOADED, faces[:, (normals[1] > 0.5) & (middles[0] > 2.0)])
+    return Setting(mesh, 1.0, (1.0, 1.0), -0.005)
+
+
+def hertz(path: str) -> Setting:
+    """Return the quarter cylinder of Example 7.1, radius 8, traction 100 on the cut."""
+    mesh = gf.Mesh("import", "gmsh", path)
+    mesh.set("optimize structure")
+    faces, _, middles = outer_faces(mesh)
+    symmetry, top = middles[0] < 1e-9, middles[1] > 8 - 1e-9
+    mesh.set_region(HELD, faces[:, symmetry])
+    mesh.set_region(CONTACT, faces[:, ~symmetry & ~top])
+    mesh.set_region(LOADED, faces[:, top])
+    return Setting(mesh, 2000.0, (1.0, 0.0), -100.0)
+
+
+def model(setting: Setting, mu: float) -> tuple[gf.Model, tuple[object, ...]]:
+    """Return the contact problem as a GetFEM model, and what has to live as long as it."""
+    mesh, young, poisson = setting.mesh, setting.young, 0.3
+    u = gf.MeshFem(mesh, 2)
+    u.set_fem(gf.Fem("FEM_PK(2,1)"))
+    obstacle = gf.MeshFem(mesh, 1)
+    obstacle.set_fem(gf.Fem("FEM_PK(2,1)"))
+    rule = gf.MeshIm(mesh, gf.Integ("IM_TRIANGLE(4)"))
+    made = gf.Model("real")
+    made.add_fem_variable("u", u)
+    made.add_initialized_data("lame", [young * poisson / ((1 + poisson) * (1 - 2 * poisson))])
+    made.add_initialized_data("shear", [young / (2 + 2 * poisson)])
+    made.add_isotropic_linearized_elasticity_brick(rule, "u", "lame", "shear")
+    if all(setting.held):
+        made.add_Dirichlet_condition_with_simplification("u", HELD)
+    else:
+        made.add_initialized_data("zero", [0.0, 0.0])
+        made.add_initialized_data("held", np.diag(setting.held))
+        made.add_generalized_Dirichlet_condition_with_multipliers(
+            rule, "u", u, HELD, "zero", "held"
+        )
+    made.add_initialized_data("load", [0.0, setting.traction])
+    made.add_source_term_brick(rule, "u", "load", LOADED)
+    made.add_filtered_fem_variable("lambda", u, CONTACT)
+    made.add_initialized_data("r", [young])
+    made.add_initialized_data("friction", [mu])
+    made.add_initialized_fem_data("obstacle", obstacle, obstacle.eval("y"))
+    made.add_integral_contact_with_rigid_obstacle_brick(
+        rule, "u", "lambda", "obstacle", "r", "friction", CONTACT, 1
+    )
+    return made, (u, obstacle, rule)
+
+
+def main() -> None:
+    """Solve, and print what it took."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("problem", choices=("bar", "hertz"))
+    parser.add_argument("mesh", help="cells per unit length, or the mesh file")
+    parser.add_argument("mu", type=float)
+    parser.add_argument("--rounds", type=int, default=2)
+    given = parser.parse_args()
+    best: dict[str, float] = {}
+    for _ in range(given.rounds):
+        setting = bar(int(given.mesh)) if given.problem == "bar" else hertz(given.mesh)
+        problem, _owners = model(setting, given.mu)
+        begin = time.perf_counter()
+        problem.assembly()
+        assembled = time.perf_counter()
+        steps, converged = problem.solve("max_res", 1e-10, "max_iter", 60, "lsolver", "mumps")
+        seconds = time.perf_counter() - assembled
+        if not best or seconds < best["solve"]:
+            u = problem.variable("u").reshape(-1, 2)
+            best = {
+                "assembly": assembled - begin,
+                "solve": seconds,
+                "steps": int(steps),
+                "converged": bool(converged),
+                "unknowns": int(problem.nbdof()),
+                "max_displacement": float(np.linalg.norm(u, axis=1).max()),
+            }
+        if not converged:
+            break
+    print(json.dumps(best))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,136 @@
+"""How a piezoelectric body is used as a sensor: charge or potential of an electrode over the load.
+
+A short-circuited electrode is read by its charge, an open one by its potential. The case's loads
+are multiplied by a factor; the electrode is any part of its mesh.
+
+`python3 -m scripts.examples.sensor [CASE] [--electrode PART] [--factors F ...] [--out DIR]
+[--coarse]`, also under mpirun.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from contact import Case, build_problem, load_case
+from contact.output.balances import Reading, sensor
+from contact.problem.problem import ContactProblem, Field, Load
+from contact.typing import Array
+from scripts.reporting import CASES, Report, parser, solved, subplots
+
+#: Multiples of the case's load.
+FACTORS = (0.25, 0.5, 0.75, 1.0, 1.5, 2.0, 2.5, 3.0)
+
+
+class Scaled:
+    """A given function times a number.
+
+    Parameters
+    ----------
+    function, factor
+        The function and the number.
+    """
+
+    def __init__(self, function: Field, factor: float) -> None:
+        self._function, self._factor = function, factor
+
+    def ufl(self, x: object) -> object:
+        """Return the product as UFL."""
+        return self._factor * self._function.ufl(x)
+
+    def numpy(self, points: Array) -> Array:
+        """Return the product at points of shape (n, d)."""
+        return self._factor * self._function.numpy(points)
+
+
+def loaded(problem: ContactProblem, factor: float) -> ContactProblem:
+    """Return the problem with its loads multiplied by a factor. Collective."""
+
+    def scaled(load: Load) -> Load:
+        force = None if load.force is None else [Scaled(f, factor) for f in load.force]
+        pressure = None if load.pressure is None else Scaled(load.pressure, factor)
+        return replace(load, force=force, pressure=pressure)
+
+    body = replace(problem.body, loads=[scaled(load) for load in problem.body.loads])
+    return ContactProblem(
+        problem.domain,
+        body,
+        problem.contact,
+        problem.friction,
+        problem.response.conductor,
+        problem.degree,
+    )
+
+
+def opened(case: Case, electrode: str) -> Case:
+    """Return the case with the electrode left open: its potential is not prescribed."""
+    kept = []
+    for fixed in case.fixed:
+        if fixed.on == electrode:
+            fixed = fixed.model_copy(update={"potential": None})
+        if fixed.potential is not None or fixed.displacement is not None:
+            kept.append(fixed)
+    return case.model_copy(update={"fixed": tuple(kept)})
+
+
+def readings(case: Case, electrode: str, factors: Sequence[float]) -> list[Reading]:
+    """Return what the electrode reads at multiples of the load. Collective."""
+    base = build_problem(case)
+    found = []
+    for factor in factors:
+        solution = solved(case, loaded(base, factor))
+        found.append(sensor(solution.problem, solution.forces, electrode))
+    return found
+
+
+def curve(report: Report, case: Case, electrode: str, factors: Sequence[float]) -> None:
+    """Tabulate and draw charge (short circuit) and potential (open) over the load."""
+    shorted = [reading.charge for reading in readings(case, electrode, factors)]
+    left_open = [r.potential for r in readings(opened(case, electrode), electrode, factors)]
+    columns: dict[str, Sequence[object]] = {"load factor": factors}
+    figure, axes = subplots(1, 2, size=(7.2, 3.0))
+    pairs = (
+        (
+            "charge",
+            "charge, short circuit (units of the case)",
+            [np.nan if q is None else q for q in shorted],
+        ),
+        ("potential", "mean potential, open (units of the case)", left_open),
+    )
+    for ax, (name, label, found) in zip(axes, pairs, strict=True):
+        columns[name] = found
+        ax.plot([0.0, *factors], [0.0, *found], "o-", ms=3)
+        slope = found[0] / factors[0]
+        ax.plot([0.0, factors[-1]], [0.0, slope * factors[-1]], "k:", lw=0.8)
+        ax.set(xlabel="load / load of the case", ylabel=label)
+    columns["charge per load"] = [q / f for q, f in zip(columns["charge"], factors, strict=True)]
+    columns["potential per load"] = [
+        v / f for v, f in zip(columns["potential"], factors, strict=True)
+    ]
+    note = (
+        "Dotted: in proportion to the smallest load. With full contact and Coulomb friction a "
+        "linear body's reading is proportional to the load; yielding bends the curves. Charge: "
+        "integral of D.nu over the electrode, from the reactions of the discrete equations."
+    )
+    caption = f"Sensor: charge or potential of the part {electrode!r} over the load"
+    report.table("sensor-table", caption, columns, note)
+    report.figure("sensor", caption, figure, columns, note)
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Make the curve. Collective."""
+    made = parser(__doc__, "sensor")
+    made.add_argument("case", nargs="?", type=Path, default=CASES / "piezo-sensor.toml")
+    made.add_argument("--electrode", default="electrode")
+    made.add_argument("--factors", nargs="+", type=float, default=list(FACTORS))
+    chosen = made.parse_args(arguments)
+    factors = chosen.factors[1::3] if chosen.coarse else chosen.factors
+    changes = ["mesh.cells=[16, 8]"] if chosen.coarse else []
+    curve(Report(chosen.out), load_case(chosen.case, changes), chosen.electrode, factors)
+
+
+if __name__ == "__main__":
+    main()

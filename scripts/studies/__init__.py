@@ -1,0 +1,1 @@
+"""Numerical studies: convergence, limits, agreement of the methods."""

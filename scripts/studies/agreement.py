@@ -1,0 +1,363 @@
+"""Do the methods agree? Newton's, block relaxation and, as eps -> 0, the penalty method.
+
+Every case file is solved by each of them. Where two find different solutions, each method is
+started from the other's, to show that both are solutions of the same discrete problem.
+
+`python3 -m scripts.studies.agreement [--out DIR] [--coarse] [--only CASE...]`, also under mpirun.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from itertools import groupby
+
+import numpy as np
+
+from contact import Case, build_problem, load_case
+from contact.case.file import Solver
+from scripts.reporting import CASES, Report, observed_orders, parser
+from scripts.studies.branches import AGREE, DISTURBANCE, Branches, Found
+
+#: Tolerance on the residuals of `newton` and `uzawa`.
+TOLERANCE = 1e-10
+
+#: Tolerance on the residual of the penalised problem: rounding is magnified by 1/eps.
+PENALISED = 1e-9
+
+#: eps of the penalty method, relative to what the solution is like.
+EPS = {f"eps 1e-{k}": 10.0**-k for k in range(3, 8)}
+
+#: rho of (7.16), and mu = k_e.
+RHO = (0.0, 1e5, 1e6, 1e7, 6e7)
+TABLE_8_4 = (6e-1, 2e-1, 6.8e-2, 5.1e-3, 6.2e-4, 1.4e-5, 3.5e-6, 8.5e-7)
+
+
+@dataclass(frozen=True)
+class Example:
+    """A case file with changes.
+
+    Attributes
+    ----------
+    label
+        In the tables.
+    name
+        Of the case file.
+    changes
+        To the case file, its mesh aside.
+    """
+
+    label: str
+    name: str
+    changes: tuple[str, ...] = ()
+
+    def case(self, coarse: bool) -> Case:
+        """Return the case on its mesh of moderate size, or on a coarse one."""
+        meshes = COARSE if coarse else MESHES
+        mesh = next((mesh for start, mesh in meshes.items() if self.name.startswith(start)), ())
+        exact = ("solver.method=newton", f"solver.tolerance={TOLERANCE}")
+        return load_case(CASES / f"{self.name}.toml", [*mesh, *exact, *self.changes])
+
+
+#: Start of a case file's name -> its mesh; the others keep that of the file.
+MESHES: Mapping[str, tuple[str, ...]] = {
+    "bar": ("mesh.cells=[128, 32]",),
+    "piezo-column": (),
+    "piezo": ("mesh.cells=[64, 32]",),
+    "compliance": ("mesh.cells=[96, 16]",),
+}
+COARSE: Mapping[str, tuple[str, ...]] = {
+    "bar": ("mesh.cells=[64, 16]",),
+    "hertz-sphere": ("mesh.contact_size=0.3",),
+    "piezo-column": (),
+    "piezo": ("mesh.cells=[16, 8]",),
+    "compliance": ("mesh.cells=[24, 4]",),
+}
+
+
+def examples() -> list[Example]:
+    """Return all case files, those of tables with the rows of these."""
+    found = []
+    for name, load in (("bar", -0.005), ("bar-large", -0.05)):
+        for rho in RHO:
+            changes = (f"friction.mu.rho={rho}",)
+            found.append(Example(f"7.2, f2 = {load:g}, rho = {short(rho)}", name, changes))
+    others = {
+        "7.1, load 160, no friction": "hertz-small",
+        "7.1": "hertz",
+        "sphere": "hertz-sphere",
+        "8.1, insulated": "piezo-8-1",
+        "8.1": "piezo-8-1-conductive",
+        "8.2": "piezo-8-2",
+        "column": "piezo-column",
+        "sensor": "piezo-sensor",
+        "8.3": "compliance-8-3",
+        "8.3, top only": "compliance-8-3-top",
+        "8.3, layer": "compliance-8-3-layer",
+        "8.3, no rigid part": "compliance-8-3-soft",
+    }
+    found += [Example(label, name) for label, name in others.items()]
+    for suffix in ("", "-layer"):
+        name, words = f"compliance-8-4{suffix}", suffix.replace("-", ", ")
+        for mu, k_e in ((0.6, 1.0), (0.6, 0.0), (0.0, 1.0)):
+            changes = (f"friction.mu={mu}", f"electric.k_e={k_e}")
+            found.append(Example(f"8.4{words}, mu = {mu:g}, k_e = {k_e:g}", name, changes))
+        for value in TABLE_8_4:
+            changes = (f"friction.mu={value}", f"electric.k_e={value}")
+            found.append(Example(f"8.4{words}, mu = k_e = {value:g}", name, changes))
+    return found
+
+
+def short(number: float) -> str:
+    """Return a number such as 60000000.0 as 6e7."""
+    return f"{number:.0e}".replace("e+0", "e") if number > 0 else "0"
+
+
+@dataclass
+class Compared:
+    """What the methods have found of one example.
+
+    Attributes
+    ----------
+    example
+        The example.
+    newton
+        Settings of Newton's method.
+    branches
+        Its solutions.
+    runs
+        Name of a method or start -> where it has ended.
+    letters
+        Method, start or eps -> which solution that is, or which one is next to a penalised one.
+    """
+
+    example: Example
+    newton: Solver
+    branches: Branches
+    runs: dict[str, Found]
+    letters: dict[str, str]
+
+    @property
+    def several(self) -> bool:
+        """Whether more than one solution has been found."""
+        return len(self.branches.solutions) > 1
+
+
+def compare(example: Example, coarse: bool) -> Compared:
+    """Solve an example by all methods. Collective."""
+    case = example.case(coarse)
+    branches = Branches(build_problem(case))
+    newton = case.solver
+    runs = {"newton": branches.run(newton), "uzawa": branches.run(relaxed(newton))}
+    start = branches.nested_start(case)
+    if start is not None:
+        runs["nested"] = branches.run(newton, start)
+    letters = {name: branches.letter(run) for name, run in runs.items()}
+    last: Found | None = None
+    for name, eps in EPS.items():
+        settings = penalised(branches, runs["newton"], newton, eps)
+        last = branches.run(settings, None if last is None else last.start)
+        runs[name] = last
+        letters[name] = branches.letter(branches.next_to(last.start, TOLERANCE))
+    return Compared(example, newton, branches, runs, letters)
+
+
+def relaxed(newton: Solver) -> Solver:
+    """Return the settings of block relaxation."""
+    return newton.model_copy(update={"method": "uzawa"})
+
+
+def penalised(branches: Branches, solution: Found, newton: Solver, eps: float) -> Solver:
+    """Return the penalty method with eps relative to a solution. Collective.
+
+    At the largest pressure the penetration is eps max|u|, and that is the slip length as well.
+    """
+    displacement, pressure = branches.size(solution)
+    return newton.model_copy(
+        update={
+            "method": "penalty",
+            "tolerance": PENALISED,
+            "max_outer": 1000,
+            "eps_contact": eps * displacement / pressure,
+            "eps_slip": eps * displacement,
+        }
+    )
+
+
+def agreement(report: Report, compared: Sequence[Compared]) -> None:
+    """Tabulate the differences between Newton's method and block relaxation. Collective."""
+    names = (
+        "example", "unknowns", "newton", "uzawa", "solves", "uzawa's", "u", "phi", "energy",
+        "p", "tau", "verdict", "solutions", "warned",
+    )  # fmt: skip
+    columns: dict[str, list[object]] = {name: [] for name in names}
+    for one in compared:
+        newton, uzawa = one.runs["newton"], one.runs["uzawa"]
+        apart = one.branches.difference(uzawa, newton)
+        problem = one.branches.problem
+        row = (
+            one.example.label,
+            problem.space.dofmap.index_map.size_global * problem.block_size,
+            newton.solution.outcome.kkt.largest,
+            uzawa.solution.outcome.kkt.largest,
+            newton.solution.counters.linear_solves,
+            uzawa.solution.counters.linear_solves,
+            apart.u,
+            apart.phi,
+            apart.energy,
+            apart.pressure,
+            apart.friction,
+            verdict(one, apart.largest),
+            len(one.branches.solutions),
+            one.branches.warned(newton),
+        )
+        for column, value in zip(columns.values(), row, strict=True):
+            column.append(value)
+    report.table(
+        "agreement",
+        f"Newton's method and block relaxation, both to residuals of {TOLERANCE:g}",
+        columns,
+        "newton, uzawa: the largest residual at the end, computed from scratch. Then the linear "
+        "solves of the whole body, and the relative differences of the two: u and phi, largest "
+        "difference at a node; energy, |eps(u)| and |grad(phi)| in L2, the larger one; pressure "
+        "and friction stress in L2 of Gamma_3, both over the pressure. The verdict is `agree` "
+        f"where all are at most {AGREE:g}, else the letters of the two solutions in the last "
+        "table. solutions: how many different ones have been found by any start or method here; "
+        "warned: whether the program itself says that there may be several.",
+    )
+
+
+def verdict(one: Compared, apart: float) -> str:
+    """Return in words whether Newton's method and block relaxation agree."""
+    letters = one.letters["newton"], one.letters["uzawa"]
+    if "—" in letters:
+        return "not converged"
+    return "agree" if apart <= AGREE else " and ".join(letters)
+
+
+def limits(report: Report, compared: Sequence[Compared]) -> None:
+    """Tabulate how the penalised solutions tend to those with multipliers. Collective."""
+    names = ("example", "converged", "limit", *EPS, "order", "p", "order of p")
+    columns: dict[str, list[object]] = {name: [] for name in names}
+    for one in compared:
+        runs = [one.runs[name] for name in EPS]
+        near, apart = zip(*map(one.branches.nearest, runs), strict=True)
+        u = [float(np.nanmax([each.u, each.phi])) for each in apart]
+        p = [each.pressure for each in apart]
+        row = (
+            one.example.label,
+            all(run.converged for run in runs),
+            path(near),
+            *u,
+            last_order(near, u),
+            p[-1],
+            last_order(near, p),
+        )
+        for column, value in zip(columns.values(), row, strict=True):
+            column.append(value)
+    report.table(
+        "agreement-penalty",
+        "The penalty method as eps -> 0: distance to the solution with multipliers",
+        columns,
+        "eps is relative: the penetration at the largest pressure is eps max|u|, and so is the "
+        "slip length. The first eps is solved from zero displacement, each further one from "
+        f"the one before, to a residual of {PENALISED:g} of the penalised problem. limit: the "
+        "closest of the solutions in the last table, to which the distances belong; A is always "
+        "that of Newton's method from zero, and an arrow tells that smaller eps are closer to "
+        "another one. Then the largest relative difference of u and phi at a node; at the "
+        "smallest eps that of the pressure in L2 of Gamma_3; and the orders of the last step. "
+        "Without friction the order is 1 throughout. With friction it tends to 1 once eps is "
+        "below the slip of all sliding nodes: the friction law is rounded over the slip length, "
+        "so that nodes creep that ought to stick. Without a rigid part nothing is penalised.",
+    )
+
+
+def last_order(near: Sequence[str], apart: Sequence[float]) -> float:
+    """Return the order of the last step; NaN between two solutions, or in rounding."""
+    if near[-1] != near[-2] or apart[-1] < 10 * TOLERANCE:
+        return np.nan
+    return observed_orders(list(EPS.values())[-2:], apart[-2:])[-1]
+
+
+def path(letters: Sequence[str]) -> str:
+    """Return letters without repetitions, with arrows between them."""
+    return " -> ".join(letter for letter, _ in groupby(letters))
+
+
+def solutions(report: Report, compared: Sequence[Compared]) -> None:
+    """Tabulate the solutions of the examples that have several. Collective."""
+    names = (
+        "example", "solution", "found by", "stick", "slide", "open", "others than in A",
+        "max |u_i|", "max p", "distance to A", "residual", "newton from it", "uzawa from it",
+        "newton, disturbed", "uzawa, disturbed",
+    )  # fmt: skip
+    columns: dict[str, list[object]] = {name: [] for name in names}
+    for one in compared:
+        if not one.several:
+            continue
+        branches = one.branches
+        first = branches.solutions["A"]
+        # Disturbed starts may lead to further ones; these are not looked at in turn.
+        for letter, found in list(branches.solutions.items()):
+            others = int(branches.problem.comm.allreduce(np.sum(found.status != first.status)))
+            row = (
+                one.example.label,
+                letter,
+                ", ".join(name for name, to in one.letters.items() if to == letter),
+                *branches.counts(found),
+                others,
+                *branches.size(found),
+                branches.difference(found, first).largest,
+                branches.residuals(found).largest,
+                *held(one, found),
+            )
+            for column, value in zip(columns.values(), row, strict=True):
+                column.append(value)
+    if columns["example"]:
+        report.table(
+            "agreement-branches",
+            "Examples with several solutions, and who finds which",
+            columns,
+            "Number of contact nodes that stick, slide and are open, and of those that do "
+            "something else than in solution A; the largest relative difference to A; the "
+            "largest residual, computed from scratch; then how far Newton's method and block "
+            "relaxation go away from the solution if they are started there, and which "
+            f"solution they end at if each node is off by up to {DISTURBANCE:g} of its values. "
+            "nested: Newton's method by way of coarser meshes; eps: next to the penalised "
+            "solution. "
+            "With (7.16) mu falls from 0.6 to 0.5 as soon as a node slides by a few 1/rho: one "
+            "where |sigma_tau| lies between 0.5 and 0.6 of the pressure may stick or slide. In "
+            "Example 7.2 that is so for the node at the end of the bar and for those at the tip "
+            "of the sliding zone, each on its own; between sticking and sliding there is a "
+            "solution on the falling part of the law, which both methods leave if disturbed. In "
+            "Example 8.4 it takes both much friction and much current, which opens most of the "
+            "contact: different sets of nodes can touch then.",
+        )
+
+
+def held(one: Compared, found: Found) -> tuple[object, ...]:
+    """Return what both methods make of a solution and of a start beside it. Collective."""
+    branches = one.branches
+    stays, back = [], []
+    for settings in (one.newton, relaxed(one.newton)):
+        stays.append(branches.difference(branches.run(settings, found.start), found))
+        back.append(branches.letter(branches.run(settings, branches.disturbed(found))))
+    return (*(each.largest for each in stays), *back)
+
+
+def main(arguments: Sequence[str] | None = None) -> list[Compared]:
+    """Make the tables. Collective."""
+    command = parser(__doc__, "agreement")
+    command.add_argument("--only", nargs="+", metavar="CASE", help="these case files alone")
+    chosen = command.parse_args(arguments)
+    report = Report(chosen.out)
+    wanted = [e for e in examples() if chosen.only is None or e.name in chosen.only]
+    compared = [compare(example, chosen.coarse) for example in wanted]
+    agreement(report, compared)
+    limits(report, compared)
+    solutions(report, compared)
+    return compared
+
+
+if __name__ == "__main__":
+    main()

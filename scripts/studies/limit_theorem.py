@@ -1,0 +1,332 @@
+"""Chapter 6's theorems in numbers: what the proofs promise, and the orders that are observed.
+
+Theorem 6.3: the solution x(mu, k_e) of Problem (PV2) tends to that of (PV1) like mu + k_e.
+Theorems 6.4 and 6.5: the fixed points (6.29) and (6.30), Algorithms 8 and 6, converge.
+Section 1.3.2: the normal compliance law (1.27) tends to Signorini's as it gets stiff.
+Section 1.3.3: with the rigid part far enough away, (1.29) is (1.27).
+
+`python3 -m scripts.studies.limit_theorem [--out DIR] [--coarse]`, also under mpirun.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import ufl
+from dolfinx import fem
+from matplotlib.figure import Figure
+
+from contact import Case, InputError, build_problem, load_case, solve_problem
+from contact.interface.obstacle import GapFunction
+from contact.interface.response import Layer
+from contact.methods.report import Record
+from contact.problem.problem import Contact, ContactProblem
+from contact.typing import Array
+from forms.kinematics import strain
+from forms.laws import Compliance, PotentialFactor
+from scripts.reporting import CASES, Report, iterate, observed_orders, options, solved, subplots
+
+#: mu = k_e of Table 8.4.
+TABLE_8_4 = (6e-1, 2e-1, 6.8e-2, 5.1e-3, 6.2e-4, 1.4e-5, 3.5e-6, 8.5e-7)
+
+#: mu = k_e of the limit: those of the table and some between them.
+SMALLEST = TABLE_8_4[-1]
+VALUES = tuple(sorted({*TABLE_8_4, 2e-2, 1.5e-3, 2e-4, 6e-5, 4e-6}, reverse=True))
+
+#: How names of parameters and curves are drawn.
+SYMBOLS = {
+    "mu = k_e": r"$\mu = k_e$",
+    "1/c": r"$1/c$ (m/GPa)",
+    "p = c [r]^+": r"$p = c\,[r]^+$",
+}
+
+#: Where the layer of the pure compliance law is touched, and its stiffnesses and thicknesses.
+TOUCH = 0.5
+STIFFNESS = tuple(10.0 ** np.arange(2, 8))
+THICKNESS = (0.0, 0.05, 0.1, 0.2, 0.3, 0.4, 0.6)
+
+
+class ProductNorm:
+    """The norms of X = V x W, (5.15): |eps(u)| and |grad(phi)| in L2(Omega).
+
+    Parameters
+    ----------
+    problem
+        Whose unknowns, owned arrays of `problem.x`, are measured.
+    """
+
+    def __init__(self, problem: ContactProblem) -> None:
+        self._x = fem.Function(problem.space)
+        u, phi = problem.parts_of(self._x)
+        parts = [ufl.inner(strain(u), strain(u))]
+        if phi is not None:
+            parts.append(ufl.inner(ufl.grad(phi), ufl.grad(phi)))
+        self._forms = [fem.form(part * problem.domain.dx) for part in parts]
+        self._comm, self._owned = problem.comm, problem.owned
+
+    def __call__(self, x: Array) -> tuple[float, ...]:
+        """Return the norms in V and, with a potential, W of owned unknowns. Collective."""
+        self._x.x.array[: self._owned] = x
+        self._x.x.scatter_forward()
+        squares = [self._comm.allreduce(fem.assemble_scalar(form)) for form in self._forms]
+        return tuple(float(np.sqrt(square)) for square in squares)
+
+
+def case_of(name: str, cells: Sequence[int], changes: Sequence[str] = ()) -> Case:
+    """Return a case file of Examples 8.3 and 8.4 on another mesh, solved to 1e-11."""
+    grid = f"mesh.cells=[{cells[0]}, {cells[1]}]"
+    exact = ("solver.tolerance=1e-11", "solver.inner_tolerance=2e-12")
+    return load_case(CASES / f"{name}.toml", [grid, *exact, *changes])
+
+
+@dataclass(frozen=True)
+class Errors:
+    """Distances to a limit over a parameter.
+
+    Attributes
+    ----------
+    name
+        What was varied.
+    parameter
+        Its values, shape (k,).
+    norms
+        Distances in V (and W), shape (k, 1 or 2).
+    """
+
+    name: str
+    parameter: Array
+    norms: Array
+
+    @property
+    def total(self) -> Array:
+        """Distances in X, shape (k,)."""
+        return np.linalg.norm(self.norms, axis=1)
+
+    def order(self, low: float, high: float) -> float:
+        """Return the least-squares order over a range of the parameter."""
+        inside = (self.parameter >= low) & (self.parameter <= high)
+        x, y = np.log(self.parameter[inside]), np.log(self.total[inside])
+        return float(np.polyfit(x, y, 1)[0])
+
+
+def theorem_6_3(
+    layer: bool, cells: Sequence[int] = (96, 16), values: Sequence[float] = VALUES
+) -> Errors:
+    """Return |x(mu, k_e) - x(0, 0)| for mu = k_e, by Algorithms 6 and 8. Collective.
+
+    Parameters
+    ----------
+    layer
+        Whether the layer of thickness 0.1 is there; else Example 8.4 as printed.
+    cells
+        Of the mesh.
+    values
+        mu = k_e.
+    """
+    suffix = "-layer" if layer else ""
+    limit_case = case_of(f"compliance-8-3{suffix}", cells)
+    problem = build_problem(limit_case)
+    domain, norm = problem.domain, ProductNorm(problem)
+    solved(limit_case, problem)
+    limit, distances = iterate(problem), []
+    for value in values:
+        changes = [f"friction.mu={value}", f"electric.k_e={value}"]
+        case = case_of(f"compliance-8-4{suffix}", cells, changes)
+        problem = build_problem(case, domain=domain)
+        solved(case, problem)
+        distances.append(norm(iterate(problem) - limit))
+    return Errors("mu = k_e", np.array(values), np.array(distances))
+
+
+def fixed_point_errors(
+    name: str, cells: Sequence[int] = (96, 16), changes: Sequence[str] = ()
+) -> Array:
+    """Return |x_n - x| in X over the outer iterations of a lagged fixed point. Collective.
+
+    Parameters
+    ----------
+    name
+        Case file; its layer and its current are taken from the previous iterate.
+    cells
+        Of the mesh.
+    changes
+        Overrides of the case.
+    """
+    lagged = ["contact.lagged=true", "solver.material_step=secant", *changes]
+    case = case_of(name, cells, lagged)
+    problem = build_problem(case)
+    iterates: list[Array] = []
+
+    def keep(record: Record) -> None:
+        iterates.append(iterate(problem))
+
+    outcome = solve_problem(problem, case.solver, keep).outcome
+    if not outcome.converged:
+        raise InputError(f"{case.title}: {outcome.reason}")
+    norm, exact = ProductNorm(problem), iterates[-1]
+    return np.array([np.linalg.norm(norm(x - exact)) for x in iterates[:-1]])
+
+
+def with_layer(problem: ContactProblem, c: float, thickness: float = np.inf) -> ContactProblem:
+    """Return the problem without friction and current, on a layer that is touched at TOUCH.
+
+    Parameters
+    ----------
+    problem
+        Whose body and contact part are taken.
+    c
+        Stiffness of the law (1.28), p = c [r]^+.
+    thickness
+        Distance of the rigid part behind; infinity for none.
+    """
+    gap = TOUCH + (thickness if np.isfinite(thickness) else 0.0)
+    foundation = GapFunction(lambda points: np.full(len(points), gap))
+    layer = Layer(thickness, Compliance(np.inf), PotentialFactor(c))
+    contact = Contact(problem.contact.on, foundation, layer)
+    return ContactProblem(problem.domain, problem.body, contact)
+
+
+def stiffness_limit(
+    cells: Sequence[int] = (96, 16), stiffness: Sequence[float] = STIFFNESS
+) -> Errors:
+    """Return the distance between (1.27) with p = c [r]^+ and Signorini's law over 1/c.
+
+    Rounding in u, multiplied by c, bounds the residuals that can be reached.
+    """
+    inner = "solver.inner_tolerance=1e-10"
+    case = case_of("compliance-8-3", cells, ["solver.tolerance=1e-9", inner])
+    problem = build_problem(case)
+    solved(case, problem)
+    norm, limit, distances = ProductNorm(problem), iterate(problem), []
+    for c in stiffness:
+        soft = with_layer(problem, c)
+        solved(case, soft)
+        distances.append(norm(iterate(soft) - limit))
+    return Errors("1/c", 1 / np.array(stiffness), np.array(distances))
+
+
+def distance_limit(
+    cells: Sequence[int] = (96, 16), thickness: Sequence[float] = THICKNESS, c: float = 10.0
+) -> tuple[Errors, float]:
+    """Return the distance between (1.29) and (1.27) over rho - rho_0, and the penetration.
+
+    The penetration is that of (1.27). A rigid part behind it is never reached.
+    """
+    case = case_of("compliance-8-3", cells)
+    problem = with_layer(build_problem(case), c)
+    solved(case, problem)
+    norm, limit, distances = ProductNorm(problem), iterate(problem), []
+    u_n = problem.trace.normal_component(problem.trace.values(limit))
+    depth = problem.trace.maximum(u_n) - TOUCH
+    for value in thickness:
+        rigid = with_layer(problem, c, value)
+        solved(case, rigid)
+        distances.append(norm(iterate(rigid) - limit))
+    return Errors("rho - rho_0", np.array(thickness), np.array(distances)), depth
+
+
+def table(report: Report, name: str, caption: str, errors: Errors, note: str = "") -> None:
+    """Write a table of distances, with the observed orders between neighbours."""
+    orders = observed_orders(errors.parameter, errors.total)
+    columns = {errors.name: errors.parameter, "in V": errors.norms[:, 0]}
+    columns |= {"in W": errors.norms[:, 1], "order": orders}
+    report.table(name, caption, columns, note)
+
+
+def draw_errors(curves: Mapping[str, Errors]) -> tuple[Figure, dict[str, Array]]:
+    """Draw distances in V and W over the parameter, with a line of slope 1."""
+    figure, axes = subplots(size=(5.5, 3.8))
+    data: dict[str, Array] = {}
+    for (label, errors), fill in zip(curves.items(), ("none", "full"), strict=False):
+        data[f"{errors.name}, {label}"] = errors.parameter
+        words = SYMBOLS.get(label, label)
+        for norms, space, line in zip(errors.norms.T, "VW", ("o-", "s--"), strict=True):
+            size = 7 if fill == "none" else 3
+            axes.loglog(
+                errors.parameter, norms, line, label=f"{words}, in {space}", ms=size, fillstyle=fill
+            )
+            data[f"in {space}, {label}"] = norms
+    slope = 2 * errors.total[-1] / errors.parameter[-1]
+    axes.loglog(errors.parameter, slope * errors.parameter, "k:", label="slope 1")
+    axes.set(xlabel=SYMBOLS[errors.name], ylabel="distance to the limit (V: m, W: GV)")
+    axes.legend()
+    return figure, data
+
+
+def draw_iterations(curves: Mapping[str, Array]) -> Figure:
+    """Draw errors over the iterations of the fixed point."""
+    figure, axes = subplots(size=(5.5, 3.8))
+    for label, errors in curves.items():
+        axes.semilogy(
+            np.arange(1, errors.size + 1),
+            errors,
+            "o-",
+            label=label.replace("mu = k_e = 0.02", r"$\mu = k_e = 0.02$"),
+            ms=4,
+        )
+    axes.set(xlabel=r"iteration $n$", ylabel=r"$|x_n - x|$ in $X$")
+    axes.legend()
+    return figure
+
+
+#: Lagged fixed points whose errors are shown: label -> case file and overrides.
+FIXED_POINTS = {
+    "Theorem 6.4, Algorithm 8": ("compliance-8-3-layer", ()),
+    "Theorem 6.4, yield strain 0.1": ("compliance-8-3-layer", ("material.yield_strain=0.1",)),
+    "Theorem 6.5, mu = k_e = 0.02": (
+        "compliance-8-4-layer",
+        ("friction.mu=0.02", "electric.k_e=0.02", "electric.lagged=true"),
+    ),
+    "Theorem 6.5, yield strain 0.1": (
+        "compliance-8-4-layer",
+        (
+            "friction.mu=0.02",
+            "electric.k_e=0.02",
+            "electric.lagged=true",
+            "material.yield_strain=0.1",
+        ),
+    ),
+}
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Compute, print and draw all. Collective."""
+    chosen = options(__doc__, "limit_theorem", arguments)
+    report, cells = Report(chosen.out), (24, 4) if chosen.coarse else (96, 16)
+    limits = {
+        "layer of thickness 0.1": theorem_6_3(True, cells),
+        "as printed": theorem_6_3(False, cells),
+    }
+    for name, (label, errors) in zip(("layer", "printed"), limits.items(), strict=True):
+        caption = f"Theorem 6.3: distance of x(mu, k_e) to x(0, 0), Example 8.4, {label}"
+        order = errors.order(SMALLEST, 1e-2)
+        table(report, f"theorem-6-3-{name}", caption, errors, f"Order below 0.01: {order:.4f}")
+    caption = "Theorem 6.3: x(mu, k_e) tends to x(0, 0) like mu + k_e"
+    report.figure("figure-theorem-6-3", caption, *draw_errors(limits))
+
+    iterations = {
+        label: fixed_point_errors(name, cells, changes)
+        for label, (name, changes) in FIXED_POINTS.items()
+    }
+    caption = "Theorems 6.4 and 6.5: errors of Algorithms 8 and 6, layer and current lagged"
+    report.figure("figure-theorems-6-4-6-5", caption, draw_iterations(iterations), iterations)
+
+    stiff = stiffness_limit(cells)
+    caption = "The normal compliance law (1.28) tends to Signorini's as c grows"
+    table(report, "compliance-stiffness", caption, stiff)
+    report.figure("figure-compliance-stiffness", caption, *draw_errors({"p = c [r]^+": stiff}))
+
+    far, depth = distance_limit(cells)
+    caption = "Law (1.29) tends to (1.27), c = 10, as the rigid part moves away"
+    report.table(
+        "compliance-distance",
+        caption,
+        {far.name: far.parameter, "in V": far.norms[:, 0], "in W": far.norms[:, 1]},
+        f"Without rigid part the layer is pressed in by {depth:.4f}: farther away it is not met.",
+    )
+
+
+if __name__ == "__main__":
+    main()

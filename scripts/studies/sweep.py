@@ -1,0 +1,268 @@
+"""Robustness sweep: some 300 problems, how many converge by each method, and at what cost.
+
+`python3 -m scripts.studies.sweep [--out DIR] [--coarse] [--methods newton uzawa] [--only NAME]`,
+also under mpirun. The problems are drawn once, with a fixed seed, from the ranges below.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator, Sequence
+from typing import Any
+
+import numpy as np
+from mpi4py import MPI
+
+from contact import build_problem, solve_problem
+from contact.case.file import Case, parse_case
+from scripts.reporting import Report, parser
+
+METHODS = ("newton", "uzawa")
+#: How many problems of each family; --coarse takes a tenth.
+COUNTS = {"bar": 120, "piezo": 60, "layer": 40, "hertz": 30, "block": 50}
+SEED = 20240229
+
+
+def _rectangle(rng: np.random.Generator, size: list[float], n: int) -> dict[str, Any]:
+    return {
+        "generator": "rectangle",
+        "size": size,
+        "cells": [round(n * size[0] / size[1]), n],
+        "rotation": float(rng.choice([0.0, 0.0, 30.0])),
+    }
+
+
+def _turned(force: tuple[float, float], degrees: float) -> list[float]:
+    angle = np.deg2rad(degrees)
+    c, s = np.cos(angle), np.sin(angle)
+    return [float(c * force[0] - s * force[1]), float(s * force[0] + c * force[1])]
+
+
+def _friction(rng: np.random.Generator, slip_length: float, radius: float = 0.0) -> dict[str, Any]:
+    """Draw mu from 0 to 1, constant or falling with the slip, rho from 0 to 6e7 a length."""
+    mu = float(rng.choice([0.0, 0.1, 0.2, 0.4, 0.6, 0.8, 1.0]))
+    if mu == 0.0:
+        return {"law": "none"}
+    rho = float(rng.choice([0.0, 1e2, 1e4, 1e5, 1e6, 6e7])) / slip_length
+    law = {"law": "slip", "a": mu * 5 / 6, "b": mu / 3, "rho": rho}
+    return {"law": "coulomb", "mu": law if rho > 0 else mu, "radius": radius}
+
+
+def bar(rng: np.random.Generator) -> dict[str, Any]:
+    """Draw Example 7.2: loads 1 to 10 times the printed ones, P1 and P2, gaps."""
+    mesh = _rectangle(rng, [4.0, 1.0], int(rng.choice([8, 16, 32])))
+    mesh["parts"] = {"loaded": {"side": "top", "from": 2.0, "to": 4.0}}
+    load = -0.005 * float(rng.choice([1, 3, 10]))
+    direction = str(rng.choice(["body", "foundation"]))
+    angle = np.deg2rad(mesh["rotation"])
+    gap = float(rng.choice([0.0, 0.0, 0.002]))
+    normal = [float(-np.sin(angle)), float(np.cos(angle))]
+    plane = {"shape": "plane", "point": [-gap * normal[0], -gap * normal[1]], "normal": normal}
+    return {
+        "mesh": mesh,
+        "space": {"degree": int(rng.choice([1, 1, 2]))},
+        "material": {
+            "law": str(rng.choice(["log", "log", "linear"])),
+            "young": 1.0,
+            "poisson": float(rng.choice([0.1, 0.3, 0.45])),
+            "yield_strain": 0.05,
+        },
+        "fixed": [{"on": "left", "displacement": [0.0, 0.0]}],
+        "load": [{"on": "loaded", "traction": _turned((0.0, load), mesh["rotation"])}],
+        "contact": {"on": "bottom", "foundation": plane, "direction": direction},
+        "friction": _friction(rng, 1.0, float(rng.choice([0.0, 0.0, 0.1]))),
+    }
+
+
+def _pzt() -> dict[str, float]:
+    return {"e31": -5.4, "e33": 15.8, "e15": 12.3, "beta11": 8.13866, "beta33": 7.37455}
+
+
+def piezo(rng: np.random.Generator) -> dict[str, Any]:
+    """Draw Examples 8.1 and 8.2: k_e 0 to 10, phi_F 0 to 32, loads to 15 x."""
+    n = int(rng.choice([8, 16]))
+    case = {
+        "mesh": {"generator": "rectangle", "size": [8.0, 4.0], "cells": [2 * n, n]},
+        "space": {"degree": int(rng.choice([1, 1, 2]))},
+        "material": {
+            "law": str(rng.choice(["linear", "log"])),
+            "young": 58.7102,
+            "poisson": 0.3912,
+            "yield_strain": 1.8,
+            "piezo": _pzt(),
+        },
+        "fixed": [{"on": "left", "displacement": [0.0, 0.0], "potential": 0.0}],
+        "load": [{"on": "top", "traction": [0.0, f"{-float(rng.choice([5, 10, 15]))}*x"]}],
+        "contact": {"on": "bottom"},
+        "friction": _friction(rng, 1e4),
+    }
+    k_e = float(rng.choice([0.0, 1e-3, 1e-1, 1.0, 10.0]))
+    if k_e > 0:
+        phi_f = float(rng.choice([0.0, 8.0, 32.0]))
+        case["electric"] = {"law": "shifted", "k_e": k_e, "phi_f": phi_f}
+    return case
+
+
+def layer(rng: np.random.Generator) -> dict[str, Any]:
+    """Draw Examples 8.3 and 8.4: a compliant layer or none, mu = k_e from 0 to 0.6."""
+    n = int(rng.choice([8, 16]))
+    small = float(rng.choice([0.0, 1e-6, 1e-4, 1e-2, 0.2, 0.6]))
+    piece = [{"side": "top"}, {"side": "bottom", "to": 2.0}, {"side": "bottom", "from": 10.0}]
+    case = {
+        "mesh": {
+            "generator": "rectangle",
+            "size": [12.0, 2.0],
+            "cells": [6 * n, n],
+            "parts": {
+                "foundation": {"side": "bottom", "from": 2.0, "to": 10.0},
+                "grounded": piece,
+            },
+        },
+        "material": {
+            "law": "log",
+            "young": 58.7102,
+            "poisson": 0.3912,
+            "yield_strain": 1.8,
+            "piezo": _pzt(),
+        },
+        "fixed": [
+            {"on": "left", "displacement": [0.0, 0.0]},
+            {"on": "right", "displacement": [0.0, 0.0]},
+            {"on": "grounded", "potential": 0.0},
+        ],
+        "load": [{"on": "grounded", "traction": [0.0, -float(rng.choice([3.0, 5.0, 8.0]))]}],
+        "contact": {
+            "on": "foundation",
+            "law": "compliance",
+            "gap": float(rng.choice([0.3, 0.5])),
+            "layer": float(rng.choice([0.0, 0.1])),
+            "stiffness": float(rng.choice([1.0, 10.0, 100.0])),
+            "limit": 0.1,
+            "potential_factor": float(rng.choice([1.0, 2.0])),
+        },
+        "friction": {"law": "coulomb", "mu": small} if small > 0 else {"law": "none"},
+    }
+    if small > 0:
+        case["electric"] = {"law": "shifted", "k_e": small, "phi_f": 32.0}
+    return case
+
+
+def hertz(rng: np.random.Generator) -> dict[str, Any]:
+    """Draw Example 7.1: both contact directions, loads 160 to 1600, mu 0 to 1."""
+    load = float(rng.choice([160.0, 800.0, 1600.0])) / 16
+    plane = {"shape": "plane", "point": [0.0, 0.0], "normal": [0.0, 1.0]}
+    fine = float(rng.choice([0.1, 0.2]))
+    return {
+        "mesh": {"generator": "quarter_disc", "radius": 8.0, "contact_size": fine},
+        "material": {
+            "law": "linear",
+            "young": 2000.0,
+            "poisson": float(rng.choice([0.1, 0.3, 0.45])),
+        },
+        "fixed": [{"on": "symmetry", "displacement": [0.0, "free"]}],
+        "load": [{"on": "top", "traction": [0.0, -load]}],
+        "contact": {
+            "on": "contact",
+            "foundation": plane,
+            "direction": str(rng.choice(["foundation", "body"])),
+        },
+        "friction": _friction(rng, 1.0),
+    }
+
+
+def block(rng: np.random.Generator) -> dict[str, Any]:
+    """Draw a block in space, clamped on one side, pressed and pushed aside on top."""
+    n = int(rng.choice([4, 6]))
+    push, press = 0.005 * float(rng.choice([0, 1, 2])), -0.01 * float(rng.choice([1, 3]))
+    return {
+        "mesh": {"generator": "box", "size": [2.0, 1.0, 1.0], "cells": [2 * n, n, n]},
+        "space": {"degree": int(rng.choice([1, 1, 1, 2])) if n == 4 else 1},
+        "material": {
+            "law": str(rng.choice(["linear", "log"])),
+            "young": 1.0,
+            "poisson": float(rng.choice([0.1, 0.3, 0.45])),
+            "yield_strain": 0.02,
+        },
+        "fixed": [{"on": "left", "displacement": [0.0, 0.0, 0.0]}],
+        "load": [{"on": "top", "traction": [0.0, push, press]}],
+        "contact": {"on": "bottom", "gap": float(rng.choice([0.0, 0.0, 0.005]))},
+        "friction": _friction(rng, 1.0),
+    }
+
+
+FAMILIES = {"bar": bar, "piezo": piezo, "layer": layer, "hertz": hertz, "block": block}
+
+
+def problems(coarse: bool, only: str | None = None) -> Iterator[tuple[str, Case]]:
+    """Draw the problems, the same ones on every machine and rank."""
+    for number, (name, draw) in enumerate(FAMILIES.items()):
+        rng = np.random.default_rng([SEED, number])
+        for k in range(COUNTS[name] // 10 if coarse else COUNTS[name]):
+            case = parse_case(draw(rng), source=f"{name}-{k}")
+            if only is None or case.source == only or name == only:
+                yield name, case
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Solve all problems by all methods and write what came of it."""
+    command = parser(__doc__, "sweep")
+    command.add_argument("--methods", nargs="+", default=list(METHODS), choices=METHODS)
+    command.add_argument("--only", help="a family, or one problem such as bar-7")
+    given = command.parse_args(arguments)
+    rows: dict[str, list[Any]] = {
+        key: [] for key in ("problem", "method", "converged", "solves", "seconds", "why")
+    }
+    for _, case in problems(given.coarse, given.only):
+        problem = build_problem(case)
+        for method in given.methods:
+            begin = time.perf_counter()
+            settings = case.solver.model_copy(update={"method": method})
+            solution = solve_problem(problem, settings)
+            notes = {r.note for r in solution.history.records}
+            for word in ("tangent", "taken back"):  # steps of the method itself
+                notes = {note.replace(word, "").strip() for note in notes}
+            fallback = ", ".join(sorted(notes - {""}))
+            row = (
+                case.source,
+                method,
+                solution.converged,
+                solution.counters.linear_solves,
+                round(time.perf_counter() - begin, 2),
+                fallback if solution.converged else solution.outcome.reason,
+            )
+            for key, value in zip(rows, row, strict=True):
+                rows[key].append(value)
+            if MPI.COMM_WORLD.rank == 0 and (not solution.converged or fallback):
+                print(*row, flush=True)
+    report = Report(given.out)
+    report.numbers("sweep", rows)
+    report.table("sweep-summary", "Robustness sweep", summary(rows, given.methods))
+
+
+def summary(rows: dict[str, list[Any]], methods: Sequence[str]) -> dict[str, list[Any]]:
+    """Count by family and method."""
+    table: dict[str, list[Any]] = {
+        "family": [],
+        "method": [],
+        "problems": [],
+        "converged": [],
+        "without fall-back": [],
+        "median solves": [],
+        "most solves": [],
+    }
+    family = np.array([name.rsplit("-", 1)[0] for name in rows["problem"]])
+    for name in dict.fromkeys(family):
+        for method in methods:
+            chosen = (family == name) & (np.array(rows["method"]) == method)
+            converged = np.array(rows["converged"])[chosen]
+            plain = np.array([why == "" for why in rows["why"]])[chosen]
+            solves = np.array(rows["solves"])[chosen]
+            values = (name, method, chosen.sum(), converged.sum(), (converged & plain).sum())
+            values += (int(np.median(solves)), solves.max())
+            for key, value in zip(table, values, strict=True):
+                table[key].append(value)
+    return table
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,81 @@
+"""Which script makes which tables and figures, in the order of the results page."""
+
+from __future__ import annotations
+
+import argparse
+import importlib
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from mpi4py import MPI
+
+
+@dataclass(frozen=True)
+class Part:
+    """A script.
+
+    Attributes
+    ----------
+    script
+        Its name, and that of the folder that it writes into.
+    heading
+        On the results page.
+    tables, figures
+        Whether it makes tables, and figures.
+    package
+        Where the script is.
+    """
+
+    script: str
+    heading: str
+    tables: bool = True
+    figures: bool = True
+    package: str = "thesis"
+
+    @property
+    def module(self) -> str:
+        """Return the name to import."""
+        return f"scripts.{self.package}.{self.script}"
+
+
+PARTS = (
+    Part("hertz", "Example 7.1: Hertz's cylinder, and a sphere"),
+    Part("table_7_1", "Example 7.2: Table 7.1, Algorithms 1 and 2", figures=False),
+    Part("figures_mechanics", "Example 7.2: Figures 7.4, 7.5, 7.7 and 7.8", tables=False),
+    Part("table_7_2", "Example 7.2: Table 7.2, the penalty method, Theorem 4.2"),
+    Part("convergence_mechanics", "Figure 7.6 and Theorems 3.2, 4.3 and 4.5", package="studies"),
+    Part("nonlocal_friction", "Non-local friction at work", package="studies"),
+    Part("tables_piezo", "Examples 8.1 and 8.2: Tables 8.2 and 8.3", figures=False),
+    Part("figures_piezo", "Examples 8.1 and 8.2: Figures 8.2 to 8.7", tables=False),
+    Part("tables_compliance", "Examples 8.3 and 8.4: Table 8.4", figures=False),
+    Part("figures_compliance", "Examples 8.3 and 8.4: figures", tables=False),
+    Part(
+        "limit_theorem",
+        "Theorems 6.3 to 6.5: limits of the compliant foundation",
+        package="studies",
+    ),
+    Part("agreement", "Do the methods agree? All examples", figures=False, package="studies"),
+)
+
+
+def run(parts: Sequence[Part], text: str, arguments: Sequence[str] | None = None) -> None:
+    """Run scripts into folders side by side. Collective."""
+    parser = argparse.ArgumentParser(description=text.splitlines()[0])
+    parser.add_argument("--out", type=Path, default=Path("results"))
+    parser.add_argument("--coarse", action="store_true", help="coarse meshes, for tests")
+    parser.add_argument("--only", nargs="+", metavar="SCRIPT", help="these scripts alone")
+    chosen = parser.parse_args(arguments)
+    names = {part.script for part in PARTS}
+    for name in chosen.only or ():
+        if name not in names:
+            parser.error(f"--only: no script {name!r} (accepted: {', '.join(sorted(names))})")
+    for part in parts:
+        if chosen.only and part.script not in chosen.only:
+            continue
+        begin = time.perf_counter()
+        flags = ["--out", str(chosen.out / part.script), *["--coarse"] * chosen.coarse]
+        importlib.import_module(part.module).main(flags)
+        if MPI.COMM_WORLD.rank == 0:
+            print(f"\n== {part.script}: {time.perf_counter() - begin:.0f} s", flush=True)

@@ -1,0 +1,201 @@
+"""Figures 8.2 to 8.7: Examples 8.1 and 8.2.
+
+`python3 -m scripts.thesis.figures_piezo [--out DIR] [--coarse]`, also under mpirun.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import ufl
+from dolfinx import fem
+from matplotlib.figure import Figure
+from mpi4py import MPI
+
+from contact.body.transfer import carry
+from contact.output.figures.body import draw_plane, picture
+from contact.output.table import contact_table
+from contact.problem.problem import ContactProblem
+from contact.typing import Array
+from forms.kinematics import strain
+from scripts.reporting import Report, observed_orders, options, subplots
+from scripts.studies.lagged_current import theorem_5_2
+from scripts.thesis.figures_compliance import (
+    ALONG,
+    POTENTIAL,
+    example,
+    remark,
+    solution_of,
+    with_forces,
+)
+
+MU = (0.0, 0.2, 1.0)
+PHI_F = (0, 1, 2, 4, 8, 16, 32)
+K_E = (0.0, 1e-3, 1e-2, 1e-1, 1.0)
+
+#: Norms of Figure 8.7.
+NORMS = ("u in H1", "phi in H1", "u in L2", "phi in L2")
+
+
+@dataclass(frozen=True)
+class Curve:
+    """One curve of a figure: how a case file is changed for it, and its label."""
+
+    label: str
+    changes: tuple[str, ...]
+
+
+def figure_8_2a(report: Report, cells: tuple[int, int]) -> None:
+    """Draw the deformed bar on an insulating foundation. Collective."""
+    solution = solution_of("piezo-8-1", cells)
+    table = contact_table(solution)
+    deformed = picture(solution, "potential", POTENTIAL)
+    if table is None or deformed is None:
+        return
+    values = deformed.values
+    report.figure(
+        "figure-8-2a",
+        "Figure 8.2 (a): deformed bar, potential, contact forces on it (arrows), k_e = 0, mu = 0.2",
+        with_forces(draw_plane(deformed, table), deformed, table),
+        {"smallest potential": [float(values.min())], "largest potential": [float(values.max())]},
+        remark(solution, table),
+    )
+
+
+def potentials(
+    report: Report, number: str, what: str, name: str, curves: Sequence[Curve],
+    cells: tuple[int, int],
+) -> None:  # fmt: skip
+    """Draw the potential on Gamma_3 for several data. Collective."""
+    domain = None
+    data: dict[str, Array] = {}
+    figure, axes = subplots(size=(6.0, 3.2))
+    residual = 0.0
+    for k, curve in enumerate(curves):
+        solution = solution_of(name, cells, *curve.changes, domain=domain)
+        domain = solution.problem.domain
+        residual = max(residual, solution.outcome.kkt.largest)
+        table = contact_table(solution)
+        if table is not None:
+            data.setdefault("x", table["x"])
+            data[curve.label] = table["phi"]
+            # Dashes let curves be seen that coincide.
+            axes.plot(table["x"], table["phi"], "--" if k % 2 else "-", lw=1.0, label=curve.label)
+    if MPI.COMM_WORLD.rank > 0:
+        return
+    axes.set(xlabel=ALONG, ylabel=POTENTIAL)
+    axes.legend(ncols=2)
+    report.figure(
+        f"figure-{number}",
+        f"Figure {number.replace('-', '.', 1)[:3]} ({number[-1]}): potential on Gamma_3, {what}",
+        figure,
+        data,
+        f"Largest residual {residual:.1e}.",
+    )
+
+
+def all_potentials(report: Report, cells: tuple[int, int]) -> None:
+    """Draw Figures 8.2 (b), 8.4 and 8.6. Collective."""
+    # Without friction the case has none, so that mu = 0 is allowed by the law itself.
+    friction = [Curve(rf"$\mu = {mu:g}$", (f"friction.mu={mu}",)) for mu in MU]
+    potentials(report, "8-2b", "k_e = 0, for mu = 0, 0.2, 1", "piezo-8-1", friction, cells)
+    phi_f = [Curve(rf"$\varphi_F = {v}$", (f"electric.phi_f={v}",)) for v in PHI_F]
+    k_e = [Curve(rf"$k_e = {v:g}$", (f"electric.k_e={v}",)) for v in K_E]
+    for number, name in (("8-4", "piezo-8-1-conductive"), ("8-6", "piezo-8-2")):
+        potentials(report, f"{number}a", "k_e = 1, for phi_F = 0 to 32", name, phi_f, cells)
+        potentials(report, f"{number}b", "phi_F = 32, for k_e = 0 to 1", name, k_e, cells)
+
+
+def norms(problem: ContactProblem) -> Callable[[fem.Function], Array]:
+    """Return the norms of u and phi in H1 (seminorms |eps|, |grad|) and in L2. Collective."""
+    difference = fem.Function(problem.space)
+    u, phi = problem.parts_of(difference)
+    assert phi is not None
+    parts = (strain(u), ufl.grad(phi), u, phi)
+    forms = [fem.form(ufl.inner(part, part) * problem.domain.dx) for part in parts]
+
+    def measure(function: fem.Function) -> Array:
+        difference.x.array[:] = function.x.array
+        squares = [problem.comm.allreduce(fem.assemble_scalar(form)) for form in forms]
+        return np.sqrt(squares)
+
+    return measure
+
+
+def figure_8_7(report: Report, coarse: bool) -> dict[str, Array]:
+    """Draw the error against a reference two levels finer than the last mesh. Collective."""
+    cells, last = ((8, 16), 64) if coarse else ((16, 32, 64, 128), 512)
+    columns: dict[str, list[object]] = {"problem": [], "cells": [], "reference": []}
+    for name in NORMS:
+        columns |= {name: [], f"order ({name})": []}
+    found = {}
+    for label, name in (("Example 8.1", "piezo-8-1-conductive"), ("Example 8.2", "piezo-8-2")):
+        reference = solution_of(name, (last, last // 2)).problem
+        measure, rows = norms(reference), []
+        scale = measure(reference.x)
+        for n in cells:
+            other = carry(solution_of(name, (n, n // 2)).problem.x, reference.space)
+            other.x.array[:] -= reference.x.x.array
+            rows.append(measure(other) / scale)
+        errors, h = np.array(rows), 4.0 / (np.array(cells) / 2)
+        found[label] = errors
+        columns["problem"] += [label] * h.size
+        columns["cells"] += [f"{n} x {n // 2}" for n in cells]
+        columns["reference"] += [f"{last} x {last // 2}"] * h.size
+        for k, norm in enumerate(NORMS):
+            columns[norm] += errors[:, k].tolist()
+            columns[f"order ({norm})"] += observed_orders(h, errors[:, k])
+    note = (
+        "Relative errors; |eps(u)| and |grad(phi)| stand for the norms of H1. The thesis's "
+        "reference, 256 x 128 cells, is the finest mesh that it tests, so that its last point "
+        "means nothing; here it is two levels finer than the finest mesh. The clamped and "
+        "grounded corners are singular, which costs P1 its full order 1 in H1 and 2 in L2."
+    )
+    caption = "Figure 8.7: errors of u and phi against a reference solution"
+    report.table("figure-8-7-table", caption, columns, note)
+    report.figure("figure-8-7", caption, error_figure(h, found), columns, note)
+    return found
+
+
+def error_figure(h: Array, found: Mapping[str, Array]) -> Figure:
+    """Return errors over the mesh size, one curve a problem and norm.
+
+    Parameters
+    ----------
+    h
+        Mesh sizes, shape (n,).
+    found
+        Problem -> its errors in `NORMS`, shape (n, 4).
+    """
+    figure, axes = subplots(1, 2, size=(7.2, 3.4))
+    for line, (label, errors) in zip(("o-", "x--"), found.items(), strict=True):
+        for k, symbol in enumerate(("$u$", r"$\varphi$") * 2):
+            axes[k // 2].loglog(h, errors[:, k], line, ms=4, label=f"{symbol}, {label}")
+    for ax, power, title in zip(axes, (1, 2), ("$H^1$", "$L^2$"), strict=True):
+        low = 0.7 * ax.dataLim.y0
+        ends = np.array([h.min(), h.max()])
+        ax.loglog(ends, low * (ends / ends[0]) ** power, "k:", label=f"slope {power}")
+        ax.set(title=f"relative error in {title}", xlabel="$h$ (mesh units)")
+        ax.set_xticks(h, [f"1/{1 / size:g}" for size in h])
+        ax.minorticks_off()
+        ax.legend(fontsize=6)
+    return figure
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Make the figures. Collective."""
+    chosen = options(__doc__, "figures_piezo", arguments)
+    report, cells = Report(chosen.out), (16, 8) if chosen.coarse else (128, 64)
+    figure_8_2a(report, cells)
+    what = "k_e = 1, phi_F = 32"
+    example(report, "8-3", "piezo-8-1-conductive", f"Example 8.1, {what}", cells)
+    example(report, "8-5", "piezo-8-2", f"Example 8.2, {what}", cells)
+    all_potentials(report, cells)
+    theorem_5_2(report, chosen.coarse)
+    figure_8_7(report, chosen.coarse)
+
+
+if __name__ == "__main__":
+    main()

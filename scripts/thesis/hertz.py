@@ -1,0 +1,432 @@
+"""Hertz's problems: cylinder (Example 7.1) and sphere on a rigid plane.
+
+`python3 -m scripts.thesis.hertz [--out DIR] [--coarse]`, also under mpirun.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from mpi4py import MPI
+
+from contact import Case, Solution, build_problem, load_case
+from contact.body.norms import volume
+from contact.mesh.make import make_domain
+from contact.output.figures.body import draw_plane, picture
+from contact.output.table import contact_table
+from contact.typing import Array
+from scripts.reporting import CASES, Report, options, solved, subplots
+
+
+@dataclass(frozen=True)
+class Cylinder:
+    """Hertz's line contact of an elastic cylinder with a rigid plane.
+
+    Attributes
+    ----------
+    load
+        Line load of the whole cylinder (force/length).
+    """
+
+    load: float
+    young: float = 2000.0
+    poisson: float = 0.3
+    radius: float = 8.0
+
+    @property
+    def half_width(self) -> float:
+        """Return b = 2 sqrt(F R (1 - nu^2) / (pi E))."""
+        modulus = self.young / (1 - self.poisson**2)
+        return float(2 * np.sqrt(self.load * self.radius / (np.pi * modulus)))
+
+    @property
+    def peak(self) -> float:
+        """Return p_0 = 2 F / (pi b)."""
+        return 2 * self.load / (np.pi * self.half_width)
+
+    def pressure(self, x: Array) -> Array:
+        """Return p_0 sqrt(1 - x^2/b^2)."""
+        return self.peak * np.sqrt(np.maximum(1 - (x / self.half_width) ** 2, 0.0))
+
+
+@dataclass(frozen=True)
+class Sphere:
+    """Hertz's point contact of an elastic sphere with a rigid plane, closed form 5."""
+
+    force: float = 100.0
+    young: float = 1000.0
+    poisson: float = 0.3
+    radius: float = 10.0
+
+    @property
+    def contact_radius(self) -> float:
+        """Return a = (3 F R / (4 E*))^(1/3)."""
+        modulus = self.young / (1 - self.poisson**2)
+        return float(np.cbrt(3 * self.force * self.radius / (4 * modulus)))
+
+    @property
+    def peak(self) -> float:
+        """Return p_0 = 3 F / (2 pi a^2)."""
+        return 3 * self.force / (2 * np.pi * self.contact_radius**2)
+
+    @property
+    def approach(self) -> float:
+        """Return delta = a^2/R, the approach of infinitely distant points."""
+        return self.contact_radius**2 / self.radius
+
+    def axial(self, depth: float) -> float:
+        """Return Hertz's approach of the point of the axis at a depth: delta - u_z(depth).
+
+        u_z is the integral of the axial strain from there to infinity.
+        """
+        zeta = np.geomspace(depth / self.contact_radius, 1e5, 20001)
+        axial = -1 / (1 + zeta**2)
+        radial = -(1 + self.poisson) * (1 - zeta * np.arctan(1 / zeta)) - axial / 2
+        strain = self.peak * (axial - 2 * self.poisson * radial) / self.young
+        # Beyond, the strain falls like 1/zeta^2.
+        integral = np.trapezoid(strain, zeta) + strain[-1] * zeta[-1]
+        return self.approach + self.contact_radius * float(integral)
+
+
+@dataclass(frozen=True)
+class Found:
+    """What a contact solution says of Hertz's quantities.
+
+    Attributes
+    ----------
+    edge
+        Radius where a line through p^2 over r^2, of the outer half of the nodes in contact,
+        vanishes.
+    moment
+        Radius of Hertz's pressure with the same second moment.
+    peak
+        The largest nodal pressure.
+    centre
+        Pressure at r = 0 of a line through p^2 over r^2 of the inner half of the nodes, free
+        of the noise of the nodal values on irregular meshes.
+    force_error
+        |contact force - load|/load, vertical.
+    h
+        Spacing of the contact nodes.
+    """
+
+    edge: float
+    moment: float
+    peak: float
+    centre: float
+    force_error: float
+    h: float
+
+
+def measure(solution: Solution, load: float) -> Found:
+    """Measure contact radius, peak pressure and force; the axis is x = 0. Collective."""
+    problem, trace = solution.problem, solution.problem.trace
+    d = problem.dim
+    pressure, points = trace.gather(solution.pressure), trace.gather(trace.points)
+    weight = trace.gather(trace.weight)
+    r = np.linalg.norm(points[:, : d - 1], axis=1)
+    touching = pressure > 1e-6 * pressure.max()
+    radius = r[touching].max()
+    outer = touching & (r > radius / 2)
+    slope, offset = np.polyfit(r[outer] ** 2, pressure[outer] ** 2, 1)
+    inner = r <= radius / 2
+    centre = np.polyfit(r[inner] ** 2, pressure[inner] ** 2, 1)[1]
+    # Hertz's pressure has <r^2> = b^2/4 in the plane and 2 a^2/5 in space.
+    factor = 4.0 if d == 2 else 2.5
+    moment = np.sqrt(factor * (weight @ (pressure * r**2)) / (weight @ pressure))
+    force = -solution.contact_force[-1]
+    h = weight[touching].sum() / np.count_nonzero(touching)
+    return Found(
+        float(np.sqrt(-offset / slope)),
+        float(moment),
+        float(pressure.max()),
+        float(np.sqrt(centre)),
+        abs(force - load) / load,
+        float(h if d == 2 else np.sqrt(h)),
+    )
+
+
+def cylinder(
+    load: float,
+    *,
+    mu: str = "0.0",
+    direction: str = "foundation",
+    shape: str = "quarter_disc",
+    fineness: float = 20.0,
+    degree: int = 1,
+) -> Case:
+    """Return Example 7.1 with another load, friction, contact direction and shape.
+
+    Parameters
+    ----------
+    load
+        Line load of the whole cylinder.
+    mu
+        Coefficient of friction, as in a case file.
+    direction
+        Of contact: "foundation" or "body".
+    shape
+        Mesh recipe: "quarter_disc", "half_disc" or "disc". The latter two are pressed by a
+        platen that they stick to sideways: nothing else holds them there.
+    fineness
+        Elements on Hertz's half-width.
+    degree
+        Of the elements.
+    """
+    hertz = Cylinder(load)
+    b = hertz.half_width
+    changes = [
+        f"title=Hertz: {shape}, load {load:g}, mu = {mu}, direction {direction}",
+        f"mesh.contact_size={b / fineness}",
+        f"mesh.contact_width={1.25 * b}",
+        f"mesh.size={min(0.8, 9.6 / fineness)}",
+        f"contact.direction={direction}",
+        f"space.degree={degree}",
+    ]
+    if mu != "(7.16)":
+        changes.append(f"friction.mu={mu}")
+    width = 2 * hertz.radius
+    if shape != "quarter_disc":
+        changes += [f"mesh.generator={shape}", "fixed.0.on=top"]
+    if shape == "disc":
+        # The platen touches the arc within 30 degrees of the top.
+        changes.append("mesh.top_angle=30.0")
+        width = 2 * hertz.radius * np.sin(np.deg2rad(30.0))
+    changes.append(f"load.0.traction=[0.0, {-load / width}]")
+    return load_case(CASES / "hertz.toml", changes)
+
+
+def run(case: Case, load: float) -> tuple[Solution, Found]:
+    """Solve a case with the traction scaled to the load on the polygonal body. Collective.
+
+    Parameters
+    ----------
+    case
+        The case; its first load is vertical and on ``top``.
+    load
+        Vertical force on the meshed part of the body.
+    """
+    domain = make_domain(case.mesh, MPI.COMM_WORLD)
+    problem = build_problem(case, domain=domain)
+    area = volume(problem, domain.ds("top"))
+    first = case.load[0]
+    assert first.traction is not None
+    scaled = [0.0] * (domain.dim - 1) + [-load / area]
+    traction = tuple(type(first.traction[0])(value) for value in scaled)
+    loads = (first.model_copy(update={"traction": traction}), *case.load[1:])
+    case = case.model_copy(update={"load": loads})
+    solution = solved(case, build_problem(case, domain=domain))
+    return solution, measure(solution, load)
+
+
+#: Load, mu, direction and shape of the rows of the table of cylinders.
+CYLINDERS = (
+    (16.0, "0.0", "foundation", "quarter_disc"),
+    (160.0, "0.0", "foundation", "quarter_disc"),
+    (160.0, "0.0", "foundation", "half_disc"),
+    (160.0, "0.0", "foundation", "disc"),
+    (160.0, "0.5", "foundation", "quarter_disc"),
+    (1600.0, "0.0", "foundation", "quarter_disc"),
+    (1600.0, "0.0", "body", "quarter_disc"),
+    (1600.0, "0.5", "foundation", "quarter_disc"),
+    (1600.0, "0.5", "body", "quarter_disc"),
+    (1600.0, "(7.16)", "foundation", "quarter_disc"),
+    (1600.0, "(7.16)", "body", "quarter_disc"),
+)
+
+
+def cylinders(report: Report, fineness: float) -> Mapping[tuple[object, ...], Solution]:
+    """Make the table of cylinders; return its solutions by row. Collective."""
+    names = (
+        "shape",
+        "load",
+        "mu",
+        "direction",
+        "b/h",
+        "b/b_H (edge)",
+        "b/b_H (moment)",
+        "p_0/p_H",
+        "force error",
+        "residual",
+    )
+    columns: dict[str, list[object]] = {name: [] for name in names}
+    solutions = {}
+    for load, mu, direction, shape in CYLINDERS:
+        hertz = Cylinder(load)
+        case = cylinder(load, mu=mu, direction=direction, shape=shape, fineness=fineness)
+        part = load / 2 if shape == "quarter_disc" else load
+        solution, found = run(case, part)
+        solutions[load, mu, direction, shape] = solution
+        row = (
+            shape,
+            load,
+            mu,
+            direction,
+            hertz.half_width / found.h,
+            found.edge / hertz.half_width,
+            found.moment / hertz.half_width,
+            found.peak / hertz.peak,
+            found.force_error,
+            solution.outcome.kkt.largest,
+        )
+        for name, value in zip(names, row, strict=True):
+            columns[name].append(value)
+    report.table(
+        "hertz-cylinder",
+        "Cylinder on a plane (Example 7.1): half-width and peak pressure over Hertz's",
+        columns,
+        "Example 7.1 is the load 1600, where b/R = 0.34 and the solution of linear elasticity is "
+        "no longer Hertz's; the small loads show the classical solution. (edge) is where p^2, "
+        "extrapolated in x^2, vanishes; (moment) is the half-width of the elliptic pressure with "
+        "the same second moment: both agree for Hertz's. Friction of a cylinder pressed once on "
+        "a rigid plane narrows the contact; Hertz knows none.",
+    )
+    return solutions
+
+
+def figure_7_2(report: Report, solutions: Mapping[tuple[object, ...], Solution]) -> None:
+    """Draw the counterpart of Figure 7.2 from solutions of `cylinders`. Collective."""
+    hertz = Cylinder(1600.0)
+    shown = {
+        "no friction": (1600.0, "0.0", "foundation", "quarter_disc"),
+        "no friction, body's normal": (1600.0, "0.0", "body", "quarter_disc"),
+        "(7.16), rho = 1e4": (1600.0, "(7.16)", "foundation", "quarter_disc"),
+        "(7.16), body's normal": (1600.0, "(7.16)", "body", "quarter_disc"),
+    }
+    tables = {label: contact_table(solutions[key]) for label, key in shown.items()}
+    deformed = picture(
+        solutions[shown["(7.16), rho = 1e4"]], "von_mises", "von Mises stress (units of the case)"
+    )
+    if MPI.COMM_WORLD.rank > 0:
+        return
+    x = np.linspace(0, 1.25 * hertz.half_width, 400)
+    data: dict[str, Sequence[float]] = {"x": x, "Hertz": hertz.pressure(x)}
+    figure, axes = subplots(2, 1, size=(6.3, 5.2), sharex=True)
+    axes[0].plot(x, hertz.pressure(x), "k--", lw=1.0, label="Hertz")
+    for label, table in tables.items():
+        assert table is not None
+        near = table["x"] <= x[-1]
+        where = table["x"][near]
+        (line,) = axes[0].plot(where, table["pressure"][near], label=label)
+        data |= {f"x, {label}": where, f"pressure, {label}": table["pressure"][near]}
+        if np.any(table["bound"] > 0):
+            colour = line.get_color()
+            axes[1].plot(where, table["tau"][near], color=colour, label=label)
+            bound = f"{label}: bound $-s$"
+            axes[1].plot(where, -table["bound"][near], ":", color=colour, label=bound)
+            data |= {f"tau, {label}": table["tau"][near], f"bound, {label}": table["bound"][near]}
+    axes[0].set_ylabel(r"$-\sigma_\nu$ (units of the case)")
+    axes[1].set_xlabel(r"$x$ along $\Gamma_3$ (mesh units)")
+    axes[1].set_ylabel(r"$-\sigma_\tau\cdot t$ (units of the case)")
+    for ax in axes:
+        ax.legend()
+    report.figure(
+        "figure-7-2a",
+        "Figure 7.2 (a): pressure and tangential stress on Gamma_3, Hertz's solution beside",
+        figure,
+        data,
+        "Example 7.1. Hertz's solution is one of small contact widths and without friction; "
+        "friction narrows the contact and raises the pressure.",
+    )
+    assert deformed is not None
+    table = tables["(7.16), rho = 1e4"]
+    assert table is not None
+    report.figure(
+        "figure-7-2b",
+        "Figure 7.2 (b): deformed quarter cylinder, von Mises stress",
+        draw_plane(deformed, table),
+        {"von Mises": [float(deformed.values.max())]},
+        "Coulomb friction (7.16), rho = 1e4, contact along the foundation's normal. The number "
+        "is the largest von Mises stress.",
+    )
+
+
+def sphere(fineness: float, degree: int = 1) -> Case:
+    """Return the sphere with a number of elements on Hertz's contact radius."""
+    a = Sphere().contact_radius
+    return load_case(
+        CASES / "hertz-sphere.toml",
+        [
+            f"mesh.contact_size={a / fineness}",
+            f"mesh.contact_width={1.15 * a}",
+            f"mesh.size={min(2.0, 12.0 / fineness)}",
+            f"space.degree={degree}",
+        ],
+    )
+
+
+def approach(solution: Solution) -> float:
+    """Return how far the middle of the cut, at the depth R, has come down. Collective."""
+    problem, hertz = solution.problem, Sphere()
+    points = problem.space.tabulate_dof_coordinates()[: problem.owned // problem.block_size]
+    u = problem.x.x.array[: problem.owned].reshape(-1, problem.block_size)
+    middle = np.linalg.norm(points - [0.0, 0.0, hertz.radius], axis=1) < 1e-6 * hertz.radius
+    return float(problem.comm.allreduce(-u[middle, 2].sum(), op=MPI.SUM))
+
+
+def spheres(report: Report, levels: Sequence[tuple[float, int]]) -> dict[str, list[float]]:
+    """Make the table of spheres over (fineness, degree); return the ratios. Collective."""
+    hertz = Sphere()
+    names = (
+        "a/h wanted",
+        "degree",
+        "dofs",
+        "a/a_H (moment)",
+        "p_0/p_H (fit)",
+        "approach/Hertz's at depth R",
+        "force error",
+        "p_0/p_H (node)",
+        "Newton steps",
+        "residual",
+    )
+    columns: dict[str, list[object]] = {name: [] for name in names}
+    ratios: dict[str, list[float]] = {"radius": [], "peak": [], "approach": [], "force": []}
+    for fineness, degree in levels:
+        solution, found = run(sphere(fineness, degree), hertz.force / 4)
+        space = solution.problem.space
+        values = {
+            "radius": found.moment / hertz.contact_radius,
+            "peak": found.centre / hertz.peak,
+            "approach": approach(solution) / hertz.axial(hertz.radius),
+            "force": found.force_error,
+        }
+        row = (
+            fineness,
+            degree,
+            space.dofmap.index_map.size_global * space.dofmap.index_map_bs,
+            *values.values(),
+            found.peak / hertz.peak,
+            len(solution.history.records),
+            solution.outcome.kkt.largest,
+        )
+        for name, value in zip(names, row, strict=True):
+            columns[name].append(value)
+        for key, value in values.items():
+            ratios[key].append(value)
+    report.table(
+        "hertz-sphere",
+        "Sphere on a plane (closed form 5) over Hertz's solution",
+        columns,
+        "Radius from the second moment of the pressure; peak pressure from p^2 as a linear "
+        "function of r^2 near the axis, and as the largest nodal value. The body is a half ball, "
+        "and the approach is that of the middle of its cut, at the depth R; beside it is Hertz's "
+        "displacement at that depth of the half space "
+        f"({hertz.axial(hertz.radius):.5f}; of infinitely distant points {hertz.approach:.5f}). "
+        "The load is scaled to the area of the polyhedral cut, so that the forces can balance.",
+    )
+    return ratios
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Make the tables and the figure."""
+    chosen = options(__doc__, "hertz", arguments)
+    report = Report(chosen.out)
+    figure_7_2(report, cylinders(report, 12 if chosen.coarse else 30))
+    coarse = ((4, 1), (6, 1))
+    spheres(report, coarse if chosen.coarse else ((4, 1), (8, 1), (12, 1), (4, 2), (6, 2)))
+
+
+if __name__ == "__main__":
+    main()

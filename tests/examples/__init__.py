@@ -1,0 +1,1 @@
+"""The examples and case files run."""

@@ -1,0 +1,76 @@
+"""The examples: every case file converges, and Example 7.2 has its reference values."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from contact.case.file import load_case
+from contact.cli.main import CONVERGED, main
+from contact.solving import solve
+
+CASES = Path(__file__).parents[2] / "scripts" / "cases"
+
+#: Cells along the length, load f2, rho -> largest pressure, largest displacement component:
+#: an independent code's solutions of Example 7.2.
+REFERENCE = [
+    (64, -0.005, 1e5, 0.01367, 0.00499),
+    (128, -0.005, 1e5, 0.01679, 0.00501),
+    (128, -0.05, 1e5, 0.14840, 0.05022),
+    (128, -0.05, 6e7, 0.14806, 0.05022),
+]
+
+
+@pytest.mark.parametrize("path", sorted(CASES.glob("*.toml")), ids=lambda path: path.stem)
+def test_case_converges(path: Path) -> None:
+    """A coarse version of each case file converges by the file's own method."""
+    case = load_case(path)
+    assert case.title
+    if case.mesh.cells is not None:
+        coarse = ", ".join(str(max(n // 4, 2)) for n in case.mesh.cells)
+        case = load_case(path, [f"mesh.cells=[{coarse}]"])
+    solution = solve(case)
+    assert solution.converged, solution.outcome.reason
+    assert solution.outcome.kkt.largest <= case.solver.tolerance
+
+
+@pytest.mark.parametrize(("cells", "load", "rho", "pressure", "largest"), REFERENCE)
+@pytest.mark.parametrize("method", ["newton", pytest.param("uzawa", marks=pytest.mark.slow)])
+def test_example_7_2(
+    cells: int, load: float, rho: float, pressure: float, largest: float, method: str
+) -> None:
+    """Pressure and displacement are those of the independent code, to its digits."""
+    case = load_case(
+        CASES / ("bar.toml" if load == -0.005 else "bar-large.toml"),
+        [
+            f"mesh.cells=[{cells}, {cells // 4}]",
+            f"friction.mu.rho={rho}",
+            f'solver.method="{method}"',
+        ],
+    )
+    solution = solve(case)
+    assert solution.converged
+    assert solution.outcome.kkt.largest <= 1e-8
+    assert solution.pressure.max() == pytest.approx(pressure, abs=1.01e-5 / 2)
+    assert np.abs(solution.displacement.x.array).max() == pytest.approx(largest, abs=1.01e-5 / 2)
+
+
+def test_warning_and_review(tmp_path: Path) -> None:
+    """The uniqueness estimate of the slip law and (h1) are told, in the summary too."""
+    path = str(CASES / "bar-large.toml")
+    arguments = ["solve", path, "--out", str(tmp_path), "--quiet", "--set", "mesh.cells=[64, 16]"]
+    assert main(arguments) == CONVERGED
+    summary = json.loads((tmp_path / "summary.json").read_text())
+    (warning,) = summary["warnings"]
+    assert "mu* + L_mu = 0.6 + 5000" in warning
+    assert "several solutions may exist" in warning
+    assert any("(h1) holds" in note for note in summary["notes"])
+    assert summary["max_dev_strain"] > 0.05
+
+
+def test_gentle_slip_law_warns_of_nothing() -> None:
+    """Where the sliding block has one solution, there is a note and no warning."""
+    solution = solve(load_case(CASES / "bar.toml", ["mesh.cells=[16, 4]", "friction.mu.rho=100"]))
+    assert solution.warnings == []
+    assert any("Theorem 3.1" in note for note in solution.notes)

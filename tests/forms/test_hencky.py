@@ -1,0 +1,308 @@
+"""Hencky's laws against an independent energy, written in NumPy from (1.11) and (7.8)."""
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+import ufl
+from dolfinx import fem
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from mpi4py import MPI
+from scipy.integrate import quad
+
+from contact.linear.operator import LinearOperator
+from contact.problem.problem import Body, Contact, ContactProblem, Fixed
+from forms.hencky import (
+    Linear,
+    Log,
+    UserLaw,
+    check_monotonicity,
+    energy_density,
+    secant_stress,
+    stress,
+)
+from forms.kinematics import deviator, deviator_squared, strain, von_mises
+from forms.ops import exp
+from tests.problems.mechanics import Affine, bar, leaning_block, pressed_block
+
+XI = 0.05
+LAWS = {
+    "linear": Linear(1.0, 0.3),
+    "norm": Log(2.0, 0.25, yield_strain=XI),
+    "square": Log(2.0, 0.25, yield_strain=XI**2, argument="square"),
+    "norm with floor": Log(2.0, 0.25, yield_strain=XI, g_min=0.4),
+    "square with floor": Log(2.0, 0.25, yield_strain=XI**2, argument="square", g_min=0.3),
+    "user": UserLaw(2.0, 0.25, modulus=lambda t: 0.3 + 0.5 * exp(-t / XI)),
+}
+every_law = pytest.mark.parametrize("name", LAWS)
+
+
+def modulus(name, t):
+    """Return the secant modulus g(t) by the printed formulas."""
+    law = LAWS[name]
+    shear = law.young / 2 / (1 + law.poisson)
+    if name == "linear":
+        return shear
+    if name == "user":
+        return 0.3 + 0.5 * np.exp(-t / XI)
+    xi, s = (XI, t) if law.argument == "norm" else (XI**2, t**2)
+    g = shear if s <= xi else shear * xi / s * (np.log(s / xi) + 1)
+    return max(g, law.g_min)
+
+
+def energy(name, eps):
+    """M of (1.11) for a plane or solid strain, by numerical integration."""
+    law, full = LAWS[name], np.zeros((3, 3))
+    full[: len(eps), : len(eps)] = eps
+    dev = full - np.trace(full) / 3 * np.eye(3)
+    t = np.sqrt(np.sum(dev**2))
+    kinks = [k for k in kinks_of(name) if k < t]
+    pieces = [0.0, *kinks, t]
+    shear = sum(
+        quad(lambda s: 2 * modulus(name, s) * s, a, b, epsabs=0, epsrel=1e-12)[0]
+        for a, b in pairwise(pieces)
+    )
+    bulk = law.young / 3 / (1 - 2 * law.poisson)
+    return bulk / 2 * np.trace(full) ** 2 + shear
+
+
+def kinks_of(name):
+    """Yield, and where the floor starts."""
+    law = LAWS[name]
+    if not isinstance(law, Log):
+        return []
+    start = np.sqrt(law._floor_start) if law.g_min > 0 else np.inf
+    return [XI, start]
+
+
+def number(expression):
+    """Evaluate an expression without coordinates; UFL makes plain floats of some."""
+    return float(expression if isinstance(expression, int | float) else expression(()))
+
+
+def tensor(eps):
+    return ufl.as_tensor(eps.tolist())
+
+
+@st.composite
+def strains(draw, dim):
+    """Symmetric strains from far below to twelve times the yield strain."""
+    entries = draw(st.lists(st.floats(-1, 1), min_size=9, max_size=9))
+    size = draw(st.sampled_from([0.1, 0.9, 1.0, 1.1, 3.0, 12.0])) * XI
+    eps = np.array(entries).reshape(3, 3)[:dim, :dim]
+    return size * (eps + eps.T) / 2
+
+
+both_strains = st.one_of(strains(2), strains(3))
+
+
+@every_law
+@given(eps=both_strains)
+@settings(max_examples=40, deadline=None)
+def test_energy(name, eps):
+    expected = energy(name, eps)
+    assert number(energy_density(LAWS[name], tensor(eps))) == pytest.approx(
+        expected, rel=1e-9, abs=1e-16
+    )
+
+
+@every_law
+@given(eps=both_strains)
+@settings(max_examples=40, deadline=None)
+def test_stress_is_the_derivative_of_the_energy(name, eps):
+    sigma = np.array([[number(stress(LAWS[name], tensor(eps))[i, j]) for j in range(3)]
+                      for i in range(3)])  # fmt: skip
+    h = 1e-6 * XI
+    for i in range(len(eps)):
+        for j in range(len(eps)):
+            # One entry, not the symmetric pair: M is a function of the symmetric part.
+            step = np.zeros_like(eps)
+            step[i, j] = step[j, i] = h
+            slope = (energy(name, eps + step) - energy(name, eps - step)) / (2 * h)
+            expected = slope if i == j else slope / 2
+            assert sigma[i, j] == pytest.approx(expected, rel=2e-5, abs=1e-8)
+
+
+@given(eps=strains(2))
+@settings(max_examples=40, deadline=None)
+def test_the_stress_out_of_the_plane(eps):
+    """Plane strain is a solid whose eps_zz is held at 0: sigma_zz resists it."""
+    law = LAWS["norm"]
+    full = np.zeros((3, 3))
+    full[:2, :2] = eps
+    flat, solid = stress(law, tensor(eps)), stress(law, tensor(full))
+    for i in range(3):
+        for j in range(3):
+            assert number(flat[i, j]) == pytest.approx(number(solid[i, j]), abs=1e-15)
+    up, down = full.copy(), full.copy()
+    h = 1e-6 * XI
+    up[2, 2], down[2, 2] = h, -h
+    slope = (energy("norm", up) - energy("norm", down)) / (2 * h)
+    assert number(flat[2, 2]) == pytest.approx(slope, rel=2e-5, abs=1e-8)
+    s = np.array([[number(flat[i, j]) for j in range(3)] for i in range(3)])
+    dev = s - np.trace(s) / 3 * np.eye(3)
+    assert number(von_mises(flat)) == pytest.approx(np.sqrt(1.5 * np.sum(dev**2)), abs=1e-15)
+
+
+@given(eps=both_strains)
+@settings(max_examples=30, deadline=None)
+def test_deviator(eps):
+    full = np.zeros((3, 3))
+    full[: len(eps), : len(eps)] = eps
+    dev = full - np.trace(full) / 3 * np.eye(3)
+    assert number(deviator_squared(tensor(eps))) == pytest.approx(np.sum(dev**2), rel=1e-13)
+    ours = deviator(tensor(eps))
+    assert number(ours[0, 1]) == pytest.approx(dev[0, 1], rel=1e-13)
+    assert number(ours[2, 2]) == pytest.approx(dev[2, 2], rel=1e-13)
+
+
+@pytest.mark.parametrize("argument", ["norm", "square"])
+def test_the_law_of_the_thesis(argument):
+    law = Log(1.0, 0.3, yield_strain=XI, argument=argument)
+    limit = XI if argument == "norm" else np.sqrt(XI)
+    assert law.bulk == pytest.approx(1 / (3 - 6 * 0.3))
+    assert law.shear == pytest.approx(1 / (2 + 2 * 0.3))
+    below, at, above = (law.secant_modulus((f * limit) ** 2) for f in (0.5, 1.0, 1 + 1e-6))
+    assert below == at == law.shear
+    assert above == pytest.approx(law.shear, rel=1e-11)  # C1: the first difference is quadratic
+    t = np.linspace(0, 10 * limit, 1001)
+    for points in (t, t.tolist()[7]):
+        q = np.square(points)
+        assert np.all(law.secant_modulus(q) <= law.shear)
+    symbolic = law.secant_modulus(ufl.as_ufl(float(t[700] ** 2)))
+    assert number(symbolic) == pytest.approx(law.secant_modulus(t[700] ** 2), rel=1e-14)
+
+
+def test_monotonicity_is_reported():
+    law, t_max = Log(1.0, 0.3, yield_strain=XI), 0.4
+    report = check_monotonicity(law, t_max)
+    assert report.holds
+    assert report.alpha == pytest.approx(law.shear * XI / t_max, rel=1e-3)
+    assert report.beta == pytest.approx(law.shear, rel=1e-12)
+    assert report.g_0 == pytest.approx(law.shear, rel=1e-12)
+    # With the square as the argument the law softens beyond xi = e xi_0.
+    square = Log(1.0, 0.3, yield_strain=XI, argument="square")
+    turn = np.sqrt(np.e * XI)
+    assert check_monotonicity(square, 0.99 * turn).holds
+    assert not check_monotonicity(square, 1.05 * turn).holds
+    # A floor keeps (h1) on every range: alpha is the slope where the floor begins.
+    floored = Log(1.0, 0.3, yield_strain=XI, g_min=0.1)
+    start = np.sqrt(floored._floor_start)
+    for t_max in (2 * start, 10 * start):
+        alpha = check_monotonicity(floored, t_max, 20000).alpha
+        assert alpha == pytest.approx(floored.shear * XI / start, rel=1e-2)
+    assert check_monotonicity(Linear(1.0, 0.3), 0.0).holds
+
+
+@pytest.mark.parametrize("bad", [dict(argument="cube"), dict(g_min=-0.1), dict(g_min=0.5)])
+def test_a_law_that_makes_no_sense_is_refused(bad):
+    with pytest.raises(ValueError, match=next(iter(bad))):
+        Log(1.0, 0.3, yield_strain=XI, **bad)
+
+
+def problems():
+    for name, law in LAWS.items():
+        yield f"{name} P1", bar(MPI.COMM_SELF, 4, law=law)
+        yield f"{name} P2", bar(MPI.COMM_SELF, 2, law=law, degree=2)
+    solid = leaning_block(MPI.COMM_SELF, 1, 2)
+    yield "norm in space P2", solid
+    floating = pressed_block(MPI.COMM_SELF, 3, 1)
+    held = Body(LAWS["norm"], [Fixed("left", [Affine((0.0,) * 3)] * 3)])
+    yield (
+        "norm in space P1",
+        ContactProblem(floating.domain, held, Contact("bottom", floating.contact.foundation)),
+    )
+
+
+@pytest.fixture(scope="module")
+def cases():
+    return dict(problems())
+
+
+NAMES = [f"{name} P{p}" for name in LAWS for p in (1, 2)]
+NAMES += ["norm in space P2", "norm in space P1"]
+
+
+def scattered(problem, seed):
+    """Give the problem a random displacement with strains around and beyond yield."""
+    random = np.random.default_rng(seed)
+    size = 3 * XI / problem.domain.mesh.geometry.x.max()
+    problem.x.x.array[:] = size * random.standard_normal(problem.x.x.array.size)
+    problem.freeze()
+    direction = random.standard_normal(problem.owned) * problem.free.ravel()
+    return direction / np.linalg.norm(direction)
+
+
+@pytest.mark.parametrize("case", NAMES)
+def test_internal_forces_are_the_derivative_of_the_assembled_energy(cases, case):
+    """B(u; u, v) = d/dt M(u + t v), with shear strains and all."""
+    problem = cases[case]
+    direction = scattered(problem, 1)
+    u = ufl.as_vector([problem.x[i] for i in range(problem.dim)])
+    degree = 1 if problem.degree == 1 else 4
+    dx = problem.domain.dx(metadata={"quadrature_degree": degree})
+    stored = fem.form(energy_density(problem.body.law, strain(u)) * dx)
+    work = float(problem.internal_forces() @ direction)
+    base, h = problem.x.x.array.copy(), 1e-5 * XI
+    energies = []
+    for t in (2, 1, -1, -2):
+        problem.x.x.array[:] = base + t * h * direction
+        energies.append(fem.assemble_scalar(stored))
+    problem.x.x.array[:] = base
+    slope = (8 * (energies[1] - energies[2]) - (energies[0] - energies[3])) / (12 * h)
+    assert work == pytest.approx(slope, rel=1e-5, abs=1e-9)
+
+
+@pytest.mark.parametrize("case", NAMES)
+def test_tangent_is_the_derivative_of_the_internal_forces(cases, case):
+    problem = cases[case]
+    direction = scattered(problem, 2)
+    operator = LinearOperator(problem)
+    bs = problem.block_size
+    operator.update(problem.tangent, np.zeros((problem.trace.nodes.size, bs, bs)))
+    product = operator.matrix.createVecRight()
+    vector = operator.matrix.createVecRight()
+    vector.array[:] = direction
+    operator.matrix.mult(vector, product)
+    base, h = problem.x.x.array.copy(), 1e-6 * XI
+    forces = []
+    for t in (1, -1):
+        problem.x.x.array[:] = base + t * h * direction
+        problem.freeze()
+        forces.append(problem.internal_forces())
+    slope = np.where(problem.free.ravel(), (forces[0] - forces[1]) / (2 * h), 0.0)
+    assert np.linalg.norm(product.array - slope) < 2e-4 * np.linalg.norm(slope)
+
+
+@pytest.mark.parametrize("case", ["norm P1", "norm P2", "norm in space P2"])
+def test_the_secant_form_with_frozen_modulus(cases, case):
+    """B(u; v, w) is linear and symmetric in v and w; B(u; u, w) are the internal forces."""
+    problem = cases[case]
+    scattered(problem, 3)
+    forces = problem.internal_forces()
+    operator = LinearOperator(problem)
+    bs = problem.block_size
+    operator.update(problem.secant, np.zeros((problem.trace.nodes.size, bs, bs)))
+    matrix = operator.matrix
+    assert matrix.isSymmetric(1e-12)
+    free = problem.free.ravel()
+    x = problem.x.x.array.copy()
+    vector, product = matrix.createVecs()
+    # Columns of fixed unknowns are eliminated: take their displacement as 0.
+    problem.x.x.array[~free] = 0.0
+    inner = problem.internal_forces()
+    vector.array[:] = problem.x.x.array
+    matrix.mult(vector, product)
+    assert np.abs(product.array - inner)[free].max() < 1e-13
+    problem.x.x.array[:] = 2 * x  # the frozen modulus stays
+    assert np.abs(problem.internal_forces() - 2 * forces).max() < 1e-13
+
+
+def test_the_secant_stress_takes_the_modulus_from_the_frozen_strain():
+    law = LAWS["norm"]
+    frozen, eps = np.diag([4 * XI, -4 * XI]), np.diag([XI / 10, 0.0])
+    sigma = secant_stress(law, tensor(frozen), tensor(eps))
+    g = modulus("norm", np.sqrt(32) * XI)
+    expected = (law.bulk - 2 * g / 3) * XI / 10 + 2 * g * XI / 10
+    assert number(sigma[0, 0]) == pytest.approx(expected, rel=1e-12)

@@ -1,0 +1,173 @@
+"""Foundations, and boundary forms integrated by the vertex rule against nodal sums."""
+
+import numpy as np
+import pytest
+import ufl
+from dolfinx import fem
+from mpi4py import MPI
+
+from contact.errors import InputError
+from contact.interface.obstacle import GapFunction, Plane, Sphere
+from contact.interface.penalised import Lagged, Regularisation
+from contact.mesh.make import box, rectangle
+from contact.methods.uzawa import augmentation
+from contact.problem.problem import Contact, ContactProblem, Friction
+from contact.problem.state import nodal_iterate
+from forms import foundation as forms
+from forms.laws import ConstantCoefficient
+from tests.problems.mechanics import bar, flat, leaning_block
+
+R, EPS = 3.7, 0.02
+
+
+def turned(dim):
+    """Return a problem whose contact part is flat but along no axis."""
+    if dim == 2:
+        example = bar(MPI.COMM_SELF, 4)
+        domain = rectangle(MPI.COMM_SELF, [0, 0], [1, 1], [5, 2], rotation=25.0)
+    else:
+        example = leaning_block(MPI.COMM_SELF, 2)
+        domain = box(
+            MPI.COMM_SELF, [0] * 3, [1] * 3, [3, 2, 1], rotation=25.0, axis=(1.0, 2.0, 0.5)
+        )
+    body = example.body
+    held = type(body)(body.law, [type(body.fixed[0])("top", body.fixed[0].displacement)])
+    friction = Friction(ConstantCoefficient(0.4))
+    gap = GapFunction(lambda points: 0.02 * np.sin(5 * points[:, 0]))
+    return ContactProblem(domain, held, Contact("bottom", gap), friction)
+
+
+@pytest.fixture(scope="module", params=[2, 3], ids=["in the plane", "in space"])
+def problem(request):
+    problem = turned(request.param)
+    random = np.random.default_rng(5)
+    problem.x.x.array[:] = 0.03 * random.standard_normal(problem.x.x.array.size)
+    return problem
+
+
+def vertex_rule(problem):
+    return problem.domain.ds("bottom")(
+        metadata={"quadrature_rule": "vertex", "quadrature_degree": 1}
+    )
+
+
+def field(problem, values):
+    """Return a scalar P1 function with nodal values on the contact nodes."""
+    function = fem.Function(fem.functionspace(problem.domain.mesh, ("Lagrange", 1)))
+    function.x.array[problem.trace.nodes] = values
+    return function
+
+
+def assembled(form):
+    return fem.assemble_vector(fem.form(form)).array
+
+
+def lumped(problem, vectors):
+    total = np.zeros(problem.owned)
+    problem.trace.add(total, problem.trace.weight[:, None] * vectors)
+    return total
+
+
+def test_augmentation_is_the_form_of_the_augmented_lagrangian(problem):
+    v, nu, ds = ufl.TestFunction(problem.space), normal_of(problem), vertex_rule(problem)
+    trace = problem.trace
+    for friction in (True, False):
+        blocks = augmentation(problem, R, friction)
+        product = np.einsum("nij,nj->ni", blocks, nodal_iterate(problem))
+        total = np.zeros(problem.owned)
+        trace.add(total, product)
+        form = forms.augmented_lagrangian(problem.x, v, nu, R, friction) * ds
+        assert assembled(form) == pytest.approx(total, abs=1e-15)
+
+
+def normal_of(problem):
+    return ufl.FacetNormal(problem.domain.mesh)
+
+
+def test_auxiliary_load(problem):
+    random = np.random.default_rng(6)
+    trace, v = problem.trace, ufl.TestFunction(problem.space)
+    phi_c, lam_c = random.standard_normal((2, trace.size))
+    phi_f, lam_f = fem.Function(problem.space), fem.Function(problem.space)
+    for function in (phi_f, lam_f):
+        function.x.array[:] = random.standard_normal(function.x.array.size)
+    form = forms.auxiliary_load(
+        field(problem, phi_c), phi_f, field(problem, lam_c), lam_f, v, normal_of(problem), R
+    )
+    tangential = [trace.tangential_component(trace.values(f.x.array)) for f in (phi_f, lam_f)]
+    vectors = (R * phi_c - lam_c)[:, None] * trace.normal + R * tangential[0] - tangential[1]
+    assert assembled(form * vertex_rule(problem)) == pytest.approx(
+        lumped(problem, vectors), abs=1e-14
+    )
+
+
+def test_penalty_forms(problem):
+    v, nu, ds = ufl.TestFunction(problem.space), normal_of(problem), vertex_rule(problem)
+    trace, nodal = problem.trace, nodal_iterate(problem)
+    laws = Lagged(problem, Regularisation(EPS, EPS), nodal)
+    forces = laws.forces(nodal)
+    gap = field(problem, trace.gap)
+    assert 0 < np.count_nonzero(forces.pressure) < trace.size
+    normal = forms.penalty(problem.x, v, nu, gap, EPS) * ds
+    expected = lumped(problem, forces.pressure[:, None] * trace.normal)
+    assert assembled(normal) == pytest.approx(expected, abs=1e-14)
+    bound = field(problem, np.asarray(problem.friction_bound(forces.pressure, forces.pressure)))
+    friction = forms.penalty_friction(problem.x, problem.x, v, nu, bound, EPS) * ds
+    assert assembled(friction) == pytest.approx(lumped(problem, forces.friction), abs=1e-14)
+
+
+def test_contact_multiplier():
+    pressure = forms.contact_multiplier(np.array([1.0, 0.0, 0.0]), 2.0, np.array([0.5, -1, 1]), 0.5)
+    assert pressure.tolist() == [1.0, 0.0, 1.0]
+
+
+def test_plane():
+    plane = Plane((0.0, -1.0), (0.0, 2.0))
+    points = np.array([[0.3, 0.5], [2.0, -1.0]])
+    down = np.array([[0.0, -1.0], [np.sin(0.3), -np.cos(0.3)]])
+    direction, gap = plane.measure(points, down)
+    assert direction.tolist() == [[0.0, -1.0]] * 2
+    assert gap == pytest.approx([1.5, 0.0])
+    direction, gap = Plane((0.0, -1.0), (0.0, 1.0), "body").measure(points[[0, 0]], down)
+    assert direction is down
+    assert gap == pytest.approx([1.5, 1.5 / np.cos(0.3)])
+    # A normal that does not lead to the foundation never meets it.
+    away = Plane((0.0, -1.0), (0.0, 1.0), "body").measure(points, -down)[1]
+    assert np.all(np.isinf(away))
+
+
+@pytest.mark.parametrize("inside", [False, True])
+def test_sphere_along_its_radius_and_along_the_body_s_normal(inside):
+    sphere = Sphere((1.0, 0.0, 0.0), 2.0, inside)
+    random = np.random.default_rng(0)
+    unit = random.standard_normal((20, 3))
+    unit /= np.linalg.norm(unit, axis=1)[:, None]
+    distance = random.uniform(0.5, 1.9, 20) if inside else random.uniform(2.1, 5, 20)
+    points = sphere.centre + distance[:, None] * unit
+    direction, gap = sphere.measure(points, unit)
+    assert direction == pytest.approx(unit if inside else -unit)
+    assert gap == pytest.approx(np.abs(distance - 2.0))
+    nearly = direction + 0.1 * random.standard_normal((20, 3))
+    nearly /= np.linalg.norm(nearly, axis=1)[:, None]
+    along, gap = Sphere((1.0, 0.0, 0.0), 2.0, inside, "body").measure(points, nearly)
+    touching = points + gap[:, None] * along
+    met = np.isfinite(gap)
+    assert met.any()
+    assert np.linalg.norm(touching - sphere.centre, axis=1)[met] == pytest.approx(2.0)
+    assert np.all(gap[met] > 0)
+    away = Sphere((1.0, 0.0, 0.0), 2.0, False, "body").measure(points, unit)[1]
+    assert inside or np.all(np.isinf(away)), "a ray that leads away never touches"
+
+
+def test_gap_function_and_directions_of_the_body():
+    direction, gap = flat(0.3).measure(np.zeros((4, 2)), np.tile([0.0, -1.0], (4, 1)))
+    assert gap.tolist() == [0.3] * 4
+    assert direction.shape == (4, 2)
+
+
+def test_a_foundation_that_no_node_can_reach_is_refused():
+    example = bar(MPI.COMM_SELF, 4)
+    with pytest.raises(InputError, match="bottom"):
+        ContactProblem(
+            example.domain, example.body, Contact("bottom", Plane((0, 9), (0, -1), "body"))
+        )

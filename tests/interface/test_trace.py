@@ -1,0 +1,185 @@
+"""The contact nodes: weights, directions, gaps, and what supports leave free."""
+
+import numpy as np
+import pytest
+from dolfinx import mesh
+from mpi4py import MPI
+
+from contact.errors import InputError
+from contact.interface.obstacle import GapFunction, Plane, Sphere
+from contact.mesh.make import from_mesh, rectangle, refined
+from contact.problem.problem import Body, Contact, ContactProblem, Fixed, Friction, Load
+from forms.hencky import Linear
+from forms.laws import ConstantCoefficient
+from tests.problems.mechanics import bar, constant, contact_data, flat, leaning_block, solve, turn
+
+LAW = Linear(1.0, 0.3)
+ZERO = constant(0.0, 2)
+
+
+def arch(cells=24):
+    """Return a strip whose lower side is an arc of radius 2 about (0, 2), 60 degrees wide."""
+    grid = mesh.create_rectangle(MPI.COMM_SELF, [[-1.0, 0.0], [1.0, 1.0]], [cells, 4])
+    x = grid.geometry.x
+    angle, radius = x[:, 0] * np.pi / 6, 2.0 - x[:, 1]
+    low = {"arc": lambda x: np.isclose(np.hypot(x[0], x[1] - 2), 2.0)}
+    x[:, :2] = np.column_stack([radius * np.sin(angle), 2 - radius * np.cos(angle)])
+    return from_mesh(grid, low | {"top": lambda x: np.isclose(np.hypot(x[0], x[1] - 2), 1.0)})
+
+
+def on_arch(foundation, degree=1, fixed=("top", (ZERO, ZERO))):
+    body = Body(LAW, [Fixed(fixed[0], fixed[1])])
+    return ContactProblem(arch(), body, Contact("arc", foundation), degree=degree).trace
+
+
+@pytest.mark.parametrize("degree", [1, 2])
+def test_normals_of_a_curved_part_are_averaged(degree):
+    trace = on_arch(flat(), degree)
+    radial = (trace.points - [0.0, 2.0]) / np.hypot(*(trace.points - [0.0, 2.0]).T)[:, None]
+    corner = np.abs(np.hypot(*(trace.points - [0.0, 2.0]).T) - 2) < 1e-9
+    ends = np.abs(radial[:, 0]) > np.sin(np.pi / 6) - 1e-6
+    # A straight facet's normal is that of its middle: at the ends there is but one facet.
+    assert np.abs(trace.normal - radial)[corner & ~ends].max() < 1e-12
+    assert np.abs(trace.normal - radial).max() < np.pi / 6 / 24 * 1.01
+    assert np.linalg.norm(trace.normal, axis=1) == pytest.approx(1.0, rel=1e-14)
+    length = 24 * 2 * 2 * np.sin(np.pi / 6 / 24)
+    assert trace.sum(np.ones(trace.size)) == pytest.approx(length, rel=1e-13)
+
+
+def test_directions_and_gaps_of_a_curved_part_over_a_plane():
+    plane = Plane((0.0, -0.1), (0.0, 1.0))
+    theirs = on_arch(plane)
+    assert theirs.normal == pytest.approx(np.tile([0.0, -1.0], (25, 1)))
+    assert theirs.gap == pytest.approx(theirs.points[:, 1] + 0.1)
+    own = on_arch(Plane((0.0, -0.1), (0.0, 1.0), "body"))
+    # Along either direction, the gap ends on the plane.
+    assert (own.points + own.gap[:, None] * own.normal)[:, 1] == pytest.approx(-0.1)
+    assert np.all(own.gap >= theirs.gap - 1e-15)
+
+
+def test_a_concentric_arc_has_a_constant_gap():
+    trace = on_arch(Sphere((0.0, 2.0), 2.25, inside=True))
+    assert trace.gap == pytest.approx(0.25)
+    own = on_arch(Sphere((0.0, 2.0), 2.25, inside=True, direction="body"))
+    assert own.gap == pytest.approx(0.25, rel=2e-3)
+
+
+def test_tangents_project_onto_the_free_tangential_directions():
+    for trace in (on_arch(flat()), leaning_block(MPI.COMM_SELF, 2, 2).trace):
+        t = trace.tangent
+        assert np.einsum("nij,njk->nik", t, t) == pytest.approx(t, abs=1e-14)
+        assert np.abs(np.einsum("nij,nj->ni", t, trace.normal)).max() < 1e-14
+        assert np.einsum("nii->n", t) == pytest.approx(trace.dim - 1)
+
+
+def test_values_and_add_are_each_other_s_transpose():
+    problem = leaning_block(MPI.COMM_SELF, 2)
+    trace, random = problem.trace, np.random.default_rng(0)
+    x, y = random.standard_normal(problem.owned), random.standard_normal((trace.size, 3))
+    total = np.zeros(problem.owned)
+    trace.add(total, y)
+    assert total @ x == pytest.approx(np.sum(trace.values(x) * y), rel=1e-12)
+
+
+def inclined(prescribed, degree):
+    """Return a block over an inclined plane; its foot slides on a vertical line."""
+    domain = rectangle(MPI.COMM_SELF, [0.0, 0.0], [1.0, 1.0], [3, 3])
+    normal = turn(2, 20.0) @ [0.0, 1.0]
+    body = Body(
+        LAW,
+        [Fixed("bottom", [constant(prescribed, 2), None])],
+        [Load("top", [ZERO, constant(-0.05, 2)])],
+    )
+    plane = Plane((0.0, -0.5), tuple(normal))
+    friction = Friction(ConstantCoefficient(0.3))
+    problem = ContactProblem(domain, body, Contact("bottom", plane), friction, degree=degree)
+    return problem, normal
+
+
+@pytest.mark.parametrize("degree", [1, 2])
+@pytest.mark.parametrize("prescribed", [0.0, 0.05, -0.1])
+def test_a_direction_that_is_partly_fixed(prescribed, degree):
+    """The plane is met where it is, also if the node is displaced along the fixed component."""
+    problem, normal = inclined(prescribed, degree)
+    trace = problem.trace
+    assert trace.normal == pytest.approx(np.tile([0.0, -1.0], (trace.size, 1)))
+    assert np.abs(trace.tangent).max() < 1e-15
+    loop = solve(problem, 1e-10)
+    u = trace.values(problem.x.x.array)
+    assert u[:, 0] == pytest.approx(prescribed)
+    distance = (trace.points + u - [0.0, -0.5]) @ normal
+    assert distance.min() == pytest.approx(0.0, abs=1e-10)
+    assert np.abs(distance[loop.forces.pressure > 1e-8]).max() < 1e-10
+    # The load is carried: the wall takes the horizontal part.
+    assert trace.sum(loop.forces.pressure) == pytest.approx(0.05, rel=1e-9)
+
+
+def test_nodes_that_cannot_reach_the_foundation_are_left_out():
+    away = GapFunction(lambda p: np.where(p[:, 0] > 2, np.inf, 0.0))
+    example = bar(MPI.COMM_SELF, 4)
+    trace = ContactProblem(example.domain, example.body, Contact("bottom", away)).trace
+    assert trace.points[:, 0].max() <= 2.0
+    assert np.all(np.isfinite(trace.gap))
+
+
+def test_two_bodies_that_differ_by_a_rotation_have_the_same_contact():
+    """Not only for uniform fields: a bar turned with its clamp, load and foundation."""
+    straight = bar(MPI.COMM_SELF, 8, -0.02)
+    q = turn(2, 30.0)
+    domain = rectangle(MPI.COMM_SELF, [0.0, 0.0], [4.0, 1.0], [32, 8], rotation=30.0)
+    body = Body(
+        straight.body.law,
+        [Fixed("left", [ZERO, ZERO])],
+        [Load("top", [constant(c, 2) for c in q @ [0.0, -0.01]])],
+    )
+    plane = Plane((0.0, 0.0), tuple(q @ [0.0, 1.0]))
+    turned = ContactProblem(domain, body, Contact("bottom", plane), straight.friction)
+    upright = ContactProblem(
+        rectangle(MPI.COMM_SELF, [0.0, 0.0], [4.0, 1.0], [32, 8]),
+        Body(body.law, body.fixed, [Load("top", [ZERO, constant(-0.01, 2)])]),
+        Contact("bottom", flat()),
+        straight.friction,
+    )
+    ours, theirs = contact_data(solve(turned, 1e-11)), solve(upright, 1e-11)
+    order = np.argsort(ours["points"] @ q[:, 0])
+    expected = contact_data(theirs)
+    for name in ("pressure", "bound", "u_n"):
+        assert np.abs(ours[name][order] - expected[name]).max() < 1e-9
+    assert np.abs(ours["friction"][order] @ q - expected["friction"]).max() < 1e-9
+    assert np.abs(ours["u_t"][order] @ q - expected["u_t"]).max() < 1e-9
+
+
+def around_a_circle(radius, degree=1, levels=0, cells=24, direction="foundation"):
+    """Return the trace of the arch's upper side, a concave arc of radius 1, on a circle."""
+    domain = arch(cells)
+    for _ in range(levels):
+        domain = refined(domain)
+    body = Body(LAW, [Fixed("arc", (ZERO, ZERO))])
+    circle = Sphere((0.0, 2.0), radius, direction=direction)
+    return ContactProblem(domain, body, Contact("top", circle), degree=degree).trace
+
+
+@pytest.mark.parametrize("direction", ["foundation", "body"])
+@pytest.mark.parametrize(("degree", "levels"), [(1, 0), (1, 1), (1, 2), (2, 0), (2, 1)])
+def test_straight_facets_around_a_circle_touch_it(degree, levels, direction):
+    """The corners lie on the circle, all other nodes in it by the depth of the chords."""
+    cells = 6
+    trace = around_a_circle(1.0, degree, levels, cells, direction)
+    depth = 1 - np.cos(np.pi / 6 / cells)
+    assert np.abs(trace.gap).max() < 1e-12
+    assert trace.cut == pytest.approx(depth if (degree, levels) != (1, 0) else 0.0)
+    loose = around_a_circle(1.0 - 0.5 * depth, degree, levels, cells, direction)
+    assert loose.gap.min() == pytest.approx(0.5 * depth if (degree, levels) == (1, 0) else 0.0)
+    assert loose.gap.max() == pytest.approx(0.5 * depth, rel=0.01)
+
+
+@pytest.mark.parametrize(("degree", "levels"), [(1, 0), (1, 1), (2, 0), (2, 1)])
+def test_a_circle_larger_than_its_hole_is_refused(degree, levels):
+    with pytest.raises(InputError, match="cuts it at rest"):
+        around_a_circle(1.01, degree, levels)
+
+
+def test_chords_do_not_reach_into_a_sphere_around_the_body():
+    assert Sphere((0.0, 0.0), 1.0).chord_depth(0.2) == pytest.approx(1 - np.sqrt(1 - 0.01))
+    assert Sphere((0.0, 0.0, 0.0), 1.0).chord_depth(0.3) == pytest.approx(1 - np.sqrt(1 - 0.03))
+    assert Sphere((0.0, 0.0), 1.0, inside=True).chord_depth(0.2) == 0.0

@@ -1,0 +1,265 @@
+"""Block relaxation and the fixed point around it: counts, options, and honest ends."""
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+
+from contact.interface.projections import disc_derivative, project_disc, project_half_line
+from contact.methods.acceleration import ResidualMinimiser
+from contact.methods.fixed_point import FixedPoint
+from contact.methods.options import FixedPointOptions
+from contact.methods.uzawa import automatic_r
+from contact.problem.problem import Body, Contact, ContactProblem, Friction
+from forms.hencky import Linear, Log
+from forms.laws import ConstantCoefficient
+from tests.problems.mechanics import Affine, attempt, bar, contact_data, flat, pressed_block, solve
+
+
+@pytest.mark.parametrize("f2", [-0.005, -0.05])
+@pytest.mark.parametrize("n", [32, 64])
+def test_few_inner_iterations_on_fine_meshes(n, f2):
+    """To 1e-8, for the frictionless start and each Tresca step."""
+    options = {"inner_tolerance": 1e-8, "max_outer": 2}
+    loop, _ = attempt(bar(MPI.COMM_SELF, n, f2), **options)
+    counts = [record.inner for record in loop.history.records]
+    assert len(counts) == 3
+    assert max(counts) <= 34
+    assert all(record.kkt.contact <= 1e-8 for record in loop.history.records)
+
+
+@pytest.mark.parametrize(
+    ("n", "f2", "rho", "pressure", "largest"),
+    [
+        (16, -0.005, 1e5, 0.01367, 0.00499),
+        (32, -0.005, 1e5, 0.01679, 0.00501),
+        (32, -0.05, 1e5, 0.14840, 0.05022),
+        (32, -0.05, 6e7, 0.14806, 0.05022),
+    ],
+)
+def test_reference_values_of_another_code(n, f2, rho, pressure, largest):
+    problem = bar(MPI.COMM_SELF, n, f2, rho)
+    loop = solve(problem, 1e-8)
+    assert loop.forces.pressure.max() == pytest.approx(pressure, abs=5.1e-6)
+    assert np.abs(problem.x.x.array).max() == pytest.approx(largest, abs=5.1e-6)
+
+
+def coarse(**options):
+    law = Log(1.0, 0.3, yield_strain=0.05)
+    friction = Friction(ConstantCoefficient(0.4))
+    return solve(bar(MPI.COMM_SELF, 8, -0.05, law=law, friction=friction), **options)
+
+
+@pytest.fixture(scope="module")
+def reference():
+    return contact_data(coarse(tolerance=1e-11))
+
+
+VARIANTS = [
+    {"depth": 0, "max_inner": 20000},
+    {"depth": 0, "over_relaxation": 1.7, "max_inner": 20000},
+    {"depth": 1},
+    {"depth": 3},
+    {"depth": 60},
+    {"single_loop": True},
+    {"material_step": "secant"},
+    {"material_step": "tangent"},
+    {"r": 0.3},
+    {"r": 30.0},
+]
+
+
+@pytest.mark.parametrize("options", VARIANTS, ids=str)
+def test_every_variant_finds_the_same_solution(options, reference):
+    data = contact_data(coarse(tolerance=1e-9, **options))
+    for name in ("pressure", "friction", "u_t", "u_n"):
+        assert np.abs(data[name] - reference[name]).max() < 1e-7 * reference["pressure"].max()
+
+
+def test_acceleration_and_over_relaxation_save_solves():
+    counts = [
+        coarse(tolerance=1e-8, max_inner=20000, **options).counters.linear_solves
+        for options in ({"depth": 0}, {"depth": 0, "over_relaxation": 1.7}, {})
+    ]
+    assert counts[2] < 0.7 * counts[1] < 0.7 * counts[0]
+
+
+def test_factorisations_are_kept():
+    """One for the start and one for all steps with friction, if the material is linear."""
+    linear = bar(MPI.COMM_SELF, 8, law=Linear(1.0, 0.3))
+    loop = solve(linear)
+    assert loop.counters.factorizations == 2
+    assert len(loop.history.records) > 3
+    free = bar(MPI.COMM_SELF, 8, law=Linear(1.0, 0.3), friction=Friction())
+    assert solve(free).counters.factorizations == 1
+    loop = solve(bar(MPI.COMM_SELF, 8, -0.05))
+    assert loop.counters.factorizations == len(loop.history.records)
+    assert loop.counters.linear_solves == sum(record.inner for record in loop.history.records)
+
+
+def test_tresca_friction_is_one_step():
+    """A given bound leaves nothing for the outer loop to update."""
+    friction = Friction(tresca=Affine((0.001, 0.0), 0.0005))
+    loop = solve(bar(MPI.COMM_SELF, 8, law=Linear(1.0, 0.3), friction=friction))
+    assert len(loop.history.records) == 2
+    data = contact_data(loop)
+    size = np.linalg.norm(data["friction"], axis=1)
+    assert np.all(size <= data["bound"] * (1 + 1e-9))
+    assert data["bound"] == pytest.approx(0.001 * data["points"][:, 0] + 0.0005)
+    slides = size > 0.999 * data["bound"]
+    assert slides.any()
+    assert not slides.all()
+    # Friction resists: the body drags the foundation along.
+    assert np.all(np.sum(data["friction"] * data["u_t"], axis=1) >= -1e-12)
+
+
+@pytest.mark.parametrize("gap", [1e-3, 1.0, 1e3])
+def test_a_wide_gap_takes_few_solves(gap):
+    """The body is held by nothing until it touches."""
+    loop = solve(pressed_block(MPI.COMM_SELF, 2, gap=gap), 1e-9)
+    assert loop.counters.linear_solves <= 40
+    assert loop.forces.pressure == pytest.approx(0.02, abs=1e-9)
+
+
+def test_the_single_loop_needs_no_outer_one():
+    """One solve after the other, with the bound of the newest pressure and slip."""
+    problem = bar(MPI.COMM_SELF, 32, law=Linear(1.0, 0.3))
+    loop = solve(problem, 1e-8, single_loop=True)
+    assert [record.inner for record in loop.history.records] == pytest.approx([34], abs=6)
+    assert loop.counters.factorizations == 1
+    twice = solve(bar(MPI.COMM_SELF, 32, law=Linear(1.0, 0.3)), 1e-8)
+    assert loop.forces.pressure == pytest.approx(twice.forces.pressure, abs=1e-8)
+
+
+def test_automatic_r():
+    problem = bar(MPI.COMM_SELF, 16)
+    h = 4.0 / 64
+    assert automatic_r(problem) == pytest.approx(1.39 / (1 - 0.3**2) / np.sqrt(h * 1.0), rel=1e-12)
+    fine = bar(MPI.COMM_SELF, 8, degree=2)
+    assert automatic_r(fine) == pytest.approx(automatic_r(problem), rel=1e-12)
+
+
+#: More than numbers can give.
+ROUNDING = {"tolerance": 1e-18, "inner_tolerance": 1e-18, "max_inner": 10**6}
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        ({"max_outer": 1}, "1 outer iterations"),
+        ({"max_inner": 3, "max_outer": 8}, "8 outer iterations"),
+        ({"stopping": "thesis", "eps": 1e-3, "eps_fp": 1e-3}, "criterion is met, but"),
+        (ROUNDING, "stalled at"),
+        ({**ROUNDING, "depth": 0, "r": 3.0}, "stalled at"),
+        ({**ROUNDING, "stopping": "thesis", "eps": 1e-17}, "criterion is met, but"),
+    ],
+)
+def test_a_run_that_has_not_converged_says_so(options, words):
+    loop, outcome = attempt(bar(MPI.COMM_SELF, 8), **options)
+    assert not outcome.converged
+    assert words in outcome.reason
+    assert outcome.kkt.largest > options.get("tolerance", 1e-8)
+    assert loop.counters.linear_solves < 20_000
+    assert outcome.kkt == loop.history.records[-1].kkt
+
+
+def test_the_rules_of_the_thesis_end_the_loops():
+    loop, outcome = attempt(bar(MPI.COMM_SELF, 8), stopping="thesis", tolerance=1e-3)
+    assert outcome.converged
+    assert "criterion" in outcome.reason
+    assert loop.history.records[-1].change < 1e-5
+    assert 3 <= len(loop.history.records) - 1 <= 12
+    free = bar(MPI.COMM_SELF, 8, friction=Friction())
+    assert attempt(free, stopping="thesis", tolerance=1e-3)[1].converged
+
+
+def test_starting_again_gives_the_same_iterations():
+    problem = bar(MPI.COMM_SELF, 8)
+    first, second = solve(problem), solve(problem)
+    assert [r.inner for r in first.history.records] == [r.inner for r in second.history.records]
+    assert np.array_equal(first.forces.pressure, second.forces.pressure)
+
+
+def test_a_start_from_the_solution_takes_one_step():
+    """And few from a disturbed one."""
+    problem = bar(MPI.COMM_SELF, 8)
+    forces = solve(problem).forces
+    x = problem.x.x.array.copy()
+    for disturbance, most in ((0.0, 1), (1e-3, 15)):
+        problem.x.x.array[:] = (1 + disturbance) * x
+        loop = FixedPoint(problem, FixedPointOptions(tolerance=1e-9))
+        assert loop.solve_from(forces).converged
+        assert len(loop.history.records) <= most
+        assert np.allclose(problem.x.x.array, x, rtol=0, atol=1e-7 * np.abs(x).max())
+
+
+def test_nothing_to_do():
+    """No load: a body at rest on its foundation, and one that does not touch it."""
+    for gap in (0.0, 1.0):
+        example = bar(MPI.COMM_SELF, 4)
+        body = Body(example.body.law, example.body.fixed)
+        problem = ContactProblem(
+            example.domain, body, Contact("bottom", flat(gap)), example.friction
+        )
+        loop = solve(problem)
+        assert np.abs(problem.x.x.array).max() < 1e-14
+        assert np.abs(loop.forces.pressure).max() < 1e-14
+    lifted = bar(MPI.COMM_SELF, 4, 0.005)
+    gapped = ContactProblem(lifted.domain, lifted.body, Contact("bottom", flat(5.0)))
+    assert np.abs(solve(gapped).forces.pressure).max() < 1e-13
+
+
+def test_projections():
+    z = np.array([[3.0, 4.0], [0.3, 0.4], [0.0, 0.0], [-6.0, 8.0]])
+    assert project_disc(z, np.array([1.0, 1.0, 0.0, 0.0])) == pytest.approx(
+        np.array([[0.6, 0.8], [0.3, 0.4], [0.0, 0.0], [0.0, 0.0]])
+    )
+    assert project_half_line(np.array([-1.0, 2.0])).tolist() == [0.0, 2.0]
+
+
+@pytest.mark.parametrize("dim", [1, 2, 3])
+def test_the_derivative_of_the_projection_onto_a_disc(dim):
+    random = np.random.default_rng(dim)
+    z, radius = random.standard_normal((40, dim)), random.uniform(0, 2, 40)
+    directions, h = random.standard_normal((40, dim, 5)), 1e-6
+    exact = disc_derivative(z, radius, directions)
+    for k in range(5):
+        step = h * directions[:, :, k]
+        slope = (project_disc(z + step, radius) - project_disc(z - step, radius)) / (2 * h)
+        assert np.abs(exact[:, :, k] - slope).max() < 1e-6
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_the_acceleration_solves_random_complementarity_problems(seed):
+    """Find p >= 0 with u = u_0 - C p <= 0, p u = 0, for a random positive definite C."""
+    random = np.random.default_rng(seed)
+    m, r = 60, 1.0
+    basis = np.linalg.qr(random.standard_normal((m, m)))[0]
+    compliance = basis @ np.diag(np.geomspace(0.02, 20, m)) @ basis.T
+    u_0 = random.standard_normal(m)
+    matrix = np.linalg.inv(np.eye(m) + r * compliance)
+
+    def project(z):
+        return np.maximum(z, 0.0)
+
+    def solves(depth):
+        accelerator = ResidualMinimiser(
+            lambda a, b: a.T @ b, project, lambda z, d: (z > 0)[:, None] * d, depth
+        )
+        z = np.zeros(m)
+        for count in range(1, 2000):
+            force = project(z)
+            q = 2 * force - z
+            u = matrix @ (u_0 - compliance @ q)
+            p = q + r * u
+            if np.linalg.norm(p - project(p + r * u)) < 1e-9:
+                return count, p
+            image = force + r * u
+            z = accelerator.next(p, p + r * u, image) if depth else image
+        raise AssertionError("not converged")
+
+    slow, expected = solves(0)
+    for depth in (2, 10, 40):
+        fast, found = solves(depth)
+        assert fast < slow
+        assert found == pytest.approx(expected, abs=1e-7)
+    assert fast <= 60

@@ -1,0 +1,1 @@
+"""The same results on any number of ranks."""

@@ -1,0 +1,201 @@
+"""The same solutions on any number of ranks, also where a rank has nothing to do."""
+
+import numpy as np
+import pytest
+from dolfinx import fem, graph, mesh
+from mpi4py import MPI
+
+from contact._compat import geometry_dofmap
+from contact.interface.smoothing import Smoothing
+from contact.mesh.make import Piece, from_mesh, rectangle
+from contact.problem.problem import Body, Contact, ContactProblem, Fixed, Friction, Load
+from forms.hencky import Log
+from forms.laws import SlipCoefficient
+from tests.problems.mechanics import (
+    bar,
+    constant,
+    contact_data,
+    flat,
+    leaning_block,
+    pressed_block,
+    solve,
+)
+
+pytestmark = pytest.mark.parallel
+
+TOLERANCE = 1e-8
+
+
+def displacements(problem):
+    """Return the displacements of all nodes, sorted by position, on every rank."""
+    dim, owned = problem.dim, problem.owned // problem.block_size
+    x = problem.space.tabulate_dof_coordinates()[:owned, :dim]
+    u = problem.x.x.array[: problem.owned].reshape(-1, problem.block_size)[:, :dim]
+    x, u = (np.concatenate(problem.comm.allgather(part)) for part in (x, u))
+    return u[np.lexsort(np.round(x, 9).T)]
+
+
+def agree(comm, make):
+    """Solve on all ranks together and on one alone, and compare."""
+    together, alone = (solve(make(c), 1e-10) for c in (comm, MPI.COMM_SELF))
+    u, v = displacements(together.problem), displacements(alone.problem)
+    assert u.shape == v.shape
+    assert np.abs(u - v).max() < TOLERANCE * np.abs(v).max()
+    ours, theirs = contact_data(together), contact_data(alone)
+    assert ours["points"] == pytest.approx(theirs["points"], abs=1e-12)
+    scale = theirs["pressure"].max()
+    assert scale > 0
+    for name in ("pressure", "friction", "bound"):
+        assert np.abs(ours[name] - theirs[name]).max() < TOLERANCE * scale
+    assert np.array_equal(ours["open"], theirs["open"])
+    assert np.array_equal(ours["sticks"], theirs["sticks"])
+    assert together.r == pytest.approx(alone.r, rel=1e-12)
+    assert together.problem.domain.size == pytest.approx(alone.problem.domain.size, rel=1e-14)
+    return together
+
+
+@pytest.mark.parametrize("degree", [1, 2])
+def test_example_7_2(comm, degree):
+    agree(comm, lambda c: bar(c, 8 // degree, -0.005, 1e5, degree))
+
+
+def test_example_7_2_with_yield_and_smoothing(comm):
+    law = Log(1.0, 0.3, yield_strain=0.05)
+    friction = Friction(SlipCoefficient(0.5, 0.2, 1e5), radius=0.3)
+    agree(comm, lambda c: bar(c, 8, -0.05, law=law, friction=friction))
+
+
+@pytest.mark.parametrize("degree", [1, 2])
+def test_in_space(comm, degree):
+    agree(comm, lambda c: leaning_block(c, 3 - degree // 2, degree))
+
+
+def test_a_body_that_only_the_foundation_holds(comm):
+    agree(comm, lambda c: pressed_block(c, 3, 2, gap=0.05))
+
+
+def tower(comm, cells=(2, 24)):
+    """Return a tower on a small part of its foot: some rank is far from the ground."""
+    domain = rectangle(
+        comm, [0.0, 0.0], [1.0, 12.0], cells, parts={"foot": Piece("bottom", 0.0, 0.5)}
+    )
+    zero = constant(0.0, 2)
+    body = Body(
+        Log(1.0, 0.3, yield_strain=0.05),
+        [Fixed("top", [zero, constant(-0.1, 2)])],
+        [Load("right", [constant(-1e-5, 2), zero])],
+    )
+    return ContactProblem(domain, body, Contact("foot", flat()), Friction(radius=0.0))
+
+
+def test_a_rank_without_contact_nodes(comm):
+    together = agree(comm, tower)
+    counts = comm.allgather(together.problem.trace.nodes.size)
+    assert comm.size == 1 or min(counts) == 0
+
+
+def tower_with_friction(comm):
+    plain = tower(comm)
+    friction = Friction(SlipCoefficient(0.3, 0.2, 10.0), radius=0.4)
+    return ContactProblem(plain.domain, plain.body, plain.contact, friction, degree=2)
+
+
+def test_a_rank_without_contact_nodes_with_friction_and_smoothing(comm):
+    agree(comm, tower_with_friction)
+
+
+def on_one_rank(comm):
+    """Return a unit square whose cells are all on rank 0."""
+    whole = mesh.create_unit_square(MPI.COMM_SELF, 4, 4)
+    cells, x = np.empty((0, 3), np.int64), np.empty((0, 2))
+    if comm.rank == 0:
+        cells, x = geometry_dofmap(whole).astype(np.int64), whole.geometry.x[:, :2].copy()
+
+    def partitioner(_comm, _parts, _types, cells):
+        size = len(cells[0]) // 3
+        return adjacency(np.zeros((size, 1), dtype=np.int32))
+
+    element = whole.ufl_domain().ufl_coordinate_element()
+    return mesh.create_mesh(comm, cells, x=x, e=element, partitioner=partitioner)
+
+
+def adjacency(links):
+    made = graph.adjacencylist(links)
+    return getattr(made, "_cpp_object", made)
+
+
+def idle(comm):
+    """Return a problem of which all ranks but one hold nothing."""
+    square = on_one_rank(comm) if comm.size > 1 else mesh.create_unit_square(comm, 4, 4)
+    domain = from_mesh(
+        square, {"bottom": lambda x: np.isclose(x[1], 0), "top": lambda x: np.isclose(x[1], 1)}
+    )
+    body = Body(
+        Log(1.0, 0.3, yield_strain=0.05),
+        [Fixed("top", [constant(0.02, 2), constant(-0.03, 2)])],
+    )
+    friction = Friction(SlipCoefficient(0.3, 0.2, 10.0), radius=0.3)
+    return ContactProblem(domain, body, Contact("bottom", flat()), friction)
+
+
+def test_ranks_without_cells(comm):
+    together = agree(comm, idle)
+    cells = comm.allgather(together.problem.domain.mesh.topology.index_map(2).size_local)
+    assert comm.size == 1 or min(cells) == 0
+
+
+def test_a_mesh_of_two_cells(comm):
+    def make(c):
+        domain = rectangle(c, [0.0, 0.0], [1.0, 1.0], [1, 1])
+        body = Body(
+            Log(1.0, 0.3, yield_strain=0.05),
+            [Fixed("top", [constant(0.05, 2), constant(-0.03, 2)])],
+        )
+        friction = Friction(SlipCoefficient(0.3, 0.2, 10.0))
+        return ContactProblem(domain, body, Contact("bottom", flat()), friction, degree=2)
+
+    agree(comm, make)
+
+
+@pytest.mark.parametrize("radius", [0.0, 0.2, 1.0, 9.0])
+def test_smoothing(comm, radius):
+    """Neighbours within the radius count, whichever rank has them."""
+    results = []
+    for c in (comm, MPI.COMM_SELF):
+        trace = bar(c, 8, degree=2).trace
+        pressure = np.sin(3 * trace.points[:, 0]) + 1
+        smooth = trace.gather(Smoothing(trace, radius)(pressure))
+        results.append(smooth[np.argsort(trace.gather(trace.points)[:, 0])])
+    assert results[0] == pytest.approx(results[1], rel=1e-13)
+
+
+def test_sums_norms_and_maxima_are_global(comm):
+    trace, alone = bar(comm, 8).trace, bar(MPI.COMM_SELF, 8).trace
+    assert trace.size == alone.size == 32
+    x, y = trace.points[:, 0], alone.points[:, 0]
+    assert trace.sum(x) == pytest.approx(alone.sum(y), rel=1e-14)
+    assert trace.norm(trace.points) == pytest.approx(alone.norm(alone.points), rel=1e-14)
+    assert trace.maximum(-x, -9.0) == pytest.approx(-y.min())
+    assert sorted(trace.gather(x)) == pytest.approx(sorted(y))
+
+
+def test_every_node_has_one_owner_and_full_weight(comm):
+    for degree in (1, 2):
+        trace = leaning_block(comm, 2, degree).trace
+        alone = leaning_block(MPI.COMM_SELF, 2, degree).trace
+        order = [np.lexsort(np.round(t.gather(t.points), 9).T) for t in (trace, alone)]
+        for quantity in ("points", "weight", "normal", "gap", "tangent"):
+            ours, theirs = (
+                t.gather(getattr(t, quantity))[o]
+                for t, o in zip((trace, alone), order, strict=True)
+            )
+            assert ours == pytest.approx(theirs, abs=1e-14)
+
+
+def test_prescribed_values_reach_ghosts(comm):
+    problem = idle(comm)
+    problem.reset()
+    height = fem.Function(problem.space)
+    height.interpolate(lambda x: np.vstack([x[1], x[1]]))
+    top = np.isclose(height.x.array, 1.0)
+    assert set(np.unique(problem.x.x.array[top]).tolist()) <= {0.02, -0.03}

@@ -1,0 +1,161 @@
+"""The body condensed onto the contact nodes: against the whole one, on any number of ranks."""
+
+import numpy as np
+import pytest
+from dolfinx.fem.petsc import assemble_matrix, create_matrix
+from mpi4py import MPI
+from petsc4py import PETSc
+
+from contact.linear.operator import Counters, LinearOperator
+from contact.linear.schur import SchurComplement
+from contact.methods.newton import Newton
+from contact.methods.options import NewtonOptions
+from contact.problem import condensed
+from contact.problem.kkt import evaluate
+from contact.problem.problem import ContactProblem, Friction
+from forms.hencky import Linear
+from forms.laws import ConstantCoefficient
+from tests.problems import mechanics
+
+WORLD, SELF = MPI.COMM_WORLD, MPI.COMM_SELF
+
+
+def bar(comm: MPI.Intracomm, **options) -> ContactProblem:
+    return mechanics.bar(comm, 8, friction=Friction(ConstantCoefficient(0.5)), **options)
+
+
+@pytest.mark.parallel
+@pytest.mark.parametrize("cells", [8, 1])  # with 1 some ranks have nothing to eliminate
+def test_condensing_and_expanding_solves_the_whole_system(cells):
+    problem = mechanics.bar(WORLD, cells, law=Linear(1.0, 0.3))
+    problem.reset()
+    operator = LinearOperator(problem)
+    size = problem.block_size
+    operator.update(problem.secant, np.zeros((problem.trace.nodes.size, size, size)))
+    whole = operator.solve(problem.external)
+
+    kept = (problem.trace.nodes[:, None] * size + np.arange(size, dtype=np.int32)).ravel()
+    schur = SchurComplement(operator.matrix, kept, "contact_")
+    # The second time the analysis and the local matrices are used again.
+    assert np.array_equal(schur.factorise(operator.matrix), schur.factorise(operator.matrix))
+    stiffness = schur.factorise(operator.matrix)
+    assert stiffness.shape == (problem.trace.size * size,) * 2
+    assert np.allclose(stiffness, stiffness.T, rtol=0, atol=1e-13)
+    forces = schur.condense(np.where(problem.free.ravel(), problem.external, 0.0))
+    found = schur.expand(np.linalg.solve(stiffness, forces))
+    largest = WORLD.allreduce(np.abs(whole).max(initial=0.0), op=MPI.MAX)
+    assert np.allclose(found, whole, rtol=0, atol=1e-9 * largest)
+
+
+@pytest.mark.parametrize("few", [1, 5, 10])
+def test_few_unknowns_are_eliminated_beside_many_that_are_kept(few):
+    """MUMPS's own estimate of its workspace is too small there."""
+    problem = mechanics.bar(SELF, 8, law=Linear(1.0, 0.3))
+    matrix = create_matrix(problem.secant)
+    assemble_matrix(matrix, problem.secant, bcs=problem.bcs)
+    matrix.assemble()
+    order = np.random.default_rng(1).permutation(problem.owned).astype(np.int32)
+    kept, eliminated = np.sort(order[few:]), np.sort(order[:few])
+    found = SchurComplement(matrix, kept, "contact_").factorise(matrix)
+    dense = matrix[:, :]
+    coupling = dense[np.ix_(eliminated, kept)]
+    inside = dense[np.ix_(eliminated, eliminated)]
+    expected = dense[np.ix_(kept, kept)] - coupling.T @ np.linalg.solve(inside, coupling)
+    assert np.allclose(found, expected, rtol=0, atol=1e-12)
+
+
+@pytest.mark.parallel
+def test_a_small_block_is_condensed_on_any_number_of_ranks():
+    """On three ranks one of them eliminates next to nothing."""
+    found = []
+    for comm in (WORLD, SELF):
+        problem = mechanics.leaning_block(comm, 4)
+        method = Newton(problem, NewtonOptions(tolerance=1e-10))
+        assert method.solve().converged
+        counters = method.counters
+        found.append((problem.trace.norm(method.forces.pressure), counters.linear_solves))
+    assert np.isclose(found[0][0], found[1][0], rtol=1e-9)
+    assert found[0][1] == found[1][1] < 10
+
+
+@pytest.mark.parallel
+def test_a_mesh_of_few_cells_is_solved_on_any_number_of_ranks():
+    found = []
+    for comm in (WORLD, SELF):
+        problem = mechanics.bar(comm, 1, -0.05, friction=Friction(ConstantCoefficient(0.5)))
+        method = Newton(problem, NewtonOptions(tolerance=1e-10))
+        assert method.solve().converged
+        counters = method.counters
+        found.append((problem.trace.norm(method.forces.pressure), counters.linear_solves))
+    assert np.isclose(found[0][0], found[1][0], rtol=1e-9)
+    assert found[0][1] == found[1][1]
+
+
+@pytest.mark.parallel
+def test_what_is_left_of_a_problem_has_the_same_residuals():
+    """The trace of a state of equilibrium is one of the condensed problem, and no other."""
+    problem = bar(WORLD, law=Linear(1.0, 0.3))
+    method = Newton(problem, NewtonOptions(tolerance=1e-10))
+    assert method.solve().converged
+    body = condensed.Condensation(problem, Counters())
+    evaluate(problem, method.forces)
+    assert body.linearise(problem.secant)
+    assert evaluate(body.problem, method.forces).largest < 1e-10
+    body.problem.add(1e-3 * np.where(body.problem.free.ravel(), body.problem.unknowns, 0.0))
+    moved = evaluate(body.problem, method.forces)
+    problem.add(body.expand())
+    assert np.isclose(moved.equilibrium, evaluate(problem, method.forces).equilibrium, rtol=1e-3)
+    assert moved.equilibrium > 1e-6
+
+
+def test_slower_methods_work_at_the_contact_nodes_too():
+    problem = bar(SELF, law=Linear(1.0, 0.3))
+    reference = Newton(problem, NewtonOptions(tolerance=1e-10))
+    assert reference.solve().converged
+    method = Newton(problem, NewtonOptions(tolerance=1e-10, max_iterations=2))
+    assert method.solve().converged
+    assert method.counters.factorizations == 1
+    assert "frozen friction" in method.history.records[0].note
+    assert np.allclose(method.forces.friction, reference.forces.friction, rtol=0, atol=1e-9)
+
+
+def condenses(problem: ContactProblem, kind: str = "auto") -> bool:
+    return condensed.condensation(problem, Counters(), kind) is not None
+
+
+def test_where_the_body_is_condensed(monkeypatch):
+    problem = bar(SELF)
+    assert condenses(problem)
+    assert condenses(problem, "lu")
+    assert not condenses(problem, "iterative")
+    monkeypatch.setattr(condensed, "LARGEST", 10)
+    assert not condenses(problem)
+
+
+@pytest.mark.parametrize(
+    ("option", "value"), [("ksp_type", "gmres"), ("pc_factor_mat_solver_type", "petsc")]
+)
+def test_a_solver_of_the_users_takes_the_whole_body(option, value):
+    problem, options = bar(SELF, law=Linear(1.0, 0.3)), PETSc.Options()
+    options[f"contact_{option}"] = value
+    try:
+        assert not condenses(problem)
+        method = Newton(problem, NewtonOptions(tolerance=1e-10))
+        assert method.solve().converged
+    finally:
+        options.delValue(f"contact_{option}")
+
+
+def test_steps_run_out_where_the_body_is_condensed():
+    method = Newton(bar(SELF), NewtonOptions(tolerance=1e-14, limit=1))
+    # The second time none is left: what has been taken is told.
+    for outcome in (method.solve(), method.resume()):
+        assert not outcome.converged
+        assert outcome.ended == "not converged in 1 steps"
+
+
+def test_a_body_that_cannot_be_condensed_is_solved_whole(monkeypatch):
+    monkeypatch.setattr(condensed.Condensation, "linearise", lambda self, form: False)
+    method = Newton(bar(SELF), NewtonOptions(tolerance=1e-10))
+    assert method.solve().converged
+    assert method.counters.contact_solves == 0

@@ -1,0 +1,226 @@
+"""The residuals that decide: zero at the solution, and each fault raises the right one."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+
+from contact.case.file import parse_case
+from contact.mesh.make import rectangle
+from contact.problem.kkt import KKT, evaluate
+from contact.problem.problem import Body, Contact, ContactProblem, Fixed, Friction, Load
+from contact.problem.state import Multipliers, bound_of, nodal_iterate
+from contact.solving import solve as solve_case
+from forms.hencky import Log
+from forms.laws import SlipCoefficient
+from tests.problems.mechanics import (
+    attempt,
+    bar,
+    constant,
+    contact_data,
+    flat,
+    leaning_block,
+    solve,
+    turn,
+)
+
+SMALL = 1e-10
+
+
+class Solved:
+    """A solution with open, sticking and sliding nodes, that can be spoilt and restored."""
+
+    def __init__(self, problem):
+        self.loop = solve(problem, SMALL)
+        self.problem, self.trace = problem, problem.trace
+        self.forces, self.x = self.loop.forces, problem.x.x.array.copy()
+        self.base = self.residuals()
+        nodal = nodal_iterate(problem)
+        self.bound = bound_of(problem, nodal, self.forces)
+        self.pressed = self.forces.pressure > 1e-3 * self.forces.pressure.max()
+        size = np.linalg.norm(self.forces.friction, axis=1)
+        self.sticks = self.pressed & (size < 0.95 * self.bound)
+        self.slides = self.pressed & ~self.sticks & (size > 0.999 * self.bound)
+        self.open = self.forces.pressure < 1e-9 * self.forces.pressure.max()
+
+    def residuals(self, nodal=None, forces=None):
+        """Return the residuals with a displacement added at the contact nodes, or new forces."""
+        problem = self.problem
+        problem.x.x.array[:] = self.x
+        if nodal is not None:
+            problem.trace.add(problem.x.x.array, nodal)
+        return evaluate(problem, forces or self.forces)
+
+    def along(self, chosen, component):
+        """Return nodal vectors along the normal, or along the friction force where there is any."""
+        friction = self.forces.friction
+        size = np.linalg.norm(friction, axis=1)[:, None]
+        unit = np.where(size > 0, friction / np.where(size > 0, size, 1), 0.0)
+        directions = self.trace.normal if component == "normal" else unit
+        return directions * chosen[:, None]
+
+
+@pytest.fixture(scope="module", params=["plane", "space"])
+def solved(request):
+    if request.param == "plane":
+        # Rolled up to the right: open nodes, and some that stick and slide.
+        domain = rectangle(MPI.COMM_SELF, [0.0, 0.0], [4.0, 1.0], [24, 6])
+        zero = constant(0.0, 2)
+        body = Body(
+            Log(1.0, 0.3, yield_strain=0.01),
+            [Fixed("left", [constant(0.01, 2), constant(-0.01, 2)])],
+            [Load("right", [zero, constant(0.0015, 2)])],
+        )
+        friction = Friction(SlipCoefficient(0.2, 0.2, 10.0))
+        problem = ContactProblem(domain, body, Contact("bottom", flat()), friction)
+    else:
+        problem = leaning_block(MPI.COMM_SELF, 2, mu=0.2)
+    found = Solved(problem)
+    assert found.sticks.any() or found.slides.any()
+    return found
+
+
+def test_zero_at_the_solution(solved):
+    assert solved.base.largest <= SMALL
+
+
+def test_a_wrong_displacement_is_out_of_equilibrium(solved):
+    problem = solved.problem
+    problem.x.x.array[:] = solved.x
+    random = np.random.default_rng(0)
+    shake = 1e-4 * random.standard_normal(problem.owned) * problem.free.ravel()
+    shake.reshape(-1, problem.block_size)[problem.trace.nodes] = 0.0
+    problem.x.x.array[:] += shake
+    found = evaluate(problem, solved.forces)
+    assert found.equilibrium > 1e-4
+    assert found.contact <= SMALL
+    assert found.friction <= SMALL
+
+
+def test_penetration_and_gaps_under_pressure_break_the_contact_law(solved):
+    for sign in (1e-4, -1e-4):
+        found = solved.residuals(nodal=sign * solved.along(solved.pressed, "normal"))
+        assert found.contact > 1e-5
+        assert found.equilibrium > 1e-6
+    if solved.open.any():
+        opened = solved.residuals(nodal=-1e-4 * solved.along(solved.open, "normal"))
+        assert opened.contact <= SMALL
+
+
+def test_a_wrong_pressure(solved):
+    forces = solved.forces
+    pressure = forces.pressure * np.where(solved.pressed, 1.01, 1.0)
+    found = solved.residuals(forces=replace(forces, pressure=pressure))
+    assert found.equilibrium > 1e-4
+    assert found.contact <= SMALL  # any pressure will do where the gap is closed
+    if solved.slides.any():
+        assert found.friction > 1e-4
+    glued = forces.pressure - 1e-3 * forces.pressure.max() * solved.open
+    if solved.open.any():
+        assert solved.residuals(forces=replace(forces, pressure=glued)).contact > 1e-5
+    pulled = replace(forces, pressure=-forces.pressure)
+    assert solved.residuals(forces=pulled).contact > 0.5
+
+
+def test_a_wrong_friction_force(solved):
+    forces = solved.forces
+    if solved.sticks.any():
+        # A sticking node may carry any force within its bound.
+        less = forces.friction * np.where(solved.sticks, 0.9, 1.0)[:, None]
+        found = solved.residuals(forces=replace(forces, friction=less))
+        assert found.friction <= SMALL
+        assert found.equilibrium > 1e-5
+    if solved.slides.any():
+        for factor in (0.9, 1.1, -1.0):
+            spoilt = forces.friction * np.where(solved.slides, factor, 1.0)[:, None]
+            found = solved.residuals(forces=replace(forces, friction=spoilt))
+            assert found.friction > 1e-5
+            assert found.contact <= SMALL
+
+
+def test_slip_of_a_sticking_node_and_slip_the_wrong_way(solved):
+    if solved.sticks.any():
+        found = solved.residuals(nodal=1e-4 * solved.along(solved.sticks, "tangent"))
+        assert found.friction > 1e-6
+        assert found.contact <= SMALL
+    if solved.slides.any():
+        back = -2 * solved.trace.tangential_component(nodal(solved)) * solved.slides[:, None]
+        assert solved.residuals(nodal=back).friction > 1e-5
+
+
+def nodal(solved):
+    solved.problem.x.x.array[:] = solved.x
+    return nodal_iterate(solved.problem)
+
+
+def test_the_bound_is_that_of_the_final_pressure_and_slip(solved):
+    """A solution for another coefficient does not pass."""
+    problem = solved.problem
+    solved.residuals()
+    kept = problem.friction
+    try:
+        problem.friction = Friction(SlipCoefficient(0.15, 0.1, 10.0))
+        assert evaluate(problem, solved.forces).friction > 1e-4
+    finally:
+        problem.friction = kept
+    assert evaluate(problem, solved.forces).largest <= SMALL
+
+
+@pytest.mark.parametrize("unit", [1e-9, 1e9])
+def test_residuals_do_not_depend_on_units_of_stress(unit):
+    found = []
+    for factor in (1.0, unit):
+        law = Log(factor, 0.3, yield_strain=0.05)
+        problem = bar(MPI.COMM_SELF, 8, -0.005 * factor, law=law)
+        loop, outcome = attempt(problem, tolerance=1e-30, max_outer=3, inner_tolerance=1e-10)
+        found.append(outcome.kkt)
+        assert not outcome.converged
+        assert contact_data(loop)["pressure"].max() == pytest.approx(0.01 * factor, rel=0.5)
+    assert found[0].friction == pytest.approx(found[1].friction, rel=1e-3)
+    assert found[1].equilibrium < 1e-11
+
+
+def test_residuals_of_an_open_body():
+    problem = bar(MPI.COMM_SELF, 4, 0.005)  # lifted: nothing touches but near the clamp
+    problem.reset()
+    zero = Multipliers.zero(problem)
+    assert evaluate(problem, zero).contact == 0
+    assert evaluate(problem, zero).equilibrium == pytest.approx(1.0)
+    sunk = np.zeros((problem.trace.size, 2))
+    sunk[:, 1] = -0.01
+    problem.trace.add(problem.x.x.array, sunk)
+    assert evaluate(problem, zero).contact > 0.5
+
+
+def test_what_is_no_number_has_not_converged():
+    assert KKT(0.0, float("nan"), 0.0).largest == np.inf
+    assert KKT(float("inf"), 0.0, 0.0).largest == np.inf
+    assert KKT(1e-9, 3e-9, 2e-9).largest == 3e-9
+
+
+@pytest.mark.parallel
+@pytest.mark.parametrize("dim", [2, 3])
+@pytest.mark.parametrize("degree", [1, 2])
+@pytest.mark.parametrize("method", ["newton", "uzawa", "penalty"])
+def test_a_body_moved_without_touching_is_in_equilibrium(method, degree, dim):
+    """All its forces are rounding, the reactions as well: that is no residual."""
+    for rotation, move in ((0.0, 0.02), (30.0, -0.005)):
+        normal = turn(dim, rotation) @ np.eye(dim)[-1]
+        section = {
+            "mesh": {
+                "generator": "rectangle" if dim == 2 else "box",
+                "size": [1.0] * dim,
+                "cells": [12 // dim] * dim,
+                "rotation": rotation,
+            },
+            "space": {"degree": degree},
+            "material": {"young": 210e9, "poisson": 0.3},
+            "fixed": [{"on": "top", "displacement": (move * normal).tolist()}],
+            "contact": {"on": "bottom", "gap": 0.01},
+            "friction": {"law": "coulomb", "mu": 0.3},
+            "solver": {"method": method},
+        }
+        solution = solve_case(parse_case(section))
+        assert solution.outcome.converged, solution.outcome
+        assert solution.outcome.kkt.equilibrium < 1e-8

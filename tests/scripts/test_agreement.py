@@ -1,0 +1,62 @@
+"""The script that compares the methods, on coarse meshes."""
+
+import csv
+from pathlib import Path
+
+import pytest
+
+from scripts.studies import agreement
+from scripts.studies.branches import AGREE
+
+
+def rows(path: Path) -> list[dict[str, str]]:
+    with path.open() as stream:
+        return list(csv.DictReader(stream))
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory) -> Path:
+    out = tmp_path_factory.mktemp("agreement")
+    cases = ("bar", "hertz-sphere", "piezo-8-1-conductive", "compliance-8-3-layer")
+    agreement.main(["--coarse", "--out", str(out), "--only", *cases])
+    return out
+
+
+def test_every_case_file_is_compared():
+    cases = Path(__file__).parents[2] / "scripts" / "cases"
+    assert {e.name for e in agreement.examples()} == {path.stem for path in cases.glob("*.toml")}
+
+
+def test_newton_and_block_relaxation_agree_or_find_different_solutions(folder):
+    found = {row["example"]: row for row in rows(folder / "agreement.csv")}
+    assert len(found) == 8
+    for name, row in found.items():
+        assert max(float(row["newton"]), float(row["uzawa"])) <= 1e-10
+        apart = max(float(row[key]) for key in ("u", "energy", "p", "tau"))
+        if row["warned"] == "False":
+            assert row["verdict"] == "agree", name
+        assert (row["verdict"] == "agree") == (apart <= AGREE)
+        # Nothing in between: another solution is far away.
+        assert apart <= AGREE or (apart > 1e-4 and int(row["solutions"]) > 1)
+    assert found["7.2, f2 = -0.005, rho = 6e7"]["verdict"] == "A and B"
+
+
+def test_both_methods_stay_at_each_other_s_solutions(folder):
+    found = [
+        row
+        for row in rows(folder / "agreement-branches.csv")
+        if {"newton", "uzawa"} & set(row["found by"].split(", "))
+    ]
+    assert len(found) >= 4
+    for row in found:
+        assert float(row["residual"]) <= 1e-9
+        assert max(float(row["newton from it"]), float(row["uzawa from it"])) <= AGREE
+        assert row["newton, disturbed"] == row["uzawa, disturbed"] == row["solution"]
+
+
+def test_the_penalty_method_tends_to_a_solution(folder):
+    for row in rows(folder / "agreement-penalty.csv"):
+        assert row["converged"] == "True"
+        assert float(row["eps 1e-7"]) < 1e-4
+        if not row["example"].startswith("7.2"):
+            assert float(row["order"]) == pytest.approx(1.0, abs=0.01)

@@ -1,0 +1,281 @@
+"""scripts/fx: runs a command where FEniCSx is, or makes that place once.
+
+A copy of the launcher runs with a PATH of stand-ins, so nothing is downloaded or mounted and the
+tests are the same inside and outside a private root.
+"""
+
+import os
+import re
+import shutil
+import signal
+import subprocess
+import sys
+import time
+import tomllib
+from pathlib import Path
+
+import pytest
+
+CLONE = Path(__file__).resolve().parents[2]
+UNAVAILABLE = 69
+
+TOOLS = """awk bash cat cut df dirname env flock grep head ls mkdir mv paste readlink rm sed setpriv
+setsid sh sha256sum sleep tail tar touch uname""".split()
+
+# as root it makes the folder it is told; else it writes an archive
+MMDEBSTRAP = """
+echo call >>"$FAKES/calls"
+echo "I: stand-in"
+sleep "${FAKE_SECONDS:-0}"
+[[ -z ${FAKE_FAILURE-} ]] || { echo "E: the mirror is gone"; exit 25; }
+for target; do [[ $target != */*.part/root && $target != - ]] || break; done
+folder=$target
+[[ $target != - ]] || folder=$(mktemp -d)
+mkdir -p "$folder"/{usr,etc/ssl/certs,var} "$folder$FAKES" # for the marker
+[[ $target != - ]] || tar -c -C "$folder" .
+"""
+# like the real one it waits for its child and hands on the status
+BWRAP = """
+while [[ $1 != env && $1 != true ]]; do shift; done
+echo "${FENICSX_SUITE:-trixie}" >"$FAKES/marker"
+status=0
+"$@" || status=$?
+rm -f "$FAKES/marker"
+exit $status
+"""
+
+
+class Launcher:
+    """A clone with the launcher, a cache and stand-ins, all below paths with spaces."""
+
+    def __init__(self, folder: Path):
+        self.clone = folder / "a clone"
+        self.fakes = folder / "fakes"
+        self.cache = folder / "a cache"
+        self.elsewhere = folder / "else where"
+        for place in (self.clone / "scripts", self.fakes, self.elsewhere):
+            place.mkdir(parents=True)
+        shutil.copy(CLONE / "pyproject.toml", self.clone)
+        shutil.copy(CLONE / "scripts/debian-packages.txt", self.clone / "scripts")
+        text = (CLONE / "scripts/fx").read_text()
+        # inside a root the real marker would be seen
+        text, count = re.subn(r"^marker=\S+", "marker=$FAKES/marker", text, flags=re.MULTILINE)
+        assert count == 1
+        self.fx = self.clone / "scripts/fx"
+        self.fx.write_text(text)
+        self.fx.chmod(0o755)
+        for tool in [*TOOLS, "mktemp"]:
+            found = shutil.which(tool)
+            if found is None:
+                pytest.skip(f"{tool} is not installed")
+            (self.fakes / tool).symlink_to(found)
+        self.env = {
+            "PATH": str(self.fakes),
+            "FAKES": str(self.fakes),
+            "HOME": str(folder),
+            "XDG_CACHE_HOME": str(self.cache),
+            "DISPLAY": ":0",
+        }
+
+    def fake(self, name: str, text: str = "exit 0") -> None:
+        """Put a stand-in on the PATH."""
+        path = self.fakes / name
+        path.write_text(f"#!{shutil.which('bash')}\n{text}\n")
+        path.chmod(0o755)
+
+    def bootstrap_tools(self) -> None:
+        """Put there what making and entering a root takes."""
+        self.fake("mmdebstrap", MMDEBSTRAP)
+        self.fake("bwrap", BWRAP)
+        self.fake("newuidmap")
+        self.fake("unshare", "exit 1")
+
+    def start(self, *command: str, **env: str) -> subprocess.Popen[str]:
+        """Start the launcher, from another folder."""
+        return subprocess.Popen(
+            [str(self.fx), *command],
+            env=self.env | env,
+            cwd=self.elsewhere,
+            text=True,
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            start_new_session=True,
+        )
+
+    def run(self, *command: str, **env: str) -> tuple[int, str, str]:
+        """Run the launcher and return its status and what it wrote."""
+        process = self.start(*command, **env)
+        out, err = process.communicate(timeout=30)
+        return process.returncode, out, err
+
+    def calls(self) -> int:
+        """How often mmdebstrap was started."""
+        calls = self.fakes / "calls"
+        return len(calls.read_text().split()) if calls.exists() else 0
+
+    def roots(self) -> list[str]:
+        """List the folders in the cache, finished or not."""
+        return sorted(path.name for path in self.cache.glob("*/*") if path.is_dir())
+
+
+@pytest.fixture
+def launcher(tmp_path: Path) -> Launcher:
+    return Launcher(tmp_path)
+
+
+def _wait_for(condition, seconds: float = 10.0) -> None:
+    end = time.monotonic() + seconds
+    while not condition():
+        assert time.monotonic() < end, "waited in vain"
+        time.sleep(0.02)
+
+
+def test_runs_directly_where_fenicsx_is(launcher):
+    launcher.fake("python3")
+    status, out, _ = launcher.run("sh", "-c", 'echo "$PYTHONPATH:$1:$PWD"; exit 7', "sh", "a  b")
+    assert status == 7
+    assert out == f"{launcher.clone}:a  b:{launcher.elsewhere}\n"
+    assert launcher.roots() == []
+
+
+def test_threads_under_mpi_only_where_the_user_set_none(launcher):
+    launcher.fake("python3")
+    variables = "$OMP_NUM_THREADS $PRTE_MCA_rmaps_default_mapping_policy $OMPI_MCA_topo"
+    launcher.fake("mpirun", f'echo "{variables}"')
+    launcher.fakes.joinpath("mpirun").write_text(
+        launcher.fakes.joinpath("mpirun").read_text()
+        + "[[ $1 != --version ]] || echo 'mpirun (Open MPI) 5.0.7'\n"
+    )
+    assert launcher.run("mpirun", "-n", "3")[1] == "1 :oversubscribe basic\n"
+    assert launcher.run("mpirun", "-n", "3", OMP_NUM_THREADS="2")[1] == "2 :oversubscribe basic\n"
+    assert launcher.run("sh", "-c", "echo ${OMP_NUM_THREADS-unset}")[1] == "unset\n"
+
+
+@pytest.mark.parametrize(
+    ("version", "scalar", "reason"),
+    [
+        ("0.9.0", "float", None),
+        ("0.10.0.post2", "float", None),
+        ("0.11.0", "float", None),
+        ("0.8.0", "float", "dolfinx 0.8.0 is not in >=0.9,<0.12"),
+        ("0.12.0", "float", "dolfinx 0.12.0 is not in >=0.9,<0.12"),
+        ("0.9.0", "complex", "complex scalars"),
+        (None, "float", "cannot import dolfinx"),
+    ],
+)
+def test_tells_which_fenicsx_is_supported(launcher, version, scalar, reason):
+    modules = launcher.elsewhere / "modules"
+    (modules / "petsc4py").mkdir(parents=True)
+    (modules / "petsc4py/__init__.py").touch()
+    (modules / "petsc4py/PETSc.py").write_text(f"RealType = float\nScalarType = {scalar}\n")
+    text = "raise ModuleNotFoundError(name='dolfinx')"
+    if version is not None:
+        text = f"print('a warning'); __version__ = {version!r}"
+    (modules / "dolfinx.py").write_text(text)
+    launcher.fake("python3", f'exec "{sys.executable}" "$@"')
+    status, out, err = launcher.run("sh", "-c", "echo here", PYTHONPATH=str(modules))
+    if reason is None:
+        assert (status, out, err) == (0, "here\n", "")
+    else:
+        assert (status, out) == (UNAVAILABLE, "")
+        assert reason in err
+
+
+def test_refuses_clearly_without_tools(launcher):
+    status, out, err = launcher.run("true")
+    assert (status, out) == (UNAVAILABLE, "")
+    assert "sudo apt install mmdebstrap bubblewrap" in err
+    for way in ("no python3", "Debian 13", "conda env create", "docker build"):
+        assert way in err
+    assert launcher.roots() == []
+
+
+def test_makes_the_root_once_and_passes_the_status(launcher):
+    launcher.bootstrap_tools()
+    status, out, err = launcher.run("sh", "-c", 'echo "$1"; exit 5', "sh", "a  b")
+    assert (status, out) == (5, "a  b\n")
+    assert "conda env create" in err
+    (root,) = launcher.roots()
+    assert root.startswith("trixie-") and not root.endswith(".part")
+    status, out, err = launcher.run("sh", "-c", "exit 6")
+    assert (status, out, err) == (6, "", "")
+    assert launcher.calls() == 1
+
+
+def test_the_suite_has_a_root_of_its_own(launcher):
+    launcher.bootstrap_tools()
+    launcher.fake("python3")  # FEniCSx is here, but another one is asked for
+    launcher.env["FENICSX_SUITE"] = "sid"
+    assert launcher.run("true")[0] == 0
+    assert [name.split("-")[0] for name in launcher.roots()] == ["sid"]
+    status, _, err = launcher.run("true", FENICSX_SUITE="buster")
+    assert status == 2
+    assert "'buster'" in err and "sid" in err
+
+
+def test_a_second_start_waits_for_the_first(launcher):
+    launcher.bootstrap_tools()
+    first = launcher.start("sh", "-c", "echo first", FAKE_SECONDS="1")
+    _wait_for(lambda: launcher.calls() == 1)
+    status, out, err = launcher.run("sh", "-c", "echo second")
+    assert (status, out) == (0, "second\n")
+    assert "waiting" in err
+    assert first.communicate(timeout=30)[0] == "first\n"
+    assert launcher.calls() == 1
+
+
+@pytest.mark.parametrize("kill", [signal.SIGTERM, signal.SIGINT, signal.SIGKILL])
+def test_an_interrupted_start_leaves_nothing_half_made(launcher, kill):
+    launcher.bootstrap_tools()
+    # without namespaces what SIGKILL leaves goes on, and the next start has to wait for it
+    process = launcher.start("true", FAKE_SECONDS="2" if kill == signal.SIGKILL else "60")
+    _wait_for(lambda: launcher.calls() == 1)
+    process.send_signal(kill)
+    process.communicate(timeout=30)
+    assert process.returncode == (-kill if kill == signal.SIGKILL else 128 + kill)
+    assert not [name for name in launcher.roots() if not name.endswith(".part")]
+    if kill != signal.SIGKILL:
+        assert launcher.roots() == []
+    assert launcher.run("true")[0] == 0
+    assert len(launcher.roots()) == 1 and not launcher.roots()[0].endswith(".part")
+
+
+def test_a_failed_bootstrap_is_said_and_removed(launcher):
+    launcher.bootstrap_tools()
+    status, _, err = launcher.run("true", FAKE_FAILURE="1")
+    assert status == UNAVAILABLE
+    assert "the mirror is gone" in err and ".log" in err
+    assert launcher.roots() == []
+
+
+@pytest.mark.parametrize("kind", [signal.SIGTERM, signal.SIGINT, signal.SIGHUP])
+def test_signals_reach_the_command(launcher, kind):
+    launcher.bootstrap_tools()
+    assert launcher.run("true")[0] == 0
+    trap = f'trap "echo caught; exit 9" {kind.name[3:]}'
+    program = f"{trap}; echo ready; while :; do sleep 0.05; done"
+    process = launcher.start("bash", "-c", program)
+    assert process.stdout is not None
+    assert process.stdout.readline() == "ready\n"
+    process.send_signal(kind)
+    out, _ = process.communicate(timeout=30)
+    assert (process.returncode, out) == (9, "caught\n")
+
+
+def test_one_floor_and_one_package_list():
+    project = tomllib.loads((CLONE / "pyproject.toml").read_text())["project"]
+    (dolfinx,) = [d for d in project["dependencies"] if d.startswith("fenics-dolfinx")]
+    bounds = dolfinx.removeprefix("fenics-dolfinx")
+    assert f"- fenics-dolfinx {bounds}\n" in (CLONE / "environment.yml").read_text()
+    packages = (CLONE / "scripts/debian-packages.txt").read_text().split("\n")
+    assert "libopenblas0-pthread" in packages
+    assert "scripts/debian-packages.txt" in (CLONE / "Dockerfile").read_text()
+
+
+def test_usage():
+    fx = CLONE / "scripts/fx"
+    for arguments, status in (([], 2), (["--help"], 0)):
+        done = subprocess.run([fx, *arguments], capture_output=True, text=True, env=os.environ)
+        assert done.returncode == status
+        assert "FENICSX_SUITE" in done.stderr

@@ -1,0 +1,1 @@
+"""Solutions against closed forms, manufactured solutions and published values."""

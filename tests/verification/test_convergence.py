@@ -1,0 +1,154 @@
+"""Errors between meshes, and coarse versions of the convergence studies of the scripts."""
+
+from __future__ import annotations
+
+import csv
+
+import numpy as np
+import pytest
+from dolfinx import fem
+
+from contact.body.transfer import carry, errors
+from contact.mesh.make import rectangle, refined
+from forms.hencky import energy_density
+from forms.kinematics import strain
+from scripts.reporting import Report, subplots
+from scripts.studies import convergence_mechanics as study
+from scripts.studies import nonlocal_friction
+from scripts.thesis import figures_mechanics, table_7_2
+from tests.problems.mechanics import bar
+
+
+def function(domain, degree, formula):
+    f = fem.Function(fem.functionspace(domain.mesh, ("Lagrange", degree, (2,))))
+    f.interpolate(formula)
+    return f
+
+
+@pytest.mark.parallel
+@pytest.mark.parametrize("degree", [1, 2])
+def test_nested_meshes_lose_nothing(comm, degree):
+    coarse = rectangle(comm, [0.0, 0.0], [2.0, 1.0], [6, 3])
+    fine = refined(coarse)
+    wild = function(coarse, degree, lambda x: np.sin(9 * x[:2] + 1))
+    there = carry(wild, fem.functionspace(fine.mesh, ("Lagrange", degree, (2,))))
+    back = carry(there, wild.function_space)
+    assert np.allclose(back.x.array, wild.x.array, atol=1e-10)
+
+
+@pytest.mark.parallel
+def test_non_matching_meshes_keep_polynomials(comm):
+    one = rectangle(comm, [0.0, 0.0], [2.0, 1.0], [7, 3])
+    other = rectangle(comm, [0.0, 0.0], [2.0, 1.0], [5, 4], diagonal="left")
+
+    def formula(x):
+        return np.vstack([1 + x[0] - 2 * x[1], 3 * x[1] - x[0]])
+
+    made = carry(function(one, 1, formula), fem.functionspace(other.mesh, ("Lagrange", 2, (2,))))
+    assert np.allclose(made.x.array, function(other, 2, formula).x.array, atol=1e-10)
+
+
+@pytest.mark.parallel
+def test_norms(comm):
+    problem = bar(comm, 4)
+    problem.x.interpolate(lambda x: np.vstack([0.01 * x[0], 0 * x[0]]))
+    norm = errors(problem, None)
+    assert norm.l2 == pytest.approx(0.01 * np.sqrt(64 / 3))
+    assert norm.h1 == pytest.approx(0.02)
+    # Within the elastic limit B(u; u, u) is twice the energy.
+    density = energy_density(problem.body.law, strain(problem.parts_of(problem.x)[0]))
+    energy = fem.assemble_scalar(fem.form(density * problem.domain.dx))
+    assert norm.energy**2 == pytest.approx(2 * comm.allreduce(energy))
+    assert errors(problem, problem.x).h1 == 0.0
+    ratio = norm / norm
+    assert (ratio.l2, ratio.h1, ratio.energy) == (1.0, 1.0, 1.0)
+
+
+def test_figure_7_6(tmp_path):
+    found = study.figure_7_6(Report(tmp_path), coarse=True)
+    for label, table in found.items():
+        orders = np.log2(table[:-1] / table[1:])
+        assert np.all(orders[:, 0] > 1.3), label
+        assert np.all(orders[:, 1:] > 0.7), label
+    assert np.all(found["P2, f2 = -0.005"][1] < 0.5 * found["P1, f2 = -0.005"][1])
+    for suffix in ("png", "csv", "md"):
+        assert (tmp_path / f"figure-7-6.{suffix}").is_file()
+
+
+def test_known_solutions(tmp_path):
+    found = study.known_solutions(Report(tmp_path), coarse=True)
+    for label, table in found.items():
+        degree = 1 if "P1" in label else 2
+        orders = np.log2(table[-2] / table[-1])[:2]
+        low = np.array([degree + 1, degree]) - 0.1
+        if "Signorini" in label:
+            low = np.array([1.8, 0.95 if degree == 1 else 1.3])
+        assert np.all(orders > low), label
+    with (tmp_path / "known-solutions.csv").open() as stream:
+        assert all(float(row["residual"]) <= 1e-9 for row in csv.DictReader(stream))
+
+
+def test_theorem_4_3(tmp_path):
+    for table in study.theorem_4_3(Report(tmp_path), coarse=True).values():
+        assert np.all(np.log2(table[:-1] / table[1:]) > 0.7)
+
+
+def test_rates_of_the_fixed_points(tmp_path):
+    """Theorems 3.2 and 4.5: linear convergence, with friction or without."""
+    rates = study.fixed_points(Report(tmp_path), coarse=True)
+    with (tmp_path / "fixed-point-rates.csv").open() as stream:
+        rows = {row["iteration"]: row for row in csv.DictReader(stream)}
+    assert set(rows) == set(rates)
+    for label, rate in rates.items():
+        assert rate < 0.9
+        if "mu" not in label:
+            bound = float(rows[label]["Kacanov's bound"])
+            assert 0.5 * bound < rate < 1.02 * bound, label
+
+
+def test_rate_of_the_secant_iteration():
+    assert study.secant_rate(0.04) == 0.0
+    assert study.secant_rate(0.05 * np.e) == pytest.approx(0.5)
+    assert study.secant_rate(0.05 * np.e**4) == pytest.approx(0.8)
+
+
+def test_theorem_4_2(tmp_path):
+    values = (1e-3, 1e-8, 1e-9)
+    found = table_7_2.study(Report(tmp_path), 8, values)
+    for label, distances in found.items():
+        order = np.log10(distances[1] / distances[2])
+        assert order == pytest.approx(1.0, abs=0.1), label
+
+
+def test_table_7_2(tmp_path):
+    table_7_2.table(Report(tmp_path), 8)
+    with (tmp_path / "table-7-2.csv").open() as stream:
+        rows = list(csv.DictReader(stream))
+    assert [int(row["thesis"]) for row in rows] == [6, 9, 13, 14, 10, 14, 15, 16]
+    assert all(float(row["residual of (PV_eps)"]) <= 1e-8 for row in rows)
+    counts = [int(row["(4.38)"]) for row in rows]
+    assert counts[:4] == sorted(counts[:4])
+    assert counts[4:] == sorted(counts[4:])
+
+
+def test_smoothing_radius(tmp_path):
+    solutions = nonlocal_friction.study(Report(tmp_path), 8, -0.005)
+    forces = np.array([solution.contact_force for solution in solutions.values()])
+    assert np.allclose(forces[:, 1], forces[0, 1], rtol=0.01)
+    # A radius of h or less is no smoothing.
+    assert np.allclose(solutions["h"].pressure, solutions["0"].pressure, rtol=1e-6, atol=1e-10)
+
+
+def test_figures_mechanics(tmp_path):
+    figures_mechanics.main(["--coarse", "--out", str(tmp_path)])
+    for name in ("7-4a", "7-4b", "7-5a", "7-5b", "7-7a", "7-7b", "7-8a", "7-8b"):
+        assert (tmp_path / f"figure-{name}.png").stat().st_size > 10_000
+        assert (tmp_path / f"figure-{name}.csv").is_file()
+    assert (tmp_path / "multipliers-and-penalty.png").is_file()
+
+
+def test_units_of_example_7_2():
+    figure, axes = subplots()
+    axes.set(xlabel="$x$ (mesh units)", ylabel="$p$ (units of the case)")
+    figures_mechanics.in_units(figure)
+    assert (axes.get_xlabel(), axes.get_ylabel()) == ("$x$ (mm)", "$p$ (daN/mm²)")

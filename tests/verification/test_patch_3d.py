@@ -1,0 +1,74 @@
+"""Patch test: a block under uniform pressure rests on a plane with exactly that pressure."""
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+
+from contact.mesh.make import rectangle
+from contact.problem.problem import Body, Contact, ContactProblem, Fixed
+from forms.hencky import Linear
+from forms.laws import ConstantCoefficient
+from tests.problems.mechanics import SlidingBlock, contact_data, flat, pressed_block, solve
+
+
+@pytest.mark.parametrize("degree", [1, 2])
+@pytest.mark.parametrize("dim", [2, 3])
+@pytest.mark.parametrize(("gap", "poisson"), [(0.0, 0.3), (0.0, 0.45), (0.05, 0.3)])
+def test_uniform_pressure(gap, poisson, dim, degree):
+    pressure = 0.02
+    problem = pressed_block(MPI.COMM_SELF, dim, degree, pressure=pressure, gap=gap, poisson=poisson)
+    data = contact_data(solve(problem, 1e-12))
+    assert np.abs(data["pressure"] - pressure).max() < 1e-9
+    assert np.abs(data["u_n"] - gap).max() < 1e-9
+    # Free sides: the stress is uniaxial, in plane strain with sigma_zz = nu sigma_yy.
+    thinning = -pressure * (1 - poisson**2) if dim == 2 else -pressure
+    widening = pressure * poisson * (1 + poisson) if dim == 2 else pressure * poisson
+    x = problem.space.tabulate_dof_coordinates()[:, :dim]
+    exact = x * ([widening] * (dim - 1) + [thinning]) - np.eye(dim)[-1] * gap
+    assert np.abs(problem.x.x.array.reshape(-1, dim) - exact).max() < 1e-9
+
+
+def test_weights_carry_a_constant_pressure():
+    for dim, degree in ((2, 1), (2, 2), (3, 1), (3, 2)):
+        trace = pressed_block(MPI.COMM_SELF, dim, degree).trace
+        assert trace.sum(np.ones_like(trace.gap)) == pytest.approx(1.0, rel=1e-13)
+        assert trace.weight.min() > 1e-3
+
+
+def test_p2_contact_nodes_of_triangles_are_the_midpoints_of_their_edges():
+    problem = pressed_block(MPI.COMM_SELF, 3, 2)
+    corners = problem.domain.mesh.geometry.x
+    distance = np.linalg.norm(problem.trace.points[:, None] - corners[None], axis=2)
+    assert distance.min() > 0.1
+    # A grid of 2 x 3 squares, each cut in two: edges along x, along y, and diagonals.
+    assert problem.trace.size == 2 * 4 + 3 * 3 + 6
+
+
+def test_normals_are_the_body_s_own_for_a_given_gap():
+    """A turned block whose contact direction is computed from its facets."""
+    for dim in (2, 3):
+        block = SlidingBlock(Linear(1.0, 0.3), ConstantCoefficient(0.5), 0.01, 0.03, 0.0125)
+        with_plane = block.problem(MPI.COMM_SELF, dim, 2, 30.0)
+        with_gap = ContactProblem(
+            with_plane.domain,
+            with_plane.body,
+            Contact("bottom", flat()),
+            with_plane.friction,
+            degree=2,
+        )
+        assert np.abs(with_plane.trace.normal - with_gap.trace.normal).max() < 1e-12
+        loop = solve(with_gap, 1e-11)
+        assert loop.forces.pressure == pytest.approx(block.pressure, abs=1e-9)
+
+
+def test_a_fixed_node_carries_no_contact_and_a_fixed_direction_no_friction():
+    domain = rectangle(MPI.COMM_SELF, [0.0, 0.0], [1.0, 1.0], [4, 4])
+    zero = pressed_block(MPI.COMM_SELF, 2).body.fixed[0].displacement[0]
+    clamped = Body(Linear(1.0, 0.3), [Fixed("left", [zero, zero])])
+    symmetric = Body(Linear(1.0, 0.3), [Fixed("left", [zero, None])])
+    assert ContactProblem(domain, clamped, Contact("bottom", flat())).trace.size == 4
+    trace = ContactProblem(domain, symmetric, Contact("bottom", flat())).trace
+    assert trace.size == 5
+    held = trace.points[:, 0] < 1e-9
+    assert np.abs(trace.tangent[held]).max() == 0
+    assert np.abs(trace.tangent[~held] - np.diag([1.0, 0.0])).max() < 1e-14

@@ -1,0 +1,202 @@
+"""Examples 8.1 and 8.2: independent values, the series, ranks, the iterative solver."""
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+
+from contact.linear.operator import LinearOperator
+from contact.methods.fixed_point import FixedPoint
+from contact.methods.options import FixedPointOptions
+from contact.methods.uzawa import augmentation, automatic_r
+from contact.output.balances import charge_balance
+from contact.problem.kkt import residual_forces
+from contact.problem.problem import Friction
+from contact.problem.state import Multipliers, nodal_iterate
+from forms.laws import ConstantCoefficient, SlipCoefficient
+from tests.problems.piezo import SCALED, SI, Column, example, hencky, potential
+
+COMM = MPI.COMM_WORLD
+SLIP = Friction(SlipCoefficient(0.5, 0.2, 1.0))
+K_E = (0.0, 1e-3, 1e-2, 1e-1, 1.0)
+PHI_F = (0.0, 1.0, 2.0, 4.0, 8.0, 16.0, 32.0)
+
+
+def solve(problem, tolerance=1e-8, **options):
+    solver = FixedPoint(problem, FixedPointOptions(tolerance=tolerance, **options))
+    outcome = solver.solve()
+    assert outcome.converged, outcome.reason
+    return solver
+
+
+def extremes(problem, solver):
+    """Return phi on Gamma_3, largest displacement component and pressure, over all ranks."""
+    trace, comm = problem.trace, problem.comm
+    phi = potential(problem)
+    u = problem.x.x.array.reshape(-1, problem.block_size)[:, : problem.dim]
+    return (
+        -trace.maximum(-phi, -np.inf),
+        trace.maximum(phi, -np.inf),
+        comm.allreduce(np.abs(u).max(), MPI.MAX),
+        trace.maximum(solver.forces.pressure),
+    )
+
+
+INDEPENDENT = {
+    0.2: (0.0366, 3.396, 3.0004, 150.756),
+    0.0: (0.0489, 2.514, 2.9356, 75.377),
+    1.0: (0.0367, 3.464, 2.9907, 210.531),
+}
+
+
+@pytest.mark.parallel
+@pytest.mark.parametrize("mu", INDEPENDENT)
+def test_independent_values(mu):
+    """Another code, 64 x 32 cells, load -10x, insulated: to the digits given."""
+    friction = Friction(ConstantCoefficient(mu)) if mu > 0 else Friction()
+    problem = example(COMM, (64, 32), -10.0, friction=friction, k_e=0.0)
+    found = extremes(problem, solve(problem))
+    for value, expected in zip(found, INDEPENDENT[mu], strict=True):
+        digits = len(str(expected).split(".")[1])
+        assert round(value, digits) == expected
+
+
+@pytest.mark.parametrize("law", [None, hencky()], ids=["8.1", "8.2"])
+@pytest.mark.parametrize(
+    "changes", [*({"k_e": k_e} for k_e in K_E), *({"phi_f": phi_f} for phi_f in PHI_F)], ids=str
+)
+def test_series(changes, law):
+    """Those of the conductivity and of the foundation's potential."""
+    problem = example(COMM, (64, 32), friction=SLIP, law=law, **changes)
+    solver = solve(problem)
+    assert charge_balance(problem, solver.forces).imbalance < 1e-8
+
+
+def test_potential_grows_with_phi_f_and_k_e():
+    """As Figures 8.4 and 8.6: over most of Gamma_3, away from the grounded end."""
+    for rows in (
+        [{"phi_f": p} for p in (0.0, 8.0, 32.0)],
+        [{"k_e": k} for k in (0.0, 1e-1, 1.0)],
+    ):
+        curves = []
+        for row in rows:
+            problem = example(COMM, (32, 16), friction=SLIP, **row)
+            solve(problem)
+            order = np.argsort(problem.trace.points[:, 0])
+            curves.append(potential(problem)[order][4:])
+        for low, high in pairwise(curves):
+            assert np.all(high > low)
+
+
+def test_yield_matters():
+    """Example 8.2 passes the yield strain: the pressures differ, but not by much."""
+    found = []
+    for law in (None, hencky()):
+        problem = example(COMM, (64, 32), friction=SLIP, law=law)
+        found.append(extremes(problem, solve(problem)))
+    assert abs(found[0][2] - found[1][2]) > 1e-7
+    assert np.allclose(found[0], found[1], rtol=1e-2)
+
+
+def test_lagged_current_stops_converging():
+    """Theorem 5.2 asks for small k_e if the charge is lagged, as in Algorithm 4."""
+    lagged = example(COMM, (16, 8), friction=SLIP, k_e=10.0, lagged=True)
+    outcome = FixedPoint(lagged, FixedPointOptions()).solve()
+    assert not outcome.converged
+    solve(example(COMM, (16, 8), friction=SLIP, k_e=10.0))
+
+
+@pytest.mark.parametrize("law", [None, hencky()], ids=["8.1", "8.2"])
+def test_units_do_not_matter(law):
+    runs = []
+    for units in (SCALED, SI):
+        material = None
+        if law is not None:
+            material = hencky()
+            material = type(material)(
+                material.young * units.stress, material.poisson, yield_strain=1.8
+            )
+        problem = example(COMM, (32, 16), friction=SLIP, law=material, units=units)
+        solver = solve(problem)
+        steps = [record.inner for record in solver.history.records]
+        runs.append((solver.forces.pressure / units.stress, steps))
+        runs[-1] += (potential(problem) / units.potential,)
+    assert np.allclose(runs[0][0], runs[1][0], rtol=1e-8)
+    assert np.allclose(runs[0][2], runs[1][2], rtol=1e-8, atol=1e-8)
+    assert runs[0][1] == runs[1][1]
+
+
+@pytest.mark.parallel
+@pytest.mark.parametrize("law", [None, hencky()], ids=["8.1", "8.2"])
+def test_ranks_agree(law):
+    """All ranks together find what one finds alone, to 1e-8."""
+    found = []
+    for comm in (COMM, MPI.COMM_SELF):
+        problem = example(comm, (32, 16), friction=SLIP, law=law)
+        solver = solve(problem, 1e-11)
+        charge = charge_balance(problem, solver.forces)
+        norms = (problem.trace.norm(solver.forces.pressure), problem.trace.norm(potential(problem)))
+        found.append((*extremes(problem, solver), *norms, charge.foundation))
+    assert np.allclose(found[0], found[1], rtol=1e-8)
+
+
+# The iterative solver
+
+
+def first_solve(problem, symmetric=True, compare=True):
+    """Return the iterations of a first linear solve, and its difference to the direct one."""
+    problem.reset()
+    nodal = nodal_iterate(problem)
+    blocks = augmentation(problem, automatic_r(problem), problem.frictional)
+    contact = np.ones(nodal.shape[0])
+    current = problem.response.current_block(nodal, contact)
+    blocks = blocks + problem.trace.weight[:, None, None] * current
+    found = []
+    for kind in ("lu", "iterative") if compare else ("iterative",):
+        operator = LinearOperator(problem, symmetric=symmetric, kind=kind)
+        operator.update(problem.secant, blocks)
+        increment = operator.solve(-residual_forces(problem, Multipliers.zero(problem)))
+        found.append((increment, operator.counters.linear_iterations))
+    comm = problem.comm
+    size = comm.allreduce(np.abs(found[0][0]).max(initial=0), MPI.MAX)
+    wrong = comm.allreduce(np.abs(found[0][0] - found[-1][0]).max(initial=0), MPI.MAX)
+    return found[-1][1], wrong / size
+
+
+@pytest.mark.parallel
+@pytest.mark.parametrize("symmetric", [True, False], ids=["MINRES", "GMRES"])
+@pytest.mark.parametrize("cells", [(32, 16), (8, 2, 4)], ids=["plane", "space"])
+def test_iterative_solver_agrees_with_the_direct_one(cells, symmetric):
+    iterations, wrong = first_solve(example(COMM, cells), symmetric)
+    assert 1 < iterations < 100
+    assert wrong < 1e-8
+
+
+def test_iterations_do_not_depend_on_units():
+    counts = [first_solve(example(COMM, (32, 16), units=units))[0] for units in (SCALED, SI)]
+    assert counts[0] == counts[1]
+
+
+def test_iterative_fixed_point():
+    found = []
+    for kind in ("lu", "iterative"):
+        problem = example(COMM, (16, 8), friction=SLIP)
+        found.append(extremes(problem, solve(problem, linear=kind)))
+    assert np.allclose(found[0], found[1], rtol=1e-8)
+
+
+@pytest.mark.slow
+def test_iterations_are_flat_in_the_plane():
+    counts = [first_solve(example(COMM, (n, n // 2)), compare=False)[0] for n in (32, 64, 128, 256)]
+    assert max(counts) <= 1.3 * min(counts), counts
+
+
+@pytest.mark.slow
+def test_iterations_are_flat_in_space():
+    column = Column(k_e=1.0, phi_f=32.0)
+    counts = [
+        first_solve(column.problem(COMM, 3, cells=[n, n, 2 * n], mu=0.2), compare=False)[0]
+        for n in (10, 14, 20)
+    ]
+    assert max(counts) <= 1.3 * min(counts), counts
