@@ -21,14 +21,12 @@ from matplotlib import rcParams
 from matplotlib.figure import Figure
 from mpi4py import MPI
 
-from contact import Case, InputError, Solution, load_case, solve, solve_problem
+from contact import Case, InputError, Solution, solve, solve_problem
 from contact.body.norms import volume
 from contact.output.figures.figures import STYLE
 from contact.problem.problem import ContactProblem
 from forms.hencky import Log
 from forms.kinematics import deviator_squared, strain
-
-CASES = Path(__file__).parent / "cases"
 
 rcParams.update(STYLE)
 rcParams["axes.titlesize"] = 9
@@ -139,20 +137,6 @@ def parser(text: str, script: str) -> argparse.ArgumentParser:
     # A table solves a hundred problems; what each is worth is told by `contact solve`.
     logging.getLogger("contact").setLevel(logging.ERROR)
     return made
-
-
-def bar(n: int, load: float, rho: float, *changes: str) -> Case:
-    """Return Example 7.2 with n cells per unit length, solved by Newton's method."""
-    return load_case(
-        CASES / "bar.toml",
-        [
-            f"mesh.cells=[{4 * n}, {n}]",
-            f"load.0.traction=[0.0, {load}]",
-            f"friction.mu.rho={rho}",
-            "solver.method=newton",
-            *changes,
-        ],
-    )
 
 
 def solved(case: Case, problem: ContactProblem | None = None) -> Solution:

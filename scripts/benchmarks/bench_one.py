@@ -30,7 +30,7 @@ from contact.linear.operator import LinearOperator
 from contact.methods.nested import coarse_solution
 from contact.output.solution import Solution
 from contact.problem.problem import ContactProblem
-from scripts.reporting import CASES, bar
+from scripts.cases import CASES, bar
 
 COMM = MPI.COMM_WORLD
 

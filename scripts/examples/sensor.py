@@ -19,7 +19,8 @@ from contact import Case, build_problem, load_case
 from contact.output.balances import Reading, sensor
 from contact.problem.problem import ContactProblem, Field, Load
 from contact.typing import Array
-from scripts.reporting import CASES, Report, parser, solved, subplots
+from scripts.cases import CASES
+from scripts.reporting import Report, parser, solved, subplots
 
 #: Multiples of the case's load.
 FACTORS = (0.25, 0.5, 0.75, 1.0, 1.5, 2.0, 2.5, 3.0)

@@ -16,7 +16,8 @@ import numpy as np
 
 from contact import Case, build_problem, load_case
 from contact.case.file import Solver
-from scripts.reporting import CASES, Report, observed_orders, parser
+from scripts.cases import CASES
+from scripts.reporting import Report, observed_orders, parser
 from scripts.studies.branches import AGREE, DISTURBANCE, Branches, Found
 
 #: Tolerance on the residuals of `newton` and `uzawa`.

@@ -24,7 +24,8 @@ from contact.methods.report import Monitor, Outcome, Record
 from contact.output.fields import DerivedFields
 from contact.problem.problem import ContactProblem
 from contact.typing import Array
-from scripts.reporting import Report, bar, iterate, observed_orders, options, solved, subplots
+from scripts.cases import bar
+from scripts.reporting import Report, iterate, observed_orders, options, solved, subplots
 from scripts.studies.exact_solutions import Singular, exact, manufactured
 
 RHO = 1e4

@@ -19,7 +19,8 @@ from contact.methods.options import FixedPointOptions
 from contact.methods.report import Record
 from contact.problem.problem import ContactProblem
 from contact.typing import Array
-from scripts.reporting import CASES, Report, iterate, options, subplots
+from scripts.cases import CASES
+from scripts.reporting import Report, iterate, options, subplots
 from scripts.studies.limit_theorem import ProductNorm
 
 #: k_e of the figure.

@@ -26,7 +26,8 @@ from contact.problem.problem import Contact, ContactProblem
 from contact.typing import Array
 from forms.kinematics import strain
 from forms.laws import Compliance, PotentialFactor
-from scripts.reporting import CASES, Report, iterate, observed_orders, options, solved, subplots
+from scripts.cases import CASES
+from scripts.reporting import Report, iterate, observed_orders, options, solved, subplots
 
 #: mu = k_e of Table 8.4.
 TABLE_8_4 = (6e-1, 2e-1, 6.8e-2, 5.1e-3, 6.2e-4, 1.4e-5, 3.5e-6, 8.5e-7)

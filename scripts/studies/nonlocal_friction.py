@@ -13,7 +13,8 @@ from mpi4py import MPI
 from contact import Solution
 from contact.body.transfer import errors
 from contact.output.table import Table, contact_table
-from scripts.reporting import Report, bar, options, solved, subplots
+from scripts.cases import bar
+from scripts.reporting import Report, options, solved, subplots
 
 RHO = 1e4
 LOADS = (-0.005, -0.05)

@@ -20,7 +20,8 @@ from contact.output.table import Table, contact_table, csv_columns, tangent_of
 from contact.typing import Array
 from forms.foundation import contact_multiplier
 from forms.laws import Compliance, PotentialFactor, RampConductivity, ShiftedConductivity
-from scripts.reporting import CASES, Report, options, solved, subplots, yielded_share
+from scripts.cases import CASES
+from scripts.reporting import Report, options, solved, subplots, yielded_share
 
 #: Labels of axes and colours.
 POTENTIAL = r"potential $\varphi$ (units of the case)"

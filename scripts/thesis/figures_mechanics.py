@@ -16,7 +16,8 @@ from contact import Case, Solution
 from contact.output.figures.body import draw_plane, picture
 from contact.output.figures.contact import draw_line
 from contact.output.table import Table, contact_table, csv_columns
-from scripts.reporting import Report, bar, options, solved, subplots
+from scripts.cases import bar
+from scripts.reporting import Report, options, solved, subplots
 
 RHO = 1e4
 EPS = 1.05e-5

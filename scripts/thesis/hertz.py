@@ -17,7 +17,8 @@ from contact.mesh.make import make_domain
 from contact.output.figures.body import draw_plane, picture
 from contact.output.table import contact_table
 from contact.typing import Array
-from scripts.reporting import CASES, Report, options, solved, subplots
+from scripts.cases import CASES
+from scripts.reporting import Report, options, solved, subplots
 
 
 @dataclass(frozen=True)

@@ -13,7 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from contact import Solution, build_problem, solve_problem
-from scripts.reporting import Report, bar, parser
+from scripts.cases import bar
+from scripts.reporting import Report, parser
 
 LOADS = (-0.005, -0.05)
 RHO = (1e5, 1e6, 1e7, 6e7)

@@ -15,7 +15,8 @@ from contact.body.transfer import errors
 from contact.case.file import Friction
 from contact.output.solution import Solution
 from contact.problem.problem import ContactProblem
-from scripts.reporting import Report, bar, iterate, observed_orders, options, solved, subplots
+from scripts.cases import bar
+from scripts.reporting import Report, iterate, observed_orders, options, solved, subplots
 
 LOADS = (-0.005, -0.05)
 EPS = (1e-2, 1e-3, 1e-4, 1e-5)

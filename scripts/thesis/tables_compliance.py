@@ -12,7 +12,8 @@ import numpy as np
 from contact import Case, Solution, build_problem, load_case, solve_problem
 from contact.mesh.make import Domain
 from contact.problem.problem import ContactProblem
-from scripts.reporting import CASES, Report, options
+from scripts.cases import CASES
+from scripts.reporting import Report, options
 
 #: mu = k_e -> iterations of the thesis.
 THESIS: Mapping[float, int] = {

@@ -16,7 +16,8 @@ from contact.output.balances import charge_balance, force_balance
 from contact.problem.kkt import residual_forces
 from contact.problem.problem import ContactProblem
 from contact.problem.state import Multipliers, nodal_iterate
-from scripts.reporting import CASES, Report, options, yielded_share
+from scripts.cases import CASES
+from scripts.reporting import Report, options, yielded_share
 from scripts.thesis.tables_compliance import difference, iterations, run
 
 PHI_F = (0, 1, 2, 4, 8, 16, 32)

@@ -9,8 +9,7 @@ import pytest
 from contact.case.file import load_case
 from contact.cli.main import CONVERGED, main
 from contact.solving import solve
-
-CASES = Path(__file__).parents[2] / "scripts" / "cases"
+from scripts.cases import CASES, bar
 
 #: Cells along the length, load f2, rho -> largest pressure, largest displacement component:
 #: an independent code's solutions of Example 7.2.
@@ -41,14 +40,7 @@ def test_example_7_2(
     cells: int, load: float, rho: float, pressure: float, largest: float, method: str
 ) -> None:
     """Pressure and displacement are those of the independent code, to its digits."""
-    case = load_case(
-        CASES / ("bar.toml" if load == -0.005 else "bar-large.toml"),
-        [
-            f"mesh.cells=[{cells}, {cells // 4}]",
-            f"friction.mu.rho={rho}",
-            f'solver.method="{method}"',
-        ],
-    )
+    case = bar(cells // 4, load, rho, f"solver.method={method}")
     solution = solve(case)
     assert solution.converged
     assert solution.outcome.kkt.largest <= 1e-8
@@ -71,6 +63,6 @@ def test_warning_and_review(tmp_path: Path) -> None:
 
 def test_gentle_slip_law_warns_of_nothing() -> None:
     """Where the sliding block has one solution, there is a note and no warning."""
-    solution = solve(load_case(CASES / "bar.toml", ["mesh.cells=[16, 4]", "friction.mu.rho=100"]))
+    solution = solve(bar(4, -0.005, 100.0, "solver.method=uzawa"))
     assert solution.warnings == []
     assert any("Theorem 3.1" in note for note in solution.notes)

@@ -7,7 +7,7 @@ import pytest
 from mpi4py import MPI
 
 from contact.build import build_problem
-from contact.case.file import parse_case
+from contact.case.file import Case, parse_case
 from contact.errors import InputError
 from contact.interface.linearised import CLOSED, FREE, SLIDES, STICKS, Moduli, linearise
 from contact.methods.fixed_point import FixedPoint
@@ -21,6 +21,7 @@ from contact.problem.state import Multipliers, nodal_iterate
 from contact.solving import solve
 from forms.hencky import Linear, Log
 from forms.laws import ConstantCoefficient, SlipCoefficient
+from scripts.cases import bar
 from tests.problems import mechanics
 
 SELF = MPI.COMM_SELF
@@ -166,33 +167,21 @@ def test_falling_friction_is_followed_as_far_as_allowed(softening):
     assert np.allclose(base.blocks[:, 0, 0], expected, rtol=1e-4)
 
 
-def bar_case(cells: list[int], **solver) -> dict:
-    return {
-        "mesh": {
-            "generator": "rectangle",
-            "size": [4.0, 1.0],
-            "cells": cells,
-            "parts": {"loaded": {"side": "top", "from": 2.0, "to": 4.0}},
-        },
-        "material": {"law": "log", "young": 1.0, "poisson": 0.3, "yield_strain": 0.05},
-        "fixed": [{"on": "left", "displacement": [0.0, 0.0]}],
-        "load": [{"on": "loaded", "traction": [0.0, -0.05]}],
-        "contact": {"on": "bottom"},
-        "friction": {"law": "coulomb", "mu": 0.5},
-        "solver": {"method": "newton", "tolerance": 1e-10, **solver},
-    }
+def bar_case(n: int, *changes: str) -> Case:
+    """Return Example 7.2 with ten times its load and a constant mu."""
+    return bar(n, -0.05, 1.0, "friction.mu=0.5", "solver.tolerance=1e-10", *changes)
 
 
 def test_nested_meshes_save_steps_and_change_nothing():
-    plain = solve(parse_case(bar_case([128, 32])), comm=SELF)
-    nested = solve(parse_case(bar_case([128, 32], nested=True)), comm=SELF)
+    plain = solve(bar_case(32), comm=SELF)
+    nested = solve(bar_case(32, "solver.nested=true"), comm=SELF)
     assert plain.outcome.converged and nested.outcome.converged
     assert nested.counters.linear_solves < plain.counters.linear_solves <= 5
     assert np.allclose(plain.forces.pressure, nested.forces.pressure, rtol=0, atol=1e-8)
 
 
 def test_nested_levels_halve_the_cells():
-    case = parse_case(bar_case([256, 64], nested=True))
+    case = bar_case(64, "solver.nested=true")
     # A mesh of 65 x 17 nodes still pays; those below it are used when they are asked for.
     assert [c.mesh.cells for c in coarser_cases(case)] == [(64, 16), (128, 32)]
     assert [c.mesh.cells for c in coarser_cases(case, 2)] == [(128, 32)]
@@ -225,7 +214,7 @@ def test_slower_methods_take_over_where_newton_gives_up(friction, note):
 
 @pytest.mark.parametrize("method", ["newton", "uzawa"])
 def test_the_number_of_outer_iterations_is_limited(method):
-    solution = solve(parse_case(bar_case([32, 8], method=method, max_outer=2)), comm=SELF)
+    solution = solve(bar_case(8, f"solver.method={method}", "solver.max_outer=2"), comm=SELF)
     assert not solution.outcome.converged
     # the frictionless start of the fixed point is its iteration 0
     assert len(solution.history.records) <= 3
@@ -271,7 +260,7 @@ def test_a_method_cannot_call_itself_converged(monkeypatch):
         return Outcome(KKT(0.0, 0.0, 0.0), KKT(1.0, 1.0, 1.0), "all is well")
 
     monkeypatch.setattr(Newton, "solve", boast)
-    solution = solve(parse_case(bar_case([16, 4])), comm=SELF)
+    solution = solve(bar_case(4), comm=SELF)
     assert not solution.converged
     assert solution.outcome.kkt == evaluate(solution.problem, solution.forces)
     assert "all is well, but the equilibrium residual is 1.00e+00" in solution.outcome.reason

@@ -18,29 +18,17 @@ from contact.methods.options import FixedPointOptions, PenaltyOptions
 from contact.methods.penalty import Penalty
 from contact.problem.problem import Body, Contact, ContactProblem, Fixed, Friction, Load
 from contact.problem.state import nodal_iterate
-from forms.hencky import Linear, Log
+from forms.hencky import Linear
 from forms.laws import ConstantCoefficient, SlipCoefficient
+from tests.problems import mechanics
 
 ZERO = Expression(0.0)
 
 
 def bar(cells: int = 8, load: float = -0.005, coefficient=None, degree: int = 1, **friction):
     """Return Example 7.2 on `cells` squares a unit length."""
-    body_domain = domain.rectangle(
-        MPI.COMM_WORLD,
-        [0, 0],
-        [4, 1],
-        [4 * cells, cells],
-        parts={"loaded": domain.Piece("top", 2.0, 4.0)},
-    )
-    body = Body(
-        Log(1.0, 0.3, yield_strain=0.05),
-        [Fixed("left", [ZERO, ZERO])],
-        [Load("loaded", [ZERO, Expression(load)])],
-    )
-    contact = Contact("bottom", GapFunction(lambda x: np.zeros(len(x))))
-    law = Friction(coefficient, **friction) if coefficient or friction else None
-    return ContactProblem(body_domain, body, contact, law, degree=degree)
+    law = Friction(coefficient, **friction)
+    return mechanics.bar(MPI.COMM_WORLD, cells, load, degree=degree, friction=law)
 
 
 def relative(problem: ContactProblem, a, b) -> float:

@@ -7,8 +7,9 @@ import numpy as np
 import ufl
 from mpi4py import MPI
 
+from contact.build import build_problem
 from contact.interface.obstacle import GapFunction, Plane
-from contact.mesh.make import Domain, Piece, box, rectangle
+from contact.mesh.make import Domain, box, rectangle
 from contact.methods.fixed_point import FixedPoint
 from contact.methods.options import FixedPointOptions
 from contact.methods.report import Outcome
@@ -17,6 +18,7 @@ from contact.problem.state import nodal_iterate
 from contact.typing import Array
 from forms.hencky import Hencky, Linear, Log
 from forms.laws import FrictionCoefficient, SlipCoefficient
+from scripts import cases
 
 
 @dataclass(frozen=True)
@@ -70,17 +72,11 @@ def bar(
     friction: Friction | None = None,
 ) -> ContactProblem:
     """Return Example 7.2 with n cells per unit length."""
-    domain = rectangle(
-        comm, [0.0, 0.0], [4.0, 1.0], [4 * n, n], parts={"loaded": Piece("top", 2.0, 4.0)}
-    )
-    zero = constant(0.0, 2)
-    body = Body(
-        law or Log(1.0, 0.3, yield_strain=0.05),
-        [Fixed("left", [zero, zero])],
-        [Load("loaded", [zero, constant(f2, 2)])],
-    )
-    friction = friction or Friction(SlipCoefficient(0.5, 0.2, rho))
-    return ContactProblem(domain, body, Contact("bottom", flat()), friction, degree=degree)
+    case = cases.bar(n, f2, rho, f"space.degree={degree}")
+    built = build_problem(case, comm, law=law)
+    if friction is None:
+        return built
+    return ContactProblem(built.domain, built.body, built.contact, friction, degree=degree)
 
 
 def leaning_block(comm: MPI.Comm, n: int = 3, degree: int = 1, mu: float = 0.3) -> ContactProblem:

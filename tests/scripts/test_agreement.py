@@ -5,6 +5,7 @@ from pathlib import Path
 
 import pytest
 
+from scripts.cases import CASES
 from scripts.studies import agreement
 from scripts.studies.branches import AGREE
 
@@ -23,8 +24,7 @@ def folder(tmp_path_factory) -> Path:
 
 
 def test_every_case_file_is_compared():
-    cases = Path(__file__).parents[2] / "scripts" / "cases"
-    assert {e.name for e in agreement.examples()} == {path.stem for path in cases.glob("*.toml")}
+    assert {e.name for e in agreement.examples()} == {path.stem for path in CASES.glob("*.toml")}
 
 
 def test_newton_and_block_relaxation_agree_or_find_different_solutions(folder):

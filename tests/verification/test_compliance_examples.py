@@ -2,7 +2,6 @@
 
 from dataclasses import replace
 from functools import cache
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -14,10 +13,9 @@ from contact.interface.response import Layer
 from contact.output.table import contact_table
 from contact.problem.problem import ContactProblem, Friction
 from forms.laws import Compliance, PotentialFactor, SlipCoefficient
+from scripts.cases import CASES
 from scripts.studies import limit_theorem
 from scripts.thesis import figures_compliance, tables_compliance
-
-CASES = Path(__file__).parents[2] / "scripts/cases"
 
 
 @cache

@@ -1,0 +1,36 @@
+"""The case files, and the one that most studies vary."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from contact import Case, load_case
+
+#: Where the case files are.
+CASES = Path(__file__).parent
+
+
+def bar(n: int, load: float = -0.005, rho: float = 1e5, *changes: str) -> Case:
+    """Return Example 7.2 with n cells per unit length, solved by Newton's method.
+
+    Parameters
+    ----------
+    n
+        Cells per unit length.
+    load
+        Vertical traction on the right half of the top.
+    rho
+        How fast the coefficient of friction falls with the slip, (7.16).
+    *changes
+        Further keys, ``section.key=value`` as after ``--set``.
+    """
+    return load_case(
+        CASES / "bar.toml",
+        [
+            f"mesh.cells=[{4 * n}, {n}]",
+            f"load.0.traction=[0.0, {load}]",
+            f"friction.mu.rho={rho}",
+            "solver.method=newton",
+            *changes,
+        ],
+    )
