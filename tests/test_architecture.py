@@ -1,0 +1,141 @@
+"""Who imports whom: the packages of the solver know those above them in the list alone."""
+
+import ast
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[1]
+
+#: A package or module of contact/ imports its own line and those above it.
+LAYERS = (
+    {"errors", "typing", "tolerances", "_compat"},
+    {"mesh"},
+    {"linear"},
+    {"body"},
+    {"interface"},
+    {"problem"},
+    {"methods"},
+    {"output"},
+    {"case"},
+    {"build", "solving"},
+    {"cli"},
+)
+
+#: Longest file of contact/, in lines.
+LONGEST = 300
+
+#: What breaks the rules as yet: (importing, imported), modules in a cycle, files. What is mended
+#: has to leave its list; nothing may join one.
+DOWNWARDS = {
+    ("contact.body.norms", "contact.problem.problem"),
+    ("contact.body.transfer", "contact.problem.problem"),
+    ("contact.interface.linearised", "contact.problem.problem"),
+    ("contact.interface.linearised", "contact.problem.state"),
+    ("contact.interface.penalised", "contact.problem.problem"),
+    ("contact.interface.penalised", "contact.problem.state"),
+    ("contact.linear.block", "contact.problem.held"),
+    ("contact.linear.block", "contact.problem.problem"),
+    ("contact.linear.multigrid", "contact.problem.held"),
+    ("contact.linear.multigrid", "contact.problem.problem"),
+    ("contact.linear.operator", "contact.problem.problem"),
+    ("contact.mesh.make", "contact.case.mesh"),
+    ("contact.methods.nested", "contact.build"),
+    ("contact.methods.nested", "contact.case.file"),
+    ("contact.methods.nested", "contact.case.mesh"),
+    ("contact.output.solution", "contact.case.solver"),
+}
+CYCLIC = {"contact.case.checks", "contact.case.file"}
+LONG = {
+    "contact.interface.response",
+    "contact.methods.newton",
+    "contact.methods.penalty",
+    "contact.problem.problem",
+}
+
+
+def modules(package: str) -> dict[str, Path]:
+    """Return the modules of a package by their full names."""
+    found = {}
+    for path in sorted((ROOT / package).rglob("*.py")):
+        parts = path.relative_to(ROOT).with_suffix("").parts
+        found[".".join(parts[:-1] if parts[-1] == "__init__" else parts)] = path
+    return found
+
+
+def imports(path: Path) -> set[str]:
+    """Return the modules and names that a file imports, anywhere in it."""
+    found = set()
+    for node in ast.walk(ast.parse(path.read_text())):
+        if isinstance(node, ast.Import):
+            found.update(alias.name for alias in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            assert node.level == 0, f"{path}: imports are absolute"
+            found.update(f"{node.module}.{alias.name}" for alias in node.names)
+    return found
+
+
+CONTACT = modules("contact")
+
+
+def graph() -> dict[str, set[str]]:
+    """Return the modules of contact/ that each of them imports.
+
+    Left out is the folder's own `__init__`, whose names are looked up on first use.
+    """
+    edges = {}
+    for name, path in CONTACT.items():
+        whole = {i if i in CONTACT else i.rpartition(".")[0] for i in imports(path)}
+        edges[name] = (whole & CONTACT.keys()) - {name, "contact"}
+    del edges["contact"]
+    return edges
+
+
+def layer(module: str) -> int:
+    """Return the line of the list that a module stands on."""
+    head = module.split(".")[1]
+    name = "cli" if head == "__main__" else head
+    (line,) = (i for i, names in enumerate(LAYERS) if name in names)
+    return line
+
+
+def agrees(found: set, known: set) -> None:
+    """Check what breaks a rule against the list of what is known to."""
+    assert not found - known, "new, and against the rule"
+    assert not known - found, "mended: take it off the list"
+
+
+def test_imports_go_up():
+    edges = graph()
+    agrees({(a, b) for a in edges for b in edges[a] if layer(b) > layer(a)}, DOWNWARDS)
+
+
+def test_no_module_imports_itself_through_others():
+    edges = graph()
+
+    def reached(start: str) -> set[str]:
+        seen, front = set(), set(edges[start])
+        while front:
+            seen |= front
+            front = set().union(*(edges[name] for name in front)) - seen
+        return seen
+
+    agrees({name for name in edges if name in reached(name)}, CYCLIC)
+
+
+def test_files_are_short():
+    lengths = {name: len(path.read_text().splitlines()) for name, path in CONTACT.items()}
+    agrees({name for name, length in lengths.items() if length > LONGEST}, LONG)
+
+
+@pytest.mark.parametrize("name", modules("forms"))
+def test_forms_need_no_mesh_and_no_solver(name):
+    allowed = {"forms", "ufl", "numpy", "scipy", *sys.stdlib_module_names}
+    assert {used.split(".")[0] for used in imports(modules("forms")[name])} <= allowed
+
+
+@pytest.mark.parametrize("name", modules("meshes"))
+def test_recipes_need_the_solver_for_its_errors_alone(name):
+    used = {i for i in imports(modules("meshes")[name]) if i.split(".")[0] in ("contact", "forms")}
+    assert used <= {"contact.errors.InputError"}
