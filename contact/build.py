@@ -10,20 +10,23 @@ import numpy as np
 from mpi4py import MPI
 from ufl.core.expr import Expr
 
+from contact.body.description import Body, Fixed, Load
 from contact.case import file as sections
 from contact.case.formula import Expression
 from contact.errors import InputError
-from contact.interface.obstacle import Foundation, GapFunction, Plane, Sphere
-from contact.interface.response import Conductor, Layer
+from contact.interface.current import Conductor
+from contact.interface.friction import Friction
+from contact.interface.layer import Layer
+from contact.interface.obstacle import GapFunction, Obstacle, Plane, Sphere
 from contact.mesh.make import Domain, make_domain
-from contact.problem import problem as parts
 from contact.problem.held import check_held
-from contact.problem.problem import ContactProblem
+from contact.problem.problem import Contact, ContactProblem
 from contact.tolerances import HUGE
 from contact.typing import Array
 from forms.hencky import Hencky, Linear, Log
 from forms.laws import (
     Compliance,
+    Conductivity,
     ConstantCoefficient,
     FrictionCoefficient,
     PerfectConductivity,
@@ -43,7 +46,7 @@ def build_problem(
     domain: Domain | None = None,
     law: Hencky | None = None,
     coefficient: FrictionCoefficient | None = None,
-    foundation: Foundation | None = None,
+    foundation: Obstacle | None = None,
     layer: Layer | None = None,
 ) -> ContactProblem:
     """Build the problem that a case describes. Collective.
@@ -71,7 +74,7 @@ def build_problem(
         _check_loads(case, domain)
         law = material_law(case.material) if law is None else law
         _check_range("material.young", float(law.young))
-        body = parts.Body(
+        body = Body(
             law,
             [_fixed(i, fixed, domain.comm) for i, fixed in enumerate(case.fixed)],
             [_load(i, load, domain.comm) for i, load in enumerate(case.load)],
@@ -81,17 +84,16 @@ def build_problem(
         problem = ContactProblem(
             domain,
             body,
-            parts.Contact(
-                case.contact.on, obstacle, _layer(case.contact) if layer is None else layer
-            ),
+            Contact(case.contact.on, obstacle, _layer(case.contact) if layer is None else layer),
             _friction(case.friction, domain.comm, coefficient),
             None if case.electric is None else _conductor(case.electric, domain.size),
             case.space.degree,
         )
-        finite = bool(np.isfinite(problem.external).all())
+        loads = problem.equilibrium.external()
+        finite = bool(np.isfinite(loads).all())
         if not domain.comm.allreduce(finite, op=MPI.LAND):
             raise InputError("load: a formula is not finite everywhere on its part")
-        largest = float(np.abs(problem.external).max(initial=0.0))
+        largest = float(np.abs(loads).max(initial=0.0))
         _check_range("load", domain.comm.allreduce(largest, op=MPI.MAX), least=0.0)
         check_held(problem)
     return problem
@@ -183,7 +185,7 @@ def piezo(section: sections.Piezo, dim: int) -> Piezo:
     return material.poled_along(section.poling)
 
 
-def _fixed(i: int, section: sections.Fixed, comm: MPI.Intracomm) -> parts.Fixed:
+def _fixed(i: int, section: sections.Fixed, comm: MPI.Intracomm) -> Fixed:
     key = f"fixed.{i}"
     displacement = None
     if section.displacement is not None:
@@ -191,16 +193,14 @@ def _fixed(i: int, section: sections.Fixed, comm: MPI.Intracomm) -> parts.Fixed:
             NodalField(f"{key}.displacement.{k}", c, comm) if isinstance(c, Expression) else None
             for k, c in enumerate(section.displacement)
         ]
-    return parts.Fixed(
-        section.on, displacement, _field(f"{key}.potential", section.potential, comm)
-    )
+    return Fixed(section.on, displacement, _field(f"{key}.potential", section.potential, comm))
 
 
-def _load(i: int, section: sections.Load, comm: MPI.Intracomm) -> parts.Load:
+def _load(i: int, section: sections.Load, comm: MPI.Intracomm) -> Load:
     key = f"load.{i}"
     force = section.body_force if section.everywhere else section.traction
     charge = section.body_charge if section.everywhere else section.charge
-    return parts.Load(
+    return Load(
         None if section.everywhere else section.on,
         None if force is None else [NodalField(key, f, comm) for f in force],
         _field(key, section.pressure, comm),
@@ -214,7 +214,7 @@ def _field(
     return None if expression is None else NodalField(key, expression, comm, minimum)
 
 
-def _foundation(section: sections.Contact, domain: Domain) -> Foundation:
+def _foundation(section: sections.Contact, domain: Domain) -> Obstacle:
     match section.foundation:
         case sections.Plane() as plane:
             _check_range("contact.foundation.point", max(map(abs, plane.point)), least=0.0)
@@ -243,26 +243,26 @@ def _layer(section: sections.Contact) -> Layer | None:
 
 def _friction(
     section: sections.Friction, comm: MPI.Intracomm, coefficient: FrictionCoefficient | None
-) -> parts.Friction:
+) -> Friction:
     if coefficient is not None:
-        return parts.Friction(coefficient, radius=section.radius)
+        return Friction(coefficient, radius=section.radius)
     if section.law == "none":
-        return parts.Friction()
+        return Friction()
     if section.law == "tresca":
-        return parts.Friction(tresca=_field("friction.bound", section.bound, comm, 0.0))
+        return Friction(tresca=_field("friction.bound", section.bound, comm, 0.0))
     mu = section.mu
     if isinstance(mu, sections.SlipLaw):
-        return parts.Friction(SlipCoefficient(mu.a, mu.b, mu.rho), radius=section.radius)
+        return Friction(SlipCoefficient(mu.a, mu.b, mu.rho), radius=section.radius)
     assert mu is not None  # demanded by the section
     if mu.is_constant:
-        return parts.Friction(ConstantCoefficient(mu.value), radius=section.radius)
+        return Friction(ConstantCoefficient(mu.value), radius=section.radius)
     field = NodalField("friction.mu", mu, comm, 0.0)
-    return parts.Friction(mu=field, radius=section.radius)
+    return Friction(mu=field, radius=section.radius)
 
 
 def _conductor(section: sections.Electric, size: float) -> Conductor:
     delta = 1e3 / size if section.delta is None else section.delta
-    psi: ShiftedConductivity | RampConductivity | PerfectConductivity
+    psi: Conductivity
     if section.law == "shifted":
         psi = ShiftedConductivity(section.k_e, delta)
     elif section.law == "ramp":

@@ -7,58 +7,32 @@ import time
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 from mpi4py import MPI
 
 from contact.build import build_problem, named
 from contact.case.file import Case, Solver, load_case
-from contact.linear.operator import Counters
 from contact.methods.fixed_point import FixedPoint
 from contact.methods.interrupt import Interrupted, stop_on_signal
+from contact.methods.method import Method
 from contact.methods.nested import coarse_solution, prolong
 from contact.methods.newton import Newton
 from contact.methods.options import FixedPointOptions, NewtonOptions, PenaltyOptions
 from contact.methods.penalty import Penalty
-from contact.methods.report import History, Monitor, Outcome
+from contact.methods.report import Monitor, Outcome
 from contact.output.review import review
 from contact.output.solution import Solution
 from contact.problem.held import check_potential
 from contact.problem.kkt import KKT, evaluate
 from contact.problem.problem import ContactProblem
-from contact.problem.state import Multipliers
+from contact.problem.state import State
 
 logger = logging.getLogger("contact.solve")
 
 #: Stands for residuals until they are measured.
 NOTHING = KKT(np.inf, np.inf, np.inf)
-
-
-class MethodOptions(Protocol):
-    """What every method is told."""
-
-    @property
-    def allowed(self) -> KKT:
-        """How large each residual may be where the method has converged."""
-
-
-class Method(Protocol):
-    """A solver: it moves the problem's iterate and can be asked at any time where it is."""
-
-    @property
-    def options(self) -> MethodOptions:
-        """Options of the method."""
-
-    forces: Multipliers
-    history: History
-    counters: Counters
-
-    def solve(self) -> Outcome:
-        """Iterate from zero displacement until convergence or a limit. Collective."""
-
-    def solve_from(self, forces: Multipliers) -> Outcome:
-        """Iterate from the problem's present iterate and given contact forces. Collective."""
 
 
 def fixed_point(problem: ContactProblem, settings: Solver, monitor: Monitor | None) -> FixedPoint:
@@ -158,7 +132,7 @@ def solve_problem(
     problem: ContactProblem,
     settings: Solver,
     monitor: Monitor | None = None,
-    start: tuple[ContactProblem, Multipliers] | None = None,
+    start: tuple[ContactProblem, State] | None = None,
 ) -> Solution:
     """Solve a problem. Collective.
 
@@ -167,7 +141,7 @@ def solve_problem(
     problem, settings, monitor
         The problem, the method with its tolerances, and who is told of the outer iterations.
     start
-        A solution on a coarser mesh, for Newton's method to start from.
+        A problem on a coarser mesh and its solution, to start from.
 
     An interrupt (Ctrl-C, or SIGTERM from a batch system) ends the solve after the running
     iteration and keeps what the last outer one left; a second one ends the program.
@@ -182,19 +156,17 @@ def solve_problem(
         method = METHODS[settings.method](problem, settings, stop)
         setup = time.perf_counter() - begin
         try:
-            if start is not None and isinstance(method, Newton):
-                outcome = method.solve_from(prolong(*start, problem))
-            else:
-                outcome = method.solve()
+            state, outcome = method.solve(None if start is None else prolong(*start, problem))
         except Interrupted as interrupt:
+            state = method.state
             outcome = Outcome(NOTHING, NOTHING, str(interrupt), interrupt.number)
     # From scratch and at the whole load, whatever the method says and wherever it has stopped.
-    problem.apply_load(1.0)
-    outcome = replace(outcome, kkt=evaluate(problem, method.forces), allowed=method.options.allowed)
-    check_potential(problem, method.forces)
+    state = State(problem.equilibrium.prescribe(state.x), state.forces)
+    outcome = replace(outcome, kkt=evaluate(problem, state), allowed=method.options.allowed)
+    check_potential(problem, state)
     solution = Solution(
         problem=problem,
-        forces=method.forces,
+        state=state,
         outcome=outcome,
         history=method.history,
         counters=method.counters,

@@ -121,8 +121,59 @@ def _ramp_slope(position: Value, slope: Value) -> Value:
     return where(less(0.0, position), where(less(position, 1.0), slope, 0.0), 0.0)
 
 
+class Conductivity(Protocol):
+    """psi: how well a foundation conducts, assumption (h5). A new law is a class with these."""
+
+    @property
+    def follows_gap(self) -> bool:
+        """Whether it is a function of the gap that Newton's method can follow."""
+
+    def at(self, s: Value, pressed: Value, loaded: Value | None = None) -> Value:
+        """Return the conductivity at nodes, k_e at most.
+
+        Parameters
+        ----------
+        s
+            u_nu - rho.
+        pressed
+            Whether the rigid part presses, and s = 0 but for the tolerance of a solver.
+        loaded
+            Whether any pressure acts, the layer's included; `pressed` by default.
+        """
+
+    def gap_slope(self, s: Value, pressed: Value) -> Value:
+        """Return the derivative by s, 0 where the rigid part presses."""
+
+
+class _Ramp:
+    """What the two ramps share."""
+
+    k_e: float
+
+    @property
+    def follows_gap(self) -> bool:
+        """True, unless nothing is conducted."""
+        return self.k_e > 0
+
+    def at(self, s: Value, pressed: Value, loaded: Value | None = None) -> Value:
+        """Return the conductivity: that of s = 0 where the rigid part presses."""
+        return self(where(pressed, 0.0, s))
+
+    def gap_slope(self, s: Value, pressed: Value) -> Value:
+        """Return the generalised derivative by s, 0 where the rigid part presses."""
+        return where(pressed, 0.0, self.derivative(s))
+
+    def __call__(self, s: Value) -> Value:
+        """Return the conductivity at s = u_nu - rho."""
+        raise NotImplementedError
+
+    def derivative(self, s: Value) -> Value:
+        """Return the generalised derivative."""
+        raise NotImplementedError
+
+
 @dataclass(frozen=True)
-class RampConductivity:
+class RampConductivity(_Ramp):
     """psi(s) = k_e clip(delta s, 0, 1), equation (1.34) as printed, s = u_nu - rho.
 
     With a unilateral constraint s never exceeds 0 and the ramp never conducts.
@@ -141,7 +192,7 @@ class RampConductivity:
 
 
 @dataclass(frozen=True)
-class ShiftedConductivity:
+class ShiftedConductivity(_Ramp):
     """psi(s) = k_e clip(1 + delta s, 0, 1): the ramp moved to the closing gap.
 
     Full conductivity in contact, none beyond the distance 1/delta; Lipschitz, as (h5) asks.
@@ -165,9 +216,19 @@ class PerfectConductivity:
 
     k_e: float
 
+    follows_gap = False
+
     def __call__(self, in_contact: Value) -> Value:
         """Return the conductivity; the argument tells whether the node is in contact."""
         return where(in_contact, self.k_e, 0.0)
+
+    def at(self, s: Value, pressed: Value, loaded: Value | None = None) -> Value:
+        """Return k_e where any pressure acts."""
+        return self(pressed if loaded is None else loaded)
+
+    def gap_slope(self, s: Value, pressed: Value) -> Value:
+        """Return 0: the contact flag is kept."""
+        return 0.0 * s
 
 
 class PenetrationLaw(Protocol):

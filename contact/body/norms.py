@@ -1,29 +1,34 @@
-"""Norms and volumes over the body."""
+"""Norms, errors and volumes over the body."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 
 import numpy as np
 import ufl
 from dolfinx import fem
 from dolfinx.fem.petsc import assemble_matrix
 from mpi4py import MPI
+from ufl.core.expr import Expr
 
-from contact.problem.problem import ContactProblem
+from contact.body.constants import constant, law_with_constants
+from contact.body.equilibrium import BodyEquilibrium
+from contact.mesh.domain import Domain
 from contact.typing import Array
+from forms.hencky import secant_form
 
 
-def volume(problem: ContactProblem, measure: ufl.Measure) -> float:
+def volume(domain: Domain, measure: ufl.Measure) -> float:
     """Return the volume or area that a UFL measure covers, over all ranks. Collective."""
-    form = fem.form(problem.constant(1.0) * measure)
-    return float(problem.comm.allreduce(fem.assemble_scalar(form), op=MPI.SUM))
+    form = fem.form(constant(domain.mesh, 1.0) * measure)
+    return float(domain.comm.allreduce(fem.assemble_scalar(form), op=MPI.SUM))
 
 
-def domain_norm(problem: ContactProblem) -> Callable[[Array], float]:
+def domain_norm(body: BodyEquilibrium) -> Callable[[Array], float]:
     """Return the L2(Omega) norm of owned unknowns (displacement and scaled potential)."""
-    trial, test = ufl.TrialFunction(problem.space), ufl.TestFunction(problem.space)
-    mass = assemble_matrix(fem.form(ufl.inner(trial, test) * problem.domain.dx))
+    trial, test = ufl.TrialFunction(body.space), ufl.TestFunction(body.space)
+    mass = assemble_matrix(fem.form(ufl.inner(trial, test) * body.domain.dx))
     mass.assemble()
     vector, image = mass.createVecs()
 
@@ -33,3 +38,60 @@ def domain_norm(problem: ContactProblem) -> Callable[[Array], float]:
         return float(np.sqrt(max(vector.dot(image), 0.0)))
 
     return norm
+
+
+@dataclass(frozen=True)
+class Errors:
+    """Norms of the difference between two displacements.
+
+    Attributes
+    ----------
+    l2, h1
+        Norm in L2(Omega), and |grad(.)| in L2(Omega).
+    energy
+        sqrt(B(u; e, e)) with the secant form of the finer solution u: the norm in which Cea's
+        lemma holds for a linear material.
+    """
+
+    l2: float
+    h1: float
+    energy: float
+
+    def __truediv__(self, other: Errors) -> Errors:
+        """Return relative errors."""
+        return Errors(self.l2 / other.l2, self.h1 / other.h1, self.energy / other.energy)
+
+
+def errors(
+    body: BodyEquilibrium,
+    x: Array,
+    other: fem.Function | Callable[[ufl.SpatialCoordinate], Expr] | None,
+) -> Errors:
+    """Return the norms of the displacement's distance to another one. Collective.
+
+    Parameters
+    ----------
+    body, x
+        The body on the finer mesh, and its unknowns: the solution.
+    other
+        A function in `body.space`, or the displacement as a UFL vector of the coordinates; None
+        for the norms of the solution itself.
+    """
+    solution = body.function(x)
+    u, _ = body.split(solution)
+    if isinstance(other, fem.Function):
+        e = body.split(solution - other)[0]
+    elif other is None:
+        e = u
+    else:
+        e = u - other(ufl.SpatialCoordinate(body.domain.mesh))
+    law = law_with_constants(body.body.law, body.domain.mesh)
+    squares = (
+        ufl.inner(e, e),
+        ufl.inner(ufl.grad(e), ufl.grad(e)),
+        secant_form(law, u, e, e),
+    )
+    dx = body.domain.dx(metadata={"quadrature_degree": 2 * body.degree + 4})
+    integrals = [fem.assemble_scalar(fem.form(square * dx)) for square in squares]
+    totals = body.comm.allreduce(np.array(integrals), op=MPI.SUM)
+    return Errors(*(float(np.sqrt(max(total, 0.0))) for total in totals))

@@ -12,9 +12,7 @@ def describe(case: Case, problem: ContactProblem) -> str:
     """Return the text. Collective; the same on all ranks."""
     domain, comm = problem.domain, problem.comm
     cells = domain.mesh.topology.index_map(domain.dim).size_global
-    dofmap = problem.space.dofmap
-    dofs = dofmap.index_map.size_global * dofmap.index_map_bs
-    contact_nodes = comm.allreduce(problem.trace.nodes.size)
+    layout = problem.equilibrium.layout
     counts = {name: comm.allreduce(domain.facets(name).size) for name in sorted(domain.parts)}
     width = max(len(name) for name in counts)
     library = environment.blas()
@@ -24,7 +22,8 @@ def describe(case: Case, problem: ContactProblem) -> str:
         f"{domain.size:g}",
         "# parts of its boundary, with their facets:",
         *(f"#   {name:{width}}  {count}" for name, count in counts.items()),
-        f"# unknowns: {dofs} ({problem.block_size} a node), contact nodes: {contact_nodes}",
+        f"# unknowns: {layout.unknowns} ({layout.block_size} a node), contact nodes: "
+        f"{problem.nodes.size}",
         f"# blas: {library.name} {library.path}".rstrip(),
         "# versions: " + ", ".join(f"{k} {v}" for k, v in environment.versions().items()),
     ]

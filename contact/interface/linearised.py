@@ -14,13 +14,10 @@ import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
 
-from contact.problem.problem import ContactProblem
-from contact.problem.state import Multipliers, total_pressure
+from contact.interface.interface import Interface
+from contact.interface.multipliers import Multipliers
+from contact.interface.status import CLOSED, SLIDES, STICKS
 from contact.typing import Array
-
-#: What a contact node does: a friction state, plus CLOSED where it touches. A smoothed
-#: pressure and Tresca's law bound the friction of open nodes too.
-FREE, SLIDES, STICKS, CLOSED = 0, 1, 2, 4
 
 #: Part of a node's own stiffness that a falling friction coefficient may take away, and how much
 #: more in each further step in which no node changes its status.
@@ -68,26 +65,8 @@ class LinearisedContact:
     settled: bool
 
 
-def touching(problem: ContactProblem, nodal: Array, pressure: Array, c: float) -> NDArray[np.bool_]:
-    """Tell which nodes the rigid part presses, p + c (u_nu - rho) > 0, shape (n,)."""
-    trace = problem.trace
-    return np.asarray(pressure + c * (trace.normal_component(nodal) - trace.gap) > 0)
-
-
-def node_status(
-    problem: ContactProblem, nodal: Array, forces: Multipliers, bound: Array, c: float
-) -> NDArray[np.int8]:
-    """Return the states of the nodes at nodal unknowns, contact forces and bounds."""
-    closed = touching(problem, nodal, forces.pressure, c)
-    tangential = problem.trace.tangential_component(nodal)
-    size = np.linalg.norm(forces.friction + c * tangential, axis=1)
-    state = np.where(size <= bound, STICKS, SLIDES)
-    state[(bound <= 0) & ~closed] = FREE
-    return (state * problem.frictional + CLOSED * closed).astype(np.int8)
-
-
 def linearise(
-    problem: ContactProblem,
+    interface: Interface,
     nodal: Array,
     forces: Multipliers,
     moduli: Moduli,
@@ -99,8 +78,8 @@ def linearise(
 
     Parameters
     ----------
-    problem, nodal, forces
-        The problem, its iterate at the contact nodes and the contact forces.
+    interface, nodal, forces
+        The contact nodes with their laws, the unknowns there, and the contact forces.
     moduli
         Stiffnesses.
     before
@@ -110,42 +89,40 @@ def linearise(
     softening
         Part of a node's own stiffness that a falling friction coefficient may take away.
     """
-    trace, d, c = problem.trace, problem.dim, moduli.status
-    p, lam, n = forces.pressure, forces.friction, trace.normal
-    opening = trace.normal_component(nodal) - trace.gap
-    slip = trace.tangential_component(nodal)
+    jump, frictional, c = interface.jump, interface.friction.acts, moduli.status
+    p, lam, n, d = forces.pressure, forces.friction, jump.normal, jump.dim
+    opening, slip = interface.opening(nodal), jump.tangential_component(nodal)
     length = np.linalg.norm(slip, axis=1)
-    total = total_pressure(problem, nodal, forces)
-    bound = problem.friction_bound(total, length) if frozen_bound is None else frozen_bound
-    bound = np.asarray(bound, dtype=float)
+    total = interface.pressure(nodal, forces)
+    bound = interface.friction.bound(total, length) if frozen_bound is None else frozen_bound
     trial = lam + c * slip
     size = np.linalg.norm(trial, axis=1)
 
     if before is None:
-        touches = opening >= -1e-12 * problem.domain.size
-        status = touches.astype(np.int8) * (CLOSED + STICKS * problem.frictional)
+        touches = opening >= -1e-12 * interface.size
+        status = touches.astype(np.int8) * (CLOSED + STICKS * frictional)
     else:
-        status = node_status(problem, nodal, forces, bound, c)
+        status = interface.status(nodal, forces, bound, c)
         # Friction that pushes a sliding node along: it has to stop before it can turn back.
         pushed = (before & SLIDES > 0) & (np.einsum("ni,ni->n", lam, slip) < 0)
         status[pushed & (status & SLIDES > 0)] ^= SLIDES | STICKS
     closed, sticks, slides = (status & flag > 0 for flag in (CLOSED, STICKS, SLIDES))
     changed = before is None or not np.array_equal(status, before)
-    settled = problem.comm.allreduce(int(changed), op=MPI.SUM) == 0
+    settled = interface.comm.allreduce(int(changed), op=MPI.SUM) == 0
     if frozen_bound is None and not settled and before is not None:
-        bound = np.where(slides, _foreseen_bound(problem, total, length, size, moduli), bound)
+        bound = np.where(slides, _foreseen_bound(interface, total, length, size, moduli), bound)
 
     pressure = np.where(closed, p + moduli.gamma * opening, 0.0)
-    blocks = np.zeros((p.size, trace.block_size, trace.block_size))
+    blocks = np.zeros((p.size, jump.block_size, jump.block_size))
     slope = np.where(closed, moduli.gamma, 0.0)[:, None] * n
     blocks[:, :d, :d] = n[:, :, None] * slope[:, None, :]
     friction = np.zeros_like(lam)
-    if problem.frictional:
+    if frictional:
         friction[sticks] = (lam + moduli.gamma * slip)[sticks]
-        blocks[sticks, :d, :d] += moduli.gamma * trace.tangent[sticks]
+        blocks[sticks, :d, :d] += moduli.gamma * jump.tangent[sticks]
 
         along = trial / np.maximum(size, 1e-300)[:, None]
-        across = trace.tangent - along[:, :, None] * along[:, None, :]
+        across = jump.tangent - along[:, :, None] * along[:, None, :]
         # Across z = lambda + c u_tau the new multiplier is s/|u_tau| times the new slip:
         # lambda = s z/|z|, linearised in u and lambda and solved for the latter.
         turning = np.minimum(bound * c / np.maximum(size - bound, 1e-300), moduli.gamma)
@@ -153,9 +130,9 @@ def linearise(
         friction[slides] = (bound[:, None] * along + np.einsum("nij,nj->ni", sliding, slip))[slides]
         if frozen_bound is None:
             limit = softening * moduli.nodal if settled else None
-            rate = _bound_gradient(problem, total, slip, length, limit)
+            rate = _bound_gradient(interface, total, slip, length, limit)
             ahead, follows = _follow_pressure(
-                problem, nodal, length, slope, opening, moduli, closed
+                interface, nodal, length, slope, opening, moduli, closed
             )
             friction[slides] += (ahead[:, None] * along)[slides]
             rate = rate + follows
@@ -165,41 +142,41 @@ def linearise(
 
 
 def _foreseen_bound(
-    problem: ContactProblem, total: Array, length: Array, size: Array, moduli: Moduli
+    interface: Interface, total: Array, length: Array, size: Array, moduli: Moduli
 ) -> Array:
     """Return the bound that a node which lets go will slide on, shape (n,).
 
     Its coefficient falls on the way: foreseen, this saves steps for each node that the sliding
     zone gains. With neighbours that slide along it is about half as stiff as alone.
     """
-    bound = np.asarray(problem.friction_bound(total, length), dtype=float)
+    bound = interface.friction.bound(total, length)
     for _ in range(5):
         ahead = np.maximum(length, (size - bound) / (0.5 * moduli.nodal))
-        bound = np.asarray(problem.friction_bound(total, ahead), dtype=float)
+        bound = interface.friction.bound(total, ahead)
     return bound
 
 
 def _bound_gradient(
-    problem: ContactProblem, total: Array, slip: Array, length: Array, limit: float | None
+    interface: Interface, total: Array, slip: Array, length: Array, limit: float | None
 ) -> Array:
     """Return the derivative of mu(|u_tau|) R p by the slip, shape (n, block size).
 
     Taken only when the sliding zone has settled, and limited: where friction falls faster
     than the node's own stiffness, the linearised node would snap.
     """
-    gradient = np.zeros((length.size, problem.block_size))
-    coefficient = problem.friction.coefficient
+    gradient = np.zeros((length.size, interface.jump.block_size))
+    coefficient = interface.friction.coefficient
     if coefficient is None or limit is None:
         return gradient
-    smooth = np.maximum(problem.smoothing(total), 0.0)
+    smooth = interface.friction.smooth(total)
     fall = np.maximum(coefficient.derivative(length) * smooth, -limit)
     direction = slip / np.maximum(length, 1e-300)[:, None]
-    gradient[:, : problem.dim] = fall[:, None] * direction
+    gradient[:, : interface.dim] = fall[:, None] * direction
     return gradient
 
 
 def _follow_pressure(
-    problem: ContactProblem,
+    interface: Interface,
     nodal: Array,
     length: Array,
     slope: Array,
@@ -212,11 +189,11 @@ def _follow_pressure(
     A smoothed pressure (R other than the identity) couples all nodes within the radius and
     would fill the matrix: it is lagged.
     """
-    coefficient = problem.friction.coefficient
-    gradient = np.zeros((length.size, problem.block_size))
-    if coefficient is None or problem.friction.radius > 0:
+    coefficient = interface.friction.coefficient
+    gradient = np.zeros((length.size, interface.jump.block_size))
+    if coefficient is None or not interface.friction.local:
         return np.zeros_like(length), gradient
     mu = coefficient(length)
-    gradient[:, : problem.dim] = mu[:, None] * slope
-    gradient += mu[:, None] * problem.response.layer_gradient(nodal)
+    gradient[:, : interface.dim] = mu[:, None] * slope
+    gradient += mu[:, None] * interface.response.layer_gradient(nodal)
     return np.where(closed, mu * moduli.gamma * opening, 0.0), gradient

@@ -11,8 +11,31 @@ import numpy as np
 from contact.typing import Array
 
 
-class Foundation(Protocol):
-    """A rigid obstacle, seen from the contact nodes."""
+class Obstacle(Protocol):
+    """A rigid obstacle, seen from the contact nodes.
+
+    A new shape is a class with these four.
+    """
+
+    @property
+    def direction(self) -> str:
+        """Whose normal the contact direction is: "foundation" or "body"."""
+
+    @property
+    def is_shape(self) -> bool:
+        """Whether the gaps are those of a body in space, which the mesh must not cut at rest.
+
+        Gaps that are given as such are what was asked for.
+        """
+
+    def chord_depth(self, length: float) -> float:
+        """Return how deep straight facets reach into the obstacle that their corners touch.
+
+        Parameters
+        ----------
+        length
+            Longest edge of the facets.
+        """
 
     def measure(self, points: Array, body_normal: Array) -> tuple[Array, Array]:
         """Return the contact direction, shape (n, d), and the gap along it, shape (n,).
@@ -38,6 +61,13 @@ class GapFunction:
 
     gap: Callable[[Array], Array]
 
+    direction = "body"
+    is_shape = False
+
+    def chord_depth(self, length: float) -> float:
+        """Return 0: given gaps are not those of a shape."""
+        return 0.0
+
     def measure(self, points: Array, body_normal: Array) -> tuple[Array, Array]:
         """Return the body's normals and the gap at the points."""
         return body_normal, np.broadcast_to(self.gap(points), points.shape[:1]).astype(float)
@@ -58,6 +88,12 @@ class Plane:
     point: tuple[float, ...]
     normal: tuple[float, ...]
     direction: str = "foundation"
+
+    is_shape = True
+
+    def chord_depth(self, length: float) -> float:
+        """Return 0: chords of a plane lie in it."""
+        return 0.0
 
     def measure(self, points: Array, body_normal: Array) -> tuple[Array, Array]:
         """Return contact directions and gaps."""
@@ -88,13 +124,15 @@ class Sphere:
     inside: bool = False
     direction: str = "foundation"
 
+    is_shape = True
+
     def measure(self, points: Array, body_normal: Array) -> tuple[Array, Array]:
         """Return contact directions and gaps."""
         offset = points - np.asarray(self.centre)
         distance = np.linalg.norm(offset, axis=1)
         outward = 1.0 if self.inside else -1.0
         if self.direction == "foundation":
-            # The centre itself has none: NaN, which `build_trace` refuses on all ranks together.
+            # The centre itself has none: NaN, which `find_nodes` refuses on all ranks together.
             known = distance > 1e-12 * self.radius
             radial = offset / np.where(known, distance, np.nan)[:, None]
             return outward * radial, outward * (self.radius - distance)
@@ -120,7 +158,9 @@ class Sphere:
         # longer than its radius do not represent it.
         dim = len(self.centre)
         sine = min(length / self.radius * np.sqrt((dim - 1) / (2 * dim)), 0.5)
-        return float(self.radius * sine**2 / (1 + np.sqrt(1 - sine**2)))
+        depth = self.radius * sine**2 / (1 + np.sqrt(1 - sine**2))
+        # The contact direction may be the body's, a little aside.
+        return float(1.1 * depth)
 
 
 def _along_ray(distance: Array, cosine: Array) -> Array:

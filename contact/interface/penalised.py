@@ -12,8 +12,8 @@ from typing import Protocol
 
 import numpy as np
 
-from contact.problem.problem import ContactProblem
-from contact.problem.state import Multipliers, bound_of, slip_of
+from contact.interface.interface import Interface
+from contact.interface.multipliers import Multipliers
 from contact.typing import Array
 from forms.foundation import penalty_friction_modulus, penalty_pressure
 
@@ -34,9 +34,9 @@ class Regularisation:
     slip: float
 
 
-def penalised_forces(problem: ContactProblem, nodal: Array, eps: Regularisation) -> Multipliers:
+def penalised_forces(interface: Interface, nodal: Array, eps: Regularisation) -> Multipliers:
     """Return the contact forces of (4.3) at nodal unknowns of shape (n, bs). Collective."""
-    return Implicit(problem, eps).forces(nodal)
+    return Implicit(interface, eps).forces(nodal)
 
 
 class NodalLaw(Protocol):
@@ -49,12 +49,12 @@ class NodalLaw(Protocol):
         """Return their derivative, shape (n, d, d). Collective."""
 
 
-def _pressure(problem: ContactProblem, nodal: Array, eps: Regularisation) -> tuple[Array, Array]:
+def _pressure(interface: Interface, nodal: Array, eps: Regularisation) -> tuple[Array, Array]:
     """Return the penalty pressure and its derivative in u_nu: 1/eps also at first touch."""
-    trace = problem.trace
-    normal = trace.normal_component(nodal)
-    pressure = penalty_pressure(normal, trace.gap, eps.contact)
-    return pressure, (normal >= trace.gap) / eps.contact
+    jump = interface.jump
+    normal = jump.normal_component(nodal)
+    pressure = penalty_pressure(normal, jump.gap, eps.contact)
+    return pressure, (normal >= jump.gap) / eps.contact
 
 
 def outer(a: Array, b: Array) -> Array:
@@ -67,33 +67,33 @@ class Lagged:
 
     Parameters
     ----------
-    problem
-        The contact problem.
+    interface
+        The contact nodes with their laws.
     eps
         Parameters of the laws.
     iterate
         Nodal unknowns at which the modulus is taken, shape (n, block size).
     """
 
-    def __init__(self, problem: ContactProblem, eps: Regularisation, iterate: Array) -> None:
-        self._problem, self._eps = problem, eps
-        pressure, _ = _pressure(problem, iterate, eps)
-        forces = Multipliers(pressure, np.zeros((iterate.shape[0], problem.dim)))
-        bound = bound_of(problem, iterate, forces)
-        self._modulus = penalty_friction_modulus(bound, slip_of(problem, iterate), eps.slip)
+    def __init__(self, interface: Interface, eps: Regularisation, iterate: Array) -> None:
+        self._interface, self._eps = interface, eps
+        pressure, _ = _pressure(interface, iterate, eps)
+        forces = Multipliers(pressure, np.zeros((iterate.shape[0], interface.dim)))
+        bound = interface.bound(iterate, forces)
+        self._modulus = penalty_friction_modulus(bound, interface.slip(iterate), eps.slip)
 
     def forces(self, nodal: Array) -> Multipliers:
         """Return the forces."""
-        pressure, _ = _pressure(self._problem, nodal, self._eps)
-        tangential = self._problem.trace.tangential_component(nodal)
+        pressure, _ = _pressure(self._interface, nodal, self._eps)
+        tangential = self._interface.jump.tangential_component(nodal)
         return Multipliers(pressure, self._modulus[:, None] * tangential)
 
     def block(self, nodal: Array) -> Array:
         """Return the derivative: only the active set of the normal part depends on `nodal`."""
-        trace = self._problem.trace
-        _, slope = _pressure(self._problem, nodal, self._eps)
-        normal = slope[:, None, None] * outer(trace.normal, trace.normal)
-        return normal + self._modulus[:, None, None] * trace.tangent
+        jump = self._interface.jump
+        _, slope = _pressure(self._interface, nodal, self._eps)
+        normal = slope[:, None, None] * outer(jump.normal, jump.normal)
+        return normal + self._modulus[:, None, None] * jump.tangent
 
 
 class Implicit:
@@ -103,40 +103,41 @@ class Implicit:
     would couple the nodes.
     """
 
-    def __init__(self, problem: ContactProblem, eps: Regularisation) -> None:
-        self._problem, self._eps = problem, eps
+    def __init__(self, interface: Interface, eps: Regularisation) -> None:
+        self._interface, self._eps = interface, eps
 
     def forces(self, nodal: Array) -> Multipliers:
         """Return the forces. Collective."""
-        problem = self._problem
-        pressure, _ = _pressure(problem, nodal, self._eps)
-        tangential = problem.trace.tangential_component(nodal)
+        interface = self._interface
+        pressure, _ = _pressure(interface, nodal, self._eps)
+        tangential = interface.jump.tangential_component(nodal)
         forces = Multipliers(pressure, np.zeros_like(tangential))
-        slip = slip_of(problem, nodal)
-        modulus = penalty_friction_modulus(bound_of(problem, nodal, forces), slip, self._eps.slip)
+        slip = interface.slip(nodal)
+        modulus = penalty_friction_modulus(interface.bound(nodal, forces), slip, self._eps.slip)
         return Multipliers(pressure, modulus[:, None] * tangential)
 
     def block(self, nodal: Array) -> Array:
         """Return the derivative. Collective."""
-        problem, trace, eps = self._problem, self._problem.trace, self._eps.slip
-        pressure, slope = _pressure(problem, nodal, self._eps)
-        forces = Multipliers(pressure, np.zeros((nodal.shape[0], problem.dim)))
-        bound = bound_of(problem, nodal, forces)
-        slip = slip_of(problem, nodal)
+        interface, eps = self._interface, self._eps.slip
+        jump = interface.jump
+        pressure, slope = _pressure(interface, nodal, self._eps)
+        forces = Multipliers(pressure, np.zeros((nodal.shape[0], interface.dim)))
+        bound = interface.bound(nodal, forces)
+        slip = interface.slip(nodal)
         modulus = penalty_friction_modulus(bound, slip, eps)
         # Unit vectors of the slip; zero where there is none, as are the terms with it.
-        tangential = trace.tangential_component(nodal)
+        tangential = jump.tangential_component(nodal)
         unit = tangential / np.where(slip > 0, slip, 1.0)[:, None]
         along = -modulus * slip / (slip + eps)
         across = np.zeros_like(slip)
-        coefficient = problem.friction.coefficient
-        if problem.tresca is None and coefficient is not None:
+        coefficient = interface.friction.coefficient
+        if interface.friction.tresca is None and coefficient is not None:
             at_rest = np.asarray(coefficient(slip))
             ratio = np.divide(bound, at_rest, out=np.zeros_like(bound), where=at_rest > 0)
             along += np.asarray(coefficient.derivative(slip)) * ratio * slip / (slip + eps)
-            if problem.friction.radius == 0:
+            if interface.friction.local:
                 across = at_rest * slope * slip / (slip + eps)
-        block = slope[:, None, None] * outer(trace.normal, trace.normal)
-        block = block + modulus[:, None, None] * trace.tangent
+        block = slope[:, None, None] * outer(jump.normal, jump.normal)
+        block = block + modulus[:, None, None] * jump.tangent
         block = block + along[:, None, None] * outer(unit, unit)
-        return block + across[:, None, None] * outer(unit, trace.normal)
+        return block + across[:, None, None] * outer(unit, jump.normal)

@@ -6,7 +6,7 @@ import numpy as np
 from scipy import sparse
 from scipy.spatial import cKDTree
 
-from contact.interface.nodes import ContactTrace
+from contact.interface.nodes import ContactNodes
 from contact.typing import Array
 
 
@@ -18,32 +18,32 @@ class Smoothing:
 
     Parameters
     ----------
-    trace
+    nodes
         The contact nodes; those of other ranks within the radius are taken into account.
     radius
         The radius r >= 0 (length); 0 gives the identity.
     """
 
-    def __init__(self, trace: ContactTrace, radius: float) -> None:
-        self.trace, self.radius = trace, radius
+    def __init__(self, nodes: ContactNodes, radius: float) -> None:
+        self._nodes, self.radius = nodes, radius
         self._matrix: sparse.csr_array | None = None
         if radius > 0:
-            self._matrix = _mollifier(trace, radius)
+            self._matrix = _mollifier(nodes, radius)
 
     def __call__(self, values: Array) -> Array:
         """Return R applied to nodal values, shape (n,). Collective."""
         if self._matrix is None:
             return values
-        return self._matrix @ self.trace.gather(values)
+        return self._matrix @ self._nodes.gather(values)
 
 
-def _mollifier(trace: ContactTrace, radius: float) -> sparse.csr_array:
+def _mollifier(nodes: ContactNodes, radius: float) -> sparse.csr_array:
     """Return the rows of R that belong to the owned nodes."""
-    points, weight = trace.gather(trace.points), trace.gather(trace.weight)
-    shape = (trace.nodes.size, weight.size)
-    if trace.nodes.size == 0:
+    points, weight = nodes.gather(nodes.points), nodes.gather(nodes.weight)
+    shape = (nodes.nodes.size, weight.size)
+    if nodes.nodes.size == 0:
         return sparse.csr_array(shape)
-    pairs = cKDTree(trace.points).sparse_distance_matrix(
+    pairs = cKDTree(nodes.points).sparse_distance_matrix(
         cKDTree(points), radius * (1 - 1e-9), output_type="coo_matrix"
     )
     # exp(1 + ...) is omega up to the constant that the division below removes.

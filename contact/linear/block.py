@@ -16,15 +16,15 @@ import numpy as np
 from numpy.typing import NDArray
 from petsc4py import PETSc
 
-from contact.linear import multigrid as linear_amg
-from contact.problem.held import rigid_motions
-from contact.problem.problem import ContactProblem
+from contact.linear import multigrid
+from contact.linear.layout import Layout
+from contact.linear.rigid import rigid_motions
 
 #: Options of the displacement's block where the user gives none, under ``fieldsplit_u_``. The
 #: W-cycle keeps the counts flat at a small price: coarse levels have few unknowns.
 MECHANICAL = {
     "pc_type": "gamg",
-    **linear_amg.DEFAULTS,
+    **multigrid.DEFAULTS,
     "pc_mg_cycle_type": "w",
 }
 
@@ -51,14 +51,14 @@ class BlockPreconditioner:
     ksp
         The solver, which is set up for fieldsplit. Options under its prefix come first, for
         instance ``-contact_fieldsplit_phi_pc_type gamg``.
-    problem
-        A piezoelectric problem.
+    layout
+        Unknowns with a potential.
     symmetric
         Whether the operator is symmetric: MINRES, else GMRES.
     """
 
-    def __init__(self, ksp: PETSc.KSP, problem: ContactProblem, symmetric: bool) -> None:
-        self._problem = problem
+    def __init__(self, ksp: PETSc.KSP, layout: Layout, symmetric: bool) -> None:
+        self._layout = layout
         self._matrix: PETSc.Mat | None = None
         self._signs: PETSc.Vec | None = None
         ksp.setType("minres" if symmetric else "gmres")
@@ -67,8 +67,8 @@ class BlockPreconditioner:
         ksp.setTolerances(rtol=TOLERANCE, max_it=500)
         pc = ksp.getPC()
         pc.setType("fieldsplit")
-        mechanical, electric = _fields(problem)
-        mechanical.compose("nearnullspace", _rigid_motions(problem))
+        mechanical, electric = _fields(layout)
+        mechanical.compose("nearnullspace", rigid_motions(layout))
         pc.setFieldSplitIS(("u", mechanical), ("phi", electric))
         pc.setFieldSplitType(PETSc.PC.CompositeType.ADDITIVE)
         prefix = ksp.getOptionsPrefix() or ""
@@ -80,9 +80,9 @@ class BlockPreconditioner:
         """Return the matrix that preconditions an operator. Collective."""
         if self._matrix is None:
             self._matrix = operator.copy()
-            # Fixed unknowns have a unit diagonal, which stays positive.
-            sign = np.ones(self._problem.free.shape)
-            sign[self._problem.free[:, -1], -1] = -1.0
+            # The diagonal of fixed unknowns is positive, and stays so.
+            sign = np.ones(self._layout.free.shape)
+            sign[self._layout.free[:, -1], -1] = -1.0
             self._signs = operator.createVecLeft()
             self._signs.array[:] = sign.ravel()
         else:
@@ -98,30 +98,13 @@ def _default(prefix: str, values: dict[str, str]) -> None:
             options[name] = value
 
 
-def _fields(problem: ContactProblem) -> tuple[PETSc.IS, PETSc.IS]:
+def _fields(layout: Layout) -> tuple[PETSc.IS, PETSc.IS]:
     """Return the global numbers of the owned mechanical and electric unknowns."""
-    d, bs = problem.dim, problem.block_size
-    start, end = problem.space.dofmap.index_map.local_range
+    d, bs = layout.dim, layout.block_size
+    start, end = layout.index_map.local_range
     numbers: NDArray[np.integer] = np.arange(start * bs, end * bs, dtype=PETSc.IntType)
     nodes = numbers.reshape(-1, bs)
-    mechanical = PETSc.IS().createGeneral(nodes[:, :d].ravel(), problem.comm)
+    mechanical = PETSc.IS().createGeneral(nodes[:, :d].ravel(), layout.comm)
     mechanical.setBlockSize(d)
-    electric = PETSc.IS().createGeneral(nodes[:, d].copy(), problem.comm)
+    electric = PETSc.IS().createGeneral(nodes[:, d].copy(), layout.comm)
     return mechanical, electric
-
-
-def _rigid_motions(problem: ContactProblem) -> PETSc.NullSpace:
-    """Return the rigid motions of the displacement block, orthonormalised. Collective."""
-    d, index_map = problem.dim, problem.space.dofmap.index_map
-    points = problem.space.tabulate_dof_coordinates()[: index_map.size_local, :d]
-    motions = rigid_motions(points / problem.domain.size)
-    size = (index_map.size_local * d, index_map.size_global * d)
-    vectors: list[PETSc.Vec] = []
-    for k in range(motions.shape[2]):
-        vector = PETSc.Vec().createMPI(size, d, problem.comm)
-        vector.array[:] = motions[:, :, k].ravel()
-        for other in vectors:
-            vector.axpy(-vector.dot(other), other)
-        vector.normalize()
-        vectors.append(vector)
-    return PETSc.NullSpace().create(vectors=vectors, comm=problem.comm)

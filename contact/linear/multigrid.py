@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-import numpy as np
-from mpi4py import MPI
 from petsc4py import PETSc
 
 from contact._compat import keeps_inverted_blocks
-from contact.problem.held import rigid_motions
-from contact.problem.problem import ContactProblem
+from contact.linear.layout import Layout
 
 #: Unknowns from which an iterative solver pays, by dimension and whether the body is piezoelectric
 #: (seen in `make bench`).
@@ -37,36 +34,12 @@ DEFAULTS = {
 }
 
 
-def is_large(problem: ContactProblem) -> bool:
-    """Tell whether an iterative solver pays for a problem of this size."""
-    unknowns = problem.space.dofmap.index_map.size_global * problem.block_size
-    return unknowns >= LARGE[problem.dim, problem.piezoelectric]
+def is_large(layout: Layout) -> bool:
+    """Tell whether an iterative solver pays for a system of this size."""
+    return layout.unknowns >= LARGE[layout.dim, layout.coupled]
 
 
-def near_nullspace(problem: ContactProblem) -> PETSc.NullSpace:
-    """Return the rigid-body motions on the free unknowns, orthonormalised. Collective."""
-    d, bs = problem.dim, problem.block_size
-    index_map = problem.space.dofmap.index_map
-    points = problem.space.tabulate_dof_coordinates()[: index_map.size_local, :d]
-    # About one centre on all ranks: about different ones these would be no rigid motions.
-    total = problem.comm.allreduce(points.sum(axis=0), op=MPI.SUM)
-    motions = rigid_motions((points - total / index_map.size_global) / problem.domain.size)
-    vectors: list[PETSc.Vec] = []
-    for k in range(motions.shape[2]):
-        values = np.zeros((index_map.size_local, bs))
-        values[:, :d] = motions[:, :, k]
-        vector = PETSc.Vec().createMPI(
-            (index_map.size_local * bs, index_map.size_global * bs), bs, problem.comm
-        )
-        vector.array[:] = np.where(problem.free, values, 0.0).ravel()
-        for other in vectors:
-            vector.axpy(-vector.dot(other), other)
-        vector.normalize()
-        vectors.append(vector)
-    return PETSc.NullSpace().create(vectors=vectors, comm=problem.comm)
-
-
-def configure(ksp: PETSc.KSP, problem: ContactProblem, symmetric: bool) -> None:
+def configure(ksp: PETSc.KSP, symmetric: bool) -> None:
     """Set up CG (GMRES where friction makes the operator non-symmetric) with GAMG.
 
     Options given by the user under the solver's prefix come first.

@@ -1,6 +1,6 @@
 """A linear operator that is assembled and factorised once and then solves many times.
 
-The operator is a bulk form plus a small dense block at each contact node: the augmentation
+The operator is a bulk matrix plus a small dense block at each of some nodes: the augmentation
 r I of Algorithm 2, a compliant layer, a current, or Newton's linearised contact laws.
 """
 
@@ -9,18 +9,19 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
-from dolfinx import fem
-from dolfinx.fem.petsc import assemble_matrix, create_matrix
+from mpi4py import MPI
 from numpy.typing import NDArray
 from petsc4py import PETSc
 
 from contact.errors import InputError
-from contact.linear import multigrid as linear_amg
+from contact.linear import multigrid
 from contact.linear.block import BlockPreconditioner
+from contact.linear.layout import Layout
+from contact.linear.rigid import held_motions
 from contact.linear.stiff_nodes import TOUCH, StiffNodes
-from contact.problem.problem import ContactProblem
 from contact.tolerances import HUGE
 from contact.typing import Array
 
@@ -38,7 +39,7 @@ def petsc_options(prefix: str) -> Iterator[None]:
         ) from error
 
 
-def check_overflow(problem: ContactProblem, operator: float, rhs: float) -> None:
+def check_overflow(layout: Layout, operator: float, rhs: float) -> None:
     """Refuse a linear system whose numbers overflow, given its norms.
 
     Raises
@@ -46,13 +47,27 @@ def check_overflow(problem: ContactProblem, operator: float, rhs: float) -> None
     InputError
         If they do.
     """
-    young = float(problem.body.law.young)
+    young = layout.stiffness
     if not (operator < HUGE and rhs < HUGE and rhs < HUGE * young):
         raise InputError(
             f"numbers overflow: Young's modulus is {young:.3g}, the linear operator of the "
             f"size {operator:.3g}, its right-hand side {rhs:.3g}; accepted: constants, loads "
             "and prescribed values in units that bring them nearer to 1"
         )
+
+
+class Bulk(Protocol):
+    """What an operator needs of a body: matrices of its unknowns."""
+
+    @property
+    def layout(self) -> Layout:
+        """The unknowns."""
+
+    def create_matrix(self) -> PETSc.Mat:
+        """Return an empty matrix with the pattern of the body. Collective."""
+
+    def assemble(self, matrix: PETSc.Mat, kind: str, x: Array) -> None:
+        """Assemble the body's "secant" or "tangent" at local unknowns. Collective."""
 
 
 @dataclass
@@ -69,13 +84,27 @@ class Counters:
     contact_solves: int = 0
 
 
-class LinearOperator:
-    """Bulk operator plus nodal contact blocks, with one factorisation until either changes.
+class Operator(Protocol):
+    """Solves with a bulk matrix plus blocks at nodes, sparse or dense."""
+
+    symmetric: bool
+
+    def update(self, kind: str, x: Array, blocks: Array, *, constant: bool = False) -> None:
+        """Assemble and factorise; see `SparseOperator.update`. Collective."""
+
+    def solve(self, rhs: Array, rtol: float | None = None, guess: Array | None = None) -> Array:
+        """Solve for the owned unknowns; see `SparseOperator.solve`. Collective."""
+
+
+class SparseOperator:
+    """Bulk matrix plus nodal blocks, with one factorisation until either changes.
 
     Parameters
     ----------
-    problem
-        The problem whose secant or tangent form is assembled.
+    bulk
+        Assembles the matrices of the body.
+    nodes
+        Owned nodes that may have blocks, local numbers, shape (n,).
     symmetric
         Whether the blocks are symmetric too: LDL^T instead of LU.
     prefix
@@ -88,32 +117,33 @@ class LinearOperator:
 
     def __init__(
         self,
-        problem: ContactProblem,
+        bulk: Bulk,
+        nodes: NDArray[np.int32],
         *,
         symmetric: bool = True,
         prefix: str = "contact_",
         counters: Counters | None = None,
         kind: str = "auto",
     ) -> None:
-        self.problem = problem
+        self.bulk, self.layout, self._nodes = bulk, bulk.layout, nodes
         self.counters = counters or Counters()
         self.symmetric = symmetric
-        self.matrix = create_matrix(problem.secant)
-        self._form: fem.Form | None = None
+        self.matrix = bulk.create_matrix()
+        self._kind = ""
         self._blocks: Array | None = None
         self._bulk: PETSc.Mat | None = None
         self._rhs, self._solution = self.matrix.createVecs()
-        self.ksp = PETSc.KSP().create(problem.comm)
+        self.ksp = PETSc.KSP().create(self.layout.comm)
         self.ksp.setOptionsPrefix(prefix)
-        self.iterative = kind == "iterative" or (kind == "auto" and linear_amg.is_large(problem))
+        self.iterative = kind == "iterative" or (kind == "auto" and multigrid.is_large(self.layout))
         self._split: BlockPreconditioner | None = None
         self._stiff: StiffNodes | None = None
         self._prefix = prefix
-        if self.iterative and problem.piezoelectric:
-            self._split = BlockPreconditioner(self.ksp, problem, symmetric)
+        if self.iterative and self.layout.coupled:
+            self._split = BlockPreconditioner(self.ksp, self.layout, symmetric)
         elif self.iterative:
-            self.matrix.setNearNullSpace(linear_amg.near_nullspace(problem))
-            linear_amg.configure(self.ksp, problem, symmetric)
+            self.matrix.setNearNullSpace(held_motions(self.layout))
+            multigrid.configure(self.ksp, symmetric)
         else:
             self.ksp.setType("preonly")
             pc = self.ksp.getPC()
@@ -122,33 +152,30 @@ class LinearOperator:
         with petsc_options(prefix):
             self.ksp.setFromOptions()
 
-    def update(self, form: fem.Form, blocks: Array, *, constant: bool = False) -> None:
-        """Assemble the operator at the problem's iterate. Collective.
+    def update(self, kind: str, x: Array, blocks: Array, *, constant: bool = False) -> None:
+        """Assemble the operator at local unknowns. Collective.
 
         Parameters
         ----------
-        form
-            `problem.secant` or `problem.tangent`.
+        kind
+            "secant" or "tangent".
+        x
+            Where the body is linearised, local unknowns.
         blocks
-            Weighted nodal blocks, shape (n, block size, block size).
+            Weighted blocks at the nodes, shape (n, block size, block size).
         constant
-            Whether the bulk form has not changed since the last call with the same form:
+            Whether the bulk matrix has not changed since the last call with the same kind:
             nothing is done when the blocks are the same too.
         """
-        nodes = self.problem.trace.nodes
-        if self.problem.held is not None:
-            held = self.problem.held.block(self.problem.unknowns)
-            nodes = np.concatenate([nodes, self.problem.held.nodes])
-            blocks = np.concatenate([blocks, held])
-        last, same = self._blocks, constant and form is self._form
+        nodes = self._nodes
+        last, same = self._blocks, constant and kind == self._kind
         if same and last is not None and self._all(np.array_equal(blocks, last)):
             return
         if same and self._bulk is not None:
             self._bulk.copy(self.matrix, PETSc.Mat.Structure.SAME_NONZERO_PATTERN)
         else:
-            self.matrix.zeroEntries()
-            assemble_matrix(self.matrix, form, bcs=self.problem.bcs)
-            self.matrix.assemble()
+            self.bulk.assemble(self.matrix, kind, x)
+            balance(self.matrix, self.layout)
             if constant:
                 self._bulk = self.matrix.copy()
         rest = self._masked(nodes, blocks)
@@ -162,7 +189,7 @@ class LinearOperator:
         if self._stiff is not None:
             self._stiff.follow(self.matrix, self._masked(nodes, blocks))
         self._set_up(self.symmetric)
-        self._form, self._blocks = form, blocks.copy()
+        self._kind, self._blocks = kind, blocks.copy()
         self.counters.factorizations += 1
 
     @property
@@ -171,7 +198,7 @@ class LinearOperator:
         return self._split is None and self.ksp.getPC().getType() == "gamg"
 
     def _all(self, flag: bool) -> bool:
-        return bool(self.problem.comm.allreduce(int(flag)) == self.problem.comm.size)
+        return bool(self.layout.comm.allreduce(int(flag)) == self.layout.comm.size)
 
     def _set_up(self, symmetric: bool) -> None:
         """Set up the solver for the matrix as it is."""
@@ -183,7 +210,7 @@ class LinearOperator:
 
     def _masked(self, at: NDArray[np.int32], blocks: Array) -> Array:
         """Return blocks at nodes, zero where an unknown is fixed."""
-        free = self.problem.free[at].astype(float)
+        free = self.layout.free[at].astype(float)
         return blocks * free[:, :, None] * free[:, None, :]
 
     def _add(self, at: NDArray[np.int32], blocks: Array) -> None:
@@ -214,7 +241,7 @@ class LinearOperator:
         InputError
             If the operator is singular, for the body is not held, or its numbers overflow.
         """
-        self._rhs.array[:] = np.where(self.problem.free.ravel(), rhs, 0.0)
+        self._rhs.array[:] = self.layout.mask(rhs)
         if rtol is not None:
             self.ksp.setTolerances(rtol=rtol)
         if self.iterative:
@@ -238,7 +265,7 @@ class LinearOperator:
 
     def _fault(self) -> InputError:
         """Say why there is no solution. Collective."""
-        check_overflow(self.problem, self.matrix.norm(), self._rhs.norm())
+        check_overflow(self.layout, self.matrix.norm(), self._rhs.norm())
         if self.ksp.getPC().getFailedReason() == PETSc.PC.FailedReason.FACTOR_OUTMEMORY:
             return InputError(
                 "the factorisation needs more memory than it was given; accepted: a smaller mesh, "
@@ -249,3 +276,17 @@ class LinearOperator:
             "the linear system is singular: the body can move freely; fix enough "
             "displacement components (or, for a piezoelectric body, a potential)"
         )
+
+
+def balance(matrix: PETSc.Mat, layout: Layout) -> None:
+    """Put the size of the matrix's own diagonal at fixed unknowns, in place of ones. Collective.
+
+    Against a modulus of 1e12 ones are nothing, and multigrid takes them for a body that is not
+    held; against 1e-12 they are all that it sees.
+    """
+    diagonal, free = matrix.getDiagonal(), layout.free.ravel()
+    sizes = np.array([np.abs(diagonal.array[free]).sum(), np.count_nonzero(free)])
+    layout.comm.Allreduce(MPI.IN_PLACE, sizes, op=MPI.SUM)
+    if sizes[0] > 0 and np.isfinite(sizes[0]):
+        diagonal.array[~free] = sizes[0] / sizes[1]
+        matrix.setDiagonal(diagonal)

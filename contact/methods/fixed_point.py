@@ -10,7 +10,7 @@ and piezoelectric bodies, rigid and compliant foundations differ in what there i
 - Algorithm 8, Problem (PV1): as Algorithm 6 without friction and current.
 
 All four are `FixedPoint.solve` with `_step`, `_base_residual` and `_update_bound`; their inner
-Algorithms 2, 5, 7 and 9 are `uzawa.block_relaxation`. What differs is `ContactProblem.response`.
+Algorithms 2, 5, 7 and 9 are `uzawa.block_relaxation`. What differs is `Interface.response`.
 """
 
 from __future__ import annotations
@@ -21,11 +21,13 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from contact.body.equilibrium import BodyEquilibrium
 from contact.body.norms import domain_norm
-from contact.linear.operator import Counters
+from contact.linear.operator import Counters, Operator
 from contact.methods.following import Following
 from contact.methods.options import FixedPointOptions
 from contact.methods.report import History, Monitor, Outcome, Record
+from contact.methods.stagnation import Stagnation
 from contact.methods.uzawa import (
     Linearised,
     Relaxation,
@@ -34,16 +36,15 @@ from contact.methods.uzawa import (
     block_relaxation,
     split,
 )
-from contact.problem.condensed import operator
 from contact.problem.kkt import KKT, evaluate, residual_forces
-from contact.problem.problem import ContactProblem
-from contact.problem.state import Multipliers, bound_of, nodal_iterate, total_pressure
+from contact.problem.protocols import Problem
+from contact.problem.state import State
 from contact.tolerances import PRECISION
 from contact.typing import Array
 
 #: Outer iterations without progress after which the loop is given up, and how many where the
 #: block relaxation gets no further either.
-PATIENCE, PATIENCE_STALLED = 25, 3
+PATIENCE, PATIENCE_STALLED, PROGRESS = 25, 3, 0.9
 
 #: Residual below which frozen coefficients give way to their derivatives.
 NEAR = 1e-2
@@ -56,7 +57,7 @@ class FixedPoint:
     Parameters
     ----------
     problem
-        The contact problem; its iterate is the current one.
+        The contact problem.
     options
         Options of the loop.
     monitor
@@ -64,9 +65,14 @@ class FixedPoint:
     poll
         Called in every inner iteration, on all ranks, to stop the solve by an exception; that of
         the monitor by default.
+
+    Attributes
+    ----------
+    state
+        What the last outer iteration has left.
     """
 
-    problem: ContactProblem
+    problem: Problem
     options: FixedPointOptions
     monitor: Monitor | None = None
     counters: Counters = field(default_factory=Counters)
@@ -74,101 +80,126 @@ class FixedPoint:
 
     def __post_init__(self) -> None:
         """Choose r and set up the operator."""
-        self.r = self.options.r or automatic_r(self.problem)
-        self.operator = operator(self.problem, counters=self.counters, kind=self.options.linear)
+        options, body = self.options, self.problem.equilibrium
+        self.r = options.r or automatic_r(self.problem.scales)
+        self.operator = self._new_operator(symmetric=True)
         self.history = History(self.monitor)
-        self.forces = Multipliers.zero(self.problem)
-        thesis = self.options.stopping == "thesis"
-        inner = self.options.inner_tolerance or max(self.options.tolerance / 10, PRECISION)
+        self.state = self.problem.start()
+        thesis = options.stopping == "thesis"
+        inner = options.inner_tolerance or max(options.tolerance / 10, PRECISION)
         self._stalled = False
         self._following = Following(NEAR)
         self._relaxation = Relaxation(
             self.r,
             inner,
-            self.options.max_inner,
-            self.options.depth,
-            self.options.over_relaxation,
-            self.options.eps if thesis else None,
-            self.options.single_loop,
+            options.max_inner,
+            options.depth,
+            options.over_relaxation,
+            options.eps if thesis else None,
+            options.single_loop,
         )
-        self._norm = domain_norm(self.problem) if thesis else None
+        self._norm: Callable[[Array], float] | None = None
+        if thesis:
+            assert isinstance(body, BodyEquilibrium)  # the thesis's rules are those of the whole
+            self._norm = domain_norm(body)
 
-    def solve(self) -> Outcome:
-        """Iterate from zero displacement until convergence, stagnation or the limit. Collective."""
-        problem = self.problem
-        problem.reset()
-        n = problem.trace.nodes.size
-        # Iteration 0 is the pure contact problem that the thesis starts from. A bound that is
-        # updated in the block relaxation needs none.
-        first = 0 if problem.frictional and not self.options.single_loop else 1
-        return self._solve(np.zeros((n, 1 + problem.dim)), np.zeros(n), first)
+    def _new_operator(self, symmetric: bool) -> Operator:
+        return self.problem.equilibrium.operator(
+            self.problem.interface.coupled,
+            symmetric=symmetric,
+            counters=self.counters,
+            kind=self.options.linear,
+        )
 
-    def solve_from(self, forces: Multipliers) -> Outcome:
-        """Iterate from the problem's present iterate and given contact forces. Collective."""
-        problem, nodal = self.problem, nodal_iterate(self.problem)
-        self.forces = forces
-        pressure = forces.pressure
-        if problem.response.normal_law(nodal) is not None:
-            pressure = total_pressure(problem, nodal, forces)
-        z = np.column_stack([pressure, forces.friction])
-        z = z + self.r * split(problem, nodal, problem.frictional)
-        return self._solve(z, bound_of(problem, nodal, forces), 1)
+    def solve(self, start: State | None = None) -> tuple[State, Outcome]:
+        """Iterate until convergence, stagnation or the limit. Collective.
 
-    def _solve(self, z: Array, bound: Array, first: int) -> Outcome:
-        """Iterate from the iterate, a state of the relaxation and a friction bound."""
+        Parameters
+        ----------
+        start
+            Where from; from rest by default.
+        """
+        problem, interface = self.problem, self.problem.interface
+        jump, frictional = interface.jump, interface.friction.acts
+        if start is None:
+            self.state = problem.start()
+            z: Array = np.zeros((jump.gap.size, 1 + jump.normal.shape[1]))
+            # Iteration 0 is the pure contact problem that the thesis starts from. A bound that is
+            # updated in the block relaxation needs none.
+            first = 0 if frictional and not self.options.single_loop else 1
+            # The secant at rest: prescribed values strain the elements beside them alone.
+            return self._solve(z, np.zeros(jump.gap.size), first, problem.equilibrium.rest())
+        self.state, nodal = start, jump.apply(start.x)
+        pressure = start.forces.pressure
+        if interface.response.normal_law(nodal) is not None:
+            pressure = interface.pressure(nodal, start.forces)
+        z = np.column_stack([pressure, start.forces.friction])
+        z = z + self.r * split(jump, nodal, frictional)
+        return self._solve(z, interface.bound(nodal, start.forces), 1, start.x)
+
+    def _solve(self, z: Array, bound: Array, first: int, secant_at: Array) -> tuple[State, Outcome]:
+        """Iterate from a state of the relaxation, a friction bound and a secant modulus."""
         begin, problem, options = time.perf_counter(), self.problem, self.options
+        body, frictional = problem.equilibrium, problem.interface.friction.acts
         tangent = options.material_step == "tangent"
-        best, since = np.inf, 0
+        stagnation = Stagnation(PATIENCE, PROGRESS)
         for iteration in range(first, options.max_outer + 1):
-            friction = problem.frictional and iteration > 0
+            friction = frictional and iteration > 0
             if friction and first == 0 and iteration == 1:
                 # The slip without friction is a bad guess, and so is the contact that goes with it.
                 z = np.zeros_like(z)
-            previous = problem.unknowns[: problem.owned].copy()
+            previous = self.state
             # Newton's tangent of a zero strain is the secant, and cheaper.
-            inner, z = self._step(bound, z, friction, tangent and iteration > first)
-            residuals = evaluate(problem, self.forces)
+            kind = "tangent" if tangent and iteration > first else "secant"
+            inner, z = self._step(bound, z, friction, kind, secant_at)
+            secant_at = self.state.x
+            residuals = evaluate(problem, self.state)
             change, bound = self._update_bound(bound, iteration == 0)
-            note = "tangent" if tangent and iteration > first else ""
+            note = "tangent" if kind == "tangent" else ""
             self.history.add(
                 Record(iteration, inner, residuals, change, time.perf_counter() - begin, note)
             )
             if options.stopping == "thesis":
                 if iteration > first and self._thesis_criterion(change, previous):
-                    return self._outcome(residuals, "the thesis's criterion is met")
+                    return self._end(residuals, "the thesis's criterion is met")
             elif residuals.largest <= options.tolerance:
-                return self._outcome(residuals)
+                return self._end(residuals)
             if not np.isfinite(residuals.largest):
-                return self._outcome(residuals, "the iteration diverged")
-            if options.material_step == "auto" and not problem.linear_material:
+                return self._end(residuals, "the iteration diverged")
+            if options.material_step == "auto" and not body.linear:
                 # Far from the solution the tangent is too soft and overshoots.
-                tangent = residuals.largest < (NEAR if not tangent else 2 * best)
-            since = 0 if residuals.largest < 0.9 * best else since + 1
-            best = min(best, residuals.largest)
+                tangent = residuals.largest < (NEAR if not tangent else 2 * stagnation.best)
             patience = PATIENCE_STALLED if self._stalled else PATIENCE
-            if since >= patience and options.stopping == "residual":
-                return self._outcome(residuals, f"the residual stalled at {best:.2e}")
-        return self._outcome(residuals, f"not converged in {options.max_outer} outer iterations")
+            given_up = stagnation(residuals.largest, patience)
+            if given_up and options.stopping == "residual":
+                return self._end(residuals, f"the residual stalled at {stagnation.best:.2e}")
+        return self._end(residuals, f"not converged in {options.max_outer} outer iterations")
 
-    def _step(self, bound: Array, z: Array, friction: bool, tangent: bool) -> tuple[int, Array]:
-        """Freeze, solve the frozen problem, and move the iterate."""
-        problem = self.problem
-        form = problem.tangent if tangent else problem.secant
-        nodal = nodal_iterate(problem)
-        blocks = augmentation(problem, self.r, friction)
-        if problem.response.active:
-            pressure = total_pressure(problem, nodal, self.forces)
-            weight = problem.trace.weight[:, None, None]
-            blocks = blocks + weight * self._current_block(nodal, pressure)
-        self.operator.update(form, blocks, constant=problem.linear_material)
-        residual = self._base_residual(nodal)
-        law = problem.response.normal_law(nodal)
-        step = Linearised(self.operator, residual, nodal, bound, law, friction)
+    def _step(
+        self, bound: Array, z: Array, friction: bool, kind: str, secant_at: Array
+    ) -> tuple[int, Array]:
+        """Freeze, solve the frozen problem, and move the state."""
+        problem, interface, state = self.problem, self.problem.interface, self.state
+        body, nodal = problem.equilibrium, interface.jump.apply(state.x)
+        blocks = augmentation(interface.jump, self.r, friction)
+        if interface.response.active:
+            pressure = interface.pressure(nodal, state.forces)
+            blocks = blocks + self._current_block(nodal, pressure)
+        about = secant_at if kind == "secant" else state.x
+        self.operator.update(kind, about, interface.weighted(blocks, state.x), constant=body.linear)
+        step = Linearised(
+            self.operator,
+            self._base_residual(nodal, secant_at),
+            state.x[: body.owned],
+            nodal,
+            bound,
+            interface.response.normal_law(nodal),
+            friction,
+        )
         poll = self.poll or self.history.poll
-        result = block_relaxation(problem, step, z, self._relaxation, self._norm, poll)
+        result = block_relaxation(interface, step, z, self._relaxation, self._norm, poll)
         self._stalled = result.stalled
-        problem.add(result.increment)
-        self.forces = result.forces
+        self.state = State(body.moved(state.x, result.increment), result.forces, state.load)
         return result.iterations, result.z
 
     def _current_block(self, nodal: Array, pressure: Array) -> Array:
@@ -176,28 +207,27 @@ class FixedPoint:
 
         Frozen, a steep ramp costs many iterations there; followed from afar, it overshoots.
         """
-        response, records = self.problem.response, self.history.records
+        response, records = self.problem.interface.response, self.history.records
         residual = records[-1].kkt.largest if records else np.inf
         if not response.follows_gap or not self._following(residual):
             return response.current_block(nodal, pressure)
         if self.operator.symmetric:
-            self.operator = operator(
-                self.problem, symmetric=False, counters=self.counters, kind=self.options.linear
-            )
+            self.operator = self._new_operator(symmetric=False)
         return response.current_jacobian(nodal, pressure)
 
-    def _base_residual(self, nodal: Array) -> Array:
+    def _base_residual(self, nodal: Array, secant_at: Array) -> Array:
         """Return the residual without multipliers: they are the unknowns of the relaxation.
 
         So is the layer's pressure, unless it is lagged. The contact flag of the perfect
         conductor still looks at the last pressure.
         """
-        problem, trace = self.problem, self.problem.trace
-        residual = residual_forces(problem, self.forces)
-        unknown = self.forces.vectors(problem)
-        if problem.response.normal_law(nodal) is not None:
-            unknown += problem.response.layer_pressure(nodal)[:, None] * trace.normal
-        trace.add(residual, -trace.weight[:, None] * unknown)
+        interface, forces = self.problem.interface, self.state.forces
+        jump = interface.jump
+        residual = residual_forces(self.problem, self.state, secant_at)
+        unknown = forces.vectors(jump)
+        if interface.response.normal_law(nodal) is not None:
+            unknown += interface.response.layer_pressure(nodal)[:, None] * jump.normal
+        jump.transpose(-jump.weight[:, None] * unknown, residual)
         return residual
 
     def _update_bound(self, old: Array, start: bool) -> tuple[float, Array]:
@@ -205,26 +235,26 @@ class FixedPoint:
 
         After the frictionless start the bound is that of zero slip.
         """
-        problem, trace = self.problem, self.problem.trace
-        if not problem.frictional:
+        interface, forces = self.problem.interface, self.state.forces
+        if not interface.friction.acts:
             return np.nan, old
-        nodal = nodal_iterate(problem)
+        nodal = interface.jump.apply(self.state.x)
         if start:
-            nodal = np.zeros_like(nodal)
-            pressure = total_pressure(problem, nodal_iterate(problem), self.forces)
-            new = np.asarray(problem.friction_bound(pressure, np.zeros_like(pressure)))
+            pressure = interface.pressure(nodal, forces)
+            new = interface.friction.bound(pressure, np.zeros_like(pressure))
         else:
-            new = bound_of(problem, nodal, self.forces)
-        size = trace.norm(new)
-        return (trace.norm(new - old) / size if size > 0 else 0.0), new
+            new = interface.bound(nodal, forces)
+        size = interface.jump.norm(new)
+        return (interface.jump.norm(new - old) / size if size > 0 else 0.0), new
 
-    def _thesis_criterion(self, change: float, previous: Array) -> bool:
+    def _thesis_criterion(self, change: float, previous: State) -> bool:
         """Tell whether (3.46), or (6.40) without friction, is met."""
-        if self.problem.frictional:
+        if self.problem.interface.friction.acts:
             return change < self.options.eps_fp
         assert self._norm is not None
-        now = self.problem.unknowns[: self.problem.owned]
-        return self._norm(now - previous) < self.options.eps_fp * self._norm(now)
+        owned = self.problem.equilibrium.owned
+        now = self.state.x[:owned]
+        return self._norm(now - previous.x[:owned]) < self.options.eps_fp * self._norm(now)
 
-    def _outcome(self, residuals: KKT, ended: str = "") -> Outcome:
-        return Outcome(residuals, self.options.allowed, ended)
+    def _end(self, residuals: KKT, ended: str = "") -> tuple[State, Outcome]:
+        return self.state, Outcome(residuals, self.options.allowed, ended)

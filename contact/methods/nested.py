@@ -13,11 +13,12 @@ from contact.build import build_problem
 from contact.case.file import Case
 from contact.case.mesh import Mesh
 from contact.errors import InputError
+from contact.interface.multipliers import Multipliers
 from contact.interface.projections import project_half_line
 from contact.methods.newton import Newton
 from contact.methods.options import NewtonOptions
 from contact.problem.problem import ContactProblem
-from contact.problem.state import Multipliers
+from contact.problem.state import State
 from contact.typing import Array
 
 #: Tolerance on the coarser levels: their discretisation error is larger by far.
@@ -77,35 +78,33 @@ def _nodes(mesh: Mesh) -> float:
 
 def coarse_solution(
     case: Case, comm: MPI.Intracomm, **replacements: Any
-) -> tuple[ContactProblem, Multipliers]:
+) -> tuple[ContactProblem, State]:
     """Solve on all meshes but the finest, each from the one before. Collective."""
     options = NewtonOptions(
         tolerance=max(COARSE_TOLERANCE, case.solver.tolerance), linear=case.solver.linear
     )
-    last: tuple[ContactProblem, Multipliers] | None = None
+    last: tuple[ContactProblem, State] | None = None
     for level in coarser_cases(case, case.solver.nested_levels):
         problem = build_problem(level, comm, **replacements)
         method = Newton(problem, options)
-        if last is None:
-            method.solve()
-        else:
-            method.solve_from(prolong(*last, problem))
-        last = problem, method.forces
+        state, _ = method.solve(None if last is None else prolong(*last, problem))
+        last = problem, state
     assert last is not None
     return last
 
 
-def prolong(coarse: ContactProblem, forces: Multipliers, fine: ContactProblem) -> Multipliers:
-    """Put a coarse solution into a finer problem; return its contact forces. Collective."""
-    fine.x.x.array[:] = carry(coarse.x, fine.space).x.array
+def prolong(coarse: ContactProblem, state: State, fine: ContactProblem) -> State:
+    """Carry a state of a coarse problem to a finer one. Collective."""
+    body = fine.equilibrium
+    x = carry(coarse.equilibrium.function(state.x), body.space).x.array.copy()
     if coarse.piezoelectric:
-        potential = fine.x.x.array[coarse.dim :: coarse.block_size]
-        potential *= coarse.phi_scale / fine.phi_scale
-    fine.apply_load(1.0)
-    gathered = coarse.trace.gather(np.column_stack([forces.pressure, forces.friction]))
-    values = _interpolate(coarse.trace.gather(coarse.trace.points), gathered, fine.trace.points)
-    friction = np.einsum("nij,nj->ni", fine.trace.tangent, values[:, 1:])
-    return Multipliers(project_half_line(values[:, 0]), friction)
+        x[coarse.dim :: body.block_size] *= coarse.equilibrium.phi_scale / body.phi_scale
+    forces = np.column_stack([state.forces.pressure, state.forces.friction])
+    points = coarse.nodes.gather(coarse.nodes.points)
+    values = _interpolate(points, coarse.nodes.gather(forces), fine.nodes.points)
+    friction = np.einsum("nij,nj->ni", fine.nodes.tangent, values[:, 1:])
+    multipliers = Multipliers(project_half_line(values[:, 0]), friction)
+    return State(body.prescribe(x), multipliers)
 
 
 def _interpolate(points: Array, values: Array, at: Array) -> Array:

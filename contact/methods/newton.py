@@ -1,11 +1,8 @@
-"""Semismooth Newton: contact, friction, material and foundation in one loop.
+"""Newton's method, and the roads that are taken where it fails.
 
-The nodal multipliers are condensed onto the displacement, so that the linear systems keep
-the size and the pattern of the elastic ones. Where the contact nodes are few, the linearised
-body is condensed onto them in turn: the loop over contact and friction then takes place there,
-in small dense steps, and the one around it follows the material alone. Where a loop cycles,
-friction is frozen and updated outside (Algorithm 1 with Newton inside); where that fails too,
-the block relaxation takes over, and at last the load is applied in steps. The history says
+First the condensed body, where the contact nodes are few, then the whole one. Where a loop
+cycles, friction is frozen and updated outside (Algorithm 1 with Newton inside); where that fails
+too, the block relaxation takes over, and at last the load is applied in steps. The history says
 which.
 
 References
@@ -17,58 +14,45 @@ Hueeber, Stadler and Wohlmuth, SIAM J. Sci. Comput. 30 (2008).
 from __future__ import annotations
 
 import logging
-import time
-from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
-from contact.interface.linearised import (
-    MORE_SOFTENING,
-    Moduli,
-    linearise,
-    node_status,
-    touching,
-)
-from contact.linear.operator import Counters, LinearOperator
+from contact.interface.linearised import Moduli
+from contact.interface.multipliers import Multipliers
+from contact.interface.status import touching
+from contact.linear.operator import Counters
 from contact.methods.fixed_point import FixedPoint
-from contact.methods.following import Following
+from contact.methods.loop import UPDATE, NewtonLoop
+from contact.methods.material import SECANT_UNTIL, MaterialStep
 from contact.methods.options import FixedPointOptions, NewtonOptions
-from contact.methods.report import History, Monitor, Outcome, Quiet, Record
+from contact.methods.report import History, Monitor, Outcome, Record
+from contact.methods.step import Iterate, WholeStep
 from contact.methods.uzawa import automatic_r
-from contact.problem.condensed import (
-    Condensation,
-    CondensedProblem,
-    DenseOperator,
-    condensation,
-    operator,
-)
-from contact.problem.kkt import KKT, evaluate, interface_residuals, residual_forces
+from contact.problem.condensed import condensation
+from contact.problem.kkt import KKT, evaluate
 from contact.problem.problem import ContactProblem
-from contact.problem.state import Multipliers, bound_of, nodal_iterate, total_pressure
-from contact.typing import Array
+from contact.problem.protocols import Problem
+from contact.problem.scales import Scales
+from contact.problem.state import State
 
 logger = logging.getLogger("contact.solver")
-
-#: Residual from which on the foundation's conductivity is followed although nodes still change
-#: their status.
-NEAR = 0.05
-
-#: How much more accurately than the material is linearised the contact problem is solved.
-CONTACT_PART = 1e-3
-
-#: Equilibrium residual below which the tangent replaces the secant of a condensed body.
-CONDENSED_SECANT_UNTIL = 0.3
 
 #: What the history says of the slower methods.
 SLOWER = FROZEN_FRICTION, BLOCK_RELAXATION = "frozen friction", "block relaxation"
 
-#: Why Newton's method with a frozen friction bound ends.
-UPDATE = "friction bound to be updated"
+#: Updates of a frozen friction bound, and what the first of its problems is solved to.
+MOST_UPDATES, FIRST_GOAL = 40, 1e-2
 
-#: Iterate, contact forces, status and layer pressure.
-_State = tuple[Array, Multipliers, NDArray[np.int8] | None, Array | None]
+#: Part of the load in the first of the load steps, and the least one that is tried.
+FIRST_STEP, LEAST_STEP = 0.25, 1e-2
+
+
+def moduli_of(scales: Scales, gamma: float) -> Moduli:
+    """Return stiffnesses of the linearised laws that fit a body and its mesh."""
+    middle = automatic_r(scales)
+    nodal = middle**2 / scales.young
+    return Moduli(middle, nodal, gamma * max(middle, nodal))
 
 
 @dataclass
@@ -78,119 +62,139 @@ class Newton:
     Parameters
     ----------
     problem
-        The contact problem; its iterate is the current one.
+        The contact problem.
     options
         Options of the method.
     monitor
         Told of every step.
-    given
+    moduli
         Stiffnesses of the linearised laws; chosen from those of the body by default.
     """
 
-    problem: ContactProblem
+    problem: Problem
     options: NewtonOptions = field(default_factory=NewtonOptions)
     monitor: Monitor | None = None
     counters: Counters = field(default_factory=Counters)
-    given: Moduli | None = None
+    moduli: Moduli | None = None
+    history: History = field(init=False)
 
     def __post_init__(self) -> None:
         """Choose the moduli, and condense the body where that pays."""
-        self.moduli = self.given or self._moduli()
+        problem, options = self.problem, self.options
         self.history = History(self.monitor)
-        self.forces = Multipliers.zero(self.problem)
-        self._status: NDArray[np.int8] | None = None
-        self._layer_pressure: Array | None = None  # after the last step; None: that of the iterate
-        self._following = Following()
-        self._calm = 0  # steps in which no node has changed its status
-        self._begin = 0.0
-        self._load = 1.0  # part of the loads and prescribed displacements that is applied
-        self._best: _State | None = None
-        self._least = np.inf
-        self._operator: LinearOperator | DenseOperator | None = None
-        self._body: Condensation | None = None
-        if self.options.condense:
-            self._body = condensation(self.problem, self.counters, self.options.linear)
-        if self._body is not None:
-            options = replace(self.options, condense=False, limit=NewtonOptions.limit)
-            quiet = Quiet(self.history.poll)
-            self._at_contact = Newton(self._body.problem, options, quiet, given=self.moduli)
-            self._at_contact.history.level = logging.DEBUG
+        self._moduli = self.moduli or moduli_of(problem.scales, options.gamma)
+        self._forget()
+        self.whole = WholeStep(problem, options, self._moduli, self.counters)
+        self._condensed: MaterialStep | None = None
+        if options.condense and isinstance(problem, ContactProblem):
+            body = condensation(problem, self.counters, options.linear)
+            if body is not None:
+                self._condensed = MaterialStep(
+                    body, options, self._moduli, _solve_condensed, self.history, self.counters,
+                    SLOWER,
+                )  # fmt: skip
 
-    def _moduli(self) -> Moduli:
-        """Return stiffnesses that fit the body and its mesh."""
-        middle = automatic_r(self.problem)
-        nodal = middle**2 / float(self.problem.body.law.young)
-        return Moduli(middle, nodal, self.options.gamma * max(middle, nodal))
+    def _forget(self) -> None:
+        self._at = Iterate(self.problem.start())
+        self._best: Iterate | None = None
+        self._least = np.inf
 
     @property
-    def operator(self) -> LinearOperator | DenseOperator:
-        """The operator of the linear systems."""
-        if self._operator is None:
-            asymmetric = self.problem.frictional or self.problem.response.active
-            self._operator = operator(
-                self.problem,
-                symmetric=not asymmetric,
-                counters=self.counters,
-                kind=self.options.linear,
-            )
-        return self._operator
+    def state(self) -> State:
+        """What the last step has left."""
+        return self._at.state
 
-    def solve(self) -> Outcome:
-        """Iterate from zero displacement until convergence or the limit. Collective."""
-        self.problem.reset()
-        self.forces = Multipliers.zero(self.problem)
-        self._status = self._layer_pressure = None
-        return self.resume()
+    def solve(self, start: State | None = None) -> tuple[State, Outcome]:
+        """Iterate until convergence or the limit. Collective.
 
-    def solve_from(self, forces: Multipliers) -> Outcome:
-        """Iterate from the problem's present iterate and given contact forces. Collective."""
-        problem, nodal = self.problem, nodal_iterate(self.problem)
+        Parameters
+        ----------
+        start
+            Where from; from rest by default.
+        """
+        self._forget()
+        iterate = self._at if start is None else self._started(start)
+        iterate, outcome = self.run(iterate)
+        return iterate.state, outcome
+
+    def _started(self, start: State) -> Iterate:
+        """Return an iterate at a given state."""
+        interface, c = self.problem.interface, self._moduli.status
+        nodal = interface.jump.apply(start.x)
         # What is left of a pressure where a node is open would give it a friction bound: one of
         # the size of rounding, with friction of any direction, on which the node would stick.
-        closed = touching(problem, nodal, forces.pressure, self.moduli.status)
-        self.forces = Multipliers(np.where(closed, forces.pressure, 0.0), forces.friction)
-        bound = bound_of(problem, nodal, self.forces)
-        self._status = node_status(problem, nodal, self.forces, bound, self.moduli.status)
-        self._layer_pressure = None
-        return self.resume()
+        closed = touching(start.forces.pressure, interface.opening(nodal), c)
+        pressure = np.where(closed, start.forces.pressure, 0.0)
+        forces = Multipliers(pressure, start.forces.friction)
+        bound = interface.bound(nodal, forces)
+        status = interface.status(nodal, forces, bound, c)
+        return Iterate(State(start.x, forces, start.load), status)
 
-    def resume(self) -> Outcome:
-        """Iterate from where the method is, and fall back on slower ones where that fails."""
-        self._begin = time.perf_counter()
-        self._best, self._least = None, np.inf
-        outcome = self._resume()
+    def run(self, iterate: Iterate) -> tuple[Iterate, Outcome]:
+        """Take one road after the other from an iterate; the best iterate if all fail."""
+        self._at, self._best, self._least = iterate, None, np.inf
+        self.history.restart()
+        iterate, outcome = self._roads(iterate)
         if not outcome.converged and self._best is not None:
-            self._return_to(self._best)
-            outcome = replace(outcome, kkt=evaluate(self.problem, self.forces))
-        return outcome
+            iterate = self._best
+            outcome = replace(outcome, kkt=evaluate(self.problem, iterate.state))
+        self._at = iterate
+        return iterate, outcome
 
-    def _resume(self) -> Outcome:
-        if self._body is not None:
-            outcome = self._newton("", self._condensed_step)
-            if outcome.converged or self._left <= 0:
-                return outcome
-            logger.info("%s; going on with the whole body", outcome.reason)
-        outcome = self._newton("")
-        if not outcome.converged and self.problem.frictional and self._left > 0:
-            outcome = self._frozen_friction()
-        if not outcome.converged and self._left > 0:
-            outcome = self._block_relaxation()
-        # A condensed body has been linearised at the whole load.
-        condensed = isinstance(self.problem, CondensedProblem)
-        if not outcome.converged and self._left > 0 and not condensed:
-            outcome = self._load_steps()
-        return outcome
+    def _see(self, iterate: Iterate, residuals: KKT) -> None:
+        """Remember where the method is, and which iterate meets the whole load best."""
+        self._at = iterate
+        if iterate.state.load == 1.0 and residuals.largest < self._least:
+            self._best, self._least = iterate, residuals.largest
 
     @property
     def _left(self) -> int:
         """Number of steps that are left of the limit."""
         return self.options.limit - len(self.history.records)
 
-    def _block_relaxation(self) -> Outcome:
+    def _roads(self, iterate: Iterate) -> tuple[Iterate, Outcome]:
+        if self._condensed is not None:
+            loop = NewtonLoop(
+                self.problem, self.options, self._condensed, self.history, self._see, SECANT_UNTIL
+            )
+            iterate, outcome = loop.run(iterate)
+            if outcome.converged or self._left <= 0:
+                return iterate, outcome
+            logger.info("%s; going on with the whole body", outcome.ended)
+        loop = self._whole_loop()
+        iterate, outcome = loop.run(iterate)
+        if not outcome.converged and self.problem.interface.friction.acts and self._left > 0:
+            iterate, outcome = self._frozen_friction(loop, iterate)
+        if not outcome.converged and self._left > 0:
+            iterate, outcome = self._block_relaxation()
+        if not outcome.converged and self._left > 0 and self.options.load_steps:
+            iterate, outcome = self._load_steps(loop)
+        return iterate, outcome
+
+    def _whole_loop(self) -> NewtonLoop:
+        options = self.options
+        return NewtonLoop(
+            self.problem, options, self.whole, self.history, self._see, options.secant_until
+        )
+
+    def _frozen_friction(self, loop: NewtonLoop, iterate: Iterate) -> tuple[Iterate, Outcome]:
+        """Update the friction bound outside of Newton's loop: each problem is then convex."""
+        goal, interface = FIRST_GOAL, self.problem.interface
+        for _ in range(MOST_UPDATES):
+            state = iterate.state
+            bound = interface.bound(interface.jump.apply(state.x), state.forces)
+            iterate, outcome = loop.run(iterate, FROZEN_FRICTION, bound, goal)
+            if outcome.converged or outcome.ended != UPDATE:
+                break
+            goal = 0.1 * outcome.kkt.largest
+        return iterate, outcome
+
+    def _block_relaxation(self) -> tuple[Iterate, Outcome]:
         """Solve by the fixed point over block relaxation, which damps what Newton lets cycle."""
 
         def note(record: Record) -> None:
-            self._record(record.kkt, BLOCK_RELAXATION, record.inner)
+            self._see(Iterate(relaxed.state), record.kkt)
+            self.history.record(record.kkt, BLOCK_RELAXATION, record.inner)
 
         options = FixedPointOptions(
             tolerance=self.options.tolerance,
@@ -198,232 +202,36 @@ class Newton:
             linear=self.options.linear,
         )
         relaxed = FixedPoint(self.problem, options, note, self.counters, self.history.poll)
-        try:
-            outcome = relaxed.solve()
-        finally:
-            self.forces, self._status, self._layer_pressure = relaxed.forces, None, None
-        self._keep_best(outcome.kkt)
-        return outcome
+        state, outcome = relaxed.solve()
+        return Iterate(state), outcome
 
-    def _newton(
-        self,
-        note: str,
-        step: Callable[[bool, float], tuple[str, int] | None] | None = None,
-        frozen: Array | None = None,
-        goal: float = 0.0,
-    ) -> Outcome:
-        """Iterate on the full problem, or on the one with a frozen friction bound.
-
-        With a frozen bound the residual of that bound has to fall below `goal`. `step` takes
-        the place of `_step`.
-        """
-        problem, options = self.problem, self.options
-        goal = max(goal, options.tolerance)
-        residuals = evaluate(problem, self.forces)
-        best, since = np.inf, 0
-        self._following, self._calm = Following(), 0
-        # Where contact is solved exactly in each step, the tangent does not fear what it changes.
-        until = options.secant_until if step is None else CONDENSED_SECANT_UNTIL
-        # A start from elsewhere is near the solution; zero displacement has no better tangent.
-        tangent = self._status is not None and not problem.linear_material
-        for _ in range(min(options.max_iterations, self._left)):
-            before, kept = residuals, self._state()
-            if step is not None:
-                at_contact = step(tangent, residuals.largest)
-                if at_contact is None:
-                    return self._outcome(residuals, "the condensed contact problem is not solved")
-                said, solves = at_contact
-            else:
-                said, solves = "", 0
-                self._step(tangent, residuals.largest, frozen)
-            residuals = evaluate(problem, self.forces)
-            worse = self._following.worsened(residuals.largest)
-            words = (note, said, "tangent" * tangent, "taken back" * worse)
-            self._record(residuals, " ".join(word for word in words if word), contact=solves)
-            if worse:
-                self._return_to(kept)
-                residuals = evaluate(problem, self.forces)
-            self._keep_best(residuals)
-            measured = self._measure(residuals, frozen)
-            if residuals.largest <= options.tolerance:
-                return self._outcome(residuals)
-            if frozen is not None and measured <= goal:
-                return self._outcome(residuals, UPDATE)
-            if not np.isfinite(measured):
-                return self._outcome(residuals, "Newton's method diverged")
-            if not problem.linear_material:
-                falls = residuals.equilibrium < max(before.equilibrium, options.tolerance)
-                tangent = residuals.equilibrium < until and (falls or not tangent)
-            since = 0 if measured < 0.9 * best else since + 1
-            best = min(best, measured)
-            # A node that opens along the ramp of psi, frozen from step to step, takes its time.
-            if since >= options.patience * (3 if self._following.frozen else 1):
-                return self._outcome(residuals, f"Newton's method stalled at {best:.1e}")
-        steps = len(self.history.records)
-        return self._outcome(residuals, f"not converged in {steps} steps")
-
-    def _outcome(self, residuals: KKT, ended: str = "") -> Outcome:
-        return Outcome(residuals, self.options.allowed, ended)
-
-    def _keep_best(self, residuals: KKT) -> None:
-        """Remember the iterate that meets the problem at its whole load best."""
-        if self._load == 1.0 and residuals.largest < self._least:
-            self._least, self._best = residuals.largest, self._state()
-
-    def _measure(self, residuals: KKT, frozen: Array | None) -> float:
-        """Return the largest residual, with the frozen friction bound if there is one."""
-        if frozen is None:
-            return residuals.largest
-        nodal = nodal_iterate(self.problem)
-        interface = interface_residuals(self.problem, nodal, self.forces, frozen)
-        return max(residuals.equilibrium, *interface)
-
-    def _frozen_friction(self) -> Outcome:
-        """Update the friction bound outside of Newton's method: each step is then convex."""
-        bound = bound_of(self.problem, nodal_iterate(self.problem), self.forces)
-        outcome, goal = None, 1e-2
-        for _ in range(40):
-            outcome = self._newton(FROZEN_FRICTION, frozen=bound, goal=goal)
-            if outcome.converged or outcome.ended != UPDATE:
-                break
-            new = bound_of(self.problem, nodal_iterate(self.problem), self.forces)
-            goal = 0.1 * outcome.kkt.largest
-            bound = new
-        assert outcome is not None
-        return outcome
-
-    def _load_steps(self) -> Outcome:
+    def _load_steps(self, loop: NewtonLoop) -> tuple[Iterate, Outcome]:
         """Apply loads and prescribed displacements in steps, halved where they are too large."""
-        problem, step, reached = self.problem, 0.25, 0.0
-        problem.reset()
-        self.forces = Multipliers.zero(problem)
-        self._status = self._layer_pressure = None
-        while reached < 1.0 and step > 1e-2 and self._left > 0:
-            kept = self._state()
-            self._load = min(1.0, reached + step)
-            problem.apply_load(self._load)
-            outcome = self._newton(f"load {self._load:.3g}")
-            if not outcome.converged and problem.frictional:
-                outcome = self._frozen_friction()
+        body, step, reached = self.problem.equilibrium, FIRST_STEP, 0.0
+        iterate = Iterate(self.problem.start(0.0))
+        while reached < 1.0 and step > LEAST_STEP and self._left > 0:
+            load = min(1.0, reached + step)
+            state = iterate.state
+            loaded = State(body.prescribe(state.x, load), state.forces, load)
+            tried, outcome = loop.run(replace(iterate, state=loaded), f"load {load:.3g}")
+            if not outcome.converged and self.problem.interface.friction.acts:
+                tried, outcome = self._frozen_friction(loop, tried)
             if outcome.converged:
-                reached = self._load
-                continue
-            self._return_to(kept)
-            step /= 2
-        self._load = 1.0
-        problem.apply_load(1.0)
-        residuals = evaluate(problem, self.forces)
-        self._keep_best(residuals)
-        if reached < 1.0:
-            return self._outcome(residuals, f"load steps ended at {reached:.3g} of the load")
-        return self._outcome(residuals)
+                iterate, reached = tried, load
+            else:
+                step /= 2
+        state = iterate.state
+        iterate = replace(iterate, state=State(body.prescribe(state.x), state.forces))
+        residuals = evaluate(self.problem, iterate.state)
+        self._see(iterate, residuals)
+        ended = "" if reached == 1.0 else f"load steps ended at {reached:.3g} of the load"
+        return iterate, Outcome(residuals, self.options.allowed, ended)
 
-    def _state(self) -> _State:
-        """Return what `_return_to` needs to take steps back."""
-        return self.problem.unknowns.copy(), self.forces, self._status, self._layer_pressure
 
-    def _return_to(self, kept: _State) -> None:
-        """Go back to a state before."""
-        self.problem.unknowns[:], self.forces, self._status, self._layer_pressure = kept
-
-    def _step(self, tangent: bool, reached: float, frozen: Array | None) -> None:
-        """Take one Newton step: one assembly, one factorisation, one solve."""
-        problem, trace = self.problem, self.problem.trace
-        nodal = nodal_iterate(problem)
-        softening = self.options.softening + MORE_SOFTENING * self._calm
-        contact = linearise(
-            problem, nodal, self.forces, self.moduli, self._status, frozen, softening
-        )
-        self._calm = self._calm + 1 if contact.settled else 0
-        blocks = contact.blocks
-        layer, shift = self._layer(nodal, contact.settled)
-        if problem.response.active:
-            pressure = total_pressure(problem, nodal, contact.forces)
-            response = problem.response
-            follow = contact.settled or reached < NEAR
-            if response.follows_gap:
-                follow = self._following(reached, follow)
-            current = response.current_jacobian if follow else response.current_block
-            blocks = blocks + layer + current(nodal, pressure)
-        self.operator.update(
-            problem.tangent if tangent else problem.secant,
-            trace.weight[:, None, None] * blocks,
-            constant=problem.linear_material,
-        )
-        # Gamma leaves this part of an interface residual in any case. A goal that depended on the
-        # residuals would ask for more digits on finer meshes, whose residuals pass through more
-        # values between the first and the last.
-        rtol = 1 / self.options.gamma
-        residual = residual_forces(problem, contact.forces)
-        trace.add(residual, (trace.weight * shift)[:, None] * trace.normal)
-        increment = self.operator.solve(-residual, rtol)
-        problem.add(increment)
-        moved = trace.values(increment)
-        change = np.einsum("nij,nj->ni", contact.blocks, moved)
-        vectors = contact.forces.vectors(problem) + change[:, : problem.dim]
-        self.forces = Multipliers(
-            trace.normal_component(vectors), trace.tangential_component(vectors)
-        )
-        self._status = contact.status
-        pressed = trace.normal_component(np.einsum("nij,nj->ni", layer, moved))
-        self._layer_pressure = problem.response.layer_pressure(nodal) + shift + pressed
-
-    def _condensed_step(self, tangent: bool, reached: float) -> tuple[str, int] | None:
-        """Linearise the material alone, and solve the contact problem that is left.
-
-        Returns the slower methods that this took, in words, and the number of dense solves, or
-        None if it could not be solved.
-        """
-        problem, body, inner = self.problem, self._body, self._at_contact
-        assert body is not None
-        if not body.linearise(problem.tangent if tangent else problem.secant):
-            return None
-        # No more accurate than the material is linearised, nor than the end asks for.
-        enough = 0.1 * self.options.tolerance
-        if not problem.linear_material:
-            enough = max(enough, CONTACT_PART * min(reached, 1.0))
-        inner.options = replace(inner.options, tolerance=enough)
-        inner.take(self)
-        inner.history.records.clear()
-        outcome = inner.resume()
-        records = inner.history.records
-        solves = sum(record.inner for record in records)
-        self.counters.contact_solves += solves
-        if outcome.kkt.largest > max(enough, NEAR * reached):
-            return None
-        self.take(inner)
-        problem.add(body.expand())
-        slower = [word for word in SLOWER if any(word in record.note for record in records)]
-        return ", ".join(slower), solves
-
-    def take(self, other: Newton) -> None:
-        """Go on from where another Newton method on the same contact nodes is."""
-        self.forces, self._status = other.forces, other._status
-        self._layer_pressure = other._layer_pressure
-
-    def _layer(self, nodal: Array, full: bool) -> tuple[Array, Array]:
-        """Linearise the layer; return its block, and how it differs from the layer's force.
-
-        It is linearised where the law is met from the pressure and the displacement of the
-        step before together, as the status of a contact node is found. Linearised about the
-        displacement alone, a layer stiffer than the body cycles between its regimes.
-        """
-        problem, c = self.problem, self.moduli.status
-        law = problem.response.normal_law(nodal)
-        if law is None:
-            none = np.zeros(nodal.shape[0])
-            return problem.response.layer_block(nodal, full), none
-        trace, response = problem.trace, problem.response
-        u_n, layer = trace.normal_component(nodal), response.layer_pressure(nodal)
-        known = layer if self._layer_pressure is None else self._layer_pressure
-        place = law.displacement(self.forces.pressure + known + c * u_n, c)
-        about = nodal.copy()
-        about[:, : problem.dim] += (place - u_n)[:, None] * trace.normal
-        block = response.layer_block(about, full)
-        back = trace.normal_component(np.einsum("nij,nj->ni", block, nodal - about))
-        return block, response.layer_pressure(about) + back - layer
-
-    def _record(self, residuals: KKT, note: str, solves: int = 1, contact: int = 0) -> None:
-        seconds = time.perf_counter() - self._begin
-        number = len(self.history.records) + 1
-        self.history.add(Record(number, solves, residuals, np.nan, seconds, note, contact))
+def _solve_condensed(
+    problem: Problem, options: NewtonOptions, moduli: Moduli, history: History, iterate: Iterate
+) -> tuple[Iterate, Outcome]:
+    """Solve a contact problem at its own nodes, by all roads that are open there."""
+    method = Newton(problem, options, moduli=moduli)
+    method.history = history
+    return method.run(iterate)

@@ -128,6 +128,8 @@ class NewtonOptions:
     condense
         Whether to condense the linearised body onto the contact nodes where that pays: one
         step then solves the whole contact problem for a linear body.
+    load_steps
+        Whether to apply the load in steps where all else has failed.
     """
 
     tolerance: float = 1e-8
@@ -139,6 +141,7 @@ class NewtonOptions:
     softening: float = 0.25
     linear: str = "auto"
     condense: bool = True
+    load_steps: bool = True
 
     @property
     def allowed(self) -> KKT:

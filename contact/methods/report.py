@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import logging
+import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Protocol, runtime_checkable
+
+import numpy as np
 
 from contact.problem.kkt import KKT
 
@@ -86,6 +89,20 @@ class History:
     monitor: Monitor | None = None
     records: list[Record] = field(default_factory=list)
     level: int = logging.INFO
+    _begin: float = field(default_factory=time.perf_counter)
+
+    def restart(self) -> None:
+        """Count the seconds from now on."""
+        self._begin = time.perf_counter()
+
+    def record(self, kkt: KKT, note: str, inner: int = 1, contact: int = 0) -> None:
+        """Append a record of the next step, with what it took; see `Record`."""
+        seconds = time.perf_counter() - self._begin
+        self.add(Record(len(self.records) + 1, inner, kkt, np.nan, seconds, note, contact))
+
+    def quiet(self) -> Monitor:
+        """Return a monitor for a loop within a step: it looks whether the solve is to end."""
+        return Quiet(self.poll)
 
     def add(self, record: Record) -> None:
         """Append a record."""

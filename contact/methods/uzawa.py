@@ -8,20 +8,23 @@ which `acceleration` speeds up.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 from mpi4py import MPI
 
+from contact.interface.interface import Interface
+from contact.interface.jump import Jump
+from contact.interface.layer import NormalLaw
+from contact.interface.multipliers import Multipliers
 from contact.interface.projections import disc_derivative, project_disc
-from contact.interface.response import NormalLaw
-from contact.linear.operator import LinearOperator
+from contact.interface.residuals import interface_residuals
+from contact.linear.operator import Operator
 from contact.methods.acceleration import ResidualMinimiser
-from contact.problem.condensed import DenseOperator
-from contact.problem.kkt import interface_residuals
-from contact.problem.problem import ContactProblem
-from contact.problem.state import Multipliers, bound_of
+from contact.methods.stagnation import Stagnation
+from contact.problem.scales import Scales
 from contact.typing import Array
 from forms.foundation import contact_multiplier
 
@@ -71,6 +74,8 @@ class Linearised:
         Factorised operator, augmented by r at the contact nodes.
     residual
         Owned residual without multipliers at the iterate.
+    x
+        The iterate's owned unknowns.
     nodal
         The iterate at the contact nodes, shape (n, block size).
     bound
@@ -82,8 +87,9 @@ class Linearised:
         Whether tangential forces act; the operator is augmented tangentially only then.
     """
 
-    operator: LinearOperator | DenseOperator
+    operator: Operator
     residual: Array
+    x: Array
     nodal: Array
     bound: Array
     law: NormalLaw | None = None
@@ -118,62 +124,47 @@ class RelaxationResult:
     stalled: bool = False
 
 
-def automatic_r(problem: ContactProblem) -> float:
+def automatic_r(scales: Scales) -> float:
     """Return r* = 1.39 E'/sqrt(h H), the geometric mean of the Steklov spectrum's ends.
 
     E' = E/(1 - nu^2); h is the spacing of the contact nodes and H the volume of the body over
     the area of Gamma_3. Good to a factor of a few, which acceleration makes up for.
     """
-    from dolfinx import fem
-
-    domain, law = problem.domain, problem.body.law
-    one = problem.constant(1.0)
-
-    def integral(measure: object) -> float:
-        return float(problem.comm.allreduce(fem.assemble_scalar(fem.form(one * measure)), MPI.SUM))
-
-    area = integral(domain.ds(problem.contact.on))
-    height = integral(domain.dx) / area
-    spacing = (area / problem.trace.size) ** (1 / (problem.dim - 1))
-    modulus = float(law.young) / (1 - float(law.poisson) ** 2)
-    return 1.39 * modulus / float(np.sqrt(spacing * height))
+    return 1.39 * scales.plane_modulus / math.sqrt(scales.spacing * scales.height)
 
 
-def augmentation(problem: ContactProblem, r: float, friction: bool) -> Array:
-    """Return the weighted nodal blocks of r u_nu v_nu [+ r u_tau v_tau], (n, bs, bs)."""
-    trace, d = problem.trace, problem.dim
-    blocks = np.zeros((trace.nodes.size, trace.block_size, trace.block_size))
-    blocks[:, :d, :d] = trace.normal[:, :, None] * trace.normal[:, None, :]
+def augmentation(jump: Jump, r: float, friction: bool) -> Array:
+    """Return the nodal blocks of r u_nu v_nu [+ r u_tau v_tau], without weights, (n, bs, bs)."""
+    n, d = jump.normal.shape
+    blocks = np.zeros((n, jump.block_size, jump.block_size))
+    blocks[:, :d, :d] = jump.normal[:, :, None] * jump.normal[:, None, :]
     if friction:
-        blocks[:, :d, :d] += trace.tangent
-    return r * trace.weight[:, None, None] * blocks
+        blocks[:, :d, :d] += jump.tangent
+    return r * blocks
 
 
-def split(problem: ContactProblem, nodal: Array, friction: bool) -> Array:
+def split(jump: Jump, nodal: Array, friction: bool) -> Array:
     """Return normal and tangential displacements side by side, shape (n, 1 + d).
 
     Without friction the tangential ones are no unknowns of the relaxation, and 0 here.
     """
-    trace = problem.trace
-    tangential = trace.tangential_component(nodal)
+    tangential = jump.tangential_component(nodal)
     if not friction:
         tangential = np.zeros_like(tangential)
-    return np.column_stack([trace.normal_component(nodal), tangential])
+    return np.column_stack([jump.normal_component(nodal), tangential])
 
 
-def _project(
-    problem: ContactProblem, z: Array, r: float, bound: Array, law: NormalLaw | None
-) -> Array:
+def _project(jump: Jump, z: Array, r: float, bound: Array, law: NormalLaw | None) -> Array:
     """Return the new multipliers, Steps 2 and 3: (3.43) and the friction disc."""
     if law is None:
-        pressure = contact_multiplier(z[:, 0], r, 0.0, problem.trace.gap)
+        pressure = contact_multiplier(z[:, 0], r, 0.0, jump.gap)
     else:
         pressure = law.pressure(z[:, 0], r)
     return np.column_stack([pressure, project_disc(z[:, 1:], bound)])
 
 
 def _derivative(
-    problem: ContactProblem,
+    jump: Jump,
     z: Array,
     r: float,
     bound: Array,
@@ -182,20 +173,20 @@ def _derivative(
 ) -> Array:
     """Return the derivatives of `_project` along directions of shape (n, 1 + d, k)."""
     if law is None:
-        slope = np.where(z[:, 0] > r * problem.trace.gap, 1.0, 0.0)
+        slope = np.where(z[:, 0] > r * jump.gap, 1.0, 0.0)
     else:
         slope = law.pressure_slope(z[:, 0], r)
     normal = slope[:, None, None] * directions[:, :1]
     return np.concatenate([normal, disc_derivative(z[:, 1:], bound, directions[:, 1:])], axis=1)
 
 
-def _vectors(problem: ContactProblem, pairs: Array) -> Array:
+def _vectors(jump: Jump, pairs: Array) -> Array:
     """Return (normal, tangential) pairs as vectors, shape (n, d)."""
-    return pairs[:, :1] * problem.trace.normal + pairs[:, 1:]
+    return pairs[:, :1] * jump.normal + pairs[:, 1:]
 
 
 def block_relaxation(
-    problem: ContactProblem,
+    interface: Interface,
     step: Linearised,
     z: Array,
     parameters: Relaxation,
@@ -206,10 +197,10 @@ def block_relaxation(
 
     Parameters
     ----------
-    problem
-        The contact problem; its iterate is left alone.
+    interface
+        The contact nodes with their laws.
     step
-        The linearised problem; its operator holds `augmentation(problem, r, friction)`.
+        The linearised problem; its operator holds `augmentation(jump, r, friction)`.
     z
         lambda + r u to start from, shape (n, 1 + d).
     parameters
@@ -219,18 +210,18 @@ def block_relaxation(
     poll
         Called before every iteration, on all ranks; what it raises ends the relaxation.
     """
-    trace, r, bound, law = problem.trace, parameters.r, step.bound, step.law
-    weights = np.repeat(trace.weight, z.shape[1])
+    jump, r, bound, law = interface.jump, parameters.r, step.bound, step.law
+    weights = np.repeat(jump.weight, z.shape[1])
 
     def inner(a: Array, b: Array) -> Array:
-        return np.asarray(trace.comm.allreduce(a.T @ (weights[:, None] * b), op=MPI.SUM))
+        return np.asarray(jump.comm.allreduce(a.T @ (weights[:, None] * b), op=MPI.SUM))
 
     def project(flat: Array) -> Array:
-        return _project(problem, flat.reshape(z.shape), r, bound, law).ravel()
+        return _project(jump, flat.reshape(z.shape), r, bound, law).ravel()
 
     def derivative(flat: Array, directions: Array) -> Array:
         columns = directions.reshape(*z.shape, directions.shape[1])
-        slopes = _derivative(problem, flat.reshape(z.shape), r, bound, law, columns)
+        slopes = _derivative(jump, flat.reshape(z.shape), r, bound, law, columns)
         return slopes.reshape(directions.shape)
 
     accelerator = None
@@ -238,48 +229,45 @@ def block_relaxation(
         accelerator = ResidualMinimiser(inner, project, derivative, parameters.depth)
     old_increment: Array | None = None
     old_phi: Array | None = None
-    residual, forces = np.inf, Multipliers.zero(problem)
-    increment: Array = np.zeros(problem.owned)
-    start = split(problem, step.nodal, step.friction)
-    best, since = np.inf, 0
-    patience = PATIENCE_PLAIN if accelerator is None else PATIENCE
+    residual, forces = np.inf, Multipliers.zero(jump)
+    increment: Array = np.zeros(step.x.size)
+    start = split(jump, step.nodal, step.friction)
+    stagnation = Stagnation(PATIENCE_PLAIN if accelerator is None else PATIENCE, PROGRESS)
     for iteration in range(1, parameters.max_iterations + 1):
         if poll is not None:
             poll()
-        multiplier = _project(problem, z, r, bound, law)
+        multiplier = _project(jump, z, r, bound, law)
         q = 2 * multiplier - z
         rhs = -step.residual
-        trace.add(rhs, -trace.weight[:, None] * _vectors(problem, q + r * start))
+        jump.transpose(-jump.weight[:, None] * _vectors(jump, q + r * start), rhs)
         increment = step.operator.solve(rhs, guess=increment)
-        nodal = step.nodal + trace.values(increment)
-        u = split(problem, nodal, step.friction)
+        nodal = step.nodal + jump.apply(increment)
+        u = split(jump, nodal, step.friction)
         # q + r u is the force that the foundation exerted in this very solve.
         total = q + r * u
         layer = 0.0 if law is None else law.layer(u[:, 0])
         forces = Multipliers(total[:, 0] - layer, total[:, 1:])
         if parameters.single_loop and step.friction:
-            bound = bound_of(problem, nodal, forces)
-        residual = max(interface_residuals(problem, nodal, forces, bound))
+            bound = interface.bound(nodal, forces)
+        residual = max(interface_residuals(interface, nodal, forces, bound))
         phi = (z - multiplier) * (1 / r)
         image = multiplier + r * (phi + parameters.over_relaxation * (u - phi))
         measured = residual
         if parameters.thesis_tolerance is not None:
             assert domain_norm is not None
-            phi = (image - _project(problem, image, r, bound, law)) * (1 / r)
+            phi = (image - _project(jump, image, r, bound, law)) * (1 / r)
             if old_phi is not None and old_increment is not None:
                 moved, projected = increment - old_increment, phi - old_phi
-                change = domain_norm(moved) ** 2 + trace.norm(projected) ** 2
-                size = domain_norm(problem.unknowns[: problem.owned] + increment) ** 2
-                size += trace.norm(phi) ** 2
+                change = domain_norm(moved) ** 2 + jump.norm(projected) ** 2
+                size = domain_norm(step.x + increment) ** 2
+                size += jump.norm(phi) ** 2
                 if change < parameters.thesis_tolerance**2 * size:
                     return RelaxationResult(increment, forces, image, iteration, residual)
                 measured = float(np.sqrt(change / size)) if size > 0 else 0.0
             old_phi, old_increment = phi, increment
         elif residual <= parameters.tolerance or not np.isfinite(residual):
             return RelaxationResult(increment, forces, image, iteration, residual)
-        since = 0 if measured < PROGRESS * best else since + 1
-        best = min(best, measured)
-        if since >= patience:
+        if stagnation(measured):
             return RelaxationResult(increment, forces, image, iteration, residual, stalled=True)
         z = image
         if accelerator is not None:

@@ -17,10 +17,12 @@ from dolfinx import fem
 from dolfinx.la import InsertMode
 from mpi4py import MPI
 
+from contact.body.constants import constant
+from contact.body.loads import expression
 from contact.errors import InputError
 from contact.problem.kkt import residual_forces
 from contact.problem.problem import ContactProblem
-from contact.problem.state import Multipliers, nodal_iterate, total_pressure
+from contact.problem.state import State
 from contact.typing import Array
 
 
@@ -104,8 +106,8 @@ class Reading:
     potential: float
 
 
-def charge_balance(problem: ContactProblem, forces: Multipliers) -> ChargeBalance:
-    """Return the charges by part at the iterate and contact forces. Collective.
+def charge_balance(problem: ContactProblem, state: State) -> ChargeBalance:
+    """Return the charges by part at a state. Collective.
 
     Raises
     ------
@@ -113,12 +115,12 @@ def charge_balance(problem: ContactProblem, forces: Multipliers) -> ChargeBalanc
         If the body is not piezoelectric.
     """
     _demand_potential(problem)
-    problem.freeze()
-    d, bs = problem.dim, problem.block_size
-    residual = residual_forces(problem, forces) / problem.phi_scale
+    equilibrium = problem.equilibrium
+    d, bs = problem.dim, equilibrium.block_size
+    residual = residual_forces(problem, state) / equilibrium.phi_scale
     electrodes: dict[str, float] = {}
     magnitude = 0.0
-    taken = np.zeros(problem.owned, dtype=bool)
+    taken = np.zeros(equilibrium.owned, dtype=bool)
     for fixed in problem.body.fixed:
         if fixed.potential is None:
             continue
@@ -130,53 +132,50 @@ def charge_balance(problem: ContactProblem, forces: Multipliers) -> ChargeBalanc
         magnitude += _sum(problem, np.abs(residual[new]))
     given: dict[str, float] = {}
     body = 0.0
-    x, test = ufl.SpatialCoordinate(problem.domain.mesh), ufl.TestFunction(problem.space)
+    x, test = ufl.SpatialCoordinate(problem.domain.mesh), ufl.TestFunction(equilibrium.space)
     for load in problem.body.loads:
         if load.charge is None:
             continue
         measure = problem.domain.dx if load.on is None else problem.domain.ds(load.on)
-        density = problem.expression(load.charge, x)
+        density = expression(problem.domain, load.charge, x)
         vector = fem.assemble_vector(fem.form(density * test[d] * measure))
         vector.scatter_reverse(InsertMode.add)
-        nodal = vector.array[: problem.owned].reshape(-1, bs)[:, d]
+        nodal = vector.array[: equilibrium.owned].reshape(-1, bs)[:, d]
         charge = _sum(problem, nodal)
         magnitude += _sum(problem, np.abs(nodal))
         if load.on is None:
             body += charge
         else:
             given[load.on] = given.get(load.on, 0.0) + charge
-    passed = _foundation_charges(problem, forces)
+    passed = _foundation_charges(problem, state)
     magnitude += _sum(problem, np.abs(passed))
     return ChargeBalance(electrodes, given, _sum(problem, passed), body, magnitude)
 
 
-def _foundation_charges(problem: ContactProblem, forces: Multipliers) -> Array:
+def _foundation_charges(problem: ContactProblem, state: State) -> Array:
     """Return the charges that pass through the owned nodes of the contact part."""
-    nodal = nodal_iterate(problem)
-    density = problem.response.charge(nodal, total_pressure(problem, nodal, forces))
-    charges = problem.trace.weight * density
-    if problem.held is None:
+    interface, nodal = problem.interface, problem.nodal(state)
+    pressure = interface.pressure(nodal, state.forces)
+    charges = problem.nodes.weight * interface.response.charge(nodal, pressure)
+    if interface.held is None:
         return charges
-    held = problem.held.weight * problem.held.charge(problem.unknowns)
+    held = interface.held.weight * interface.held.charge(state.x)
     return np.concatenate([charges, held])
 
 
-def force_balance(problem: ContactProblem, forces: Multipliers) -> ForceBalance:
-    """Return the resultant forces at the iterate and contact forces. Collective."""
-    problem.freeze()
-    d, bs, trace = problem.dim, problem.block_size, problem.trace
-    residual = residual_forces(problem, forces).reshape(-1, bs)[:, :d]
+def force_balance(problem: ContactProblem, state: State) -> ForceBalance:
+    """Return the resultant forces at a state. Collective."""
+    body, d = problem.equilibrium, problem.dim
+    residual = residual_forces(problem, state).reshape(-1, body.block_size)[:, :d]
     supports = np.where(problem.free[:, :d], 0.0, residual).sum(axis=0)
-    vectors = total_pressure(problem, nodal_iterate(problem), forces)[:, None] * trace.normal
-    vectors = vectors + forces.friction
-    local = np.stack(
-        [problem.external.reshape(-1, bs)[:, :d].sum(axis=0), supports, -trace.weight @ vectors]
-    )
+    stress = problem.interface.stress(problem.nodal(state), state.forces)
+    given = body.external(state.load).reshape(-1, body.block_size)[:, :d].sum(axis=0)
+    local = np.stack([given, supports, -problem.nodes.weight @ stress])
     applied, supports, contact = problem.comm.allreduce(local, op=MPI.SUM)
     return ForceBalance(applied, supports, contact)
 
 
-def mean_potential(problem: ContactProblem, part: str) -> float:
+def mean_potential(problem: ContactProblem, state: State, part: str) -> float:
     """Return the mean potential over a part of the boundary. Collective.
 
     Raises
@@ -185,24 +184,25 @@ def mean_potential(problem: ContactProblem, part: str) -> float:
         If the body is not piezoelectric or has no such part.
     """
     _demand_potential(problem)
-    _, phi = problem.parts_of(problem.x)
+    body = problem.equilibrium
+    _, phi = body.split(body.function(state.x))
     ds = problem.domain.ds(part)
     local = [
         fem.assemble_scalar(fem.form(phi * ds)),
-        fem.assemble_scalar(fem.form(problem.constant(1.0) * ds)),
+        fem.assemble_scalar(fem.form(constant(problem.domain.mesh, 1.0) * ds)),
     ]
     integral, area = problem.comm.allreduce(np.array(local), op=MPI.SUM)
     return float(integral / area)
 
 
-def sensor(problem: ContactProblem, forces: Multipliers, electrode: str) -> Reading:
+def sensor(problem: ContactProblem, state: State, electrode: str) -> Reading:
     """Return what an electrode reads: its charge where it is held at a potential. Collective.
 
     A short-circuited electrode (prescribed potential) is read by its charge, one that is left
     open by its mean potential; it is then no conductor, but a strip of the free surface.
     """
-    charges = charge_balance(problem, forces).electrodes
-    return Reading(charges.get(electrode), mean_potential(problem, electrode))
+    charges = charge_balance(problem, state).electrodes
+    return Reading(charges.get(electrode), mean_potential(problem, state, electrode))
 
 
 def _demand_potential(problem: ContactProblem) -> None:
@@ -212,11 +212,12 @@ def _demand_potential(problem: ContactProblem) -> None:
 
 def _electric_dofs(problem: ContactProblem, part: str) -> Array:
     """Return the owned electric unknowns on a part."""
-    subspace = problem.space.sub(problem.dim)
+    body = problem.equilibrium
+    subspace = body.space.sub(problem.dim)
     scalar, _ = subspace.collapse()
     facets = problem.domain.facets(part)
     dofs = fem.locate_dofs_topological((subspace, scalar), problem.dim - 1, facets)[0]
-    return dofs[dofs < problem.owned]
+    return dofs[dofs < body.owned]
 
 
 def _sum(problem: ContactProblem, values: Array) -> float:

@@ -13,11 +13,12 @@ from dolfinx import mesh as dmesh
 from mpi4py import MPI
 
 from contact.errors import InputError
+from contact.interface.multipliers import Multipliers
 from contact.mesh.make import Domain, from_mesh
 from contact.output.fields import nodal_function, unknowns
 from contact.output.solution import Solution
 from contact.problem.problem import ContactProblem
-from contact.problem.state import Multipliers
+from contact.problem.state import State
 
 #: Groups of attributes. adios4dolfinx 0.9 strips the letters of the group's name from the start
 #: of the attributes' names, so that the former are digits and the latter begin with letters.
@@ -41,8 +42,8 @@ class Checkpoint:
     contact_forces: fem.Function
     potential: fem.Function | None
 
-    def restore(self, problem: ContactProblem) -> Multipliers:
-        """Set the iterate of a problem on the checkpoint's domain; return the contact forces.
+    def restore(self, problem: ContactProblem) -> State:
+        """Return the state of a problem on the checkpoint's domain.
 
         Raises
         ------
@@ -50,25 +51,26 @@ class Checkpoint:
             If the problem lives on another mesh, or has another degree or kind of unknowns.
         """
         given = self.displacement.function_space
-        same = given.ufl_element().embedded_superdegree == problem.degree
+        same = given.ufl_element().embedded_superdegree == problem.equilibrium.degree
         same &= problem.domain.mesh is self.domain.mesh
         if not same or problem.piezoelectric != (self.potential is not None):
             raise InputError(
                 "the checkpoint does not fit the problem; accepted: one built on the checkpoint's "
                 "domain, with the degree and the kind of material that it was written with"
             )
-        d, nodes = problem.dim, problem.space.dofmap.list
-        x = problem.x.x.array.reshape(-1, problem.block_size)
+        body, d = problem.equilibrium, problem.dim
+        nodes = body.space.dofmap.list
+        x = body.rest().reshape(-1, body.block_size)
         x[nodes, :d] = self.displacement.x.array.reshape(-1, d)[given.dofmap.list]
         if self.potential is not None:
             dofs = self.potential.function_space.dofmap.list
-            x[nodes, d] = self.potential.x.array[dofs] / problem.phi_scale
-        problem.x.x.scatter_forward()
+            x[nodes, d] = self.potential.x.array[dofs] / body.phi_scale
         vectors = np.zeros((x.shape[0], d))
         vectors[nodes] = self.contact_forces.x.array.reshape(-1, d)[given.dofmap.list]
-        trace = problem.trace
-        local = vectors[trace.nodes]
-        return Multipliers(trace.normal_component(local), trace.tangential_component(local))
+        jump = problem.nodes
+        local = vectors[jump.nodes]
+        forces = Multipliers(jump.normal_component(local), jump.tangential_component(local))
+        return State(body.local(x.ravel()[: body.owned]), forces)
 
 
 def write_checkpoint(solution: Solution, path: str | Path) -> None:
@@ -86,11 +88,12 @@ def write_checkpoint(solution: Solution, path: str | Path) -> None:
     # Attributes are numbers: the tag values of each part, under its name.
     parts = {PART + name: np.array(v, dtype=np.int32) for name, v in domain.parts.items()}
     adios.write_attributes(path, domain.comm, PARTS, parts)
-    vectors = np.zeros((problem.x.x.array.size // problem.block_size, d))
-    vectors[problem.trace.nodes] = solution.forces.vectors(problem)
-    forces = nodal_function("contact_forces", problem.space, vectors, (d,))
-    functions = {**unknowns(problem), "contact_forces": forces}
-    kind = {"degree": np.array([problem.degree]), "size": np.array([domain.size])}
+    body, state = problem.equilibrium, solution.state
+    vectors = np.zeros((state.x.size // body.block_size, d))
+    vectors[problem.nodes.nodes] = state.forces.vectors(problem.nodes)
+    forces = nodal_function("contact_forces", body.space, vectors, (d,))
+    functions = {**unknowns(body, state.x), "contact_forces": forces}
+    kind = {"degree": np.array([body.degree]), "size": np.array([domain.size])}
     kind["piezoelectric"] = np.array([int(problem.piezoelectric)])
     adios.write_attributes(path, domain.comm, KIND, kind)
     for name, function in functions.items():

@@ -16,12 +16,13 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 
 from contact import _compat
-from contact.problem.problem import ContactProblem, with_constants
+from contact.body.constants import law_with_constants, piezo_with_constants
+from contact.body.equilibrium import BodyEquilibrium
 from contact.typing import Array
 from forms.hencky import stress
 from forms.kinematics import deviator_squared, strain, von_mises
 from forms.ops import maximum, sqrt
-from forms.piezo import Piezo, coupling_stress, electric_displacement
+from forms.piezo import coupling_stress, electric_displacement
 
 #: Cells that are evaluated at once: bounds the memory that large meshes need.
 CHUNK = 100_000
@@ -63,18 +64,23 @@ def linear(function: fem.Function) -> fem.Function:
     return made
 
 
-def unknowns(problem: ContactProblem) -> dict[str, fem.Function]:
+def unknowns(body: BodyEquilibrium, x: Array) -> dict[str, fem.Function]:
     """Return the displacement and, for a piezoelectric body, the potential. Collective."""
-    values, d = problem.x.x.array.reshape(-1, problem.block_size), problem.dim
-    made = {"displacement": nodal_function("displacement", problem.space, values[:, :d], (d,))}
-    if problem.piezoelectric:
-        potential = problem.phi_scale * values[:, d:]
-        made["potential"] = nodal_function("potential", problem.space, potential, ())
+    values, d = x.reshape(-1, body.block_size), body.dim
+    made = {"displacement": nodal_function("displacement", body.space, values[:, :d], (d,))}
+    if body.piezoelectric:
+        potential = body.phi_scale * values[:, d:]
+        made["potential"] = nodal_function("potential", body.space, potential, ())
     return made
 
 
 class DerivedFields:
-    """Fields derived from the iterate of a problem. The methods are collective.
+    """Fields derived from the unknowns of a body. The methods are collective.
+
+    Parameters
+    ----------
+    body, x
+        The body, and its local unknowns.
 
     Attributes
     ----------
@@ -83,16 +89,16 @@ class DerivedFields:
         piezoelectric body, electric_displacement (d,) and electric_field (d,).
     """
 
-    def __init__(self, problem: ContactProblem) -> None:
-        self.problem = problem
+    def __init__(self, body: BodyEquilibrium, x: Array) -> None:
+        self.body, self._x = body, body.function(x)
         self.shapes: dict[str, tuple[int, ...]] = {
             "stress": (3, 3),
             "von_mises": (),
             "dev_strain": (),
         }
-        if problem.piezoelectric:
-            self.shapes["electric_displacement"] = (problem.dim,)
-            self.shapes["electric_field"] = (problem.dim,)
+        if body.piezoelectric:
+            self.shapes["electric_displacement"] = (body.dim,)
+            self.shapes["electric_field"] = (body.dim,)
 
     @property
     def columns(self) -> Mapping[str, slice]:
@@ -107,30 +113,26 @@ class DerivedFields:
     @cached_property
     def points(self) -> Array:
         """Reference points of a cell: its nodes, or its middle, for P1 strains are constant."""
-        mesh, d = self.problem.domain.mesh, self.problem.dim
-        if self.problem.degree == 1:
+        mesh, d = self.body.domain.mesh, self.body.dim
+        if self.body.degree == 1:
             return np.full((1, d), 1 / (d + 1))
-        element = basix.ufl.element("Lagrange", mesh.topology.cell_name(), self.problem.degree)
+        element = basix.ufl.element("Lagrange", mesh.topology.cell_name(), self.body.degree)
         return np.asarray(element.basix_element.points)
 
     @cached_property
     def expression(self) -> fem.Expression:
         """All components, one after the other."""
-        problem, piezo = self.problem, self.problem.body.piezo
-        u, phi = problem.parts_of(problem.x)
+        body, mesh, piezo = self.body, self.body.domain.mesh, self.body.body.piezo
+        u, phi = body.split(self._x)
         eps = strain(u)
-        sigma = stress(with_constants(problem.body.law, problem.constant), eps)
+        sigma = stress(law_with_constants(body.body.law, mesh), eps)
         induced: list[ufl.core.expr.Expr] = []
         if piezo is not None:
-            mesh = problem.domain.mesh
-            constants = Piezo(
-                fem.Constant(mesh, np.asarray(piezo.e, dtype=float)),
-                fem.Constant(mesh, np.asarray(piezo.beta, dtype=float)),
-            )
+            constants = piezo_with_constants(piezo, mesh)
             sigma = sigma + coupling_stress(constants, phi)
             d = electric_displacement(constants, eps, phi)
-            induced = [d[i] for i in range(problem.dim)]
-            induced += [-ufl.grad(phi)[i] for i in range(problem.dim)]
+            induced = [d[i] for i in range(body.dim)]
+            induced += [-ufl.grad(phi)[i] for i in range(body.dim)]
         values = [sigma[i, j] for i in range(3) for j in range(3)]
         # Rounding can make |dev eps|^2 slightly negative.
         values += [von_mises(sigma), sqrt(maximum(deviator_squared(eps), 0.0))]
@@ -138,7 +140,7 @@ class DerivedFields:
 
     def _chunks(self) -> Iterator[tuple[NDArray[np.int32], Array]]:
         """Yield owned cells and the values there, shape (cells, points, components)."""
-        mesh = self.problem.domain.mesh
+        mesh = self.body.domain.mesh
         cells = np.arange(mesh.topology.index_map(mesh.topology.dim).size_local, dtype=np.int32)
         components = sum(math.prod(shape) for shape in self.shapes.values())
         for chosen in np.array_split(cells, cells.size // CHUNK + 1):
@@ -149,16 +151,16 @@ class DerivedFields:
         """Return the largest |dev eps| over the cells (their nodes, for degree 2)."""
         column = self.columns["dev_strain"]
         largest = max(float(v[..., column].max(initial=0.0)) for _, v in self._chunks())
-        return float(self.problem.comm.allreduce(largest, op=MPI.MAX))
+        return float(self.body.comm.allreduce(largest, op=MPI.MAX))
 
     def cells(self) -> dict[str, fem.Function]:
         """Return the fields as they are: discontinuous, of degree 0 for P1 and 1 for P2."""
-        mesh, degree = self.problem.domain.mesh, self.problem.degree - 1
+        mesh, degree = self.body.domain.mesh, self.body.degree - 1
         made = {
             name: fem.Function(fem.functionspace(mesh, ("DG", degree, shape)), name=name)
             for name, shape in self.shapes.items()
         }
-        corners = 1 if degree == 0 else self.problem.dim + 1
+        corners = 1 if degree == 0 else self.body.dim + 1
         for chosen, values in self._chunks():
             for name, columns in self.columns.items():
                 dofs = made[name].function_space.dofmap.list[chosen]
@@ -170,10 +172,10 @@ class DerivedFields:
 
     def nodes(self) -> dict[str, fem.Function]:
         """Return the fields at the nodes: the cells' values, averaged by volume."""
-        space, volume = self.problem.space, self._volumes()
+        space, volume = self.body.space, self._volumes()
         count = sum(math.prod(shape) for shape in self.shapes.values())
         total = fem.Function(
-            fem.functionspace(space.mesh, ("Lagrange", self.problem.degree, (count + 1,)))
+            fem.functionspace(space.mesh, ("Lagrange", self.body.degree, (count + 1,)))
         )
         sums = total.x.array.reshape(-1, count + 1)
         for chosen, values in self._chunks():
@@ -191,7 +193,7 @@ class DerivedFields:
 
     def _volumes(self) -> Array:
         """Return the volumes of the local cells, which are straight simplices."""
-        mesh, d = self.problem.domain.mesh, self.problem.dim
+        mesh, d = self.body.domain.mesh, self.body.dim
         corners = mesh.geometry.x[_compat.geometry_dofmap(mesh)][:, : d + 1, :d]
         edges = corners[:, 1:] - corners[:, :1]
         return np.asarray(np.abs(np.linalg.det(edges)) / math.factorial(d))

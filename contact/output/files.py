@@ -103,14 +103,14 @@ def summarise(solution: Solution, table: Table | None) -> dict[str, Any]:
     problem, records = solution.problem, solution.history.records
     status = np.array([]) if table is None else table["status"]
     counts = problem.comm.bcast({s: int(np.sum(status == s)) for s in ("open", "stick", "slip")})
-    mesh, dofmap, counters = problem.domain.mesh, problem.space.dofmap, solution.counters
+    mesh, counters = problem.domain.mesh, solution.counters
     kkt = solution.outcome.kkt
     summary: dict[str, Any] = {
         "title": solution.title,
         "converged": solution.converged,
         "reason": solution.outcome.reason,
         "method": solution.method,
-        "dofs": dofmap.index_map.size_global * dofmap.index_map_bs,
+        "dofs": problem.equilibrium.layout.unknowns,
         "cells": mesh.topology.index_map(mesh.topology.dim).size_global,
         "ranks": problem.comm.size,
         "outer_iterations": len(records),
@@ -120,14 +120,14 @@ def summarise(solution: Solution, table: Table | None) -> dict[str, Any]:
         "factorizations": counters.factorizations,
         "contact_solves": counters.contact_solves,
         "kkt": {"equilibrium": kkt.equilibrium, "contact": kkt.contact, "friction": kkt.friction},
-        "max_pressure": problem.trace.maximum(solution.pressure),
+        "max_pressure": problem.nodes.maximum(solution.pressure),
         "contact_force": solution.contact_force.tolist(),
         "max_displacement": _largest_displacement(solution),
         "max_dev_strain": solution.max_dev_strain,
         "contact_nodes": counts["stick"] + counts["slip"],
         "stick_nodes": counts["stick"],
         "slip_nodes": counts["slip"],
-        "contact_direction": getattr(problem.contact.foundation, "direction", "body"),
+        "contact_direction": problem.contact.foundation.direction,
         "notes": solution.notes,
         "warnings": solution.warnings,
     }
@@ -138,16 +138,17 @@ def summarise(solution: Solution, table: Table | None) -> dict[str, Any]:
 
 def _largest_displacement(solution: Solution) -> float:
     problem = solution.problem
-    u = problem.x.x.array[: problem.owned].reshape(-1, problem.block_size)[:, : problem.dim]
+    body = problem.equilibrium
+    u = solution.state.x[: body.owned].reshape(-1, body.block_size)[:, : problem.dim]
     largest = float(np.linalg.norm(u, axis=1).max(initial=0.0))
     return float(problem.comm.allreduce(largest, op=MPI.MAX))
 
 
 def _electric(solution: Solution) -> dict[str, Any]:
-    problem = solution.problem
-    scaled = problem.x.x.array[: problem.owned].reshape(-1, problem.block_size)[:, -1]
-    phi = problem.phi_scale * scaled
-    charges = charge_balance(problem, solution.forces)
+    problem, body = solution.problem, solution.problem.equilibrium
+    scaled = solution.state.x[: body.owned].reshape(-1, body.block_size)[:, -1]
+    phi = body.phi_scale * scaled
+    charges = charge_balance(problem, solution.state)
     return {
         "phi_min": problem.comm.allreduce(float(phi.min(initial=math.inf)), op=MPI.MIN),
         "phi_max": problem.comm.allreduce(float(phi.max(initial=-math.inf)), op=MPI.MAX),
@@ -179,9 +180,10 @@ def write_fields(solution: Solution, folder: Path) -> None:
     the derived ones as they are, cell by cell: one VTX file has one kind of elements only.
     Without ADIOS2, or on demand, both go to ``fields.xdmf``, of degree 1 at most.
     """
-    problem, derived = solution.problem, DerivedFields(solution.problem)
+    problem, x = solution.problem, solution.state.x
+    derived = DerivedFields(problem.equilibrium, x)
     comm = problem.comm
-    at_nodes = [*unknowns(problem).values(), *derived.nodes().values()]
+    at_nodes = [*unknowns(problem.equilibrium, x).values(), *derived.nodes().values()]
     in_cells = list(derived.cells().values())
     if has_adios2 and solution.output.fields == "vtx":
 

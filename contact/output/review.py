@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 from mpi4py import MPI
 
-from contact.body.norms import volume
 from contact.output.fields import DerivedFields
 from contact.output.solution import Solution
 from forms.hencky import check_monotonicity
@@ -13,7 +12,9 @@ from forms.hencky import check_monotonicity
 
 def review(solution: Solution) -> None:
     """Add what there is to say to the notes and warnings of a solution. Collective."""
-    solution.max_dev_strain = DerivedFields(solution.problem).largest_strain()
+    solution.max_dev_strain = DerivedFields(
+        solution.problem.equilibrium, solution.state.x
+    ).largest_strain()
     for text, good in (
         _monotonicity(solution),
         _uniqueness(solution),
@@ -46,22 +47,20 @@ def _uniqueness(solution: Solution) -> tuple[str, bool]:
     slides by s where G (U - s)/H = mu(s) p; the left-hand side falls faster than the right for
     all s if L_mu < G/(p H), and only then is s unique for every U.
     """
-    problem, coefficient = solution.problem, solution.problem.friction.coefficient
+    problem, coefficient = solution.problem, solution.problem.interface.friction.coefficient
     if coefficient is None:
         return "", True
-    comm, trace = problem.comm, problem.trace
-    own = (coefficient.maximum, coefficient.lipschitz) if trace.nodes.size else (0.0, 0.0)
+    comm, nodes = problem.comm, problem.nodes
+    own = (coefficient.maximum, coefficient.lipschitz) if nodes.nodes.size else (0.0, 0.0)
     maximum, lipschitz = (comm.allreduce(value, op=MPI.MAX) for value in own)
     pressure = solution.pressure
     # Pressures of rounding size are none, as in `Solution.status`.
-    area = trace.sum((pressure > 1e-9 * trace.maximum(pressure)).astype(float))
-    mean = trace.sum(pressure) / area if area > 0 else 0.0
+    area = nodes.sum((pressure > 1e-9 * nodes.maximum(pressure)).astype(float))
+    mean = nodes.sum(pressure) / area if area > 0 else 0.0
     text = f"Theorem 3.1: unique if mu* + L_mu = {maximum:.4g} + {lipschitz:.4g} is small enough"
     if lipschitz == 0 or mean <= 0:
         return text, True
-    domain = problem.domain
-    height = volume(problem, domain.dx) / volume(problem, domain.ds(problem.contact.on))
-    bound = problem.body.law.shear / (mean * height)
+    bound = problem.scales.shear / (mean * problem.scales.height)
     text += f"; a sliding block under the mean pressure {mean:.4g} asks for L_mu < {bound:.4g}"
     if lipschitz < bound:
         return text, True
@@ -71,7 +70,7 @@ def _uniqueness(solution: Solution) -> tuple[str, bool]:
 
 def _chords(solution: Solution) -> tuple[str, bool]:
     """Say where nodes on straight facets were found in the foundation, and put on it."""
-    cut = solution.problem.trace.cut
+    cut = solution.problem.nodes.cut
     if cut == 0:
         return "", True
     return (
@@ -86,7 +85,7 @@ def _preload(solution: Solution) -> tuple[str, bool]:
     problem = solution.problem
     if problem.contact.layer is None:
         return "", True
-    least = -problem.trace.maximum(-problem.response.touch, -np.inf)
+    least = -problem.nodes.maximum(-problem.interface.response.touch, -np.inf)
     if least >= -1e-9 * problem.domain.size:
         return "", True
     return (

@@ -10,12 +10,13 @@ from dolfinx import fem
 from mpi4py import MPI
 
 from contact.case.solver import Output
+from contact.interface.multipliers import Multipliers
+from contact.interface.status import CLOSED, STICKS
 from contact.linear.operator import Counters
 from contact.methods.report import History, Outcome
 from contact.output.fields import unknowns
-from contact.problem.kkt import stiffness_scale
 from contact.problem.problem import ContactProblem
-from contact.problem.state import Multipliers, bound_of, nodal_iterate, total_pressure
+from contact.problem.state import State
 from contact.typing import Array
 
 
@@ -29,9 +30,9 @@ class Solution:
     Attributes
     ----------
     problem
-        The problem; its iterate is the solution.
-    forces
-        Multipliers of the unilateral constraint and of friction.
+        The problem.
+    state
+        Where it is: a value, which nothing that is done with the problem changes.
     outcome
         Whether it has converged, why it ended, and the residuals.
     history
@@ -55,7 +56,7 @@ class Solution:
     """
 
     problem: ContactProblem
-    forces: Multipliers
+    state: State
     outcome: Outcome
     history: History
     counters: Counters
@@ -75,7 +76,7 @@ class Solution:
 
     @cached_property
     def _unknowns(self) -> dict[str, fem.Function]:
-        return unknowns(self.problem)
+        return unknowns(self.problem.equilibrium, self.state.x)
 
     @property
     def displacement(self) -> fem.Function:
@@ -90,12 +91,17 @@ class Solution:
     @property
     def nodal(self) -> Array:
         """Displacement (and scaled potential) at the contact nodes, shape (n, block size)."""
-        return nodal_iterate(self.problem)
+        return self.problem.nodal(self.state)
+
+    @property
+    def forces(self) -> Multipliers:
+        """Multipliers of the unilateral constraint and of friction."""
+        return self.state.forces
 
     @property
     def pressure(self) -> Array:
         """Contact pressure -sigma_nu, shape (n,): multiplier and layer."""
-        return total_pressure(self.problem, self.nodal, self.forces)
+        return self.problem.interface.pressure(self.nodal, self.forces)
 
     @property
     def friction(self) -> Array:
@@ -105,24 +111,24 @@ class Solution:
     @property
     def friction_bound(self) -> Array:
         """Friction bound s, shape (n,). Collective."""
-        return bound_of(self.problem, self.nodal, self.forces)
+        return self.problem.interface.bound(self.nodal, self.forces)
 
     @property
     def normal_displacement(self) -> Array:
         """u_nu along the contact direction, shape (n,)."""
-        return self.problem.trace.normal_component(self.nodal)
+        return self.problem.nodes.normal_component(self.nodal)
 
     @property
     def slip(self) -> Array:
         """Tangential displacement u_tau, shape (n, d)."""
-        return self.problem.trace.tangential_component(self.nodal)
+        return self.problem.nodes.tangential_component(self.nodal)
 
     @property
     def contact_force(self) -> Array:
         """The force that the body exerts on the foundation, shape (d,). Collective."""
-        trace = self.problem.trace
-        vectors = self.pressure[:, None] * trace.normal + self.friction
-        return np.asarray(trace.comm.allreduce(trace.weight @ vectors, op=MPI.SUM))
+        nodes = self.problem.nodes
+        stress = self.problem.interface.stress(self.nodal, self.forces)
+        return np.asarray(nodes.comm.allreduce(nodes.weight @ stress, op=MPI.SUM))
 
     @property
     def status(self) -> Array:
@@ -133,13 +139,9 @@ class Solution:
         exceeds the friction bound (always without friction), and sticks else. What is below
         1e-9 of the largest pressure counts as rounding.
         """
-        problem, c = self.problem, stiffness_scale(self.problem)
-        opening = self.normal_displacement - problem.trace.gap
-        layer = problem.response.layer_pressure(self.nodal)
-        rounding = 1e-9 * problem.trace.maximum(self.pressure)
-        touching = (self.forces.pressure + c * opening > rounding) | (layer > rounding)
-        trial = np.linalg.norm(self.friction + c * self.slip, axis=1)
-        slipping = trial > self.friction_bound + rounding
-        if not problem.frictional:
-            slipping[:] = True
-        return np.where(touching, np.where(slipping, "slip", "stick"), "open")
+        interface, nodal = self.problem.interface, self.nodal
+        rounding = 1e-9 * interface.jump.maximum(self.pressure)
+        status = interface.status(nodal, self.forces, self.friction_bound, rounding=rounding)
+        layer = interface.response.layer_pressure(nodal) > rounding
+        touches = (status & CLOSED > 0) | layer
+        return np.where(touches, np.where(status & STICKS > 0, "stick", "slip"), "open")

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scipy import sparse
 from scipy.sparse import csgraph
 
-from contact.interface.nodes import candidates
+from contact.interface.placing import candidates
 from contact.output.solution import Solution
 from contact.problem.problem import ContactProblem
 from contact.typing import Array
@@ -39,17 +39,18 @@ def contact_table(solution: Solution) -> Table | None:
     contact direction; ``pressure`` and ``bound`` are -sigma_nu and the friction bound;
     ``d_n`` is the charge D.nu that leaves through the foundation.
     """
-    problem, trace = solution.problem, solution.problem.trace
+    problem, nodes = solution.problem, solution.problem.nodes
     nodal, pressure = solution.nodal, solution.pressure
     # Mesh generators leave coordinates such as -3e-19.
-    points = np.where(np.abs(trace.points) < 1e-15 * problem.domain.size, 0.0, trace.points)
+    points = np.where(np.abs(nodes.points) < 1e-15 * problem.domain.size, 0.0, nodes.points)
     columns: dict[str, NDArray[Any]] = dict(zip("xyz", points.T, strict=False))
     # The gap without a rigid part is that of the layer's first touch.
-    gap = problem.response.trace.gap
-    columns |= {"weight": trace.weight, "gap": gap, "u_n": solution.normal_displacement}
+    response = problem.interface.response
+    gap = response.jump.gap
+    columns |= {"weight": nodes.weight, "gap": gap, "u_n": solution.normal_displacement}
     slip, friction = solution.slip, solution.friction
     if problem.dim == 2:
-        tangent = tangent_of(trace.normal)
+        tangent = tangent_of(nodes.normal)
         columns |= {
             "u_t": np.einsum("ni,ni->n", slip, tangent),
             "pressure": pressure,
@@ -61,9 +62,9 @@ def contact_table(solution: Solution) -> Table | None:
         columns |= {f"tau_{axis}": friction[:, i] for i, axis in enumerate("xyz")}
     columns |= {"bound": solution.friction_bound, "status": solution.status}
     if problem.piezoelectric:
-        columns["phi"] = problem.phi_scale * nodal[:, -1]
-        columns["d_n"] = problem.response.charge(nodal, pressure)
-    columns |= {f"nu_{axis}": trace.normal[:, i] for i, axis in enumerate("xyz"[: problem.dim])}
+        columns["phi"] = problem.equilibrium.phi_scale * nodal[:, -1]
+        columns["d_n"] = response.charge(nodal, pressure)
+    columns |= {f"nu_{axis}": nodes.normal[:, i] for i, axis in enumerate("xyz"[: problem.dim])}
     order = _order(problem)
     gathered = {name: problem.comm.gather(values) for name, values in columns.items()}
     if order is None:
@@ -78,17 +79,17 @@ def csv_columns(table: Table) -> Table:
 
 def held_points(problem: ContactProblem) -> Array:
     """Return the nodes of Gamma_3 that are no contact nodes, (n, d), from all ranks. Collective."""
-    found = candidates(problem.domain, problem.space, problem.contact.on)
-    points = found.points[~np.isin(found.nodes, problem.trace.nodes)]
+    found = candidates(problem.domain, problem.equilibrium.space, problem.contact.on)
+    points = found.points[~np.isin(found.nodes, problem.nodes.nodes)]
     return np.concatenate(problem.comm.allgather(points))
 
 
 def _order(problem: ContactProblem) -> NDArray[np.intp] | None:
     """Return the order of the gathered contact nodes, on rank 0."""
-    trace, comm = problem.trace, problem.comm
-    index_map = problem.space.dofmap.index_map
-    names = comm.gather(index_map.local_to_global(trace.nodes))
-    points = comm.gather(trace.points)
+    nodes, comm = problem.nodes, problem.comm
+    index_map = problem.equilibrium.layout.index_map
+    names = comm.gather(index_map.local_to_global(nodes.nodes))
+    points = comm.gather(nodes.points)
     links = comm.gather(_links(problem)) if problem.dim == 2 else None
     if names is None or points is None:
         return None
@@ -103,7 +104,7 @@ def _order(problem: ContactProblem) -> NDArray[np.intp] | None:
 
 def _links(problem: ContactProblem) -> NDArray[np.int64]:
     """Return the global numbers of neighbours on the owned facets of Gamma_3, shape (m, 2)."""
-    mesh, space = problem.domain.mesh, problem.space
+    mesh, space = problem.domain.mesh, problem.equilibrium.space
     facets = problem.domain.facets(problem.contact.on)
     topology = mesh.topology
     topology.create_connectivity(1, 2)

@@ -7,18 +7,22 @@ contact problem solves this one too, in small dense steps.
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
-from dolfinx import fem
-from dolfinx.fem.petsc import assemble_matrix, create_matrix
+from mpi4py import MPI
+from numpy.typing import NDArray
 from petsc4py import PETSc
-from scipy.linalg.lapack import dgetrf, dgetrs
 
-from contact.linear import multigrid as linear_amg
-from contact.linear.operator import Counters, LinearOperator, check_overflow, petsc_options
+from contact.interface.interface import Interface
+from contact.interface.multipliers import Multipliers
+from contact.linear import multigrid
+from contact.linear.dense import DenseOperator
+from contact.linear.operator import Counters, balance, check_overflow, petsc_options
 from contact.linear.schur import SchurComplement
 from contact.problem.problem import ContactProblem
+from contact.problem.scales import Scales
+from contact.problem.state import State
 from contact.typing import Array
 
 #: Unknowns that are kept at most: the dense matrix then takes 130 MB.
@@ -27,90 +31,97 @@ LARGEST = 4200
 PREFIX = "contact_"
 
 
-class CondensedProblem(ContactProblem):
-    """The contact nodes of a problem, with a linear body behind them.
-
-    Parameters
-    ----------
-    full
-        The problem whose laws, nodes and foundation these are.
+@dataclass(frozen=True)
+class CondensedBody:
+    """A linear body seen from its kept nodes: an equilibrium of its own.
 
     Attributes
     ----------
+    comm, dim
+        As those of the body.
+    free
+        Which unknowns of the owned kept nodes are not fixed, shape (nodes, block size).
     stiffness
-        The body's Schur complement, on all ranks.
+        The Schur complement, on all ranks.
+    residual
+        Condensed internal forces minus loads where the body was linearised, all ranks.
+    at
+        The owned kept unknowns there.
+    own
+        Where these are among those of all ranks.
+    size
+        Norm of the loads and reactions of the whole body.
     """
 
-    def __init__(self, full: ContactProblem) -> None:
-        # Everything about Gamma_3 is shared; nothing of the body is built again.
-        self.__dict__.update(full.__dict__)
-        held = full.held.nodes if full.held is not None else full.trace.nodes[:0]
-        self.nodes = np.concatenate([full.trace.nodes, held])
-        positions = np.arange(self.nodes.size, dtype=np.int32)
-        own = full.trace.nodes.size
-        self.trace = replace(full.trace, nodes=positions[:own])
-        if full.held is not None:
-            self.held = replace(full.held, nodes=positions[own:])
-        self.free = full.free[self.nodes]
-        self._unknowns = np.zeros(self.free.size)
-        self.external = np.zeros(self.free.size)
+    comm: MPI.Intracomm
+    dim: int
+    free: NDArray[np.bool_]
+    stiffness: Array
+    residual: Array
+    at: Array
+    own: slice
+    size: float
+
+    linear = True
 
     @property
-    def unknowns(self) -> Array:
-        """The iterate at the kept nodes."""
-        return self._unknowns
+    def block_size(self) -> int:
+        """Number of unknowns of a node."""
+        return self.free.shape[1]
 
     @property
-    def linear_material(self) -> bool:
-        """True: the material has been linearised."""
-        return True
+    def owned(self) -> int:
+        """Number of unknowns that this rank owns."""
+        return self.free.size
 
-    @property
-    def load_size(self) -> float:
-        """Norm of the loads and reactions of the whole body."""
-        return self._load_size
+    def rest(self) -> Array:
+        """Return unknowns of zero."""
+        return np.zeros(self.owned)
 
-    def linearise(
-        self, stiffness: Array, residual: Array, offset: int, full: ContactProblem, size: float
-    ) -> None:
-        """Take a new linear body.
+    def prescribe(self, x: Array, load: float = 1.0) -> Array:
+        """Return unknowns with the fixed ones as they were: the load has been condensed."""
+        return np.where(self.free.ravel(), x, self.at)
 
-        Parameters
-        ----------
-        stiffness, residual
-            Its Schur complement, and the condensed internal forces minus loads, all ranks.
-        offset
-            Where the owned unknowns begin.
-        full
-            The problem that it was linearised at.
-        size
-            Norm of the loads and reactions of the whole body.
-        """
-        self.stiffness, self._residual, self._load_size = stiffness, residual, size
-        self._at = full.unknowns.reshape(-1, full.block_size)[self.nodes].ravel()
-        self.own = slice(offset, offset + self._at.size)
-        self._unknowns = self._at.copy()
+    def moved(self, x: Array, increment: Array) -> Array:
+        """Return unknowns plus an increment."""
+        return x + increment
 
-    def internal_forces(self) -> Array:
-        """Return the owned forces of the linear body, loads taken off."""
-        moved = self.trace.gather(self.moved)
-        return self.stiffness[self.own] @ moved + self._residual[self.own]
+    def internal_forces(self, x: Array, secant_at: Array | None = None) -> Array:
+        """Return the owned forces of the linear body, loads taken off. Collective."""
+        moved = np.concatenate(self.comm.allgather(x - self.at))
+        return np.asarray(self.stiffness[self.own] @ moved + self.residual[self.own])
 
-    @property
-    def moved(self) -> Array:
-        """How far the owned unknowns have moved since the body was linearised."""
-        return self._unknowns - self._at
+    def external(self, load: float = 1.0) -> Array:
+        """Return zero: the loads are part of the forces."""
+        return np.zeros(self.owned)
 
-    def freeze(self) -> None:
-        """Do nothing: the body is linear."""
+    def load_size(self, load: float = 1.0) -> float:
+        """Return the norm of the loads and reactions of the whole body."""
+        return self.size
 
-    def reset(self) -> None:
-        """Set the free unknowns to zero."""
-        self._unknowns[:] = np.where(self.free.ravel(), 0.0, self._at)
+    def operator(
+        self, nodes: NDArray[np.int32], *, symmetric: bool, counters: Counters, kind: str
+    ) -> DenseOperator:
+        """Return the dense operator; it has blocks at all nodes, in their order."""
+        return DenseOperator(self, counters)
 
-    def add(self, increment: Array) -> None:
-        """Add an increment of the owned unknowns."""
-        self._unknowns += increment
+    def norm(self, values: Array) -> float:
+        """Return the Euclidean norm of owned values. Collective."""
+        return float(np.sqrt(self.comm.allreduce(np.dot(values, values), op=MPI.SUM)))
+
+
+@dataclass(frozen=True)
+class CondensedProblem:
+    """The contact nodes of a problem, with a linear body behind them."""
+
+    equilibrium: CondensedBody
+    interface: Interface
+    scales: Scales
+
+    def start(self, load: float = 1.0) -> State:
+        """Return the state with the free unknowns at zero."""
+        x = self.equilibrium.prescribe(self.equilibrium.rest())
+        return State(x, Multipliers.zero(self.interface.jump), load)
 
 
 class Condensation:
@@ -122,66 +133,97 @@ class Condensation:
         The whole problem.
     counters
         Where sparse factorisations and solves are counted.
-
-    Attributes
-    ----------
-    problem
-        What is left to be solved at the contact nodes.
     """
 
     def __init__(self, full: ContactProblem, counters: Counters) -> None:
         self.full, self.counters = full, counters
-        self.problem = CondensedProblem(full)
-        self._matrix = create_matrix(full.secant)
-        self._form: fem.Form | None = None
+        self.nodes = full.interface.coupled
+        self._interface = _at_kept_nodes(full.interface)
+        self._matrix = full.equilibrium.create_matrix()
+        self._kind = ""
         self._schur: SchurComplement | None = None
 
-    def linearise(self, form: fem.Form) -> bool:
-        """Condense the body at the full problem's iterate, after `freeze`. Collective.
+    def linearise(self, kind: str, state: State) -> CondensedProblem | None:
+        """Condense the body, linearised at a state of the full problem. Collective.
 
         Parameters
         ----------
-        form
-            `problem.secant` or `problem.tangent`.
+        kind
+            "secant" or "tangent".
+        state
+            Where.
 
         Returns
         -------
-        Whether it can be: few unknowns are kept, and these hold the others.
+        What is left to be solved; None if it cannot be condensed: many unknowns are kept, or
+        these do not hold the others.
 
         Raises
         ------
         InputError
             If numbers overflow.
         """
-        full, problem = self.full, self.problem
-        if self._schur is None or form is not self._form or not full.linear_material:
-            self._matrix.zeroEntries()
-            assemble_matrix(self._matrix, form, bcs=full.bcs)
-            self._matrix.assemble()
+        body = self.full.equilibrium
+        if self._schur is None or kind != self._kind or not body.linear:
+            body.assemble(self._matrix, kind, state.x)
+            balance(self._matrix, body.layout)
             if self._schur is None:
-                columns = np.arange(full.block_size, dtype=np.int32)
-                kept = (problem.nodes[:, None] * full.block_size + columns).ravel()
-                self._schur = SchurComplement(self._matrix, kept, PREFIX)
+                self._schur = SchurComplement(self._matrix, self._kept(), PREFIX)
             if self._schur.dense_size > LARGEST:
-                return False
+                return None
             with petsc_options(PREFIX):
                 self._stiffness = self._schur.factorise(self._matrix)
-            self._form = form
+            self._kind = kind
             self.counters.factorizations += 1
-        residual, free = full.internal_forces() - full.external, full.free.ravel()
-        check_overflow(full, self._matrix.norm(), full.norm(residual))
-        reactions = full.norm(np.where(free, 0.0, residual))
-        forces = -self._schur.condense(np.where(free, -residual, 0.0))
-        problem.linearise(
-            self._stiffness, forces, self._schur.offset, full, full.load_size + reactions
+        residual = body.internal_forces(state.x) - body.external(state.load)
+        check_overflow(body.layout, self._matrix.norm(), body.norm(residual))
+        reactions = body.norm(np.where(body.free.ravel(), 0.0, residual))
+        forces = -self._schur.condense(body.layout.mask(-residual))
+        if not (np.isfinite(self._stiffness).all() and np.isfinite(forces).all()):
+            return None
+        at = state.x.reshape(-1, body.block_size)[self.nodes].ravel()
+        condensed = CondensedBody(
+            body.comm,
+            body.dim,
+            body.free[self.nodes],
+            self._stiffness,
+            forces,
+            at,
+            slice(self._schur.offset, self._schur.offset + at.size),
+            body.load_size(state.load) + reactions,
         )
-        return bool(np.isfinite(self._stiffness).all() and np.isfinite(forces).all())
+        return CondensedProblem(condensed, self._interface, self.full.scales)
 
-    def expand(self) -> Array:
-        """Return the increment of the full problem's owned unknowns. Collective."""
+    def _kept(self) -> NDArray[np.int32]:
+        bs = self.full.equilibrium.block_size
+        return (self.nodes[:, None] * bs + np.arange(bs, dtype=np.int32)).ravel()
+
+    def expand(self, condensed: CondensedProblem, x: Array) -> Array:
+        """Return the increment of the full problem's owned unknowns. Collective.
+
+        Parameters
+        ----------
+        condensed
+            The condensed problem that was made last.
+        x
+            Its solution.
+        """
         assert self._schur is not None
         self.counters.linear_solves += 1
-        return self._schur.expand(self.problem.trace.gather(self.problem.moved))
+        moved = x - condensed.equilibrium.at
+        return self._schur.expand(np.concatenate(self.full.comm.allgather(moved)))
+
+
+def _at_kept_nodes(interface: Interface) -> Interface:
+    """Return an interface whose nodes are numbered among the kept ones."""
+    count = interface.jump.nodes.size
+    positions = np.arange(interface.coupled.size, dtype=np.int32)
+    held = interface.held
+    return replace(
+        interface,
+        jump=replace(interface.jump, nodes=positions[:count]),
+        held=None if held is None else replace(held, nodes=positions[count:]),
+    )
 
 
 def condensation(problem: ContactProblem, counters: Counters, kind: str) -> Condensation | None:
@@ -193,50 +235,8 @@ def condensation(problem: ContactProblem, counters: Counters, kind: str) -> Cond
     options = PETSc.Options(PREFIX)
     names = ("ksp_type", "pc_type", "pc_factor_mat_solver_type")
     chosen = any(options.hasName(name) for name in names)
-    iterative = kind == "iterative" or (kind == "auto" and linear_amg.is_large(problem))
-    if chosen or iterative or problem.trace.size * problem.block_size > LARGEST:
+    body = problem.equilibrium
+    iterative = kind == "iterative" or (kind == "auto" and multigrid.is_large(body.layout))
+    if chosen or iterative or problem.nodes.size * body.block_size > LARGEST:
         return None
     return Condensation(problem, counters)
-
-
-class DenseOperator:
-    """The linear body of a condensed problem plus nodal blocks; as `linear.LinearOperator`."""
-
-    symmetric = False
-
-    def __init__(self, problem: CondensedProblem, counters: Counters) -> None:
-        self.problem, self.counters = problem, counters
-        self._factors: tuple[Array, Array] | None = None
-
-    def update(self, form: fem.Form, blocks: Array, *, constant: bool = False) -> None:
-        """Add up and factorise. Collective; see `linear.LinearOperator.update`."""
-        problem = self.problem
-        if problem.held is not None:
-            blocks = np.concatenate([blocks, problem.held.block(problem.unknowns)])
-        free = problem.free.astype(float)
-        masked = problem.trace.gather(blocks * free[:, :, None] * free[:, None, :])
-        total = problem.stiffness.copy(order="F")
-        n, size = masked.shape[:2]
-        rows = np.arange(n * size).reshape(n, size)
-        total[rows[:, :, None], rows[:, None, :]] += masked
-        factors, pivots, _ = dgetrf(total, overwrite_a=True)
-        self._factors = factors, pivots
-        self.counters.factorizations += 1
-
-    def solve(self, rhs: Array, rtol: float | None = None, guess: Array | None = None) -> Array:
-        """Solve for the owned unknowns. Collective; see `linear.LinearOperator.solve`."""
-        assert self._factors is not None
-        problem = self.problem
-        total = problem.trace.gather(np.where(problem.free.ravel(), rhs, 0.0))
-        self.counters.linear_solves += 1
-        solution, _ = dgetrs(*self._factors, total, overwrite_b=True)
-        return np.asarray(solution[problem.own])
-
-
-def operator(
-    problem: ContactProblem, *, symmetric: bool = True, counters: Counters, kind: str = "auto"
-) -> LinearOperator | DenseOperator:
-    """Return the operator of a problem: sparse, or dense where its body is condensed."""
-    if isinstance(problem, CondensedProblem):
-        return DenseOperator(problem, counters)
-    return LinearOperator(problem, symmetric=symmetric, counters=counters, kind=kind)

@@ -10,7 +10,7 @@ from scipy.optimize import linprog
 from contact.body.pieces import connected_pieces
 from contact.errors import InputError
 from contact.problem.problem import ContactProblem
-from contact.problem.state import Multipliers, nodal_iterate, total_pressure
+from contact.problem.state import State
 from contact.typing import Array
 
 #: Eigenvalues of the Gram matrices below are between 0 and about 1.
@@ -29,16 +29,16 @@ def check_held(problem: ContactProblem) -> None:
     InputError
         If the body can move freely or is pulled off.
     """
-    piece, count = connected_pieces(problem.space)
+    piece, count = connected_pieces(problem.equilibrium.space)
     for k in range(count):
         _check_piece(problem, piece == k, count)
 
 
 def _check_piece(problem: ContactProblem, inside: NDArray[np.bool_], count: int) -> None:
     """Check one piece, of which there are `count`, given its owned nodes."""
-    trace, d = problem.trace, problem.dim
-    points = problem.space.tabulate_dof_coordinates()[: problem.free.shape[0], :d]
-    touching_here = inside[trace.nodes]
+    nodes, d = problem.nodes, problem.dim
+    points = problem.equilibrium.layout.points
+    touching_here = inside[nodes.nodes]
     centre, size = _centre(problem), problem.domain.size
     if count > 1:
         centre, size = _middle(problem, points[inside])
@@ -49,10 +49,10 @@ def _check_piece(problem: ContactProblem, inside: NDArray[np.bool_], count: int)
     free = _null_space(supports)
     if free.shape[1] == 0:
         return
-    at_contact = rigid_motions((trace.points - centre) / size) * touching_here[:, None, None]
-    normal = np.einsum("ni,nim->nm", trace.normal, at_contact)
+    at_contact = rigid_motions((nodes.points - centre) / size) * touching_here[:, None, None]
+    normal = np.einsum("ni,nim->nm", nodes.normal, at_contact)
     touching = _gram(problem, normal[:, None, :])
-    tangential = np.einsum("nij,njm->nim", trace.tangent, at_contact)
+    tangential = np.einsum("nij,njm->nim", nodes.tangent, at_contact)
     if problem.frictional:
         touching = touching + _gram(problem, tangential)
     loose = _null_space(supports + touching)
@@ -66,11 +66,12 @@ def _check_piece(problem: ContactProblem, inside: NDArray[np.bool_], count: int)
             "accepted: displacement components fixed so that it cannot"
             + (", or regions that share the nodes between them" if count > 1 else "")
         )
-    loads = problem.external.reshape(-1, problem.block_size)[:, :d] * inside[:, None]
+    body = problem.equilibrium
+    loads = body.external().reshape(-1, body.block_size)[:, :d] * inside[:, None]
     _check_loads(problem, loads, free, normal, tangential, (points - centre) / size)
 
 
-def check_potential(problem: ContactProblem, forces: Multipliers) -> None:
+def check_potential(problem: ContactProblem, state: State) -> None:
     """Check that the potential of a solution is more than known but for a constant. Collective.
 
     It is where it is prescribed, and where current flows, also through nodes that cannot move.
@@ -83,11 +84,12 @@ def check_potential(problem: ContactProblem, forces: Multipliers) -> None:
     """
     if not problem.piezoelectric:
         return
-    nodal, comm = nodal_iterate(problem), problem.comm
-    slopes = problem.response.jacobian(nodal, total_pressure(problem, nodal, forces))[:, -1, -1]
+    interface, nodal, comm = problem.interface, problem.nodal(state), problem.comm
+    pressure = interface.pressure(nodal, state.forces)
+    slopes = interface.response.jacobian(nodal, pressure)[:, -1, -1]
     known = bool(np.any(slopes != 0)) or not np.all(problem.free[:, -1])
-    if problem.held is not None:
-        known = known or bool(np.any(problem.held.slope(problem.unknowns) != 0))
+    if interface.held is not None:
+        known = known or bool(np.any(interface.held.slope(state.x) != 0))
     if not comm.allreduce(known, op=MPI.LOR):
         raise InputError(
             "the potential is not determined: it is prescribed nowhere, and the foundation "
@@ -111,9 +113,9 @@ def rigid_motions(points: NDArray[np.floating]) -> Array:
 
 def _centre(problem: ContactProblem) -> Array:
     """Return the mean of the contact nodes: rotations about it are well scaled."""
-    trace = problem.trace
-    weight = trace.sum(np.ones_like(trace.weight))
-    return np.array([trace.sum(x) for x in trace.points.T]) / weight
+    nodes = problem.nodes
+    weight = nodes.sum(np.ones_like(nodes.weight))
+    return np.array([nodes.sum(x) for x in nodes.points.T]) / weight
 
 
 def _middle(problem: ContactProblem, points: Array) -> tuple[Array, float]:
@@ -153,7 +155,7 @@ def _check_loads(
     free: Array,
     normal: Array,
     tangential: Array,
-    points: Array,
+    points: NDArray[np.floating],
 ) -> None:
     """Refuse loads that no contact force can balance.
 
@@ -161,8 +163,9 @@ def _check_loads(
     m.nu <= -mu |m_tau| at every node (Farkas). A given friction bound, and a smoothed pressure,
     are not bounded by the pressure at the node: such problems are left to the solver.
     """
-    coefficient = problem.friction.coefficient
-    if problem.tresca is not None or problem.friction.radius > 0:
+    friction = problem.interface.friction
+    coefficient = friction.coefficient
+    if friction.tresca is not None or not friction.local:
         return
     mu = 0.0 if coefficient is None else coefficient.maximum
     mu = problem.comm.allreduce(mu, op=MPI.MAX)
@@ -173,7 +176,7 @@ def _check_loads(
     # |m_tau| <= sqrt(d) times its largest component: a cone of planes inside the cone.
     across = [np.sqrt(d) * mu * part @ free for part in np.moveaxis(tangential, 1, 0)]
     rows = [normal @ free + sign * part for part in across for sign in (-1, 1)]
-    cone = np.concatenate([problem.trace.gather(row) for row in rows])
+    cone = np.concatenate([problem.nodes.gather(row) for row in rows])
     pulled = False
     if comm.rank == 0 and np.abs(work).max() > ROUNDING * scale:
         motion = linprog(-work, cone, np.zeros(len(cone)), bounds=[(-1, 1)] * free.shape[1])

@@ -10,9 +10,9 @@ from dataclasses import dataclass
 import numpy as np
 from mpi4py import MPI
 
-from contact.interface.projections import project_disc, project_half_line
-from contact.problem.problem import ContactProblem
-from contact.problem.state import Multipliers, bound_of, nodal_iterate, total_pressure
+from contact.interface.residuals import interface_residuals
+from contact.problem.protocols import Problem
+from contact.problem.state import State
 from contact.typing import Array
 
 
@@ -56,70 +56,53 @@ class KKT:
         return f"the {worst} residual is {value:.2e}, above {limit:g}"
 
 
-def stiffness_scale(problem: ContactProblem) -> float:
-    """Return c = E / (size of the body): the scale between displacements and stresses."""
-    return float(problem.body.law.young) / problem.domain.size
-
-
-def residual_forces(problem: ContactProblem, forces: Multipliers) -> Array:
-    """Return F(x) - loads + contact and foundation forces, owned unknowns, after `freeze`.
+def residual_forces(problem: Problem, state: State, secant_at: Array | None = None) -> Array:
+    """Return F(x) - loads + contact and foundation forces on the owned unknowns. Collective.
 
     Its entries at fixed unknowns are minus the reactions of the supports.
+
+    Parameters
+    ----------
+    problem, state
+        The problem, and where it is.
+    secant_at
+        Unknowns at which the secant modulus of the material is taken; those of the state by
+        default.
     """
-    trace, nodal = problem.trace, nodal_iterate(problem)
-    residual = problem.internal_forces() - problem.external
-    trace.add(residual, trace.weight[:, None] * forces.vectors(problem))
-    pressure = total_pressure(problem, nodal, forces)
-    trace.add(residual, trace.weight[:, None] * problem.response.force(nodal, pressure))
-    if problem.held is not None:
-        problem.held.add_force(residual, problem.unknowns)
+    body = problem.equilibrium
+    residual = body.internal_forces(state.x, secant_at) - body.external(state.load)
+    problem.interface.add_forces(residual, state.x, state.forces)
     return residual
 
 
-def interface_residuals(
-    problem: ContactProblem, nodal: Array, forces: Multipliers, bound: Array
-) -> tuple[float, float]:
-    """Return the relative contact and friction residuals at nodal unknowns. Collective."""
-    trace, c = problem.trace, stiffness_scale(problem)
-    opening = trace.normal_component(nodal) - trace.gap
-    contact = forces.pressure - project_half_line(forces.pressure + c * opening)
-    trial = forces.friction + c * trace.tangential_component(nodal)
-    friction = forces.friction - project_disc(trial, bound)
-    # Where next to nothing presses, rounding is compared with the stress that closing would take.
-    closing = c * trace.norm(np.minimum(np.abs(opening), problem.domain.size))
-    scale = max(trace.norm(total_pressure(problem, nodal, forces)), 1e-4 * closing) or 1.0
-    return trace.norm(contact) / scale, trace.norm(friction) / scale
-
-
-def _least_force(problem: ContactProblem) -> float:
+def _least_force(problem: Problem, state: State) -> float:
     """Return 1e-6 of the forces that would hold each node alone at the prescribed displacement.
 
     Rounding is some 1e-15 of those, so that it passes for nothing at any sensible tolerance.
     """
-    law, dim, comm = problem.body.law, problem.dim, problem.comm
-    prescribed = problem.unknowns[: problem.owned][~problem.free.ravel()]
-    largest = comm.allreduce(float(np.abs(prescribed).max(initial=0.0)), op=MPI.MAX)
-    nodes = comm.allreduce(problem.free.shape[0], op=MPI.SUM)
-    spacing = problem.domain.size / nodes ** (1 / dim)
-    stiffness = (float(law.bulk) + 4 / 3 * float(law.shear)) * spacing ** (dim - 2)
+    body, scales = problem.equilibrium, problem.scales
+    prescribed = state.x[: body.owned][~body.free.ravel()]
+    largest = body.comm.allreduce(float(np.abs(prescribed).max(initial=0.0)), op=MPI.MAX)
+    nodes = body.comm.allreduce(body.free.shape[0], op=MPI.SUM)
+    spacing = scales.size / nodes ** (1 / body.dim)
+    stiffness = (scales.bulk + 4 / 3 * scales.shear) * spacing ** (body.dim - 2)
     return 1e-6 * stiffness * largest * float(np.sqrt(nodes))
 
 
-def evaluate(problem: ContactProblem, forces: Multipliers) -> KKT:
-    """Return the residuals of the iterate `problem.x` and the contact forces. Collective."""
-    problem.freeze()
-    residual = residual_forces(problem, forces)
-    free = problem.free.ravel()
-    trace, nodal = problem.trace, nodal_iterate(problem)
+def evaluate(problem: Problem, state: State) -> KKT:
+    """Return the residuals of a state. Collective; nothing is changed by it."""
+    body, interface = problem.equilibrium, problem.interface
+    residual, free = residual_forces(problem, state), body.free.ravel()
+    jump, nodal = interface.jump, interface.jump.apply(state.x)
     contact_forces = np.zeros_like(residual)
-    vectors = total_pressure(problem, nodal, forces)[:, None] * trace.normal + forces.friction
-    trace.add(contact_forces, trace.weight[:, None] * vectors)
-    loads, pushes = problem.load_size, problem.norm(contact_forces)
-    scale = loads + pushes + problem.norm(np.where(free, 0.0, residual))
+    stress = interface.stress(nodal, state.forces)
+    jump.transpose(jump.weight[:, None] * stress, contact_forces)
+    loads, pushes = body.load_size(state.load), body.norm(contact_forces)
+    scale = loads + pushes + body.norm(np.where(free, 0.0, residual))
     # Supports that move an untouched body rigidly leave rounding, in the reactions as well.
-    least = _least_force(problem)
+    least = _least_force(problem, state)
     if loads == 0 and pushes <= 1e-6 * least:
         scale = max(scale, least)
-    equilibrium = problem.norm(np.where(free, residual, 0.0)) / (scale or 1.0)
-    bound = bound_of(problem, nodal, forces)
-    return KKT(equilibrium, *interface_residuals(problem, nodal, forces, bound))
+    equilibrium = body.norm(np.where(free, residual, 0.0)) / (scale or 1.0)
+    bound = interface.bound(nodal, state.forces)
+    return KKT(equilibrium, *interface_residuals(interface, nodal, state.forces, bound))

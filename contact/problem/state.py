@@ -1,4 +1,4 @@
-"""The unknowns of a contact problem at the contact nodes, and how they are read."""
+"""The state of a contact problem: a value, which queries take and methods return."""
 
 from __future__ import annotations
 
@@ -6,52 +6,43 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from contact.problem.problem import ContactProblem
+from contact.interface.multipliers import Multipliers
 from contact.typing import Array
 
 
 @dataclass(frozen=True)
-class Multipliers:
-    """Contact forces at the owned contact nodes.
+class State:
+    """Unknowns and contact forces, and how much of the load acts.
+
+    Its arrays are not to be written to (they are marked so): a new state has new ones.
 
     Attributes
     ----------
-    pressure
-        lambda_c = -sigma_nu without the layer's part, shape (n,).
-    friction
-        lambda_f = -sigma_tau, tangential vectors, shape (n, d).
+    x
+        Local unknowns, those of the ghosts behind the owned ones: displacement and scaled
+        potential, node by node.
+    forces
+        Multipliers of the unilateral constraint and of friction.
+    load
+        Part of the loads and prescribed values that acts; 1 for all.
     """
 
-    pressure: Array
-    friction: Array
+    x: Array
+    forces: Multipliers
+    load: float = 1.0
 
-    @staticmethod
-    def zero(problem: ContactProblem) -> Multipliers:
-        """Return vanishing contact forces."""
-        n = problem.trace.nodes.size
-        return Multipliers(np.zeros(n), np.zeros((n, problem.dim)))
+    def __post_init__(self) -> None:
+        """Keep whoever holds the state from changing it."""
+        for array in (self.x, self.forces.pressure, self.forces.friction):
+            array.flags.writeable = False
 
-    def vectors(self, problem: ContactProblem) -> Array:
-        """Return lambda_c nu + lambda_f, shape (n, d)."""
-        return self.pressure[:, None] * problem.trace.normal + self.friction
-
-
-def nodal_iterate(problem: ContactProblem) -> Array:
-    """Return the iterate at the owned contact nodes, shape (n, block size)."""
-    return problem.trace.values(problem.unknowns[: problem.owned])
-
-
-def slip_of(problem: ContactProblem, nodal: Array) -> Array:
-    """Return |u_tau| at nodal unknowns of shape (n, block size)."""
-    return np.linalg.norm(problem.trace.tangential_component(nodal), axis=1)
-
-
-def total_pressure(problem: ContactProblem, nodal: Array, forces: Multipliers) -> Array:
-    """Return -sigma_nu: the multiplier and the layer's pressure."""
-    return forces.pressure + problem.response.layer_pressure(nodal)
-
-
-def bound_of(problem: ContactProblem, nodal: Array, forces: Multipliers) -> Array:
-    """Return the friction bound s at nodal unknowns and contact forces. Collective."""
-    pressure = total_pressure(problem, nodal, forces)
-    return np.asarray(problem.friction_bound(pressure, slip_of(problem, nodal)), dtype=float)
+    def near(self, other: State, rtol: float = 0.0, atol: float = 0.0) -> bool:
+        """Tell whether another state of the same problem has the same values on this rank."""
+        pairs = (
+            (self.x, other.x),
+            (self.forces.pressure, other.forces.pressure),
+            (self.forces.friction, other.forces.friction),
+        )
+        return self.load == other.load and all(
+            np.allclose(one, two, rtol=rtol, atol=atol) for one, two in pairs
+        )

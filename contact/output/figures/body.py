@@ -96,7 +96,7 @@ def picture(solution: Solution, field: str, label: str) -> Picture | None:
         assert solution.potential is not None
         values = linear(solution.potential)
     else:
-        values = DerivedFields(problem).cells()[field]
+        values = DerivedFields(problem.equilibrium, solution.state.x).cells()[field]
     cells, places = _triangles(domain)
     x = domain.mesh.geometry.x[_compat.geometry_dofmap(domain.mesh)]
     corners = np.take_along_axis(x[cells][:, :, :d], places[:, :, None], axis=1)

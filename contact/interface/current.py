@@ -1,22 +1,47 @@
-"""The current through contact nodes that cannot move.
+"""The conductive foundation, and the current through nodes that cannot move.
 
-A node of Gamma_3 whose displacement is prescribed carries no contact force, but where its
-potential is free it lets the current through like any other. Leaving it out would take its
-share of Gamma_3 from the electric contact.
+The foundation draws the charge psi(u_nu - rho) phi_L(phi - phi_F), (1.30). A node of Gamma_3
+whose displacement is prescribed carries no contact force, but where its potential is free it
+lets the current through like any other. Leaving it out would take its share of Gamma_3 from the
+electric contact.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
-from contact.interface.nodes import Candidates, ContactTrace
-from contact.interface.obstacle import Foundation
-from contact.interface.response import Conductor
+from contact.interface.nodes import ContactNodes
+from contact.interface.obstacle import Obstacle
+from contact.interface.placing import Candidates
 from contact.typing import Array
-from forms.laws import PerfectConductivity
+from forms.laws import Conductivity, Truncation
+
+
+@dataclass(frozen=True)
+class Conductor:
+    """A conductive foundation at the potential phi_f.
+
+    Attributes
+    ----------
+    psi
+        Conductivity law.
+    phi_f
+        Potential of the foundation.
+    phi_l
+        Truncation of the potential difference.
+    lagged
+        Whether the charge is taken from the previous outer iterate, as Algorithm 4 of the
+        thesis does: it then converges for small k_e only (Theorem 5.2). Else the block
+        relaxation of Algorithm 5 has phi implicit, as a Robin term, and only psi is lagged.
+    """
+
+    psi: Conductivity
+    phi_f: float
+    phi_l: Truncation = field(default_factory=lambda: Truncation(np.inf))
+    lagged: bool = False
 
 
 @dataclass(frozen=True)
@@ -48,13 +73,13 @@ class HeldCurrent:
     def _at_nodes(self, x: Array) -> tuple[Array, Array]:
         """Return psi and phi - phi_F for a local dof array."""
         size = self.block_size
-        nodal = x[: x.size // size * size].reshape(-1, size)[self.nodes]
+        nodal = x.reshape(-1, size)[self.nodes]
         opening = np.einsum("ni,ni->n", nodal[:, :-1], self.direction) - self.gap
         # Closed up to the rounding of the prescribed displacement.
         reach = np.abs(self.gap) + np.linalg.norm(nodal[:, :-1], axis=1)
         closed = opening >= -1e-12 * reach
-        psi = self.conductor.psi
-        conductivity = psi(closed if isinstance(psi, PerfectConductivity) else opening)
+        # Its displacement is prescribed, not found up to a tolerance: nothing is taken for closed.
+        conductivity = self.conductor.psi.at(opening, np.zeros_like(closed), closed)
         return conductivity, self.phi_scale * nodal[:, -1] - self.conductor.phi_f
 
     def charge(self, x: Array) -> Array:
@@ -82,9 +107,9 @@ class HeldCurrent:
 
 def held_current(
     candidates: Candidates,
-    foundation: Foundation,
+    obstacle: Obstacle,
     free: NDArray[np.bool_],
-    trace: ContactTrace,
+    jump: ContactNodes,
     conductor: Conductor,
     phi_scale: float,
 ) -> HeldCurrent:
@@ -94,15 +119,15 @@ def held_current(
     ----------
     candidates
         All owned nodes of Gamma_3.
-    foundation
+    obstacle
         Gives their contact direction and gap.
     free
         Which components of the owned nodes are not fixed, shape (nodes, block size).
-    trace, conductor, phi_scale
+    jump, conductor, phi_scale
         The contact nodes, the conductive foundation and the unit of the potential.
     """
-    direction, gap = foundation.measure(candidates.points, candidates.normal)
-    keep = ~np.isin(candidates.nodes, trace.nodes) & free[candidates.nodes, -1] & np.isfinite(gap)
+    direction, gap = obstacle.measure(candidates.points, candidates.normal)
+    keep = ~np.isin(candidates.nodes, jump.nodes) & free[candidates.nodes, -1] & np.isfinite(gap)
     return HeldCurrent(
         candidates.nodes[keep],
         candidates.weight[keep],
@@ -110,5 +135,5 @@ def held_current(
         gap[keep],
         conductor,
         phi_scale,
-        trace.block_size,
+        jump.block_size,
     )

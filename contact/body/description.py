@@ -1,0 +1,102 @@
+"""What is said of one body: material, supports and loads."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Protocol
+
+import numpy as np
+from ufl.core.expr import Expr
+
+from contact.errors import InputError
+from contact.typing import Array
+from forms.hencky import Hencky, Linear
+from forms.piezo import Piezo
+
+
+class Field(Protocol):
+    """A given function of position, for instance `contact.case.formula.Expression`."""
+
+    def ufl(self, x: Expr) -> Expr:
+        """Return the function as a UFL expression of the coordinates."""
+
+    def numpy(self, points: Array) -> Array:
+        """Return the values at points of shape (n, d)."""
+
+
+@dataclass(frozen=True)
+class Fixed:
+    """Prescribed values on a part; None leaves a component free."""
+
+    on: str
+    displacement: Sequence[Field | None] | None = None
+    potential: Field | None = None
+
+
+@dataclass(frozen=True)
+class Load:
+    """Given forces and charges: on a part, or in the whole body where `on` is None.
+
+    Attributes
+    ----------
+    force
+        Traction (force/area) on a part, body force (force/volume) in the body.
+    pressure
+        Pressure against the outward normal of the part (force/area).
+    charge
+        Surface charge q_2 = D.nu on a part, body charge q_0 in the body.
+    """
+
+    on: str | None
+    force: Sequence[Field] | None = None
+    pressure: Field | None = None
+    charge: Field | None = None
+
+
+@dataclass(frozen=True)
+class Body:
+    """Material and supports.
+
+    Attributes
+    ----------
+    law
+        Hencky law of the stress.
+    piezo
+        Piezoelectric tensors in the body's axes, or None.
+    """
+
+    law: Hencky
+    fixed: Sequence[Fixed]
+    loads: Sequence[Load] = field(default_factory=tuple)
+    piezo: Piezo | None = None
+
+    @property
+    def linear(self) -> bool:
+        """Whether the stress is a linear function of the strain."""
+        return isinstance(self.law, Linear)
+
+    @property
+    def phi_scale(self) -> float:
+        """Unit of the potential in the unknowns, sqrt(mu1/beta): both blocks are then alike."""
+        if self.piezo is None:
+            return 1.0
+        permittivity = float(np.trace(np.asarray(self.piezo.beta))) / 3
+        return float(np.sqrt(self.law.shear / permittivity))
+
+    def check(self, dim: int) -> None:
+        """Refuse piezoelectric tensors that are none, or none of a plane body.
+
+        Raises
+        ------
+        InputError
+            If they are not.
+        """
+        if self.piezo is None:
+            return
+        try:
+            self.piezo.check()
+            if dim == 2:
+                self.piezo.check_plane()
+        except ValueError as error:
+            raise InputError(f"piezoelectric material: {error}") from error

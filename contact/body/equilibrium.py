@@ -1,0 +1,218 @@
+"""Equilibrium of one body: what its forms give at a state.
+
+Unknowns are held in one blocked Lagrange space: d displacement components a node and, for a
+piezoelectric body, the potential divided by `phi_scale` = sqrt(mu1/beta). In these units both
+blocks of the operator have the same size, whatever the unit system.
+
+A state's unknowns are a local array, those of the ghosts behind the owned ones. Nothing here
+remembers one: every query is given the state that it is about.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import ufl
+from dolfinx import fem
+from dolfinx.fem.petsc import assemble_matrix, create_matrix
+from dolfinx.la import InsertMode
+from mpi4py import MPI
+from numpy.typing import NDArray
+from petsc4py import PETSc
+from ufl.core.expr import Expr
+
+from contact.body.constants import law_with_constants, piezo_with_constants
+from contact.body.description import Body
+from contact.body.loads import external_work
+from contact.body.supports import dirichlet, free_components
+from contact.linear.layout import Layout
+from contact.linear.operator import Counters, SparseOperator
+from contact.mesh.domain import Domain
+from contact.typing import Array
+from forms.hencky import secant_form
+from forms.piezo import symmetrised_form
+
+
+class BodyEquilibrium:
+    """Space, boundary conditions and weak forms of one body.
+
+    Parameters
+    ----------
+    domain
+        Mesh and named parts.
+    body
+        Material, supports and loads.
+    degree
+        Degree of the Lagrange elements, 1 or 2.
+
+    Raises
+    ------
+    InputError
+        If a part is missing, a vector has the wrong length, or the material is none.
+    """
+
+    def __init__(self, domain: Domain, body: Body, degree: int = 1) -> None:
+        body.check(domain.dim)
+        self.domain, self.body, self.degree = domain, body, degree
+        self.dim, self.phi_scale = domain.dim, body.phi_scale
+        self.block_size = self.dim + (body.piezo is not None)
+        mesh = domain.mesh
+        self.space = fem.functionspace(mesh, ("Lagrange", degree, (self.block_size,)))
+        self.bcs = dirichlet(domain, self.space, body)
+        index_map = self.space.dofmap.index_map
+        self.layout = Layout(
+            domain.comm,
+            index_map,
+            self.space.tabulate_dof_coordinates()[: index_map.size_local, : self.dim],
+            free_components(self.space, self.bcs),
+            domain.size,
+            float(body.law.young),
+        )
+        # Where the forms are evaluated; written anew by each query.
+        self._at = fem.Function(self.space)
+        self._secant_at = fem.Function(self.space)
+        self._compile()
+
+    @property
+    def comm(self) -> MPI.Intracomm:
+        """Communicator of the mesh."""
+        return self.domain.comm
+
+    @property
+    def free(self) -> NDArray[np.bool_]:
+        """Which unknowns of the owned nodes are not fixed, shape (nodes, block size)."""
+        return self.layout.free
+
+    @property
+    def owned(self) -> int:
+        """Number of unknowns that this rank owns."""
+        return self.free.size
+
+    @property
+    def linear(self) -> bool:
+        """Whether the operator is the same at all states."""
+        return self.body.linear
+
+    @property
+    def piezoelectric(self) -> bool:
+        """Whether there is a potential."""
+        return self.body.piezo is not None
+
+    def split(self, x: Any) -> tuple[Expr, Expr | None]:
+        """Split a function or argument into displacement and scaled-back potential."""
+        u = ufl.as_vector([x[i] for i in range(self.dim)])
+        return u, (self.phi_scale * x[self.dim] if self.piezoelectric else None)
+
+    def function(self, x: Array, name: str = "x") -> fem.Function:
+        """Return local unknowns as a function in `space`."""
+        made = fem.Function(self.space, name=name)
+        made.x.array[:] = x
+        return made
+
+    def _compile(self) -> None:
+        mesh, body = self.domain.mesh, self.body
+        law = law_with_constants(body.law, mesh)
+        piezo = None if body.piezo is None else piezo_with_constants(body.piezo, mesh)
+        trial, test = ufl.TrialFunction(self.space), ufl.TestFunction(self.space)
+        degree = 1 if self.degree == 1 else (2 if self.linear else 4)
+        dx = self.domain.dx(metadata={"quadrature_degree": degree})
+        v, xi = self.split(test)
+
+        def internal(secant_at: Any, x: Any) -> ufl.Form:
+            u, phi = self.split(x)
+            u_0, _ = self.split(secant_at)
+            if piezo is None:
+                return secant_form(law, u_0, u, v) * dx
+            return symmetrised_form(law, piezo, u_0, u, phi, v, xi) * dx
+
+        self._internal = fem.form(internal(self._secant_at, self._at))
+        self._forms = {"secant": fem.form(internal(self._secant_at, trial))}
+        self._forms["tangent"] = self._forms["secant"]
+        if not self.linear:
+            derivative = ufl.derivative(internal(self._at, self._at), self._at, trial)
+            self._forms["tangent"] = fem.form(derivative)
+        work = external_work(self.domain, body, v, xi)
+        self._external: Array = np.zeros(self.owned)
+        if work is not None:
+            self._external = self._assembled(fem.form(work))
+
+    def _assembled(self, form: fem.Form) -> Array:
+        """Return the owned part of an assembled vector."""
+        vector = fem.assemble_vector(form)
+        vector.scatter_reverse(InsertMode.add)
+        return np.asarray(vector.array[: self.owned].copy())
+
+    def rest(self) -> Array:
+        """Return the unknowns of the body at rest, without prescribed values."""
+        return np.zeros_like(self._at.x.array)
+
+    def prescribe(self, x: Array, load: float = 1.0) -> Array:
+        """Return unknowns with the prescribed values, times the part of the load that acts."""
+        at = self._at.x
+        at.array[:] = x
+        for bc in self.bcs:
+            bc.set(at.array, None, load)
+        at.scatter_forward()
+        return np.asarray(at.array.copy())
+
+    def local(self, owned: Array) -> Array:
+        """Return owned unknowns with those of the ghosts behind them. Collective."""
+        at = self._at.x
+        at.array[: self.owned] = owned
+        at.scatter_forward()
+        return np.asarray(at.array.copy())
+
+    def moved(self, x: Array, increment: Array) -> Array:
+        """Return unknowns plus an increment of the owned ones. Collective."""
+        return self.local(x[: self.owned] + increment)
+
+    def internal_forces(self, x: Array, secant_at: Array | None = None) -> Array:
+        """Return the owned nodal forces of the stresses at local unknowns. Collective.
+
+        Parameters
+        ----------
+        x
+            The unknowns.
+        secant_at
+            Where the secant modulus is taken; at `x` by default: the material law itself.
+        """
+        self._at.x.array[:] = x
+        self._secant_at.x.array[:] = x if secant_at is None else secant_at
+        return self._assembled(self._internal)
+
+    def external(self, load: float = 1.0) -> Array:
+        """Return the owned nodal loads, times the part of them that acts."""
+        return load * self._external
+
+    def create_matrix(self) -> PETSc.Mat:
+        """Return an empty matrix with the pattern of the body. Collective."""
+        return create_matrix(self._forms["secant"])
+
+    def assemble(self, matrix: PETSc.Mat, kind: str, x: Array) -> None:
+        """Assemble Kacanov's "secant" or Newton's "tangent" at local unknowns. Collective."""
+        self._at.x.array[:] = self._secant_at.x.array[:] = x
+        matrix.zeroEntries()
+        assemble_matrix(matrix, self._forms[kind], bcs=self.bcs)
+        matrix.assemble()
+
+    def operator(
+        self, nodes: NDArray[np.int32], *, symmetric: bool, counters: Counters, kind: str
+    ) -> SparseOperator:
+        """Return the operator of the body with blocks at nodes."""
+        return SparseOperator(self, nodes, symmetric=symmetric, counters=counters, kind=kind)
+
+    def norm(self, values: Array) -> float:
+        """Return the Euclidean norm of owned values. Collective."""
+        return float(np.sqrt(self.comm.allreduce(np.dot(values, values), op=MPI.SUM)))
+
+    def load_size(self, load: float = 1.0) -> float:
+        """Return the Euclidean norm of the nodal loads. Collective."""
+        return abs(load) * self.norm(self._external)
+
+    @property
+    def largest_prescribed(self) -> float:
+        """Largest component of a prescribed displacement, at the whole load. Collective."""
+        values = self.prescribe(self.rest()).reshape(-1, self.block_size)
+        largest = float(np.abs(values[:, : self.dim]).max(initial=0.0))
+        return float(self.comm.allreduce(largest, op=MPI.MAX))

@@ -1,0 +1,133 @@
+"""Gamma_3 with all its laws, node by node: nothing here knows the body behind."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from mpi4py import MPI
+from numpy.typing import NDArray
+
+from contact.interface.current import HeldCurrent
+from contact.interface.friction import NodalFriction
+from contact.interface.multipliers import Multipliers
+from contact.interface.nodes import ContactNodes
+from contact.interface.response import FoundationResponse
+from contact.interface.status import CLOSED, node_status, touching
+from contact.typing import Array
+
+
+@dataclass(frozen=True)
+class Interface:
+    """Unilateral contact, friction, layer and current at the owned contact nodes.
+
+    Nodal unknowns are arrays of shape (n, block size): displacement, then scaled potential.
+
+    Attributes
+    ----------
+    jump
+        The contact nodes; their gap is that of the unilateral constraint.
+    response
+        Layer and current.
+    friction
+        Friction.
+    held
+        The current through nodes that cannot move; None without.
+    stiffness
+        c = E/size, which weighs displacements against stresses in residuals (stress/length).
+    size
+        Largest extent of the body (length).
+    """
+
+    jump: ContactNodes
+    response: FoundationResponse
+    friction: NodalFriction
+    held: HeldCurrent | None
+    stiffness: float
+    size: float
+
+    @property
+    def comm(self) -> MPI.Intracomm:
+        """Communicator."""
+        return self.jump.comm
+
+    @property
+    def dim(self) -> int:
+        """Number of displacement components."""
+        return self.jump.dim
+
+    def opening(self, nodal: Array) -> Array:
+        """Return u_nu - rho, shape (n,)."""
+        return self.jump.normal_component(nodal) - self.jump.gap
+
+    def slip(self, nodal: Array) -> Array:
+        """Return |u_tau|, shape (n,)."""
+        return np.linalg.norm(self.jump.tangential_component(nodal), axis=1)
+
+    def pressure(self, nodal: Array, forces: Multipliers) -> Array:
+        """Return -sigma_nu, the multiplier and the layer's pressure, shape (n,)."""
+        return forces.pressure + self.response.layer_pressure(nodal)
+
+    def bound(self, nodal: Array, forces: Multipliers) -> Array:
+        """Return the friction bound s, shape (n,). Collective."""
+        return self.friction.bound(self.pressure(nodal, forces), self.slip(nodal))
+
+    def stress(self, nodal: Array, forces: Multipliers) -> Array:
+        """Return -sigma nu, layer included, shape (n, d)."""
+        return self.pressure(nodal, forces)[:, None] * self.jump.normal + forces.friction
+
+    def status(
+        self,
+        nodal: Array,
+        forces: Multipliers,
+        bound: Array,
+        c: float | None = None,
+        rounding: float = 0.0,
+    ) -> NDArray[np.int8]:
+        """Return what each node does, see `contact.interface.status`, shape (n,).
+
+        Parameters
+        ----------
+        nodal, forces, bound
+            Unknowns, contact forces and friction bound.
+        c, rounding
+            Weight of displacements against stresses, `stiffness` by default, and a stress that
+            counts as none.
+        """
+        c = self.stiffness if c is None else c
+        closed = touching(forces.pressure, self.opening(nodal), c, rounding)
+        if not self.friction.acts:
+            return (CLOSED * closed).astype(np.int8)
+        slip = self.jump.tangential_component(nodal)
+        return node_status(closed, forces.friction, slip, bound, c, rounding)
+
+    def add_forces(self, residual: Array, x: Array, forces: Multipliers) -> None:
+        """Add all that the foundation does to the body at local unknowns, to owned values."""
+        jump, nodal = self.jump, self.jump.apply(x)
+        jump.transpose(jump.weight[:, None] * forces.vectors(jump), residual)
+        answer = self.response.force(nodal, self.pressure(nodal, forces))
+        jump.transpose(jump.weight[:, None] * answer, residual)
+        if self.held is not None:
+            self.held.add_force(residual, x)
+
+    @property
+    def coupled(self) -> NDArray[np.int32]:
+        """Nodes at which the operator has blocks: contact nodes, then held ones."""
+        if self.held is None:
+            return self.jump.nodes
+        return np.concatenate([self.jump.nodes, self.held.nodes])
+
+    def weighted(self, blocks: Array, x: Array) -> Array:
+        """Return the operator's blocks at `coupled`: those of the contact nodes, times weight.
+
+        Parameters
+        ----------
+        blocks
+            Derivatives of nodal forces, without weights, shape (n, block size, block size).
+        x
+            Local unknowns.
+        """
+        weighted = self.jump.weight[:, None, None] * blocks
+        if self.held is None:
+            return weighted
+        return np.concatenate([weighted, self.held.block(x)])

@@ -1,0 +1,164 @@
+"""A compliant layer in front of the rigid part, and the graph that both make together.
+
+The layer presses with h_nu(phi - phi_F) p_nu(u_nu - rho_0), section 8.1.2.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from contact.errors import InputError
+from contact.typing import Array
+from forms.laws import PenetrationLaw, StiffnessLaw
+
+EPS = float(np.finfo(float).eps)
+
+
+@dataclass(frozen=True)
+class Layer:
+    """A compliant layer in front of the rigid part.
+
+    Attributes
+    ----------
+    thickness
+        rho - rho_0 >= 0: the layer is touched before the rigid part (length). Infinity: there
+        is no rigid part, law (1.27), and the contact's gap is that of the first touch.
+    p_nu, h_nu
+        Penetration law and stiffness of section 8.1.2, or any others with their derivative.
+        They are vectorised functions; p_nu must vanish for negative arguments.
+    lagged
+        Whether the force is taken from the previous outer iterate, as in the thesis.
+    """
+
+    thickness: float
+    p_nu: PenetrationLaw
+    h_nu: StiffnessLaw
+    lagged: bool = False
+
+    def check(self, size: float) -> None:
+        """Refuse laws that are none of a layer, (h6) and (h7).
+
+        Parameters
+        ----------
+        size
+            Of the body: p_nu is looked at for penetrations up to it, or to the rigid part.
+
+        Raises
+        ------
+        InputError
+            If the thickness, p_nu or h_nu is negative or no number, a law has no derivative, or
+            p_nu does not vanish before the layer is touched.
+        """
+        if not self.thickness >= 0:
+            raise InputError(f"layer: the thickness is {self.thickness:g}; accepted: >= 0, or inf")
+        depths = self.depths(size)
+        differences = np.concatenate([[0.0], np.logspace(-6, 3, 37)])
+        for name, law, samples in (
+            ("p_nu", self.p_nu, np.concatenate([-size * np.logspace(-9, 0, 37), depths])),
+            ("h_nu", self.h_nu, np.concatenate([-differences, differences])),
+        ):
+            if not callable(getattr(law, "derivative", None)):
+                raise InputError(f"layer: {name} has no method `derivative`")
+            with np.errstate(all="ignore"):
+                values = np.broadcast_to(law(samples), samples.shape)
+                slopes = np.broadcast_to(law.derivative(samples), samples.shape)
+            if not (np.isfinite(values).all() and np.isfinite(slopes).all()):
+                bad = samples[~(np.isfinite(values) & np.isfinite(slopes))][0]
+                raise InputError(f"layer: {name} or its derivative is no number at {bad:g}")
+            if values.min() < 0:
+                bad = samples[np.argmin(values)]
+                raise InputError(f"layer: {name} is negative at {bad:g}; accepted: values >= 0")
+            if name == "p_nu" and np.any(values[samples < 0] > 0):
+                raise InputError(
+                    "layer: p_nu presses before the layer is touched; accepted: 0 at negative "
+                    "penetrations"
+                )
+
+    def depths(self, size: float) -> Array:
+        """Return penetrations from 0 to the rigid part, or to the size of the body if it is less.
+
+        Parameters
+        ----------
+        size
+            Of the body.
+        """
+        return min(self.thickness, size) * np.concatenate([[0.0], np.logspace(-6, 0, 73)])
+
+    def falls(self, size: float) -> bool:
+        """Tell whether p_nu falls somewhere: several solutions may then exist.
+
+        Parameters
+        ----------
+        size
+            Of the body.
+        """
+        values = np.broadcast_to(self.p_nu(self.depths(size)), (74,))
+        return bool(np.any(np.diff(values) < -1e-12 * values.max()))
+
+
+@dataclass(frozen=True)
+class NormalLaw:
+    """-sigma_nu as a graph of u_nu (Figure 1.6): free, compliant layer, rigid part.
+
+    Attributes
+    ----------
+    p_nu
+        Penetration law.
+    stiffness
+        h_nu, frozen, shape (n,).
+    touch, gap
+        rho_0 and rho: where the layer and the rigid part are touched, shape (n,).
+    """
+
+    p_nu: PenetrationLaw
+    stiffness: Array
+    touch: Array
+    gap: Array
+
+    def layer(self, u_n: Array) -> Array:
+        """Return the pressure of the layer at normal displacements."""
+        return self.stiffness * self.p_nu(u_n - self.touch)
+
+    def layer_slope(self, u_n: Array) -> Array:
+        """Return the derivative of `layer`."""
+        return self.stiffness * self.p_nu.derivative(u_n - self.touch)
+
+    def pressure(self, z: Array, r: float) -> Array:
+        """Return the total pressure P for which (phi, P) is on the graph and P + r phi = z.
+
+        This is what (3.43) becomes with a layer. The graph rises, so that P is unique for any
+        r > 0; where p_nu falls, r must exceed its slope.
+        """
+        low, high = self.touch, np.minimum(self.gap, z / r)
+        free, rigid = z <= r * low, z - r * self.gap >= self.layer(high)
+        phi, done = high, free | rigid
+        # Newton's method in a bracket; every third sweep halves it, should Newton not.
+        for sweep in range(90):
+            excess = r * phi + self.layer(phi) - z
+            slope = r + self.layer_slope(phi)
+            # Below this the excess is rounding in phi.
+            rounding = 4 * EPS * (np.abs(z) + np.abs(slope) * (np.abs(phi) + np.abs(self.touch)))
+            done |= np.abs(excess) <= rounding
+            if np.all(done):
+                break
+            low, high = np.where(excess < 0, phi, low), np.where(excess > 0, phi, high)
+            newton = phi - excess / np.where(slope > 0, slope, r)
+            inside = (newton > low) & (newton < high) & (sweep % 3 < 2)
+            phi = np.where(done, phi, np.where(inside, newton, 0.5 * (low + high)))
+        # The layer's pressure is exact where it is small, the remainder where it is stiff.
+        soft = self.layer_slope(phi) < r
+        pressed = np.where(soft, self.layer(phi), z - r * phi)
+        return np.where(free, 0.0, np.where(rigid, z - r * self.gap, pressed))
+
+    def displacement(self, z: Array, r: float) -> Array:
+        """Return the u_nu that goes with `pressure`."""
+        return np.asarray((z - self.pressure(z, r)) / r, dtype=float)
+
+    def pressure_slope(self, z: Array, r: float) -> Array:
+        """Return the derivative of `pressure` by z: 0 free, 1 rigid, between them in the layer."""
+        high = np.minimum(self.gap, z / r)
+        free, rigid = z <= r * self.touch, z - r * self.gap >= self.layer(high)
+        slope = self.layer_slope(self.displacement(z, r))
+        return np.where(free, 0.0, np.where(rigid, 1.0, slope / (slope + r)))

@@ -1,0 +1,35 @@
+"""Contact forces at the contact nodes."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from contact.interface.jump import Jump
+from contact.typing import Array
+
+
+@dataclass(frozen=True)
+class Multipliers:
+    """Contact forces at the owned contact nodes.
+
+    Attributes
+    ----------
+    pressure
+        lambda_c = -sigma_nu without the layer's part, shape (n,).
+    friction
+        lambda_f = -sigma_tau, tangential vectors, shape (n, d).
+    """
+
+    pressure: Array
+    friction: Array
+
+    @staticmethod
+    def zero(jump: Jump) -> Multipliers:
+        """Return vanishing contact forces."""
+        return Multipliers(np.zeros(jump.gap.size), np.zeros(jump.normal.shape))
+
+    def vectors(self, jump: Jump) -> Array:
+        """Return lambda_c nu + lambda_f, shape (n, d)."""
+        return self.pressure[:, None] * jump.normal + self.friction

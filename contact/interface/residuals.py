@@ -1,0 +1,25 @@
+"""Residuals of the contact and the friction law."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from contact.interface.interface import Interface
+from contact.interface.multipliers import Multipliers
+from contact.interface.projections import project_disc, project_half_line
+from contact.typing import Array
+
+
+def interface_residuals(
+    interface: Interface, nodal: Array, forces: Multipliers, bound: Array
+) -> tuple[float, float]:
+    """Return the relative contact and friction residuals at nodal unknowns. Collective."""
+    jump, c = interface.jump, interface.stiffness
+    opening = interface.opening(nodal)
+    contact = forces.pressure - project_half_line(forces.pressure + c * opening)
+    trial = forces.friction + c * jump.tangential_component(nodal)
+    friction = forces.friction - project_disc(trial, bound)
+    # Where next to nothing presses, rounding is compared with the stress that closing would take.
+    closing = c * jump.norm(np.minimum(np.abs(opening), interface.size))
+    scale = max(jump.norm(interface.pressure(nodal, forces)), 1e-4 * closing) or 1.0
+    return jump.norm(contact) / scale, jump.norm(friction) / scale

@@ -1,0 +1,129 @@
+"""Newton's loop: step after step, until the residuals say that it has converged or stalled."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from contact.interface.residuals import interface_residuals
+from contact.methods.options import NewtonOptions
+from contact.methods.report import History, Outcome
+from contact.methods.stagnation import Stagnation
+from contact.methods.step import Iterate, Step
+from contact.problem.kkt import KKT, evaluate
+from contact.problem.protocols import Problem
+from contact.typing import Array
+
+#: What counts as progress of a step.
+PROGRESS = 0.9
+
+#: Why a loop with a frozen friction bound ends.
+UPDATE = "friction bound to be updated"
+
+#: How much more patience there is where psi is frozen from step to step: a node that opens along
+#: its ramp takes its time.
+FROZEN_RAMP = 3
+
+
+@dataclass
+class NewtonLoop:
+    """Newton's loop with one kind of step.
+
+    Attributes
+    ----------
+    problem, options
+        What is solved, and the tolerances.
+    step
+        Takes the steps.
+    history
+        Gets a record a step.
+    seen
+        Told of every iterate and its residuals, before they are recorded.
+    secant_until
+        Equilibrium residual below which the material's tangent replaces its secant: far from the
+        solution the tangent is too soft, and overshoots.
+    """
+
+    problem: Problem
+    options: NewtonOptions
+    step: Step
+    history: History
+    seen: Callable[[Iterate, KKT], None]
+    secant_until: float
+
+    @property
+    def left(self) -> int:
+        """Number of steps that are left of the limit."""
+        return self.options.limit - len(self.history.records)
+
+    def run(
+        self, iterate: Iterate, note: str = "", bound: Array | None = None, goal: float = 0.0
+    ) -> tuple[Iterate, Outcome]:
+        """Iterate. Collective.
+
+        Parameters
+        ----------
+        iterate
+            Where from.
+        note
+            What the history says of the steps.
+        bound
+            A frozen friction bound, shape (n,): Tresca's law in place of Coulomb's.
+        goal
+            With a frozen bound, what the residual of that bound has to fall below.
+        """
+        problem, options, linear = self.problem, self.options, self.problem.equilibrium.linear
+        goal = max(goal, options.tolerance)
+        residuals = evaluate(problem, iterate.state)
+        stagnation = Stagnation(options.patience, PROGRESS)
+        self.step.begin()
+        # A start from elsewhere is near the solution; zero displacement has no better tangent.
+        tangent = iterate.status is not None and not linear
+        for _ in range(min(options.max_iterations, self.left)):
+            before, kept = residuals, iterate
+            taken = self.step(iterate, tangent, residuals.largest, bound)
+            if taken is None:
+                return kept, self._end(residuals, "the condensed contact problem is not solved")
+            iterate = taken.iterate
+            residuals = evaluate(problem, iterate.state)
+            worse = self.step.following.worsened(residuals.largest)
+            self.seen(iterate, residuals)
+            words = (note, taken.note, "tangent" * tangent, "taken back" * worse)
+            said = " ".join(word for word in words if word)
+            self.history.record(residuals, said, contact=taken.solves)
+            if worse:
+                iterate = kept
+                residuals = evaluate(problem, iterate.state)
+                self.seen(iterate, residuals)
+            measured = self._measure(iterate, residuals, bound)
+            if residuals.largest <= options.tolerance:
+                return iterate, self._end(residuals)
+            if bound is not None and measured <= goal:
+                return iterate, self._end(residuals, UPDATE)
+            if not np.isfinite(measured):
+                return iterate, self._end(residuals, "Newton's method diverged")
+            if not linear:
+                falls = residuals.equilibrium < max(before.equilibrium, options.tolerance)
+                near = residuals.equilibrium < self.secant_until
+                tangent = near and (falls or not tangent)
+            more = FROZEN_RAMP if self.step.following.frozen else 1
+            if stagnation(measured, options.patience * more):
+                words_of_end = f"Newton's method stalled at {stagnation.best:.1e}"
+                return iterate, self._end(residuals, words_of_end)
+        steps = len(self.history.records)
+        return iterate, self._end(residuals, f"not converged in {steps} steps")
+
+    def _measure(self, iterate: Iterate, residuals: KKT, bound: Array | None) -> float:
+        """Return the largest residual, with the frozen friction bound if there is one."""
+        if bound is None:
+            return residuals.largest
+        interface, state = self.problem.interface, iterate.state
+        nodal = interface.jump.apply(state.x)
+        return max(
+            residuals.equilibrium, *interface_residuals(interface, nodal, state.forces, bound)
+        )
+
+    def _end(self, residuals: KKT, ended: str = "") -> Outcome:
+        return Outcome(residuals, self.options.allowed, ended)

@@ -1,0 +1,103 @@
+"""The loop over the material alone, around a contact problem that is solved at its own nodes.
+
+Where the contact nodes are few, the linearised body is condensed onto them: the loop over contact
+and friction then takes place there, in small dense steps, and the one around it follows the
+material.
+"""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Callable
+from dataclasses import replace
+
+from contact.interface.linearised import Moduli
+from contact.linear.operator import Counters
+from contact.methods.following import Following
+from contact.methods.options import NewtonOptions
+from contact.methods.report import History, Outcome
+from contact.methods.step import NEAR, Iterate, Taken
+from contact.problem.condensed import Condensation, CondensedProblem
+from contact.problem.state import State
+from contact.typing import Array
+
+#: How much more accurately than the material is linearised the contact problem is solved.
+CONTACT_PART = 1e-3
+
+#: Equilibrium residual below which the tangent replaces the secant of a condensed body. Where
+#: contact is solved exactly in each step, the tangent does not fear what it changes.
+SECANT_UNTIL = 0.3
+
+#: Solves a condensed problem from an iterate, with a history of its own.
+Solver = Callable[
+    [CondensedProblem, NewtonOptions, Moduli, History, Iterate], tuple[Iterate, Outcome]
+]
+
+
+class MaterialStep:
+    """Linearises the material, and solves the contact problem that is left.
+
+    Parameters
+    ----------
+    condensation
+        Condenses the body of the whole problem.
+    options, moduli
+        What is chosen for the whole problem.
+    solve
+        Solves a contact problem at its own nodes.
+    history
+        Of the whole problem: it is asked whether the solve is to end.
+    counters
+        Where the dense solves are counted.
+    slower
+        Notes of records that tell of slower methods.
+    """
+
+    def __init__(
+        self,
+        condensation: Condensation,
+        options: NewtonOptions,
+        moduli: Moduli,
+        solve: Solver,
+        history: History,
+        counters: Counters,
+        slower: tuple[str, ...],
+    ) -> None:
+        self.condensation, self.options, self.moduli = condensation, options, moduli
+        self.counters, self.following = counters, Following()
+        self._solve, self._history, self._slower = solve, history, slower
+
+    def begin(self) -> None:
+        """Do nothing: each step begins anew."""
+
+    def __call__(
+        self, iterate: Iterate, tangent: bool, reached: float, bound: Array | None
+    ) -> Taken | None:
+        """Take a step; None where the body cannot be condensed or contact is not solved."""
+        state, body = iterate.state, self.condensation.full.equilibrium
+        condensed = self.condensation.linearise("tangent" if tangent else "secant", state)
+        if condensed is None:
+            return None
+        # No more accurate than the material is linearised, nor than the end asks for.
+        enough = 0.1 * self.options.tolerance
+        if not body.linear:
+            enough = max(enough, CONTACT_PART * min(reached, 1.0))
+        options = replace(
+            self.options,
+            tolerance=enough,
+            limit=NewtonOptions.limit,
+            condense=False,
+            load_steps=False,
+        )
+        history = History(self._history.quiet(), level=logging.DEBUG)
+        begin = replace(iterate, state=State(condensed.equilibrium.at, state.forces, state.load))
+        end, outcome = self._solve(condensed, options, self.moduli, history, begin)
+        solves = sum(record.inner for record in history.records)
+        self.counters.contact_solves += solves
+        if outcome.kkt.largest > max(enough, NEAR * reached):
+            return None
+        increment = self.condensation.expand(condensed, end.state.x)
+        new = State(body.moved(state.x, increment), end.state.forces, state.load)
+        notes = [record.note for record in history.records]
+        slower = [word for word in self._slower if any(word in note for note in notes)]
+        return Taken(replace(end, state=new), ", ".join(slower), solves)

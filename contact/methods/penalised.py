@@ -1,0 +1,166 @@
+"""The nonlinear problem of an outer iteration of Algorithm 3, for PETSc's SNES."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from petsc4py import PETSc
+
+from contact.errors import InputError
+from contact.interface.penalised import NodalLaw, Regularisation, outer
+from contact.linear.operator import Counters, petsc_options
+from contact.methods.options import PenaltyOptions
+from contact.problem.kkt import residual_forces
+from contact.problem.problem import ContactProblem
+from contact.problem.state import State
+from contact.typing import Array
+
+
+class PenalisedProblem:
+    """The nonlinear problem of an outer iteration, in the owned unknowns.
+
+    SNES asks `LinearOperator` for its linear solves, through a shell preconditioner. Its
+    options have the prefix ``penalty_``, for instance ``-penalty_snes_monitor``.
+    """
+
+    def __init__(
+        self,
+        problem: ContactProblem,
+        options: PenaltyOptions,
+        eps: Regularisation,
+        counters: Counters,
+        symmetric: bool,
+    ) -> None:
+        self._options, self._eps = options, eps
+        self._error: InputError | None = None
+        self._problem = problem
+        self._body, self._interface = problem.equilibrium, problem.interface
+        self.operator = self._body.operator(
+            self._interface.coupled, symmetric=symmetric, counters=counters, kind=options.linear
+        )
+        matrix = self.operator.matrix
+        self._iterate, self._residual = matrix.createVecs()
+        self.snes = PETSc.SNES().create(problem.comm)
+        self.snes.setOptionsPrefix("penalty_")
+        self.snes.setFunction(self._function, self._residual)
+        self.snes.setJacobian(self._jacobian, matrix)
+        self.snes.getKSP().setType("preonly")
+        pc = self.snes.getKSP().getPC()
+        pc.setType("python")
+        pc.setPythonContext(self)
+        # A wrong active set raises the residual by 1/eps, for a step.
+        self.snes.setDivergenceTolerance(1e300)
+        # Full steps: the active set of the pressure settles in a few of them, while a line
+        # search on the residual, which has kinks of the size 1/eps, takes tiny ones. A layer that
+        # saturates needs the search: full steps cycle between its open and its saturated state.
+        # So do implicit friction and material: full steps jump between sticking and sliding.
+        given = PETSc.Options()
+        name = "penalty_snes_linesearch_type"
+        default = not given.hasName(name)
+        if default:
+            layer = problem.interface.response.layer
+            given[name] = "basic" if symmetric and (layer is None or layer.lagged) else "bt"
+        try:
+            with petsc_options("penalty_"):
+                self.snes.setFromOptions()
+        finally:
+            if default:
+                given.delValue(name)
+
+    def apply(self, _: Any, rhs: PETSc.Vec, solution: PETSc.Vec) -> None:
+        """Solve with the operator: the preconditioner of SNES's KSP."""
+        try:
+            solution.array[:] = self.operator.solve(rhs.array_r)
+        except InputError as error:
+            # Not through PETSc, which would wrap it; SNES stops at a solution without numbers.
+            self._error = error
+            solution.array[:] = np.nan
+
+    def solve(self, law: NodalLaw, state: State, implicit: bool) -> tuple[Array, int, str]:
+        """Solve from a state; return the unknowns, the iterations and what went wrong."""
+        body, interface = self._body, self._interface
+        nodal = interface.jump.apply(state.x)
+        self._law, self._implicit, self._nodal = law, implicit, nodal
+        self._state = state
+        self._assembled = body.linear
+        pressure = interface.pressure(nodal, state.forces)
+        self._response = interface.response.force(nodal, pressure)
+        self._current_block = interface.response.current_block(nodal, pressure)
+        self._layer = interface.response.normal_law(nodal)
+        if self._layer is not None:
+            # Like the unilateral [.]^+ it is that of the new iterate, but for h_nu.
+            self._response[:, : body.dim] = 0.0
+        scale = body.load_size(state.load) + body.norm(residual_forces(self._problem, state))
+        vectors = interface.jump.weight[:, None] * state.forces.vectors(interface.jump)
+        scale += body.norm(vectors.ravel())
+        self.snes.setTolerances(
+            rtol=1e-14,
+            # Rounding is magnified by 1/eps: the residual may stay above any tolerance.
+            stol=1e-14,
+            atol=self._options.tolerance / 10 * scale,
+            max_it=min(self._options.max_inner, 20) if implicit else self._options.max_inner,
+        )
+        self._error = None
+        self._iterate.array[:] = state.x[: body.owned] + self._touch()
+        self.snes.solve(None, self._iterate)
+        if self._error is not None and not implicit:
+            raise self._error
+        reason = self.snes.getConvergedReason()
+        note = "" if reason > 0 else f"SNES stopped with reason {reason}"
+        return self._unknowns(self._iterate), self.snes.getIterationNumber(), note
+
+    def _touch(self) -> Array:
+        """Return a first guess: zero, or where nothing touches yet, the closest nodes in touch.
+
+        A body that only the foundation holds would otherwise give a singular first system.
+        """
+        body, interface, nodal = self._body, self._interface, self._nodal
+        jump, state = interface.jump, self._state
+        # Of the rigid part, or without one of the layer.
+        opening = jump.normal_component(nodal) - interface.response.jump.gap
+        closest = jump.maximum(opening, -np.inf)
+        if closest >= 0:
+            return np.zeros(body.owned)
+        spring = (opening >= closest - 1e-9 * interface.size) / self._eps.contact
+        n, d = jump.normal.shape
+        blocks = np.zeros((n, jump.block_size, jump.block_size))
+        blocks[:, :d, :d] = spring[:, None, None] * outer(jump.normal, jump.normal)
+        self.operator.update("secant", state.x, interface.weighted(blocks, state.x))
+        rhs = body.external(state.load) - body.internal_forces(state.x)
+        jump.transpose(-(jump.weight * spring * opening)[:, None] * jump.normal, rhs)
+        return self.operator.solve(rhs)
+
+    def _unknowns(self, iterate: PETSc.Vec) -> Array:
+        """Return the local unknowns of an iterate of SNES. Collective."""
+        return self._body.local(iterate.array_r)
+
+    def _function(self, _: PETSc.SNES, iterate: PETSc.Vec, residual: PETSc.Vec) -> None:
+        body, jump, x = self._body, self._interface.jump, self._unknowns(iterate)
+        nodal = jump.apply(x)
+        secant_at = None if self._implicit else self._state.x
+        values = body.internal_forces(x, secant_at) - body.external(self._state.load)
+        jump.transpose(jump.weight[:, None] * self._law.forces(nodal).vectors(jump), values)
+        change = np.einsum("nij,nj->ni", self._current_block, nodal - self._nodal)
+        if self._layer is not None:
+            u_n = np.minimum(jump.normal_component(nodal), jump.gap)
+            change[:, : jump.dim] += self._layer.layer(u_n)[:, None] * jump.normal
+        jump.transpose(jump.weight[:, None] * (self._response + change), values)
+        residual.array[:] = body.layout.mask(values)
+
+    def _jacobian(
+        self, _: PETSc.SNES, iterate: PETSc.Vec, matrix: PETSc.Mat, __: PETSc.Mat
+    ) -> None:
+        body, jump, x = self._body, self._interface.jump, self._unknowns(iterate)
+        nodal, d = jump.apply(x), body.dim
+        blocks = self._current_block.copy()
+        blocks[:, :d, :d] += self._law.block(nodal)
+        if self._layer is not None:
+            u_n = jump.normal_component(nodal)
+            slope = np.where(u_n < jump.gap, self._layer.layer_slope(u_n), 0.0)
+            blocks[:, :d, :d] += slope[:, None, None] * outer(jump.normal, jump.normal)
+        kind, about = ("tangent", x) if self._implicit else ("secant", self._state.x)
+        unchanged = body.linear or (self._assembled and not self._implicit)
+        blocks = self._interface.weighted(blocks, x)
+        self.operator.update(kind, about, blocks, constant=unchanged)
+        self._assembled = True

@@ -1,0 +1,199 @@
+"""One step of Newton's method: contact, friction, layer and current linearised together.
+
+The nodal multipliers are condensed onto the displacement, so that the linear systems keep the
+size and the pattern of the elastic ones.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from contact.interface.interface import Interface
+from contact.interface.linearised import MORE_SOFTENING, LinearisedContact, Moduli, linearise
+from contact.interface.multipliers import Multipliers
+from contact.linear.operator import Counters, Operator
+from contact.methods.following import Following
+from contact.methods.options import NewtonOptions
+from contact.problem.kkt import residual_forces
+from contact.problem.protocols import Problem
+from contact.problem.state import State
+from contact.typing import Array
+
+#: Residual from which on the foundation's conductivity is followed although nodes still change
+#: their status: far away, its derivative belongs to nodes that will not be where they are.
+NEAR = 0.05
+
+
+@dataclass(frozen=True)
+class Iterate:
+    """A state, and what the next step takes from the one that led to it.
+
+    Attributes
+    ----------
+    state
+        Unknowns and contact forces.
+    status
+        What each node did in that step, shape (n,); None before the first one.
+    layer_pressure
+        Pressure of the linearised layer after it, shape (n,); None for that of the state.
+    """
+
+    state: State
+    status: NDArray[np.int8] | None = None
+    layer_pressure: Array | None = None
+
+
+@dataclass(frozen=True)
+class Taken:
+    """A step that was taken.
+
+    Attributes
+    ----------
+    iterate
+        Where it led.
+    note
+        What was special about it.
+    solves
+        Dense solves at the contact nodes that it took.
+    """
+
+    iterate: Iterate
+    note: str = ""
+    solves: int = 0
+
+
+class Step(Protocol):
+    """A step of Newton's method."""
+
+    following: Following
+
+    def begin(self) -> None:
+        """Forget the steps before: a new loop begins."""
+
+    def __call__(
+        self, iterate: Iterate, tangent: bool, reached: float, bound: Array | None
+    ) -> Taken | None:
+        """Take a step; None if it cannot be taken. Collective.
+
+        Parameters
+        ----------
+        iterate
+            Where from.
+        tangent
+            Whether the material's tangent is taken, or its secant.
+        reached
+            The largest residual there.
+        bound
+            A friction bound that is frozen, shape (n,); None for the law's own.
+        """
+
+
+class WholeStep:
+    """One assembly, one factorisation, one solve of the whole linearised problem.
+
+    Parameters
+    ----------
+    problem, options, moduli
+        The problem, and what is chosen for it.
+    counters
+        Where factorisations and solves are counted.
+    """
+
+    def __init__(
+        self, problem: Problem, options: NewtonOptions, moduli: Moduli, counters: Counters
+    ) -> None:
+        self.problem, self.options, self.moduli = problem, options, moduli
+        self.counters = counters
+        self._operator: Operator | None = None
+        self.begin()
+
+    def begin(self) -> None:
+        """Forget the steps before."""
+        self.following = Following()
+        self._calm = 0  # steps in which no node has changed its status
+
+    @property
+    def operator(self) -> Operator:
+        """The operator of the linear systems."""
+        if self._operator is None:
+            interface = self.problem.interface
+            asymmetric = interface.friction.acts or interface.response.active
+            self._operator = self.problem.equilibrium.operator(
+                interface.coupled,
+                symmetric=not asymmetric,
+                counters=self.counters,
+                kind=self.options.linear,
+            )
+        return self._operator
+
+    def __call__(
+        self, iterate: Iterate, tangent: bool, reached: float, bound: Array | None
+    ) -> Taken | None:
+        """Take a step; see `Step`."""
+        state, interface = iterate.state, self.problem.interface
+        body, jump = self.problem.equilibrium, interface.jump
+        nodal = jump.apply(state.x)
+        softening = self.options.softening + MORE_SOFTENING * self._calm
+        contact = linearise(
+            interface, nodal, state.forces, self.moduli, iterate.status, bound, softening
+        )
+        self._calm = self._calm + 1 if contact.settled else 0
+        layer, shift = linearised_layer(interface, nodal, iterate, self.moduli, contact.settled)
+        blocks = contact.blocks + layer + self._current(nodal, contact, reached)
+        kind = "tangent" if tangent else "secant"
+        blocks = interface.weighted(blocks, state.x)
+        self.operator.update(kind, state.x, blocks, constant=body.linear)
+        here = State(state.x, contact.forces, state.load)
+        residual = residual_forces(self.problem, here)
+        jump.transpose((jump.weight * shift)[:, None] * jump.normal, residual)
+        # Gamma leaves this part of an interface residual in any case. A goal that depended on the
+        # residuals would ask for more digits on finer meshes, whose residuals pass through more
+        # values between the first and the last.
+        increment = self.operator.solve(-residual, 1 / self.options.gamma)
+        moved = jump.apply(increment)
+        change = np.einsum("nij,nj->ni", contact.blocks, moved)
+        vectors = contact.forces.vectors(jump) + change[:, : interface.dim]
+        forces = Multipliers(jump.normal_component(vectors), jump.tangential_component(vectors))
+        pressed = jump.normal_component(np.einsum("nij,nj->ni", layer, moved))
+        known = interface.response.layer_pressure(nodal) + shift + pressed
+        new = State(body.moved(state.x, increment), forces, state.load)
+        return Taken(Iterate(new, contact.status, known))
+
+    def _current(self, nodal: Array, contact: LinearisedContact, reached: float) -> Array | float:
+        """Return the derivative of the current, with psi followed or frozen."""
+        interface = self.problem.interface
+        response = interface.response
+        if not response.active:
+            return 0.0
+        follow = contact.settled or reached < NEAR
+        if response.follows_gap:
+            follow = self.following(reached, follow)
+        current = response.current_jacobian if follow else response.current_block
+        return current(nodal, interface.pressure(nodal, contact.forces))
+
+
+def linearised_layer(
+    interface: Interface, nodal: Array, iterate: Iterate, moduli: Moduli, full: bool
+) -> tuple[Array, Array]:
+    """Linearise the layer; return its block, and how it differs from the layer's force.
+
+    It is linearised where the law is met from the pressure and the displacement of the step
+    before together, as the status of a contact node is found. Linearised about the displacement
+    alone, a layer stiffer than the body cycles between its regimes.
+    """
+    response, jump, c = interface.response, interface.jump, moduli.status
+    law = response.normal_law(nodal)
+    if law is None:
+        return response.layer_block(nodal, full), np.zeros(nodal.shape[0])
+    u_n, layer = jump.normal_component(nodal), response.layer_pressure(nodal)
+    known = layer if iterate.layer_pressure is None else iterate.layer_pressure
+    place = law.displacement(iterate.state.forces.pressure + known + c * u_n, c)
+    about = nodal.copy()
+    about[:, : interface.dim] += (place - u_n)[:, None] * jump.normal
+    block = response.layer_block(about, full)
+    back = jump.normal_component(np.einsum("nij,nj->ni", block, nodal - about))
+    return block, response.layer_pressure(about) + back - layer

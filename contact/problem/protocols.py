@@ -1,0 +1,95 @@
+"""What joins the packages: the protocols that methods are written against.
+
+`Jump` is in `contact.interface.jump`, for the laws of the interface need it too.
+"""
+
+from __future__ import annotations
+
+from typing import Protocol
+
+import numpy as np
+from mpi4py import MPI
+from numpy.typing import NDArray
+
+from contact.interface.interface import Interface
+from contact.linear.operator import Counters, Operator
+from contact.problem.scales import Scales
+from contact.problem.state import State
+from contact.typing import Array
+
+
+class Equilibrium(Protocol):
+    """A body as its contact nodes feel it: forces and operators at given unknowns.
+
+    The whole body (`contact.body.equilibrium`) and the one condensed onto its contact nodes
+    (`contact.problem.condensed`) are two implementations. Neither remembers a state.
+    """
+
+    @property
+    def comm(self) -> MPI.Intracomm:
+        """Communicator."""
+
+    @property
+    def dim(self) -> int:
+        """Number of displacement components of a node."""
+
+    @property
+    def block_size(self) -> int:
+        """Number of unknowns of a node."""
+
+    @property
+    def free(self) -> NDArray[np.bool_]:
+        """Which unknowns of the owned nodes are not fixed, shape (nodes, block size)."""
+
+    @property
+    def owned(self) -> int:
+        """Number of unknowns that this rank owns."""
+
+    @property
+    def linear(self) -> bool:
+        """Whether the operator is the same at all unknowns."""
+
+    def rest(self) -> Array:
+        """Return the local unknowns of the body at rest."""
+
+    def prescribe(self, x: Array, load: float = 1.0) -> Array:
+        """Return unknowns with the prescribed values, times the part of the load that acts."""
+
+    def moved(self, x: Array, increment: Array) -> Array:
+        """Return unknowns plus an increment of the owned ones. Collective."""
+
+    def internal_forces(self, x: Array, secant_at: Array | None = None) -> Array:
+        """Return the owned nodal forces of the stresses. Collective."""
+
+    def external(self, load: float = 1.0) -> Array:
+        """Return the owned nodal loads."""
+
+    def load_size(self, load: float = 1.0) -> float:
+        """Return the norm of the loads. Collective."""
+
+    def operator(
+        self, nodes: NDArray[np.int32], *, symmetric: bool, counters: Counters, kind: str
+    ) -> Operator:
+        """Return an operator with blocks at nodes."""
+
+    def norm(self, values: Array) -> float:
+        """Return the Euclidean norm of owned values. Collective."""
+
+
+class Problem(Protocol):
+    """A body and what may touch it."""
+
+    @property
+    def equilibrium(self) -> Equilibrium:
+        """The body."""
+
+    @property
+    def interface(self) -> Interface:
+        """Gamma_3 with its laws."""
+
+    @property
+    def scales(self) -> Scales:
+        """Sizes of the body and its stiffness."""
+
+    def start(self, load: float = 1.0) -> State:
+        """Return the state to start from: at rest, but for the prescribed values."""
