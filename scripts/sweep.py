@@ -16,6 +16,7 @@ from reporting import Report, parser
 
 from contact import build_problem, solve_problem
 from contact.case.file import Case, parse_case
+from contact.methods.options import with_method
 
 METHODS = ("newton", "uzawa")
 #: How many problems of each family; --coarse takes a tenth.
@@ -216,7 +217,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
         problem = build_problem(case)
         for method in given.methods:
             begin = time.perf_counter()
-            settings = case.solver.model_copy(update={"method": method})
+            settings = with_method(case.solver, method)
             solution = solve_problem(problem, settings)
             notes = {r.note for r in solution.history.records}
             for word in ("tangent", "taken back"):  # steps of the method itself

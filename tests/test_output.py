@@ -4,6 +4,7 @@ import csv
 import json
 import os
 import signal
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -13,8 +14,9 @@ from mpi4py import MPI
 
 from contact.build import build_problem
 from contact.case.file import Case, parse_case
-from contact.case.solver import Output, Solver
+from contact.case.solver import Output
 from contact.linear.operator import LinearOperator
+from contact.methods.options import NewtonOptions, with_method
 from contact.methods.report import Record
 from contact.output.fields import DerivedFields
 from contact.output.figures.figures import write_figures
@@ -116,7 +118,7 @@ def test_iterations_of_the_linear_solver_are_written(tmp_path: Path) -> None:
     counts = []
     for kind in ("lu", "iterative"):
         case = electric(2)
-        settings = case.solver.model_copy(update={"linear": kind})
+        settings = replace(case.solver, linear=kind)
         summary, _ = written(solve(case.model_copy(update={"solver": settings})), tmp_path / kind)
         assert summary["converged"] is True
         counts.append(summary["linear_iterations"] / summary["linear_solves"])
@@ -401,7 +403,7 @@ def test_an_interrupted_load_step_is_judged_by_the_full_load() -> None:
         problem.apply_load(0.25)
         signal.raise_signal(signal.SIGINT)
 
-    solution = solve_problem(problem, Solver(), press)
+    solution = solve_problem(problem, NewtonOptions(), press)
     assert solution.outcome.signal == signal.SIGINT
     kept = problem.external.copy(), problem.x.x.array.copy()
     problem.apply_load(1.0)
@@ -415,7 +417,7 @@ def test_an_interrupted_load_step_is_judged_by_the_full_load() -> None:
 def test_ranks_without_cells_write_and_draw_too(method: str, shared_tmp_path: Path) -> None:
     """Two triangles: with three ranks one has none."""
     case = block(2, mesh={"generator": "rectangle", "size": [1.0, 1.0], "cells": [1, 1]})
-    solution = solve(case, case.solver.model_copy(update={"method": method}))
+    solution = solve(case, with_method(case.solver, method))
     assert solution.converged
     summary, rows = written(solution, shared_tmp_path)
     assert summary["cells"] == 2

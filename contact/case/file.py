@@ -21,12 +21,12 @@ from contact.case.interface import Contact, Electric, Friction, Plane, SlipLaw, 
 from contact.case.mesh import Mesh, Piece
 from contact.case.messages import describe, describe_fault
 from contact.case.overrides import override
-from contact.case.solver import DEFAULT_METHOD, Output, Solver
-from contact.case.types import Accepted, Section, Text, as_tuple
+from contact.case.solver import DEFAULT, Output, Solver
+from contact.case.types import Section, Text, as_tuple
 from contact.errors import InputError
+from contact.settings import Accepted
 
 __all__ = [
-    "DEFAULT_METHOD",
     "Case",
     "Contact",
     "Electric",
@@ -72,7 +72,7 @@ class Case(Section):
     electric: Electric | None = Field(
         default=None, description="Conductive foundation: `[electric]`. Absent: insulated."
     )
-    solver: Solver = Field(default=Solver(), description="Method and tolerances: `[solver]`.")
+    solver: Solver = Field(default=DEFAULT, description="Method and tolerances: `[solver]`.")
     output: Output = Field(default=Output(), description="What is written: `[output]`.")
 
     _source: str = PrivateAttr("case")

@@ -11,11 +11,8 @@ from pydantic import Discriminator, Field, Tag, model_validator
 import meshes
 from contact.case.types import (
     UNKNOWN,
-    Accepted,
-    Count,
     Name,
     Number,
-    Positive,
     Section,
     Text,
     Triple,
@@ -24,6 +21,7 @@ from contact.case.types import (
     as_tuple,
     fault,
 )
+from contact.settings import Accepted, Count, Positive
 
 #: Dimension and names of the sides of the generators that need no recipe.
 GENERATORS: Mapping[str, tuple[int, tuple[str, ...]]] = {

@@ -74,7 +74,8 @@ class FixedPoint:
 
     def __post_init__(self) -> None:
         """Choose r and set up the operator."""
-        self.r = self.options.r or automatic_r(self.problem)
+        given = self.options.r
+        self.r = automatic_r(self.problem) if given == "auto" else given
         self.operator = operator(self.problem, counters=self.counters, kind=self.options.linear)
         self.history = History(self.monitor)
         self.forces = Multipliers.zero(self.problem)
@@ -86,8 +87,8 @@ class FixedPoint:
             self.r,
             inner,
             self.options.max_inner,
-            self.options.depth,
-            self.options.over_relaxation,
+            self.options.depth if self.options.acceleration == "anderson" else 0,
+            self.options.relaxation,
             self.options.eps if thesis else None,
             self.options.single_loop,
         )

@@ -58,6 +58,9 @@ NEAR = 0.05
 #: How much more accurately than the material is linearised the contact problem is solved.
 CONTACT_PART = 1e-3
 
+#: Most dense steps in one solve of the condensed contact problem.
+CONTACT_STEPS = 1000
+
 #: Equilibrium residual below which the tangent replaces the secant of a condensed body.
 CONDENSED_SECANT_UNTIL = 0.3
 
@@ -111,7 +114,7 @@ class Newton:
         if self.options.condense:
             self._body = condensation(self.problem, self.counters, self.options.linear)
         if self._body is not None:
-            options = replace(self.options, condense=False, limit=NewtonOptions.limit)
+            options = replace(self.options, condense=False, max_outer=CONTACT_STEPS)
             quiet = Quiet(self.history.poll)
             self._at_contact = Newton(self._body.problem, options, quiet, given=self.moduli)
             self._at_contact.history.level = logging.DEBUG
@@ -184,7 +187,7 @@ class Newton:
     @property
     def _left(self) -> int:
         """Number of steps that are left of the limit."""
-        return self.options.limit - len(self.history.records)
+        return self.options.max_outer - len(self.history.records)
 
     def _block_relaxation(self) -> Outcome:
         """Solve by the fixed point over block relaxation, which damps what Newton lets cycle."""
