@@ -21,9 +21,10 @@ from contact.case.interface import Contact, Electric, Friction, Plane, SlipLaw, 
 from contact.case.mesh import Mesh, Piece
 from contact.case.messages import describe, describe_fault
 from contact.case.overrides import override
-from contact.case.solver import DEFAULT, Output, Solver
-from contact.case.types import Section, Text, as_tuple
+from contact.case.solver import DEFAULT, Solver
+from contact.case.types import FromTable, Section, Text, as_tuple
 from contact.errors import InputError
+from contact.output.options import OutputOptions
 from contact.settings import Accepted
 
 __all__ = [
@@ -36,7 +37,6 @@ __all__ = [
     "Load",
     "Material",
     "Mesh",
-    "Output",
     "Piece",
     "Piezo",
     "Plane",
@@ -73,7 +73,9 @@ class Case(Section):
         default=None, description="Conductive foundation: `[electric]`. Absent: insulated."
     )
     solver: Solver = Field(default=DEFAULT, description="Method and tolerances: `[solver]`.")
-    output: Output = Field(default=Output(), description="What is written: `[output]`.")
+    output: Annotated[OutputOptions, FromTable] = Field(
+        default=OutputOptions(), description="What is written: `[output]`."
+    )
 
     _source: str = PrivateAttr("case")
 

@@ -19,7 +19,7 @@ from contact.case.file import Case
 from contact.case.solver import DEFAULT
 from contact.case.text import literal
 from contact.case.types import Section, accepted_by, either, keys_of, sections_of
-from contact.methods.options import OPTIONS, Options
+from contact.methods.options import OPTIONS
 from contact.settings import ReadWith
 
 PAGE = Path(__file__).parents[2] / "docs" / "case-file.md"
@@ -123,7 +123,11 @@ def _options(key: str, classes: list[type]) -> Iterator[str]:
 def _default(field: FieldInfo) -> str:
     if field.is_required():
         return "required"
-    if field.default is None or isinstance(field.default, Section | dict | tuple | Options):
+    if (
+        field.default is None
+        or isinstance(field.default, Section | dict | tuple)
+        or is_dataclass(field.default)
+    ):
         return ""
     return f"`{literal(field.default)}`"
 

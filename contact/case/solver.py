@@ -4,19 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import fields
-from typing import Annotated, Any, Literal, TypeAlias
+from typing import Annotated, Any, TypeAlias
 
-from pydantic import (
-    AfterValidator,
-    BeforeValidator,
-    Discriminator,
-    Field,
-    PlainSerializer,
-    Tag,
-)
+from pydantic import AfterValidator, BeforeValidator, Discriminator, PlainSerializer, Tag
 
 from contact.case.grammar import shown
-from contact.case.types import UNKNOWN, FromTable, Section, either, fault
+from contact.case.types import UNKNOWN, FromTable, either, fault
 from contact.methods.options import (
     OPTIONS,
     FixedPointOptions,
@@ -24,7 +17,7 @@ from contact.methods.options import (
     Options,
     PenaltyOptions,
 )
-from contact.settings import Accepted, Switch, read_by, settings_of
+from contact.settings import Accepted, read_by, settings_of
 
 #: The options where the case file names no method.
 DEFAULT = NewtonOptions()
@@ -89,14 +82,3 @@ Solver: TypeAlias = Annotated[
     PlainSerializer(_read),
     Accepted("a table"),
 ]
-
-
-class Output(Section):
-    """`[output]`: what is written besides the summary and the tables."""
-
-    fields: Literal["vtx", "xdmf", "none"] = Field(
-        default="vtx", description="Format of the fields: `vtx` (fields.bp), `xdmf` or none."
-    )
-    checkpoint: Switch = Field(
-        default=False, description="`true`: write a checkpoint from which a computation can go on."
-    )

@@ -9,10 +9,10 @@ import numpy as np
 from dolfinx import fem
 from mpi4py import MPI
 
-from contact.case.solver import Output
 from contact.linear.operator import Counters
 from contact.methods.report import History, Outcome
 from contact.output.fields import unknowns
+from contact.output.options import OutputOptions
 from contact.problem.kkt import stiffness_scale
 from contact.problem.problem import ContactProblem
 from contact.problem.state import Multipliers, bound_of, nodal_iterate, total_pressure
@@ -66,7 +66,7 @@ class Solution:
     max_dev_strain: float = np.nan
     start: str = "zero slip"
     title: str = ""
-    output: Output = field(default_factory=Output)
+    output: OutputOptions = field(default_factory=OutputOptions)
 
     @property
     def converged(self) -> bool:
