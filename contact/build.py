@@ -15,7 +15,8 @@ from contact.case.formula import Expression
 from contact.errors import InputError
 from contact.interface.obstacle import Foundation, GapFunction, Plane, Sphere
 from contact.interface.response import Conductor, Layer
-from contact.mesh.make import Domain, make_domain
+from contact.mesh.domain import Domain
+from contact.meshing import make_domain
 from contact.problem import problem as parts
 from contact.problem.held import check_held
 from contact.problem.problem import ContactProblem

@@ -97,7 +97,7 @@ def test_the_bar(bar):
 def test_the_rest_of_the_keys():
     case = parse_case(
         changed(
-            mesh={"generator": "box", "size": [1, 1, 2], "cells": [1, 1, 2], "rotation": 30},
+            mesh={"generator": "box", "size": [1, 1, 2], "cells": [1, 2, 2], "rotation": 30},
             mesh__parts__strip=[{"side": "top", "from": [0, 0], "to": [1, 0.5]}, {"side": "left"}],
             material__piezo={**PIEZO, "poling": [0, 0, 1]},
             fixed=[
@@ -193,6 +193,10 @@ BAD = {
     "side": ({"mesh__parts__loaded__side": "front"}, "left, right, bottom, top"),
     "backward piece": ({"mesh__parts__loaded__to": 1.0}, "mesh.parts.loaded.to: given 1.0"),
     "piece in space": ({"mesh__parts__loaded__to": [1, 2]}, "mesh.parts.loaded.to: given [1.0"),
+    "piece off the grid": (
+        {"mesh__parts__loaded": [{"side": "top"}, {"side": "left", "to": 0.3}]},
+        "mesh.parts.loaded.1.to: given 0.3; accepted: positions of the grid on its side (nearest",
+    ),
     "part named as a side": ({"mesh__parts__top": {"side": "left"}}, "a name that no side has"),
     "recipe key": (
         {"mesh": {"generator": "quarter_disc", "radios": 1}},
@@ -353,6 +357,8 @@ BAD = {
     "iterations": ({"solver__max_outer": 0}, "solver.max_outer: given 0"),
     "levels": ({"solver__nested_levels": 3}, "nested_levels with nested = true"),
     "output": ({"output": {"fields": "vtk"}}, '"vtx", "xdmf" or "none"'),
+    "unknown output": ({"output": {"feilds": "vtx"}}, "output.feilds: unknown key, did you mean f"),
+    "output as a number": ({"output": 3}, "output: given 3; accepted: a table"),
     "title": ({"title": 3}, "title: given 3; accepted: a text"),
 }
 
