@@ -18,7 +18,8 @@ from contact.interface.current import Conductor
 from contact.interface.friction import Friction
 from contact.interface.layer import Layer
 from contact.interface.obstacle import GapFunction, Obstacle, Plane, Sphere
-from contact.mesh.make import Domain, make_domain
+from contact.mesh.domain import Domain
+from contact.meshing import make_domain
 from contact.problem.held import check_held
 from contact.problem.problem import Contact, ContactProblem
 from contact.tolerances import HUGE

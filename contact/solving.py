@@ -13,13 +13,13 @@ import numpy as np
 from mpi4py import MPI
 
 from contact.build import build_problem, named
-from contact.case.file import Case, Solver, load_case
+from contact.case.file import Case, load_case
 from contact.methods.fixed_point import FixedPoint
 from contact.methods.interrupt import Interrupted, stop_on_signal
 from contact.methods.method import Method
 from contact.methods.nested import coarse_solution, prolong
 from contact.methods.newton import Newton
-from contact.methods.options import FixedPointOptions, NewtonOptions, PenaltyOptions
+from contact.methods.options import NewtonOptions, Options
 from contact.methods.penalty import Penalty
 from contact.methods.report import Monitor, Outcome
 from contact.output.review import review
@@ -35,61 +35,17 @@ logger = logging.getLogger("contact.solve")
 NOTHING = KKT(np.inf, np.inf, np.inf)
 
 
-def fixed_point(problem: ContactProblem, settings: Solver, monitor: Monitor | None) -> FixedPoint:
-    """Return the fixed point over block relaxation of `[solver]`: Algorithms 1, 4, 6 and 8."""
-    options = FixedPointOptions(
-        tolerance=settings.tolerance,
-        r=None if settings.r == "auto" else settings.r,
-        stopping=settings.stopping,
-        eps=settings.eps,
-        eps_fp=settings.eps_fp,
-        depth=settings.depth if settings.acceleration == "anderson" else 0,
-        over_relaxation=settings.relaxation,
-        single_loop=settings.single_loop,
-        inner_tolerance=settings.inner_tolerance,
-        material_step=settings.material_step,
-        linear=settings.linear,
-        max_outer=settings.max_outer,
-        max_inner=settings.max_inner,
-    )
-    return FixedPoint(problem, options, monitor)
-
-
-def newton(problem: ContactProblem, settings: Solver, monitor: Monitor | None) -> Newton:
-    """Return semismooth Newton."""
-    options = NewtonOptions(
-        tolerance=settings.tolerance, limit=settings.max_outer, linear=settings.linear
-    )
-    return Newton(problem, options, monitor)
-
-
-def penalty(problem: ContactProblem, settings: Solver, monitor: Monitor | None) -> Penalty:
-    """Return the penalty method: Algorithm 3."""
-    options = PenaltyOptions(
-        eps_contact=settings.eps_contact,
-        eps_slip=settings.eps_slip,
-        tolerance=settings.tolerance,
-        stopping=settings.stopping,
-        eps_fp=settings.eps_fp,
-        material_step=settings.material_step,
-        max_outer=settings.max_outer,
-        max_inner=settings.max_inner,
-        linear=settings.linear,
-    )
-    return Penalty(problem, options, monitor)
-
-
-#: Method of `[solver]` -> its maker.
-METHODS: Mapping[str, Callable[[ContactProblem, Solver, Monitor | None], Method]] = {
-    "uzawa": fixed_point,
-    "penalty": penalty,
-    "newton": newton,
+#: Name of a method -> its class.
+METHODS: Mapping[str, Callable[[ContactProblem, Any, Monitor | None], Method]] = {
+    "uzawa": FixedPoint,
+    "penalty": Penalty,
+    "newton": Newton,
 }
 
 
 def solve(
     case: Case | ContactProblem | str | Path,
-    settings: Solver | None = None,
+    settings: Options | None = None,
     monitor: Monitor | None = None,
     comm: MPI.Intracomm = MPI.COMM_WORLD,
     **replacements: Any,
@@ -116,12 +72,13 @@ def solve(
     """
     begin = time.perf_counter()
     if isinstance(case, ContactProblem):
-        return solve_problem(case, settings or Solver(), monitor)
+        return solve_problem(case, settings or NewtonOptions(), monitor)
     case = case if isinstance(case, Case) else load_case(case)
     settings = settings or case.solver
     problem = build_problem(case, comm, **replacements)
     with named(case.source):
-        start = coarse_solution(case, comm, **replacements) if settings.nested else None
+        nested = isinstance(settings, NewtonOptions) and settings.nested
+        start = coarse_solution(case, comm, **replacements) if nested else None
         solution = solve_problem(problem, settings, monitor, start)
     solution.title, solution.output = case.title, case.output
     solution.seconds["setup"] += time.perf_counter() - begin - sum(solution.seconds.values())
@@ -130,7 +87,7 @@ def solve(
 
 def solve_problem(
     problem: ContactProblem,
-    settings: Solver,
+    settings: Options,
     monitor: Monitor | None = None,
     start: tuple[ContactProblem, State] | None = None,
 ) -> Solution:

@@ -9,20 +9,18 @@ from numpy.typing import NDArray
 from pydantic import Discriminator, Field, Tag, model_validator
 
 from contact.case.types import (
-    Accepted,
     Formula,
     FormulaVector,
     Name,
     NonNegative,
     Number,
-    Positive,
     Section,
-    Switch,
     Triple,
     Words,
     as_tuple,
     fault,
 )
+from contact.settings import Accepted, Positive, Switch
 from forms.piezo import hexagonal_voigt
 
 

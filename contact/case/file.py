@@ -21,12 +21,13 @@ from contact.case.interface import Contact, Electric, Friction, Plane, SlipLaw, 
 from contact.case.mesh import Mesh, Piece
 from contact.case.messages import describe, describe_fault
 from contact.case.overrides import override
-from contact.case.solver import DEFAULT_METHOD, Output, Solver
-from contact.case.types import Accepted, Section, Text, as_tuple
+from contact.case.solver import DEFAULT, Solver
+from contact.case.types import FromTable, Section, Text, as_tuple
 from contact.errors import InputError
+from contact.output.options import OutputOptions
+from contact.settings import Accepted
 
 __all__ = [
-    "DEFAULT_METHOD",
     "Case",
     "Contact",
     "Electric",
@@ -36,7 +37,6 @@ __all__ = [
     "Load",
     "Material",
     "Mesh",
-    "Output",
     "Piece",
     "Piezo",
     "Plane",
@@ -72,8 +72,10 @@ class Case(Section):
     electric: Electric | None = Field(
         default=None, description="Conductive foundation: `[electric]`. Absent: insulated."
     )
-    solver: Solver = Field(default=Solver(), description="Method and tolerances: `[solver]`.")
-    output: Output = Field(default=Output(), description="What is written: `[output]`.")
+    solver: Solver = Field(default=DEFAULT, description="Method and tolerances: `[solver]`.")
+    output: Annotated[OutputOptions, FromTable] = Field(
+        default=OutputOptions(), description="What is written: `[output]`."
+    )
 
     _source: str = PrivateAttr("case")
 

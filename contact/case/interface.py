@@ -9,18 +9,16 @@ from pydantic import Discriminator, Field, Tag, model_validator
 
 from contact.case.formula import Expression
 from contact.case.types import (
-    Accepted,
     Name,
     NonNegative,
     NonNegativeFormula,
     Number,
-    Positive,
     Section,
-    Switch,
     Vector,
     Words,
     fault,
 )
+from contact.settings import Accepted, Positive, Switch
 
 SHAPES = Accepted('"plane" or "sphere"')
 

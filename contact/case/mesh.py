@@ -11,11 +11,8 @@ from pydantic import Discriminator, Field, Tag, model_validator
 import meshes
 from contact.case.types import (
     UNKNOWN,
-    Accepted,
-    Count,
     Name,
     Number,
-    Positive,
     Section,
     Text,
     Triple,
@@ -24,11 +21,12 @@ from contact.case.types import (
     as_tuple,
     fault,
 )
+from contact.mesh import grid
+from contact.settings import Accepted, Count, Positive
 
 #: Dimension and names of the sides of the generators that need no recipe.
 GENERATORS: Mapping[str, tuple[int, tuple[str, ...]]] = {
-    "rectangle": (2, ("left", "right", "bottom", "top")),
-    "box": (3, ("left", "right", "front", "back", "bottom", "top")),
+    name: (len(sides) // 2, tuple(sides)) for name, sides in grid.SIDES.items()
 }
 
 #: Keys of `[mesh]` that go with every generator and file.
@@ -58,6 +56,11 @@ class Piece(Section):
         alias="to",
         description="Where the piece ends. Both are positions of the grid.",
     )
+
+    @property
+    def on_grid(self) -> grid.Piece:
+        """The piece as the grid takes it."""
+        return grid.Piece(self.side, self.start, self.stop)
 
 
 def _piece_kind(given: Any) -> str:
@@ -181,8 +184,8 @@ class Mesh(Section):
             raise fault("axis", self.axis, "a vector that is not zero")
         if self.diagonal is not None and self.generator != "rectangle":
             raise fault("diagonal", self.diagonal, "diagonal for a rectangle only")
-        if self.dimension is not None:
-            self._check_grid(self.dimension)
+        if self.generator is not None and self.sides:
+            self._check_grid(self.generator)
             return self
         for key in ("origin", "size", "cells", "parts"):
             if getattr(self, key):
@@ -191,28 +194,25 @@ class Mesh(Section):
             raise fault("parameters", self.parameters, "parameters of a recipe only")
         return self
 
-    def _check_grid(self, dimension: int) -> None:
+    @property
+    def pieces(self) -> dict[str, grid.Piece | list[grid.Piece]]:
+        """The further parts of a rectangle or box."""
+        return {
+            name: [piece.on_grid for piece in given] if isinstance(given, tuple) else given.on_grid
+            for name, given in self.parts.items()
+        }
+
+    def _check_grid(self, generator: str) -> None:
         if self.parameters:
             key = next(iter(self.parameters))
             raise fault(f"parameters.{key}", self.parameters[key], "parameters of a recipe only")
-        for key in ("size", "cells", "origin"):
-            value = getattr(self, key)
-            if value is None:
-                raise fault(key, Words("missing"), f"a list of {dimension} numbers")
-            if len(value) != dimension:
-                raise fault(key, value, f"a list of {dimension} numbers for a {self.generator}")
-        for name, pieces in self.parts.items():
-            if name in self.sides:
-                raise fault(f"parts.{name}", name, "a name that no side has")
-            for piece in (pieces,) if isinstance(pieces, Piece) else pieces:
-                self._check_piece(f"parts.{name}", piece, dimension)
-
-    def _check_piece(self, path: str, piece: Piece, dimension: int) -> None:
-        if piece.side not in self.sides:
-            raise fault(f"{path}.side", piece.side, ", ".join(self.sides))
-        for key, given in (("from", piece.start), ("to", piece.stop)):
-            if given is not None and isinstance(given, tuple) != (dimension == 3):
-                raise fault(f"{path}.{key}", given, "a number" if dimension == 2 else "2 numbers")
-        if piece.start is not None and piece.stop is not None:
-            if not np.all(np.less(piece.start, piece.stop)):
-                raise fault(f"{path}.to", piece.stop, "a position beyond from")
+        for key in ("size", "cells"):
+            if getattr(self, key) is None:
+                raise fault(key, Words("missing"), f"a list of {self.dimension} numbers")
+        assert self.origin is not None  # filled in before
+        assert self.size is not None
+        assert self.cells is not None
+        try:
+            grid.plan(generator, self.origin, self.size, self.cells, self.pieces)
+        except grid.GridError as error:
+            raise fault(error.key, error.given, error.accepted) from None

@@ -7,16 +7,13 @@ from collections.abc import Iterable, Mapping
 from typing import Any, get_origin
 
 from pydantic import ValidationError
-from pydantic.fields import FieldInfo
 from pydantic_core import ErrorDetails, PydanticCustomError
 
 from contact.case.grammar import shown
-from contact.case.types import UNKNOWN, Section, Words, accepted_by, sections_of
+from contact.case.types import UNKNOWN, Section, Words, accepted_by, keys_of, sections_of
 
-
-def keys_of(section: type[Section]) -> dict[str, FieldInfo]:
-    """Return the fields of a section by the names that they have in the case file."""
-    return {field.alias or name: field for name, field in section.model_fields.items()}
+#: What pydantic calls an unknown key, of a section and of a class of options.
+UNKNOWN_KEY = ("extra_forbidden", "unexpected_keyword_argument")
 
 
 def describe(error: ValidationError, root: type[Section], source: str) -> str:
@@ -25,7 +22,7 @@ def describe(error: ValidationError, root: type[Section], source: str) -> str:
     An unknown key comes before all else: what is missing or wrong elsewhere is often but its
     consequence.
     """
-    errors = sorted(error.errors(), key=lambda e: e["type"] != "extra_forbidden")
+    errors = sorted(error.errors(), key=lambda e: e["type"] not in UNKNOWN_KEY)
     return f"{source}: {_message(errors[0], root)}"
 
 
@@ -47,7 +44,7 @@ def _message(error: ErrorDetails, root: type[Section]) -> str:
     given = _given(error["input"])
     if kind == "fault":
         return _fault(keys, **context)
-    if kind == "extra_forbidden":
+    if kind in UNKNOWN_KEY:
         options = dict.fromkeys(key for section in sections for key in keys_of(section))
         return _unknown([*keys, str(error["loc"][-1])], options)
     if kind == "value_error":
@@ -75,7 +72,7 @@ def _unknown(keys: list[str], accepted: Iterable[str]) -> str:
 
 def _locate(
     location: tuple[int | str, ...], root: type[Section]
-) -> tuple[list[str], list[type[Section]], str]:
+) -> tuple[list[str], list[type], str]:
     """Follow a location of pydantic's through the sections.
 
     Returns
@@ -84,7 +81,7 @@ def _locate(
     stand there, and what is accepted there, in words.
     """
     keys: list[str] = []
-    options: Mapping[str, type[Section]] = {root.__name__: root}
+    options: Mapping[str, type] = {root.__name__: root}
     accepted = "tables"
     named = False  # the next item is a name chosen by the user
     for item in location:

@@ -8,15 +8,19 @@ from __future__ import annotations
 import inspect
 import sys
 from collections.abc import Iterator
+from dataclasses import is_dataclass
 from pathlib import Path
-from typing import Any
+
+from pydantic.fields import FieldInfo
 
 import meshes
 from contact.case import grammar as formulas
 from contact.case.file import Case
-from contact.case.messages import keys_of
+from contact.case.solver import DEFAULT
 from contact.case.text import literal
-from contact.case.types import Section, accepted_by, sections_of
+from contact.case.types import Section, accepted_by, either, keys_of, sections_of
+from contact.methods.options import OPTIONS
+from contact.settings import ReadWith
 
 PAGE = Path(__file__).parents[2] / "docs" / "case-file.md"
 
@@ -50,8 +54,11 @@ def page() -> str:
     """Return the reference page (Markdown)."""
     lines = [INTRODUCTION, "## Top level", "", *_rows(Case)]
     for key, field in keys_of(Case).items():
-        for section in sections_of(field.annotation).values():
-            lines += _describe(section)
+        sections = list(sections_of(field.annotation).values())
+        if any(is_dataclass(section) for section in sections):
+            lines += _options(key, sections)
+        else:
+            lines += [line for section in sections for line in _describe(section)]
         if key == "mesh":
             lines += _recipes()
     return "\n".join(lines) + "\n"
@@ -66,20 +73,61 @@ def _describe(section: type[Section]) -> Iterator[str]:
             yield from _describe(inner)
 
 
-def _rows(section: type[Section]) -> Iterator[str]:
+def _rows(section: type) -> Iterator[str]:
     yield "| key | accepted | default | meaning |"
     yield "|---|---|---|---|"
     for key, field in keys_of(section).items():
-        accepted = accepted_by(field.annotation, field.metadata)
-        meaning = field.description or ""
-        cells = (f"`{key}`", accepted, _default(field), meaning)
-        yield "| " + " | ".join(cell.replace("|", r"\|") for cell in cells) + " |"
+        yield _row(f"`{key}`", *_cells(field))
 
 
-def _default(field: Any) -> str:
+def _row(*cells: str) -> str:
+    return "| " + " | ".join(cell.replace("|", r"\|") for cell in cells) + " |"
+
+
+def _cells(field: FieldInfo) -> tuple[str, str, str]:
+    """Return what a key accepts, its default and its meaning."""
+    accepted = accepted_by(field.annotation, field.metadata)
+    needs = "".join(
+        f" Read with `{mark.key} = {literal(mark.value)}` only."
+        for mark in field.metadata
+        if isinstance(mark, ReadWith)
+    )
+    return accepted, _default(field), (field.description or "") + needs
+
+
+def _options(key: str, classes: list[type]) -> Iterator[str]:
+    """Describe a table that is read as options: of one class, or of one for each method."""
+    yield from ("", f"## `[{key}]`", "")
+    if len(classes) == 1:
+        yield from ((inspect.getdoc(classes[0]) or "").split("\n")[0], "", *_rows(classes[0]))
+        return
+    yield "Method, tolerances and limits. What the method does not read is refused."
+    yield from ("", "| method | |", "|---|---|")
+    rows: dict[tuple[str, ...], list[str]] = {}
+    for options in classes:
+        keys = keys_of(options)
+        method = f"`{keys.pop('method').default}`"
+        yield _row(method, (inspect.getdoc(options) or "").split("\n")[0])
+        for name, field in keys.items():
+            rows.setdefault((f"`{name}`", *_cells(field)), []).append(method)
+    yield from ("", "| key | accepted | default | method | meaning |", "|---|---|---|---|---|")
+    default = literal(DEFAULT.method)
+    yield _row(
+        "`method`", either([literal(name) for name in OPTIONS]), f"`{default}`", "", "See above."
+    )
+    for (name, accepted, default, meaning), methods in rows.items():
+        which = "all" if len(methods) == len(classes) else ", ".join(methods)
+        yield _row(name, accepted, default, which, meaning)
+
+
+def _default(field: FieldInfo) -> str:
     if field.is_required():
         return "required"
-    if field.default is None or isinstance(field.default, Section | dict | tuple):
+    if (
+        field.default is None
+        or isinstance(field.default, Section | dict | tuple)
+        or is_dataclass(field.default)
+    ):
         return ""
     return f"`{literal(field.default)}`"
 

@@ -14,8 +14,7 @@ _BARE = re.compile(r"[A-Za-z0-9_-]+")
 
 def to_toml(case: Case) -> str:
     """Return a case file that gives the same case again, without what its method ignores."""
-    ignored = {"solver": set(case.solver.unread)}
-    data = case.model_dump(by_alias=True, exclude_none=True, exclude=ignored)
+    data = case.model_dump(by_alias=True, exclude_none=True)
     return "\n".join(_table(data, ())).strip() + "\n"
 
 

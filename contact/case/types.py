@@ -8,15 +8,16 @@ from __future__ import annotations
 
 import types
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import is_dataclass
 from typing import Annotated, Any, Literal, TypeAlias, Union, get_args, get_origin
 
 from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field
+from pydantic.fields import FieldInfo
 from pydantic_core import PydanticCustomError, core_schema
 
 from contact.case import formula as expressions
 from contact.errors import InputError
-from contact.tolerances import PRECISION
+from contact.settings import Accepted, settings_of
 
 
 class Section(BaseModel):
@@ -32,11 +33,16 @@ class Section(BaseModel):
     )
 
 
-@dataclass(frozen=True)
-class Accepted:
-    """What a kind of value accepts, in words."""
+class FromTable:
+    """Lets pydantic read a frozen dataclass from a table, with all the checks of a section."""
 
-    text: str
+    @classmethod
+    def __get_pydantic_core_schema__(cls, source: Any, handler: Any) -> core_schema.CoreSchema:
+        """Make the schema of the dataclass accept tables."""
+        schema = handler.resolve_ref_schema(handler(source))
+        # Strictness, which the fields are to have, would take instances alone here.
+        schema["strict"] = False
+        return schema
 
 
 class _FormulaSchema:
@@ -71,17 +77,7 @@ NonNegativeFormula: TypeAlias = Annotated[
     Accepted("a number >= 0 or a formula"),
 ]
 Number: TypeAlias = Annotated[float, Accepted("a number")]
-Positive: TypeAlias = Annotated[float, Field(gt=0), Accepted("a number > 0")]
 NonNegative: TypeAlias = Annotated[float, Field(ge=0), Accepted("a number >= 0")]
-Tolerance: TypeAlias = Annotated[
-    float,
-    Field(ge=PRECISION, lt=1),
-    Accepted(f"a number from {PRECISION:g}, the precision of numbers, to 1, excluded"),
-]
-Count: TypeAlias = Annotated[
-    int, Field(ge=1, le=10_000_000), Accepted("a whole number from 1 to 10000000")
-]
-Switch: TypeAlias = Annotated[bool, Accepted("true or false")]
 Text: TypeAlias = Annotated[str, Accepted("a text")]
 Name: TypeAlias = Annotated[str, Field(min_length=1), Accepted("the name of a part")]
 Vector: TypeAlias = Annotated[
@@ -128,15 +124,31 @@ def fault(key: str, given: Any, accepted: str) -> PydanticCustomError:
     return PydanticCustomError("fault", "fault", {"key": key, "given": given, "accepted": accepted})
 
 
-def sections_of(annotation: Any) -> Mapping[str, type[Section]]:
-    """Return the models that an annotation holds, by the names of pydantic's union tags."""
-    if isinstance(annotation, type) and issubclass(annotation, Section):
+def sections_of(annotation: Any) -> Mapping[str, type]:
+    """Return what reads tables in an annotation, by the names of pydantic's union tags.
+
+    These are sections, and classes of options (`contact.settings`).
+    """
+    if isinstance(annotation, type) and (
+        issubclass(annotation, Section) or is_dataclass(annotation)
+    ):
         return {annotation.__name__: annotation}
-    found: dict[str, type[Section]] = {}
+    found: dict[str, type] = {}
     if get_origin(annotation) is not Literal:
         for argument in get_args(annotation):
             found |= sections_of(argument)
     return found
+
+
+def keys_of(section: type) -> dict[str, FieldInfo]:
+    """Return the keys of a section, or of a class of options, as in the case file."""
+    if issubclass(section, Section):
+        return {field.alias or name: field for name, field in section.model_fields.items()}
+    keys = {}
+    for name, setting in settings_of(section).items():
+        keys[name] = FieldInfo.from_annotated_attribute(setting.annotation, setting.default)
+        keys[name].description = setting.meaning
+    return keys
 
 
 def accepted_by(annotation: Any, metadata: tuple[Any, ...] | list[Any] = ()) -> str:

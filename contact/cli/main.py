@@ -159,8 +159,9 @@ def _check(case: Case, options: argparse.Namespace, comm: MPI.Intracomm) -> int:
     from contact.build import build_problem
     from contact.cli.describe import describe
     from contact.methods.nested import coarser_cases
+    from contact.methods.options import NewtonOptions
 
-    if case.solver.nested:
+    if isinstance(case.solver, NewtonOptions) and case.solver.nested:
         coarser_cases(case, case.solver.nested_levels)
     text = describe(case, build_problem(case, comm))
     if comm.rank == 0:

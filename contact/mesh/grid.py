@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -21,6 +22,30 @@ BOX_SIDES = {
     "bottom": (2, 0),
     "top": (2, 1),
 }
+
+
+#: Generator -> its sides.
+SIDES = {"rectangle": RECTANGLE_SIDES, "box": BOX_SIDES}
+
+
+class GridError(InputError):
+    """A grid that cannot be.
+
+    Parameters
+    ----------
+    key
+        What is wrong, by the name that it has in ``[mesh]``.
+    given, accepted
+        What was given, and in words what is accepted.
+    """
+
+    def __init__(self, key: str, given: Any, accepted: str) -> None:
+        super().__init__(key, given, accepted)
+        self.key, self.given, self.accepted = key, given, accepted
+
+    def __str__(self) -> str:
+        """Return the message."""
+        return f"mesh.{self.key}: given {self.given}; accepted: {self.accepted}"
 
 
 @dataclass(frozen=True)
@@ -71,11 +96,10 @@ def rectangle(
     InputError
         On wrong sizes or pieces; the ends of a piece must be grid positions.
     """
-    grid = _grid(origin, size, cells, 2)
+    grid, chosen = plan("rectangle", origin, size, cells, parts or {})
     kinds = dmesh.DiagonalType.__members__
     if diagonal not in kinds:
         raise InputError(f"mesh diagonal {diagonal!r} is unknown (accepted: {', '.join(kinds)})")
-    chosen = _boxes(grid, RECTANGLE_SIDES, parts or {})
     mesh = dmesh.create_rectangle(
         comm,
         grid[:2],
@@ -108,10 +132,9 @@ def box(
     InputError
         On wrong sizes or pieces; the corners of a piece must be grid positions.
     """
-    grid = _grid(origin, size, cells, 3)
+    grid, chosen = plan("box", origin, size, cells, parts or {})
     if np.shape(axis) != (3,) or not np.linalg.norm(axis) > 0.0:
         raise InputError(f"mesh axis must be 3 numbers, not all zero; given: {axis}")
-    chosen = _boxes(grid, BOX_SIDES, parts or {})
     mesh = dmesh.create_box(comm, grid[:2], list(cells), ghost_mode=dmesh.GhostMode.none)
     domain = _tag_grid(mesh, grid, chosen)
     rotate(mesh, rotation, axis)
@@ -124,53 +147,68 @@ _Grid = tuple[npt.NDArray[np.float64], npt.NDArray[np.float64], npt.NDArray[np.f
 _Patch = tuple[int, float, npt.NDArray[np.float64], npt.NDArray[np.float64]]
 
 
-def _grid(origin: Sequence[float], size: Sequence[float], cells: Sequence[int], dim: int) -> _Grid:
+def plan(
+    kind: str,
+    origin: Sequence[float],
+    size: Sequence[float],
+    cells: Sequence[int],
+    parts: Mapping[str, Piece | Sequence[Piece]],
+) -> tuple[_Grid, dict[str, list[_Patch]]]:
+    """Return the grid and the patches of its boundary that its sides and parts consist of.
+
+    Nothing is made yet: this is also how a case is checked before its mesh is.
+
+    Parameters
+    ----------
+    kind
+        ``rectangle`` or ``box``.
+    origin, size, cells, parts
+        See `rectangle`.
+
+    Raises
+    ------
+    GridError
+        On wrong sizes or pieces.
+    """
+    sides = SIDES[kind]
+    dim = len(sides) // 2
     for key, given in (("origin", origin), ("size", size), ("cells", cells)):
         if np.shape(given) != (dim,):
-            raise InputError(f"mesh {key} must be {dim} numbers; given: {given}")
-    if min(size) <= 0:
-        raise InputError(f"mesh size must be positive; given: {list(size)}")
+            raise GridError(key, given, f"a list of {dim} numbers for a {kind}")
+    if not min(size) > 0:
+        raise GridError("size", size, "positive numbers")
     if min(cells) < 1 or any(n != int(n) for n in cells):
-        raise InputError(f"mesh cells must be positive whole numbers; given: {list(cells)}")
+        raise GridError("cells", cells, "positive whole numbers")
     low = np.asarray(origin, dtype=np.float64)
     extent = np.asarray(size, dtype=np.float64)
-    return low, low + extent, extent / np.asarray(cells)
-
-
-def _boxes(
-    grid: _Grid,
-    sides: Mapping[str, tuple[int, int]],
-    parts: Mapping[str, Piece | Sequence[Piece]],
-) -> dict[str, list[_Patch]]:
-    """Turn the sides and the extra parts into patches of the grid's boundary."""
-    pieces: dict[str, Sequence[Piece]] = {side: [Piece(side)] for side in sides}
-    for name, given in parts.items():
+    grid = low, low + extent, extent / np.asarray(cells)
+    patches = {side: [_patch("", Piece(side), grid, sides)] for side in sides}
+    for name, pieces in parts.items():
+        key = f"parts.{name}"
         if name in sides:
-            raise InputError(f"mesh part {name!r} is a side already; choose another name")
-        pieces[name] = [given] if isinstance(given, Piece) else list(given)
-    return {name: [_patch(name, p, grid, sides) for p in ps] for name, ps in pieces.items()}
+            raise GridError(key, name, "a name that no side has")
+        if isinstance(pieces, Piece):
+            patches[name] = [_patch(key, pieces, grid, sides)]
+        else:
+            patches[name] = [_patch(f"{key}.{i}", p, grid, sides) for i, p in enumerate(pieces)]
+    return grid, patches
 
 
-def _patch(name: str, piece: Piece, grid: _Grid, sides: Mapping[str, tuple[int, int]]) -> _Patch:
+def _patch(key: str, piece: Piece, grid: _Grid, sides: Mapping[str, tuple[int, int]]) -> _Patch:
     if piece.side not in sides:
-        raise InputError(
-            f"mesh part {name!r}: unknown side {piece.side!r} (accepted: {', '.join(sides)})"
-        )
+        raise GridError(f"{key}.side", piece.side, ", ".join(sides))
     axis, end = sides[piece.side]
     along = [i for i in range(len(grid[0])) if i != axis]
     low, high, h = (values[along] for values in grid)
-    start = _on_grid(name, "from", piece.start, low, (low, high, h))
-    stop = _on_grid(name, "to", piece.stop, high, (low, high, h))
+    start = _on_grid(f"{key}.from", piece.start, low, (low, high, h))
+    stop = _on_grid(f"{key}.to", piece.stop, high, (low, high, h))
     if np.any(stop - start < 0.5 * h):
-        raise InputError(
-            f"mesh part {name!r}: to must lie beyond from; given: from {start.tolist()} "
-            f"to {stop.tolist()}"
-        )
+        given = high.tolist() if piece.stop is None else piece.stop
+        raise GridError(f"{key}.to", given, "a position beyond from")
     return axis, float(grid[end][axis]), start, stop
 
 
 def _on_grid(
-    name: str,
     key: str,
     given: float | Sequence[float] | None,
     default: npt.NDArray[np.float64],
@@ -180,11 +218,11 @@ def _on_grid(
     if given is None:
         return default
     low, high, h = along
+    # A number in the plane, a list of two in space.
+    if np.shape(given) != (() if low.size == 1 else low.shape):
+        accepted = "a number" if low.size == 1 else f"a list of {low.size} numbers"
+        raise GridError(key, given, accepted)
     point = np.atleast_1d(np.asarray(given, dtype=np.float64))
-    if point.shape != low.shape:
-        raise InputError(
-            f"mesh part {name!r}: {key} must be {low.size} number(s) along the side; given: {given}"
-        )
     step = (point - low) / h
     count = np.rint((high - low) / h)
     below, above = np.clip(np.floor(step), 0, count), np.clip(np.ceil(step), 0, count)
@@ -193,10 +231,8 @@ def _on_grid(
     if np.any(np.abs(step - nearest) > 1e-6):
         i = int(np.argmax(np.abs(step - nearest)))
         options = sorted({float(low[i] + k * h[i]) for k in (below[i], above[i])})
-        raise InputError(
-            f"mesh part {name!r}: {key} = {point[i]:g} is no grid position of its side "
-            f"(nearest: {', '.join(f'{v:g}' for v in options)})"
-        )
+        near = ", ".join(f"{v:g}" for v in options)
+        raise GridError(key, given, f"positions of the grid on its side (nearest: {near})")
     return low + nearest * h
 
 

@@ -81,7 +81,7 @@ class FixedPoint:
     def __post_init__(self) -> None:
         """Choose r and set up the operator."""
         options, body = self.options, self.problem.equilibrium
-        self.r = options.r or automatic_r(self.problem.scales)
+        self.r = automatic_r(self.problem.scales) if options.r == "auto" else options.r
         self.operator = self._new_operator(symmetric=True)
         self.history = History(self.monitor)
         self.state = self.problem.start()
@@ -93,8 +93,8 @@ class FixedPoint:
             self.r,
             inner,
             options.max_inner,
-            options.depth,
-            options.over_relaxation,
+            options.depth if options.acceleration == "anderson" else 0,
+            options.relaxation,
             options.eps if thesis else None,
             options.single_loop,
         )

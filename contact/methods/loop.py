@@ -56,7 +56,7 @@ class NewtonLoop:
     @property
     def left(self) -> int:
         """Number of steps that are left of the limit."""
-        return self.options.limit - len(self.history.records)
+        return self.options.max_outer - len(self.history.records)
 
     def run(
         self, iterate: Iterate, note: str = "", bound: Array | None = None, goal: float = 0.0

@@ -28,6 +28,9 @@ CONTACT_PART = 1e-3
 #: contact is solved exactly in each step, the tangent does not fear what it changes.
 SECANT_UNTIL = 0.3
 
+#: Most dense steps in one solve of the condensed contact problem.
+MOST_STEPS = 1000
+
 #: Solves a condensed problem from an iterate, with a history of its own.
 Solver = Callable[
     [CondensedProblem, NewtonOptions, Moduli, History, Iterate], tuple[Iterate, Outcome]
@@ -85,7 +88,7 @@ class MaterialStep:
         options = replace(
             self.options,
             tolerance=enough,
-            limit=NewtonOptions.limit,
+            max_outer=MOST_STEPS,
             condense=False,
             load_steps=False,
         )

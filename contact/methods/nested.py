@@ -84,7 +84,8 @@ def coarse_solution(
         tolerance=max(COARSE_TOLERANCE, case.solver.tolerance), linear=case.solver.linear
     )
     last: tuple[ContactProblem, State] | None = None
-    for level in coarser_cases(case, case.solver.nested_levels):
+    levels = case.solver.nested_levels if isinstance(case.solver, NewtonOptions) else None
+    for level in coarser_cases(case, levels):
         problem = build_problem(level, comm, **replacements)
         method = Newton(problem, options)
         state, _ = method.solve(None if last is None else prolong(*last, problem))

@@ -150,7 +150,7 @@ class Newton:
     @property
     def _left(self) -> int:
         """Number of steps that are left of the limit."""
-        return self.options.limit - len(self.history.records)
+        return self.options.max_outer - len(self.history.records)
 
     def _roads(self, iterate: Iterate) -> tuple[Iterate, Outcome]:
         if self._condensed is not None:

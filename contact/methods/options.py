@@ -1,98 +1,137 @@
-"""What the methods are told: tolerances, limits and parameters."""
+"""What the methods are told: tolerances, limits and parameters.
+
+Each setting is stated here alone, see `contact.settings`: the case file's `[solver]` is one of
+these classes, by its method.
+"""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, fields
+from typing import Annotated, Any, Literal
+
+from annotated_types import Ge, Gt, Le, Lt
 
 from contact.problem.kkt import KKT
+from contact.settings import Accepted, Count, Internal, Positive, ReadWith, Switch, Tolerance
 from contact.tolerances import LAWS_HOLD
 
-#: Most inner iterations in an outer one.
-MAX_INNER = 5000
 
-
-def all_within(tolerance: float) -> KKT:
-    """Return one bound for every residual."""
-    return KKT(tolerance, tolerance, tolerance)
-
-
-@dataclass(frozen=True)
-class FixedPointOptions:
-    """Options of the fixed point.
+@dataclass(frozen=True, kw_only=True)
+class Options:
+    """What every method is told.
 
     Attributes
     ----------
+    method
+        Name of the method.
     tolerance
-        On every KKT residual.
-    r
-        Augmentation parameter, or None for `automatic_r`.
-    stopping
-        "residual", or "thesis": (3.45) with `eps` inside and (3.46) or (6.40) with `eps_fp`.
-    depth, over_relaxation, single_loop
-        See `uzawa.Relaxation`.
-    inner_tolerance
-        Of the block relaxation; None for a tenth of the tolerance, as far as rounding allows.
-    material_step
-        "secant" (Kacanov), "tangent" (Newton), or "auto": secant steps until the residual is
-        below 1e-2, then tangent ones as long as they reduce it.
+        Tolerance on each KKT residual (relative); of `penalty`, on the equilibrium of the
+        penalised problem.
+    max_outer
+        Most outer iterations; of `newton`, most steps in all its stages together.
     linear
-        Kind of linear solver, see `linear.LinearOperator`.
+        Linear solver: `auto` chooses by size.
     """
 
-    tolerance: float = 1e-8
-    r: float | None = None
-    stopping: str = "residual"
-    eps: float = 1e-5
-    eps_fp: float = 1e-5
-    depth: int = 30
-    over_relaxation: float = 1.0
-    single_loop: bool = False
-    inner_tolerance: float | None = None
-    material_step: str = "auto"
-    linear: str = "auto"
-    max_outer: int = 200
-    max_inner: int = MAX_INNER
+    method: str
+    tolerance: Tolerance = 1e-8
+    max_outer: Count = 200
+    linear: Literal["auto", "lu", "iterative"] = "auto"
 
     @property
     def allowed(self) -> KKT:
         """How large each residual may be at the end."""
-        return all_within(self.tolerance)
+        return KKT(self.tolerance, self.tolerance, self.tolerance)
 
 
-@dataclass(frozen=True)
-class PenaltyOptions:
-    """Options of the penalty method.
+@dataclass(frozen=True, kw_only=True)
+class LoopOptions(Options):
+    """What the methods with an inner and an outer loop are told.
+
+    Attributes
+    ----------
+    stopping
+        `residual`: the KKT residuals end the loops; `thesis`: the rules (3.45) and (3.46), with
+        a potential (6.40), by `penalty` (4.38), on the change between iterations do. The
+        residuals decide `converged` in any case.
+    eps_fp
+        Tolerance of (3.46), outer loop.
+    max_inner
+        Most inner iterations in an outer one.
+    material_step
+        Linearisation of the material: `secant` (Kacanov; Algorithms as printed), `tangent`, or
+        secant first and tangent from a residual of 1e-2 on as long as that reduces it. The
+        tangent of `penalty` is implicit in friction too.
+    """
+
+    stopping: Literal["residual", "thesis"] = "residual"
+    eps_fp: Annotated[Tolerance, ReadWith("stopping", "thesis")] = 1e-5
+    max_inner: Count = 5000
+    material_step: Literal["secant", "tangent", "auto"] = "auto"
+
+
+@dataclass(frozen=True, kw_only=True)
+class FixedPointOptions(LoopOptions):
+    """Algorithms 1, 2 and their kin: a fixed point over block relaxation.
+
+    Attributes
+    ----------
+    eps
+        Tolerance of (3.45), inner loop.
+    inner_tolerance
+        Tolerance of the inner loop. Default: a tenth of `tolerance`.
+    r
+        Augmentation parameter of the block relaxation (force/volume).
+    acceleration
+        Acceleration of the block relaxation.
+    depth
+        Number of earlier solves that `anderson` uses.
+    relaxation
+        Relaxation of the multiplier's step; above 1: over-relaxation.
+    single_loop
+        `true`: the friction bound is updated in the block relaxation itself.
+    """
+
+    method: Literal["uzawa"] = "uzawa"
+    eps: Annotated[Tolerance, ReadWith("stopping", "thesis")] = 1e-5
+    inner_tolerance: Annotated[Tolerance | None, ReadWith("stopping", "residual")] = None
+    r: Annotated[Literal["auto"] | Positive, Accepted('"auto" or a number > 0')] = "auto"
+    acceleration: Literal["anderson", "none"] = "anderson"
+    depth: Annotated[
+        int,
+        Ge(1),
+        Le(100),
+        Accepted("a whole number from 1 to 100"),
+        ReadWith("acceleration", "anderson"),
+    ] = 30
+    relaxation: Annotated[
+        float,
+        Gt(0),
+        Lt(2),
+        Accepted("a number between 0 and 2, both excluded"),
+        ReadWith("acceleration", "none"),
+    ] = 1.0
+    single_loop: Switch = False
+
+
+@dataclass(frozen=True, kw_only=True)
+class PenaltyOptions(LoopOptions):
+    """Algorithm 3, the penalty method.
 
     Attributes
     ----------
     eps_contact
-        1/stiffness of the foundation (length^3/force); None for `automatic_eps`.
+        1/eps_contact is the stiffness of the contact (force/length^3). Default: 0.01 h/E, h the
+        spacing of the contact nodes.
     eps_slip
-        Slip length of the regularised friction; None for the number `eps_contact`, as in the
-        thesis, or where that is None too for `automatic_eps`.
-    tolerance
-        On the equilibrium residual of the penalised problem.
-    stopping
-        "residual", or "thesis": (4.38) with `eps_fp`.
-    material_step
-        "secant": Algorithm 3 as printed. "tangent": material and friction are implicit in
-        SNES from the first frictional iteration on. "auto": Algorithm 3 until the residual is
-        below 1e-2, implicit from there as long as SNES converges.
-    max_outer, max_inner
-        Largest number of outer iterations, and of SNES iterations in one of them.
-    linear
-        Kind of linear solver, see `linear.LinearOperator`.
+        Slip length of the regularised friction. Default: the number `eps_contact` where that is
+        given, as in the thesis, else a hundredth of the displacement that the loads give.
     """
 
-    eps_contact: float | None = None
-    eps_slip: float | None = None
-    tolerance: float = 1e-8
-    stopping: str = "residual"
-    eps_fp: float = 1e-5
-    material_step: str = "auto"
-    max_outer: int = 1000
-    max_inner: int = 50
-    linear: str = "auto"
+    method: Literal["penalty"] = "penalty"
+    eps_contact: Positive | None = None
+    eps_slip: Positive | None = None
 
     @property
     def allowed(self) -> KKT:
@@ -100,18 +139,18 @@ class PenaltyOptions:
         return KKT(self.tolerance, LAWS_HOLD, LAWS_HOLD)
 
 
-@dataclass(frozen=True)
-class NewtonOptions:
-    """Options of Newton's method.
+@dataclass(frozen=True, kw_only=True)
+class NewtonOptions(Options):
+    """Semismooth Newton.
 
     Attributes
     ----------
-    tolerance
-        On every KKT residual.
+    nested
+        `true`: solve on coarser meshes first and start from there.
+    nested_levels
+        Number of nested meshes. Default: all that save time.
     max_iterations
         Number of steps allowed in each stage.
-    limit
-        Number of steps allowed in all stages together.
     gamma
         Stiffness of the condensed constraints over that of the body.
     secant_until
@@ -123,8 +162,6 @@ class NewtonOptions:
         Part of a node's own stiffness that a falling friction coefficient may take away in the
         first step. Infinity for the exact derivative: from nearby, it also leads to solutions
         on the falling part of the law, which are unstable.
-    linear
-        Kind of linear solver, see `linear.LinearOperator`.
     condense
         Whether to condense the linearised body onto the contact nodes where that pays: one
         step then solves the whole contact problem for a linear body.
@@ -132,18 +169,39 @@ class NewtonOptions:
         Whether to apply the load in steps where all else has failed.
     """
 
-    tolerance: float = 1e-8
-    max_iterations: int = 60
-    limit: int = 1000
-    gamma: float = 1e4
-    secant_until: float = 1e-2
-    patience: int = 12
-    softening: float = 0.25
-    linear: str = "auto"
-    condense: bool = True
-    load_steps: bool = True
+    method: Literal["newton"] = "newton"
+    nested: Switch = False
+    nested_levels: Annotated[
+        Annotated[int, Ge(2), Le(20), Accepted("a whole number from 2 to 20")] | None,
+        ReadWith("nested", True),
+    ] = None
+    max_iterations: Annotated[int, Internal()] = 60
+    gamma: Annotated[float, Internal()] = 1e4
+    secant_until: Annotated[float, Internal()] = 1e-2
+    patience: Annotated[int, Internal()] = 12
+    softening: Annotated[float, Internal()] = 0.25
+    condense: Annotated[bool, Internal()] = True
+    load_steps: Annotated[bool, Internal()] = True
 
-    @property
-    def allowed(self) -> KKT:
-        """How large each residual may be at the end."""
-        return all_within(self.tolerance)
+
+#: Name of a method -> its options.
+OPTIONS: Mapping[str, type[Options]] = {
+    options.method: options for options in (FixedPointOptions, PenaltyOptions, NewtonOptions)
+}
+
+
+def with_method(options: Options, method: str, **changes: Any) -> Options:
+    """Return the options of a method with those settings of another's that both have.
+
+    Parameters
+    ----------
+    options
+        Options of any method.
+    method
+        Name of the method to be told.
+    changes
+        Further settings of that method.
+    """
+    other = OPTIONS[method]
+    shared = {f.name for f in fields(other)} & {f.name for f in fields(options)} - {"method"}
+    return other(method=method, **{key: getattr(options, key) for key in shared} | changes)

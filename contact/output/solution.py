@@ -9,12 +9,12 @@ import numpy as np
 from dolfinx import fem
 from mpi4py import MPI
 
-from contact.case.solver import Output
 from contact.interface.multipliers import Multipliers
 from contact.interface.status import CLOSED, STICKS
 from contact.linear.operator import Counters
 from contact.methods.report import History, Outcome
 from contact.output.fields import unknowns
+from contact.output.options import OutputOptions
 from contact.problem.problem import ContactProblem
 from contact.problem.state import State
 from contact.typing import Array
@@ -67,7 +67,7 @@ class Solution:
     max_dev_strain: float = np.nan
     start: str = "zero slip"
     title: str = ""
-    output: Output = field(default_factory=Output)
+    output: OutputOptions = field(default_factory=OutputOptions)
 
     @property
     def converged(self) -> bool:

@@ -84,14 +84,14 @@ def described(solution: Solution) -> dict[str, Any]:
 
 def warm(case: Case, coarse: Callable[[], Case]) -> None:
     """Compile the forms of a case on a small mesh."""
-    solve_problem(build_problem(coarse()), case.solver.model_copy(update={"nested": False}))
+    solve_problem(build_problem(coarse()), case.solver)
 
 
 def from_file(name: str, *changes: str) -> dict[str, Any]:
     """Measure a case file."""
     case = load_case(CASES / name, changes)
     warm(case, lambda: case)
-    start = coarse_solution(case, COMM) if case.solver.nested else None
+    start = coarse_solution(case, COMM) if getattr(case.solver, "nested", False) else None
     return described(solve_problem(build_problem(case), case.solver, start=start))
 
 
@@ -149,7 +149,7 @@ def ratio(dimension: str, n: str, start: str) -> dict[str, Any]:
 
 def phases(dimension: str, n: str) -> dict[str, Any]:
     """Measure mesh and forms, assembly, factorisation, one solve, everything, and output."""
-    from contact.mesh.make import make_domain
+    from contact.meshing import make_domain
     from contact.output.files import write_outputs
     from contact.problem.kkt import evaluate, residual_forces
     from contact.problem.state import Multipliers

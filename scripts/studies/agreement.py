@@ -15,7 +15,7 @@ from itertools import groupby
 import numpy as np
 
 from contact import Case, build_problem, load_case
-from contact.case.file import Solver
+from contact.methods.options import Options, PenaltyOptions, with_method
 from scripts.cases import CASES
 from scripts.reporting import Report, observed_orders, parser
 from scripts.studies.branches import AGREE, DISTURBANCE, Branches, Found
@@ -133,7 +133,7 @@ class Compared:
     """
 
     example: Example
-    newton: Solver
+    newton: Options
     branches: Branches
     runs: dict[str, Found]
     letters: dict[str, str]
@@ -163,25 +163,23 @@ def compare(example: Example, coarse: bool) -> Compared:
     return Compared(example, newton, branches, runs, letters)
 
 
-def relaxed(newton: Solver) -> Solver:
+def relaxed(newton: Options) -> Options:
     """Return the settings of block relaxation."""
-    return newton.model_copy(update={"method": "uzawa"})
+    return with_method(newton, "uzawa")
 
 
-def penalised(branches: Branches, solution: Found, newton: Solver, eps: float) -> Solver:
+def penalised(branches: Branches, solution: Found, newton: Options, eps: float) -> Options:
     """Return the penalty method with eps relative to a solution. Collective.
 
     At the largest pressure the penetration is eps max|u|, and that is the slip length as well.
     """
     displacement, pressure = branches.size(solution)
-    return newton.model_copy(
-        update={
-            "method": "penalty",
-            "tolerance": PENALISED,
-            "max_outer": 1000,
-            "eps_contact": eps * displacement / pressure,
-            "eps_slip": eps * displacement,
-        }
+    return PenaltyOptions(
+        tolerance=PENALISED,
+        max_outer=1000,
+        linear=newton.linear,
+        eps_contact=eps * displacement / pressure,
+        eps_slip=eps * displacement,
     )
 
 

@@ -8,10 +8,9 @@ import numpy as np
 from mpi4py import MPI
 
 from contact import Case, InputError, Solution
-from contact.case.file import Solver
 from contact.methods.nested import coarse_solution, coarser_cases, prolong
 from contact.methods.newton import Newton
-from contact.methods.options import NewtonOptions
+from contact.methods.options import NewtonOptions, Options
 from contact.methods.report import Outcome
 from contact.output.review import review
 from contact.problem.kkt import KKT, evaluate
@@ -110,7 +109,7 @@ class Branches:
         self.solutions: dict[str, Found] = {}
         self._norm = ProductNorm(problem)
 
-    def run(self, settings: Solver, start: Start | None = None) -> Found:
+    def run(self, settings: Options, start: Start | None = None) -> Found:
         """Solve from zero displacement, or from elsewhere. Collective."""
         method = METHODS[settings.method](self.problem, settings, None)
         if start is None:

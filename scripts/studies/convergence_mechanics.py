@@ -64,7 +64,7 @@ class Variant:
 
     def case(self, n: int, nested: bool = False) -> Case:
         """Return the case on a mesh, solved on coarser ones first if wanted."""
-        meshes = [f"solver.nested={str(nested).lower()}"]
+        meshes = ["solver.nested=true"] if nested else []
         return bar(n, self.load, RHO, f"space.degree={self.degree}", *meshes, *self.changes)
 
 
@@ -304,8 +304,8 @@ def watched(iteration: Iteration, n: int) -> tuple[Array, float, float]:
 def _solver(problem: ContactProblem, iteration: Iteration, keep: Monitor) -> FixedPoint | Penalty:
     tight = 1e-10
     if iteration.eps is not None:
-        options_ = PenaltyOptions(iteration.eps, tolerance=tight, material_step="secant")
-        return Penalty(problem, options_, keep)
+        lagged = PenaltyOptions(eps_contact=iteration.eps, tolerance=tight, material_step="secant")
+        return Penalty(problem, lagged, keep)
     return FixedPoint(
         problem,
         FixedPointOptions(tolerance=tight, inner_tolerance=1e-12, material_step="secant"),

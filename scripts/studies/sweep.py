@@ -15,6 +15,7 @@ from mpi4py import MPI
 
 from contact import build_problem, solve_problem
 from contact.case.file import Case, parse_case
+from contact.methods.options import with_method
 from scripts.reporting import Report, parser
 
 METHODS = ("newton", "uzawa")
@@ -216,7 +217,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
         problem = build_problem(case)
         for method in given.methods:
             begin = time.perf_counter()
-            settings = case.solver.model_copy(update={"method": method})
+            settings = with_method(case.solver, method)
             solution = solve_problem(problem, settings)
             notes = {r.note for r in solution.history.records}
             for word in ("tangent", "taken back"):  # steps of the method itself

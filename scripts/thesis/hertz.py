@@ -13,7 +13,7 @@ from mpi4py import MPI
 
 from contact import Case, Solution, build_problem, load_case
 from contact.body.norms import volume
-from contact.mesh.make import make_domain
+from contact.meshing import make_domain
 from contact.output.figures.body import draw_plane, picture
 from contact.output.table import contact_table
 from contact.typing import Array

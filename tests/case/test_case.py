@@ -14,11 +14,11 @@ import pytest
 from contact.case import reference
 from contact.case.file import Case, SlipLaw, Sphere, load_case, parse_case
 from contact.case.formula import Expression
-from contact.case.messages import keys_of
 from contact.case.text import to_toml
-from contact.case.types import sections_of
+from contact.case.types import keys_of, sections_of
 from contact.cli.main import main, parse
 from contact.errors import InputError
+from contact.methods.options import OPTIONS, NewtonOptions, with_method
 from contact.output.environment import identify
 
 BAR = """\
@@ -97,7 +97,7 @@ def test_the_bar(bar):
 def test_the_rest_of_the_keys():
     case = parse_case(
         changed(
-            mesh={"generator": "box", "size": [1, 1, 2], "cells": [1, 1, 2], "rotation": 30},
+            mesh={"generator": "box", "size": [1, 1, 2], "cells": [1, 2, 2], "rotation": 30},
             mesh__parts__strip=[{"side": "top", "from": [0, 0], "to": [1, 0.5]}, {"side": "left"}],
             material__piezo={**PIEZO, "poling": [0, 0, 1]},
             fixed=[
@@ -174,7 +174,7 @@ BAD = {
     "modulus as text": ({"material__young": "1.0"}, 'material.young: given "1.0"; accepted'),
     "modulus as switch": ({"material__young": True}, "material.young: given true"),
     "not a number": ({"material__young": float("nan")}, "material.young: given nan"),
-    "infinite": ({"solver__r": float("inf")}, "solver.r: given inf"),
+    "infinite": ({"solver": {"method": "uzawa", "r": float("inf")}}, "solver.r: given inf"),
     "huge": ({"material__young": 10**400}, "material.young: given 1000"),
     "incompressible": ({"material__poisson": 0.5}, "a number between -1 and 0.5, both excluded"),
     "unknown law": ({"material__law": "plastic"}, 'accepted: "linear" or "log"'),
@@ -193,6 +193,10 @@ BAD = {
     "side": ({"mesh__parts__loaded__side": "front"}, "left, right, bottom, top"),
     "backward piece": ({"mesh__parts__loaded__to": 1.0}, "mesh.parts.loaded.to: given 1.0"),
     "piece in space": ({"mesh__parts__loaded__to": [1, 2]}, "mesh.parts.loaded.to: given [1.0"),
+    "piece off the grid": (
+        {"mesh__parts__loaded": [{"side": "top"}, {"side": "left", "to": 0.3}]},
+        "mesh.parts.loaded.1.to: given 0.3; accepted: positions of the grid on its side (nearest",
+    ),
     "part named as a side": ({"mesh__parts__top": {"side": "left"}}, "a name that no side has"),
     "recipe key": (
         {"mesh": {"generator": "quarter_disc", "radios": 1}},
@@ -296,7 +300,7 @@ BAD = {
     "method": ({"solver__method": "newtn"}, '"uzawa", "penalty" or "newton"'),
     "setting of another method": (
         {"solver__r": 25},
-        'solver.r: given 25.0; accepted: r with method = "uzawa"',
+        'solver.r: given 25; accepted: r with method = "uzawa"',
     ),
     "stopping rule of Newton's method": (
         {"solver__stopping": "thesis"},
@@ -316,15 +320,34 @@ BAD = {
     ),
     "tolerance of another rule": (
         {"solver": {"method": "uzawa", "eps": 1e-4}},
-        'solver.eps: given 0.0001; accepted: eps with method = "uzawa" and stopping = "thesis"',
+        'solver.eps: given 0.0001; accepted: eps with stopping = "thesis"',
     ),
     "over-relaxation of Anderson's steps": (
         {"solver": {"method": "uzawa", "relaxation": 1.7}},
-        'relaxation with method = "uzawa" and acceleration = "none"',
+        'relaxation with acceleration = "none"',
     ),
-    "augmentation": ({"solver__r": 0}, 'solver.r: given 0; accepted: "auto" or a number > 0'),
-    "augmentation text": ({"solver__r": "big"}, 'accepted: "auto" or a number > 0'),
-    "relaxation": ({"solver__relaxation": 2.0}, "between 0 and 2, both excluded"),
+    "augmentation": (
+        {"solver": {"method": "uzawa", "r": 0}},
+        'solver.r: given 0; accepted: "auto" or a number > 0',
+    ),
+    "augmentation text": (
+        {"solver": {"method": "uzawa", "r": "big"}},
+        'accepted: "auto" or a number > 0',
+    ),
+    "relaxation": (
+        {"solver": {"method": "uzawa", "acceleration": "none", "relaxation": 2.0}},
+        "between 0 and 2, both excluded",
+    ),
+    "method as a list": ({"solver__method": ["newton"]}, 'solver.method: given ["newton"]'),
+    "unknown setting": ({"solver__tolerence": 1}, "solver.tolerence: unknown key, did you mean to"),
+    "a setting of Python's": ({"solver__gamma": 1.0}, "solver.gamma: unknown key; accepted: met"),
+    "nested meshes of another method": (
+        {"solver": {"method": "penalty", "nested": True}},
+        'solver.nested: given true; accepted: nested with method = "newton"',
+    ),
+    "tolerance as a text": ({"solver__tolerance": "1e-8"}, 'solver.tolerance: given "1e-8"'),
+    "count as a number": ({"solver__max_outer": 3.0}, "solver.max_outer: given 3.0"),
+    "switch as a number": ({"solver__nested": 1}, "solver.nested: given 1; accepted: true or"),
     "tolerance": ({"solver__tolerance": 0.0}, "solver.tolerance: given 0.0"),
     "tolerance below rounding": ({"solver__tolerance": 1e-16}, "a number from 1e-15"),
     "loose inner loop": (
@@ -334,6 +357,8 @@ BAD = {
     "iterations": ({"solver__max_outer": 0}, "solver.max_outer: given 0"),
     "levels": ({"solver__nested_levels": 3}, "nested_levels with nested = true"),
     "output": ({"output": {"fields": "vtk"}}, '"vtx", "xdmf" or "none"'),
+    "unknown output": ({"output": {"feilds": "vtx"}}, "output.feilds: unknown key, did you mean f"),
+    "output as a number": ({"output": 3}, "output: given 3; accepted: a table"),
     "title": ({"title": 3}, "title: given 3; accepted: a text"),
 }
 
@@ -444,7 +469,24 @@ def test_every_key_is_described():
         for key, field in keys_of(section).items():
             assert field.description, f"{section.__name__}.{key}"
             sections += sections_of(field.annotation).values()
-    assert len(sections) == 16
+    assert len(sections) == 18
+
+
+@pytest.mark.parametrize("method", OPTIONS)
+def test_the_settings_of_a_method_are_its_options(method):
+    solver = parse_case(changed(solver={"method": method})).solver
+    assert solver == OPTIONS[method]()
+    given = OPTIONS[method](tolerance=1e-18)  # not looked at, in Python
+    assert parse_case(changed(solver=given)).solver is given
+    assert with_method(given, "newton") == NewtonOptions(tolerance=1e-18)
+
+
+def test_the_resolved_case_holds_what_the_method_reads():
+    keys = "method", "tolerance", "max_outer", "linear"
+    table = tomllib.loads(to_toml(parse_case(changed())))["solver"]
+    assert tuple(table) == (*keys, "nested")
+    table = tomllib.loads(to_toml(parse_case(changed(solver={"method": "penalty"}))))["solver"]
+    assert tuple(table) == (*keys, "stopping", "max_inner", "material_step")
 
 
 def test_the_reference_page_is_up_to_date():

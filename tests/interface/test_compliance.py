@@ -13,13 +13,12 @@ from mpi4py import MPI
 
 from contact import InputError
 from contact import solve as solve_case
-from contact.case.file import Solver
 from contact.interface.nodes import ContactTrace
 from contact.interface.response import Conductor, FoundationResponse, Layer
 from contact.mesh.make import box, rectangle
 from contact.methods.fixed_point import FixedPoint
 from contact.methods.newton import Newton
-from contact.methods.options import NewtonOptions
+from contact.methods.options import OPTIONS, NewtonOptions, PenaltyOptions
 from contact.problem.problem import Body, Contact, ContactProblem, Fixed, Friction
 from contact.problem.state import nodal_iterate
 from forms.foundation import compliance
@@ -192,7 +191,7 @@ def test_penalty_on_columns(column):
     # Full steps would cycle between the open and the saturated layer.
     eps = 1e-7
     solution = solve_case(
-        column.problem(), Solver(method="penalty", eps_contact=eps, tolerance=1e-10, max_inner=50)
+        column.problem(), PenaltyOptions(eps_contact=eps, tolerance=1e-10, max_inner=50)
     )
     assert solution.converged, solution.outcome
     u_n, _, layer, rest, _ = column.solution()
@@ -246,7 +245,7 @@ def hump_slope(s):
 @pytest.mark.parametrize("method", ["uzawa", "newton", "penalty"])
 def test_falling_law_is_solved_with_a_warning(method):
     column = LayerColumn(0.3, p_nu=Made(hump, hump_slope))
-    solution = solve_case(column.problem(), Solver(method=method, tolerance=1e-10))
+    solution = solve_case(column.problem(), OPTIONS[method](tolerance=1e-10))
     assert solution.converged, solution.outcome
     assert any("p_nu falls" in warning for warning in solution.warnings)
     assert np.allclose(solution.normal_displacement, column.solution()[0], rtol=0, atol=1e-8)
@@ -254,13 +253,13 @@ def test_falling_law_is_solved_with_a_warning(method):
 
 def test_layer_thicker_than_the_gap_presses_at_rest_with_a_warning():
     column = LayerColumn(0.0, touch=-0.1, gap=0.05)
-    solution = solve_case(column.problem(), Solver(tolerance=1e-11))
+    solution = solve_case(column.problem(), NewtonOptions(tolerance=1e-11))
     assert solution.converged
     assert any("presses on the body at rest" in warning for warning in solution.warnings)
     u_n, _, layer, _, _ = column.solution()
     assert layer > 1.0
     assert np.allclose(solution.normal_displacement, u_n, rtol=0, atol=1e-10)
-    plain = solve_case(REGIMES["linear"].problem(), Solver())
+    plain = solve_case(REGIMES["linear"].problem(), NewtonOptions())
     assert not any("layer" in warning or "p_nu" in warning for warning in plain.warnings)
 
 

@@ -9,7 +9,8 @@ from mpi4py import MPI
 
 from contact.case.mesh import Mesh as MeshSection
 from contact.errors import InputError
-from contact.mesh.make import Piece, box, from_mesh, make_domain, rectangle, refined
+from contact.mesh.make import Piece, box, from_mesh, rectangle, refined
+from contact.meshing import make_domain
 
 COMM = MPI.COMM_WORLD
 
@@ -122,18 +123,21 @@ def test_unknown_part_names_the_nearest_and_all():
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"size": (4, 0)}, "size must be positive"),
-        ({"size": (4, 1, 1)}, "size must be 2 numbers"),
-        ({"origin": 0.0}, "origin must be 2 numbers"),
-        ({"cells": (4, 0)}, "cells must be positive whole"),
-        ({"cells": (4, 1.5)}, "cells must be positive whole"),
+        ({"size": (4, 0)}, r"mesh.size: given \(4, 0\); accepted: positive"),
+        ({"size": (4, 1, 1)}, "mesh.size: .* a list of 2 numbers for a rectangle"),
+        ({"origin": 0.0}, "mesh.origin: given 0.0; accepted: a list of 2"),
+        ({"cells": (4, 0)}, "mesh.cells: .* positive whole"),
+        ({"cells": (4, 1.5)}, "mesh.cells: .* positive whole"),
         ({"diagonal": "up"}, "diagonal 'up' is unknown"),
-        ({"parts": {"top": Piece("top")}}, "'top' is a side already"),
-        ({"parts": {"a": Piece("front")}}, "unknown side 'front'"),
-        ({"parts": {"a": Piece("top", 0.3, 4.0)}}, r"from = 0.3 .*nearest: 0, 0.5\)"),
-        ({"parts": {"a": Piece("top", 0.5, 5.0)}}, r"to = 5 .*nearest: 4\)"),
-        ({"parts": {"a": Piece("top", 2.0, 2.0)}}, "to must lie beyond from"),
-        ({"parts": {"a": Piece("top", (2.0, 1.0))}}, "from must be 1 number"),
+        (
+            {"parts": {"top": Piece("top")}},
+            "parts.top: given top; accepted: a name that no side",
+        ),
+        ({"parts": {"a": Piece("front")}}, "mesh.parts.a.side: given front; accepted: left, right"),
+        ({"parts": {"a": Piece("top", 0.3, 4.0)}}, r"parts.a.from: given 0.3; .*nearest: 0, 0.5\)"),
+        ({"parts": {"a": Piece("top", 0.5, 5.0)}}, r"parts.a.to: given 5.0; .*nearest: 4\)"),
+        ({"parts": {"a": Piece("top", 2.0, 2.0)}}, "a position beyond from"),
+        ({"parts": {"a": [Piece("top", (2.0, 1.0))]}}, "mesh.parts.a.0.from: .* a number"),
         ({"parts": {"a": []}}, "'a' contains no facet"),
         ({"parts": {f"p{i}": Piece("top") for i in range(28)}}, "32 boundary parts; at most 31"),
     ],
@@ -150,8 +154,11 @@ def test_wrong_rectangles_are_refused(change, message):
     [
         ({"axis": (0, 0, 0)}, "axis must be 3 numbers"),
         ({"axis": (0, 1)}, "axis must be 3 numbers"),
-        ({"parts": {"a": Piece("top", 0.5)}}, "from must be 2 number"),
-        ({"parts": {"a": Piece("top", (0, 0), (1.1, 1))}}, r"to = 1.1 .*nearest: 1, 2\)"),
+        ({"parts": {"a": Piece("top", 0.5)}}, "parts.a.from: .* a list of 2 numbers"),
+        (
+            {"parts": {"a": Piece("top", (0, 0), (1.1, 1))}},
+            r"given \(1.1, 1\); .*nearest: 1, 2\)",
+        ),
     ],
 )
 def test_wrong_boxes_are_refused(change, message):

@@ -113,7 +113,9 @@ def test_the_two_parameters_are_separate():
     problem = bar(coefficient=ConstantCoefficient(0.5))
     solutions = {}
     for contact, slip in ((1e-4, None), (1e-4, 1e-4), (1e-4, 1e-6)):
-        assert Penalty(problem, PenaltyOptions(contact, slip)).solve().converged
+        assert (
+            Penalty(problem, PenaltyOptions(eps_contact=contact, eps_slip=slip)).solve().converged
+        )
         solutions[contact, slip] = problem.x.x.array[: problem.owned].copy()
     same, other = solutions[1e-4, None], solutions[1e-4, 1e-6]
     assert relative(problem, same, solutions[1e-4, 1e-4]) < 1e-12

@@ -54,9 +54,11 @@ def reference():
     return contact_data(coarse(tolerance=1e-11))
 
 
+PLAIN = {"acceleration": "none"}
+
 VARIANTS = [
-    {"depth": 0, "max_inner": 20000},
-    {"depth": 0, "over_relaxation": 1.7, "max_inner": 20000},
+    {**PLAIN, "max_inner": 20000},
+    {**PLAIN, "relaxation": 1.7, "max_inner": 20000},
     {"depth": 1},
     {"depth": 3},
     {"depth": 60},
@@ -78,7 +80,7 @@ def test_every_variant_finds_the_same_solution(options, reference):
 def test_acceleration_and_over_relaxation_save_solves():
     counts = [
         coarse(tolerance=1e-8, max_inner=20000, **options).counters.linear_solves
-        for options in ({"depth": 0}, {"depth": 0, "over_relaxation": 1.7}, {})
+        for options in (PLAIN, {**PLAIN, "relaxation": 1.7}, {})
     ]
     assert counts[2] < 0.7 * counts[1] < 0.7 * counts[0]
 
@@ -149,7 +151,7 @@ ROUNDING = {"tolerance": 1e-18, "inner_tolerance": 1e-18, "max_inner": 10**6}
         ({"max_inner": 3, "max_outer": 8}, "8 outer iterations"),
         ({"stopping": "thesis", "eps": 1e-3, "eps_fp": 1e-3}, "criterion is met, but"),
         (ROUNDING, "stalled at"),
-        ({**ROUNDING, "depth": 0, "r": 3.0}, "stalled at"),
+        ({**ROUNDING, **PLAIN, "r": 3.0}, "stalled at"),
         ({**ROUNDING, "stopping": "thesis", "eps": 1e-17}, "criterion is met, but"),
     ],
 )

@@ -4,6 +4,7 @@ import csv
 import json
 import os
 import signal
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -13,12 +14,13 @@ from mpi4py import MPI
 
 from contact.build import build_problem
 from contact.case.file import Case, parse_case
-from contact.case.solver import Output, Solver
 from contact.linear.operator import LinearOperator
+from contact.methods.options import NewtonOptions, with_method
 from contact.methods.report import Record
 from contact.output.fields import DerivedFields
 from contact.output.figures.figures import write_figures
 from contact.output.files import write_outputs
+from contact.output.options import OutputOptions
 from contact.output.solution import Solution
 from contact.output.table import contact_table, csv_columns, held_points, tangent_of
 from contact.problem.kkt import evaluate
@@ -116,7 +118,7 @@ def test_iterations_of_the_linear_solver_are_written(tmp_path: Path) -> None:
     counts = []
     for kind in ("lu", "iterative"):
         case = electric(2)
-        settings = case.solver.model_copy(update={"linear": kind})
+        settings = replace(case.solver, linear=kind)
         summary, _ = written(solve(case.model_copy(update={"solver": settings})), tmp_path / kind)
         assert summary["converged"] is True
         counts.append(summary["linear_iterations"] / summary["linear_solves"])
@@ -209,7 +211,7 @@ def test_fields_can_be_read_back(shared_tmp_path: Path) -> None:
 def test_xdmf(shared_tmp_path: Path) -> None:
     """Without VTX the fields go to XDMF, for P2 interpolated to P1."""
     solution = solve(block(2, 2))
-    solution.output = Output(fields="xdmf")
+    solution.output = OutputOptions(fields="xdmf")
     written(solution, shared_tmp_path)
     text = (shared_tmp_path / "fields.xdmf").read_text()
     assert all(name in text for name in ("displacement", "stress", "von_mises", "dev_strain"))
@@ -234,7 +236,7 @@ def test_a_failed_write_leaves_no_fields(
 
     solution = solve(block(2))
     written(solution, shared_tmp_path)
-    solution.output = Output(fields=format_)
+    solution.output = OutputOptions(fields=format_)
     monkeypatch.setattr(io.XDMFFile, "write_function", fail)
     monkeypatch.setattr(io, "VTXWriter", fail)
     with pytest.raises(OSError, match="no space"):
@@ -272,7 +274,7 @@ def test_checkpoint(kind: str, shared_tmp_path: Path) -> None:
 
     case = electric(2) if kind == "piezoelectric" else block(2, int(kind[1]))
     solution = solve(case)
-    solution.output = Output(checkpoint=True)
+    solution.output = OutputOptions(checkpoint=True)
     written(solution, shared_tmp_path)
     checkpoint = read_checkpoint(shared_tmp_path / "checkpoint.bp")
     assert checkpoint.domain.parts.keys() == solution.problem.domain.parts.keys()
@@ -286,7 +288,7 @@ def test_outputs_are_replaced(shared_tmp_path: Path) -> None:
     from contact.output.figures.figures import write_figures
 
     first, second = solve(block(2)), solve(block(2, 2))
-    first.output = Output(fields="xdmf")
+    first.output = OutputOptions(fields="xdmf")
     written(first, shared_tmp_path)
     write_figures(first, shared_tmp_path)
     (shared_tmp_path / "notes.txt").write_text("mine")
@@ -401,7 +403,7 @@ def test_an_interrupted_load_step_is_judged_by_the_full_load() -> None:
         problem.apply_load(0.25)
         signal.raise_signal(signal.SIGINT)
 
-    solution = solve_problem(problem, Solver(), press)
+    solution = solve_problem(problem, NewtonOptions(), press)
     assert solution.outcome.signal == signal.SIGINT
     kept = problem.external.copy(), problem.x.x.array.copy()
     problem.apply_load(1.0)
@@ -415,7 +417,7 @@ def test_an_interrupted_load_step_is_judged_by_the_full_load() -> None:
 def test_ranks_without_cells_write_and_draw_too(method: str, shared_tmp_path: Path) -> None:
     """Two triangles: with three ranks one has none."""
     case = block(2, mesh={"generator": "rectangle", "size": [1.0, 1.0], "cells": [1, 1]})
-    solution = solve(case, case.solver.model_copy(update={"method": method}))
+    solution = solve(case, with_method(case.solver, method))
     assert solution.converged
     summary, rows = written(solution, shared_tmp_path)
     assert summary["cells"] == 2

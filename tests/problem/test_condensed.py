@@ -147,7 +147,7 @@ def test_a_solver_of_the_users_takes_the_whole_body(option, value):
 
 
 def test_steps_run_out_where_the_body_is_condensed():
-    method = Newton(bar(SELF), NewtonOptions(tolerance=1e-14, limit=1))
+    method = Newton(bar(SELF), NewtonOptions(tolerance=1e-14, max_outer=1))
     # The second time none is left: what has been taken is told.
     for outcome in (method.solve(), method.resume()):
         assert not outcome.converged

@@ -1,0 +1,111 @@
+"""Settings: kinds of values with their bounds, in words too, and what a class of options offers.
+
+A class of options is a frozen dataclass that states each setting once: name, type with bounds and
+default in its field, the meaning under "Attributes" in its docstring. Python builds it without
+any check; the case file reads it with the bounds, and makes its messages and its reference page
+from the same statement.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import inspect
+from dataclasses import dataclass
+from typing import Annotated, Any, TypeAlias, get_args, get_type_hints
+
+from annotated_types import Ge, Gt, Le, Lt
+
+from contact.tolerances import PRECISION
+
+
+@dataclass(frozen=True)
+class Accepted:
+    """What a kind of value accepts, in words."""
+
+    text: str
+
+
+@dataclass(frozen=True)
+class ReadWith:
+    """The value that another setting must have for this one to be read at all."""
+
+    key: str
+    value: str | bool
+
+
+@dataclass(frozen=True)
+class Internal:
+    """Marks a setting that is for Python alone: the case file does not offer it."""
+
+
+Positive: TypeAlias = Annotated[float, Gt(0), Accepted("a number > 0")]
+Tolerance: TypeAlias = Annotated[
+    float,
+    Ge(PRECISION),
+    Lt(1),
+    Accepted(f"a number from {PRECISION:g}, the precision of numbers, to 1, excluded"),
+]
+Count: TypeAlias = Annotated[
+    int, Ge(1), Le(10_000_000), Accepted("a whole number from 1 to 10000000")
+]
+Switch: TypeAlias = Annotated[bool, Accepted("true or false")]
+
+
+@dataclass(frozen=True)
+class Setting:
+    """A setting that a class of options offers.
+
+    Attributes
+    ----------
+    annotation
+        Its type with the bounds.
+    default
+        Its default.
+    meaning
+        What it is, in words.
+    condition
+        When it is read; None for always.
+    """
+
+    annotation: Any
+    default: Any
+    meaning: str
+    condition: ReadWith | None
+
+
+def settings_of(options: type) -> dict[str, Setting]:
+    """Return the settings that a class of options offers to the case file, by name."""
+    hints = get_type_hints(options, include_extras=True)
+    meanings: dict[str, str] = {}
+    for base in reversed(options.__mro__):
+        meanings |= _meanings(base)
+    found = {}
+    for field in dataclasses.fields(options):
+        marks = get_args(hints[field.name])[1:]
+        if not any(isinstance(mark, Internal) for mark in marks):
+            condition = next((mark for mark in marks if isinstance(mark, ReadWith)), None)
+            meaning = meanings.get(field.name, "")
+            found[field.name] = Setting(hints[field.name], field.default, meaning, condition)
+    return found
+
+
+def read_by(options: Any) -> dict[str, Any]:
+    """Return the settings that have an effect, given the others, with their values."""
+    return {
+        key: getattr(options, key)
+        for key, setting in settings_of(type(options)).items()
+        if (to := setting.condition) is None or getattr(options, to.key) == to.value
+    }
+
+
+def _meanings(options: type) -> dict[str, str]:
+    """Return what the docstring of one class says under "Attributes", by name."""
+    _, _, attributes = inspect.cleandoc(options.__doc__ or "").partition("Attributes\n----------\n")
+    found: dict[str, str] = {}
+    for line in attributes.splitlines():
+        if line and not line.startswith(" "):
+            name = line
+            found[name] = ""
+        else:
+            found[name] = f"{found[name]} {line.strip()}".strip()
+    return found
