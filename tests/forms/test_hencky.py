@@ -11,8 +11,9 @@ from hypothesis import strategies as st
 from mpi4py import MPI
 from scipy.integrate import quad
 
+from contact.body.description import Body, Fixed
 from contact.linear.operator import LinearOperator
-from contact.problem.problem import Body, Contact, ContactProblem, Fixed
+from contact.problem.problem import Contact, ContactProblem
 from forms.hencky import (
     Linear,
     Log,
@@ -230,7 +231,7 @@ def scattered(problem, seed):
     size = 3 * XI / problem.domain.mesh.geometry.x.max()
     problem.x.x.array[:] = size * random.standard_normal(problem.x.x.array.size)
     problem.freeze()
-    direction = random.standard_normal(problem.owned) * problem.free.ravel()
+    direction = random.standard_normal(problem.equilibrium.owned) * problem.free.ravel()
     return direction / np.linalg.norm(direction)
 
 
@@ -240,7 +241,7 @@ def test_internal_forces_are_the_derivative_of_the_assembled_energy(cases, case)
     problem = cases[case]
     direction = scattered(problem, 1)
     u = ufl.as_vector([problem.x[i] for i in range(problem.dim)])
-    degree = 1 if problem.degree == 1 else 4
+    degree = 1 if problem.equilibrium.degree == 1 else 4
     dx = problem.domain.dx(metadata={"quadrature_degree": degree})
     stored = fem.form(energy_density(problem.body.law, strain(u)) * dx)
     work = float(problem.internal_forces() @ direction)
@@ -259,8 +260,8 @@ def test_tangent_is_the_derivative_of_the_internal_forces(cases, case):
     problem = cases[case]
     direction = scattered(problem, 2)
     operator = LinearOperator(problem)
-    bs = problem.block_size
-    operator.update(problem.tangent, np.zeros((problem.trace.nodes.size, bs, bs)))
+    bs = problem.equilibrium.block_size
+    operator.update(problem.tangent, np.zeros((problem.nodes.nodes.size, bs, bs)))
     product = operator.matrix.createVecRight()
     vector = operator.matrix.createVecRight()
     vector.array[:] = direction
@@ -282,8 +283,8 @@ def test_the_secant_form_with_frozen_modulus(cases, case):
     scattered(problem, 3)
     forces = problem.internal_forces()
     operator = LinearOperator(problem)
-    bs = problem.block_size
-    operator.update(problem.secant, np.zeros((problem.trace.nodes.size, bs, bs)))
+    bs = problem.equilibrium.block_size
+    operator.update(problem.secant, np.zeros((problem.nodes.nodes.size, bs, bs)))
     matrix = operator.matrix
     assert matrix.isSymmetric(1e-12)
     free = problem.free.ravel()

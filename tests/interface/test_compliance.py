@@ -13,14 +13,17 @@ from mpi4py import MPI
 
 from contact import InputError
 from contact import solve as solve_case
-from contact.interface.nodes import ContactTrace
-from contact.interface.response import Conductor, FoundationResponse, Layer
+from contact.body.description import Body, Fixed
+from contact.interface.current import Conductor
+from contact.interface.friction import Friction
+from contact.interface.layer import Layer
+from contact.interface.nodes import ContactNodes
+from contact.interface.response import FoundationResponse
 from contact.mesh.make import box, rectangle
 from contact.methods.fixed_point import FixedPoint
 from contact.methods.newton import Newton
 from contact.methods.options import OPTIONS, NewtonOptions, PenaltyOptions
-from contact.problem.problem import Body, Contact, ContactProblem, Fixed, Friction
-from contact.problem.state import nodal_iterate
+from contact.problem.problem import Contact, ContactProblem
 from forms.foundation import compliance
 from forms.hencky import Linear
 from forms.laws import (
@@ -36,12 +39,12 @@ from tests.problems.compliance import PIEZO_REGIMES, REGIMES, LayerColumn
 from tests.problems.mechanics import affine_vector, flat, leaning_block, solve
 
 
-def random_trace(n: int, dim: int, block_size: int, rng: np.random.Generator) -> ContactTrace:
+def random_trace(n: int, dim: int, block_size: int, rng: np.random.Generator) -> ContactNodes:
     """Return contact nodes without a mesh, for the pointwise laws."""
     normal = rng.standard_normal((n, dim))
     normal /= np.linalg.norm(normal, axis=1)[:, None]
     tangent = np.eye(dim) - normal[:, :, None] * normal[:, None, :]
-    return ContactTrace(
+    return ContactNodes(
         MPI.COMM_SELF,
         np.arange(n, dtype=np.int32),
         np.zeros((n, dim)),
@@ -97,11 +100,13 @@ def check_solution(column: LayerColumn, loop: FixedPoint | Newton) -> None:
     u_n, potential, layer, rest, _ = column.solution()
     problem = loop.problem
     nodal = nodal_iterate(problem)
-    assert np.abs(problem.trace.normal_component(nodal) - u_n).max() < 1e-10
-    assert np.abs(problem.response.layer_pressure(nodal) - layer).max() < 1e-10 * max(layer, 1)
+    assert np.abs(problem.nodes.normal_component(nodal) - u_n).max() < 1e-10
+    assert np.abs(problem.interface.response.layer_pressure(nodal) - layer).max() < 1e-10 * max(
+        layer, 1
+    )
     assert np.abs(loop.forces.pressure - rest).max() < 1e-10 * max(layer + rest, 1)
     if column.piezo:
-        assert np.abs(problem.phi_scale * nodal[:, -1] - potential).max() < 1e-10
+        assert np.abs(problem.equilibrium.phi_scale * nodal[:, -1] - potential).max() < 1e-10
 
 
 @pytest.mark.parametrize("regime", REGIMES)
@@ -303,9 +308,9 @@ def test_friction_bound_takes_the_layer_and_the_rigid_part_together(dim, c_nu, r
     )
     loop = solve(problem, tolerance=1e-11)
     nodal = nodal_iterate(problem)
-    assert problem.trace.size > 0
-    assert np.abs(problem.trace.normal_component(nodal) - depth).max() < 1e-10
-    assert np.abs(problem.response.layer_pressure(nodal) - share).max() < 1e-10
+    assert problem.nodes.size > 0
+    assert np.abs(problem.nodes.normal_component(nodal) - depth).max() < 1e-10
+    assert np.abs(problem.interface.response.layer_pressure(nodal) - share).max() < 1e-10
     assert np.abs(loop.forces.pressure - (pressure - share)).max() < 1e-10
     assert np.abs(loop.forces.friction[:, 0] - mu * pressure).max() < 1e-10
     assert np.abs(nodal[:, 0] - slip).max() < 1e-10
@@ -315,7 +320,7 @@ def test_the_form_j_1_is_the_nodal_force():
     column = PIEZO_REGIMES["linear"]
     problem = column.problem()
     solve(problem)
-    test = ufl.TestFunction(problem.space)
+    test = ufl.TestFunction(problem.equilibrium.space)
     u, phi = problem.parts_of(problem.x)
     v, _ = problem.parts_of(test)
     nu = ufl.FacetNormal(problem.domain.mesh)
@@ -323,8 +328,8 @@ def test_the_form_j_1_is_the_nodal_force():
     form = compliance(u, v, nu, column.p_nu, column.h_nu, column.touch, phi - column.phi_f)
     vector = fem.assemble_vector(fem.form(form * ds)).array
     nodal = np.zeros_like(vector)
-    pressure = problem.response.layer_pressure(nodal_iterate(problem))
-    trace = problem.trace
+    pressure = problem.interface.response.layer_pressure(nodal_iterate(problem))
+    trace = problem.nodes
     trace.add(nodal, (trace.weight * pressure)[:, None] * trace.normal)
     assert np.abs(nodal).max() > 1.0
     assert np.abs(vector - nodal).max() < 1e-12
@@ -342,8 +347,8 @@ def test_ranks_agree_on_a_layer_in_space(comm):
     found = []
     for ranks in (comm, MPI.COMM_SELF):
         loop = solve(problem(ranks), tolerance=1e-11)
-        nodal, trace = nodal_iterate(loop.problem), loop.problem.trace
-        layer = loop.problem.response.layer_pressure(nodal)
+        nodal, trace = nodal_iterate(loop.problem), loop.problem.nodes
+        layer = loop.problem.interface.response.layer_pressure(nodal)
         found.append(
             [
                 trace.maximum(np.linalg.norm(nodal, axis=1)),

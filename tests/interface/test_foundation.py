@@ -7,12 +7,12 @@ from dolfinx import fem
 from mpi4py import MPI
 
 from contact.errors import InputError
+from contact.interface.friction import Friction
 from contact.interface.obstacle import GapFunction, Plane, Sphere
 from contact.interface.penalised import Lagged, Regularisation
 from contact.mesh.make import box, rectangle
 from contact.methods.uzawa import augmentation
-from contact.problem.problem import Contact, ContactProblem, Friction
-from contact.problem.state import nodal_iterate
+from contact.problem.problem import Contact, ContactProblem
 from forms import foundation as forms
 from forms.laws import ConstantCoefficient
 from tests.problems.mechanics import bar, flat, leaning_block
@@ -54,7 +54,7 @@ def vertex_rule(problem):
 def field(problem, values):
     """Return a scalar P1 function with nodal values on the contact nodes."""
     function = fem.Function(fem.functionspace(problem.domain.mesh, ("Lagrange", 1)))
-    function.x.array[problem.trace.nodes] = values
+    function.x.array[problem.nodes.nodes] = values
     return function
 
 
@@ -63,18 +63,22 @@ def assembled(form):
 
 
 def lumped(problem, vectors):
-    total = np.zeros(problem.owned)
-    problem.trace.add(total, problem.trace.weight[:, None] * vectors)
+    total = np.zeros(problem.equilibrium.owned)
+    problem.nodes.ADD(total, problem.nodes.weight[:, None] * vectors)
     return total
 
 
 def test_augmentation_is_the_form_of_the_augmented_lagrangian(problem):
-    v, nu, ds = ufl.TestFunction(problem.space), normal_of(problem), vertex_rule(problem)
-    trace = problem.trace
+    v, nu, ds = (
+        ufl.TestFunction(problem.equilibrium.space),
+        normal_of(problem),
+        vertex_rule(problem),
+    )
+    trace = problem.nodes
     for friction in (True, False):
         blocks = augmentation(problem, R, friction)
         product = np.einsum("nij,nj->ni", blocks, nodal_iterate(problem))
-        total = np.zeros(problem.owned)
+        total = np.zeros(problem.equilibrium.owned)
         trace.add(total, product)
         form = forms.augmented_lagrangian(problem.x, v, nu, R, friction) * ds
         assert assembled(form) == pytest.approx(total, abs=1e-15)
@@ -86,9 +90,9 @@ def normal_of(problem):
 
 def test_auxiliary_load(problem):
     random = np.random.default_rng(6)
-    trace, v = problem.trace, ufl.TestFunction(problem.space)
+    trace, v = problem.nodes, ufl.TestFunction(problem.equilibrium.space)
     phi_c, lam_c = random.standard_normal((2, trace.size))
-    phi_f, lam_f = fem.Function(problem.space), fem.Function(problem.space)
+    phi_f, lam_f = fem.Function(problem.equilibrium.space), fem.Function(problem.equilibrium.space)
     for function in (phi_f, lam_f):
         function.x.array[:] = random.standard_normal(function.x.array.size)
     form = forms.auxiliary_load(
@@ -102,8 +106,12 @@ def test_auxiliary_load(problem):
 
 
 def test_penalty_forms(problem):
-    v, nu, ds = ufl.TestFunction(problem.space), normal_of(problem), vertex_rule(problem)
-    trace, nodal = problem.trace, nodal_iterate(problem)
+    v, nu, ds = (
+        ufl.TestFunction(problem.equilibrium.space),
+        normal_of(problem),
+        vertex_rule(problem),
+    )
+    trace, nodal = problem.nodes, nodal_iterate(problem)
     laws = Lagged(problem, Regularisation(EPS, EPS), nodal)
     forces = laws.forces(nodal)
     gap = field(problem, trace.gap)
@@ -111,7 +119,9 @@ def test_penalty_forms(problem):
     normal = forms.penalty(problem.x, v, nu, gap, EPS) * ds
     expected = lumped(problem, forces.pressure[:, None] * trace.normal)
     assert assembled(normal) == pytest.approx(expected, abs=1e-14)
-    bound = field(problem, np.asarray(problem.friction_bound(forces.pressure, forces.pressure)))
+    bound = field(
+        problem, np.asarray(problem.interface.friction.bound(forces.pressure, forces.pressure))
+    )
     friction = forms.penalty_friction(problem.x, problem.x, v, nu, bound, EPS) * ds
     assert assembled(friction) == pytest.approx(lumped(problem, forces.friction), abs=1e-14)
 

@@ -6,9 +6,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from mpi4py import MPI
 
+from contact.body.description import Body, Fixed
+from contact.interface.friction import Friction
 from contact.interface.smoothing import Smoothing
 from contact.mesh.make import rectangle
-from contact.problem.problem import Body, Contact, ContactProblem, Fixed, Friction
+from contact.problem.problem import Contact, ContactProblem
 from forms.hencky import Linear
 from forms.laws import ConstantCoefficient
 from tests.problems.mechanics import (

@@ -5,10 +5,12 @@ import pytest
 from dolfinx import mesh
 from mpi4py import MPI
 
+from contact.body.description import Body, Fixed, Load
 from contact.errors import InputError
+from contact.interface.friction import Friction
 from contact.interface.obstacle import GapFunction, Plane, Sphere
 from contact.mesh.make import from_mesh, rectangle, refined
-from contact.problem.problem import Body, Contact, ContactProblem, Fixed, Friction, Load
+from contact.problem.problem import Contact, ContactProblem
 from forms.hencky import Linear
 from forms.laws import ConstantCoefficient
 from tests.problems.mechanics import bar, constant, contact_data, flat, leaning_block, solve, turn
@@ -74,9 +76,12 @@ def test_tangents_project_onto_the_free_tangential_directions():
 
 def test_values_and_add_are_each_other_s_transpose():
     problem = leaning_block(MPI.COMM_SELF, 2)
-    trace, random = problem.trace, np.random.default_rng(0)
-    x, y = random.standard_normal(problem.owned), random.standard_normal((trace.size, 3))
-    total = np.zeros(problem.owned)
+    trace, random = problem.nodes, np.random.default_rng(0)
+    x, y = (
+        random.standard_normal(problem.equilibrium.owned),
+        random.standard_normal((trace.size, 3)),
+    )
+    total = np.zeros(problem.equilibrium.owned)
     trace.add(total, y)
     assert total @ x == pytest.approx(np.sum(trace.values(x) * y), rel=1e-12)
 
@@ -101,7 +106,7 @@ def inclined(prescribed, degree):
 def test_a_direction_that_is_partly_fixed(prescribed, degree):
     """The plane is met where it is, also if the node is displaced along the fixed component."""
     problem, normal = inclined(prescribed, degree)
-    trace = problem.trace
+    trace = problem.nodes
     assert trace.normal == pytest.approx(np.tile([0.0, -1.0], (trace.size, 1)))
     assert np.abs(trace.tangent).max() < 1e-15
     loop = solve(problem, 1e-10)

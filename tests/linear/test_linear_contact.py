@@ -19,12 +19,12 @@ GAMMA, MU = 1e4, 0.4
 
 def sticking(problem: ContactProblem) -> Array:
     """Return the blocks of nodes that stick."""
-    return np.tile(GAMMA * np.eye(problem.dim), (problem.trace.nodes.size, 1, 1))
+    return np.tile(GAMMA * np.eye(problem.dim), (problem.nodes.nodes.size, 1, 1))
 
 
 def sliding(problem: ContactProblem, mu: float) -> tuple[Array, Array]:
     """Return blocks and contact forces of nodes that slide along x, for pressure GAMMA."""
-    normal = problem.trace.normal
+    normal = problem.nodes.normal
     along = np.zeros_like(normal)
     along[:, 0] = 1.0
     force = GAMMA * (normal + mu * along)
@@ -38,7 +38,7 @@ def test_counts_do_not_grow_with_the_number_of_sliding_nodes(mu: float) -> None:
     for n in (4, 12):
         problem = mechanics.leaning_block(WORLD, n)
         problem.reset()
-        weight = problem.trace.weight[:, None, None] / problem.trace.weight.max()
+        weight = problem.nodes.weight[:, None, None] / problem.nodes.weight.max()
         operator = LinearOperator(problem, symmetric=mu == 0, kind="iterative")
         counts = []
         for blocks in (0 * sticking(problem), sticking(problem), sliding(problem, mu)[0]):
@@ -56,7 +56,7 @@ def test_forces_that_contact_carries_do_not_blur_the_solution() -> None:
     problem.reset()
     blocks, force = sliding(problem, MU)
     rhs = problem.external.copy()
-    problem.trace.add(rhs, 1e-3 * force)
+    problem.nodes.ADD(rhs, 1e-3 * force)
     solutions = []
     for kind in ("lu", "iterative"):
         operator = LinearOperator(problem, symmetric=False, kind=kind)
@@ -75,7 +75,7 @@ def test_without_contact_the_interpolation_is_that_of_the_body() -> None:
     pc = operator.ksp.getPC()
     finest = pc.getMGInterpolation(pc.getMGLevels() - 1)
     body = finest.getValuesCSR()[2].copy()
-    nodes = problem.trace.nodes
+    nodes = problem.nodes.nodes
     rows = (nodes[:, None] * 3 + np.arange(3)).ravel()
     operator.update(problem.secant, sticking(problem))
     starts, _, values = finest.getValuesCSR()

@@ -9,15 +9,17 @@ from mpi4py import MPI
 from contact.build import build_problem
 from contact.case.file import Case, parse_case
 from contact.errors import InputError
-from contact.interface.linearised import CLOSED, FREE, SLIDES, STICKS, Moduli, linearise
+from contact.interface.friction import Friction
+from contact.interface.linearised import Moduli, linearise
+from contact.interface.multipliers import Multipliers
+from contact.interface.status import CLOSED, FREE, SLIDES, STICKS
 from contact.methods.fixed_point import FixedPoint
 from contact.methods.nested import coarser_cases
 from contact.methods.newton import Newton
 from contact.methods.options import FixedPointOptions, NewtonOptions
 from contact.methods.report import Outcome
 from contact.problem.kkt import KKT, evaluate
-from contact.problem.problem import ContactProblem, Friction
-from contact.problem.state import Multipliers, nodal_iterate
+from contact.problem.problem import ContactProblem
 from contact.solving import solve
 from forms.hencky import Linear, Log
 from forms.laws import ConstantCoefficient, SlipCoefficient
@@ -81,7 +83,7 @@ def test_newton_stays_at_a_solution_that_rounding_has_touched(rho, radius):
     slow = FixedPoint(problem, FixedPointOptions(tolerance=1e-10))
     assert slow.solve().converged
     x, forces = problem.x.x.array.copy(), slow.forces
-    slip = problem.trace.tangential_component(nodal_iterate(problem))
+    slip = problem.nodes.tangential_component(nodal_iterate(problem))
     rounding = 1e-11 * forces.pressure.max()
     is_open = forces.pressure < 1e3 * rounding
     assert is_open.any()
@@ -126,7 +128,7 @@ def test_blocks_are_the_derivative_of_the_contact_forces(dimension):
     problem.reset()
     problem.x.x.array[:] = 1e-3 * rng.standard_normal(problem.x.x.array.size)
     nodal = nodal_iterate(problem)
-    n, trace = nodal.shape[0], problem.trace
+    n, trace = nodal.shape[0], problem.nodes
     forces = Multipliers(
         rng.uniform(0.5, 1.0, n),
         np.einsum("nij,nj->ni", trace.tangent, 0.3 * rng.standard_normal((n, dimension))),
@@ -139,7 +141,7 @@ def test_blocks_are_the_derivative_of_the_contact_forces(dimension):
     # a sticking node pushes with lambda + gamma u_tau, a pressed one with p + gamma (u_nu - rho)
     direction = 1e-6 * rng.standard_normal(nodal.shape)
     moved = linearise(problem, nodal + direction, forces, moduli, before, forces.pressure * 0.4)
-    difference = moved.forces.vectors(problem) - base.forces.vectors(problem)
+    difference = moved.forces.vectors(problem.nodes) - base.forces.vectors(problem.nodes)
     predicted = np.einsum("nij,nj->ni", base.blocks, direction)[:, :dimension]
     assert np.allclose(difference[sticks], predicted[sticks], rtol=1e-6, atol=1e-12)
     normal = trace.normal_component(difference)
@@ -150,7 +152,7 @@ def test_blocks_are_the_derivative_of_the_contact_forces(dimension):
 def test_falling_friction_is_followed_as_far_as_allowed(softening):
     """With no limit, the block is the derivative of mu(|u_tau|) p along the slip."""
     problem = mechanics.bar(SELF, 4, friction=Friction(SlipCoefficient(0.5, 0.2, 1e3)))
-    trace = problem.trace
+    trace = problem.nodes
     nodal = np.zeros((trace.nodes.size, 2))
     nodal[:, 0] = 1e-3
     pressure = np.full(trace.nodes.size, 0.5)

@@ -7,17 +7,18 @@ import pytest
 from mpi4py import MPI
 
 from contact import solve
+from contact.body.description import Body, Fixed, Load
 from contact.case.file import parse_case
 from contact.case.formula import Expression
 from contact.errors import InputError
+from contact.interface.friction import Friction
 from contact.interface.obstacle import GapFunction, Plane
 from contact.interface.penalised import Implicit, Lagged, Regularisation
 from contact.mesh import make as domain
 from contact.methods.fixed_point import FixedPoint
 from contact.methods.options import FixedPointOptions, PenaltyOptions
 from contact.methods.penalty import Penalty
-from contact.problem.problem import Body, Contact, ContactProblem, Fixed, Friction, Load
-from contact.problem.state import nodal_iterate
+from contact.problem.problem import Contact, ContactProblem
 from forms.hencky import Linear
 from forms.laws import ConstantCoefficient, SlipCoefficient
 from tests.problems import mechanics
@@ -41,17 +42,17 @@ def test_error_and_pressure_fall_like_eps(load):
     problem = bar(load=load, coefficient=ConstantCoefficient(0.5))
     reference = FixedPoint(problem, FixedPointOptions(tolerance=1e-11))
     assert reference.solve().converged
-    x = problem.x.x.array[: problem.owned].copy()
+    x = problem.x.x.array[: problem.equilibrium.owned].copy()
     errors, pressures = [], []
     for eps in (1e-7, 1e-8, 1e-9):
         penalty = Penalty(problem, PenaltyOptions(eps_contact=eps))
         outcome = penalty.solve()
         assert outcome.converged, outcome.reason
         assert outcome.kkt.equilibrium <= 1e-8
-        errors.append(relative(problem, problem.x.x.array[: problem.owned], x))
+        errors.append(relative(problem, problem.x.x.array[: problem.equilibrium.owned], x))
         pressure = reference.forces.pressure
-        difference = problem.trace.norm(penalty.forces.pressure - pressure)
-        pressures.append(difference / problem.trace.norm(pressure))
+        difference = problem.nodes.norm(penalty.forces.pressure - pressure)
+        pressures.append(difference / problem.nodes.norm(pressure))
     assert np.log10(errors[1] / errors[2]) == pytest.approx(1.0, abs=0.1)
     assert np.log10(pressures[1] / pressures[2]) == pytest.approx(1.0, abs=0.1)
     assert errors[2] < 1e-5
@@ -64,7 +65,7 @@ def test_without_friction_the_penetration_is_eps_times_the_pressure():
     outcome = penalty.solve()
     assert outcome.converged
     assert len(penalty.history.records) == 1
-    opening = problem.trace.normal_component(nodal_iterate(problem)) - problem.trace.gap
+    opening = problem.nodes.normal_component(nodal_iterate(problem)) - problem.nodes.gap
     touching = penalty.forces.pressure > 0
     assert np.allclose(opening[touching], 1e-5 * penalty.forces.pressure[touching])
     # The Signorini residual is the penetration: c eps with c = E/size = 1/4.
@@ -79,7 +80,7 @@ def test_all_ways_lead_to_the_same_solution(material_step):
         options = PenaltyOptions(eps_contact=1e-3, material_step=step, tolerance=1e-10)
         outcome = Penalty(problem, options).solve()
         assert outcome.converged, outcome.reason
-        solutions.append(problem.x.x.array[: problem.owned].copy())
+        solutions.append(problem.x.x.array[: problem.equilibrium.owned].copy())
     assert relative(problem, solutions[1], solutions[0]) < 1e-8
 
 
@@ -116,7 +117,7 @@ def test_the_two_parameters_are_separate():
         assert (
             Penalty(problem, PenaltyOptions(eps_contact=contact, eps_slip=slip)).solve().converged
         )
-        solutions[contact, slip] = problem.x.x.array[: problem.owned].copy()
+        solutions[contact, slip] = problem.x.x.array[: problem.equilibrium.owned].copy()
     same, other = solutions[1e-4, None], solutions[1e-4, 1e-6]
     assert relative(problem, same, solutions[1e-4, 1e-4]) < 1e-12
     assert relative(problem, other, same) > 1e-3
@@ -149,10 +150,10 @@ def test_smoothed_pressure(radius):
     problem = bar(coefficient=ConstantCoefficient(0.5), radius=radius)
     reference = FixedPoint(problem, FixedPointOptions(tolerance=1e-10))
     assert reference.solve().converged
-    x = problem.x.x.array[: problem.owned].copy()
+    x = problem.x.x.array[: problem.equilibrium.owned].copy()
     outcome = Penalty(problem, PenaltyOptions(eps_contact=1e-8)).solve()
     assert outcome.converged, outcome.reason
-    assert relative(problem, problem.x.x.array[: problem.owned], x) < 1e-4
+    assert relative(problem, problem.x.x.array[: problem.equilibrium.owned], x) < 1e-4
 
 
 @pytest.mark.parametrize("law", ["lagged", "implicit"])
@@ -168,12 +169,12 @@ def test_blocks_are_the_derivative_of_the_forces(law, dim):
     friction = Friction(SlipCoefficient(0.5, 0.2, 10.0))
     problem = ContactProblem(box, body, Contact("bottom", gap), friction)
     rng = np.random.default_rng(1)
-    x, d = rng.normal(size=(2, problem.trace.nodes.size, dim))
+    x, d = rng.normal(size=(2, problem.nodes.nodes.size, dim))
     eps = Regularisation(0.3, 0.2)
     model = Implicit(problem, eps) if law == "implicit" else Lagged(problem, eps, x + d)
 
     def forces(t: float):
-        return model.forces(x + t * d).vectors(problem)
+        return model.forces(x + t * d).vectors(problem.nodes)
 
     step = 1e-6
     numerical = (forces(step) - forces(-step)) / (2 * step)

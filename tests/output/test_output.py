@@ -250,7 +250,7 @@ def test_a_failed_write_leaves_no_fields(
 def test_derived_fields_of_a_known_strain(degree: int) -> None:
     """Homogeneous compression: the stress is (1.13), in the cells and at the nodes."""
     problem = build_problem(block(2, degree))
-    points = problem.space.tabulate_dof_coordinates()
+    points = problem.equilibrium.space.tabulate_dof_coordinates()
     problem.x.x.array[1::2] = -0.05 * points[:, 1]
     fields = DerivedFields(problem)
     law, t = problem.body.law, 0.05 * np.sqrt(2 / 3)

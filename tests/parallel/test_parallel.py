@@ -6,9 +6,11 @@ from dolfinx import fem, graph, mesh
 from mpi4py import MPI
 
 from contact._compat import geometry_dofmap
+from contact.body.description import Body, Fixed, Load
+from contact.interface.friction import Friction
 from contact.interface.smoothing import Smoothing
 from contact.mesh.make import Piece, from_mesh, rectangle
-from contact.problem.problem import Body, Contact, ContactProblem, Fixed, Friction, Load
+from contact.problem.problem import Contact, ContactProblem
 from forms.hencky import Log
 from forms.laws import SlipCoefficient
 from tests.problems.mechanics import (
@@ -28,9 +30,11 @@ TOLERANCE = 1e-8
 
 def displacements(problem):
     """Return the displacements of all nodes, sorted by position, on every rank."""
-    dim, owned = problem.dim, problem.owned // problem.block_size
-    x = problem.space.tabulate_dof_coordinates()[:owned, :dim]
-    u = problem.x.x.array[: problem.owned].reshape(-1, problem.block_size)[:, :dim]
+    dim, owned = problem.dim, problem.equilibrium.owned // problem.equilibrium.block_size
+    x = problem.equilibrium.space.tabulate_dof_coordinates()[:owned, :dim]
+    u = problem.x.x.array[: problem.equilibrium.owned].reshape(-1, problem.equilibrium.block_size)[
+        :, :dim
+    ]
     x, u = (np.concatenate(problem.comm.allgather(part)) for part in (x, u))
     return u[np.lexsort(np.round(x, 9).T)]
 
@@ -90,7 +94,7 @@ def tower(comm, cells=(2, 24)):
 
 def test_a_rank_without_contact_nodes(comm):
     together = agree(comm, tower)
-    counts = comm.allgather(together.problem.trace.nodes.size)
+    counts = comm.allgather(together.problem.nodes.nodes.size)
     assert comm.size == 1 or min(counts) == 0
 
 
@@ -195,7 +199,7 @@ def test_every_node_has_one_owner_and_full_weight(comm):
 def test_prescribed_values_reach_ghosts(comm):
     problem = idle(comm)
     problem.reset()
-    height = fem.Function(problem.space)
+    height = fem.Function(problem.equilibrium.space)
     height.interpolate(lambda x: np.vstack([x[1], x[1]]))
     top = np.isclose(height.x.array, 1.0)
     assert set(np.unique(problem.x.x.array[top]).tolist()) <= {0.02, -0.03}

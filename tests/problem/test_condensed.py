@@ -6,13 +6,14 @@ from dolfinx.fem.petsc import assemble_matrix, create_matrix
 from mpi4py import MPI
 from petsc4py import PETSc
 
+from contact.interface.friction import Friction
 from contact.linear.operator import Counters, LinearOperator
 from contact.linear.schur import SchurComplement
 from contact.methods.newton import Newton
 from contact.methods.options import NewtonOptions
 from contact.problem import condensed
 from contact.problem.kkt import evaluate
-from contact.problem.problem import ContactProblem, Friction
+from contact.problem.problem import ContactProblem
 from forms.hencky import Linear
 from forms.laws import ConstantCoefficient
 from tests.problems import mechanics
@@ -30,16 +31,16 @@ def test_condensing_and_expanding_solves_the_whole_system(cells):
     problem = mechanics.bar(WORLD, cells, law=Linear(1.0, 0.3))
     problem.reset()
     operator = LinearOperator(problem)
-    size = problem.block_size
-    operator.update(problem.secant, np.zeros((problem.trace.nodes.size, size, size)))
+    size = problem.equilibrium.block_size
+    operator.update(problem.secant, np.zeros((problem.nodes.nodes.size, size, size)))
     whole = operator.solve(problem.external)
 
-    kept = (problem.trace.nodes[:, None] * size + np.arange(size, dtype=np.int32)).ravel()
+    kept = (problem.nodes.nodes[:, None] * size + np.arange(size, dtype=np.int32)).ravel()
     schur = SchurComplement(operator.matrix, kept, "contact_")
     # The second time the analysis and the local matrices are used again.
     assert np.array_equal(schur.factorise(operator.matrix), schur.factorise(operator.matrix))
     stiffness = schur.factorise(operator.matrix)
-    assert stiffness.shape == (problem.trace.size * size,) * 2
+    assert stiffness.shape == (problem.nodes.size * size,) * 2
     assert np.allclose(stiffness, stiffness.T, rtol=0, atol=1e-13)
     forces = schur.condense(np.where(problem.free.ravel(), problem.external, 0.0))
     found = schur.expand(np.linalg.solve(stiffness, forces))
@@ -52,9 +53,9 @@ def test_few_unknowns_are_eliminated_beside_many_that_are_kept(few):
     """MUMPS's own estimate of its workspace is too small there."""
     problem = mechanics.bar(SELF, 8, law=Linear(1.0, 0.3))
     matrix = create_matrix(problem.secant)
-    assemble_matrix(matrix, problem.secant, bcs=problem.bcs)
+    assemble_matrix(matrix, problem.secant, bcs=problem.equilibrium.bcs)
     matrix.assemble()
-    order = np.random.default_rng(1).permutation(problem.owned).astype(np.int32)
+    order = np.random.default_rng(1).permutation(problem.equilibrium.owned).astype(np.int32)
     kept, eliminated = np.sort(order[few:]), np.sort(order[:few])
     found = SchurComplement(matrix, kept, "contact_").factorise(matrix)
     dense = matrix[:, :]
@@ -73,7 +74,7 @@ def test_a_small_block_is_condensed_on_any_number_of_ranks():
         method = Newton(problem, NewtonOptions(tolerance=1e-10))
         assert method.solve().converged
         counters = method.counters
-        found.append((problem.trace.norm(method.forces.pressure), counters.linear_solves))
+        found.append((problem.nodes.norm(method.forces.pressure), counters.linear_solves))
     assert np.isclose(found[0][0], found[1][0], rtol=1e-9)
     assert found[0][1] == found[1][1] < 10
 
@@ -86,7 +87,7 @@ def test_a_mesh_of_few_cells_is_solved_on_any_number_of_ranks():
         method = Newton(problem, NewtonOptions(tolerance=1e-10))
         assert method.solve().converged
         counters = method.counters
-        found.append((problem.trace.norm(method.forces.pressure), counters.linear_solves))
+        found.append((problem.nodes.norm(method.forces.pressure), counters.linear_solves))
     assert np.isclose(found[0][0], found[1][0], rtol=1e-9)
     assert found[0][1] == found[1][1]
 

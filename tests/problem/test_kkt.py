@@ -6,11 +6,13 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
+from contact.body.description import Body, Fixed, Load
 from contact.case.file import parse_case
+from contact.interface.friction import Friction
+from contact.interface.multipliers import Multipliers
 from contact.mesh.make import rectangle
 from contact.problem.kkt import KKT, evaluate
-from contact.problem.problem import Body, Contact, ContactProblem, Fixed, Friction, Load
-from contact.problem.state import Multipliers, bound_of, nodal_iterate
+from contact.problem.problem import Contact, ContactProblem
 from contact.solving import solve as solve_case
 from forms.hencky import Log
 from forms.laws import SlipCoefficient
@@ -33,11 +35,11 @@ class Solved:
 
     def __init__(self, problem):
         self.loop = solve(problem, SMALL)
-        self.problem, self.trace = problem, problem.trace
+        self.problem, self.trace = problem, problem.nodes
         self.forces, self.x = self.loop.forces, problem.x.x.array.copy()
         self.base = self.residuals()
         nodal = nodal_iterate(problem)
-        self.bound = bound_of(problem, nodal, self.forces)
+        self.bound = problem.interface.bound(nodal, self.forces)
         self.pressed = self.forces.pressure > 1e-3 * self.forces.pressure.max()
         size = np.linalg.norm(self.forces.friction, axis=1)
         self.sticks = self.pressed & (size < 0.95 * self.bound)
@@ -49,7 +51,7 @@ class Solved:
         problem = self.problem
         problem.x.x.array[:] = self.x
         if nodal is not None:
-            problem.trace.add(problem.x.x.array, nodal)
+            problem.nodes.ADD(problem.x.x.array, nodal)
         return evaluate(problem, forces or self.forces)
 
     def along(self, chosen, component):
@@ -89,8 +91,8 @@ def test_a_wrong_displacement_is_out_of_equilibrium(solved):
     problem = solved.problem
     problem.x.x.array[:] = solved.x
     random = np.random.default_rng(0)
-    shake = 1e-4 * random.standard_normal(problem.owned) * problem.free.ravel()
-    shake.reshape(-1, problem.block_size)[problem.trace.nodes] = 0.0
+    shake = 1e-4 * random.standard_normal(problem.equilibrium.owned) * problem.free.ravel()
+    shake.reshape(-1, problem.equilibrium.block_size)[problem.nodes.nodes] = 0.0
     problem.x.x.array[:] += shake
     found = evaluate(problem, solved.forces)
     assert found.equilibrium > 1e-4
@@ -184,12 +186,12 @@ def test_residuals_do_not_depend_on_units_of_stress(unit):
 def test_residuals_of_an_open_body():
     problem = bar(MPI.COMM_SELF, 4, 0.005)  # lifted: nothing touches but near the clamp
     problem.reset()
-    zero = Multipliers.zero(problem)
+    zero = Multipliers.zero(problem.nodes)
     assert evaluate(problem, zero).contact == 0
     assert evaluate(problem, zero).equilibrium == pytest.approx(1.0)
-    sunk = np.zeros((problem.trace.size, 2))
+    sunk = np.zeros((problem.nodes.size, 2))
     sunk[:, 1] = -0.01
-    problem.trace.add(problem.x.x.array, sunk)
+    problem.nodes.ADD(problem.x.x.array, sunk)
     assert evaluate(problem, zero).contact > 0.5
 
 

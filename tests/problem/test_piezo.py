@@ -9,11 +9,11 @@ from mpi4py import MPI
 from contact.build import piezo
 from contact.case.body import Piezo as PiezoSection
 from contact.errors import InputError
+from contact.interface.friction import Friction
 from contact.methods.fixed_point import FixedPoint
 from contact.methods.newton import Newton
 from contact.methods.options import FixedPointOptions, NewtonOptions
 from contact.output.balances import charge_balance, force_balance, mean_potential, sensor
-from contact.problem.problem import Friction
 from forms.laws import (
     PerfectConductivity,
     RampConductivity,
@@ -260,9 +260,9 @@ def test_turned_body(cells):
     for degrees in (0.0, 37.0):
         problem = example(COMM, cells, -10.0, degrees=degrees)
         solver = solve(problem, 1e-12)
-        nodal = problem.trace.values(problem.x.x.array)
-        normal = problem.trace.normal_component(nodal)
-        along = np.linalg.norm(problem.trace.tangential_component(nodal), axis=1)
+        nodal = problem.nodes.apply(problem.x.x.array)
+        normal = problem.nodes.normal_component(nodal)
+        along = np.linalg.norm(problem.nodes.tangential_component(nodal), axis=1)
         found.append((solver.forces.pressure, normal, along, potential(problem)))
     for straight, turned in zip(*found, strict=True):
         assert np.abs(straight - turned).max() <= 1e-9 * np.abs(straight).max() + 1e-10
@@ -306,7 +306,7 @@ def test_truncation_limits_the_charge():
     charge = charge_balance(problem, solver.forces)
     assert np.abs(potential(problem) - 32.0).min() > 3.0
     # The node at the clamped end is an electrode's; the foundation takes 3 k_e elsewhere.
-    assert charge.foundation == pytest.approx(-3.0 * problem.trace.weight.sum(), rel=1e-9)
+    assert charge.foundation == pytest.approx(-3.0 * problem.nodes.weight.sum(), rel=1e-9)
 
 
 OPTIONS = {Newton: NewtonOptions(), FixedPoint: FixedPointOptions()}

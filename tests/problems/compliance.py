@@ -6,9 +6,11 @@ import numpy as np
 from mpi4py import MPI
 from scipy.optimize import brentq
 
-from contact.interface.response import Conductor, Layer
+from contact.body.description import Body, Fixed, Load
+from contact.interface.current import Conductor
+from contact.interface.layer import Layer
 from contact.mesh.make import box, rectangle
-from contact.problem.problem import Body, Contact, ContactProblem, Fixed, Load
+from contact.problem.problem import Contact, ContactProblem
 from forms.hencky import Linear
 from forms.laws import (
     Compliance,

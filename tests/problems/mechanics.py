@@ -7,14 +7,15 @@ import numpy as np
 import ufl
 from mpi4py import MPI
 
+from contact.body.description import Body, Fixed, Load
 from contact.build import build_problem
+from contact.interface.friction import Friction
 from contact.interface.obstacle import GapFunction, Plane
 from contact.mesh.make import Domain, box, rectangle
 from contact.methods.fixed_point import FixedPoint
 from contact.methods.options import FixedPointOptions
 from contact.methods.report import Outcome
-from contact.problem.problem import Body, Contact, ContactProblem, Fixed, Friction, Load
-from contact.problem.state import nodal_iterate
+from contact.problem.problem import Contact, ContactProblem
 from contact.typing import Array
 from forms.hencky import Hencky, Linear, Log
 from forms.laws import FrictionCoefficient, SlipCoefficient
@@ -195,15 +196,15 @@ def solve(problem: ContactProblem, tolerance: float = 1e-10, **options) -> Fixed
 
 def attempt(problem: ContactProblem, **options) -> tuple[FixedPoint, Outcome]:
     loop = FixedPoint(problem, FixedPointOptions(**options))
-    return loop, loop.solve()
+    return loop, loop.solve()[1]
 
 
 def contact_data(loop: FixedPoint) -> dict[str, Array]:
     """Return what there is at all contact nodes, sorted by position."""
-    problem, trace, forces = loop.problem, loop.problem.trace, loop.forces
-    nodal = nodal_iterate(problem)
+    problem, trace, forces = loop.problem, loop.problem.nodes, loop.state.forces
+    nodal = problem.nodal(loop.state)
     slip = trace.tangential_component(nodal)
-    bound = problem.friction_bound(forces.pressure, np.linalg.norm(slip, axis=1))
+    bound = problem.interface.friction.bound(forces.pressure, np.linalg.norm(slip, axis=1))
     size = np.linalg.norm(forces.friction, axis=1)
     local = {
         "points": trace.points,

@@ -6,9 +6,12 @@ from dataclasses import dataclass
 import numpy as np
 from mpi4py import MPI
 
-from contact.interface.response import Conductor
+from contact.body.description import Body, Fixed, Load
+from contact.interface.current import Conductor
+from contact.interface.friction import Friction
 from contact.mesh.make import box, rectangle
-from contact.problem.problem import Body, Contact, ContactProblem, Fixed, Friction, Load
+from contact.problem.state import State
+from contact.problem.problem import Contact, ContactProblem
 from contact.typing import Array
 from forms.hencky import Hencky, Linear, Log
 from forms.laws import (
@@ -184,7 +187,7 @@ def hencky(xi_0: float = 1.8) -> Log:
     return Log(YOUNG, POISSON, yield_strain=xi_0)
 
 
-def potential(problem: ContactProblem) -> Array:
+def potential(problem: ContactProblem, state: State) -> Array:
     """Return the potential at the owned contact nodes."""
-    nodal = problem.trace.values(problem.x.x.array)
-    return problem.phi_scale * nodal[:, -1]
+    nodal = problem.nodal(state)
+    return problem.equilibrium.phi_scale * nodal[:, -1]

@@ -9,9 +9,10 @@ from mpi4py import MPI
 
 from contact import InputError, Solution, build_problem, load_case, solve, solve_problem
 from contact.case.formula import Expression
-from contact.interface.response import Layer
+from contact.interface.friction import Friction
+from contact.interface.layer import Layer
 from contact.output.table import contact_table
-from contact.problem.problem import ContactProblem, Friction
+from contact.problem.problem import ContactProblem
 from forms.laws import Compliance, PotentialFactor, SlipCoefficient
 from scripts.cases import CASES
 from scripts.studies import limit_theorem
@@ -28,7 +29,7 @@ def solved(name: str, cells: int = 96, *changes: str) -> Solution:
 
 
 def unknowns(solution: Solution) -> np.ndarray:
-    return solution.problem.x.x.array[: solution.problem.owned]
+    return solution.problem.x.x.array[: solution.problem.equilibrium.owned]
 
 
 def close(a: Solution, b: Solution, tolerance: float) -> bool:
@@ -49,7 +50,7 @@ INDEPENDENT = {
 def test_independent_values_of_example_8_3(name, method):
     solution = solved(name, 96, f"solver.method={method}")
     count, first, last, displacement, pressure = INDEPENDENT[name]
-    trace, touching = solution.problem.trace, solution.status != "open"
+    trace, touching = solution.problem.nodes, solution.status != "open"
     assert trace.size == 65
     assert np.count_nonzero(touching) == count
     assert trace.points[touching, 0].min() == pytest.approx(first)
@@ -61,7 +62,7 @@ def test_independent_values_of_example_8_3(name, method):
 
 def test_potential_and_strain_of_example_8_3():
     solution = solved("8-3")
-    potential = solution.problem.phi_scale * unknowns(solution)[2::3]
+    potential = solution.problem.equilibrium.phi_scale * unknowns(solution)[2::3]
     # Printed as -0.030; this code has -0.02951.
     assert potential.min() == pytest.approx(-0.030, abs=1e-3)
     assert potential.max() == pytest.approx(0.329, abs=5e-4)
@@ -187,7 +188,11 @@ def test_other_friction_laws_on_a_layer(law):
         "slip": Friction(SlipCoefficient(0.05, 0.02, 10.0)),
     }
     problem = ContactProblem(
-        problem.domain, problem.body, problem.contact, laws[law], problem.response.conductor
+        problem.domain,
+        problem.body,
+        problem.contact,
+        laws[law],
+        problem.interface.response.conductor,
     )
     solution = solve_problem(problem, case.solver)
     assert solution.converged, solution.outcome
@@ -195,7 +200,7 @@ def test_other_friction_laws_on_a_layer(law):
     slips = solution.status == "slip"
     assert np.any(slips)
     # The bound holds the layer's part of the pressure too.
-    total = solution.forces.pressure + problem.response.layer_pressure(solution.nodal)
+    total = solution.forces.pressure + problem.interface.response.layer_pressure(solution.nodal)
     slip = np.linalg.norm(solution.slip, axis=1)
     bound = 0.5 if law == "tresca" else laws[law].coefficient(slip) * total
     assert np.allclose(size[slips], np.broadcast_to(bound, slip.shape)[slips], rtol=1e-6)
@@ -239,7 +244,7 @@ def test_ranks_agree(name):
 @pytest.mark.parametrize(("diagonal", "leans"), [("right", True), ("crossed", False)])
 def test_example_8_4_is_as_symmetric_as_its_mesh(diagonal, leans):
     solution = solved("8-4", 96, f"mesh.diagonal={diagonal}")
-    order = np.argsort(solution.problem.trace.points[:, 0])
+    order = np.argsort(solution.problem.nodes.points[:, 0])
     pressure = solution.pressure[order]
     difference = np.abs(pressure - pressure[::-1]).max() / pressure.max()
     assert difference > 0.5 if leans else difference < 1e-6

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 from dolfinx import fem
 
-from contact.body.transfer import carry, errors
+from contact.body.norms import errors
+from contact.body.transfer import carry
 from contact.mesh.make import rectangle, refined
 from forms.hencky import energy_density
 from forms.kinematics import strain

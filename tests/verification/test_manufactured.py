@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from contact.body.transfer import errors_to
+from contact.body.norms import errors_to
 from contact.methods.newton import Newton
 from contact.methods.options import NewtonOptions
 from contact.output.fields import DerivedFields
@@ -62,7 +62,7 @@ def test_signorini_pressure():
     solution = Singular()
     problem = solution.problem(64)
     loop = solve(problem)
-    trace = problem.trace
+    trace = problem.nodes
     error = loop.forces.pressure - solution.pressure(trace.points[:, 0])
     # The pressure is one of a corner, where Dirichlet data meet contact, and is left out there.
     inner = trace.points[:, 0] < 0.9

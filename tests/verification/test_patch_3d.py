@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
+from contact.body.description import Body, Fixed
 from contact.mesh.make import rectangle
-from contact.problem.problem import Body, Contact, ContactProblem, Fixed
+from contact.problem.problem import Contact, ContactProblem
 from forms.hencky import Linear
 from forms.laws import ConstantCoefficient
 from tests.problems.mechanics import SlidingBlock, contact_data, flat, pressed_block, solve
@@ -23,7 +24,7 @@ def test_uniform_pressure(gap, poisson, dim, degree):
     # Free sides: the stress is uniaxial, in plane strain with sigma_zz = nu sigma_yy.
     thinning = -pressure * (1 - poisson**2) if dim == 2 else -pressure
     widening = pressure * poisson * (1 + poisson) if dim == 2 else pressure * poisson
-    x = problem.space.tabulate_dof_coordinates()[:, :dim]
+    x = problem.equilibrium.space.tabulate_dof_coordinates()[:, :dim]
     exact = x * ([widening] * (dim - 1) + [thinning]) - np.eye(dim)[-1] * gap
     assert np.abs(problem.x.x.array.reshape(-1, dim) - exact).max() < 1e-9
 
@@ -38,10 +39,10 @@ def test_weights_carry_a_constant_pressure():
 def test_p2_contact_nodes_of_triangles_are_the_midpoints_of_their_edges():
     problem = pressed_block(MPI.COMM_SELF, 3, 2)
     corners = problem.domain.mesh.geometry.x
-    distance = np.linalg.norm(problem.trace.points[:, None] - corners[None], axis=2)
+    distance = np.linalg.norm(problem.nodes.points[:, None] - corners[None], axis=2)
     assert distance.min() > 0.1
     # A grid of 2 x 3 squares, each cut in two: edges along x, along y, and diagonals.
-    assert problem.trace.size == 2 * 4 + 3 * 3 + 6
+    assert problem.nodes.size == 2 * 4 + 3 * 3 + 6
 
 
 def test_normals_are_the_body_s_own_for_a_given_gap():

@@ -30,17 +30,19 @@ def solve(problem: ContactProblem, options: FixedPointOptions = TIGHT) -> FixedP
 def errors(problem: ContactProblem, column: Column, units, degrees: float = 0.0):
     """Return the largest relative errors of displacement and potential over all nodes."""
     s, phi_b = column.solution()
-    dim, owned = problem.dim, problem.owned
+    dim, owned = problem.dim, problem.equilibrium.owned
     angle = np.deg2rad(degrees)
     up = np.array([-np.sin(angle), np.cos(angle)]) if dim == 2 else None
     if up is None:  # rotation about y
         up = np.array([np.sin(angle), 0.0, np.cos(angle)])
-    points = problem.space.tabulate_dof_coordinates()[: owned // problem.block_size, :dim]
+    points = problem.equilibrium.space.tabulate_dof_coordinates()[
+        : owned // problem.equilibrium.block_size, :dim
+    ]
     height = points @ up
-    x = problem.x.x.array[:owned].reshape(-1, problem.block_size)
+    x = problem.x.x.array[:owned].reshape(-1, problem.equilibrium.block_size)
     exact_u = s * height[:, None] * up
     exact_phi = phi_b + (column.top - phi_b) * height / column.height
-    phi = problem.phi_scale * x[:, -1] / units.potential
+    phi = problem.equilibrium.phi_scale * x[:, -1] / units.potential
     wrong_u = np.abs(x[:, :dim] - exact_u).max(initial=0) / abs(s * column.height)
     wrong_phi = np.abs(phi - exact_phi).max(initial=0) / max(abs(phi_b), abs(column.top))
     return COMM.allreduce(wrong_u, MPI.MAX), COMM.allreduce(wrong_phi, MPI.MAX)
@@ -107,7 +109,7 @@ def test_units_do_not_matter(name, dim):
         solver = solve(problem)
         phi = potential(problem) / units.potential
         steps = [record.inner for record in solver.history.records]
-        runs.append((problem.trace.values(problem.x.x.array)[:, :dim], phi, steps))
+        runs.append((problem.nodes.apply(problem.x.x.array)[:, :dim], phi, steps))
     assert np.allclose(runs[0][0], runs[1][0], rtol=1e-8, atol=1e-8)
     assert np.allclose(runs[0][1], runs[1][1], rtol=1e-8, atol=1e-8)
     assert runs[0][2] == runs[1][2]

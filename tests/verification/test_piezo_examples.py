@@ -6,14 +6,14 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
+from contact.interface.friction import Friction
+from contact.interface.multipliers import Multipliers
 from contact.linear.operator import LinearOperator
 from contact.methods.fixed_point import FixedPoint
 from contact.methods.options import FixedPointOptions
 from contact.methods.uzawa import augmentation, automatic_r
 from contact.output.balances import charge_balance
 from contact.problem.kkt import residual_forces
-from contact.problem.problem import Friction
-from contact.problem.state import Multipliers, nodal_iterate
 from forms.laws import ConstantCoefficient, SlipCoefficient
 from tests.problems.piezo import SCALED, SI, Column, example, hencky, potential
 
@@ -32,9 +32,9 @@ def solve(problem, tolerance=1e-8, **options):
 
 def extremes(problem, solver):
     """Return phi on Gamma_3, largest displacement component and pressure, over all ranks."""
-    trace, comm = problem.trace, problem.comm
+    trace, comm = problem.nodes, problem.comm
     phi = potential(problem)
-    u = problem.x.x.array.reshape(-1, problem.block_size)[:, : problem.dim]
+    u = problem.x.x.array.reshape(-1, problem.equilibrium.block_size)[:, : problem.dim]
     return (
         -trace.maximum(-phi, -np.inf),
         trace.maximum(phi, -np.inf),
@@ -83,7 +83,7 @@ def test_potential_grows_with_phi_f_and_k_e():
         for row in rows:
             problem = example(COMM, (32, 16), friction=SLIP, **row)
             solve(problem)
-            order = np.argsort(problem.trace.points[:, 0])
+            order = np.argsort(problem.nodes.points[:, 0])
             curves.append(potential(problem)[order][4:])
         for low, high in pairwise(curves):
             assert np.all(high > low)
@@ -136,7 +136,7 @@ def test_ranks_agree(law):
         problem = example(comm, (32, 16), friction=SLIP, law=law)
         solver = solve(problem, 1e-11)
         charge = charge_balance(problem, solver.forces)
-        norms = (problem.trace.norm(solver.forces.pressure), problem.trace.norm(potential(problem)))
+        norms = (problem.nodes.norm(solver.forces.pressure), problem.nodes.norm(potential(problem)))
         found.append((*extremes(problem, solver), *norms, charge.foundation))
     assert np.allclose(found[0], found[1], rtol=1e-8)
 
@@ -148,15 +148,15 @@ def first_solve(problem, symmetric=True, compare=True):
     """Return the iterations of a first linear solve, and its difference to the direct one."""
     problem.reset()
     nodal = nodal_iterate(problem)
-    blocks = augmentation(problem, automatic_r(problem), problem.frictional)
+    blocks = augmentation(problem, automatic_r(problem.scales), problem.frictional)
     contact = np.ones(nodal.shape[0])
-    current = problem.response.current_block(nodal, contact)
-    blocks = blocks + problem.trace.weight[:, None, None] * current
+    current = problem.interface.response.current_block(nodal, contact)
+    blocks = blocks + problem.nodes.weight[:, None, None] * current
     found = []
     for kind in ("lu", "iterative") if compare else ("iterative",):
         operator = LinearOperator(problem, symmetric=symmetric, kind=kind)
         operator.update(problem.secant, blocks)
-        increment = operator.solve(-residual_forces(problem, Multipliers.zero(problem)))
+        increment = operator.solve(-residual_forces(problem, Multipliers.zero(problem.nodes)))
         found.append((increment, operator.counters.linear_iterations))
     comm = problem.comm
     size = comm.allreduce(np.abs(found[0][0]).max(initial=0), MPI.MAX)

@@ -10,10 +10,11 @@ import ufl
 from dolfinx import fem
 from mpi4py import MPI
 
+from contact.body.description import Body, Fixed, Load
 from contact.mesh.make import box, rectangle
 from contact.methods.fixed_point import FixedPoint
 from contact.methods.options import FixedPointOptions
-from contact.problem.problem import Body, Contact, ContactProblem, Fixed, Load
+from contact.problem.problem import Contact, ContactProblem
 from forms.hencky import Hencky, Log, stress
 from forms.kinematics import strain
 from forms.ops import cos, sin
