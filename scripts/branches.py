@@ -10,10 +10,12 @@ from mpi4py import MPI
 from reporting import iterate
 
 from contact import Case, InputError, Solution
-from contact.methods.nested import coarse_solution, coarser_cases, prolong
+from contact.case.nesting import coarser_cases
+from contact.methods.nested import prolong
 from contact.methods.newton import Newton
 from contact.methods.options import NewtonOptions, Options
 from contact.methods.report import Outcome
+from contact.nesting import coarse_solution
 from contact.output.review import review
 from contact.problem.kkt import KKT, evaluate
 from contact.problem.problem import ContactProblem
