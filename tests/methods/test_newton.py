@@ -7,14 +7,14 @@ import pytest
 from mpi4py import MPI
 
 from contact.build import build_problem
-from contact.case.file import Case, parse_case
+from contact.case.file import parse_case
+from contact.case.nesting import coarser_cases
 from contact.errors import InputError
 from contact.interface.friction import Friction
 from contact.interface.linearised import Moduli, linearise
 from contact.interface.multipliers import Multipliers
 from contact.interface.status import CLOSED, FREE, SLIDES, STICKS
 from contact.methods.fixed_point import FixedPoint
-from contact.methods.nested import coarser_cases
 from contact.methods.newton import Newton
 from contact.methods.options import FixedPointOptions, NewtonOptions
 from contact.methods.report import Outcome
