@@ -28,8 +28,9 @@ from contact.methods.material import SECANT_UNTIL, MaterialStep
 from contact.methods.options import FixedPointOptions, NewtonOptions
 from contact.methods.report import History, Monitor, Outcome, Record
 from contact.methods.step import Iterate, WholeStep
+from contact.methods.sure import INTERIOR_POINT, solve_convex
 from contact.methods.uzawa import automatic_r
-from contact.problem.condensed import condensation
+from contact.problem.condensed import CondensedProblem, condensation
 from contact.problem.kkt import KKT, evaluate
 from contact.problem.problem import ContactProblem
 from contact.problem.protocols import Problem
@@ -39,7 +40,8 @@ from contact.problem.state import State
 logger = logging.getLogger("contact.solver")
 
 #: What the history says of the slower methods.
-SLOWER = FROZEN_FRICTION, BLOCK_RELAXATION = "frozen friction", "block relaxation"
+FROZEN_FRICTION, BLOCK_RELAXATION = "frozen friction", "block relaxation"
+SLOWER = INTERIOR_POINT, FROZEN_FRICTION, BLOCK_RELAXATION
 
 #: Updates of a frozen friction bound, and what the first of its problems is solved to.
 MOST_UPDATES, FIRST_GOAL = 40, 1e-2
@@ -163,6 +165,8 @@ class Newton:
             logger.info("%s; going on with the whole body", outcome.ended)
         loop = self._whole_loop()
         iterate, outcome = loop.run(iterate)
+        if not outcome.converged and isinstance(self.problem, CondensedProblem):
+            iterate, outcome = self._convex(self.problem, loop, iterate, outcome)
         if not outcome.converged and self.problem.interface.friction.acts and self._left > 0:
             iterate, outcome = self._frozen_friction(loop, iterate)
         if not outcome.converged and self._left > 0:
@@ -170,6 +174,23 @@ class Newton:
         if not outcome.converged and self._left > 0 and self.options.load_steps:
             iterate, outcome = self._load_steps(loop)
         return iterate, outcome
+
+    def _convex(
+        self, problem: CondensedProblem, loop: NewtonLoop, iterate: Iterate, outcome: Outcome
+    ) -> tuple[Iterate, Outcome]:
+        """Solve convex problems for sure, and let Newton's loop finish what they leave."""
+        start = problem.start() if self._best is None else self._best.state
+        found = solve_convex(problem, start, self.history.poll)
+        if found is None:
+            return iterate, outcome
+        residuals = evaluate(problem, found.state)
+        sure = self._started(found.state)
+        self._see(sure, residuals)
+        self.history.record(residuals, INTERIOR_POINT, found.steps)
+        outcome = Outcome(residuals, self.options.allowed, found.words)
+        if outcome.converged or self._left <= 0:
+            return sure, outcome
+        return loop.run(sure, INTERIOR_POINT)
 
     def _whole_loop(self) -> NewtonLoop:
         options = self.options

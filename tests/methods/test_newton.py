@@ -7,7 +7,7 @@ import pytest
 from mpi4py import MPI
 
 from contact.build import build_problem
-from contact.case.file import parse_case
+from contact.case.file import Case, parse_case
 from contact.case.nesting import coarser_cases
 from contact.errors import InputError
 from contact.interface.friction import Friction

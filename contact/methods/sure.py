@@ -1,0 +1,201 @@
+"""The sure road: contact at the nodes of a condensed body as a sequence of convex problems.
+
+With a given friction bound the problem is convex and solved to a duality gap
+(`contact.methods.convex`); Haslinger's loop updates the bound, and one around it what the layer
+and the current answer. Moduli are not compared anywhere, so that bodies that bend, whose
+flexibilities differ by many orders of magnitude, are solved like any other.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from contact.interface.interface import Interface
+from contact.interface.multipliers import Multipliers
+from contact.methods.convex.haslinger import coulomb
+from contact.methods.convex.reduced import NotConvexError, without_potential
+from contact.methods.convex.tresca import TrescaSolver
+from contact.problem.condensed import CondensedProblem
+from contact.problem.kkt import residual_forces
+from contact.problem.state import State
+from contact.typing import Array
+
+#: What the history says of this road.
+INTERIOR_POINT = "interior point"
+
+#: Times that a layer and a current are linearised anew, and the change that ends it.
+MOST_ANSWERS, SETTLED = 30, 1e-10
+
+Bound = Callable[[Array, Array], Array]
+
+
+@dataclass(frozen=True)
+class Found:
+    """What the road led to.
+
+    Attributes
+    ----------
+    state
+        Unknowns and contact forces.
+    steps
+        Steps of the interior-point method.
+    certified
+        Whether the last convex problem, and the friction bound, are settled.
+    words
+        How it ended.
+    """
+
+    state: State
+    steps: int
+    certified: bool
+    words: str
+
+
+def solve_convex(problem: CondensedProblem, state: State, poll: Callable[[], None]) -> Found | None:
+    """Solve a condensed problem; None where it is not convex. Collective.
+
+    Parameters
+    ----------
+    problem, state
+        The contact nodes with their linear body, and where layer, current and the first friction
+        bound are taken.
+    poll
+        Called between the convex problems, on all ranks.
+    """
+    steps, found = 0, None
+    for _ in range(MOST_ANSWERS if problem.interface.response.active else 1):
+        found = _solve_linearised(problem, state, poll)
+        if found is None:
+            return None
+        steps += found.steps
+        change = _largest(problem, found.state.x - state.x)
+        state = found.state
+        if change <= SETTLED * _largest(problem, state.x):
+            break
+    assert found is not None
+    return Found(state, steps, found.certified, found.words)
+
+
+def _largest(problem: CondensedProblem, values: Array) -> float:
+    comm = problem.equilibrium.comm
+    return float(np.abs(np.concatenate(comm.allgather(values))).max(initial=0.0))
+
+
+def _solve_linearised(
+    problem: CondensedProblem, state: State, poll: Callable[[], None]
+) -> Found | None:
+    """Solve with layer and current linearised at a state; rank 0 does it for all."""
+    body, interface, comm = problem.equilibrium, problem.interface, problem.equilibrium.comm
+    gathered = _Gathered.of(problem, state)
+    layer = interface.response.layer_pressure(interface.jump.apply(state.x))
+
+    def own_bound(pressure: Array, slip: Array) -> Array:
+        """Return the friction bound of this rank's nodes, held ones included."""
+        poll()
+        begin = body.own.start // body.block_size
+        own = slice(begin, begin + layer.size)
+        bound = interface.friction.bound(pressure[own] + layer, slip[own])
+        return np.concatenate([bound, np.zeros(body.free.shape[0] - layer.size)])
+
+    def bound(pressure: Array, slip: Array) -> Array:
+        comm.bcast((pressure, slip))
+        gathered_bound = comm.gather(own_bound(pressure, slip))
+        assert gathered_bound is not None
+        return np.concatenate(gathered_bound)
+
+    answer = None
+    if comm.rank == 0:
+        try:
+            answer = gathered.solve(bound, interface.friction.acts)
+        except NotConvexError:
+            answer = None
+        comm.bcast(None)
+    else:
+        while (asked := comm.bcast(None)) is not None:
+            comm.gather(own_bound(*asked))
+    answer = comm.bcast(answer)
+    if answer is None:
+        return None
+    x, pressure, friction, steps, certified, words = answer
+    begin = body.own.start // body.block_size
+    own = slice(begin, begin + layer.size)
+    forces = Multipliers(pressure[own].copy(), friction[own].copy())
+    return Found(State(x[body.own].copy(), forces, state.load), steps, certified, words)
+
+
+@dataclass(frozen=True)
+class _Gathered:
+    """The linearised problem of all ranks: kept nodes in rank order, fixed values taken off."""
+
+    stiffness: Array
+    load: Array
+    fixed: Array
+    free: NDArray[np.bool_]
+    normal: Array
+    tangent: Array
+    gap: Array
+    weight: Array
+
+    @staticmethod
+    def of(problem: CondensedProblem, state: State) -> _Gathered:
+        body, interface = problem.equilibrium, problem.interface
+        response, jump = interface.response, interface.jump
+        nodal = jump.apply(state.x)
+        blocks = response.block(nodal, interface.pressure(nodal, state.forces))
+        base = residual_forces(problem, state)
+        jump.transpose(-jump.weight[:, None] * state.forces.vectors(jump), base)
+        fixed = body.prescribe(body.rest())
+        kept = _kept_nodes(interface, body.free.shape[0])
+        weighted = interface.weighted(blocks, state.x)
+        local = (state.x - fixed, base, fixed, body.free, weighted, *kept)
+        moved, base, fixed, free, weighted, normal, tangent, gap, weight = (
+            np.concatenate(body.comm.allgather(part)) for part in local
+        )
+        total = body.stiffness.copy()
+        n, size = free.shape
+        rows = np.arange(n * size).reshape(n, size)
+        masked = weighted * free[:, :, None] * free[:, None, :]
+        total[rows[:, :, None], rows[:, None, :]] += masked
+        load = np.where(free.ravel(), total @ moved - base, 0.0)
+        return _Gathered(total, load, fixed, free, normal, tangent, gap, weight)
+
+    def solve(self, bound: Bound, frictional: bool) -> tuple[Array, Array, Array, int, bool, str]:
+        """Return unknowns, pressure, friction, steps, whether it is certified, and words."""
+        n, d = self.normal.shape
+        stiffness, load, complete = self.stiffness, self.load, None
+        if self.free.shape[1] > d:
+            stiffness, load, complete = without_potential(stiffness, load, self.free)
+        rubbing = np.full(n, frictional) & (self.weight > 0) & np.isfinite(self.gap)
+        free = self.free[:, :d]
+        solver = TrescaSolver(
+            stiffness, self.normal, self.tangent, self.gap, self.weight, free, rubbing
+        )
+        if frictional:
+            loop = coulomb(solver, load, bound)
+            result, steps, certified, words = (
+                loop.result, loop.iterations, loop.converged, loop.message
+            )  # fmt: skip
+        else:
+            result = solver.solve(load, np.zeros(n))
+            steps, certified, words = result.iterations, result.certified, result.message
+        moved = result.displacement if complete is None else complete(result.displacement)
+        x = self.fixed + moved.ravel()
+        return x, result.pressure, result.friction, steps, certified, words
+
+
+def _kept_nodes(interface: Interface, count: int) -> tuple[Array, Array, Array, Array]:
+    """Return normals, tangents, gaps and weights of kept nodes; held ones touch nothing."""
+    jump, d = interface.jump, interface.dim
+    rest = count - jump.gap.size
+    aside = np.zeros((rest, d))
+    aside[:, 0] = 1.0
+    return (
+        np.concatenate([jump.normal, aside]),
+        np.concatenate([jump.tangent, np.zeros((rest, d, d))]),
+        np.concatenate([jump.gap, np.full(rest, np.inf)]),
+        np.concatenate([jump.weight, np.ones(rest)]),
+    )
