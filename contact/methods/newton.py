@@ -30,7 +30,7 @@ from contact.methods.report import History, Monitor, Outcome, Record
 from contact.methods.step import Iterate, WholeStep
 from contact.methods.sure import INTERIOR_POINT, solve_convex
 from contact.methods.uzawa import automatic_r
-from contact.problem.condensed import CondensedProblem, condensation
+from contact.problem.condensed import CondensedProblem, condensation, pays
 from contact.problem.kkt import KKT, evaluate
 from contact.problem.problem import ContactProblem
 from contact.problem.protocols import Problem
@@ -88,6 +88,7 @@ class Newton:
         self._forget()
         self.whole = WholeStep(problem, options, self._moduli, self.counters)
         self._condensed: MaterialStep | None = None
+        self._pays = False
         if options.condense and isinstance(problem, ContactProblem):
             body = condensation(problem, self.counters, options.linear)
             if body is not None:
@@ -95,6 +96,7 @@ class Newton:
                     body, options, self._moduli, _solve_condensed, self.history, self.counters,
                     SLOWER,
                 )  # fmt: skip
+                self._pays = pays(problem)
 
     def _forget(self) -> None:
         self._at = Iterate(self.problem.start())
@@ -155,16 +157,17 @@ class Newton:
         return self.options.max_outer - len(self.history.records)
 
     def _roads(self, iterate: Iterate) -> tuple[Iterate, Outcome]:
-        if self._condensed is not None:
-            loop = NewtonLoop(
-                self.problem, self.options, self._condensed, self.history, self._see, SECANT_UNTIL
-            )
-            iterate, outcome = loop.run(iterate)
+        if self._condensed is not None and self._pays:
+            iterate, outcome = self._at_contact(self._condensed, iterate)
             if outcome.converged or self._left <= 0:
                 return iterate, outcome
             logger.info("%s; going on with the whole body", outcome.ended)
         loop = self._whole_loop()
         iterate, outcome = loop.run(iterate)
+        if not outcome.converged and self._condensed is not None and not self._pays:
+            logger.info("%s; going on at the contact nodes", outcome.ended)
+            start = Iterate(self.problem.start()) if self._best is None else self._best
+            iterate, outcome = self._at_contact(self._condensed, replace(start, status=None))
         if not outcome.converged and isinstance(self.problem, CondensedProblem):
             iterate, outcome = self._convex(self.problem, loop, iterate, outcome)
         if not outcome.converged and self.problem.interface.friction.acts and self._left > 0:
@@ -174,6 +177,11 @@ class Newton:
         if not outcome.converged and self._left > 0 and self.options.load_steps:
             iterate, outcome = self._load_steps(loop)
         return iterate, outcome
+
+    def _at_contact(self, step: MaterialStep, iterate: Iterate) -> tuple[Iterate, Outcome]:
+        """Iterate with the body condensed onto the contact nodes."""
+        loop = NewtonLoop(self.problem, self.options, step, self.history, self._see, SECANT_UNTIL)
+        return loop.run(iterate)
 
     def _convex(
         self, problem: CondensedProblem, loop: NewtonLoop, iterate: Iterate, outcome: Outcome

@@ -28,6 +28,13 @@ from contact.typing import Array
 #: Unknowns that are kept at most: the dense matrix then takes 130 MB.
 LARGEST = 4200
 
+#: Unknowns up to which dense steps take no time to speak of.
+ALWAYS = 1000
+
+#: How much faster dense operations are than those of a sparse factorisation, and how many more of
+#: its steps Newton's method takes in the worst case.
+DENSE_IS_FASTER = 50.0
+
 PREFIX = "contact_"
 
 
@@ -226,10 +233,23 @@ def _at_kept_nodes(interface: Interface) -> Interface:
     )
 
 
-def condensation(problem: ContactProblem, counters: Counters, kind: str) -> Condensation | None:
-    """Return the problem condensed onto its contact nodes, where that pays. Collective.
+def pays(problem: ContactProblem) -> bool:
+    """Tell whether dense steps at the contact nodes cost less than sparse ones of the body.
 
-    That is where a direct solver does, with the contact nodes few, unless options of PETSc ask
+    With n unknowns, k of them kept, the body is about n/k nodes deep: a sparse factorisation
+    costs about n (n/k)^2 operations, a dense one k^3. Of a slender body the contact nodes are
+    too large a part.
+    """
+    layout = problem.equilibrium.layout
+    kept, unknowns = problem.nodes.size * layout.block_size, layout.unknowns
+    depth = unknowns / kept * layout.block_size
+    return kept <= ALWAYS or kept**3 <= DENSE_IS_FASTER * unknowns * depth**2
+
+
+def condensation(problem: ContactProblem, counters: Counters, kind: str) -> Condensation | None:
+    """Return the problem condensed onto its contact nodes, where that is possible. Collective.
+
+    That is where a direct solver pays, with the contact nodes few, unless options of PETSc ask
     for a solver of the user's.
     """
     options = PETSc.Options(PREFIX)
