@@ -166,32 +166,32 @@ def test_smoothing(comm, radius):
     """Neighbours within the radius count, whichever rank has them."""
     results = []
     for c in (comm, MPI.COMM_SELF):
-        trace = bar(c, 8, degree=2).trace
-        pressure = np.sin(3 * trace.points[:, 0]) + 1
-        smooth = trace.gather(Smoothing(trace, radius)(pressure))
-        results.append(smooth[np.argsort(trace.gather(trace.points)[:, 0])])
+        nodes = bar(c, 8, degree=2).nodes
+        pressure = np.sin(3 * nodes.points[:, 0]) + 1
+        smooth = nodes.gather(Smoothing(nodes, radius)(pressure))
+        results.append(smooth[np.argsort(nodes.gather(nodes.points)[:, 0])])
     assert results[0] == pytest.approx(results[1], rel=1e-13)
 
 
 def test_sums_norms_and_maxima_are_global(comm):
-    trace, alone = bar(comm, 8).trace, bar(MPI.COMM_SELF, 8).trace
-    assert trace.size == alone.size == 32
-    x, y = trace.points[:, 0], alone.points[:, 0]
-    assert trace.sum(x) == pytest.approx(alone.sum(y), rel=1e-14)
-    assert trace.norm(trace.points) == pytest.approx(alone.norm(alone.points), rel=1e-14)
-    assert trace.maximum(-x, -9.0) == pytest.approx(-y.min())
-    assert sorted(trace.gather(x)) == pytest.approx(sorted(y))
+    nodes, alone = bar(comm, 8).nodes, bar(MPI.COMM_SELF, 8).nodes
+    assert nodes.size == alone.size == 32
+    x, y = nodes.points[:, 0], alone.points[:, 0]
+    assert nodes.sum(x) == pytest.approx(alone.sum(y), rel=1e-14)
+    assert nodes.norm(nodes.points) == pytest.approx(alone.norm(alone.points), rel=1e-14)
+    assert nodes.maximum(-x, -9.0) == pytest.approx(-y.min())
+    assert sorted(nodes.gather(x)) == pytest.approx(sorted(y))
 
 
 def test_every_node_has_one_owner_and_full_weight(comm):
     for degree in (1, 2):
-        trace = leaning_block(comm, 2, degree).trace
-        alone = leaning_block(MPI.COMM_SELF, 2, degree).trace
-        order = [np.lexsort(np.round(t.gather(t.points), 9).T) for t in (trace, alone)]
+        nodes = leaning_block(comm, 2, degree).nodes
+        alone = leaning_block(MPI.COMM_SELF, 2, degree).nodes
+        order = [np.lexsort(np.round(t.gather(t.points), 9).T) for t in (nodes, alone)]
         for quantity in ("points", "weight", "normal", "gap", "tangent"):
             ours, theirs = (
                 t.gather(getattr(t, quantity))[o]
-                for t, o in zip((trace, alone), order, strict=True)
+                for t, o in zip((nodes, alone), order, strict=True)
             )
             assert ours == pytest.approx(theirs, abs=1e-14)
 

@@ -62,8 +62,8 @@ def test_signorini_pressure():
     solution = Singular()
     problem = solution.problem(64)
     loop = solve(problem)
-    trace = problem.nodes
-    error = loop.forces.pressure - solution.pressure(trace.points[:, 0])
+    nodes = problem.nodes
+    error = loop.state.forces.pressure - solution.pressure(nodes.points[:, 0])
     # The pressure is one of a corner, where Dirichlet data meet contact, and is left out there.
-    inner = trace.points[:, 0] < 0.9
-    assert trace.norm(error * inner) < 0.05 * trace.norm(loop.forces.pressure)
+    inner = nodes.points[:, 0] < 0.9
+    assert nodes.norm(error * inner) < 0.05 * nodes.norm(loop.state.forces.pressure)

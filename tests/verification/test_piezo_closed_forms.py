@@ -70,7 +70,7 @@ def test_column(name, dim, units):
     problem = column.problem(COMM, dim, units)
     solver = solve(problem)
     assert max(errors(problem, column, units)) < 1e-10
-    pressure = solver.forces.pressure / units.stress
+    pressure = solver.state.forces.pressure / units.stress
     assert np.allclose(pressure, column.pressure, rtol=1e-10)
 
 
