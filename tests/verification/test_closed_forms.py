@@ -47,7 +47,7 @@ def solved(block, dim, degree, degrees=0.0, axis=(0.0, 1.0, 0.0)):
 
 
 def nodal_displacement(loop):
-    return loop.problem.x.x.array.reshape(-1, loop.problem.dim)
+    return loop.state.x.reshape(-1, loop.problem.dim)
 
 
 @pytest.mark.parametrize("degree", [1, 2])
