@@ -16,13 +16,15 @@ from collections.abc import Callable, Sequence
 from importlib import import_module
 from pathlib import Path
 from types import TracebackType
-from typing import Any, NoReturn, TypeVar
+from typing import TYPE_CHECKING, Any, NoReturn, TypeVar
 
 from mpi4py import MPI
 
-from contact.case.file import Case, load_case
 from contact.errors import InputError
 from contact.methods.interrupt import Terminated, ending_on_signal
+
+if TYPE_CHECKING:  # it loads dolfinx, which PETSc's options have to precede
+    from contact.case.file import Case
 
 CONVERGED, NOT_CONVERGED, BAD_INPUT = 0, 1, 2
 #: Added to the number of the signal that ended a run.
@@ -200,8 +202,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
                 import petsc4py
 
                 petsc4py.init([sys.argv[0], *_own_options(), *petsc])
+                from contact.case.file import load_case  # after PETSc's options
+
                 case = _shared(comm, lambda: load_case(options.case, options.set))
-                import_module("contact.solving")  # after PETSc's options
+                import_module("contact.solving")
             return {"solve": _solve, "check": _check}[options.command](case, options, comm)
     except InputError as error:
         if comm.rank == 0:

@@ -158,9 +158,7 @@ class Sphere:
         # longer than its radius do not represent it.
         dim = len(self.centre)
         sine = min(length / self.radius * np.sqrt((dim - 1) / (2 * dim)), 0.5)
-        depth = self.radius * sine**2 / (1 + np.sqrt(1 - sine**2))
-        # The contact direction may be the body's, a little aside.
-        return float(1.1 * depth)
+        return float(self.radius * sine**2 / (1 + np.sqrt(1 - sine**2)))
 
 
 def _along_ray(distance: Array, cosine: Array) -> Array:

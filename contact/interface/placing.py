@@ -74,7 +74,8 @@ def _chord_depth(domain: Domain, part: str, obstacle: Obstacle) -> float:
     facets = domain.facets(part)
     longest = np.max(domain.mesh.h(domain.dim - 1, facets), initial=0.0) if facets.size else 0.0
     length = 2**domain.levels * float(domain.comm.allreduce(longest, op=MPI.MAX))
-    return obstacle.chord_depth(length)
+    # The contact direction may be the body's, a little aside.
+    return 1.1 * obstacle.chord_depth(length)
 
 
 def _place(

@@ -25,7 +25,7 @@ class Solution:
     """A solved problem, or what was reached.
 
     Nodal quantities are those of the contact nodes that this rank owns, in the order of
-    `problem.trace`.
+    `problem.nodes`.
 
     Attributes
     ----------

@@ -39,7 +39,7 @@ from tests.problems.compliance import PIEZO_REGIMES, REGIMES, LayerColumn
 from tests.problems.mechanics import affine_vector, flat, leaning_block, solve
 
 
-def random_trace(n: int, dim: int, block_size: int, rng: np.random.Generator) -> ContactNodes:
+def random_nodes(n: int, dim: int, block_size: int, rng: np.random.Generator) -> ContactNodes:
     """Return contact nodes without a mesh, for the pointwise laws."""
     normal = rng.standard_normal((n, dim))
     normal /= np.linalg.norm(normal, axis=1)[:, None]
@@ -60,9 +60,9 @@ def random_trace(n: int, dim: int, block_size: int, rng: np.random.Generator) ->
 @pytest.mark.parametrize("psi", [ShiftedConductivity(0.7, 2.0), RampConductivity(0.7, 2.0)])
 def test_jacobian_is_the_derivative_of_the_force(dim, psi):
     rng = np.random.default_rng(3)
-    trace = random_trace(200, dim, dim + 1, rng)
+    nodes = random_nodes(200, dim, dim + 1, rng)
     layer = Layer(0.2, Compliance(0.3), PotentialFactor(5.0, 2.0, 3.0))
-    response = FoundationResponse(trace, layer, Conductor(psi, 1.5, Truncation(4.0)), 1.7, 1.0)
+    response = FoundationResponse(nodes, layer, Conductor(psi, 1.5, Truncation(4.0)), 1.7, 1.0)
     x = rng.standard_normal((200, dim + 1))
     pressure = response.layer_pressure(x) - 100.0  # no node presses on the rigid part
     jacobian = response.jacobian(x, pressure)
@@ -78,10 +78,10 @@ def test_jacobian_is_the_derivative_of_the_force(dim, psi):
 
 def test_block_is_the_symmetric_part_without_the_frozen_factors():
     rng = np.random.default_rng(4)
-    trace = random_trace(50, 2, 3, rng)
+    nodes = random_nodes(50, 2, 3, rng)
     layer = Layer(0.2, Compliance(0.3), PotentialFactor(5.0, 1.0))
     conductor = Conductor(ShiftedConductivity(0.7, 0.0), 1.5)
-    response = FoundationResponse(trace, layer, conductor, 1.7, 1.0)
+    response = FoundationResponse(nodes, layer, conductor, 1.7, 1.0)
     x = rng.standard_normal((50, 3))
     block = response.block(x, np.zeros(50))
     assert np.allclose(block, block.transpose(0, 2, 1), rtol=1e-14)
@@ -99,12 +99,12 @@ def check_column(column: LayerColumn, dim: int = 2, degree: int = 1, **options) 
 def check_solution(column: LayerColumn, loop: FixedPoint | Newton) -> None:
     u_n, potential, layer, rest, _ = column.solution()
     problem = loop.problem
-    nodal = nodal_iterate(problem)
+    nodal = problem.nodal(loop.state)
     assert np.abs(problem.nodes.normal_component(nodal) - u_n).max() < 1e-10
     assert np.abs(problem.interface.response.layer_pressure(nodal) - layer).max() < 1e-10 * max(
         layer, 1
     )
-    assert np.abs(loop.forces.pressure - rest).max() < 1e-10 * max(layer + rest, 1)
+    assert np.abs(loop.state.forces.pressure - rest).max() < 1e-10 * max(layer + rest, 1)
     if column.piezo:
         assert np.abs(problem.equilibrium.phi_scale * nodal[:, -1] - potential).max() < 1e-10
 
@@ -182,7 +182,7 @@ def test_a_stiff_column_does_not_cycle_between_open_and_saturated():
 )
 def test_newton_on_columns(column):
     newton = Newton(column.problem(), NewtonOptions(tolerance=1e-11))
-    assert newton.solve().converged
+    assert newton.solve()[1].converged
     assert newton.counters.linear_solves <= 8
     check_solution(column, newton)
 
@@ -307,30 +307,29 @@ def test_friction_bound_takes_the_layer_and_the_rigid_part_together(dim, c_nu, r
         Friction(ConstantCoefficient(mu)),
     )
     loop = solve(problem, tolerance=1e-11)
-    nodal = nodal_iterate(problem)
+    nodal = problem.nodal(loop.state)
     assert problem.nodes.size > 0
     assert np.abs(problem.nodes.normal_component(nodal) - depth).max() < 1e-10
     assert np.abs(problem.interface.response.layer_pressure(nodal) - share).max() < 1e-10
-    assert np.abs(loop.forces.pressure - (pressure - share)).max() < 1e-10
-    assert np.abs(loop.forces.friction[:, 0] - mu * pressure).max() < 1e-10
+    assert np.abs(loop.state.forces.pressure - (pressure - share)).max() < 1e-10
+    assert np.abs(loop.state.forces.friction[:, 0] - mu * pressure).max() < 1e-10
     assert np.abs(nodal[:, 0] - slip).max() < 1e-10
 
 
 def test_the_form_j_1_is_the_nodal_force():
     column = PIEZO_REGIMES["linear"]
     problem = column.problem()
-    solve(problem)
-    test = ufl.TestFunction(problem.equilibrium.space)
-    u, phi = problem.parts_of(problem.x)
-    v, _ = problem.parts_of(test)
+    body, state = problem.equilibrium, solve(problem).state
+    u, phi = body.split(body.function(state.x))
+    v, _ = body.split(ufl.TestFunction(body.space))
     nu = ufl.FacetNormal(problem.domain.mesh)
     ds = problem.domain.ds("bottom")(metadata={"quadrature_rule": "vertex", "quadrature_degree": 1})
     form = compliance(u, v, nu, column.p_nu, column.h_nu, column.touch, phi - column.phi_f)
     vector = fem.assemble_vector(fem.form(form * ds)).array
     nodal = np.zeros_like(vector)
-    pressure = problem.interface.response.layer_pressure(nodal_iterate(problem))
-    trace = problem.nodes
-    trace.add(nodal, (trace.weight * pressure)[:, None] * trace.normal)
+    pressure = problem.interface.response.layer_pressure(problem.nodal(state))
+    nodes = problem.nodes
+    nodes.transpose((nodes.weight * pressure)[:, None] * nodes.normal, nodal)
     assert np.abs(nodal).max() > 1.0
     assert np.abs(vector - nodal).max() < 1e-12
 
@@ -347,14 +346,14 @@ def test_ranks_agree_on_a_layer_in_space(comm):
     found = []
     for ranks in (comm, MPI.COMM_SELF):
         loop = solve(problem(ranks), tolerance=1e-11)
-        nodal, trace = nodal_iterate(loop.problem), loop.problem.nodes
+        nodal, nodes = loop.problem.nodal(loop.state), loop.problem.nodes
         layer = loop.problem.interface.response.layer_pressure(nodal)
         found.append(
             [
-                trace.maximum(np.linalg.norm(nodal, axis=1)),
-                trace.sum(layer),
-                trace.sum(loop.forces.pressure),
-                *(trace.sum(column) for column in loop.forces.friction.T),
+                nodes.maximum(np.linalg.norm(nodal, axis=1)),
+                nodes.sum(layer),
+                nodes.sum(loop.state.forces.pressure),
+                *(nodes.sum(column) for column in loop.state.forces.friction.T),
             ]
         )
     shared, alone = np.array(found)

@@ -39,10 +39,13 @@ def turned(dim):
 
 @pytest.fixture(scope="module", params=[2, 3], ids=["in the plane", "in space"])
 def problem(request):
-    problem = turned(request.param)
-    random = np.random.default_rng(5)
-    problem.x.x.array[:] = 0.03 * random.standard_normal(problem.x.x.array.size)
-    return problem
+    return turned(request.param)
+
+
+@pytest.fixture(scope="module")
+def x(problem):
+    """Return random unknowns, also where they are fixed."""
+    return 0.03 * np.random.default_rng(5).standard_normal(problem.equilibrium.owned)
 
 
 def vertex_rule(problem):
@@ -64,23 +67,17 @@ def assembled(form):
 
 def lumped(problem, vectors):
     total = np.zeros(problem.equilibrium.owned)
-    problem.nodes.ADD(total, problem.nodes.weight[:, None] * vectors)
+    problem.nodes.transpose(problem.nodes.weight[:, None] * vectors, total)
     return total
 
 
-def test_augmentation_is_the_form_of_the_augmented_lagrangian(problem):
-    v, nu, ds = (
-        ufl.TestFunction(problem.equilibrium.space),
-        normal_of(problem),
-        vertex_rule(problem),
-    )
-    trace = problem.nodes
+def test_augmentation_is_the_form_of_the_augmented_lagrangian(problem, x):
+    body, nodes = problem.equilibrium, problem.nodes
+    v, nu, ds = ufl.TestFunction(body.space), normal_of(problem), vertex_rule(problem)
     for friction in (True, False):
-        blocks = augmentation(problem, R, friction)
-        product = np.einsum("nij,nj->ni", blocks, nodal_iterate(problem))
-        total = np.zeros(problem.equilibrium.owned)
-        trace.add(total, product)
-        form = forms.augmented_lagrangian(problem.x, v, nu, R, friction) * ds
+        blocks = augmentation(nodes, R, friction)
+        total = lumped(problem, np.einsum("nij,nj->ni", blocks, nodes.apply(x)))
+        form = forms.augmented_lagrangian(body.function(x), v, nu, R, friction) * ds
         assert assembled(form) == pytest.approx(total, abs=1e-15)
 
 
@@ -90,39 +87,35 @@ def normal_of(problem):
 
 def test_auxiliary_load(problem):
     random = np.random.default_rng(6)
-    trace, v = problem.nodes, ufl.TestFunction(problem.equilibrium.space)
-    phi_c, lam_c = random.standard_normal((2, trace.size))
+    nodes, v = problem.nodes, ufl.TestFunction(problem.equilibrium.space)
+    phi_c, lam_c = random.standard_normal((2, nodes.size))
     phi_f, lam_f = fem.Function(problem.equilibrium.space), fem.Function(problem.equilibrium.space)
     for function in (phi_f, lam_f):
         function.x.array[:] = random.standard_normal(function.x.array.size)
     form = forms.auxiliary_load(
         field(problem, phi_c), phi_f, field(problem, lam_c), lam_f, v, normal_of(problem), R
     )
-    tangential = [trace.tangential_component(trace.values(f.x.array)) for f in (phi_f, lam_f)]
-    vectors = (R * phi_c - lam_c)[:, None] * trace.normal + R * tangential[0] - tangential[1]
+    tangential = [nodes.tangential_component(nodes.apply(f.x.array)) for f in (phi_f, lam_f)]
+    vectors = (R * phi_c - lam_c)[:, None] * nodes.normal + R * tangential[0] - tangential[1]
     assert assembled(form * vertex_rule(problem)) == pytest.approx(
         lumped(problem, vectors), abs=1e-14
     )
 
 
-def test_penalty_forms(problem):
-    v, nu, ds = (
-        ufl.TestFunction(problem.equilibrium.space),
-        normal_of(problem),
-        vertex_rule(problem),
-    )
-    trace, nodal = problem.nodes, nodal_iterate(problem)
-    laws = Lagged(problem, Regularisation(EPS, EPS), nodal)
+def test_penalty_forms(problem, x):
+    body, nodes = problem.equilibrium, problem.nodes
+    v, nu, ds = ufl.TestFunction(body.space), normal_of(problem), vertex_rule(problem)
+    u, nodal = body.function(x), nodes.apply(x)
+    laws = Lagged(problem.interface, Regularisation(EPS, EPS), nodal)
     forces = laws.forces(nodal)
-    gap = field(problem, trace.gap)
-    assert 0 < np.count_nonzero(forces.pressure) < trace.size
-    normal = forms.penalty(problem.x, v, nu, gap, EPS) * ds
-    expected = lumped(problem, forces.pressure[:, None] * trace.normal)
+    gap = field(problem, nodes.gap)
+    assert 0 < np.count_nonzero(forces.pressure) < nodes.size
+    normal = forms.penalty(u, v, nu, gap, EPS) * ds
+    expected = lumped(problem, forces.pressure[:, None] * nodes.normal)
     assert assembled(normal) == pytest.approx(expected, abs=1e-14)
-    bound = field(
-        problem, np.asarray(problem.interface.friction.bound(forces.pressure, forces.pressure))
-    )
-    friction = forms.penalty_friction(problem.x, problem.x, v, nu, bound, EPS) * ds
+    pressure = forces.pressure
+    bound = field(problem, problem.interface.friction.bound(pressure, pressure))
+    friction = forms.penalty_friction(u, u, v, nu, bound, EPS) * ds
     assert assembled(friction) == pytest.approx(lumped(problem, forces.friction), abs=1e-14)
 
 

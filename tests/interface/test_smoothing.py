@@ -32,40 +32,40 @@ PROBLEMS = {
 
 
 @pytest.fixture(scope="module", params=PROBLEMS)
-def trace(request):
-    return PROBLEMS[request.param]().trace
+def nodes(request):
+    return PROBLEMS[request.param]().nodes
 
 
 @given(radius=st.floats(1e-6, 50.0))
 @settings(max_examples=25, deadline=None)
-def test_a_constant_is_reproduced_to_rounding_at_any_radius(trace, radius):
-    smooth = Smoothing(trace, radius)(np.full(trace.size, 3.7))
+def test_a_constant_is_reproduced_to_rounding_at_any_radius(nodes, radius):
+    smooth = Smoothing(nodes, radius)(np.full(nodes.size, 3.7))
     assert np.abs(smooth - 3.7).max() < 1e-13
 
 
 @pytest.mark.parametrize(("degree", "accuracy"), [(1, 1e-12), (2, 2e-3)])
 def test_a_linear_pressure_is_kept_in_the_interior(degree, accuracy):
     """Exact where nodes and weights are symmetric about the node; Simpson's weights alternate."""
-    trace = bar(MPI.COMM_SELF, 16, degree=degree).trace
-    x = trace.points[:, 0]
+    nodes = bar(MPI.COMM_SELF, 16, degree=degree).nodes
+    x = nodes.points[:, 0]
     radius = 0.4
     inside = (x > radius + 0.07) & (x < 4 - radius - 0.07)
     assert inside.any()
-    smooth = Smoothing(trace, radius)(1 + 2 * x)
+    smooth = Smoothing(nodes, radius)(1 + 2 * x)
     assert np.abs(smooth - 1 - 2 * x)[inside].max() < accuracy
     assert np.abs(smooth - 1 - 2 * x)[x > 4 - radius / 2].max() > 0.01
 
 
-def test_the_weighted_kernel_is_symmetric_before_its_normalisation(trace):
+def test_the_weighted_kernel_is_symmetric_before_its_normalisation(nodes):
     """R moves no more from one node to another than back, up to the division at each."""
-    smoothing = Smoothing(trace, 0.6)
-    identity = np.eye(trace.size)
+    smoothing = Smoothing(nodes, 0.6)
+    identity = np.eye(nodes.size)
     matrix = np.column_stack([smoothing(column) for column in identity])
     assert matrix.min() >= 0
-    kernel = matrix / trace.weight
+    kernel = matrix / nodes.weight
     ratio = kernel / np.where(kernel.T > 0, kernel.T, 1.0)
     # kernel = omega / row sum: the ratio of the entries is the same along each row and column.
-    first = 1 / matrix.diagonal() * trace.weight
+    first = 1 / matrix.diagonal() * nodes.weight
     expected = first[None, :] / first[:, None]
     assert np.abs(ratio - expected)[kernel > 1e-8 * kernel.max()].max() < 1e-6
 
@@ -74,23 +74,23 @@ def test_the_weighted_kernel_is_symmetric_before_its_normalisation(trace):
 def test_a_symmetric_pressure_stays_symmetric(degree):
     domain = rectangle(MPI.COMM_SELF, [0.0, 0.0], [3.0, 1.0], [12, 2])
     held = Body(Linear(1.0, 0.3), [Fixed("top", [constant(0.0, 2)] * 2)])
-    trace = ContactProblem(domain, held, Contact("bottom", flat()), degree=degree).trace
-    x = trace.points[:, 0]
+    nodes = ContactProblem(domain, held, Contact("bottom", flat()), degree=degree).nodes
+    x = nodes.points[:, 0]
     bump = np.exp(-((x - 1.5) ** 2)) * (x > 0.4) * (x < 2.6)
-    smooth = Smoothing(trace, 0.7)(bump)[np.argsort(x)]
+    smooth = Smoothing(nodes, 0.7)(bump)[np.argsort(x)]
     assert np.abs(smooth - smooth[::-1]).max() < 1e-13
     # At the ends too, where half of the kernel is cut off.
     assert smooth[0] > 0
 
 
-def test_it_is_the_identity_at_small_radii(trace):
-    pressure = 1 + np.sin(3 * trace.points[:, 0])
-    errors = [np.abs(Smoothing(trace, r)(pressure) - pressure).max() for r in (0.8, 0.4, 0.2)]
+def test_it_is_the_identity_at_small_radii(nodes):
+    pressure = 1 + np.sin(3 * nodes.points[:, 0])
+    errors = [np.abs(Smoothing(nodes, r)(pressure) - pressure).max() for r in (0.8, 0.4, 0.2)]
     # First order in the radius: at the ends, half of the kernel is cut off.
     assert errors[0] > 1.3 * errors[1]
     assert errors[1] > 1.3 * errors[2]
     for radius in (1e-3, 1e-9, 0.0):
-        assert np.abs(Smoothing(trace, radius)(pressure) - pressure).max() < 1e-14
+        assert np.abs(Smoothing(nodes, radius)(pressure) - pressure).max() < 1e-14
 
 
 def test_the_solution_with_a_small_radius_is_that_without():

@@ -14,7 +14,8 @@ from mpi4py import MPI
 
 from contact.build import build_problem
 from contact.case.file import Case, parse_case
-from contact.linear.operator import LinearOperator
+from contact.linear.operator import SparseOperator
+from contact.methods.newton import Newton
 from contact.methods.options import NewtonOptions, with_method
 from contact.methods.report import Record
 from contact.output.fields import DerivedFields
@@ -203,7 +204,7 @@ def test_fields_can_be_read_back(shared_tmp_path: Path) -> None:
         u = file.read("displacement")
     assert {"displacement", "stress", "von_mises", "dev_strain"} <= names
     largest = np.linalg.norm(u, axis=1).max()
-    x = solution.problem.x.x.array.reshape(-1, 2)
+    x = solution.state.x.reshape(-1, 2)
     assert largest == pytest.approx(np.linalg.norm(x, axis=1).max(), rel=1e-12)
 
 
@@ -251,8 +252,9 @@ def test_derived_fields_of_a_known_strain(degree: int) -> None:
     """Homogeneous compression: the stress is (1.13), in the cells and at the nodes."""
     problem = build_problem(block(2, degree))
     points = problem.equilibrium.space.tabulate_dof_coordinates()
-    problem.x.x.array[1::2] = -0.05 * points[:, 1]
-    fields = DerivedFields(problem)
+    x = problem.equilibrium.rest()
+    x[1::2] = -0.05 * points[:, 1]
+    fields = DerivedFields(problem.equilibrium, x)
     law, t = problem.body.law, 0.05 * np.sqrt(2 / 3)
     g = float(law.secant_modulus(t**2))
     across = -0.05 * (law.bulk - 2 * g / 3)
@@ -279,8 +281,7 @@ def test_checkpoint(kind: str, shared_tmp_path: Path) -> None:
     checkpoint = read_checkpoint(shared_tmp_path / "checkpoint.bp")
     assert checkpoint.domain.parts.keys() == solution.problem.domain.parts.keys()
     problem = build_problem(case, domain=checkpoint.domain)
-    forces = checkpoint.restore(problem)
-    assert evaluate(problem, forces).largest <= 1e-8
+    assert evaluate(problem, checkpoint.restore(problem)).largest <= 1e-8
 
 
 def test_outputs_are_replaced(shared_tmp_path: Path) -> None:
@@ -379,14 +380,14 @@ def test_a_solve_stops_between_inner_iterations(
     shared_tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """A signal in a long inner loop is not left waiting for its end."""
-    solve_once = LinearOperator.solve
+    solve_once = SparseOperator.solve
 
-    def press(operator: LinearOperator, *args: Any, **options: Any) -> Any:
+    def press(operator: SparseOperator, *args: Any, **options: Any) -> Any:
         if operator.counters.linear_solves == 5 and MPI.COMM_WORLD.rank == 0:
             signal.raise_signal(signal.SIGTERM)
         return solve_once(operator, *args, **options)
 
-    monkeypatch.setattr(LinearOperator, "solve", press)
+    monkeypatch.setattr(SparseOperator, "solve", press)
     solution = solve(block(2, solver={"method": "uzawa"}))
     assert solution.counters.linear_solves == 6
     assert solution.outcome.signal == signal.SIGTERM
@@ -395,21 +396,28 @@ def test_a_solve_stops_between_inner_iterations(
     assert summary["outer_iterations"] == len(solution.history.records)
 
 
-def test_an_interrupted_load_step_is_judged_by_the_full_load() -> None:
+def test_an_interrupted_load_step_is_judged_by_the_full_load(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     """The residuals of a solve that ends in a load step are those of the problem itself."""
     problem = build_problem(block(2))
+    notes = []
+
+    def load_steps(method: Newton, _: object) -> Any:
+        return method._load_steps(method._whole_loop())
 
     def press(record: Record) -> None:
-        problem.apply_load(0.25)
+        notes.append(record.note)
         signal.raise_signal(signal.SIGINT)
 
-    solution = solve_problem(problem, NewtonOptions(), press)
+    monkeypatch.setattr(Newton, "_roads", load_steps)
+    solution = solve_problem(problem, NewtonOptions(condense=False), press)
     assert solution.outcome.signal == signal.SIGINT
-    kept = problem.external.copy(), problem.x.x.array.copy()
-    problem.apply_load(1.0)
-    np.testing.assert_array_equal(problem.external, kept[0])
-    np.testing.assert_array_equal(problem.x.x.array, kept[1])
-    assert solution.outcome.kkt == evaluate(problem, solution.forces)
+    assert [note.split()[:2] for note in notes] == [["load", "0.25"]]
+    state = solution.state
+    assert state.load == 1.0
+    np.testing.assert_array_equal(state.x, problem.equilibrium.prescribe(state.x))
+    assert solution.outcome.kkt == evaluate(problem, state)
 
 
 @pytest.mark.parallel

@@ -28,21 +28,19 @@ pytestmark = pytest.mark.parallel
 TOLERANCE = 1e-8
 
 
-def displacements(problem):
+def displacements(loop):
     """Return the displacements of all nodes, sorted by position, on every rank."""
-    dim, owned = problem.dim, problem.equilibrium.owned // problem.equilibrium.block_size
-    x = problem.equilibrium.space.tabulate_dof_coordinates()[:owned, :dim]
-    u = problem.x.x.array[: problem.equilibrium.owned].reshape(-1, problem.equilibrium.block_size)[
-        :, :dim
-    ]
-    x, u = (np.concatenate(problem.comm.allgather(part)) for part in (x, u))
+    body = loop.problem.equilibrium
+    x = body.layout.points
+    u = loop.state.x[: body.owned].reshape(-1, body.block_size)[:, : body.dim]
+    x, u = (np.concatenate(body.comm.allgather(part)) for part in (x, u))
     return u[np.lexsort(np.round(x, 9).T)]
 
 
 def agree(comm, make):
     """Solve on all ranks together and on one alone, and compare."""
     together, alone = (solve(make(c), 1e-10) for c in (comm, MPI.COMM_SELF))
-    u, v = displacements(together.problem), displacements(alone.problem)
+    u, v = displacements(together), displacements(alone)
     assert u.shape == v.shape
     assert np.abs(u - v).max() < TOLERANCE * np.abs(v).max()
     ours, theirs = contact_data(together), contact_data(alone)
@@ -166,40 +164,40 @@ def test_smoothing(comm, radius):
     """Neighbours within the radius count, whichever rank has them."""
     results = []
     for c in (comm, MPI.COMM_SELF):
-        trace = bar(c, 8, degree=2).trace
-        pressure = np.sin(3 * trace.points[:, 0]) + 1
-        smooth = trace.gather(Smoothing(trace, radius)(pressure))
-        results.append(smooth[np.argsort(trace.gather(trace.points)[:, 0])])
+        nodes = bar(c, 8, degree=2).nodes
+        pressure = np.sin(3 * nodes.points[:, 0]) + 1
+        smooth = nodes.gather(Smoothing(nodes, radius)(pressure))
+        results.append(smooth[np.argsort(nodes.gather(nodes.points)[:, 0])])
     assert results[0] == pytest.approx(results[1], rel=1e-13)
 
 
 def test_sums_norms_and_maxima_are_global(comm):
-    trace, alone = bar(comm, 8).trace, bar(MPI.COMM_SELF, 8).trace
-    assert trace.size == alone.size == 32
-    x, y = trace.points[:, 0], alone.points[:, 0]
-    assert trace.sum(x) == pytest.approx(alone.sum(y), rel=1e-14)
-    assert trace.norm(trace.points) == pytest.approx(alone.norm(alone.points), rel=1e-14)
-    assert trace.maximum(-x, -9.0) == pytest.approx(-y.min())
-    assert sorted(trace.gather(x)) == pytest.approx(sorted(y))
+    nodes, alone = bar(comm, 8).nodes, bar(MPI.COMM_SELF, 8).nodes
+    assert nodes.size == alone.size == 32
+    x, y = nodes.points[:, 0], alone.points[:, 0]
+    assert nodes.sum(x) == pytest.approx(alone.sum(y), rel=1e-14)
+    assert nodes.norm(nodes.points) == pytest.approx(alone.norm(alone.points), rel=1e-14)
+    assert nodes.maximum(-x, -9.0) == pytest.approx(-y.min())
+    assert sorted(nodes.gather(x)) == pytest.approx(sorted(y))
 
 
 def test_every_node_has_one_owner_and_full_weight(comm):
     for degree in (1, 2):
-        trace = leaning_block(comm, 2, degree).trace
-        alone = leaning_block(MPI.COMM_SELF, 2, degree).trace
-        order = [np.lexsort(np.round(t.gather(t.points), 9).T) for t in (trace, alone)]
+        nodes = leaning_block(comm, 2, degree).nodes
+        alone = leaning_block(MPI.COMM_SELF, 2, degree).nodes
+        order = [np.lexsort(np.round(t.gather(t.points), 9).T) for t in (nodes, alone)]
         for quantity in ("points", "weight", "normal", "gap", "tangent"):
             ours, theirs = (
                 t.gather(getattr(t, quantity))[o]
-                for t, o in zip((trace, alone), order, strict=True)
+                for t, o in zip((nodes, alone), order, strict=True)
             )
             assert ours == pytest.approx(theirs, abs=1e-14)
 
 
 def test_prescribed_values_reach_ghosts(comm):
     problem = idle(comm)
-    problem.reset()
+    x = problem.start().x
     height = fem.Function(problem.equilibrium.space)
     height.interpolate(lambda x: np.vstack([x[1], x[1]]))
     top = np.isclose(height.x.array, 1.0)
-    assert set(np.unique(problem.x.x.array[top]).tolist()) <= {0.02, -0.03}
+    assert set(np.unique(x[top]).tolist()) <= {0.02, -0.03}

@@ -47,7 +47,7 @@ def solved(block, dim, degree, degrees=0.0, axis=(0.0, 1.0, 0.0)):
 
 
 def nodal_displacement(loop):
-    return loop.problem.x.x.array.reshape(-1, loop.problem.dim)
+    return loop.state.x.reshape(-1, loop.problem.dim)
 
 
 @pytest.mark.parametrize("degree", [1, 2])
@@ -81,8 +81,8 @@ def test_rotation_changes_nothing(name, dim, axis, degree):
     straight = solved(block, dim, degree, 1e-300, axis)
     back = nodal_displacement(turned) @ turn(dim, 30.0, axis)
     assert np.abs(back - nodal_displacement(straight)).max() < 1e-11
-    assert turned.forces.pressure == pytest.approx(straight.forces.pressure, abs=1e-11)
-    friction = turned.forces.friction @ turn(dim, 30.0, axis)
-    assert np.abs(friction - straight.forces.friction).max() < 1e-11
+    assert turned.state.forces.pressure == pytest.approx(straight.state.forces.pressure, abs=1e-11)
+    friction = turned.state.forces.friction @ turn(dim, 30.0, axis)
+    assert np.abs(friction - straight.state.forces.friction).max() < 1e-11
     inner = [[record.inner for record in loop.history.records] for loop in (turned, straight)]
     assert len(inner[0]) == len(inner[1])

@@ -18,7 +18,8 @@ from tests.problems.mechanics import SlidingBlock, contact_data, flat, pressed_b
 def test_uniform_pressure(gap, poisson, dim, degree):
     pressure = 0.02
     problem = pressed_block(MPI.COMM_SELF, dim, degree, pressure=pressure, gap=gap, poisson=poisson)
-    data = contact_data(solve(problem, 1e-12))
+    loop = solve(problem, 1e-12)
+    data = contact_data(loop)
     assert np.abs(data["pressure"] - pressure).max() < 1e-9
     assert np.abs(data["u_n"] - gap).max() < 1e-9
     # Free sides: the stress is uniaxial, in plane strain with sigma_zz = nu sigma_yy.
@@ -26,14 +27,14 @@ def test_uniform_pressure(gap, poisson, dim, degree):
     widening = pressure * poisson * (1 + poisson) if dim == 2 else pressure * poisson
     x = problem.equilibrium.space.tabulate_dof_coordinates()[:, :dim]
     exact = x * ([widening] * (dim - 1) + [thinning]) - np.eye(dim)[-1] * gap
-    assert np.abs(problem.x.x.array.reshape(-1, dim) - exact).max() < 1e-9
+    assert np.abs(loop.state.x.reshape(-1, dim) - exact).max() < 1e-9
 
 
 def test_weights_carry_a_constant_pressure():
     for dim, degree in ((2, 1), (2, 2), (3, 1), (3, 2)):
-        trace = pressed_block(MPI.COMM_SELF, dim, degree).trace
-        assert trace.sum(np.ones_like(trace.gap)) == pytest.approx(1.0, rel=1e-13)
-        assert trace.weight.min() > 1e-3
+        nodes = pressed_block(MPI.COMM_SELF, dim, degree).nodes
+        assert nodes.sum(np.ones_like(nodes.gap)) == pytest.approx(1.0, rel=1e-13)
+        assert nodes.weight.min() > 1e-3
 
 
 def test_p2_contact_nodes_of_triangles_are_the_midpoints_of_their_edges():
@@ -57,9 +58,9 @@ def test_normals_are_the_body_s_own_for_a_given_gap():
             with_plane.friction,
             degree=2,
         )
-        assert np.abs(with_plane.trace.normal - with_gap.trace.normal).max() < 1e-12
+        assert np.abs(with_plane.nodes.normal - with_gap.nodes.normal).max() < 1e-12
         loop = solve(with_gap, 1e-11)
-        assert loop.forces.pressure == pytest.approx(block.pressure, abs=1e-9)
+        assert loop.state.forces.pressure == pytest.approx(block.pressure, abs=1e-9)
 
 
 def test_a_fixed_node_carries_no_contact_and_a_fixed_direction_no_friction():
@@ -67,9 +68,9 @@ def test_a_fixed_node_carries_no_contact_and_a_fixed_direction_no_friction():
     zero = pressed_block(MPI.COMM_SELF, 2).body.fixed[0].displacement[0]
     clamped = Body(Linear(1.0, 0.3), [Fixed("left", [zero, zero])])
     symmetric = Body(Linear(1.0, 0.3), [Fixed("left", [zero, None])])
-    assert ContactProblem(domain, clamped, Contact("bottom", flat())).trace.size == 4
-    trace = ContactProblem(domain, symmetric, Contact("bottom", flat())).trace
-    assert trace.size == 5
-    held = trace.points[:, 0] < 1e-9
-    assert np.abs(trace.tangent[held]).max() == 0
-    assert np.abs(trace.tangent[~held] - np.diag([1.0, 0.0])).max() < 1e-14
+    assert ContactProblem(domain, clamped, Contact("bottom", flat())).nodes.size == 4
+    nodes = ContactProblem(domain, symmetric, Contact("bottom", flat())).nodes
+    assert nodes.size == 5
+    held = nodes.points[:, 0] < 1e-9
+    assert np.abs(nodes.tangent[held]).max() == 0
+    assert np.abs(nodes.tangent[~held] - np.diag([1.0, 0.0])).max() < 1e-14

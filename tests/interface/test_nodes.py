@@ -31,21 +31,21 @@ def arch(cells=24):
 
 def on_arch(foundation, degree=1, fixed=("top", (ZERO, ZERO))):
     body = Body(LAW, [Fixed(fixed[0], fixed[1])])
-    return ContactProblem(arch(), body, Contact("arc", foundation), degree=degree).trace
+    return ContactProblem(arch(), body, Contact("arc", foundation), degree=degree).nodes
 
 
 @pytest.mark.parametrize("degree", [1, 2])
 def test_normals_of_a_curved_part_are_averaged(degree):
-    trace = on_arch(flat(), degree)
-    radial = (trace.points - [0.0, 2.0]) / np.hypot(*(trace.points - [0.0, 2.0]).T)[:, None]
-    corner = np.abs(np.hypot(*(trace.points - [0.0, 2.0]).T) - 2) < 1e-9
+    nodes = on_arch(flat(), degree)
+    radial = (nodes.points - [0.0, 2.0]) / np.hypot(*(nodes.points - [0.0, 2.0]).T)[:, None]
+    corner = np.abs(np.hypot(*(nodes.points - [0.0, 2.0]).T) - 2) < 1e-9
     ends = np.abs(radial[:, 0]) > np.sin(np.pi / 6) - 1e-6
     # A straight facet's normal is that of its middle: at the ends there is but one facet.
-    assert np.abs(trace.normal - radial)[corner & ~ends].max() < 1e-12
-    assert np.abs(trace.normal - radial).max() < np.pi / 6 / 24 * 1.01
-    assert np.linalg.norm(trace.normal, axis=1) == pytest.approx(1.0, rel=1e-14)
+    assert np.abs(nodes.normal - radial)[corner & ~ends].max() < 1e-12
+    assert np.abs(nodes.normal - radial).max() < np.pi / 6 / 24 * 1.01
+    assert np.linalg.norm(nodes.normal, axis=1) == pytest.approx(1.0, rel=1e-14)
     length = 24 * 2 * 2 * np.sin(np.pi / 6 / 24)
-    assert trace.sum(np.ones(trace.size)) == pytest.approx(length, rel=1e-13)
+    assert nodes.sum(np.ones(nodes.size)) == pytest.approx(length, rel=1e-13)
 
 
 def test_directions_and_gaps_of_a_curved_part_over_a_plane():
@@ -60,30 +60,28 @@ def test_directions_and_gaps_of_a_curved_part_over_a_plane():
 
 
 def test_a_concentric_arc_has_a_constant_gap():
-    trace = on_arch(Sphere((0.0, 2.0), 2.25, inside=True))
-    assert trace.gap == pytest.approx(0.25)
+    nodes = on_arch(Sphere((0.0, 2.0), 2.25, inside=True))
+    assert nodes.gap == pytest.approx(0.25)
     own = on_arch(Sphere((0.0, 2.0), 2.25, inside=True, direction="body"))
     assert own.gap == pytest.approx(0.25, rel=2e-3)
 
 
 def test_tangents_project_onto_the_free_tangential_directions():
-    for trace in (on_arch(flat()), leaning_block(MPI.COMM_SELF, 2, 2).trace):
-        t = trace.tangent
+    for nodes in (on_arch(flat()), leaning_block(MPI.COMM_SELF, 2, 2).nodes):
+        t = nodes.tangent
         assert np.einsum("nij,njk->nik", t, t) == pytest.approx(t, abs=1e-14)
-        assert np.abs(np.einsum("nij,nj->ni", t, trace.normal)).max() < 1e-14
-        assert np.einsum("nii->n", t) == pytest.approx(trace.dim - 1)
+        assert np.abs(np.einsum("nij,nj->ni", t, nodes.normal)).max() < 1e-14
+        assert np.einsum("nii->n", t) == pytest.approx(nodes.dim - 1)
 
 
-def test_values_and_add_are_each_other_s_transpose():
+def test_apply_and_transpose_are_each_other_s_transpose():
     problem = leaning_block(MPI.COMM_SELF, 2)
-    trace, random = problem.nodes, np.random.default_rng(0)
-    x, y = (
-        random.standard_normal(problem.equilibrium.owned),
-        random.standard_normal((trace.size, 3)),
-    )
-    total = np.zeros(problem.equilibrium.owned)
-    trace.add(total, y)
-    assert total @ x == pytest.approx(np.sum(trace.values(x) * y), rel=1e-12)
+    nodes, owned = problem.nodes, problem.equilibrium.owned
+    random = np.random.default_rng(0)
+    x, y = random.standard_normal(owned), random.standard_normal((nodes.size, 3))
+    total = np.zeros(owned)
+    nodes.transpose(y, total)
+    assert total @ x == pytest.approx(np.sum(nodes.apply(x) * y), rel=1e-12)
 
 
 def inclined(prescribed, degree):
@@ -106,25 +104,25 @@ def inclined(prescribed, degree):
 def test_a_direction_that_is_partly_fixed(prescribed, degree):
     """The plane is met where it is, also if the node is displaced along the fixed component."""
     problem, normal = inclined(prescribed, degree)
-    trace = problem.nodes
-    assert trace.normal == pytest.approx(np.tile([0.0, -1.0], (trace.size, 1)))
-    assert np.abs(trace.tangent).max() < 1e-15
+    nodes = problem.nodes
+    assert nodes.normal == pytest.approx(np.tile([0.0, -1.0], (nodes.size, 1)))
+    assert np.abs(nodes.tangent).max() < 1e-15
     loop = solve(problem, 1e-10)
-    u = trace.values(problem.x.x.array)
+    u = problem.nodal(loop.state)
     assert u[:, 0] == pytest.approx(prescribed)
-    distance = (trace.points + u - [0.0, -0.5]) @ normal
+    distance = (nodes.points + u - [0.0, -0.5]) @ normal
     assert distance.min() == pytest.approx(0.0, abs=1e-10)
-    assert np.abs(distance[loop.forces.pressure > 1e-8]).max() < 1e-10
+    assert np.abs(distance[loop.state.forces.pressure > 1e-8]).max() < 1e-10
     # The load is carried: the wall takes the horizontal part.
-    assert trace.sum(loop.forces.pressure) == pytest.approx(0.05, rel=1e-9)
+    assert nodes.sum(loop.state.forces.pressure) == pytest.approx(0.05, rel=1e-9)
 
 
 def test_nodes_that_cannot_reach_the_foundation_are_left_out():
     away = GapFunction(lambda p: np.where(p[:, 0] > 2, np.inf, 0.0))
     example = bar(MPI.COMM_SELF, 4)
-    trace = ContactProblem(example.domain, example.body, Contact("bottom", away)).trace
-    assert trace.points[:, 0].max() <= 2.0
-    assert np.all(np.isfinite(trace.gap))
+    nodes = ContactProblem(example.domain, example.body, Contact("bottom", away)).nodes
+    assert nodes.points[:, 0].max() <= 2.0
+    assert np.all(np.isfinite(nodes.gap))
 
 
 def test_two_bodies_that_differ_by_a_rotation_have_the_same_contact():
@@ -155,13 +153,13 @@ def test_two_bodies_that_differ_by_a_rotation_have_the_same_contact():
 
 
 def around_a_circle(radius, degree=1, levels=0, cells=24, direction="foundation"):
-    """Return the trace of the arch's upper side, a concave arc of radius 1, on a circle."""
+    """Return the nodes of the arch's upper side, a concave arc of radius 1, on a circle."""
     domain = arch(cells)
     for _ in range(levels):
         domain = refined(domain)
     body = Body(LAW, [Fixed("arc", (ZERO, ZERO))])
     circle = Sphere((0.0, 2.0), radius, direction=direction)
-    return ContactProblem(domain, body, Contact("top", circle), degree=degree).trace
+    return ContactProblem(domain, body, Contact("top", circle), degree=degree).nodes
 
 
 @pytest.mark.parametrize("direction", ["foundation", "body"])
@@ -169,10 +167,10 @@ def around_a_circle(radius, degree=1, levels=0, cells=24, direction="foundation"
 def test_straight_facets_around_a_circle_touch_it(degree, levels, direction):
     """The corners lie on the circle, all other nodes in it by the depth of the chords."""
     cells = 6
-    trace = around_a_circle(1.0, degree, levels, cells, direction)
+    nodes = around_a_circle(1.0, degree, levels, cells, direction)
     depth = 1 - np.cos(np.pi / 6 / cells)
-    assert np.abs(trace.gap).max() < 1e-12
-    assert trace.cut == pytest.approx(depth if (degree, levels) != (1, 0) else 0.0)
+    assert np.abs(nodes.gap).max() < 1e-12
+    assert nodes.cut == pytest.approx(depth if (degree, levels) != (1, 0) else 0.0)
     loose = around_a_circle(1.0 - 0.5 * depth, degree, levels, cells, direction)
     assert loose.gap.min() == pytest.approx(0.5 * depth if (degree, levels) == (1, 0) else 0.0)
     assert loose.gap.max() == pytest.approx(0.5 * depth, rel=0.01)
