@@ -17,11 +17,12 @@ from contact.case.file import Case, load_case
 from contact.methods.fixed_point import FixedPoint
 from contact.methods.interrupt import Interrupted, stop_on_signal
 from contact.methods.method import Method
-from contact.methods.nested import coarse_solution, prolong
+from contact.methods.nested import prolong
 from contact.methods.newton import Newton
 from contact.methods.options import NewtonOptions, Options
 from contact.methods.penalty import Penalty
 from contact.methods.report import Monitor, Outcome
+from contact.nesting import coarse_solution
 from contact.output.review import review
 from contact.output.solution import Solution
 from contact.problem.held import check_potential

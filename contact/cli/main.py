@@ -157,8 +157,8 @@ def _solve(case: Case, options: argparse.Namespace, comm: MPI.Intracomm) -> int:
 
 def _check(case: Case, options: argparse.Namespace, comm: MPI.Intracomm) -> int:
     from contact.build import build_problem
+    from contact.case.nesting import coarser_cases
     from contact.cli.describe import describe
-    from contact.methods.nested import coarser_cases
     from contact.methods.options import NewtonOptions
 
     if isinstance(case.solver, NewtonOptions) and case.solver.nested:

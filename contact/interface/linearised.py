@@ -125,7 +125,8 @@ def linearise(
         across = jump.tangent - along[:, :, None] * along[:, None, :]
         # Across z = lambda + c u_tau the new multiplier is s/|u_tau| times the new slip:
         # lambda = s z/|z|, linearised in u and lambda and solved for the latter.
-        turning = np.minimum(bound * c / np.maximum(size - bound, 1e-300), moduli.gamma)
+        least = np.maximum(bound * c / moduli.gamma, 1e-300)  # turning is at most gamma
+        turning = bound * c / np.maximum(size - bound, least)
         sliding = turning[:, None, None] * across
         friction[slides] = (bound[:, None] * along + np.einsum("nij,nj->ni", sliding, slip))[slides]
         if frozen_bound is None:

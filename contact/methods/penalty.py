@@ -119,11 +119,9 @@ class Penalty:
             Where from; from rest by default. From the solution of a somewhat larger eps, small
             ones are reached that are too hard from there.
         """
-        if start is None:
-            self.state = self.problem.start()
-            return self.state, self._solve(implicit=False)
-        self.state = start
-        outcome = self._solve(implicit=self.options.material_step != "secant")
+        self.state = self.problem.start() if start is None else start
+        implicit = start is not None and self.options.material_step != "secant"
+        outcome = self._solve(implicit)
         return self.state, outcome
 
     def _solve(self, implicit: bool) -> Outcome:

@@ -27,7 +27,7 @@ from contact import Case, build_problem, load_case, solve_problem
 from contact.case.file import parse_case
 from contact.case.mesh import Mesh
 from contact.linear.operator import SparseOperator
-from contact.methods.nested import coarse_solution
+from contact.nesting import coarse_solution
 from contact.output.solution import Solution
 from contact.problem.problem import ContactProblem
 from scripts.cases import CASES, bar

@@ -8,11 +8,13 @@ import numpy as np
 from mpi4py import MPI
 
 from contact import Case, InputError, Solution
+from contact.case.nesting import coarser_cases
 from contact.interface.multipliers import Multipliers
 from contact.methods.method import Method
-from contact.methods.nested import coarse_solution, coarser_cases, prolong
+from contact.methods.nested import prolong
 from contact.methods.newton import Newton
 from contact.methods.options import NewtonOptions, Options
+from contact.nesting import coarse_solution
 from contact.output.review import review
 from contact.problem.kkt import KKT, evaluate
 from contact.problem.problem import ContactProblem

@@ -7,19 +7,20 @@ import pytest
 from mpi4py import MPI
 
 from contact.build import build_problem
-from contact.case.file import Case, parse_case
+from contact.case.file import parse_case
+from contact.case.nesting import coarser_cases
 from contact.errors import InputError
 from contact.interface.friction import Friction
 from contact.interface.linearised import Moduli, linearise
 from contact.interface.multipliers import Multipliers
 from contact.interface.status import CLOSED, FREE, SLIDES, STICKS
 from contact.methods.fixed_point import FixedPoint
-from contact.methods.nested import coarser_cases
 from contact.methods.newton import Newton
 from contact.methods.options import FixedPointOptions, NewtonOptions
 from contact.methods.report import Outcome
 from contact.problem.kkt import KKT, evaluate
 from contact.problem.problem import ContactProblem
+from contact.problem.state import State
 from contact.solving import solve
 from forms.hencky import Linear, Log
 from forms.laws import ConstantCoefficient, SlipCoefficient
@@ -31,23 +32,24 @@ SELF = MPI.COMM_SELF
 
 def newton(problem: ContactProblem, **options) -> Newton:
     method = Newton(problem, NewtonOptions(**{"tolerance": 1e-10, **options}))
-    outcome = method.solve()
+    _, outcome = method.solve()
     assert outcome.converged, outcome
     return method
 
 
 def compare(one: ContactProblem, other: ContactProblem, tolerance: float) -> None:
     """Solve one problem by Newton's method, condensed and whole, its twin by block relaxation."""
-    slow = FixedPoint(other, FixedPointOptions(tolerance=1e-10))
-    assert slow.solve().converged
-    size = np.abs(other.x.x.array).max()
+    slow, outcome = FixedPoint(other, FixedPointOptions(tolerance=1e-10)).solve()
+    assert outcome.converged
+    size = np.abs(slow.x).max()
     atol = tolerance * slow.forces.pressure.max()
     for condense in (True, False):
         fast = newton(one, condense=condense)
         assert (fast.counters.contact_solves > 0) == condense
-        assert np.allclose(one.x.x.array, other.x.x.array, rtol=0, atol=tolerance * size)
-        assert np.allclose(fast.forces.pressure, slow.forces.pressure, rtol=0, atol=atol)
-        assert np.allclose(fast.forces.friction, slow.forces.friction, rtol=0, atol=atol)
+        found = fast.state
+        assert np.allclose(found.x, slow.x, rtol=0, atol=tolerance * size)
+        assert np.allclose(found.forces.pressure, slow.forces.pressure, rtol=0, atol=atol)
+        assert np.allclose(found.forces.friction, slow.forces.friction, rtol=0, atol=atol)
 
 
 @pytest.mark.parametrize("degree", [1, 2])
@@ -80,19 +82,20 @@ def test_newton_stays_at_a_solution_that_rounding_has_touched(rho, radius):
     """Block relaxation leaves small pressures on open nodes, and friction of any direction."""
     friction = Friction(SlipCoefficient(0.5, 0.2, rho), radius=radius)
     problem = mechanics.bar(SELF, 16, -0.05, friction=friction)
-    slow = FixedPoint(problem, FixedPointOptions(tolerance=1e-10))
-    assert slow.solve().converged
-    x, forces = problem.x.x.array.copy(), slow.forces
-    slip = problem.nodes.tangential_component(nodal_iterate(problem))
+    slow, outcome = FixedPoint(problem, FixedPointOptions(tolerance=1e-10)).solve()
+    assert outcome.converged
+    x, forces = slow.x, slow.forces
+    slip = problem.nodes.tangential_component(problem.nodal(slow))
     rounding = 1e-11 * forces.pressure.max()
     is_open = forces.pressure < 1e3 * rounding
     assert is_open.any()
     pressure = np.where(is_open, rounding, forces.pressure)
     against = np.where(is_open[:, None], -rounding * np.sign(slip), 0.0)
     fast = Newton(problem, NewtonOptions(tolerance=1e-9))
-    assert fast.solve_from(Multipliers(pressure, forces.friction + against)).converged
+    state, outcome = fast.solve(State(x, Multipliers(pressure, forces.friction + against)))
+    assert outcome.converged
     assert len(fast.history.records) == 1
-    assert np.allclose(problem.x.x.array, x, rtol=0, atol=1e-8 * np.abs(x).max())
+    assert np.allclose(state.x, x, rtol=0, atol=1e-8 * np.abs(x).max())
 
 
 def test_the_last_steps_square_the_residual():
@@ -108,26 +111,25 @@ def test_the_last_steps_square_the_residual():
 def test_a_body_that_only_contact_holds_is_solved():
     problem = mechanics.pressed_block(SELF, 3, gap=0.01)
     method = newton(problem)
-    assert np.allclose(method.forces.pressure, 0.02, rtol=1e-9)
+    assert np.allclose(method.state.forces.pressure, 0.02, rtol=1e-9)
 
 
 def test_the_iterative_solver_finds_the_same_solution():
     direct, iterative = mechanics.leaning_block(SELF, 4), mechanics.leaning_block(SELF, 4)
-    newton(direct, linear="lu")
+    exact = newton(direct, linear="lu")
     method = newton(iterative, linear="iterative")
-    assert method.operator.iterative
-    assert np.allclose(direct.x.x.array, iterative.x.x.array, rtol=0, atol=1e-9)
+    assert method.whole.operator.iterative
+    assert np.allclose(exact.state.x, method.state.x, rtol=0, atol=1e-9)
 
 
 @pytest.mark.parametrize("dimension", [2, 3])
 def test_blocks_are_the_derivative_of_the_contact_forces(dimension):
     """Compare with finite differences at a sliding and sticking iterate, away from kinks."""
     problem = mechanics.bar(SELF, 4) if dimension == 2 else mechanics.leaning_block(SELF, 2)
-    problem.friction = Friction(ConstantCoefficient(0.4))
+    friction = replace(problem.interface.friction, coefficient=ConstantCoefficient(0.4))
+    interface = replace(problem.interface, friction=friction)
     rng = np.random.default_rng(3)
-    problem.reset()
-    problem.x.x.array[:] = 1e-3 * rng.standard_normal(problem.x.x.array.size)
-    nodal = nodal_iterate(problem)
+    nodal = 1e-3 * rng.standard_normal((problem.nodes.gap.size, dimension))
     n, trace = nodal.shape[0], problem.nodes
     forces = Multipliers(
         rng.uniform(0.5, 1.0, n),
@@ -135,12 +137,12 @@ def test_blocks_are_the_derivative_of_the_contact_forces(dimension):
     )
     moduli = Moduli(20.0, 20.0, 20.0)
     before = np.full(n, FREE, dtype=np.int8)
-    base = linearise(problem, nodal, forces, moduli, before, forces.pressure * 0.4)
+    base = linearise(interface, nodal, forces, moduli, before, forces.pressure * 0.4)
     assert {CLOSED + SLIDES, CLOSED + STICKS} <= set(base.status.tolist())
     sticks = base.status & STICKS > 0
     # a sticking node pushes with lambda + gamma u_tau, a pressed one with p + gamma (u_nu - rho)
     direction = 1e-6 * rng.standard_normal(nodal.shape)
-    moved = linearise(problem, nodal + direction, forces, moduli, before, forces.pressure * 0.4)
+    moved = linearise(interface, nodal + direction, forces, moduli, before, forces.pressure * 0.4)
     difference = moved.forces.vectors(problem.nodes) - base.forces.vectors(problem.nodes)
     predicted = np.einsum("nij,nj->ni", base.blocks, direction)[:, :dimension]
     assert np.allclose(difference[sticks], predicted[sticks], rtol=1e-6, atol=1e-12)
@@ -159,10 +161,10 @@ def test_falling_friction_is_followed_as_far_as_allowed(softening):
     forces = Multipliers(pressure, 0.3 * pressure[:, None] * [1.0, 0.0])
     moduli = Moduli(200.0, 20.0, 1e6)
     before = np.full(trace.nodes.size, CLOSED + SLIDES, dtype=np.int8)
-    base = linearise(problem, nodal, forces, moduli, before, softening=softening)
+    base = linearise(problem.interface, nodal, forces, moduli, before, softening=softening)
     assert base.settled
     step = np.array([1e-8, 0.0])
-    moved = linearise(problem, nodal + step, forces, moduli, before, softening=softening)
+    moved = linearise(problem.interface, nodal + step, forces, moduli, before, softening=softening)
     change = (moved.forces.friction - base.forces.friction)[:, 0] / step[0]
     assert np.all(change < -0.25 * 20.0)
     expected = np.maximum(change, -softening * moduli.nodal)
@@ -234,37 +236,37 @@ def test_load_steps_that_end_early_have_not_converged():
     }
     problem = build_problem(parse_case(case), SELF)
     method = Newton(problem, NewtonOptions())
-    # Two steps of load, the second of which fails.
-    newton = method._newton
     loads: list[float] = []
 
-    def fails_late(note: str, *args: object, **options: object):
-        loads.append(method._load)
-        outcome = newton(note, *args, **options)
-        if method._load <= 0.25:
-            return replace(outcome, kkt=KKT(0.0, 0.0, 0.0))
-        return replace(outcome, kkt=KKT(1.0, 1.0, 1.0))
+    class FailsLate:
+        """Two steps of load, the second of which fails."""
 
-    method._newton = fails_late
-    outcome = method._load_steps()
+        def run(self, iterate, note="", bound=None, goal=0.0):
+            loads.append(iterate.state.load)
+            residual = 0.0 if iterate.state.load <= 0.25 else 1.0
+            kkt = KKT(residual, residual, residual)
+            return iterate, Outcome(kkt, method.options.allowed, "" if residual == 0 else "no")
+
+    iterate, outcome = method._load_steps(FailsLate())
     assert max(loads) > 0.25
     assert not outcome.converged
     assert "load steps ended at 0.25 of the load" in outcome.reason
-    assert outcome.kkt == evaluate(problem, method.forces)
+    assert iterate.state.load == 1.0
+    assert outcome.kkt == evaluate(problem, iterate.state)
 
 
 def test_a_method_cannot_call_itself_converged(monkeypatch):
     """What it says of its end is one thing, the residuals of the whole problem another."""
 
-    def boast(method: Newton):
-        method.problem.reset()
-        method.problem.apply_load(0.1)
-        return Outcome(KKT(0.0, 0.0, 0.0), KKT(1.0, 1.0, 1.0), "all is well")
+    def boast(method: Newton, start=None):
+        outcome = Outcome(KKT(0.0, 0.0, 0.0), KKT(1.0, 1.0, 1.0), "all is well")
+        return method.problem.start(0.1), outcome
 
     monkeypatch.setattr(Newton, "solve", boast)
     solution = solve(bar_case(4), comm=SELF)
     assert not solution.converged
-    assert solution.outcome.kkt == evaluate(solution.problem, solution.forces)
+    assert solution.outcome.kkt == evaluate(solution.problem, solution.state)
+    assert solution.state.load == 1.0
     assert "all is well, but the equilibrium residual is 1.00e+00" in solution.outcome.reason
 
 
@@ -272,9 +274,9 @@ def test_the_best_iterate_is_what_is_left_of_a_failure():
     """Where the limit ends the fall-backs, what they were left at may be far from anything."""
     problem = mechanics.bar(SELF, 8, -0.05, friction=Friction(ConstantCoefficient(0.5)))
     method = Newton(problem, NewtonOptions(tolerance=1e-18, max_outer=9, max_iterations=5))
-    outcome = method.solve()
+    state, outcome = method.solve()
     assert not outcome.converged
-    assert outcome.kkt == evaluate(problem, method.forces)
+    assert outcome.kkt == evaluate(problem, state)
     assert outcome.kkt.largest == min(record.kkt.largest for record in method.history.records)
 
 
@@ -308,10 +310,12 @@ def test_ranks_agree():
     shared, alone = mechanics.leaning_block(world), mechanics.leaning_block(SELF)
     method, reference = newton(shared), newton(alone)
     assert np.isclose(
-        shared.trace.maximum(method.forces.pressure), reference.forces.pressure.max(), rtol=1e-9
+        shared.nodes.maximum(method.state.forces.pressure),
+        reference.state.forces.pressure.max(),
+        rtol=1e-9,
     )
     assert np.isclose(
-        shared.trace.norm(method.forces.friction),
-        alone.trace.norm(reference.forces.friction),
+        shared.nodes.norm(method.state.forces.friction),
+        alone.nodes.norm(reference.state.forces.friction),
         rtol=1e-9,
     )

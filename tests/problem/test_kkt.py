@@ -9,10 +9,10 @@ from mpi4py import MPI
 from contact.body.description import Body, Fixed, Load
 from contact.case.file import parse_case
 from contact.interface.friction import Friction
-from contact.interface.multipliers import Multipliers
 from contact.mesh.make import rectangle
 from contact.problem.kkt import KKT, evaluate
 from contact.problem.problem import Contact, ContactProblem
+from contact.problem.state import State
 from contact.solving import solve as solve_case
 from forms.hencky import Log
 from forms.laws import SlipCoefficient
@@ -36,10 +36,10 @@ class Solved:
     def __init__(self, problem):
         self.loop = solve(problem, SMALL)
         self.problem, self.trace = problem, problem.nodes
-        self.forces, self.x = self.loop.forces, problem.x.x.array.copy()
+        self.state, self.forces = self.loop.state, self.loop.state.forces
         self.base = self.residuals()
-        nodal = nodal_iterate(problem)
-        self.bound = problem.interface.bound(nodal, self.forces)
+        self.nodal = problem.nodal(self.state)
+        self.bound = problem.interface.bound(self.nodal, self.forces)
         self.pressed = self.forces.pressure > 1e-3 * self.forces.pressure.max()
         size = np.linalg.norm(self.forces.friction, axis=1)
         self.sticks = self.pressed & (size < 0.95 * self.bound)
@@ -48,11 +48,10 @@ class Solved:
 
     def residuals(self, nodal=None, forces=None):
         """Return the residuals with a displacement added at the contact nodes, or new forces."""
-        problem = self.problem
-        problem.x.x.array[:] = self.x
+        x = self.state.x.copy()
         if nodal is not None:
-            problem.nodes.ADD(problem.x.x.array, nodal)
-        return evaluate(problem, forces or self.forces)
+            self.problem.nodes.transpose(nodal, x)
+        return evaluate(self.problem, State(x, forces or self.forces))
 
     def along(self, chosen, component):
         """Return nodal vectors along the normal, or along the friction force where there is any."""
@@ -89,12 +88,10 @@ def test_zero_at_the_solution(solved):
 
 def test_a_wrong_displacement_is_out_of_equilibrium(solved):
     problem = solved.problem
-    problem.x.x.array[:] = solved.x
     random = np.random.default_rng(0)
     shake = 1e-4 * random.standard_normal(problem.equilibrium.owned) * problem.free.ravel()
     shake.reshape(-1, problem.equilibrium.block_size)[problem.nodes.nodes] = 0.0
-    problem.x.x.array[:] += shake
-    found = evaluate(problem, solved.forces)
+    found = evaluate(problem, State(solved.state.x + shake, solved.forces))
     assert found.equilibrium > 1e-4
     assert found.contact <= SMALL
     assert found.friction <= SMALL
@@ -147,26 +144,37 @@ def test_slip_of_a_sticking_node_and_slip_the_wrong_way(solved):
         assert found.friction > 1e-6
         assert found.contact <= SMALL
     if solved.slides.any():
-        back = -2 * solved.trace.tangential_component(nodal(solved)) * solved.slides[:, None]
+        back = -2 * solved.trace.tangential_component(solved.nodal) * solved.slides[:, None]
         assert solved.residuals(nodal=back).friction > 1e-5
-
-
-def nodal(solved):
-    solved.problem.x.x.array[:] = solved.x
-    return nodal_iterate(solved.problem)
 
 
 def test_the_bound_is_that_of_the_final_pressure_and_slip(solved):
     """A solution for another coefficient does not pass."""
     problem = solved.problem
-    solved.residuals()
-    kept = problem.friction
-    try:
-        problem.friction = Friction(SlipCoefficient(0.15, 0.1, 10.0))
-        assert evaluate(problem, solved.forces).friction > 1e-4
-    finally:
-        problem.friction = kept
-    assert evaluate(problem, solved.forces).largest <= SMALL
+    other = ContactProblem(
+        problem.domain, problem.body, problem.contact, Friction(SlipCoefficient(0.15, 0.1, 10.0))
+    )
+    assert evaluate(other, solved.state).friction > 1e-4
+    assert evaluate(problem, solved.state).largest <= SMALL
+
+
+def test_a_query_changes_nothing(solved):
+    """Residuals, forces and operators are those of the state that is asked for, in any order."""
+    problem, body = solved.problem, solved.problem.equilibrium
+    other = State(0.3 * solved.state.x, solved.forces, 0.5)
+    matrices = [body.create_matrix() for _ in range(2)]
+    body.assemble(matrices[0], "secant", solved.state.x)
+    first = evaluate(problem, solved.state), body.internal_forces(solved.state.x)
+    evaluate(problem, other)
+    body.assemble(matrices[1], "tangent", other.x)
+    body.internal_forces(other.x, secant_at=solved.state.x)
+    body.assemble(matrices[1], "secant", solved.state.x)
+    matrices[1].axpy(-1.0, matrices[0])
+    assert matrices[1].norm() == 0.0
+    assert evaluate(problem, solved.state) == first[0]
+    assert np.array_equal(body.internal_forces(solved.state.x), first[1])
+    with pytest.raises(ValueError, match="read-only"):
+        solved.state.x[:] = 0.0
 
 
 @pytest.mark.parametrize("unit", [1e-9, 1e9])
@@ -185,14 +193,14 @@ def test_residuals_do_not_depend_on_units_of_stress(unit):
 
 def test_residuals_of_an_open_body():
     problem = bar(MPI.COMM_SELF, 4, 0.005)  # lifted: nothing touches but near the clamp
-    problem.reset()
-    zero = Multipliers.zero(problem.nodes)
-    assert evaluate(problem, zero).contact == 0
-    assert evaluate(problem, zero).equilibrium == pytest.approx(1.0)
+    rest = problem.start()
+    assert evaluate(problem, rest).contact == 0
+    assert evaluate(problem, rest).equilibrium == pytest.approx(1.0)
     sunk = np.zeros((problem.nodes.size, 2))
     sunk[:, 1] = -0.01
-    problem.nodes.ADD(problem.x.x.array, sunk)
-    assert evaluate(problem, zero).contact > 0.5
+    x = rest.x.copy()
+    problem.nodes.transpose(sunk, x)
+    assert evaluate(problem, State(x, rest.forces)).contact > 0.5
 
 
 def test_what_is_no_number_has_not_converged():

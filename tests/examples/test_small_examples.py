@@ -1,0 +1,53 @@
+"""The examples to read first run, on coarse meshes, and show what they say they show."""
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+
+from scripts.examples import bar_pressure, electrode_charge, own_contact, own_material, refinement
+
+pytestmark = pytest.mark.parallel
+
+
+def test_bar_pressure(shared_tmp_path, capsys):
+    solution = bar_pressure.main(shared_tmp_path, (32, 8))
+    assert solution.converged
+    MPI.COMM_WORLD.barrier()
+    assert (shared_tmp_path / "pressure.png").stat().st_size > 0
+    if MPI.COMM_WORLD.rank == 0:
+        assert "all residuals <= 1e-08" in capsys.readouterr().out
+
+
+def test_own_material():
+    solutions = own_material.main((16, 4))
+    assert all(solution.converged for solution in solutions.values())
+    assert solutions["softening"].max_dev_strain > 1.2 * solutions["linear"].max_dev_strain
+
+
+def test_own_contact():
+    mu, waves = own_contact.Weakening(0.5, 0.3, 1e-3), own_contact.Waves(2e-3, 1.0)
+    solution = own_contact.main((32, 8))
+    assert solution.converged
+    trace, touching = solution.problem.trace, solution.status != "open"
+    assert 0 < trace.comm.allreduce(int(touching.sum())) < trace.comm.allreduce(touching.size)
+    # The crests bear the load, not the troughs, which are 4e-3 deep.
+    _, gap = waves.measure(trace.points, trace.normal)
+    assert np.all(gap[touching] < 3e-3)
+    slips = solution.status == "slip"
+    bound = mu(np.linalg.norm(solution.slip, axis=1)) * solution.pressure
+    size = np.linalg.norm(solution.friction, axis=1)
+    assert np.allclose(size[slips], bound[slips], rtol=1e-6, atol=0)
+
+
+def test_electrode_charge():
+    charges = electrode_charge.main((16, 8), (5.0, 10.0, 20.0))
+    assert charges[1] == pytest.approx(2 * charges[0], rel=1e-6)
+    assert abs(charges[2]) > 2.02 * abs(charges[1])  # beyond yield
+
+
+def test_refinement(shared_tmp_path):
+    errors = refinement.main(shared_tmp_path, (2, 4, 16))
+    coarse, fine = np.transpose(list(errors.values()))
+    assert np.all(np.log2(coarse / fine) > 0.6)
+    MPI.COMM_WORLD.barrier()
+    assert (shared_tmp_path / "errors.png").is_file()
