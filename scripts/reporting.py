@@ -22,9 +22,14 @@ from matplotlib.figure import Figure
 from mpi4py import MPI
 
 from contact import Case, InputError, Solution, solve, solve_problem
+from contact.body.constants import constant
 from contact.body.norms import volume
+from contact.methods.options import Options
+from contact.methods.report import Outcome, Record
 from contact.output.figures.figures import STYLE
 from contact.problem.problem import ContactProblem
+from contact.problem.state import State
+from contact.solving import METHODS
 from forms.hencky import Log
 from forms.kinematics import deviator_squared, strain
 
@@ -162,17 +167,35 @@ def yielded_share(solution: Solution) -> float:
     law = problem.body.law
     if not isinstance(law, Log):
         return np.nan
-    u, _ = problem.parts_of(problem.x)
-    limit = problem.constant(law.yield_strain**2)
+    body, domain = problem.equilibrium, problem.domain
+    u, _ = body.split(body.function(solution.state.x))
+    limit = constant(domain.mesh, law.yield_strain**2)
     yielded = ufl.conditional(ufl.gt(deviator_squared(strain(u)), limit), 1.0, 0.0)
-    dx = problem.domain.dx
-    part = problem.comm.allreduce(fem.assemble_scalar(fem.form(yielded * dx)))
-    return float(part / volume(problem, dx))
+    part = problem.comm.allreduce(fem.assemble_scalar(fem.form(yielded * domain.dx)))
+    return float(part / volume(domain, domain.dx))
 
 
-def iterate(problem: ContactProblem) -> np.ndarray:
-    """Return a copy of the owned unknowns."""
-    return problem.x.x.array[: problem.owned].copy()
+def iterates(
+    problem: ContactProblem, settings: Options, first: int = 1
+) -> tuple[list[State], Outcome]:
+    """Return the states that the outer iterations have left, and how they ended. Collective.
+
+    Parameters
+    ----------
+    problem, settings
+        The problem, and the method with its tolerances.
+    first
+        The first iteration that counts; the frictionless start is number 0.
+    """
+    found: list[State] = []
+
+    def keep(record: Record) -> None:
+        if record.iteration >= first:
+            found.append(method.state)
+
+    method = METHODS[settings.method](problem, settings, keep)
+    _, outcome = method.solve()
+    return found, outcome
 
 
 def observed_orders(parameter: Sequence[float], errors: Sequence[float]) -> list[float]:

@@ -26,7 +26,7 @@ from mpi4py import MPI
 from contact import Case, build_problem, load_case, solve_problem
 from contact.case.file import parse_case
 from contact.case.mesh import Mesh
-from contact.linear.operator import LinearOperator
+from contact.linear.operator import SparseOperator
 from contact.nesting import coarse_solution
 from contact.output.solution import Solution
 from contact.problem.problem import ContactProblem
@@ -66,11 +66,11 @@ def memory() -> float:
 
 def described(solution: Solution) -> dict[str, Any]:
     """Return what the tables show of a solution."""
-    problem = solution.problem
-    u = problem.x.x.array[: problem.owned].reshape(-1, problem.block_size)[:, : problem.dim]
+    body = solution.problem.equilibrium
+    u = solution.state.x.reshape(-1, body.block_size)[:, : body.dim]
     largest = float(np.linalg.norm(u, axis=1).max(initial=0.0))
     return {
-        "dofs": problem.space.dofmap.index_map.size_global * problem.block_size,
+        "dofs": body.space.dofmap.index_map.size_global * body.block_size,
         "converged": solution.converged,
         "outer": len(solution.history.records),
         "solves": solution.counters.linear_solves,
@@ -112,13 +112,13 @@ def hertz_with_constant_friction(path: str, mu: str) -> dict[str, Any]:
 
 def one_linear_solve(problem: ContactProblem) -> tuple[float, int]:
     """Return the seconds and iterations of one linear elasticity solve, setup included."""
-    problem.reset()
+    body, nodes = problem.equilibrium, problem.nodes.nodes
     COMM.Barrier()
     begin = time.perf_counter()
-    operator = LinearOperator(problem)
-    n, bs = problem.trace.nodes.size, problem.block_size
-    operator.update(problem.secant, np.zeros((n, bs, bs)), constant=True)
-    operator.solve(problem.external, 1e-8)
+    operator = SparseOperator(body, nodes)
+    blocks = np.zeros((nodes.size, body.block_size, body.block_size))
+    operator.update("secant", problem.start().x, blocks, constant=True)
+    operator.solve(body.external(), 1e-8)
     return time.perf_counter() - begin, operator.counters.linear_iterations
 
 
@@ -152,7 +152,6 @@ def phases(dimension: str, n: str) -> dict[str, Any]:
     from contact.meshing import make_domain
     from contact.output.files import write_outputs
     from contact.problem.kkt import evaluate, residual_forces
-    from contact.problem.state import Multipliers
 
     case = problem_case(int(dimension), int(n))
     warm(case, lambda: problem_case(int(dimension), 4))
@@ -169,25 +168,24 @@ def phases(dimension: str, n: str) -> dict[str, Any]:
     domain = make_domain(case.mesh, COMM)
     lap("mesh")
     problem = build_problem(case, domain=domain)
-    problem.reset()
+    state = problem.start()
     lap("forms and contact nodes")
-    forces = Multipliers.zero(problem)
-    residual = residual_forces(problem, forces)
+    residual = residual_forces(problem, state)
     lap("residual")
-    operator = LinearOperator(problem)
-    size, bs = problem.trace.nodes.size, problem.block_size
-    operator.update(problem.secant, np.zeros((size, bs, bs)))
+    body, nodes = problem.equilibrium, problem.nodes.nodes
+    operator = SparseOperator(body, nodes)
+    operator.update("secant", state.x, np.zeros((nodes.size, body.block_size, body.block_size)))
     lap("assembly and factorisation")
     operator.solve(-residual, 1e-8)
     lap("one solve")
-    evaluate(problem, forces)
+    evaluate(problem, state)
     lap("KKT residuals")
     solution = solve_problem(problem, case.solver)
     lap("all Newton steps")
     with tempfile.TemporaryDirectory() as folder:
         write_outputs(solution, Path(COMM.bcast(folder)) / "out")
         lap("output")
-    clock["dofs"] = problem.space.dofmap.index_map.size_global * bs
+    clock["dofs"] = body.space.dofmap.index_map.size_global * body.block_size
     return {**clock, "solve": clock["all Newton steps"], "steps": solution.counters.linear_solves}
 
 

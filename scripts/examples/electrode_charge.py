@@ -29,7 +29,7 @@ def main(
             raise SystemExit(f"load {load}: {solution.outcome.reason}")
         # The electrode is short-circuited, that is, held at the potential 0: its charge is the
         # reaction to that, as a clamp's force is.
-        charge = sensor(solution.problem, solution.forces, "electrode").charge
+        charge = sensor(solution.problem, solution.state, "electrode").charge
         assert charge is not None  # None: the part is no electrode, its potential is free
         charges.append(charge)
         if MPI.COMM_WORLD.rank == 0:

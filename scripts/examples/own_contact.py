@@ -44,10 +44,18 @@ class Weakening:
 
 @dataclass(frozen=True)
 class Waves:
-    """The foundation y = -depth (1 - cos(2 pi x / length)): see `Foundation`."""
+    """The foundation y = -depth (1 - cos(2 pi x / length)): see `Obstacle`."""
 
     depth: float
     length: float
+
+    #: The contact direction is that of the foundation, and the gaps are those of a shape.
+    direction = "foundation"
+    is_shape = True
+
+    def chord_depth(self, length: float) -> float:
+        """Return how deep edges of a length reach into a crest between their ends."""
+        return self.depth * (np.pi * length / self.length) ** 2 / 2
 
     def measure(self, points: np.ndarray, body_normal: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return directions into the foundation, shape (n, d), and the gaps along them."""

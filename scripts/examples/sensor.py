@@ -16,8 +16,9 @@ from pathlib import Path
 import numpy as np
 
 from contact import Case, build_problem, load_case
+from contact.body.description import Field, Load
 from contact.output.balances import Reading, sensor
-from contact.problem.problem import ContactProblem, Field, Load
+from contact.problem.problem import ContactProblem
 from contact.typing import Array
 from scripts.cases import CASES
 from scripts.reporting import Report, parser, solved, subplots
@@ -61,8 +62,8 @@ def loaded(problem: ContactProblem, factor: float) -> ContactProblem:
         body,
         problem.contact,
         problem.friction,
-        problem.response.conductor,
-        problem.degree,
+        problem.conductor,
+        problem.equilibrium.degree,
     )
 
 
@@ -83,7 +84,7 @@ def readings(case: Case, electrode: str, factors: Sequence[float]) -> list[Readi
     found = []
     for factor in factors:
         solution = solved(case, loaded(base, factor))
-        found.append(sensor(solution.problem, solution.forces, electrode))
+        found.append(sensor(solution.problem, solution.state, electrode))
     return found
 
 

@@ -14,11 +14,11 @@ from itertools import groupby
 
 import numpy as np
 
-from contact import Case, build_problem, load_case
+from contact import Case, Solution, build_problem, load_case
 from contact.methods.options import Options, PenaltyOptions, with_method
 from scripts.cases import CASES
 from scripts.reporting import Report, observed_orders, parser
-from scripts.studies.branches import AGREE, DISTURBANCE, Branches, Found
+from scripts.studies.branches import AGREE, DISTURBANCE, Branches
 
 #: Tolerance on the residuals of `newton` and `uzawa`.
 TOLERANCE = 1e-10
@@ -135,7 +135,7 @@ class Compared:
     example: Example
     newton: Options
     branches: Branches
-    runs: dict[str, Found]
+    runs: dict[str, Solution]
     letters: dict[str, str]
 
     @property
@@ -154,12 +154,12 @@ def compare(example: Example, coarse: bool) -> Compared:
     if start is not None:
         runs["nested"] = branches.run(newton, start)
     letters = {name: branches.letter(run) for name, run in runs.items()}
-    last: Found | None = None
+    last: Solution | None = None
     for name, eps in EPS.items():
         settings = penalised(branches, runs["newton"], newton, eps)
-        last = branches.run(settings, None if last is None else last.start)
+        last = branches.run(settings, None if last is None else last.state)
         runs[name] = last
-        letters[name] = branches.letter(branches.next_to(last.start, TOLERANCE))
+        letters[name] = branches.letter(branches.next_to(last.state, TOLERANCE))
     return Compared(example, newton, branches, runs, letters)
 
 
@@ -168,7 +168,7 @@ def relaxed(newton: Options) -> Options:
     return with_method(newton, "uzawa")
 
 
-def penalised(branches: Branches, solution: Found, newton: Options, eps: float) -> Options:
+def penalised(branches: Branches, solution: Solution, newton: Options, eps: float) -> Options:
     """Return the penalty method with eps relative to a solution. Collective.
 
     At the largest pressure the penetration is eps max|u|, and that is the slip length as well.
@@ -193,14 +193,14 @@ def agreement(report: Report, compared: Sequence[Compared]) -> None:
     for one in compared:
         newton, uzawa = one.runs["newton"], one.runs["uzawa"]
         apart = one.branches.difference(uzawa, newton)
-        problem = one.branches.problem
+        dofmap = one.branches.problem.equilibrium.space.dofmap
         row = (
             one.example.label,
-            problem.space.dofmap.index_map.size_global * problem.block_size,
-            newton.solution.outcome.kkt.largest,
-            uzawa.solution.outcome.kkt.largest,
-            newton.solution.counters.linear_solves,
-            uzawa.solution.counters.linear_solves,
+            dofmap.index_map.size_global * dofmap.index_map_bs,
+            newton.outcome.kkt.largest,
+            uzawa.outcome.kkt.largest,
+            newton.counters.linear_solves,
+            uzawa.counters.linear_solves,
             apart.u,
             apart.phi,
             apart.energy,
@@ -334,12 +334,12 @@ def solutions(report: Report, compared: Sequence[Compared]) -> None:
         )
 
 
-def held(one: Compared, found: Found) -> tuple[object, ...]:
+def held(one: Compared, found: Solution) -> tuple[object, ...]:
     """Return what both methods make of a solution and of a start beside it. Collective."""
     branches = one.branches
     stays, back = [], []
     for settings in (one.newton, relaxed(one.newton)):
-        stays.append(branches.difference(branches.run(settings, found.start), found))
+        stays.append(branches.difference(branches.run(settings, found.state), found))
         back.append(branches.letter(branches.run(settings, branches.disturbed(found))))
     return (*(each.largest for each in stays), *back)
 

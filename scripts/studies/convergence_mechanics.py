@@ -14,18 +14,16 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import NullFormatter
 
 from contact import InputError, build_problem
-from contact.body.transfer import carry, errors, errors_to
+from contact.body.norms import errors
+from contact.body.transfer import carry
 from contact.case.file import Case, Friction
-from contact.methods.fixed_point import FixedPoint
 from contact.methods.newton import Newton
-from contact.methods.options import FixedPointOptions, NewtonOptions, PenaltyOptions
-from contact.methods.penalty import Penalty
-from contact.methods.report import Monitor, Outcome, Record
+from contact.methods.options import FixedPointOptions, NewtonOptions, Options, PenaltyOptions
+from contact.methods.report import Outcome
 from contact.output.fields import DerivedFields
-from contact.problem.problem import ContactProblem
 from contact.typing import Array
 from scripts.cases import bar
-from scripts.reporting import Report, iterate, observed_orders, options, solved, subplots
+from scripts.reporting import Report, iterates, observed_orders, options, solved, subplots
 from scripts.studies.exact_solutions import Singular, exact, manufactured
 
 RHO = 1e4
@@ -71,12 +69,14 @@ class Variant:
 def measure(variant: Variant) -> tuple[Array, list[float]]:
     """Return relative errors, shape (meshes, 3), and the residuals of the solves. Collective."""
     reference = solved(variant.case(variant.reference, nested=not variant.penalised))
-    scale = errors(reference.problem, None)
+    body, x = reference.problem.equilibrium, reference.state.x
+    scale = errors(body, x, None)
     found, residuals = [], [_residual(reference.outcome, variant)]
     for n in variant.cells:
         solution = solved(variant.case(n))
         residuals.append(_residual(solution.outcome, variant))
-        e = errors(reference.problem, carry(solution.problem.x, reference.problem.space)) / scale
+        coarse = solution.problem.equilibrium.function(solution.state.x)
+        e = errors(body, x, carry(coarse, body.space)) / scale
         found.append((e.l2, e.h1, e.energy))
     return np.array(found), residuals
 
@@ -205,14 +205,14 @@ def known_solutions(report: Report, coarse: bool) -> dict[str, Array]:
         found, residuals = [], []
         for n in cells.tolist():
             problem = manufactured(dim, degree, n) if dim else singular.problem(n, degree)
-            outcome = Newton(problem, NewtonOptions(tolerance=1e-9)).solve()
+            state, outcome = Newton(problem, NewtonOptions(tolerance=1e-9)).solve()
             if not outcome.converged:
                 raise InputError(f"{label}, 1/h = {n}: {outcome.reason}")
             residuals.append(outcome.kkt.largest)
             if dim:
-                e, largest = errors_to(problem, exact(dim)), np.nan
+                e, largest = errors(problem.equilibrium, state.x, exact(dim)), np.nan
             else:
-                e, largest = singular.errors(problem)
+                e, largest = singular.errors(problem, state)
             found.append((e.l2, e.h1, e.energy, largest))
         table = np.array(found)
         results[label] = table
@@ -282,35 +282,20 @@ def watched(iteration: Iteration, n: int) -> tuple[Array, float, float]:
     if iteration.mu == 0:
         case = case.model_copy(update={"friction": Friction()})
     problem = build_problem(case)
-    iterates: list[Array] = []
-
-    def keep(record: Record) -> None:
-        if record.iteration > 0:
-            iterates.append(iterate(problem))
-
-    outcome = _solver(problem, iteration, keep).solve()
+    found, outcome = iterates(problem, _settings(iteration))
     if not outcome.converged:
         raise InputError(f"{iteration.label}: {outcome.reason}")
-    distances, other = [], problem.x.copy()
-    for x in iterates:
-        other.x.array[: problem.owned] = x
-        other.x.scatter_forward()
-        distances.append(errors(problem, other).energy)
-    kkt = outcome.kkt
+    body, last, kkt = problem.equilibrium, found[-1].x, outcome.kkt
+    distances = [errors(body, last, body.function(state.x)).energy for state in found[:-1]]
     residual = kkt.largest if iteration.eps is None else kkt.equilibrium
-    return np.array(distances[:-1]), DerivedFields(problem).largest_strain(), residual
+    return np.array(distances), DerivedFields(body, last).largest_strain(), residual
 
 
-def _solver(problem: ContactProblem, iteration: Iteration, keep: Monitor) -> FixedPoint | Penalty:
+def _settings(iteration: Iteration) -> Options:
     tight = 1e-10
     if iteration.eps is not None:
-        lagged = PenaltyOptions(eps_contact=iteration.eps, tolerance=tight, material_step="secant")
-        return Penalty(problem, lagged, keep)
-    return FixedPoint(
-        problem,
-        FixedPointOptions(tolerance=tight, inner_tolerance=1e-12, material_step="secant"),
-        keep,
-    )
+        return PenaltyOptions(eps_contact=iteration.eps, tolerance=tight, material_step="secant")
+    return FixedPointOptions(tolerance=tight, inner_tolerance=1e-12, material_step="secant")
 
 
 def fixed_points(report: Report, coarse: bool) -> dict[str, float]:

@@ -12,10 +12,12 @@ import ufl
 from dolfinx import fem
 from mpi4py import MPI
 
-from contact.body.transfer import Errors, errors_to
+from contact.body.description import Body, Fixed, Load
+from contact.body.norms import Errors, errors
 from contact.interface.obstacle import GapFunction
 from contact.mesh.make import box, rectangle
-from contact.problem.problem import Body, Contact, ContactProblem, Fixed, Load
+from contact.problem.problem import Contact, ContactProblem
+from contact.problem.state import State
 from contact.typing import Array
 from forms.hencky import Hencky, Linear, Log, stress
 from forms.kinematics import strain
@@ -152,13 +154,14 @@ class Singular:
         flat = GapFunction(lambda points: np.zeros(len(points)))
         return ContactProblem(domain, Body(self.law, fixed), Contact("bottom", flat), degree=degree)
 
-    def errors(self, problem: ContactProblem) -> tuple[Errors, float]:
-        """Return the norms of the error, and the largest one at the nodes. Collective."""
-        points = problem.space.tabulate_dof_coordinates()[: problem.owned // 2, :2]
-        u = problem.x.x.array[: problem.owned].reshape(-1, 2)
+    def errors(self, problem: ContactProblem, state: State) -> tuple[Errors, float]:
+        """Return the norms of a state's error, and the largest one at the nodes. Collective."""
+        body = problem.equilibrium
+        points = body.space.tabulate_dof_coordinates()[:, :2]
         given = np.column_stack([self.numpy(i, points) for i in range(2)])
-        largest = np.abs(u - given).max(initial=0.0)
-        return errors_to(problem, self.ufl), float(problem.comm.allreduce(largest, op=MPI.MAX))
+        largest = np.abs(state.x.reshape(-1, 2) - given).max(initial=0.0)
+        norms = errors(body, state.x, self.ufl)
+        return norms, float(problem.comm.allreduce(largest, op=MPI.MAX))
 
 
 @dataclass(frozen=True)

@@ -16,11 +16,9 @@ import numpy as np
 from contact import Case, InputError, build_problem, load_case
 from contact.methods.fixed_point import FixedPoint
 from contact.methods.options import FixedPointOptions
-from contact.methods.report import Record
-from contact.problem.problem import ContactProblem
 from contact.typing import Array
 from scripts.cases import CASES
-from scripts.reporting import Report, iterate, options, subplots
+from scripts.reporting import Report, iterates, options, subplots
 from scripts.studies.limit_theorem import ProductNorm
 
 #: k_e of the figure.
@@ -33,25 +31,6 @@ def case_of(name: str, cells: tuple[int, int], k_e: float, lagged: bool) -> Case
     flag = f"electric.lagged={str(lagged).lower()}"
     changes = [grid, f"electric.k_e={k_e}", flag, "solver.method=uzawa"]
     return load_case(CASES / f"{name}.toml", changes)
-
-
-def iterates(
-    problem: ContactProblem, steps: int, tolerance: float = 1e-9
-) -> tuple[list[Array], bool]:
-    """Return the iterates of Algorithm 4, with Kacanov's steps, and whether it converged."""
-    kept: list[Array] = []
-
-    def keep(record: Record) -> None:
-        if record.iteration > 0:
-            kept.append(iterate(problem))
-
-    settings = FixedPointOptions(
-        tolerance=tolerance,
-        inner_tolerance=min(tolerance / 10, 1e-9),
-        material_step="secant",
-        max_outer=steps,
-    )
-    return kept, FixedPoint(problem, settings, keep).solve().converged
 
 
 def errors(
@@ -70,16 +49,19 @@ def errors(
     """
     problem = build_problem(case_of(name, cells, k_e, lagged))
     norm = ProductNorm(problem)
-    kept, converged = iterates(problem, steps)
+    settings = FixedPointOptions(
+        tolerance=1e-9, inner_tolerance=1e-10, material_step="secant", max_outer=steps
+    )
+    found, outcome = iterates(problem, settings)
     if not exact:
-        moves = [np.linalg.norm(norm(b - a)) for a, b in pairwise(kept)]
-        return np.array(moves), converged
-    solution = build_problem(case_of(name, cells, k_e, False), domain=problem.domain)
-    found = FixedPoint(solution, FixedPointOptions(tolerance=1e-11)).solve()
-    if not found.converged:
-        raise InputError(f"k_e = {k_e:g}: {found.reason}")
-    x = iterate(solution)
-    return np.array([np.linalg.norm(norm(kept_x - x)) for kept_x in kept]), converged
+        moves = [np.linalg.norm(norm(b.x - a.x)) for a, b in pairwise(found)]
+        return np.array(moves), outcome.converged
+    implicit = build_problem(case_of(name, cells, k_e, False), domain=problem.domain)
+    limit, ended = FixedPoint(implicit, FixedPointOptions(tolerance=1e-11)).solve()
+    if not ended.converged:
+        raise InputError(f"k_e = {k_e:g}: {ended.reason}")
+    distances = [np.linalg.norm(norm(state.x - limit.x)) for state in found]
+    return np.array(distances), outcome.converged
 
 
 def rate_of(sizes: Array) -> float:

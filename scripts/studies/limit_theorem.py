@@ -18,16 +18,15 @@ import ufl
 from dolfinx import fem
 from matplotlib.figure import Figure
 
-from contact import Case, InputError, build_problem, load_case, solve_problem
+from contact import Case, InputError, build_problem, load_case
+from contact.interface.layer import Layer
 from contact.interface.obstacle import GapFunction
-from contact.interface.response import Layer
-from contact.methods.report import Record
 from contact.problem.problem import Contact, ContactProblem
 from contact.typing import Array
 from forms.kinematics import strain
 from forms.laws import Compliance, PotentialFactor
 from scripts.cases import CASES
-from scripts.reporting import Report, iterate, observed_orders, options, solved, subplots
+from scripts.reporting import Report, iterates, observed_orders, options, solved, subplots
 
 #: mu = k_e of Table 8.4.
 TABLE_8_4 = (6e-1, 2e-1, 6.8e-2, 5.1e-3, 6.2e-4, 1.4e-5, 3.5e-6, 8.5e-7)
@@ -55,22 +54,22 @@ class ProductNorm:
     Parameters
     ----------
     problem
-        Whose unknowns, owned arrays of `problem.x`, are measured.
+        Whose local unknowns are measured.
     """
 
     def __init__(self, problem: ContactProblem) -> None:
-        self._x = fem.Function(problem.space)
-        u, phi = problem.parts_of(self._x)
+        body = problem.equilibrium
+        self._x = fem.Function(body.space)
+        u, phi = body.split(self._x)
         parts = [ufl.inner(strain(u), strain(u))]
         if phi is not None:
             parts.append(ufl.inner(ufl.grad(phi), ufl.grad(phi)))
         self._forms = [fem.form(part * problem.domain.dx) for part in parts]
-        self._comm, self._owned = problem.comm, problem.owned
+        self._comm = problem.comm
 
     def __call__(self, x: Array) -> tuple[float, ...]:
-        """Return the norms in V and, with a potential, W of owned unknowns. Collective."""
-        self._x.x.array[: self._owned] = x
-        self._x.x.scatter_forward()
+        """Return the norms in V and, with a potential, W of local unknowns. Collective."""
+        self._x.x.array[:] = x
         squares = [self._comm.allreduce(fem.assemble_scalar(form)) for form in self._forms]
         return tuple(float(np.sqrt(square)) for square in squares)
 
@@ -130,14 +129,12 @@ def theorem_6_3(
     limit_case = case_of(f"compliance-8-3{suffix}", cells)
     problem = build_problem(limit_case)
     domain, norm = problem.domain, ProductNorm(problem)
-    solved(limit_case, problem)
-    limit, distances = iterate(problem), []
+    limit, distances = solved(limit_case, problem).state.x, []
     for value in values:
         changes = [f"friction.mu={value}", f"electric.k_e={value}"]
         case = case_of(f"compliance-8-4{suffix}", cells, changes)
-        problem = build_problem(case, domain=domain)
-        solved(case, problem)
-        distances.append(norm(iterate(problem) - limit))
+        found = solved(case, build_problem(case, domain=domain))
+        distances.append(norm(found.state.x - limit))
     return Errors("mu = k_e", np.array(values), np.array(distances))
 
 
@@ -158,16 +155,11 @@ def fixed_point_errors(
     lagged = ["contact.lagged=true", "solver.material_step=secant", *changes]
     case = case_of(name, cells, lagged)
     problem = build_problem(case)
-    iterates: list[Array] = []
-
-    def keep(record: Record) -> None:
-        iterates.append(iterate(problem))
-
-    outcome = solve_problem(problem, case.solver, keep).outcome
+    found, outcome = iterates(problem, case.solver, first=0)
     if not outcome.converged:
         raise InputError(f"{case.title}: {outcome.reason}")
-    norm, exact = ProductNorm(problem), iterates[-1]
-    return np.array([np.linalg.norm(norm(x - exact)) for x in iterates[:-1]])
+    norm, exact = ProductNorm(problem), found[-1].x
+    return np.array([np.linalg.norm(norm(state.x - exact)) for state in found[:-1]])
 
 
 def with_layer(problem: ContactProblem, c: float, thickness: float = np.inf) -> ContactProblem:
@@ -199,12 +191,10 @@ def stiffness_limit(
     inner = "solver.inner_tolerance=1e-10"
     case = case_of("compliance-8-3", cells, ["solver.tolerance=1e-9", inner])
     problem = build_problem(case)
-    solved(case, problem)
-    norm, limit, distances = ProductNorm(problem), iterate(problem), []
+    norm, limit, distances = ProductNorm(problem), solved(case, problem).state.x, []
     for c in stiffness:
-        soft = with_layer(problem, c)
-        solved(case, soft)
-        distances.append(norm(iterate(soft) - limit))
+        soft = solved(case, with_layer(problem, c))
+        distances.append(norm(soft.state.x - limit))
     return Errors("1/c", 1 / np.array(stiffness), np.array(distances))
 
 
@@ -217,14 +207,11 @@ def distance_limit(
     """
     case = case_of("compliance-8-3", cells)
     problem = with_layer(build_problem(case), c)
-    solved(case, problem)
-    norm, limit, distances = ProductNorm(problem), iterate(problem), []
-    u_n = problem.trace.normal_component(problem.trace.values(limit))
-    depth = problem.trace.maximum(u_n) - TOUCH
+    norm, limit, distances = ProductNorm(problem), solved(case, problem), []
+    depth = problem.nodes.maximum(limit.normal_displacement) - TOUCH
     for value in thickness:
-        rigid = with_layer(problem, c, value)
-        solved(case, rigid)
-        distances.append(norm(iterate(rigid) - limit))
+        rigid = solved(case, with_layer(problem, c, value))
+        distances.append(norm(rigid.state.x - limit.state.x))
     return Errors("rho - rho_0", np.array(thickness), np.array(distances)), depth
 
 

@@ -11,7 +11,7 @@ import numpy as np
 from mpi4py import MPI
 
 from contact import Solution
-from contact.body.transfer import errors
+from contact.body.norms import errors
 from contact.output.table import Table, contact_table
 from scripts.cases import bar
 from scripts.reporting import Report, options, solved, subplots
@@ -60,10 +60,9 @@ def study(report: Report, n: int, load: float) -> dict[str, Solution]:
         solution = solved(bar(n, load, RHO, change))
         local = local or solution
         # Each problem has a mesh of its own, with the same numbering.
-        other = solution.problem.x.copy()
-        other.x.array[:] = local.problem.x.x.array
-        relative = errors(solution.problem, other) / errors(solution.problem, None)
-        status = solution.problem.trace.gather(solution.status)
+        nodes, body, x = solution.problem.nodes, solution.problem.equilibrium, solution.state.x
+        relative = errors(body, x, body.function(local.state.x)) / errors(body, x, None)
+        status = nodes.gather(solution.status)
         records = uzawa.history.records
         force = solution.contact_force
         row = (
@@ -72,7 +71,7 @@ def study(report: Report, n: int, load: float) -> dict[str, Solution]:
             solution.counters.linear_solves,
             len(records),
             sum(r.inner for r in records),
-            solution.problem.trace.maximum(solution.pressure),
+            nodes.maximum(solution.pressure),
             -force[1],
             force[0],
             int(np.count_nonzero(status == "stick")),

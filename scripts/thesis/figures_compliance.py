@@ -12,8 +12,8 @@ from matplotlib.figure import Figure
 from mpi4py import MPI
 
 from contact import Solution, build_problem, load_case
+from contact.interface.layer import NormalLaw
 from contact.interface.projections import project_disc
-from contact.interface.response import NormalLaw
 from contact.output.figures.body import Picture, draw_plane, picture
 from contact.output.figures.contact import draw_line
 from contact.output.table import Table, contact_table, csv_columns, tangent_of

@@ -14,10 +14,10 @@ from dolfinx import fem
 from matplotlib.figure import Figure
 from mpi4py import MPI
 
+from contact.body.equilibrium import BodyEquilibrium
 from contact.body.transfer import carry
 from contact.output.figures.body import draw_plane, picture
 from contact.output.table import contact_table
-from contact.problem.problem import ContactProblem
 from contact.typing import Array
 from forms.kinematics import strain
 from scripts.reporting import Report, observed_orders, options, subplots
@@ -108,17 +108,17 @@ def all_potentials(report: Report, cells: tuple[int, int]) -> None:
         potentials(report, f"{number}b", "phi_F = 32, for k_e = 0 to 1", name, k_e, cells)
 
 
-def norms(problem: ContactProblem) -> Callable[[fem.Function], Array]:
+def norms(body: BodyEquilibrium) -> Callable[[Array], Array]:
     """Return the norms of u and phi in H1 (seminorms |eps|, |grad|) and in L2. Collective."""
-    difference = fem.Function(problem.space)
-    u, phi = problem.parts_of(difference)
+    difference = fem.Function(body.space)
+    u, phi = body.split(difference)
     assert phi is not None
     parts = (strain(u), ufl.grad(phi), u, phi)
-    forms = [fem.form(ufl.inner(part, part) * problem.domain.dx) for part in parts]
+    forms = [fem.form(ufl.inner(part, part) * body.domain.dx) for part in parts]
 
-    def measure(function: fem.Function) -> Array:
-        difference.x.array[:] = function.x.array
-        squares = [problem.comm.allreduce(fem.assemble_scalar(form)) for form in forms]
+    def measure(x: Array) -> Array:
+        difference.x.array[:] = x
+        squares = [body.comm.allreduce(fem.assemble_scalar(form)) for form in forms]
         return np.sqrt(squares)
 
     return measure
@@ -132,13 +132,13 @@ def figure_8_7(report: Report, coarse: bool) -> dict[str, Array]:
         columns |= {name: [], f"order ({name})": []}
     found = {}
     for label, name in (("Example 8.1", "piezo-8-1-conductive"), ("Example 8.2", "piezo-8-2")):
-        reference = solution_of(name, (last, last // 2)).problem
-        measure, rows = norms(reference), []
-        scale = measure(reference.x)
+        reference = solution_of(name, (last, last // 2))
+        x, body = reference.state.x, reference.problem.equilibrium
+        measure, rows = norms(body), []
         for n in cells:
-            other = carry(solution_of(name, (n, n // 2)).problem.x, reference.space)
-            other.x.array[:] -= reference.x.x.array
-            rows.append(measure(other) / scale)
+            coarse = solution_of(name, (n, n // 2))
+            other = carry(coarse.problem.equilibrium.function(coarse.state.x), body.space)
+            rows.append(measure(other.x.array - x) / measure(x))
         errors, h = np.array(rows), 4.0 / (np.array(cells) / 2)
         found[label] = errors
         columns["problem"] += [label] * h.size

@@ -123,10 +123,10 @@ class Found:
 
 def measure(solution: Solution, load: float) -> Found:
     """Measure contact radius, peak pressure and force; the axis is x = 0. Collective."""
-    problem, trace = solution.problem, solution.problem.trace
-    d = problem.dim
-    pressure, points = trace.gather(solution.pressure), trace.gather(trace.points)
-    weight = trace.gather(trace.weight)
+    nodes = solution.problem.nodes
+    d = nodes.dim
+    pressure, points = nodes.gather(solution.pressure), nodes.gather(nodes.points)
+    weight = nodes.gather(nodes.weight)
     r = np.linalg.norm(points[:, : d - 1], axis=1)
     touching = pressure > 1e-6 * pressure.max()
     radius = r[touching].max()
@@ -210,8 +210,7 @@ def run(case: Case, load: float) -> tuple[Solution, Found]:
         Vertical force on the meshed part of the body.
     """
     domain = make_domain(case.mesh, MPI.COMM_WORLD)
-    problem = build_problem(case, domain=domain)
-    area = volume(problem, domain.ds("top"))
+    area = volume(domain, domain.ds("top"))
     first = case.load[0]
     assert first.traction is not None
     scaled = [0.0] * (domain.dim - 1) + [-load / area]
@@ -360,11 +359,11 @@ def sphere(fineness: float, degree: int = 1) -> Case:
 
 def approach(solution: Solution) -> float:
     """Return how far the middle of the cut, at the depth R, has come down. Collective."""
-    problem, hertz = solution.problem, Sphere()
-    points = problem.space.tabulate_dof_coordinates()[: problem.owned // problem.block_size]
-    u = problem.x.x.array[: problem.owned].reshape(-1, problem.block_size)
+    body, hertz = solution.problem.equilibrium, Sphere()
+    points = body.space.tabulate_dof_coordinates()[: len(body.free)]
+    u = solution.state.x[: body.owned].reshape(-1, body.block_size)
     middle = np.linalg.norm(points - [0.0, 0.0, hertz.radius], axis=1) < 1e-6 * hertz.radius
-    return float(problem.comm.allreduce(-u[middle, 2].sum(), op=MPI.SUM))
+    return float(body.comm.allreduce(-u[middle, 2].sum(), op=MPI.SUM))
 
 
 def spheres(report: Report, levels: Sequence[tuple[float, int]]) -> dict[str, list[float]]:
@@ -386,7 +385,7 @@ def spheres(report: Report, levels: Sequence[tuple[float, int]]) -> dict[str, li
     ratios: dict[str, list[float]] = {"radius": [], "peak": [], "approach": [], "force": []}
     for fineness, degree in levels:
         solution, found = run(sphere(fineness, degree), hertz.force / 4)
-        space = solution.problem.space
+        space = solution.problem.equilibrium.space
         values = {
             "radius": found.moment / hertz.contact_radius,
             "peak": found.centre / hertz.peak,

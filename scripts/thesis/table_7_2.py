@@ -11,12 +11,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from contact import Case, InputError, build_problem, solve_problem
-from contact.body.transfer import errors
+from contact.body.norms import errors
 from contact.case.file import Friction
 from contact.output.solution import Solution
 from contact.problem.problem import ContactProblem
 from scripts.cases import bar
-from scripts.reporting import Report, iterate, observed_orders, options, solved, subplots
+from scripts.reporting import Report, observed_orders, options, solved, subplots
 
 LOADS = (-0.005, -0.05)
 EPS = (1e-2, 1e-3, 1e-4, 1e-5)
@@ -36,14 +36,11 @@ class Distance:
     pressure: float
 
 
-def distance(reference: Solution, x: np.ndarray, penalty: Solution) -> Distance:
+def distance(reference: Solution, penalty: Solution) -> Distance:
     """Measure a penalty solution, whose problem is that of the reference. Collective."""
-    problem = penalty.problem
-    other = problem.x.copy()
-    other.x.array[: problem.owned] = x
-    other.x.scatter_forward()
-    relative = errors(problem, other) / errors(problem, None)
-    norm = problem.trace.norm
+    body, x = penalty.problem.equilibrium, penalty.state.x
+    relative = errors(body, x, body.function(reference.state.x)) / errors(body, x, None)
+    norm = penalty.problem.nodes.norm
     pressure = norm(penalty.pressure - reference.pressure) / norm(reference.pressure)
     return Distance(relative.l2, relative.energy, pressure)
 
@@ -88,13 +85,12 @@ def table(report: Report, n: int) -> None:
     for load in LOADS:
         problem = build_problem(bar(n, load, RHO))
         reference = solved(bar(n, load, RHO, "solver.tolerance=1e-10"), problem)
-        x = iterate(problem)
         for eps, thesis in zip(EPS, THESIS[load], strict=True):
             lagged = 'solver.material_step="secant"'
             stopped = penalty(problem, n, load, eps, 'solver.stopping="thesis"', lagged)
             alone = checked(penalty(problem, n, load, eps, lagged, "solver.max_outer=1000"))
             honest = checked(penalty(problem, n, load, eps))
-            error, kkt = distance(reference, x, honest), honest.outcome.kkt
+            error, kkt = distance(reference, honest), honest.outcome.kkt
             _append(
                 counts,
                 load,
@@ -177,11 +173,11 @@ def study(report: Report, n: int, values: Sequence[float] = SMALL) -> dict[str, 
         case = _with(n, changes, "solver.tolerance=1e-11")
         problem = build_problem(case)
         reference = solved(case, problem)
-        x, distances, residuals = iterate(problem), [], []
+        distances, residuals = [], []
         for eps in values:
             small = ("solver.method=penalty", f"solver.eps_contact={eps}", "solver.max_outer=1000")
             solution = checked(solve_problem(problem, _with(n, changes, *small).solver))
-            distances.append(distance(reference, x, solution))
+            distances.append(distance(reference, solution))
             residuals.append(solution.outcome.kkt.equilibrium)
         energy = [d.energy for d in distances]
         pressure = [d.pressure for d in distances]

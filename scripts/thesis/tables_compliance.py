@@ -10,8 +10,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from contact import Case, Solution, build_problem, load_case, solve_problem
-from contact.mesh.make import Domain
-from contact.problem.problem import ContactProblem
+from contact.mesh.domain import Domain
 from scripts.cases import CASES
 from scripts.reporting import Report, options
 
@@ -133,12 +132,9 @@ def table_8_4(report: Report, cells: tuple[int, int], suffix: str) -> None:
 
 def difference(a: Solution, b: Solution) -> float:
     """Return the relative difference of two solutions. Collective."""
-
-    def size(problem: ContactProblem, values: np.ndarray) -> float:
-        return float(np.sqrt(problem.comm.allreduce(np.dot(values, values))))
-
-    x, y = (s.problem.x.x.array[: s.problem.owned] for s in (a, b))
-    return size(a.problem, x - y) / size(a.problem, x)
+    body = a.problem.equilibrium
+    x, y = (solution.state.x[: body.owned] for solution in (a, b))
+    return body.norm(x - y) / body.norm(x)
 
 
 def examples(report: Report, cells: tuple[int, int]) -> None:
@@ -163,14 +159,14 @@ def examples(report: Report, cells: tuple[int, int]) -> None:
 
 def values(solution: Solution) -> tuple[object, ...]:
     """Return the columns of `examples`. Collective."""
-    problem, trace, c = solution.problem, solution.problem.trace, solution.problem.response
-    opening = solution.normal_displacement - trace.gap
-    rigid = trace.gather(solution.forces.pressure + c.contact_scale * opening > 0)
-    touching = trace.gather(solution.status != "open")
-    x = trace.gather(trace.points[:, 0])[touching]
-    nodal = problem.x.x.array[: problem.owned].reshape(-1, problem.block_size)
-    ends = [np.abs(nodal[:, :-1]).max(), (-nodal[:, -1]).max(), nodal[:, -1].max()]
-    largest = np.max(problem.comm.allgather(ends), axis=0)
+    body, interface = solution.problem.equilibrium, solution.problem.interface
+    nodes, opening = interface.jump, interface.opening(solution.nodal)
+    rigid = nodes.gather(solution.forces.pressure + interface.stiffness * opening > 0)
+    touching = nodes.gather(solution.status != "open")
+    x = nodes.gather(nodes.points[:, 0])[touching]
+    unknowns = solution.state.x.reshape(-1, body.block_size)
+    ends = [np.abs(unknowns[:, :-1]).max(), (-unknowns[:, -1]).max(), unknowns[:, -1].max()]
+    largest = np.max(body.comm.allgather(ends), axis=0)
     return (
         solution.converged,
         solution.history.records[-1].iteration,
@@ -181,9 +177,9 @@ def values(solution: Solution) -> tuple[object, ...]:
         float(x.min()),
         float(x.max()),
         float(largest[0]),
-        trace.maximum(solution.pressure),
-        float(-problem.phi_scale * largest[1]),
-        float(problem.phi_scale * largest[2]),
+        nodes.maximum(solution.pressure),
+        float(-body.phi_scale * largest[1]),
+        float(body.phi_scale * largest[2]),
         solution.max_dev_strain,
     )
 

@@ -10,12 +10,11 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from contact import Case, Solution, build_problem, load_case
-from contact.linear.operator import LinearOperator
+from contact.linear.operator import SparseOperator
 from contact.methods.uzawa import augmentation, automatic_r
 from contact.output.balances import charge_balance, force_balance
 from contact.problem.kkt import residual_forces
 from contact.problem.problem import ContactProblem
-from contact.problem.state import Multipliers, nodal_iterate
 from scripts.cases import CASES
 from scripts.reporting import Report, options, yielded_share
 from scripts.thesis.tables_compliance import difference, iterations, run
@@ -135,38 +134,38 @@ def series(report: Report, number: str, cells: tuple[int, int]) -> None:
 
 def values(solution: Solution) -> tuple[object, ...]:
     """Return the columns of `series`. Collective."""
-    problem, trace = solution.problem, solution.problem.trace
-    phi = problem.phi_scale * solution.nodal[:, -1]
-    u = problem.x.x.array.reshape(-1, problem.block_size)[:, : problem.dim]
-    charges = charge_balance(problem, solution.forces)
+    problem, nodes, state = solution.problem, solution.problem.nodes, solution.state
+    body = problem.equilibrium
+    phi = body.phi_scale * solution.nodal[:, -1]
+    u = state.x.reshape(-1, body.block_size)[:, : body.dim]
+    charges = charge_balance(problem, state)
     return (
         solution.converged,
         solution.history.records[-1].iteration,
         solution.counters.linear_solves,
         solution.outcome.kkt.largest,
-        -trace.maximum(-phi, -np.inf),
-        trace.maximum(phi, -np.inf),
+        -nodes.maximum(-phi, -np.inf),
+        nodes.maximum(phi, -np.inf),
         max(problem.comm.allgather(float(np.abs(u).max()))),
-        trace.maximum(solution.pressure),
+        nodes.maximum(solution.pressure),
         solution.max_dev_strain,
         yielded_share(solution),
         charges.electrodes["left"],
         charges.foundation,
         charges.imbalance,
-        force_balance(problem, solution.forces).imbalance,
+        force_balance(problem, state).imbalance,
     )
 
 
 def linear_iterations(problem: ContactProblem) -> int:
     """Return the MINRES iterations of the first solve, all of Gamma_3 in contact. Collective."""
-    problem.reset()
-    nodal = nodal_iterate(problem)
-    blocks = augmentation(problem, automatic_r(problem), problem.frictional)
-    current = problem.response.current_block(nodal, np.ones(len(nodal)))
-    blocks = blocks + problem.trace.weight[:, None, None] * current
-    operator = LinearOperator(problem, kind="iterative")
-    operator.update(problem.secant, blocks)
-    operator.solve(-residual_forces(problem, Multipliers.zero(problem)))
+    interface, state = problem.interface, problem.start()
+    nodal = problem.nodal(state)
+    blocks = augmentation(problem.nodes, automatic_r(problem.scales), problem.frictional)
+    blocks = blocks + interface.response.current_block(nodal, np.ones(len(nodal)))
+    operator = SparseOperator(problem.equilibrium, interface.coupled, kind="iterative")
+    operator.update("secant", state.x, interface.weighted(blocks, state.x))
+    operator.solve(-residual_forces(problem, state))
     return operator.counters.linear_iterations
 
 
@@ -181,8 +180,8 @@ def iterative(report: Report, coarse: bool) -> None:
             problem = build_problem(load_case(CASES / f"{name}.toml", [grid]))
             columns["body"].append(name)
             columns["cells"].append(" x ".join(map(str, cells)))
-            unknowns = problem.space.dofmap.index_map.size_global * problem.block_size
-            columns["unknowns"].append(unknowns)
+            dofmap = problem.equilibrium.space.dofmap
+            columns["unknowns"].append(dofmap.index_map.size_global * dofmap.index_map_bs)
             columns["iterations"].append(linear_iterations(problem))
     report.table(
         "piezo-linear-iterations",

@@ -28,10 +28,10 @@ def test_own_contact():
     mu, waves = own_contact.Weakening(0.5, 0.3, 1e-3), own_contact.Waves(2e-3, 1.0)
     solution = own_contact.main((32, 8))
     assert solution.converged
-    trace, touching = solution.problem.trace, solution.status != "open"
-    assert 0 < trace.comm.allreduce(int(touching.sum())) < trace.comm.allreduce(touching.size)
+    nodes, touching = solution.problem.nodes, solution.status != "open"
+    assert 0 < nodes.comm.allreduce(int(touching.sum())) < nodes.size
     # The crests bear the load, not the troughs, which are 4e-3 deep.
-    _, gap = waves.measure(trace.points, trace.normal)
+    _, gap = waves.measure(nodes.points, nodes.normal)
     assert np.all(gap[touching] < 3e-3)
     slips = solution.status == "slip"
     bound = mu(np.linalg.norm(solution.slip, axis=1)) * solution.pressure

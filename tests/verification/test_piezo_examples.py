@@ -7,8 +7,7 @@ import pytest
 from mpi4py import MPI
 
 from contact.interface.friction import Friction
-from contact.interface.multipliers import Multipliers
-from contact.linear.operator import LinearOperator
+from contact.linear.operator import SparseOperator
 from contact.methods.fixed_point import FixedPoint
 from contact.methods.options import FixedPointOptions
 from contact.methods.uzawa import augmentation, automatic_r
@@ -25,21 +24,21 @@ PHI_F = (0.0, 1.0, 2.0, 4.0, 8.0, 16.0, 32.0)
 
 def solve(problem, tolerance=1e-8, **options):
     solver = FixedPoint(problem, FixedPointOptions(tolerance=tolerance, **options))
-    outcome = solver.solve()
+    _, outcome = solver.solve()
     assert outcome.converged, outcome.reason
     return solver
 
 
-def extremes(problem, solver):
+def extremes(solver):
     """Return phi on Gamma_3, largest displacement component and pressure, over all ranks."""
-    trace, comm = problem.nodes, problem.comm
-    phi = potential(problem)
-    u = problem.x.x.array.reshape(-1, problem.equilibrium.block_size)[:, : problem.dim]
+    problem, state = solver.problem, solver.state
+    nodes, phi = problem.nodes, potential(problem, state)
+    u = state.x.reshape(-1, problem.equilibrium.block_size)[:, : problem.dim]
     return (
-        -trace.maximum(-phi, -np.inf),
-        trace.maximum(phi, -np.inf),
-        comm.allreduce(np.abs(u).max(), MPI.MAX),
-        trace.maximum(solver.forces.pressure),
+        -nodes.maximum(-phi, -np.inf),
+        nodes.maximum(phi, -np.inf),
+        problem.comm.allreduce(np.abs(u).max(), MPI.MAX),
+        nodes.maximum(state.forces.pressure),
     )
 
 
@@ -56,7 +55,7 @@ def test_independent_values(mu):
     """Another code, 64 x 32 cells, load -10x, insulated: to the digits given."""
     friction = Friction(ConstantCoefficient(mu)) if mu > 0 else Friction()
     problem = example(COMM, (64, 32), -10.0, friction=friction, k_e=0.0)
-    found = extremes(problem, solve(problem))
+    found = extremes(solve(problem))
     for value, expected in zip(found, INDEPENDENT[mu], strict=True):
         digits = len(str(expected).split(".")[1])
         assert round(value, digits) == expected
@@ -69,8 +68,7 @@ def test_independent_values(mu):
 def test_series(changes, law):
     """Those of the conductivity and of the foundation's potential."""
     problem = example(COMM, (64, 32), friction=SLIP, law=law, **changes)
-    solver = solve(problem)
-    assert charge_balance(problem, solver.forces).imbalance < 1e-8
+    assert charge_balance(problem, solve(problem).state).imbalance < 1e-8
 
 
 def test_potential_grows_with_phi_f_and_k_e():
@@ -82,9 +80,9 @@ def test_potential_grows_with_phi_f_and_k_e():
         curves = []
         for row in rows:
             problem = example(COMM, (32, 16), friction=SLIP, **row)
-            solve(problem)
+            phi = potential(problem, solve(problem).state)
             order = np.argsort(problem.nodes.points[:, 0])
-            curves.append(potential(problem)[order][4:])
+            curves.append(phi[order][4:])
         for low, high in pairwise(curves):
             assert np.all(high > low)
 
@@ -94,7 +92,7 @@ def test_yield_matters():
     found = []
     for law in (None, hencky()):
         problem = example(COMM, (64, 32), friction=SLIP, law=law)
-        found.append(extremes(problem, solve(problem)))
+        found.append(extremes(solve(problem)))
     assert abs(found[0][2] - found[1][2]) > 1e-7
     assert np.allclose(found[0], found[1], rtol=1e-2)
 
@@ -102,7 +100,7 @@ def test_yield_matters():
 def test_lagged_current_stops_converging():
     """Theorem 5.2 asks for small k_e if the charge is lagged, as in Algorithm 4."""
     lagged = example(COMM, (16, 8), friction=SLIP, k_e=10.0, lagged=True)
-    outcome = FixedPoint(lagged, FixedPointOptions()).solve()
+    _, outcome = FixedPoint(lagged, FixedPointOptions()).solve()
     assert not outcome.converged
     solve(example(COMM, (16, 8), friction=SLIP, k_e=10.0))
 
@@ -120,8 +118,8 @@ def test_units_do_not_matter(law):
         problem = example(COMM, (32, 16), friction=SLIP, law=material, units=units)
         solver = solve(problem)
         steps = [record.inner for record in solver.history.records]
-        runs.append((solver.forces.pressure / units.stress, steps))
-        runs[-1] += (potential(problem) / units.potential,)
+        runs.append((solver.state.forces.pressure / units.stress, steps))
+        runs[-1] += (potential(problem, solver.state) / units.potential,)
     assert np.allclose(runs[0][0], runs[1][0], rtol=1e-8)
     assert np.allclose(runs[0][2], runs[1][2], rtol=1e-8, atol=1e-8)
     assert runs[0][1] == runs[1][1]
@@ -135,9 +133,10 @@ def test_ranks_agree(law):
     for comm in (COMM, MPI.COMM_SELF):
         problem = example(comm, (32, 16), friction=SLIP, law=law)
         solver = solve(problem, 1e-11)
-        charge = charge_balance(problem, solver.forces)
-        norms = (problem.nodes.norm(solver.forces.pressure), problem.nodes.norm(potential(problem)))
-        found.append((*extremes(problem, solver), *norms, charge.foundation))
+        state, norm = solver.state, problem.nodes.norm
+        charge = charge_balance(problem, state)
+        norms = (norm(state.forces.pressure), norm(potential(problem, state)))
+        found.append((*extremes(solver), *norms, charge.foundation))
     assert np.allclose(found[0], found[1], rtol=1e-8)
 
 
@@ -146,17 +145,18 @@ def test_ranks_agree(law):
 
 def first_solve(problem, symmetric=True, compare=True):
     """Return the iterations of a first linear solve, and its difference to the direct one."""
-    problem.reset()
-    nodal = nodal_iterate(problem)
-    blocks = augmentation(problem, automatic_r(problem.scales), problem.frictional)
-    contact = np.ones(nodal.shape[0])
-    current = problem.interface.response.current_block(nodal, contact)
-    blocks = blocks + problem.nodes.weight[:, None, None] * current
+    interface, state = problem.interface, problem.start()
+    nodal = problem.nodal(state)
+    blocks = augmentation(problem.nodes, automatic_r(problem.scales), problem.frictional)
+    blocks = blocks + interface.response.current_block(nodal, np.ones(nodal.shape[0]))
+    blocks = interface.weighted(blocks, state.x)
     found = []
     for kind in ("lu", "iterative") if compare else ("iterative",):
-        operator = LinearOperator(problem, symmetric=symmetric, kind=kind)
-        operator.update(problem.secant, blocks)
-        increment = operator.solve(-residual_forces(problem, Multipliers.zero(problem.nodes)))
+        operator = SparseOperator(
+            problem.equilibrium, interface.coupled, symmetric=symmetric, kind=kind
+        )
+        operator.update("secant", state.x, blocks)
+        increment = operator.solve(-residual_forces(problem, state))
         found.append((increment, operator.counters.linear_iterations))
     comm = problem.comm
     size = comm.allreduce(np.abs(found[0][0]).max(initial=0), MPI.MAX)
@@ -182,7 +182,7 @@ def test_iterative_fixed_point():
     found = []
     for kind in ("lu", "iterative"):
         problem = example(COMM, (16, 8), friction=SLIP)
-        found.append(extremes(problem, solve(problem, linear=kind)))
+        found.append(extremes(solve(problem, linear=kind)))
     assert np.allclose(found[0], found[1], rtol=1e-8)
 
 
