@@ -8,7 +8,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from mpi4py import MPI
 
 from contact.interface.residuals import interface_residuals
 from contact.problem.protocols import Problem
@@ -24,8 +23,8 @@ class KKT:
     ----------
     equilibrium
         |F(u) + contact forces| on free unknowns, over the sum of the norms of loads, contact
-        forces and reactions; mechanical and (scaled) electric unknowns together. Without loads
-        and contact, reactions of the size of rounding do not count.
+        forces and reactions, or over what rounding makes of the stresses around the nodes
+        (`_least_force`); mechanical and (scaled) electric unknowns together.
     contact
         |p - max(0, p + c (u_nu - rho))| / |p| in L2(Gamma_3), c = E/length.
     friction
@@ -76,17 +75,14 @@ def residual_forces(problem: Problem, state: State, secant_at: Array | None = No
 
 
 def _least_force(problem: Problem, state: State) -> float:
-    """Return 1e-6 of the forces that would hold each node alone at the prescribed displacement.
+    """Return 1e-6 of the forces that would hold each node alone at its displacement.
 
-    Rounding is some 1e-15 of those, so that it passes for nothing at any sensible tolerance.
+    The stresses around a node of a slender body, or of one that is moved without being touched,
+    cancel but for far smaller forces, and their rounding, some 1e-16 of each, remains: that
+    passes for nothing at any sensible tolerance.
     """
-    body, scales = problem.equilibrium, problem.scales
-    prescribed = state.x[: body.owned][~body.free.ravel()]
-    largest = body.comm.allreduce(float(np.abs(prescribed).max(initial=0.0)), op=MPI.MAX)
-    nodes = body.comm.allreduce(body.free.shape[0], op=MPI.SUM)
-    spacing = scales.size / nodes ** (1 / body.dim)
-    stiffness = (scales.bulk + 4 / 3 * scales.shear) * spacing ** (body.dim - 2)
-    return 1e-6 * stiffness * largest * float(np.sqrt(nodes))
+    body = problem.equilibrium
+    return 1e-6 * problem.scales.stiffness * body.norm(state.x[: body.owned])
 
 
 def evaluate(problem: Problem, state: State) -> KKT:
@@ -99,10 +95,7 @@ def evaluate(problem: Problem, state: State) -> KKT:
     jump.transpose(jump.weight[:, None] * stress, contact_forces)
     loads, pushes = body.load_size(state.load), body.norm(contact_forces)
     scale = loads + pushes + body.norm(np.where(free, 0.0, residual))
-    # Supports that move an untouched body rigidly leave rounding, in the reactions as well.
-    least = _least_force(problem, state)
-    if loads == 0 and pushes <= 1e-6 * least:
-        scale = max(scale, least)
+    scale = max(scale, _least_force(problem, state))
     equilibrium = body.norm(np.where(free, residual, 0.0)) / (scale or 1.0)
     bound = interface.bound(nodal, state.forces)
     return KKT(equilibrium, *interface_residuals(interface, nodal, state.forces, bound))

@@ -111,17 +111,20 @@ class ContactProblem:
         )
 
     def _scales(self) -> Scales:
-        domain, law = self.domain, self.body.law
+        domain, law, d = self.domain, self.body.law, self.dim
         area = volume(domain, domain.ds(self.contact.on))
+        whole = volume(domain, domain.dx)
+        cell = (whole / self.equilibrium.layout.index_map.size_global) ** (1 / d)
         return Scales(
             young=float(law.young),
             poisson=float(law.poisson),
             bulk=float(law.bulk),
             shear=float(law.shear),
             size=domain.size,
-            height=volume(domain, domain.dx) / area,
+            height=whole / area,
             area=area,
-            spacing=(area / self.nodes.size) ** (1 / (self.dim - 1)),
+            spacing=(area / self.nodes.size) ** (1 / (d - 1)),
+            stiffness=float(law.bulk + 4 / 3 * law.shear) * cell ** (d - 2),
         )
 
     @property

@@ -21,6 +21,8 @@ class Scales:
         Of Gamma_3 (length^(d - 1)).
     spacing
         Of the contact nodes (length).
+    stiffness
+        Of one node alone against a displacement (force/length).
     """
 
     young: float
@@ -31,6 +33,7 @@ class Scales:
     height: float
     area: float
     spacing: float
+    stiffness: float
 
     @property
     def plane_modulus(self) -> float:

@@ -1,7 +1,8 @@
 """Robustness sweep: some 300 problems, how many converge by each method, and at what cost.
 
-`python3 -m scripts.studies.sweep [--out DIR] [--coarse] [--methods newton uzawa] [--only NAME]`,
-also under mpirun. The problems are drawn once, with a fixed seed, from the ranges below.
+`python3 -m scripts.studies.sweep [--out DIR] [--coarse] [--methods newton uzawa] [--only NAME]
+[--hard]`, also under mpirun. The problems are drawn once, with a fixed seed, from the ranges
+below; with --hard from those of `hard_problems`.
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ from contact import build_problem, solve_problem
 from contact.case.file import Case, parse_case
 from contact.methods.options import with_method
 from scripts.reporting import Report, parser
+from scripts.studies import hard_problems
 
 METHODS = ("newton", "uzawa")
 #: How many problems of each family; --coarse takes a tenth.
@@ -194,11 +196,15 @@ def block(rng: np.random.Generator) -> dict[str, Any]:
 FAMILIES = {"bar": bar, "piezo": piezo, "layer": layer, "hertz": hertz, "block": block}
 
 
-def problems(coarse: bool, only: str | None = None) -> Iterator[tuple[str, Case]]:
+def problems(
+    coarse: bool, only: str | None = None, hard: bool = False
+) -> Iterator[tuple[str, Case]]:
     """Draw the problems, the same ones on every machine and rank."""
-    for number, (name, draw) in enumerate(FAMILIES.items()):
-        rng = np.random.default_rng([SEED, number])
-        for k in range(COUNTS[name] // 10 if coarse else COUNTS[name]):
+    families = hard_problems.FAMILIES if hard else FAMILIES
+    counts = hard_problems.COUNTS if hard else COUNTS
+    for number, (name, draw) in enumerate(families.items()):
+        rng = np.random.default_rng([SEED, hard, number] if hard else [SEED, number])
+        for k in range(counts[name] // 10 if coarse else counts[name]):
             case = parse_case(draw(rng), source=f"{name}-{k}")
             if only is None or case.source == only or name == only:
                 yield name, case
@@ -209,11 +215,12 @@ def main(arguments: Sequence[str] | None = None) -> None:
     command = parser(__doc__, "sweep")
     command.add_argument("--methods", nargs="+", default=list(METHODS), choices=METHODS)
     command.add_argument("--only", help="a family, or one problem such as bar-7")
+    command.add_argument("--hard", action="store_true", help="those that bend, stick and stretch")
     given = command.parse_args(arguments)
     rows: dict[str, list[Any]] = {
         key: [] for key in ("problem", "method", "converged", "solves", "seconds", "why")
     }
-    for _, case in problems(given.coarse, given.only):
+    for _, case in problems(given.coarse, given.only, given.hard):
         problem = build_problem(case)
         for method in given.methods:
             begin = time.perf_counter()
@@ -236,8 +243,9 @@ def main(arguments: Sequence[str] | None = None) -> None:
             if MPI.COMM_WORLD.rank == 0 and (not solution.converged or fallback):
                 print(*row, flush=True)
     report = Report(given.out)
-    report.numbers("sweep", rows)
-    report.table("sweep-summary", "Robustness sweep", summary(rows, given.methods))
+    name = "sweep-hard" if given.hard else "sweep"
+    report.numbers(name, rows)
+    report.table(f"{name}-summary", "Robustness sweep", summary(rows, given.methods))
 
 
 def summary(rows: dict[str, list[Any]], methods: Sequence[str]) -> dict[str, list[Any]]:
