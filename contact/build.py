@@ -10,6 +10,7 @@ import numpy as np
 from mpi4py import MPI
 from ufl.core.expr import Expr
 
+from contact.blame import to_blame
 from contact.body.description import Body, Fixed, Load
 from contact.case import file as sections
 from contact.case.formula import Expression
@@ -93,9 +94,12 @@ def build_problem(
         loads = problem.equilibrium.external()
         finite = bool(np.isfinite(loads).all())
         if not domain.comm.allreduce(finite, op=MPI.LAND):
-            raise InputError("load: a formula is not finite everywhere on its part")
+            key = to_blame(body.loads, domain)
+            raise InputError(f"{key}: a formula is not finite everywhere on its part")
         largest = float(np.abs(loads).max(initial=0.0))
-        _check_range("load", domain.comm.allreduce(largest, op=MPI.MAX), least=0.0)
+        largest = domain.comm.allreduce(largest, op=MPI.MAX)
+        if largest > HUGE:
+            _check_range(to_blame(body.loads, domain), largest)
         check_held(problem)
     return problem
 
@@ -201,11 +205,13 @@ def _load(i: int, section: sections.Load, comm: MPI.Intracomm) -> Load:
     key = f"load.{i}"
     force = section.body_force if section.everywhere else section.traction
     charge = section.body_charge if section.everywhere else section.charge
+    names = ("body_force", "body_charge") if section.everywhere else ("traction", "charge")
+    along = [NodalField(f"{key}.{names[0]}.{k}", f, comm) for k, f in enumerate(force or ())]
     return Load(
         None if section.everywhere else section.on,
-        None if force is None else [NodalField(key, f, comm) for f in force],
-        _field(key, section.pressure, comm),
-        _field(key, charge, comm),
+        along or None,
+        _field(f"{key}.pressure", section.pressure, comm),
+        _field(f"{key}.{names[1]}", charge, comm),
     )
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import math
 import os
 
@@ -17,6 +18,14 @@ from contact.mesh.reader import from_msh, from_recipe
 #: Bytes that making the mesh takes for a cell, without any unknowns (seen: 235 to 345).
 CELL_MEMORY = 200
 
+#: Seconds that it takes for a cell (seen: 5e-6 to 7e-6).
+CELL_SECONDS = 6e-6
+
+#: Number of cells from which on there is a word on what they take: about a minute.
+MANY = 10_000_000
+
+logger = logging.getLogger("contact.mesh")
+
 
 def make_domain(section: Mesh, comm: MPI.Intracomm) -> Domain:
     """Make the domain that the section ``[mesh]`` of a case file describes. Collective.
@@ -30,9 +39,10 @@ def make_domain(section: Mesh, comm: MPI.Intracomm) -> Domain:
     if section.file is not None:
         domain = from_msh(comm, section.file)
     elif section.sides:
+        flat = section.generator == "rectangle"
         # Triangles of a square, tetrahedra of a cube.
-        cells = math.prod(section.cells or ()) * (2 if section.generator == "rectangle" else 6)
-        _check_memory(comm, cells)
+        each = (4 if section.diagonal == "crossed" else 2) if flat else 6
+        _check_memory(comm, each * math.prod(section.cells or ()), section.refine, 2 if flat else 3)
         # The section itself demands these three for a grid.
         assert section.origin is not None
         assert section.size is not None
@@ -47,21 +57,33 @@ def make_domain(section: Mesh, comm: MPI.Intracomm) -> Domain:
         domain = from_recipe(comm, section.generator, **section.parameters)
     axis = section.axis or (0.0, 1.0, 0.0)
     rotate(domain.mesh, section.rotation, axis if domain.dim == 3 else (0.0, 0.0, 1.0))
-    for _ in range(section.refine):
+    if not section.sides:
         cells = domain.mesh.topology.index_map(domain.dim).size_global
-        _check_memory(comm, cells * 2**domain.dim)
+        _check_memory(comm, cells, section.refine, domain.dim)
+    for _ in range(section.refine):
         domain = refined(domain)
     return domain
 
 
-def _check_memory(comm: MPI.Intracomm, cells: int) -> None:
-    """Refuse a mesh that certainly does not fit, before the system ends the program for it."""
+def _check_memory(comm: MPI.Intracomm, cells: int, refine: int, dim: int) -> None:
+    """Refuse a mesh that certainly does not fit, before anything is made of it.
+
+    Say of a large one what it takes, for that may be long.
+    """
+    total = cells * 2 ** (dim * refine)
     machine = os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
     memory = comm.allreduce(machine, op=MPI.MIN)
-    needed = cells * CELL_MEMORY / comm.size
+    needed = total * CELL_MEMORY / comm.size
+    what = f"mesh.refine: {refine} refinements of {cells:.3g} cells, " if refine else "mesh: "
     if needed > memory:
         raise InputError(
-            f"mesh: {cells:.3g} cells take more memory, {needed / 1e9:.3g} GB a rank, than there "
+            f"{what}{total:.3g} cells take more memory, {needed / 1e9:.3g} GB a rank, than there "
             f"is, {memory / 1e9:.3g} GB; accepted: fewer cells (mesh.cells, mesh.refine), or more "
             "ranks on more machines"
+        )
+    if total > MANY and comm.rank == 0:
+        seconds = total * CELL_SECONDS / comm.size
+        logger.warning(
+            f"{what}{total:.3g} cells: their mesh alone takes some {needed / 1e9:.2g} GB a rank "
+            f"and {seconds:.2g} s"
         )

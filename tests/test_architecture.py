@@ -19,7 +19,7 @@ LAYERS = (
     {"methods"},
     {"output"},
     {"case"},
-    {"build", "meshing", "nesting", "solving"},
+    {"blame", "build", "meshing", "nesting", "solving"},
     {"cli"},
 )
 

@@ -3,13 +3,19 @@
 from __future__ import annotations
 
 import difflib
-from collections.abc import Iterable, Iterator
+import math
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import fields, is_dataclass
 from typing import TYPE_CHECKING, Any
+
+from pydantic import BaseModel
 
 from contact.case.body import Piezo
 from contact.case.formula import Expression
 from contact.case.interface import Plane, Sphere
+from contact.case.showing import listed
 from contact.case.types import Words, fault
+from contact.tolerances import HUGE
 
 if TYPE_CHECKING:
     from contact.case.file import Case
@@ -17,6 +23,7 @@ if TYPE_CHECKING:
 
 def check_sections(case: Case) -> None:
     """Raise a fault if sections contradict each other."""
+    check_sizes(case)
     if case.material.piezo is None:
         _check_mechanical(case)
     else:
@@ -33,6 +40,36 @@ def check_sections(case: Case) -> None:
     if case.mesh.dimension is not None:
         _check_vectors(case, case.mesh.dimension)
         _check_parts(case, [*case.mesh.sides, *case.mesh.parts])
+
+
+def check_sizes(case: Case) -> None:
+    """Raise a fault if a number is so large or so small that its square is none any more."""
+    for path, number in _numbers((), case):
+        if number != 0 and math.isfinite(number) and not 1 / HUGE <= abs(number) <= HUGE:
+            accepted = f"0, or sizes from {1 / HUGE:g} to {HUGE:g}, whose squares do not overflow"
+            raise fault(".".join(path), number, accepted)
+
+
+def _numbers(path: tuple[str, ...], value: Any) -> Iterator[tuple[tuple[str, ...], float]]:
+    """Give all numbers below a value of the case, with their paths."""
+    match value:
+        case Expression():
+            if value.is_constant:
+                yield path, value.value
+        case int() | float():
+            yield path, value
+        case tuple():
+            for i, entry in enumerate(value):
+                yield from _numbers((*path, str(i)), entry)
+        case Mapping():
+            for key, entry in value.items():
+                yield from _numbers((*path, key), entry)
+        case BaseModel():
+            for name, field in type(value).model_fields.items():
+                yield from _numbers((*path, field.alias or name), getattr(value, name))
+        case _ if is_dataclass(value):
+            for entry in fields(value):
+                yield from _numbers((*path, entry.name), getattr(value, entry.name))
 
 
 def check_mesh(case: Case, dimension: int, parts: Iterable[str]) -> None:
@@ -147,4 +184,4 @@ def _check_parts(case: Case, parts: list[str]) -> None:
         if name not in parts:
             near = difflib.get_close_matches(name, parts, n=1)
             hint = f" (did you mean {near[0]}?)" if near else ""
-            raise fault(path, name, f"a part of the mesh: {', '.join(sorted(parts))}{hint}")
+            raise fault(path, name, f"a part of the mesh: {listed(sorted(parts))}{hint}")

@@ -6,6 +6,8 @@
 
 from __future__ import annotations
 
+import re
+import sys
 import tomllib
 from collections.abc import Iterable, Mapping
 from pathlib import Path
@@ -21,6 +23,7 @@ from contact.case.interface import Contact, Electric, Friction, Plane, SlipLaw, 
 from contact.case.mesh import Mesh, Piece
 from contact.case.messages import describe, describe_fault
 from contact.case.overrides import override
+from contact.case.showing import clipped
 from contact.case.solver import DEFAULT, Solver
 from contact.case.types import FromTable, Section, Text, as_tuple
 from contact.errors import InputError
@@ -160,14 +163,24 @@ def load_case(path: str | Path, overrides: Mapping[str, str] | Iterable[str] = (
         given and what is accepted.
     """
     path = Path(path)
+    text = ""
     try:
-        data = tomllib.loads(path.read_bytes().decode("utf-8-sig"))
+        text = path.read_bytes().decode("utf-8-sig")
+        data = tomllib.loads(text)
     except OSError as error:
         reason = error.strerror or "not readable"
         raise InputError(f"{path}: {reason}; accepted: a case file (TOML)") from None
     except UnicodeDecodeError:
         raise InputError(f"{path}: not a text in UTF-8; accepted: a case file (TOML)") from None
     except (tomllib.TOMLDecodeError, RecursionError) as error:
-        raise InputError(f"{path}: not a TOML file: {error}") from None
+        raise InputError(f"{path}: not a TOML file: {clipped(str(error), 200)}") from None
+    except ValueError:
+        # Python reads whole numbers up to a limit of digits only.
+        digits = sys.get_int_max_str_digits()
+        long = re.search(rf"[0-9_]{{{digits + 1},}}", text)
+        place = f": line {text.count(chr(10), 0, long.start()) + 1}" if long else ""
+        raise InputError(
+            f"{path}{place}: a number of more than {digits} digits; accepted: shorter ones"
+        ) from None
     override(data, overrides, str(path))
     return parse_case(data, path.parent, str(path))

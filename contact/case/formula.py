@@ -14,8 +14,8 @@ from contact.case.grammar import (
     coordinates,
     evaluate,
     parse,
-    shown,
 )
+from contact.case.showing import shown
 from contact.errors import InputError
 from forms import ops
 
@@ -50,7 +50,11 @@ class Expression:
     def __init__(self, source: float | str) -> None:
         if isinstance(source, bool) or not isinstance(source, int | float | str):
             raise InputError(f"{source!r} is neither a number nor a formula")
-        self.source = source if isinstance(source, str) else float(source)
+        try:
+            self.source = source if isinstance(source, str) else float(source)
+        except OverflowError:
+            # A whole number may be as long as it likes.
+            raise InputError(f"{shown(source)} is not finite; accepted: finite numbers") from None
         self._tree = parse(self.source)
         self.names = frozenset(COORDINATES[i] for i in coordinates(self._tree))
 

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import ast
 import itertools
-import json
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -16,6 +15,7 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
+from contact.case.showing import shown
 from contact.errors import InputError
 from forms import ops
 
@@ -83,12 +83,6 @@ class Call:
 
 
 Tree: TypeAlias = Number | Coordinate | Call
-
-
-def shown(given: Any) -> str:
-    """Show what the user gave as in the case file, on one line and not too long."""
-    text = str(given) if isinstance(given, float) else json.dumps(given, default=str)
-    return text if len(text) <= 60 else text[:57] + "..."
 
 
 def parse(source: float | str) -> Tree:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Annotated, Any, Literal, TypeAlias
 
-from pydantic import Discriminator, Field, Tag, model_validator
+from pydantic import BeforeValidator, Discriminator, Field, Tag, model_validator
 
 from contact.case.formula import Expression
 from contact.case.types import (
@@ -54,9 +54,16 @@ def _shape(given: Any) -> str:
     return "Sphere" if shape == "sphere" else "Plane"
 
 
+def _with_shape(given: Any) -> Any:
+    if isinstance(given, Mapping) and "shape" not in given:
+        raise fault("shape", Words("missing"), SHAPES.text)
+    return given
+
+
 Foundation: TypeAlias = Annotated[
     Annotated[Plane, Tag("Plane")] | Annotated[Sphere, Tag("Sphere")],
     Discriminator(_shape),
+    BeforeValidator(_with_shape),
     Accepted(
         'a table { shape = "plane", point, normal } or { shape = "sphere", centre, radius, inside }'
     ),

@@ -4,13 +4,21 @@ from __future__ import annotations
 
 import difflib
 from collections.abc import Iterable, Mapping
-from typing import Any, get_origin
+from typing import Any, Literal, get_args, get_origin
 
 from pydantic import ValidationError
 from pydantic_core import ErrorDetails, PydanticCustomError
 
-from contact.case.grammar import shown
+from contact.case.body import Load
+from contact.case.showing import listed, path_of, shown
 from contact.case.types import UNKNOWN, Section, Words, accepted_by, keys_of, sections_of
+
+#: What a user may look for in a load, and where it is.
+FORCES = {
+    key: "a load is given per area, traction = resultant / area of the part, or per volume, "
+    "body_force"
+    for key in ("force", "resultant", "forces")
+}
 
 #: What pydantic calls an unknown key, of a section and of a class of options.
 UNKNOWN_KEY = ("extra_forbidden", "unexpected_keyword_argument")
@@ -32,10 +40,10 @@ def describe_fault(error: PydanticCustomError) -> str:
 
 
 def _fault(keys: list[str], key: str, given: Any, accepted: str) -> str:
-    keys = [*keys, key]
+    keys = [*keys, *key.split(".")]
     if given is UNKNOWN:
         return _unknown(keys, accepted.split(", "))
-    return f"{'.'.join(keys)}: {_given(given)}; accepted: {accepted}"
+    return f"{path_of(keys)}: {_given(given)}; accepted: {accepted}"
 
 
 def _message(error: ErrorDetails, root: type[Section]) -> str:
@@ -45,14 +53,16 @@ def _message(error: ErrorDetails, root: type[Section]) -> str:
     if kind == "fault":
         return _fault(keys, **context)
     if kind in UNKNOWN_KEY:
+        key = str(error["loc"][-1])
         options = dict.fromkeys(key for section in sections for key in keys_of(section))
-        return _unknown([*keys, str(error["loc"][-1])], options)
+        others = _locate(error["loc"][:-2], root)[1]
+        return _unknown([*keys, key], options, _hint(key, sections, others, root))
     if kind == "value_error":
         # Raised by a formula, whose message is complete.
-        return f"{'.'.join(keys)}: {context['error']}"
+        return f"{path_of(keys)}: {context['error']}"
     if kind == "missing":
         given = "missing"
-    return f"{'.'.join(keys)}: {given}; accepted: {accepted}"
+    return f"{path_of(keys)}: {given}; accepted: {accepted}"
 
 
 def _given(value: Any) -> str:
@@ -63,11 +73,49 @@ def _given(value: Any) -> str:
     return f"given {shown(value)}"
 
 
-def _unknown(keys: list[str], accepted: Iterable[str]) -> str:
+def _unknown(keys: list[str], accepted: Iterable[str], hint: str = "") -> str:
     options = list(accepted)
     near = difflib.get_close_matches(keys[-1], options, n=1)
-    hint = f", did you mean {near[0]}?" if near else ""
-    return f"{'.'.join(keys)}: unknown key{hint}; accepted: {', '.join(options)}"
+    if near and not hint:
+        hint = f", did you mean {near[0]}?"
+    return f"{path_of(keys)}: unknown key{hint}; accepted: {listed(options)}"
+
+
+def _hint(key: str, sections: list[type], others: list[type], root: type[Section]) -> str:
+    """Return what there is to say of an unknown key that has a meaning elsewhere.
+
+    Parameters
+    ----------
+    key
+        The key.
+    sections, others
+        What it was given to; what could stand there as well.
+    root
+        The whole case.
+    """
+    field = keys_of(root).get(key)
+    if field is not None and sections_of(field.annotation):
+        table = f"[[{key}]]" if get_origin(field.annotation) is tuple else f"[{key}]"
+        return f" here: {table} is a table of its own, at the top level"
+    if Load in sections and key in FORCES:
+        return f": {FORCES[key]}"
+    for section in sections:
+        kind = _kind(section)
+        for other in others:
+            if kind and other is not section and key in keys_of(other):
+                return f" with {kind}: it belongs to {_kind(other)}"
+        if kind:
+            near = difflib.get_close_matches(key, keys_of(section), n=1)
+            return f" with {kind}" + (f", did you mean {near[0]}?" if near else "")
+    return ""
+
+
+def _kind(section: type) -> str:
+    """Return the key that tells a section from others in its place, with its value."""
+    for key, field in keys_of(section).items():
+        if get_origin(field.annotation) is Literal and len(get_args(field.annotation)) == 1:
+            return f"{key} = {shown(get_args(field.annotation)[0])}"
+    return ""
 
 
 def _locate(

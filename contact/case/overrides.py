@@ -6,8 +6,14 @@ import tomllib
 from collections.abc import Iterable, Mapping
 from typing import Any
 
-from contact.case.grammar import shown
+from contact.case.showing import clipped, path_of, shown
 from contact.errors import InputError
+
+#: Most keys above the last one of a path: no table lies as deep.
+DEEPEST = 15
+
+#: Most digits of a number of a list's entry.
+LONGEST_INDEX = 9
 
 
 def override(
@@ -37,10 +43,14 @@ def override(
         _assign(data, path.strip(), _value(path, text.strip(), source), source)
 
 
+def _refusal(source: str, path: str, words: str) -> InputError:
+    return InputError(f"{source}: --set {clipped(path)}: {words}")
+
+
 def _split(text: str, source: str) -> tuple[str, str]:
     path, equals, value = text.partition("=")
     if not equals or not path.strip():
-        raise InputError(f"{source}: --set {text}: no assignment; accepted: path.to.key=value")
+        raise _refusal(source, text, "no assignment; accepted: path.to.key=value")
     return path, value
 
 
@@ -51,15 +61,21 @@ def _value(path: str, text: str, source: str) -> Any:
     except (tomllib.TOMLDecodeError, RecursionError) as error:
         if text and text[0] not in "[{\"'":
             return text
-        raise InputError(
-            f"{source}: --set {path}: {shown(text)} is broken ({error}); accepted: a TOML value"
-        ) from None
+        words = f"{shown(text)} is broken ({clipped(str(error))}); accepted: a TOML value"
+        raise _refusal(source, path, words) from None
+    except ValueError:
+        # Python reads whole numbers up to a limit of digits only.
+        words = f"{shown(text)} has too many digits; accepted: a TOML value"
+        raise _refusal(source, path, words) from None
     # A value with line breaks could smuggle in further keys.
     return table["value"] if set(table) == {"value"} else text
 
 
 def _assign(data: dict[str, Any], path: str, value: Any, source: str) -> None:
     *parents, last = path.split(".")
+    if len(parents) > DEEPEST:
+        words = f"{len(parents) + 1} keys deep; accepted: at most {DEEPEST + 1}"
+        raise _refusal(source, path, words)
     place: Any = data
     for i, key in enumerate(parents):
         if isinstance(place, dict):
@@ -67,10 +83,8 @@ def _assign(data: dict[str, Any], path: str, value: Any, source: str) -> None:
         else:
             place = place[_index(place, key, parents[:i], path, source)]
         if not isinstance(place, dict | list):
-            raise InputError(
-                f"{source}: --set {path}: {'.'.join(parents[: i + 1])} is {shown(place)}, "
-                "no table; accepted: keys of tables"
-            )
+            words = f"{path_of(parents[: i + 1])} is {shown(place)}, no table"
+            raise _refusal(source, path, f"{words}; accepted: keys of tables")
     if isinstance(place, dict):
         place[last] = value
     else:
@@ -78,9 +92,9 @@ def _assign(data: dict[str, Any], path: str, value: Any, source: str) -> None:
 
 
 def _index(place: list[Any], key: str, above: list[str], path: str, source: str) -> int:
-    if not key.isascii() or not key.isdigit() or int(key) >= len(place):
+    number = key.isascii() and key.isdigit() and len(key) <= LONGEST_INDEX
+    if not number or int(key) >= len(place):
         accepted = f"0 to {len(place) - 1}" if len(place) > 1 else "0" if place else "none"
-        raise InputError(
-            f"{source}: --set {path}: {'.'.join(above)} has no entry {key}; accepted: {accepted}"
-        )
+        words = f"{path_of(above)} has no entry {clipped(key)}; accepted: {accepted}"
+        raise _refusal(source, path, words)
     return int(key)

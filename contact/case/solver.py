@@ -8,7 +8,7 @@ from typing import Annotated, Any, TypeAlias
 
 from pydantic import AfterValidator, BeforeValidator, Discriminator, PlainSerializer, Tag
 
-from contact.case.grammar import shown
+from contact.case.showing import shown
 from contact.case.types import UNKNOWN, FromTable, either, fault
 from contact.methods.options import (
     OPTIONS,

@@ -24,6 +24,12 @@ BOX_SIDES = {
 }
 
 
+#: Shortest edge of a rectangle or box that dolfinx takes for one.
+SHORTEST = float(np.finfo(np.float64).eps)
+
+#: Most that a cell may be stretched: far beyond use, and rounding leaves the rest some digits.
+STRETCHED = 1e6
+
 #: Generator -> its sides.
 SIDES = {"rectangle": RECTANGLE_SIDES, "box": BOX_SIDES}
 
@@ -182,6 +188,7 @@ def plan(
     low = np.asarray(origin, dtype=np.float64)
     extent = np.asarray(size, dtype=np.float64)
     grid = low, low + extent, extent / np.asarray(cells)
+    _check_sizes(grid, size)
     patches = {side: [_patch("", Piece(side), grid, sides)] for side in sides}
     for name, pieces in parts.items():
         key = f"parts.{name}"
@@ -192,6 +199,26 @@ def plan(
         else:
             patches[name] = [_patch(f"{key}.{i}", p, grid, sides) for i, p in enumerate(pieces)]
     return grid, patches
+
+
+def _check_sizes(grid: _Grid, size: Sequence[float]) -> None:
+    """Refuse edges from which no mesh can be made, before they are blamed on its parts."""
+    low, high, h = grid
+    if not np.all(high - low > SHORTEST):
+        i = int(np.argmin(high - low))
+        raise GridError(
+            f"size.{i}",
+            size[i],
+            f"sizes above {SHORTEST:.2g}, also beside the origin; choose another unit of length",
+        )
+    odd = int(np.argmax(np.abs(np.log10(h))))  # the one to blame is not of the size of 1
+    if np.max(h) > STRETCHED * np.min(h):
+        raise GridError(
+            f"size.{odd}",
+            size[odd],
+            f"cells of which one edge is at most {STRETCHED:g} times as long as another; here it "
+            f"is {np.max(h) / np.min(h):.2g}",
+        )
 
 
 def _patch(key: str, piece: Piece, grid: _Grid, sides: Mapping[str, tuple[int, int]]) -> _Patch:

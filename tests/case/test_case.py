@@ -160,7 +160,10 @@ electrode = [{"on": "left", "displacement": [0, 0], "potential": 0}]
 BAD = {
     "unknown section": ({"meterial__young": 1}, "meterial: unknown key, did you mean material?"),
     "unknown key": ({"material__yung": 1}, "material.yung: unknown key, did you mean young?"),
-    "unknown key deep": ({"friction__mu__roh": 1}, "friction.mu.roh: unknown key, did you mean"),
+    "unknown key deep": (
+        {"friction__mu__roh": 1},
+        'friction.mu.roh: unknown key with law = "slip", did you mean rho?',
+    ),
     "unknown key in a list": ({"load__0__tracton": 1}, "load.0.tracton: unknown key"),
     "no mesh": ({"mesh": None}, "mesh: missing; accepted: a table"),
     "no material": ({"material": None}, "material: missing"),
@@ -339,7 +342,10 @@ BAD = {
         "between 0 and 2, both excluded",
     ),
     "method as a list": ({"solver__method": ["newton"]}, 'solver.method: given ["newton"]'),
-    "unknown setting": ({"solver__tolerence": 1}, "solver.tolerence: unknown key, did you mean to"),
+    "unknown setting": (
+        {"solver__tolerence": 1},
+        'solver.tolerence: unknown key with method = "newton", did you mean tolerance?',
+    ),
     "a setting of Python's": ({"solver__gamma": 1.0}, "solver.gamma: unknown key; accepted: met"),
     "nested meshes of another method": (
         {"solver": {"method": "penalty", "nested": True}},

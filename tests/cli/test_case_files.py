@@ -95,9 +95,9 @@ WRONG = {
     ),
     "a formula with a mistake": ("-0.001", '"-0.001*(x"', ["load.0.traction", "not a formula"]),
     "a formula that would run code": ("-0.001", '"__import__(x)"', ["load.0.traction"]),
-    "a load that is not finite": ("-0.001", '"log(x-1)"', ["load"]),
-    "a load that overflows": ("-0.001", "-1e300", ["load", "5e+299", "overflow"]),
-    "a load formula that overflows": ("-0.001", '"-1e200*x"', ["load", "overflow"]),
+    "a load that is not finite": ("-0.001", '"log(x-1)"', ["load.0.traction.1", "not finite"]),
+    "a load that overflows": ("-0.001", "-1e300", ["load.0.traction.1", "-1e+300", "overflow"]),
+    "a load formula that overflows": ("-0.001", '"-1e200*x"', ["load.0.traction.1", "overflow"]),
     "a displacement that overflows": (
         "[0.0, 0.0]",
         "[0.0, 1e300]",
