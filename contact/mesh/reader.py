@@ -1,13 +1,16 @@
 """Meshes from Gmsh: ``.msh`` files and recipes, with physical groups as parts.
 
-Gmsh runs on rank 0 alone. What it finds is checked there, the verdict is broadcast, and
+Gmsh runs for rank 0 alone. What it finds is checked there, the verdict is broadcast, and
 all ranks go on or raise together.
 """
 
 import codecs
 import logging
+import os
 import re
 import shutil
+import subprocess
+import sys
 import tempfile
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -24,10 +27,14 @@ from mpi4py import MPI
 
 from contact.errors import InputError
 from contact.mesh.domain import Domain, Indices, exterior_facets, with_names
-from contact.mesh.extraction import extract
+from contact.mesh.extraction import Model, extract
 from contact.mesh.validity import Cells, Groups, check_model
 
 logger = logging.getLogger("contact.mesh")
+
+#: Seconds that reading a file may take, whatever its length, and for each byte of it: ten times
+#: what it takes on a machine that others use, too.
+LEAST_TIME, TIME_A_BYTE = 60.0, 5e-6
 
 #: Byte order mark, with which some editors begin a file.
 BOM = codecs.BOM_UTF8
@@ -49,22 +56,37 @@ def from_msh(comm: MPI.Intracomm, path: str | Path) -> Domain:
         straight-sided triangles or tetrahedra, degenerate or overlapping cells, or a group
         that is not part of the boundary. The message names the file.
     """
+    return _from_rank_0(comm, lambda: _read(Path(path)), f"mesh file {path}")
 
-    def fill(gmsh: Any) -> bool:
-        file = Path(path)
-        version = _format(file)
-        # Format 2 names the group of each element, but Gmsh keeps one set of groups an entity.
-        # With the two tags of an element switched, the entities are the groups.
-        switch = version < 4
-        gmsh.option.setNumber("Mesh.SwitchElementTags", switch)
+
+def _read(file: Path) -> Model:
+    """Read a mesh file in a process of its own, see `contact.mesh.extraction`."""
+    command = [sys.executable, "-P", "-m", "contact.mesh.extraction"]
+    switch = "switch" if _format(file) < 4 else "as they are"
+    limit = LEAST_TIME + TIME_A_BYTE * file.stat().st_size
+    # What this process imports, the other can import too.
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(map(os.path.abspath, sys.path))}
+    with _plain_name(file) as plain:
+        out = plain.with_name("model.npz")
         try:
-            with _plain_name(file) as plain:
-                gmsh.merge(str(plain))
-        finally:
-            gmsh.option.setNumber("Mesh.SwitchElementTags", 0)
-        return switch
-
-    return _from_gmsh(comm, fill, f"mesh file {path}")
+            done = subprocess.run(
+                [*command, str(plain), switch, str(out)],
+                env=environment,
+                stdin=subprocess.DEVNULL,
+                stdout=subprocess.PIPE,
+                stderr=subprocess.DEVNULL,
+                timeout=limit,
+            )
+        except subprocess.TimeoutExpired:
+            raise InputError(f"Gmsh does not come to an end with it in {limit:.0f} s") from None
+        if done.returncode != 0:
+            raise InputError(
+                f"Gmsh breaks off reading it (status {done.returncode}): it is damaged"
+            )
+        if not out.exists():
+            said = " ".join(done.stdout.decode(errors="replace").split())
+            raise InputError(f"Gmsh says: {said}")
+        return Model.load(out)
 
 
 def _format(file: Path) -> int:
@@ -115,26 +137,22 @@ def from_recipe(comm: MPI.Intracomm, name: str, **parameters: Any) -> Domain:
     """
     import meshes
 
-    def fill(gmsh: Any) -> bool:
-        meshes.build(name, **parameters)
-        return False
+    def build() -> Model:
+        with _gmsh() as gmsh:
+            meshes.build(name, **parameters)
+            return extract(gmsh.model, entities_are_groups=False)
 
-    return _from_gmsh(comm, fill, f"mesh generator {name!r}")
+    return _from_rank_0(comm, build, f"mesh generator {name!r}")
 
 
-def _from_gmsh(comm: MPI.Intracomm, fill: Callable[[Any], bool], what: str) -> Domain:
-    """Fill a Gmsh model on rank 0, check it and distribute it."""
+def _from_rank_0(comm: MPI.Intracomm, load: Callable[[], Model], what: str) -> Domain:
+    """Check on rank 0 what ``load`` makes there, and distribute it."""
     raw, problem = None, None
     if comm.rank == 0:
         try:
-            raw = _run_gmsh(fill)
+            raw = check_model(load())
         except InputError as error:
             problem = str(error)
-        except Exception as error:
-            # Gmsh's errors are of this very class; anything else is a fault of the program.
-            if type(error) is not Exception:
-                raise
-            problem = f"Gmsh says: {error}"
     problem = comm.bcast(problem)
     if problem is not None:
         raise InputError(f"{what}: {problem}")
@@ -171,11 +189,9 @@ def _sets(mesh: dmesh.Mesh, dim: int, groups: Groups) -> dict[str, Indices]:
     return {name: indices[np.isin(values, labels)] for name, labels in labels_of.items()}
 
 
-def _run_gmsh(fill: Callable[[Any], bool]) -> Cells:
-    """Return the mesh of a model that ``fill`` makes, leaving a running Gmsh as it was.
-
-    ``fill`` returns whether the model's entities are the groups themselves.
-    """
+@contextmanager
+def _gmsh() -> Iterator[Any]:
+    """Provide a new model of Gmsh, leaving a running Gmsh as it was."""
     try:
         import gmsh
     except (ImportError, OSError) as error:  # OSError: one of its shared libraries is missing.
@@ -188,7 +204,12 @@ def _run_gmsh(fill: Callable[[Any], bool]) -> Cells:
     gmsh.option.setNumber("General.Terminal", 0)
     gmsh.model.add("contact")
     try:
-        return check_model(extract(gmsh.model, fill(gmsh)))
+        yield gmsh
+    except Exception as error:
+        # Gmsh's errors are of this very class; anything else is a fault of the program.
+        if type(error) is not Exception:
+            raise
+        raise InputError(f"Gmsh says: {error}") from error
     finally:
         gmsh.model.remove()
         gmsh.option.setNumber("General.Terminal", terminal)
