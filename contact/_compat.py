@@ -1,7 +1,10 @@
 """Differences between dolfinx 0.9, 0.10 and 0.11, and between their PETSc."""
 
+import inspect
+
 import numpy as np
 import numpy.typing as npt
+from dolfinx import fem
 from dolfinx.mesh import Mesh
 from petsc4py import PETSc
 
@@ -25,6 +28,17 @@ def original_cells(mesh: Mesh) -> npt.NDArray[np.int64]:
     original = mesh.topology.original_cell_index
     # One array a cell type since 0.10.
     return np.asarray(original[0] if isinstance(original, list) else original)
+
+
+def facet_entities(mesh: Mesh, facets: npt.NDArray[np.int32]) -> npt.NDArray[np.int32]:
+    """Exterior facets as pairs of a cell and a facet of it, to integrate over, flat.
+
+    The connectivities of facets to cells and back must be there.
+    """
+    compute = fem.compute_integration_domains
+    # The dimension of the entities is an argument up to 0.9 only.
+    dim = (mesh.topology.dim - 1,) if "dim" in inspect.signature(compute).parameters else ()
+    return np.asarray(compute(fem.IntegralType.exterior_facet, mesh.topology, facets, *dim))
 
 
 def keeps_inverted_blocks() -> bool:

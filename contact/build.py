@@ -72,7 +72,7 @@ def build_problem(
     with named(case.source):
         domain = make_domain(case.mesh, comm) if domain is None else domain
         _check_range("mesh", domain.size)
-        case.check_mesh(domain.dim, domain.parts)
+        case.check_mesh(domain.dim, domain.names)
         _check_loads(case, domain)
         law = material_law(case.material) if law is None else law
         _check_range("material.young", float(law.young))
@@ -115,9 +115,12 @@ def _check_range(key: str, value: float, least: float = 1 / HUGE) -> None:
 
 def _check_loads(case: sections.Case, domain: Domain) -> None:
     """Refuse loads on Gamma_3, where the foundation alone acts: Gamma_2 and Gamma_b exclude it."""
-    touched = set(domain.tag_values(case.contact.on))
+    touched = domain.facets(case.contact.on)
     for i, load in enumerate(case.load):
-        if load.on is not None and touched.intersection(domain.tag_values(load.on)):
+        if load.on is None:
+            continue
+        shared = bool(np.isin(domain.facets(load.on), touched).any())
+        if domain.comm.allreduce(shared, op=MPI.LOR):
             raise InputError(
                 f"load.{i}.on: {load.on} shares facets with the contact part {case.contact.on}; "
                 "accepted: parts beside it, or body forces"

@@ -12,8 +12,8 @@ from contact.case.mesh import Mesh
 from contact.errors import InputError
 from contact.mesh.domain import Domain, rotate
 from contact.mesh.grid import box, rectangle
-from contact.mesh.make import refined
 from contact.mesh.reader import from_msh, from_recipe
+from contact.mesh.refinement import refined
 
 #: Bytes that making the mesh takes for a cell, without any unknowns (seen: 235 to 345).
 CELL_MEMORY = 200

@@ -2,8 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
+from mpi4py import MPI
+
 from contact.case.file import Case
 from contact.case.text import to_toml
+from contact.mesh.domain import Indices
 from contact.output import environment
 from contact.problem.problem import ContactProblem
 
@@ -13,15 +18,16 @@ def describe(case: Case, problem: ContactProblem) -> str:
     domain, comm = problem.domain, problem.comm
     cells = domain.mesh.topology.index_map(domain.dim).size_global
     layout = problem.equilibrium.layout
-    counts = {name: comm.allreduce(domain.facets(name).size) for name in sorted(domain.parts)}
-    width = max(len(name) for name in counts)
     library = environment.blas()
     lines = [
         to_toml(case),
         f"# mesh: {cells} cells in {domain.dim}-D on {comm.size} rank(s), largest extent "
         f"{domain.size:g}",
         "# parts of its boundary, with their facets:",
-        *(f"#   {name:{width}}  {count}" for name, count in counts.items()),
+        *_sizes(domain.parts, comm),
+        "# regions, with their cells:",
+        *_sizes(domain.regions, comm),
+        *(f"# note: {note}" for note in domain.notes),
         f"# unknowns: {layout.unknowns} ({layout.block_size} a node), contact nodes: "
         f"{problem.nodes.size}",
         f"# blas: {library.name} {library.path}".rstrip(),
@@ -30,3 +36,9 @@ def describe(case: Case, problem: ContactProblem) -> str:
     if library.is_reference:
         lines.append(f"# {environment.ADVICE}")
     return "\n".join(lines)
+
+
+def _sizes(sets: Mapping[str, Indices], comm: MPI.Intracomm) -> list[str]:
+    """Return a line for each set of indices, with its number over all ranks. Collective."""
+    width = max(map(len, sets))
+    return [f"#   {name:{width}}  {comm.allreduce(sets[name].size)}" for name in sorted(sets)]

@@ -1,13 +1,14 @@
-"""A mesh and its boundary parts, by name.
+"""A mesh with names: parts of its boundary and regions of its cells.
 
-Parts may overlap (the side ``top`` and a piece ``loaded`` of it), while a facet tag holds
-one number. The tag of a facet is therefore a bit mask of the parts that it belongs to, and
-a part is the set of masks that contain its bit.
+Each name stands for one set of indices, so that parts, and regions, may overlap (the side
+``top`` and a piece ``loaded`` of it).
 """
 
 import difflib
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Any, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
@@ -15,38 +16,49 @@ import ufl
 from dolfinx import mesh as dmesh
 from mpi4py import MPI
 
+from contact import _compat
 from contact.errors import InputError
 
-#: Facet tags are 32-bit signed integers, one bit a part.
-MAX_PARTS = 31
+#: Indices of facets or cells that this rank owns, ascending.
+Indices: TypeAlias = npt.NDArray[np.int32]
+Marker: TypeAlias = Callable[[npt.NDArray[np.float64]], npt.NDArray[np.bool_]]
+
+#: The region of a mesh whose cells nothing tells apart.
+BODY = "body"
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Domain:
-    """A mesh with named boundary parts, made by the functions of `contact.mesh`.
+    """A mesh with named parts and regions, made by the functions of `contact.mesh`.
 
     Attributes
     ----------
     mesh
         Mesh of triangles or tetrahedra with straight edges.
-    facet_tags
-        The exterior facets that this rank owns, each with the bit mask of its parts (0: in none).
     parts
-        Name of a part -> the tag values, present on any rank, that contain the part. The same
-        on all ranks.
+        Name of a part of the boundary -> its facets that this rank owns. The same names in the
+        same order on all ranks.
+    regions
+        Name of a region -> its cells that this rank owns, likewise. Each mesh has one at least.
     size
         Largest extent of the bounding box of the whole mesh (of a generated one: before its
         rotation, so that lengths derived from it do not depend on the rotation).
     levels
         How often the mesh has been refined: 2**levels of its edges make up one straight edge of
         the mesh that met a curved boundary.
+    unusable
+        Name of a group of facets that cannot be a part -> what is wrong with it.
+    notes
+        What else the source of the mesh held, one sentence each.
     """
 
     mesh: dmesh.Mesh
-    facet_tags: dmesh.MeshTags
-    parts: Mapping[str, tuple[int, ...]]
+    parts: Mapping[str, Indices]
+    regions: Mapping[str, Indices]
     size: float
     levels: int = 0
+    unusable: Mapping[str, str] = field(default_factory=dict)
+    notes: tuple[str, ...] = ()
 
     @property
     def comm(self) -> MPI.Intracomm:
@@ -59,78 +71,180 @@ class Domain:
         return self.mesh.geometry.dim
 
     @property
-    def dx(self) -> ufl.Measure:
-        """Measure over the cells."""
-        return ufl.Measure("dx", domain=self.mesh)
+    def names(self) -> tuple[str, ...]:
+        """Names that `facets` and `ds` know, be it only to say what is wrong with one."""
+        return (*self.parts, *self.unusable)
 
-    def tag_values(self, name: str) -> tuple[int, ...]:
-        """Return the tag values that make up the part ``name``.
+    def facets(self, name: str) -> Indices:
+        """Local indices of the facets of part ``name`` that this rank owns, ascending.
 
         Raises
         ------
         InputError
             If there is no such part; the message names the nearest one and lists all.
         """
-        if name not in self.parts:
-            near = difflib.get_close_matches(str(name), self.parts, n=1)
-            hint = f"; did you mean {near[0]!r}?" if near else ""
-            raise InputError(
-                f"the mesh has no part {name!r}{hint} (its parts: {', '.join(sorted(self.parts))})"
-            )
-        return self.parts[name]
+        if name in self.unusable:
+            raise InputError(self.unusable[name])
+        return self.parts[_known("part", name, self.parts)]
 
-    def facets(self, name: str) -> npt.NDArray[np.int32]:
-        """Local indices of the facets of part ``name`` that this rank owns, ascending."""
-        chosen = np.isin(self.facet_tags.values, self.tag_values(name))
-        return self.facet_tags.indices[chosen]
+    def cells(self, name: str) -> Indices:
+        """Local indices of the cells of region ``name`` that this rank owns, ascending.
+
+        Raises
+        ------
+        InputError
+            If there is no such region, likewise.
+        """
+        return self.regions[_known("region", name, self.regions)]
 
     def ds(self, name: str) -> ufl.Measure:
-        """Measure over the facets of part ``name``."""
+        """Measure over the facets of part ``name``; raises as `facets`."""
+        self.facets(name)
         return ufl.Measure(
             "ds",
             domain=self.mesh,
-            subdomain_data=self.facet_tags,
-            subdomain_id=self.tag_values(name),
+            subdomain_data=self._facet_data,
+            subdomain_id=list(self.parts).index(name),
         )
 
+    @property
+    def dx(self) -> ufl.Measure:
+        """Measure over all cells."""
+        return ufl.Measure("dx", domain=self.mesh, subdomain_data=self._cell_data)
 
-def tagged(
+    def dx_in(self, name: str) -> ufl.Measure:
+        """Measure over the cells of region ``name``; raises as `cells`."""
+        self.cells(name)
+        return self.dx(list(self.regions).index(name))
+
+    # The integrals of a form must share one object of subdomain data for each kind of integral.
+
+    @cached_property
+    def _facet_data(self) -> list[tuple[int, Indices]]:
+        facets = self.parts.values()
+        return [(i, _compat.facet_entities(self.mesh, part)) for i, part in enumerate(facets)]
+
+    @cached_property
+    def _cell_data(self) -> list[tuple[int, Indices]]:
+        return list(enumerate(self.regions.values()))
+
+
+def _known(what: str, name: str, names: Mapping[str, Indices]) -> str:
+    if name in names:
+        return name
+    near = difflib.get_close_matches(str(name), names, n=1)
+    hint = f"; did you mean {near[0]!r}?" if near else ""
+    raise InputError(
+        f"the mesh has no {what} {name!r}{hint} (its {what}s: {', '.join(sorted(names))})"
+    )
+
+
+def from_mesh(
     mesh: dmesh.Mesh,
-    facets: npt.NDArray[np.int32],
-    marks: Mapping[str, npt.NDArray[np.bool_]],
+    parts: Mapping[str, Marker | npt.NDArray[np.integer[Any]]],
     size: float | None = None,
+    regions: Mapping[str, Marker | npt.NDArray[np.integer[Any]]] | None = None,
 ) -> Domain:
-    """Make a domain of a mesh and one mask over its exterior facets a part. Collective.
+    """Name parts of the boundary, and regions, of a dolfinx mesh. Collective.
 
     Parameters
     ----------
-    facets
-        Exterior facets that this rank owns, shape (n,), ascending.
-    marks
-        Part -> mask of shape (n,); the same names in the same order on all ranks.
+    mesh
+        Triangles or tetrahedra with straight edges.
+    parts
+        Name -> function of x, shape (3, n), that is true at all vertices of the part's facets;
+        or the local indices of the facets. The same names on all ranks.
+    size
+        Largest extent of the body; by default that of its bounding box.
+    regions
+        Name -> the like for cells; by default one region, ``body``.
+
+    Raises
+    ------
+    InputError
+        For other meshes, an empty part or region, or an interior facet in a part.
+    """
+    kinds = (dmesh.CellType.triangle, dmesh.CellType.tetrahedron)
+    tdim = mesh.topology.dim
+    flat = tdim == mesh.geometry.dim and _compat.geometry_degree(mesh) == 1
+    if mesh.topology.cell_type not in kinds or not flat:
+        raise InputError(
+            "the mesh must consist of triangles in the plane or of tetrahedra, "
+            "with straight edges (geometry of degree 1)"
+        )
+    boundary = exterior_facets(mesh)
+    chosen = {name: _owned(mesh, tdim - 1, given) for name, given in parts.items()}
+    for name, facets in chosen.items():
+        inside = int(np.count_nonzero(~np.isin(facets, boundary)))
+        if mesh.comm.allreduce(inside) > 0:
+            raise InputError(f"the part {name!r} contains interior facets of the mesh")
+    cells = {name: _owned(mesh, tdim, given) for name, given in (regions or {}).items()}
+    return with_names(mesh, chosen, cells, size)
+
+
+def _owned(mesh: dmesh.Mesh, dim: int, given: Marker | npt.NDArray[np.integer[Any]]) -> Indices:
+    """Return the owned ones of given entities, ascending."""
+    if not callable(given):
+        entities = np.asarray(given, dtype=np.int32)
+    elif dim == mesh.topology.dim:
+        entities = dmesh.locate_entities(mesh, dim, given)
+    else:
+        entities = dmesh.locate_entities_boundary(mesh, dim, given)
+    return np.unique(entities[entities < mesh.topology.index_map(dim).size_local])
+
+
+def with_names(
+    mesh: dmesh.Mesh,
+    parts: Mapping[str, Indices],
+    regions: Mapping[str, Indices],
+    size: float | None = None,
+) -> Domain:
+    """Make a domain of a mesh and its named exterior facets and cells. Collective.
+
+    Parameters
+    ----------
+    parts, regions
+        As in `Domain`; without regions, all cells are the region ``body``.
     size
         Largest extent of the body; computed if not given.
 
     Raises
     ------
     InputError
-        If a part has no facet on any rank, or there are too many parts.
+        If a part or a region is empty on all ranks.
     """
-    names = list(marks)
-    if len(names) > MAX_PARTS:
-        raise InputError(f"the mesh has {len(names)} boundary parts; at most {MAX_PARTS} can be")
-    values = np.zeros(facets.size, dtype=np.int32)
-    for bit, name in enumerate(names):
-        values[marks[name]] |= 1 << bit
-    present = mesh.comm.allgather(np.unique(values))
-    masks = np.unique(np.concatenate(present)).tolist()
-    parts = {name: tuple(m for m in masks if m >> bit & 1) for bit, name in enumerate(names)}
-    empty = [name for name, tag_values in parts.items() if not tag_values]
-    if empty:
-        raise InputError(f"the part {empty[0]!r} contains no facet of the mesh's boundary")
-    tags = dmesh.meshtags(mesh, mesh.topology.dim - 1, facets, values)
-    tags.name = "parts"
-    return Domain(mesh, tags, parts, _extent(mesh) if size is None else size)
+    exterior_facets(mesh)
+    if not regions:
+        count = mesh.topology.index_map(mesh.topology.dim).size_local
+        regions = {BODY: np.arange(count, dtype=np.int32)}
+    wholes = ("part", "facet of the mesh's boundary", parts), ("region", "cell", regions)
+    for what, of_it, sets in wholes:
+        counts = mesh.comm.allreduce(np.array([s.size for s in sets.values()], dtype=np.int64))
+        empty = [name for name, count in zip(sets, counts, strict=True) if count == 0]
+        if empty:
+            raise InputError(f"the {what} {empty[0]!r} contains no {of_it}")
+    return Domain(mesh, parts, regions, _extent(mesh) if size is None else size)
+
+
+def combinations(
+    count: int, groups: Iterable[npt.NDArray[np.integer[Any]]]
+) -> tuple[Indices, tuple[tuple[int, ...], ...]]:
+    """Write groups of indices that may overlap as one number an index.
+
+    Returns
+    -------
+    For each of the indices 0, ..., count - 1 a number, and for each number the groups, by their
+    positions, that the index is in.
+    """
+    numbers = np.zeros(count, dtype=np.int32)
+    combined: list[tuple[int, ...]] = [()]
+    for position, group in enumerate(groups):
+        members = np.unique(group)
+        # What a number stood for so far divides into those within the group and those without.
+        met, within = np.unique(numbers[members], return_inverse=True)
+        numbers[members] = len(combined) + within
+        combined += [(*combined[old], position) for old in met]
+    return numbers, tuple(combined)
 
 
 def _extent(mesh: dmesh.Mesh) -> float:
@@ -143,11 +257,12 @@ def _extent(mesh: dmesh.Mesh) -> float:
     return float((high - low).max())
 
 
-def exterior_facets(mesh: dmesh.Mesh) -> npt.NDArray[np.int32]:
+def exterior_facets(mesh: dmesh.Mesh) -> Indices:
     """Exterior facets that this rank owns, ascending. Collective."""
     tdim = mesh.topology.dim
     mesh.topology.create_entities(tdim - 1)
     mesh.topology.create_connectivity(tdim - 1, tdim)
+    mesh.topology.create_connectivity(tdim, tdim - 1)
     mesh.topology.create_connectivity(tdim - 1, 0)
     return np.sort(dmesh.exterior_facet_indices(mesh.topology))
 

@@ -10,7 +10,7 @@ from dolfinx import mesh as dmesh
 from mpi4py import MPI
 
 from contact.errors import InputError
-from contact.mesh.domain import Domain, exterior_facets, rotate, tagged
+from contact.mesh.domain import Domain, exterior_facets, rotate, with_names
 
 #: Sides of the generators: name -> (axis, end), end 0 at the lower coordinate.
 RECTANGLE_SIDES = {"left": (0, 0), "right": (0, 1), "bottom": (1, 0), "top": (1, 1)}
@@ -113,7 +113,7 @@ def rectangle(
         ghost_mode=dmesh.GhostMode.none,
         diagonal=kinds[diagonal],
     )
-    domain = _tag_grid(mesh, grid, chosen)
+    domain = _name_grid(mesh, grid, chosen)
     rotate(mesh, rotation, (0.0, 0.0, 1.0))
     return domain
 
@@ -142,7 +142,7 @@ def box(
     if np.shape(axis) != (3,) or not np.linalg.norm(axis) > 0.0:
         raise InputError(f"mesh axis must be 3 numbers, not all zero; given: {axis}")
     mesh = dmesh.create_box(comm, grid[:2], list(cells), ghost_mode=dmesh.GhostMode.none)
-    domain = _tag_grid(mesh, grid, chosen)
+    domain = _name_grid(mesh, grid, chosen)
     rotate(mesh, rotation, axis)
     return domain
 
@@ -263,18 +263,19 @@ def _on_grid(
     return low + nearest * h
 
 
-def _tag_grid(mesh: dmesh.Mesh, grid: _Grid, parts: Mapping[str, list[_Patch]]) -> Domain:
-    """Tag the facets by their midpoints, which lie well inside every patch or well outside."""
+def _name_grid(mesh: dmesh.Mesh, grid: _Grid, parts: Mapping[str, list[_Patch]]) -> Domain:
+    """Choose the facets by their midpoints, which lie well inside every patch or well outside."""
     facets = exterior_facets(mesh)
     middle = dmesh.compute_midpoints(mesh, mesh.topology.dim - 1, facets)[:, : len(grid[0])]
-    marks = {}
+    chosen = {}
     for name, patches in parts.items():
-        marks[name] = np.zeros(facets.size, dtype=bool)
+        inside = np.zeros(facets.size, dtype=bool)
         for axis, level, start, stop in patches:
             along = np.delete(middle, axis, axis=1)
-            marks[name] |= (
+            inside |= (
                 (np.abs(middle[:, axis] - level) < 1e-3 * grid[2][axis])
                 & np.all(along > start, axis=1)
                 & np.all(along < stop, axis=1)
             )
-    return tagged(mesh, facets, marks)
+        chosen[name] = facets[inside]
+    return with_names(mesh, chosen, {})

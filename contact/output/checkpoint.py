@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from types import ModuleType
@@ -14,7 +15,7 @@ from mpi4py import MPI
 
 from contact.errors import InputError
 from contact.interface.multipliers import Multipliers
-from contact.mesh.make import Domain, from_mesh
+from contact.mesh.domain import Domain, Indices, combinations, exterior_facets, from_mesh
 from contact.output.fields import nodal_function, unknowns
 from contact.output.solution import Solution
 from contact.problem.problem import ContactProblem
@@ -22,7 +23,7 @@ from contact.problem.state import State
 
 #: Groups of attributes. adios4dolfinx 0.9 strips the letters of the group's name from the start
 #: of the attributes' names, so that the former are digits and the latter begin with letters.
-PARTS, KIND, PART = "1", "2", "part "
+PARTS, KIND, REGIONS, NAME = "1", "2", "3", "name "
 
 
 @dataclass(frozen=True)
@@ -84,10 +85,8 @@ def write_checkpoint(solution: Solution, path: str | Path) -> None:
     adios, problem, path = _adios(), solution.problem, Path(path)
     domain, d = problem.domain, problem.dim
     adios.write_mesh(path, domain.mesh)
-    adios.write_meshtags(path, domain.mesh, domain.facet_tags, meshtag_name="parts")
-    # Attributes are numbers: the tag values of each part, under its name.
-    parts = {PART + name: np.array(v, dtype=np.int32) for name, v in domain.parts.items()}
-    adios.write_attributes(path, domain.comm, PARTS, parts)
+    _write_sets(path, domain, PARTS, domain.parts)
+    _write_sets(path, domain, REGIONS, domain.regions)
     body, state = problem.equilibrium, solution.state
     vectors = np.zeros((state.x.size // body.block_size, d))
     vectors[problem.nodes.nodes] = state.forces.vectors(problem.nodes)
@@ -113,14 +112,9 @@ def read_checkpoint(path: str | Path, comm: MPI.Intracomm = MPI.COMM_WORLD) -> C
     if not comm.bcast(path.is_dir() if comm.rank == 0 else None):
         raise InputError(f"{path}: there is no checkpoint; accepted: a folder checkpoint.bp")
     mesh = adios.read_mesh(path, comm, ghost_mode=dmesh.GhostMode.none)
-    tags = adios.read_meshtags(path, mesh, "parts")
     kind = adios.read_attributes(path, comm, KIND)
-    parts = adios.read_attributes(path, comm, PARTS)
-    marks = {
-        name.removeprefix(PART): tags.indices[np.isin(tags.values, values)]
-        for name, values in sorted(parts.items())
-    }
-    domain = from_mesh(mesh, marks, float(kind["size"][0]))
+    parts, regions = (_read_sets(path, mesh, group) for group in (PARTS, REGIONS))
+    domain = from_mesh(mesh, parts, float(kind["size"][0]), regions)
     degree = int(kind["degree"][0])
 
     def function(name: str, shape: tuple[int, ...]) -> fem.Function:
@@ -134,6 +128,53 @@ def read_checkpoint(path: str | Path, comm: MPI.Intracomm = MPI.COMM_WORLD) -> C
         function("contact_forces", (domain.dim,)),
         function("potential", ()) if kind["piezoelectric"][0] else None,
     )
+
+
+def _write_sets(path: Path, domain: Domain, group: str, sets: Mapping[str, Indices]) -> None:
+    """Write named sets of facets or cells: which of them meet, a number each entity. Collective.
+
+    A function carries the numbers: adios4dolfinx 0.9 divides by zero where it writes tags and a
+    rank has none.
+    """
+    numbers, dofs = _numbers(domain.mesh, group)
+    labels, here = combinations(dofs.size, sets.values())
+    there = sorted(set().union(*domain.comm.allgather(here)))
+    numbers.x.array[dofs] = np.array([there.index(combined) for combined in here])[labels]
+    numbers.x.scatter_forward()
+    adios = _adios()
+    adios.write_function(path, numbers, name=group)
+    names = {
+        NAME + name: np.array([k for k, combined in enumerate(there) if i in combined])
+        for i, name in enumerate(sets)
+    }
+    adios.write_attributes(path, domain.comm, group, names)
+
+
+def _read_sets(path: Path, mesh: dmesh.Mesh, group: str) -> dict[str, Indices]:
+    """Read what `_write_sets` wrote. Collective."""
+    numbers, dofs = _numbers(mesh, group)
+    adios = _adios()
+    adios.read_function(path, numbers, name=group)
+    labels = np.rint(numbers.x.array[dofs])
+    names = adios.read_attributes(path, mesh.comm, group)
+    return {
+        name.removeprefix(NAME): np.flatnonzero(np.isin(labels, names[name])).astype(np.int32)
+        for name in sorted(names)
+    }
+
+
+def _numbers(mesh: dmesh.Mesh, group: str) -> tuple[fem.Function, Indices]:
+    """Return a function with one value a facet or cell, and where that of each owned one is."""
+    tdim = mesh.topology.dim
+    dim, element = (tdim - 1, ("CR", 1)) if group == PARTS else (tdim, ("DG", 0))
+    exterior_facets(mesh)
+    mesh.topology.create_connectivity(tdim, dim)
+    space = fem.functionspace(mesh, element)
+    entities = mesh.topology.connectivity(tdim, dim).array
+    index_map = mesh.topology.index_map(dim)
+    dofs = np.empty(index_map.size_local + index_map.num_ghosts, dtype=np.int32)
+    dofs[entities] = space.dofmap.list.ravel()
+    return fem.Function(space), dofs[: index_map.size_local]
 
 
 def _adios() -> ModuleType:

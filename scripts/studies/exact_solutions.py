@@ -15,7 +15,7 @@ from mpi4py import MPI
 from contact.body.description import Body, Fixed, Load
 from contact.body.norms import Errors, errors
 from contact.interface.obstacle import GapFunction
-from contact.mesh.make import box, rectangle
+from contact.mesh.grid import box, rectangle
 from contact.problem.problem import Contact, ContactProblem
 from contact.problem.state import State
 from contact.typing import Array

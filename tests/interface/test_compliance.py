@@ -19,7 +19,7 @@ from contact.interface.friction import Friction
 from contact.interface.layer import Layer
 from contact.interface.nodes import ContactNodes
 from contact.interface.response import FoundationResponse
-from contact.mesh.make import box, rectangle
+from contact.mesh.grid import box, rectangle
 from contact.methods.fixed_point import FixedPoint
 from contact.methods.newton import Newton
 from contact.methods.options import OPTIONS, NewtonOptions, PenaltyOptions

@@ -9,7 +9,9 @@ from contact.body.description import Body, Fixed, Load
 from contact.errors import InputError
 from contact.interface.friction import Friction
 from contact.interface.obstacle import GapFunction, Plane, Sphere
-from contact.mesh.make import from_mesh, rectangle, refined
+from contact.mesh.domain import from_mesh
+from contact.mesh.grid import rectangle
+from contact.mesh.refinement import refined
 from contact.problem.problem import Contact, ContactProblem
 from forms.hencky import Linear
 from forms.laws import ConstantCoefficient

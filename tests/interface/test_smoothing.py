@@ -9,7 +9,7 @@ from mpi4py import MPI
 from contact.body.description import Body, Fixed
 from contact.interface.friction import Friction
 from contact.interface.smoothing import Smoothing
-from contact.mesh.make import rectangle
+from contact.mesh.grid import rectangle
 from contact.problem.problem import Contact, ContactProblem
 from forms.hencky import Linear
 from forms.laws import ConstantCoefficient

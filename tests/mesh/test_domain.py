@@ -9,7 +9,9 @@ from mpi4py import MPI
 
 from contact.case.mesh import Mesh as MeshSection
 from contact.errors import InputError
-from contact.mesh.make import Piece, box, from_mesh, rectangle, refined
+from contact.mesh.domain import from_mesh
+from contact.mesh.grid import Piece, box, rectangle
+from contact.mesh.refinement import refined
 from contact.meshing import make_domain
 
 COMM = MPI.COMM_WORLD
@@ -96,9 +98,51 @@ def test_overlapping_parts_share_their_facets():
     assert np.all(np.isin(loaded, top))
     assert COMM.allreduce(loaded.size) == 4
     assert COMM.allreduce(top.size) == 8
-    assert len(set(COMM.allgather(tuple(domain.parts["top"])))) == 1
-    exterior = domain.facet_tags.indices.size
-    assert COMM.allreduce(exterior) == 2 * (8 + 4)
+    # In one form, too.
+    one = fem.Constant(domain.mesh, 1.0)
+    form = fem.form(one * domain.ds("top") + one * domain.ds("loaded"))
+    assert COMM.allreduce(fem.assemble_scalar(form)) == pytest.approx(6.0)
+
+
+@pytest.mark.parallel
+def test_there_may_be_any_number_of_parts():
+    names = [f"p{i}" for i in range(40)]
+    domain = rectangle(
+        COMM, (0, 0), (40, 1), (40, 1), {n: Piece("top", i, i + 1) for i, n in enumerate(names)}
+    )
+    assert measures(domain) == pytest.approx(
+        {"left": 1.0, "right": 1.0, "bottom": 40.0, "top": 40.0} | dict.fromkeys(names, 1.0)
+    )
+
+
+@pytest.mark.parallel
+def test_a_mesh_without_regions_is_one():
+    domain = rectangle(COMM, (0, 0), (4, 1), (8, 4))
+    assert list(domain.regions) == ["body"]
+    assert integral(domain, domain.dx_in("body")) == pytest.approx(4.0)
+
+
+def two_regions():
+    mesh = dmesh.create_rectangle(
+        COMM, [(0, 0), (4, 1)], [8, 2], ghost_mode=dmesh.GhostMode.shared_facet
+    )
+    regions = {"left": lambda x: x[0] < 1.01, "all": lambda x: x[0] < 5.0}
+    return from_mesh(mesh, {"bottom": lambda x: x[1] < 0.01}, regions=regions)
+
+
+@pytest.mark.parallel
+@pytest.mark.parametrize("refine", [False, True])
+def test_regions(refine):
+    domain = refined(two_regions()) if refine else two_regions()
+    volumes = {name: integral(domain, domain.dx_in(name)) for name in domain.regions}
+    assert volumes == pytest.approx({"left": 1.0, "all": 4.0})
+    one = fem.Constant(domain.mesh, 1.0)
+    mixed = fem.form(one * domain.dx + one * domain.dx_in("left") + one * domain.ds("bottom"))
+    assert COMM.allreduce(fem.assemble_scalar(mixed)) == pytest.approx(9.0)
+    with pytest.raises(InputError, match=r"no region 'lift'; did you mean 'left'\? \(its regions"):
+        domain.cells("lift")
+    with pytest.raises(InputError, match="region 'none' contains no cell"):
+        from_mesh(domain.mesh, {}, regions={"none": lambda x: x[0] > 5.0})
 
 
 @pytest.mark.parallel
@@ -139,7 +183,6 @@ def test_unknown_part_names_the_nearest_and_all():
         ({"parts": {"a": Piece("top", 2.0, 2.0)}}, "a position beyond from"),
         ({"parts": {"a": [Piece("top", (2.0, 1.0))]}}, "mesh.parts.a.0.from: .* a number"),
         ({"parts": {"a": []}}, "'a' contains no facet"),
-        ({"parts": {f"p{i}": Piece("top") for i in range(28)}}, "32 boundary parts; at most 31"),
     ],
 )
 @pytest.mark.parallel

@@ -1,6 +1,8 @@
 """Gmsh files and recipes: what is read, what is refused, what the recipes make."""
 
 import codecs
+import logging
+import re
 from pathlib import Path
 
 import gmsh
@@ -12,8 +14,10 @@ from dolfinx import mesh as dmesh
 from mpi4py import MPI
 
 import meshes
+from contact.build import build_problem
+from contact.case.file import parse_case
 from contact.errors import InputError
-from contact.mesh.make import from_msh, from_recipe
+from contact.mesh.reader import from_msh, from_recipe
 from meshes.__main__ import main
 
 COMM = MPI.COMM_WORLD
@@ -35,6 +39,10 @@ def vertices_of(domain, name):
     return mesh.geometry.x[np.unique(nodes)]
 
 
+def midpoints(domain, cells):
+    return dmesh.compute_midpoints(domain.mesh, domain.dim, cells).reshape(-1, 3)
+
+
 def nodes(domain):
     return domain.mesh.geometry.index_map().size_global
 
@@ -48,6 +56,7 @@ GOOD = {
     "clockwise.msh": (2, {"bottom": 1.0, "top": 1.0}),
     "triangle.msh": (2, {"bottom": 1.0, "top": 1.0}),  # one cell, stored at z = 2
     "overlap.msh": (2, {"bottom": 1.0, "top": 1.0, "all": 3.0}),
+    "regions.msh": (2, {"bottom": 1.0, "top": 1.0}),  # cells in two groups, and twice in one
     "mixed.msh": (2, {"bottom": 1.0, "top": 1.0}),  # two groups in one elementary entity
 }
 BAD = {
@@ -58,8 +67,6 @@ BAD = {
     "no-boundary.msh": "no physical groups of curves",
     "degenerate.msh": r"1 cell\(s\) of zero volume, the first near \(0.5, 0\)",
     "folded.msh": "cells overlap",
-    "interior.msh": r"'top' has 1 interior facet\(s\)",
-    "stray.msh": "'top' has facets that bound no cell",
     "quadrangle.msh": "'Quadrilateral 4', of another shape",
     "second-order.msh": "'Triangle 6', of curved geometry",
     "surface.msh": "surface in space",
@@ -83,6 +90,56 @@ def test_mesh_files_are_read_with_their_parts(name):
 def test_bad_mesh_files_are_refused_on_all_ranks(name):
     with pytest.raises(InputError, match=f"mesh file .*{name}: .*{BAD[name]}"):
         from_msh(COMM, FIXTURES / "bad" / name)
+
+
+@pytest.mark.parallel
+@pytest.mark.parametrize(
+    ("name", "reason"),
+    [
+        ("interior.msh", "'top' has 1 interior facet(s); a part must lie on the boundary"),
+        ("stray.msh", "'top' has facets that bound no cell"),
+    ],
+)
+def test_a_group_that_is_no_part_is_ignored_until_it_is_used(name, reason, caplog):
+    with caplog.at_level(logging.INFO, logger="contact"):
+        domain = from_msh(COMM, FIXTURES / name)
+    assert measures(domain) == pytest.approx({"bottom": 1.0})
+    assert len(domain.notes) == 1
+    assert reason in domain.notes[0]
+    assert [reason in message for message in caplog.messages] == [True] * (COMM.rank == 0)
+    with pytest.raises(InputError, match=f"mesh file .*{name}: .*{re.escape(reason)}"):
+        domain.ds("top")
+    case = {
+        "mesh": {"file": str(FIXTURES / name)},
+        "material": {"young": 1.0, "poisson": 0.3},
+        "fixed": [{"on": "bottom", "displacement": [0.0, 0.0]}],
+        "contact": {"on": "top"},
+    }
+    with pytest.raises(InputError, match=f"{name}: .*{re.escape(reason)}"):
+        build_problem(parse_case(case), COMM)
+
+
+def test_one_part_at_least_is_needed(tmp_path):
+    text = (FIXTURES / "interior.msh").read_text().replace("1 1 2 2 1 1 2", "1 1 2 3 1 1 3")
+    (tmp_path / "body.msh").write_text(text)
+    with pytest.raises(InputError, match=r"'top' has \d interior facet"):
+        from_msh(MPI.COMM_SELF, tmp_path / "body.msh")
+
+
+@pytest.mark.parallel
+def test_groups_of_cells_are_regions():
+    domain = from_msh(COMM, FIXTURES / "regions.msh")
+    areas = {name: integral(domain, domain.dx_in(name)) for name in domain.regions}
+    assert areas == pytest.approx({"right": 0.5, "left": 0.5, "all": 1.0})
+    x = np.vstack(COMM.allgather(midpoints(domain, domain.cells("right"))))
+    assert x == pytest.approx(np.array([[2 / 3, 1 / 3, 0.0]]))
+
+
+@pytest.mark.parallel
+def test_cells_in_no_group_are_no_part_of_the_body():
+    domain = from_msh(COMM, FIXTURES / "ungrouped.msh")
+    assert integral(domain, domain.dx) == pytest.approx(0.5)
+    assert "1 cell(s) in no physical group are no part of the body" in domain.notes
 
 
 @pytest.mark.parametrize(

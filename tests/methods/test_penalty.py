@@ -14,7 +14,7 @@ from contact.errors import InputError
 from contact.interface.friction import Friction
 from contact.interface.obstacle import GapFunction, Plane
 from contact.interface.penalised import Implicit, Lagged, Regularisation
-from contact.mesh import make as domain
+from contact.mesh import grid as domain
 from contact.methods.fixed_point import FixedPoint
 from contact.methods.options import FixedPointOptions, PenaltyOptions
 from contact.methods.penalty import Penalty

@@ -9,7 +9,8 @@ from contact._compat import geometry_dofmap
 from contact.body.description import Body, Fixed, Load
 from contact.interface.friction import Friction
 from contact.interface.smoothing import Smoothing
-from contact.mesh.make import Piece, from_mesh, rectangle
+from contact.mesh.domain import from_mesh
+from contact.mesh.grid import Piece, rectangle
 from contact.problem.problem import Contact, ContactProblem
 from forms.hencky import Log
 from forms.laws import SlipCoefficient

@@ -9,7 +9,7 @@ from mpi4py import MPI
 from contact.body.description import Body, Fixed, Load
 from contact.case.file import parse_case
 from contact.interface.friction import Friction
-from contact.mesh.make import rectangle
+from contact.mesh.grid import rectangle
 from contact.problem.kkt import KKT, evaluate
 from contact.problem.problem import Contact, ContactProblem
 from contact.problem.state import State

@@ -9,7 +9,7 @@ from scipy.optimize import brentq
 from contact.body.description import Body, Fixed, Load
 from contact.interface.current import Conductor
 from contact.interface.layer import Layer
-from contact.mesh.make import box, rectangle
+from contact.mesh.grid import box, rectangle
 from contact.problem.problem import Contact, ContactProblem
 from forms.hencky import Linear
 from forms.laws import (

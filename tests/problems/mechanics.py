@@ -11,7 +11,8 @@ from contact.body.description import Body, Fixed, Load
 from contact.build import build_problem
 from contact.interface.friction import Friction
 from contact.interface.obstacle import GapFunction, Plane
-from contact.mesh.make import Domain, box, rectangle
+from contact.mesh.domain import Domain
+from contact.mesh.grid import box, rectangle
 from contact.methods.fixed_point import FixedPoint
 from contact.methods.options import FixedPointOptions
 from contact.methods.report import Outcome

@@ -9,7 +9,7 @@ from mpi4py import MPI
 from contact.body.description import Body, Fixed, Load
 from contact.interface.current import Conductor
 from contact.interface.friction import Friction
-from contact.mesh.make import box, rectangle
+from contact.mesh.grid import box, rectangle
 from contact.problem.problem import Contact, ContactProblem
 from contact.problem.state import State
 from contact.typing import Array

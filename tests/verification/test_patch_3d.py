@@ -5,7 +5,7 @@ import pytest
 from mpi4py import MPI
 
 from contact.body.description import Body, Fixed
-from contact.mesh.make import rectangle
+from contact.mesh.grid import rectangle
 from contact.problem.problem import Contact, ContactProblem
 from forms.hencky import Linear
 from forms.laws import ConstantCoefficient

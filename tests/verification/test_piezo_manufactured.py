@@ -11,7 +11,7 @@ from dolfinx import fem
 from mpi4py import MPI
 
 from contact.body.description import Body, Fixed, Load
-from contact.mesh.make import box, rectangle
+from contact.mesh.grid import box, rectangle
 from contact.methods.fixed_point import FixedPoint
 from contact.methods.options import FixedPointOptions
 from contact.problem.problem import Contact, ContactProblem

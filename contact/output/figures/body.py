@@ -14,8 +14,7 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 
 from contact import _compat
-from contact.mesh.domain import exterior_facets
-from contact.mesh.make import Domain
+from contact.mesh.domain import Domain, exterior_facets
 from contact.output.fields import DerivedFields, linear
 from contact.output.figures.contact import BLUE, ends
 from contact.output.solution import Solution
