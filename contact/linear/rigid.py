@@ -24,7 +24,8 @@ def held_motions(layout: Layout) -> PETSc.NullSpace:
     """Return the rigid motions, 0 where the displacement is fixed, orthonormalised. Collective."""
     free = layout.free[:, : layout.dim].ravel()
     vectors: list[PETSc.Vec] = []
-    for vector in rigid_motions(layout).getVecs():
+    for motion in rigid_motions(layout).getVecs():
+        vector = motion.copy()  # PETSc locks those of a null space
         vector.array[:] *= free
         for other in vectors:
             vector.axpy(-vector.dot(other), other)
