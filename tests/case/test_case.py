@@ -574,10 +574,10 @@ def test_a_signal_before_the_solve_ends_the_run_in_words(
 @pytest.mark.parametrize("place", ["swallowed", "held"])
 def test_no_signal_is_lost(bar, capsys, monkeypatch, place):
     """Libraries may swallow an exception, and those that are being loaded would not survive one."""
-    import contact.cli.main as command
+    import contact.case.file
     import contact.solving
 
-    load, build = command.load_case, contact.solving.build_problem
+    load, build = contact.case.file.load_case, contact.solving.build_problem
 
     def swallow(*args, **options):
         with contextlib.suppress(BaseException):
@@ -591,7 +591,7 @@ def test_no_signal_is_lost(bar, capsys, monkeypatch, place):
     if place == "swallowed":
         monkeypatch.setattr(contact.solving, "build_problem", swallow)
     else:
-        monkeypatch.setattr(command, "load_case", hold)
+        monkeypatch.setattr(contact.case.file, "load_case", hold)
     out = bar.parent / "out"
     assert main(["solve", str(bar), "--out", str(out), "--quiet"]) == 143
     assert out.exists() == (place == "swallowed")
