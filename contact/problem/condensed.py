@@ -70,6 +70,8 @@ class CondensedBody:
     size: float
 
     linear = True
+    #: The reactions of the supports are out of sight here.
+    cancelling = 1e4
 
     @property
     def block_size(self) -> int:
@@ -236,14 +238,15 @@ def _at_kept_nodes(interface: Interface) -> Interface:
 def pays(problem: ContactProblem) -> bool:
     """Tell whether dense steps at the contact nodes cost less than sparse ones of the body.
 
-    With n unknowns, k of them kept, the body is about n/k nodes deep: a sparse factorisation
-    costs about n (n/k)^2 operations, a dense one k^3. Of a slender body the contact nodes are
-    too large a part.
+    A dense factorisation costs k^3 operations with k kept unknowns. A sparse one costs n b^2 with
+    n unknowns and fronts of b: in the plane the body's depth, n/k nodes, in
+    space some n^(1/2).
+    Of a slender body the contact nodes are too large a part.
     """
     layout = problem.equilibrium.layout
     kept, unknowns = problem.nodes.size * layout.block_size, layout.unknowns
-    depth = unknowns / kept * layout.block_size
-    return kept <= ALWAYS or kept**3 <= DENSE_IS_FASTER * unknowns * depth**2
+    front = unknowns / kept * layout.block_size if layout.dim == 2 else unknowns**0.5
+    return kept <= ALWAYS or kept**3 <= DENSE_IS_FASTER * unknowns * front**2
 
 
 def condensation(problem: ContactProblem, counters: Counters, kind: str) -> Condensation | None:

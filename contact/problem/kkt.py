@@ -95,7 +95,11 @@ def evaluate(problem: Problem, state: State) -> KKT:
     jump.transpose(jump.weight[:, None] * stress, contact_forces)
     loads, pushes = body.load_size(state.load), body.norm(contact_forces)
     scale = loads + pushes + body.norm(np.where(free, 0.0, residual))
-    scale = max(scale, _least_force(problem, state))
+    least = _least_force(problem, state)
+    if loads > 0 or pushes > 1e-6 * least:
+        # Not more than that: of a body that flies away all forces are rounding.
+        least = min(least, body.cancelling * scale)
+    scale = max(scale, least)
     equilibrium = body.norm(np.where(free, residual, 0.0)) / (scale or 1.0)
     bound = interface.bound(nodal, state.forces)
     return KKT(equilibrium, *interface_residuals(interface, nodal, state.forces, bound))

@@ -23,6 +23,7 @@ from tests.problems.mechanics import (
     contact_data,
     flat,
     leaning_block,
+    pressed_block,
     solve,
     turn,
 )
@@ -234,3 +235,13 @@ def test_a_body_moved_without_touching_is_in_equilibrium(method, degree, dim):
         solution = solve_case(parse_case(section))
         assert solution.outcome.converged, solution.outcome
         assert solution.outcome.kkt.equilibrium < 1e-8
+
+
+def test_a_body_that_has_flown_away_is_not_in_equilibrium():
+    """All forces of such a state are rounding: they must not be measured against themselves."""
+    problem = pressed_block(MPI.COMM_SELF, 2)
+    for distance in (1e6, 1e12, 1e15):
+        x = problem.start().x.reshape(-1, 2).copy()
+        x[:, 1] += distance
+        away = State(x.ravel(), problem.start().forces)
+        assert evaluate(problem, away).equilibrium > 1e-3
