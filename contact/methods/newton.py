@@ -43,6 +43,9 @@ logger = logging.getLogger("contact.solver")
 FROZEN_FRICTION, BLOCK_RELAXATION = "frozen friction", "block relaxation"
 SLOWER = INTERIOR_POINT, FROZEN_FRICTION, BLOCK_RELAXATION
 
+#: Patience with the whole body where a surer road is left.
+SHORT = 4
+
 #: Updates of a frozen friction bound, and what the first of its problems is solved to.
 MOST_UPDATES, FIRST_GOAL = 40, 1e-2
 
@@ -51,9 +54,13 @@ FIRST_STEP, LEAST_STEP = 0.25, 1e-2
 
 
 def moduli_of(scales: Scales, gamma: float) -> Moduli:
-    """Return stiffnesses of the linearised laws that fit a body and its mesh."""
+    """Return stiffnesses of the linearised laws that fit a body and its mesh, in any units.
+
+    A mode of Gamma_3 as long as the body is high has the stiffness E'/H, and with r* in the
+    middle, one as short as an element has r*^2 H/E'.
+    """
     middle = automatic_r(scales)
-    nodal = middle**2 / scales.young
+    nodal = middle**2 * scales.height / scales.plane_modulus
     return Moduli(middle, nodal, gamma * max(middle, nodal))
 
 
@@ -162,7 +169,8 @@ class Newton:
             if outcome.converged or self._left <= 0:
                 return iterate, outcome
             logger.info("%s; going on with the whole body", outcome.ended)
-        loop = self._whole_loop()
+        surer = self._condensed is not None and not self._pays
+        loop = self._whole_loop(SHORT if surer else self.options.patience)
         iterate, outcome = loop.run(iterate)
         if not outcome.converged and self._condensed is not None and not self._pays:
             logger.info("%s; going on at the contact nodes", outcome.ended)
@@ -200,8 +208,8 @@ class Newton:
             return sure, outcome
         return loop.run(sure, INTERIOR_POINT)
 
-    def _whole_loop(self) -> NewtonLoop:
-        options = self.options
+    def _whole_loop(self, patience: int) -> NewtonLoop:
+        options = replace(self.options, patience=patience)
         return NewtonLoop(
             self.problem, options, self.whole, self.history, self._see, options.secant_until
         )
