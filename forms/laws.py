@@ -125,6 +125,14 @@ class Conductivity(Protocol):
     """psi: how well a foundation conducts, assumption (h5). A new law is a class with these."""
 
     @property
+    def k_e(self) -> float:
+        """The largest conductivity."""
+
+    @property
+    def delta(self) -> float:
+        """Slope of psi over k_e (1/length); infinity where it jumps."""
+
+    @property
     def follows_gap(self) -> bool:
         """Whether it is a function of the gap that Newton's method can follow."""
 
@@ -217,6 +225,7 @@ class PerfectConductivity:
     k_e: float
 
     follows_gap = False
+    delta = np.inf
 
     def __call__(self, in_contact: Value) -> Value:
         """Return the conductivity; the argument tells whether the node is in contact."""

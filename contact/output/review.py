@@ -18,6 +18,7 @@ def review(solution: Solution) -> None:
     for text, good in (
         _monotonicity(solution),
         _uniqueness(solution),
+        _electric_uniqueness(solution),
         _chords(solution),
         _preload(solution),
         _falling(solution),
@@ -45,7 +46,8 @@ def _uniqueness(solution: Solution) -> tuple[str, bool]:
 
     The constants of Theorem 3.1 cannot be computed. A block of height H under the pressure p
     slides by s where G (U - s)/H = mu(s) p; the left-hand side falls faster than the right for
-    all s if L_mu < G/(p H), and only then is s unique for every U.
+    all s if L_mu < G/(p H), and only then is s unique for every U. A pressure that is uneven is
+    larger where most of it acts: there it counts with its own weight, and half of G.
     """
     problem, coefficient = solution.problem, solution.problem.interface.friction.coefficient
     if coefficient is None:
@@ -54,18 +56,48 @@ def _uniqueness(solution: Solution) -> tuple[str, bool]:
     own = (coefficient.maximum, coefficient.lipschitz) if nodes.nodes.size else (0.0, 0.0)
     maximum, lipschitz = (comm.allreduce(value, op=MPI.MAX) for value in own)
     pressure = solution.pressure
-    # Pressures of rounding size are none, as in `Solution.status`.
-    area = nodes.sum((pressure > 1e-9 * nodes.maximum(pressure)).astype(float))
-    mean = nodes.sum(pressure) / area if area > 0 else 0.0
+    total = nodes.sum(pressure)
+    mean = nodes.sum(pressure**2) / total if total > 0 else 0.0
     text = f"Theorem 3.1: unique if mu* + L_mu = {maximum:.4g} + {lipschitz:.4g} is small enough"
     if lipschitz == 0 or mean <= 0:
         return text, True
-    bound = problem.scales.shear / (mean * problem.scales.height)
-    text += f"; a sliding block under the mean pressure {mean:.4g} asks for L_mu < {bound:.4g}"
+    bound = 0.5 * problem.scales.shear / (mean * problem.scales.height)
+    text += f"; a sliding block under the pressure {mean:.4g} asks for L_mu < {bound:.4g}"
     if lipschitz < bound:
         return text, True
     several = f"several solutions may exist, and this is one reached from {solution.start}"
     return f"{text}: {several}", False
+
+
+def _electric_uniqueness(solution: Solution) -> tuple[str, bool]:
+    """Set what the current does to the gap beside the stiffness that closes it.
+
+    Of a column of height H with the stiffness C, coupling e and permittivity beta, the potential
+    follows a change of the current by the share Bi/(1 + Bi) of phi - phi_F, Bi = k_e H/beta, and
+    presses with e/H. A gap that opens by less than 1/delta thus opens itself further where
+    delta |phi - phi_F| (e/C) Bi/(1 + Bi) exceeds 1: several solutions may then exist.
+    """
+    problem, conductor = solution.problem, solution.problem.conductor
+    piezo = problem.body.piezo
+    if conductor is None or piezo is None or not conductor.psi.follows_gap:
+        return "", True
+    scales = problem.scales
+    potential = problem.equilibrium.phi_scale * solution.nodal[:, -1]
+    difference = np.abs(conductor.phi_l(potential - conductor.phi_f))
+    largest = problem.nodes.maximum(difference)
+    permittivity = float(np.trace(np.asarray(piezo.beta))) / 3
+    biot = conductor.psi.k_e * scales.height / permittivity
+    coupling = float(np.abs(np.asarray(piezo.e)).max()) / (scales.bulk + 4 / 3 * scales.shear)
+    number = conductor.psi.delta * largest * coupling * biot / (1 + biot)
+    if number < 1:
+        return "", True
+    return (
+        f"the current changes within 1/delta = {1 / conductor.psi.delta:.3g} of the gap by so much "
+        f"that it opens or closes gaps by itself (a column asks for a number below 1, and it is "
+        f"{number:.3g}): several solutions may exist, and this is one reached from "
+        f"{solution.start}; a smaller delta has fewer of them",
+        False,
+    )
 
 
 def _chords(solution: Solution) -> tuple[str, bool]:
