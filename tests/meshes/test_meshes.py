@@ -71,7 +71,7 @@ BAD = {
     "second-order.msh": "'Triangle 6', of curved geometry",
     "surface.msh": "surface in space",
     "text.msh": "no Gmsh .msh file",
-    "cut.msh": "Gmsh says",
+    "cut.msh": "it is cut off",
     "absent.msh": "no such file",
 }
 
