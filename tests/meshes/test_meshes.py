@@ -119,6 +119,20 @@ def test_a_group_that_is_no_part_is_ignored_until_it_is_used(name, reason, caplo
         build_problem(parse_case(case), COMM)
 
 
+@pytest.mark.parametrize("unit", ["e-200", "e-9", "e150"])
+def test_shapes_are_judged_in_any_unit_of_length(unit, tmp_path):
+    for name, message in (("square.msh", None), ("bad/degenerate.msh", "zero volume")):
+        head, tail = (FIXTURES / name).read_text().split("$EndNodes")
+        text = re.sub(r"(?m)^(\d+) (\S+) (\S+) (\S+)$", rf"\1 \g<2>{unit} \g<3>{unit} \4", head)
+        (tmp_path / "body.msh").write_text(f"{text}$EndNodes{tail}")
+        if message is None:
+            domain = from_msh(MPI.COMM_SELF, tmp_path / "body.msh")
+            assert domain.size == float(f"1{unit}")
+        else:
+            with pytest.raises(InputError, match=message):
+                from_msh(MPI.COMM_SELF, tmp_path / "body.msh")
+
+
 def test_one_part_at_least_is_needed(tmp_path):
     text = (FIXTURES / "interior.msh").read_text().replace("1 1 2 2 1 1 2", "1 1 2 3 1 1 3")
     (tmp_path / "body.msh").write_text(text)
@@ -182,7 +196,7 @@ def test_a_running_gmsh_is_left_as_it_was():
     if COMM.rank == 0:
         gmsh.initialize(interruptible=False)
         gmsh.model.add("mine")
-    from_msh(COMM, FIXTURES / "bar.msh")
+    from_recipe(COMM, "bar")
     if COMM.rank == 0:
         assert gmsh.isInitialized()
         assert gmsh.model.getCurrent() == "mine"
