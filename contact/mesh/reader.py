@@ -45,16 +45,19 @@ CELL_NAME = {2: "triangle", 3: "tetrahedron"}
 def from_msh(comm: MPI.Intracomm, path: str | Path) -> Domain:
     """Read a Gmsh ``.msh`` file (formats 2.2 and 4.1). Collective.
 
-    The parts are the physical groups of curves (plane meshes) or surfaces, by name; a group
-    without a name goes by its number. Facets may belong to several groups. Plane meshes may
-    be stored in any plane z = const.
+    The regions are the physical groups of surfaces (plane meshes) or volumes, by name; the
+    parts are those of curves or surfaces. A group without a name goes by its number. Groups may
+    overlap. Cells in no group are no part of the body, unless there are no groups of cells at
+    all; a group of facets that are not all on the boundary of the body is ignored, until it is
+    asked for. `Domain.notes` and the log say so. Plane meshes may be stored in any plane
+    z = const.
 
     Raises
     ------
     InputError
-        If the file is missing or no mesh, has no boundary groups, cells that are not
-        straight-sided triangles or tetrahedra, degenerate or overlapping cells, or a group
-        that is not part of the boundary. The message names the file.
+        If the file is missing, damaged or no mesh, has no boundary groups, cells that are not
+        straight-sided triangles or tetrahedra, or degenerate or overlapping cells. The message
+        names the file.
     """
     return _from_rank_0(comm, lambda: _read(Path(path)), f"mesh file {path}")
 
@@ -85,12 +88,13 @@ def _read(file: Path) -> Model:
             )
         if not out.exists():
             said = " ".join(done.stdout.decode(errors="replace").split())
+            said = said.replace(str(plain), file.name)
             raise InputError(f"Gmsh says: {said}")
         return Model.load(out)
 
 
 def _format(file: Path) -> int:
-    """Return the major version of a mesh file's format.
+    """Return the major version of a mesh file's format, having looked at both ends of the file.
 
     Gmsh takes a file for a mesh by how it begins, and anything else for a script, whose commands
     it executes: nothing may come before ``$MeshFormat``.
@@ -100,11 +104,16 @@ def _format(file: Path) -> int:
     try:
         with file.open("rb") as stream:
             start = stream.read(200)
+            stream.seek(max(0, file.stat().st_size - 200))
+            end = stream.read()
     except OSError as error:
         raise InputError(f"it cannot be read ({error.strerror})") from error
     found = re.match(rb"\$MeshFormat[ \t]*\r?\n\s*(2|4)(\.\d+)?[ \t]", start.removeprefix(BOM))
     if found is None:
         raise InputError("this is no Gmsh .msh file of format 2.2 or 4.1 (it begins otherwise)")
+    # Gmsh takes what is there of a section for all of it.
+    if re.search(rb"\$End\w+\s*$", end) is None:
+        raise InputError("it is cut off: it does not end as a section does")
     return int(found[1])
 
 

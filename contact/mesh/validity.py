@@ -13,7 +13,8 @@ from contact.mesh.domain import BODY, combinations
 from contact.mesh.extraction import Ints, Model
 from contact.typing import Array
 
-#: A cell is degenerate if its volume is below this times (longest edge)^d.
+#: A cell is degenerate if its volume is below this times (longest edge)^d. Gmsh's qualities, which
+#: need its model, would not do: the signs of the volumes say whether cells overlap.
 FLAT = 1e-10
 
 

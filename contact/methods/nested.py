@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 from scipy.spatial import cKDTree
 
-from contact.body.transfer import carry
 from contact.interface.multipliers import Multipliers
 from contact.interface.projections import project_half_line
+from contact.mesh.transfer import carry
 from contact.problem.problem import ContactProblem
 from contact.problem.state import State
 from contact.typing import Array

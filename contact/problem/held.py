@@ -7,8 +7,8 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 from scipy.optimize import linprog
 
-from contact.body.pieces import connected_pieces
 from contact.errors import InputError
+from contact.mesh.pieces import connected_pieces
 from contact.problem.problem import ContactProblem
 from contact.problem.state import State
 from contact.typing import Array

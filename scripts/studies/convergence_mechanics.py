@@ -15,8 +15,8 @@ from matplotlib.ticker import NullFormatter
 
 from contact import InputError, build_problem
 from contact.body.norms import errors
-from contact.body.transfer import carry
 from contact.case.file import Case, Friction
+from contact.mesh.transfer import carry
 from contact.methods.newton import Newton
 from contact.methods.options import FixedPointOptions, NewtonOptions, Options, PenaltyOptions
 from contact.methods.report import Outcome

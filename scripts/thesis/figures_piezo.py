@@ -15,7 +15,7 @@ from matplotlib.figure import Figure
 from mpi4py import MPI
 
 from contact.body.equilibrium import BodyEquilibrium
-from contact.body.transfer import carry
+from contact.mesh.transfer import carry
 from contact.output.figures.body import draw_plane, picture
 from contact.output.table import contact_table
 from contact.typing import Array

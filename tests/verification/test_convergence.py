@@ -9,9 +9,9 @@ import pytest
 from dolfinx import fem
 
 from contact.body.norms import errors
-from contact.body.transfer import carry
 from contact.mesh.grid import rectangle
 from contact.mesh.refinement import refined
+from contact.mesh.transfer import carry
 from forms.hencky import energy_density
 from forms.kinematics import strain
 from scripts.reporting import Report, subplots

@@ -1,6 +1,6 @@
 """Damaged mesh files: each gives one message or a sound mesh, whatever Gmsh does with it.
 
-60 are tried; ``DAMAGED_MESHES=300 scripts/fx python3 -m pytest tests/test_damaged_meshes.py``
+60 are tried; ``DAMAGED_MESHES=300 scripts/fx python3 -m pytest tests/mesh/test_damaged_files.py``
 tries as many as it says.
 """
 

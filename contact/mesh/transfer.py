@@ -1,9 +1,4 @@
-"""Functions carried from one mesh of a body to another.
-
-A coarse function is carried to the mesh of a finer one: exactly where the meshes are nested, for
-its values at the nodes of the fine element are then all there is to know, and up to the fine
-mesh's interpolation error where they are not.
-"""
+"""Functions carried from one mesh of a body to another."""
 
 from __future__ import annotations
 
@@ -24,8 +19,10 @@ def carry(coarse: fem.Function, space: fem.FunctionSpace) -> fem.Function:
 
     Notes
     -----
-    A node of the new mesh that lies slightly outside of the old one, as on a curved boundary,
-    gets the value of the closest cell.
+    Where the meshes are nested the new function is the old one, for its values at the nodes of
+    the fine element are then all there is to know; elsewhere it differs by the fine mesh's
+    interpolation error. A node of the new mesh that lies slightly outside of the old one, as on
+    a curved boundary, gets the value of the closest cell.
     """
     made = fem.Function(space, name=coarse.name)
     topology = space.mesh.topology

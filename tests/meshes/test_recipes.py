@@ -1,36 +1,19 @@
-"""Gmsh files and recipes: what is read, what is refused, what the recipes make."""
-
-import codecs
-import logging
-import re
-from pathlib import Path
+"""Recipes of meshes: what they make and what they refuse."""
 
 import gmsh
 import numpy as np
 import pytest
 import ufl
-from dolfinx import fem
 from dolfinx import mesh as dmesh
 from mpi4py import MPI
 
 import meshes
-from contact.build import build_problem
-from contact.case.file import parse_case
 from contact.errors import InputError
 from contact.mesh.reader import from_msh, from_recipe
 from meshes.__main__ import main
+from tests.problems.sizes import integral, measures
 
 COMM = MPI.COMM_WORLD
-FIXTURES = Path(meshes.__file__).parent / "fixtures"
-
-
-def integral(domain, measure, integrand=1.0):
-    form = fem.form(ufl.as_ufl(integrand) * fem.Constant(domain.mesh, 1.0) * measure)
-    return COMM.allreduce(fem.assemble_scalar(form))
-
-
-def measures(domain):
-    return {name: integral(domain, domain.ds(name)) for name in domain.parts}
 
 
 def vertices_of(domain, name):
@@ -39,142 +22,12 @@ def vertices_of(domain, name):
     return mesh.geometry.x[np.unique(nodes)]
 
 
-def midpoints(domain, cells):
-    return dmesh.compute_midpoints(domain.mesh, domain.dim, cells).reshape(-1, 3)
-
-
 def nodes(domain):
     return domain.mesh.geometry.index_map().size_global
 
 
 BAR = {"left": 1.0, "right": 1.0, "bottom": 4.0, "top": 4.0, "loaded": 2.0}
-GOOD = {
-    "bar.msh": (2, BAR),
-    "bar-2.2.msh": (2, BAR),
-    "block.msh": (3, dict.fromkeys(("left", "right", "front", "back", "bottom", "top"), 1.0)),
-    "square.msh": (2, {"bottom": 1.0, "top": 1.0}),
-    "clockwise.msh": (2, {"bottom": 1.0, "top": 1.0}),
-    "triangle.msh": (2, {"bottom": 1.0, "top": 1.0}),  # one cell, stored at z = 2
-    "overlap.msh": (2, {"bottom": 1.0, "top": 1.0, "all": 3.0}),
-    "regions.msh": (2, {"bottom": 1.0, "top": 1.0}),  # cells in two groups, and twice in one
-    "mixed.msh": (2, {"bottom": 1.0, "top": 1.0}),  # two groups in one elementary entity
-}
-BAD = {
-    "line.msh": "no triangles or tetrahedra",
-    "no-cells.msh": "no triangles or tetrahedra",
-    "empty.msh": "no triangles or tetrahedra",
-    "no-groups.msh": "no physical groups of curves",
-    "no-boundary.msh": "no physical groups of curves",
-    "degenerate.msh": r"1 cell\(s\) of zero volume, the first near \(0.5, 0\)",
-    "folded.msh": "cells overlap",
-    "quadrangle.msh": "'Quadrilateral 4', of another shape",
-    "second-order.msh": "'Triangle 6', of curved geometry",
-    "surface.msh": "surface in space",
-    "text.msh": "no Gmsh .msh file",
-    "cut.msh": "Gmsh says",
-    "absent.msh": "no such file",
-}
-
-
-@pytest.mark.parallel
-@pytest.mark.parametrize("name", GOOD)
-def test_mesh_files_are_read_with_their_parts(name):
-    dim, expected = GOOD[name]
-    domain = from_msh(COMM, FIXTURES / name)
-    assert domain.dim == dim
-    assert measures(domain) == pytest.approx(expected)
-
-
-@pytest.mark.parallel
-@pytest.mark.parametrize("name", BAD)
-def test_bad_mesh_files_are_refused_on_all_ranks(name):
-    with pytest.raises(InputError, match=f"mesh file .*{name}: .*{BAD[name]}"):
-        from_msh(COMM, FIXTURES / "bad" / name)
-
-
-@pytest.mark.parallel
-@pytest.mark.parametrize(
-    ("name", "reason"),
-    [
-        ("interior.msh", "'top' has 1 interior facet(s); a part must lie on the boundary"),
-        ("stray.msh", "'top' has facets that bound no cell"),
-    ],
-)
-def test_a_group_that_is_no_part_is_ignored_until_it_is_used(name, reason, caplog):
-    with caplog.at_level(logging.INFO, logger="contact"):
-        domain = from_msh(COMM, FIXTURES / name)
-    assert measures(domain) == pytest.approx({"bottom": 1.0})
-    assert len(domain.notes) == 1
-    assert reason in domain.notes[0]
-    assert [reason in message for message in caplog.messages] == [True] * (COMM.rank == 0)
-    with pytest.raises(InputError, match=f"mesh file .*{name}: .*{re.escape(reason)}"):
-        domain.ds("top")
-    case = {
-        "mesh": {"file": str(FIXTURES / name)},
-        "material": {"young": 1.0, "poisson": 0.3},
-        "fixed": [{"on": "bottom", "displacement": [0.0, 0.0]}],
-        "contact": {"on": "top"},
-    }
-    with pytest.raises(InputError, match=f"{name}: .*{re.escape(reason)}"):
-        build_problem(parse_case(case), COMM)
-
-
-def test_one_part_at_least_is_needed(tmp_path):
-    text = (FIXTURES / "interior.msh").read_text().replace("1 1 2 2 1 1 2", "1 1 2 3 1 1 3")
-    (tmp_path / "body.msh").write_text(text)
-    with pytest.raises(InputError, match=r"'top' has \d interior facet"):
-        from_msh(MPI.COMM_SELF, tmp_path / "body.msh")
-
-
-@pytest.mark.parallel
-def test_groups_of_cells_are_regions():
-    domain = from_msh(COMM, FIXTURES / "regions.msh")
-    areas = {name: integral(domain, domain.dx_in(name)) for name in domain.regions}
-    assert areas == pytest.approx({"right": 0.5, "left": 0.5, "all": 1.0})
-    x = np.vstack(COMM.allgather(midpoints(domain, domain.cells("right"))))
-    assert x == pytest.approx(np.array([[2 / 3, 1 / 3, 0.0]]))
-
-
-@pytest.mark.parallel
-def test_cells_in_no_group_are_no_part_of_the_body():
-    domain = from_msh(COMM, FIXTURES / "ungrouped.msh")
-    assert integral(domain, domain.dx) == pytest.approx(0.5)
-    assert "1 cell(s) in no physical group are no part of the body" in domain.notes
-
-
-@pytest.mark.parametrize(
-    "start",
-    [
-        "// $MeshFormat 2.2\n",
-        "// $MeshFormat\n// 4.1 0 8\n",
-        "\n$MeshFormat\n4.1 0 8\n",
-        " $MeshFormat\n2.2 0 8\n",
-        "\ufeff// $MeshFormat\n",
-        "$MeshFormat;\n2.2 0 8\n",
-        "/*\n$MeshFormat\n2.2 0 8\n*/\n",
-    ],
-)
-@pytest.mark.parametrize("name", ["body.msh", "body.geo", "body"])
-def test_a_mesh_file_is_never_executed(start, name, tmp_path):
-    mark = tmp_path / "executed"
-    command = f'SystemCall "touch {mark}";\nPrintf("x") > "{mark}";\n'
-    (tmp_path / name).write_text(start + command, encoding="utf-8")
-    with pytest.raises(InputError, match=r"no Gmsh .msh file"):
-        from_msh(MPI.COMM_SELF, tmp_path / name)
-    assert not mark.exists()
-
-
-@pytest.mark.parametrize("fixture", ["bar.msh", "bar-2.2.msh"])
-@pytest.mark.parametrize("mark", [b"", codecs.BOM_UTF8])
-@pytest.mark.parametrize("name", ["body.msh", "body.msh.gz", "a b; touch x.geo", "mesh"])
-def test_a_mesh_file_is_read_whatever_its_name(fixture, mark, name, tmp_path):
-    (tmp_path / name).write_bytes(mark + (FIXTURES / fixture).read_bytes())
-    assert measures(from_msh(MPI.COMM_SELF, tmp_path / name)) == pytest.approx(BAR)
-
-
-def test_every_bad_fixture_is_in_the_table_and_all_are_small():
-    assert {p.name for p in (FIXTURES / "bad").iterdir()} == set(BAD) - {"absent.msh"}
-    assert all(p.stat().st_size < 20_000 for p in FIXTURES.rglob("*.msh"))
+SIDES = ("left", "right", "front", "back", "bottom", "top")
 
 
 @pytest.mark.parallel
@@ -182,7 +35,7 @@ def test_a_running_gmsh_is_left_as_it_was():
     if COMM.rank == 0:
         gmsh.initialize(interruptible=False)
         gmsh.model.add("mine")
-    from_msh(COMM, FIXTURES / "bar.msh")
+    from_recipe(COMM, "bar")
     if COMM.rank == 0:
         assert gmsh.isInitialized()
         assert gmsh.model.getCurrent() == "mine"
@@ -209,7 +62,7 @@ RECIPES = {
         24.0,
         {"left": 2.0, "right": 2.0, "top": 12.0, "bottom_ends": 4.0, "contact": 8.0},
     ),
-    "block": (1.0, GOOD["block.msh"][1]),
+    "block": (1.0, dict.fromkeys(SIDES, 1.0)),
     "column": (
         4.0,
         {"left": 4.0, "right": 4.0, "front": 4.0, "back": 4.0, "bottom": 1.0, "top": 1.0},

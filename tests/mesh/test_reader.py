@@ -1,0 +1,185 @@
+"""Gmsh files: what is read, what is refused, what is ignored."""
+
+import codecs
+import logging
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+from dolfinx import mesh as dmesh
+from mpi4py import MPI
+
+import meshes
+from contact.build import build_problem
+from contact.case.file import parse_case
+from contact.cli.describe import describe
+from contact.errors import InputError
+from contact.mesh.reader import from_msh
+from tests.problems.sizes import integral, measures
+
+COMM = MPI.COMM_WORLD
+FIXTURES = Path(meshes.__file__).parent / "fixtures"
+
+
+def midpoints(domain, cells):
+    return dmesh.compute_midpoints(domain.mesh, domain.dim, cells).reshape(-1, 3)
+
+
+BAR = {"left": 1.0, "right": 1.0, "bottom": 4.0, "top": 4.0, "loaded": 2.0}
+GOOD = {
+    "bar.msh": (2, BAR),
+    "bar-2.2.msh": (2, BAR),
+    "block.msh": (3, dict.fromkeys(("left", "right", "front", "back", "bottom", "top"), 1.0)),
+    "square.msh": (2, {"bottom": 1.0, "top": 1.0}),
+    "clockwise.msh": (2, {"bottom": 1.0, "top": 1.0}),
+    "triangle.msh": (2, {"bottom": 1.0, "top": 1.0}),  # one cell, stored at z = 2
+    "overlap.msh": (2, {"bottom": 1.0, "top": 1.0, "all": 3.0}),
+    "regions.msh": (2, {"bottom": 1.0, "top": 1.0}),  # cells in two groups, and twice in one
+    "mixed.msh": (2, {"bottom": 1.0, "top": 1.0}),  # two groups in one elementary entity
+}
+BAD = {
+    "line.msh": "no triangles or tetrahedra",
+    "no-cells.msh": "no triangles or tetrahedra",
+    "empty.msh": "no triangles or tetrahedra",
+    "no-groups.msh": "no physical groups of curves",
+    "no-boundary.msh": "no physical groups of curves",
+    "degenerate.msh": r"1 cell\(s\) of zero volume, the first near \(0.5, 0\)",
+    "folded.msh": "cells overlap",
+    "quadrangle.msh": "'Quadrilateral 4', of another shape",
+    "second-order.msh": "'Triangle 6', of curved geometry",
+    "surface.msh": "surface in space",
+    "text.msh": "no Gmsh .msh file",
+    "cut.msh": "it is cut off",
+    "absent.msh": "no such file",
+}
+
+
+@pytest.mark.parallel
+@pytest.mark.parametrize("name", GOOD)
+def test_mesh_files_are_read_with_their_parts(name):
+    dim, expected = GOOD[name]
+    domain = from_msh(COMM, FIXTURES / name)
+    assert domain.dim == dim
+    assert measures(domain) == pytest.approx(expected)
+
+
+@pytest.mark.parallel
+@pytest.mark.parametrize("name", BAD)
+def test_bad_mesh_files_are_refused_on_all_ranks(name):
+    with pytest.raises(InputError, match=f"mesh file .*{name}: .*{BAD[name]}"):
+        from_msh(COMM, FIXTURES / "bad" / name)
+
+
+@pytest.mark.parallel
+@pytest.mark.parametrize(
+    ("name", "reason"),
+    [
+        ("interior.msh", "'top' has 1 interior facet(s); a part must lie on the boundary"),
+        ("stray.msh", "'top' has facets that bound no cell"),
+    ],
+)
+def test_a_group_that_is_no_part_is_ignored_until_it_is_used(name, reason, caplog):
+    with caplog.at_level(logging.INFO, logger="contact"):
+        domain = from_msh(COMM, FIXTURES / name)
+    assert measures(domain) == pytest.approx({"bottom": 1.0})
+    assert len(domain.notes) == 1
+    assert reason in domain.notes[0]
+    assert [reason in message for message in caplog.messages] == [True] * (COMM.rank == 0)
+    with pytest.raises(InputError, match=f"mesh file .*{name}: .*{re.escape(reason)}"):
+        domain.ds("top")
+    case = {
+        "mesh": {"file": str(FIXTURES / name)},
+        "material": {"young": 1.0, "poisson": 0.3},
+        "fixed": [{"on": "bottom", "displacement": [0.0, 0.0]}],
+        "contact": {"on": "top"},
+    }
+    with pytest.raises(InputError, match=f"{name}: .*{re.escape(reason)}"):
+        build_problem(parse_case(case), COMM)
+
+
+@pytest.mark.parametrize("unit", ["e-200", "e-9", "e150"])
+def test_shapes_are_judged_in_any_unit_of_length(unit, tmp_path):
+    for name, message in (("square.msh", None), ("bad/degenerate.msh", "zero volume")):
+        head, tail = (FIXTURES / name).read_text().split("$EndNodes")
+        text = re.sub(r"(?m)^(\d+) (\S+) (\S+) (\S+)$", rf"\1 \g<2>{unit} \g<3>{unit} \4", head)
+        (tmp_path / "body.msh").write_text(f"{text}$EndNodes{tail}")
+        if message is None:
+            domain = from_msh(MPI.COMM_SELF, tmp_path / "body.msh")
+            assert domain.size == float(f"1{unit}")
+        else:
+            with pytest.raises(InputError, match=message):
+                from_msh(MPI.COMM_SELF, tmp_path / "body.msh")
+
+
+def test_one_part_at_least_is_needed(tmp_path):
+    text = (FIXTURES / "interior.msh").read_text().replace("1 1 2 2 1 1 2", "1 1 2 3 1 1 3")
+    (tmp_path / "body.msh").write_text(text)
+    with pytest.raises(InputError, match=r"'top' has \d interior facet"):
+        from_msh(MPI.COMM_SELF, tmp_path / "body.msh")
+
+
+@pytest.mark.parallel
+def test_groups_of_cells_are_regions():
+    domain = from_msh(COMM, FIXTURES / "regions.msh")
+    areas = {name: integral(domain, domain.dx_in(name)) for name in domain.regions}
+    assert areas == pytest.approx({"right": 0.5, "left": 0.5, "all": 1.0})
+    x = np.vstack(COMM.allgather(midpoints(domain, domain.cells("right"))))
+    assert x == pytest.approx(np.array([[2 / 3, 1 / 3, 0.0]]))
+
+
+def test_check_lists_regions_and_notes():
+    case = parse_case(
+        {
+            "mesh": {"file": str(FIXTURES / "ungrouped.msh")},
+            "material": {"young": 1.0, "poisson": 0.3},
+            "fixed": [{"on": "bottom", "displacement": [0.0, "free"]}],
+            "contact": {"on": "bottom"},
+        }
+    )
+    lines = describe(case, build_problem(case, COMM)).splitlines()
+    regions = lines.index("# regions, with their cells:")
+    assert lines[regions + 1] == "#   body  1"
+    assert any(line.startswith("# note: 1 cell(s) in no physical group") for line in lines)
+
+
+@pytest.mark.parallel
+def test_cells_in_no_group_are_no_part_of_the_body():
+    domain = from_msh(COMM, FIXTURES / "ungrouped.msh")
+    assert integral(domain, domain.dx) == pytest.approx(0.5)
+    assert "1 cell(s) in no physical group are no part of the body" in domain.notes
+
+
+@pytest.mark.parametrize(
+    "start",
+    [
+        "// $MeshFormat 2.2\n",
+        "// $MeshFormat\n// 4.1 0 8\n",
+        "\n$MeshFormat\n4.1 0 8\n",
+        " $MeshFormat\n2.2 0 8\n",
+        "\ufeff// $MeshFormat\n",
+        "$MeshFormat;\n2.2 0 8\n",
+        "/*\n$MeshFormat\n2.2 0 8\n*/\n",
+    ],
+)
+@pytest.mark.parametrize("name", ["body.msh", "body.geo", "body"])
+def test_a_mesh_file_is_never_executed(start, name, tmp_path):
+    mark = tmp_path / "executed"
+    command = f'SystemCall "touch {mark}";\nPrintf("x") > "{mark}";\n'
+    (tmp_path / name).write_text(start + command, encoding="utf-8")
+    with pytest.raises(InputError, match=r"no Gmsh .msh file"):
+        from_msh(MPI.COMM_SELF, tmp_path / name)
+    assert not mark.exists()
+
+
+@pytest.mark.parametrize("fixture", ["bar.msh", "bar-2.2.msh"])
+@pytest.mark.parametrize("mark", [b"", codecs.BOM_UTF8])
+@pytest.mark.parametrize("name", ["body.msh", "body.msh.gz", "a b; touch x.geo", "mesh"])
+def test_a_mesh_file_is_read_whatever_its_name(fixture, mark, name, tmp_path):
+    (tmp_path / name).write_bytes(mark + (FIXTURES / fixture).read_bytes())
+    assert measures(from_msh(MPI.COMM_SELF, tmp_path / name)) == pytest.approx(BAR)
+
+
+def test_every_bad_fixture_is_in_the_table_and_all_are_small():
+    assert {p.name for p in (FIXTURES / "bad").iterdir()} == set(BAD) - {"absent.msh"}
+    assert all(p.stat().st_size < 20_000 for p in FIXTURES.rglob("*.msh"))
