@@ -161,7 +161,9 @@ class Interior:
             float(np.max(bound**2 * aside, initial=0.0)),
         )
         work = max(work, EPS * program.local)
-        slack = np.maximum(gap, np.sqrt(work * give))
+        # Where the body would lift off, the slack is that from the beginning: grown from a small
+        # one it would take the force beyond zero at once, and the step would be cut to nothing.
+        slack = np.maximum(np.maximum(gap, gap - free[body.normals]), np.sqrt(work * give))
         zeros = np.zeros(self.tangents.shape)
         self.x = np.zeros_like(program.load)
         self.cones = Cones(slack, work / slack, work / bound, zeros, bound, zeros)
