@@ -1,0 +1,113 @@
+"""Bodies that bend over a gap: solved for sure at their contact nodes, in one solve of the body."""
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+
+from contact.case.file import parse_case
+from contact.solving import solve
+
+SELF = MPI.COMM_SELF
+
+
+def beam(length: float, cells: list[int], load: dict, gap: float, mu: float = 0.0, **more) -> dict:
+    """Return a beam of height 1, clamped at the left, over a foundation below it."""
+    friction = {"law": "coulomb", "mu": mu} if mu > 0 else {"law": "none"}
+    return {
+        "mesh": {"generator": "rectangle", "size": [length, 1.0], "cells": cells},
+        "material": {"young": 1.0, "poisson": 0.3},
+        "fixed": [{"on": "left", "displacement": [0.0, 0.0]}],
+        "load": [load],
+        "contact": {"on": "bottom", "gap": gap},
+        "friction": friction,
+        **more,
+    }
+
+
+TIP = {"on": "right", "traction": [0.0, -1e-4]}
+UNIFORM = {"on": "top", "traction": [0.0, -1e-5]}
+
+
+@pytest.mark.parametrize(
+    ("case", "force", "nodes"),
+    [
+        (beam(100.0, [200, 2], TIP, 0.5), [0.0, -9.9734515e-05], 1),
+        (beam(100.0, [200, 2], TIP, 0.5, 0.3), [-2.9026178e-05, -9.9516588e-05], 1),
+        (beam(100.0, [400, 4], UNIFORM, 0.5), [0.0, -8.3181908e-04], 303),
+    ],
+    ids=["tip", "friction", "uniform"],
+)
+def test_a_cantilever_that_touches_a_stop(case, force, nodes):
+    """Newton's method alone ended at a residual of 0.9 with no contact at all."""
+    solution = solve(parse_case(case), comm=SELF)
+    assert solution.converged, solution.outcome.reason
+    assert np.allclose(solution.contact_force, force, rtol=0, atol=1e-7 * np.abs(force).max())
+    assert np.count_nonzero(solution.status != "open") == nodes
+    assert solution.counters.linear_solves <= 3
+    assert solution.counters.factorizations <= 3
+
+
+def test_the_force_of_the_stop_is_that_of_a_beam():
+    """Euler and Bernoulli: F - 3 E' I gap/L^3, but for shear, (h/L)^2 of the difference."""
+    case = beam(100.0, [200, 2], TIP, 0.5, space={"degree": 2})
+    solution = solve(parse_case(case), comm=SELF)
+    bending = 3 * 1 / (1 - 0.3**2) / 12 * 0.5 / 100.0**3
+    assert solution.converged
+    assert 1e-4 + solution.contact_force[1] == pytest.approx(bending, rel=2e-3)
+
+
+def test_a_beam_clamped_at_both_ends_is_pressed_to_the_ground():
+    """Its load steps ended at 0.656 of the load, and were called converged."""
+    load = {"on": "top", "traction": [0.0, -3.90625e-5]}
+    case = beam(40.0, [160, 4], load, 0.3, 0.3)
+    case["fixed"].append({"on": "right", "displacement": [0.0, 0.0]})
+    solution = solve(parse_case(case), comm=SELF)
+    assert solution.converged, solution.outcome.reason
+    assert solution.counters.linear_solves == 1
+    assert "interior point" in solution.history.records[-1].note
+    other = solve(parse_case({**case, "solver": {"method": "penalty", "eps_contact": 1e-2}}))
+    assert np.allclose(solution.contact_force[1], other.contact_force[1], rtol=2e-2)
+
+
+@pytest.mark.parametrize("mu", [0.0, 0.3])
+@pytest.mark.parametrize("degree", [1, 2])
+def test_a_beam_whose_tip_is_lifted_off(degree, mu):
+    load = {"on": "right", "traction": [0.0, 1e-5]}
+    case = beam(20.0, [80, 4], load, 0.0, mu, space={"degree": degree})
+    solution = solve(parse_case(case), comm=SELF)
+    assert solution.converged, solution.outcome.reason
+    free = solve(parse_case({**case, "contact": {"on": "bottom", "gap": 100.0}}), comm=SELF)
+    exact = free.displacement.x.array
+    assert np.abs(solution.displacement.x.array - exact).max() <= 1e-2 * np.abs(exact).max()
+
+
+def test_slender_bodies_are_not_condensed_onto_most_of_their_nodes():
+    """Dense steps took 24 s there, sparse ones take 0.1 s."""
+    case = beam(600.0, [1200, 2], {"on": "top", "traction": [0.0, -1e-3]}, 0.0, 0.3)
+    solution = solve(parse_case(case), comm=SELF)
+    assert solution.converged
+    assert solution.counters.contact_solves == 0
+    assert solution.counters.linear_solves <= 5
+
+
+def test_a_bent_piezoelectric_beam_meets_a_conductor():
+    """Voltage and load bend it onto the foundation; all methods agree where they converge."""
+    pzt = {"e31": -5.4, "e33": 15.8, "e15": 12.3, "beta11": 8.13866, "beta33": 7.37455}
+    load = {"on": "right", "traction": [0.0, -58.7 * 0.2 / 20.0**3]}
+    case = beam(20.0, [80, 4], load, 0.05, 0.3)
+    case["material"] = {"young": 58.7102, "poisson": 0.3912, "piezo": pzt}
+    case["fixed"].append({"on": "top", "potential": 0.1})
+    case["electric"] = {"k_e": 1.0, "phi_f": 0.0, "delta": 10.0}
+    solution = solve(parse_case(case), comm=SELF)
+    assert solution.converged, solution.outcome.reason
+    assert solution.counters.linear_solves <= 3
+    assert solution.contact_force[1] < 0
+
+
+@pytest.mark.parallel
+def test_ranks_agree_on_the_sure_road():
+    case = beam(100.0, [100, 1], TIP, 0.5, 0.3)
+    shared, alone = solve(parse_case(case)), solve(parse_case(case), comm=SELF)
+    assert shared.converged and alone.converged
+    assert shared.counters.contact_solves == alone.counters.contact_solves > 0
+    assert np.allclose(shared.contact_force, alone.contact_force, rtol=1e-7)
