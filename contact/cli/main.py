@@ -128,7 +128,6 @@ def _solve(case: Case, options: argparse.Namespace, comm: MPI.Intracomm) -> int:
     from contact.output.files import write_outputs
     from contact.solving import solve
 
-    on_root(comm, _check_cache)
     with result_folder(options.out, comm) as folder:
         with progress(comm, options.quiet) as monitor:
             solution = solve(case, monitor=monitor, comm=comm)
@@ -194,6 +193,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
                 case = on_root(comm, lambda: load_case(options.case, options.set))
                 import_module("contact.solving")
+                on_root(comm, _check_cache)
             return {"solve": _solve, "check": _check}[options.command](case, options, comm)
     except InputError as error:
         if comm.rank == 0:
