@@ -118,11 +118,18 @@ def result_folder(path: str | Path, comm: MPI.Intracomm) -> Iterator[ResultFolde
     path = Path(path)
     taken: list[tuple[int, list[Path]]] = []
     on_root(comm, lambda: taken.append(_take(path)))
+    together = False
     try:
         yield ResultFolder(path, comm)
+        together = True
+    except InputError:  # wrong input is so on all ranks
+        together = True
+        raise
     finally:
         for lock, made in taken:
             _release(path, lock, made)
+        if together:  # no rank finds what rank 0 is about to remove
+            comm.barrier()
 
 
 def settle(path: Path) -> None:
