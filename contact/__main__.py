@@ -2,10 +2,14 @@
 
 import signal
 import sys
+import traceback
 
 if __name__ == "__main__":
     # No traceback of the import below: until `main` has its handlers, Ctrl-C just ends this.
     signal.signal(signal.SIGINT, signal.SIG_DFL)
-    from contact.cli.main import main
-
+    try:
+        from contact.cli.main import main
+    except Exception:  # Python's own status would say that a solve has not converged
+        traceback.print_exc()
+        sys.exit(70)
     sys.exit(main())

@@ -1,36 +1,44 @@
 """The command line: ``python3 -m contact solve CASE.toml --out DIR`` and ``... check CASE.toml``.
 
-Exit status: 0 converged, 1 not converged (outputs are written), 2 bad input (one message,
-nothing is written), 130 stopped by Ctrl-C, 143 by SIGTERM (what a solve had reached is written).
+Exit status: 0 converged, 1 not converged (outputs are written), 2 bad input, or no place for the
+results (one message, nothing is written), 70 a fault of the program, 130 stopped by Ctrl-C, 143
+by SIGTERM (what a solve had reached is written).
 """
 
 from __future__ import annotations
 
 import argparse
 import difflib
+import io
 import signal
 import sys
 import tempfile
-import traceback
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from importlib import import_module
 from pathlib import Path
-from types import TracebackType
-from typing import TYPE_CHECKING, Any, NoReturn, TypeVar
+from typing import TYPE_CHECKING, Any, NoReturn
 
 from mpi4py import MPI
 
+from contact.cli.ending import (
+    BAD_INPUT,
+    CONVERGED,
+    NOT_CONVERGED,
+    SIGNALLED,
+    end,
+    end_by_crash,
+    end_in_words,
+    end_with_launcher,
+)
 from contact.errors import InputError
-from contact.methods.interrupt import Terminated, ending_on_signal
+from contact.methods.interrupt import Terminated, ending_on_signal, signals_held
+from contact.output.folder import on_root, refused, result_folder
 
 if TYPE_CHECKING:  # it loads dolfinx, which PETSc's options have to precede
     from contact.case.file import Case
 
-CONVERGED, NOT_CONVERGED, BAD_INPUT = 0, 1, 2
-#: Added to the number of the signal that ended a run.
-SIGNALLED = 128
-
-T = TypeVar("T")
+#: Seconds after a signal from which on a second one ends the writing of results too.
+PATIENCE = 2.0
 
 
 class _Parser(argparse.ArgumentParser):
@@ -96,64 +104,49 @@ def parse(arguments: Sequence[str]) -> tuple[argparse.Namespace, list[str]]:
     return options, rest
 
 
-def _shared(comm: MPI.Intracomm, action: Callable[[], T]) -> T:
-    """Do something on rank 0; its result, or its InputError, is that of all ranks."""
-    result: Any = None
-    if comm.rank == 0:
-        try:
-            result = action()
-        except InputError as error:
-            result = error
-    result = comm.bcast(result)
-    if isinstance(result, InputError):
-        raise result
-    return result
+def _check_cache() -> None:
+    """Raise an InputError if compiled forms cannot be kept. On one rank."""
+    from dolfinx.jit import get_options
 
-
-def _check_folder(folder: Path) -> None:
-    """Raise an InputError if a folder cannot be written to; nothing is left of the attempt."""
-    missing = [place for place in (folder, *folder.parents) if not place.exists()]
+    cache = Path(get_options()["cache_dir"])
     try:
-        folder.mkdir(parents=True, exist_ok=True)
-        with tempfile.TemporaryFile(dir=folder):
+        cache.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryFile(dir=cache):
             pass
     except OSError as error:
-        reason = error.strerror or "not writable"
-        raise InputError(f"--out {folder}: {reason}; accepted: a folder to write to") from None
-    finally:
-        for place in missing:
-            if place.is_dir():
-                place.rmdir()
+        raise InputError(
+            f"{cache}: {error.strerror or error}; accepted: a folder to keep compiled forms in, "
+            "by HOME or XDG_CACHE_HOME"
+        ) from None
 
 
 def _solve(case: Case, options: argparse.Namespace, comm: MPI.Intracomm) -> int:
     if not options.out:  # the present folder is "."; this is rather a variable that is not set
         raise InputError('--out "": no folder; accepted: a folder to write to')
-    out = Path(options.out)
-    _shared(comm, lambda: _check_folder(out))
-
     # Not earlier: these load dolfinx, which PETSc's options have to precede.
     from contact.cli.progress import progress
     from contact.output.files import write_outputs
     from contact.solving import solve
 
-    with progress(comm, options.quiet) as monitor:
-        solution = solve(case, monitor=monitor, comm=comm)
-    write_outputs(solution, out)
-    if options.plot:
-        from contact.output.figures.figures import write_figures
-
-        write_figures(solution, out)
+    with result_folder(options.out, comm) as folder:
+        with progress(comm, options.quiet) as monitor:
+            solution = solve(case, monitor=monitor, comm=comm)
+        # What has taken long to compute is written, signal or not.
+        with signals_held(PATIENCE) as caught:
+            write_outputs(solution, folder, figures=options.plot)
+            number = comm.allreduce(caught[0] if caught else 0, op=MPI.MAX)
+            caught.clear()
     outcome = solution.outcome
     if comm.rank == 0 and not (options.quiet and outcome.converged):
         state = "converged" if outcome.converged else "stopped"
-        text = f"{state}: {outcome.reason}; results in {out}"
+        text = f"{state}: {outcome.reason}; results in {folder.path}"
         print(
             f"contact: {text}" if options.quiet else text,
             file=sys.stderr if options.quiet else None,
+            flush=True,
         )
-    if outcome.signal:
-        return SIGNALLED + outcome.signal
+    if outcome.signal or number:
+        return SIGNALLED + (outcome.signal or number)
     return CONVERGED if outcome.converged else NOT_CONVERGED
 
 
@@ -181,31 +174,26 @@ def _own_options() -> list[str]:
     return ["-skip_petscrc", *(["-options_file", str(own)] if own.is_file() else [])]
 
 
-def _abort_on_crash(
-    kind: type[BaseException], error: BaseException, trace: TracebackType | None
-) -> None:
-    """Show the traceback and end all ranks: the others may wait for this one for ever."""
-    traceback.print_exception(kind, error, trace)
-    sys.stderr.flush()
-    MPI.COMM_WORLD.Abort(NOT_CONVERGED)
-
-
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line and return its exit status."""
     comm = MPI.COMM_WORLD
-    if comm.size > 1:
-        sys.excepthook = _abort_on_crash
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="backslashreplace")  # names of files may be any bytes
+    end_in_words()
+    end_with_launcher()
     try:
-        with ending_on_signal() as ending:
-            with ending.held():
+        with ending_on_signal():
+            with signals_held():  # C++ libraries that are being loaded take no exceptions
                 options, petsc = parse(sys.argv[1:] if arguments is None else arguments)
                 import petsc4py
 
                 petsc4py.init([sys.argv[0], *_own_options(), *petsc])
                 from contact.case.file import load_case  # after PETSc's options
 
-                case = _shared(comm, lambda: load_case(options.case, options.set))
+                case = on_root(comm, lambda: load_case(options.case, options.set))
                 import_module("contact.solving")
+                on_root(comm, _check_cache)
             return {"solve": _solve, "check": _check}[options.command](case, options, comm)
     except InputError as error:
         if comm.rank == 0:
@@ -213,15 +201,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return BAD_INPUT
     except MemoryError:
         text = "not enough memory; accepted: fewer cells, or more ranks on more machines"
-        return _end(comm, text, BAD_INPUT)
+        return end(comm, text, BAD_INPUT)
+    except OSError as error:
+        return end(comm, str(refused(error)), BAD_INPUT)
     except KeyboardInterrupt as interrupt:
         number = signal.SIGTERM if isinstance(interrupt, Terminated) else signal.SIGINT
-        return _end(comm, f"interrupted ({number.name})", SIGNALLED + number)
-
-
-def _end(comm: MPI.Intracomm, text: str, status: int) -> int:
-    """Say what has ended the run on this rank, and end the other ranks too."""
-    print(f"contact: {text}", file=sys.stderr, flush=True)
-    if comm.size > 1:
-        comm.Abort(status)
-    return status
+        return end(comm, f"interrupted ({number.name})", SIGNALLED + number)
+    except Exception:
+        return end_by_crash(comm)

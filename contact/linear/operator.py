@@ -19,6 +19,7 @@ from petsc4py import PETSc
 from contact.errors import InputError
 from contact.linear import multigrid
 from contact.linear.block import BlockPreconditioner
+from contact.linear.faults import no_solution
 from contact.linear.layout import Layout
 from contact.linear.rigid import held_motions
 from contact.linear.stiff_nodes import TOUCH, StiffNodes
@@ -260,22 +261,9 @@ class SparseOperator:
         reason = self.ksp.getConvergedReason()
         finite = bool(np.isfinite(self._solution.norm()))
         if reason == PETSc.KSP.ConvergedReason.DIVERGED_PCSETUP_FAILED or not finite:
-            raise self._fault()
+            check_overflow(self.layout, self.matrix.norm(), self._rhs.norm())
+            raise no_solution(self.ksp.getPC(), self._prefix)
         return self._solution.array.copy()
-
-    def _fault(self) -> InputError:
-        """Say why there is no solution. Collective."""
-        check_overflow(self.layout, self.matrix.norm(), self._rhs.norm())
-        if self.ksp.getPC().getFailedReason() == PETSc.PC.FailedReason.FACTOR_OUTMEMORY:
-            return InputError(
-                "the factorisation needs more memory than it was given; accepted: a smaller mesh, "
-                f"a larger -{self._prefix}mat_mumps_icntl_14 (percent of workspace beyond the "
-                'estimate), or linear = "iterative" in [solver]'
-            )
-        return InputError(
-            "the linear system is singular: the body can move freely; fix enough "
-            "displacement components (or, for a piezoelectric body, a potential)"
-        )
 
 
 def balance(matrix: PETSc.Mat, layout: Layout) -> None:

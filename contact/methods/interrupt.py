@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import signal
 import threading
 import time
@@ -126,28 +127,56 @@ class Ending:
     """
 
     caught: list[int] = field(default_factory=list)
-    _held: bool = False
 
     def __call__(self, number: int, frame: FrameType | None) -> None:
-        """Note a signal, and raise KeyboardInterrupt or `Terminated`, now or later."""
+        """Note a signal, and raise KeyboardInterrupt or `Terminated`."""
         self.caught.append(number)
-        if not self._held:
-            self.check()
+        raise Terminated if number == signal.SIGTERM else KeyboardInterrupt
 
-    def check(self) -> None:
-        """Raise for the first signal, if there was one."""
-        if self.caught:
-            raise Terminated if self.caught[0] == signal.SIGTERM else KeyboardInterrupt
 
-    @contextmanager
-    def held(self) -> Iterator[None]:
-        """Let signals wait: C++ libraries that are being loaded take no exceptions."""
-        self._held = True
-        try:
-            yield
-        finally:
-            self._held = False
-        self.check()
+@contextmanager
+def signals_held(patience: float = math.inf) -> Iterator[list[int]]:
+    """Let signals wait: what is being done must not be left half done.
+
+    Parameters
+    ----------
+    patience
+        Seconds after the first signal from which on another one has its effect at once.
+
+    Yields
+    ------
+    The signals so far. They have their effect in the end, unless the list is cleared. Where
+    signals cannot be caught, in other threads than the main one, nothing is changed.
+    """
+    caught: list[int] = []
+    since: list[float] = []
+    before: dict[int, Callable[[int, FrameType | None], object] | int] = {}
+
+    def restore() -> None:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+        before.clear()
+
+    def note(number: int, frame: FrameType | None) -> None:
+        caught.append(number)
+        since.append(time.monotonic())
+        if since[-1] - since[0] > patience:
+            caught.clear()
+            restore()
+            signal.raise_signal(number)
+
+    if threading.current_thread() is threading.main_thread():
+        for kind in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+            handler = signal.getsignal(kind)
+            if handler is not None:  # None: not installed from Python, left alone
+                before[kind] = handler
+                signal.signal(kind, note)
+    try:
+        yield caught
+    finally:
+        restore()
+        if caught:
+            signal.raise_signal(caught[0])
 
 
 @contextmanager

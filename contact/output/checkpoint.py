@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from types import ModuleType
@@ -16,7 +16,9 @@ from mpi4py import MPI
 from contact.errors import InputError
 from contact.interface.multipliers import Multipliers
 from contact.mesh.domain import Domain, Indices, combinations, exterior_facets, from_mesh
+from contact.output.disk import OVERHEAD, claim_room, library_errors
 from contact.output.fields import nodal_function, unknowns
+from contact.output.folder import settle
 from contact.output.solution import Solution
 from contact.problem.problem import ContactProblem
 from contact.problem.state import State
@@ -80,13 +82,14 @@ def write_checkpoint(solution: Solution, path: str | Path) -> None:
     Raises
     ------
     InputError
-        If adios4dolfinx is missing.
+        If adios4dolfinx is missing, or there is no room for it.
+    OSError
+        On a rank where the library fails all the same; others may wait for it.
     """
     adios, problem, path = _adios(), solution.problem, Path(path)
     domain, d = problem.domain, problem.dim
-    adios.write_mesh(path, domain.mesh)
-    _write_sets(path, domain, PARTS, domain.parts)
-    _write_sets(path, domain, REGIONS, domain.regions)
+    sets = {PARTS: _combined(domain, PARTS, domain.parts)}
+    sets[REGIONS] = _combined(domain, REGIONS, domain.regions)
     body, state = problem.equilibrium, solution.state
     vectors = np.zeros((state.x.size // body.block_size, d))
     vectors[problem.nodes.nodes] = state.forces.vectors(problem.nodes)
@@ -94,10 +97,30 @@ def write_checkpoint(solution: Solution, path: str | Path) -> None:
     functions = {**unknowns(body, state.x), "contact_forces": forces}
     kind = {"degree": np.array([body.degree]), "size": np.array([domain.size])}
     kind["piezoelectric"] = np.array([int(problem.piezoelectric)])
-    adios.write_attributes(path, domain.comm, KIND, kind)
-    for name, function in functions.items():
+    for function in functions.values():
         function.x.scatter_forward()
-        adios.write_function(path, function, name=name)
+    written = [*functions.values(), *(numbers for numbers, _ in sets.values())]
+    claim_room(domain.comm, path.parent, _bytes(domain, written))
+    with library_errors(path):
+        adios.write_mesh(path, domain.mesh)
+        for group, (numbers, names) in sets.items():
+            _write_sets(path, group, numbers, names)
+        adios.write_attributes(path, domain.comm, KIND, kind)
+        for name, function in functions.items():
+            adios.write_function(path, function, name=name)
+
+
+def _bytes(domain: Domain, functions: Sequence[fem.Function]) -> int:
+    """Bound what this rank adds to a checkpoint."""
+    mesh = domain.mesh
+    cells = mesh.topology.index_map(mesh.topology.dim).size_local
+    numbers = mesh.geometry.x.size + cells * (mesh.topology.dim + 2)
+    for function in functions:
+        links = function.function_space.dofmap
+        size = links.list.shape[1] * links.index_map_bs
+        numbers += function.x.array.size + cells * (size + 2)
+    # A function is written by itself, with names and offsets of its own.
+    return 8 * numbers + (len(functions) + 2) * OVERHEAD
 
 
 def read_checkpoint(path: str | Path, comm: MPI.Intracomm = MPI.COMM_WORLD) -> Checkpoint:
@@ -109,6 +132,8 @@ def read_checkpoint(path: str | Path, comm: MPI.Intracomm = MPI.COMM_WORLD) -> C
         If there is no such checkpoint, or adios4dolfinx is missing.
     """
     adios, path = _adios(), Path(path)
+    if comm.rank == 0:
+        settle(path.parent)
     if not comm.bcast(path.is_dir() if comm.rank == 0 else None):
         raise InputError(f"{path}: there is no checkpoint; accepted: a folder checkpoint.bp")
     mesh = adios.read_mesh(path, comm, ghost_mode=dmesh.GhostMode.none)
@@ -130,24 +155,36 @@ def read_checkpoint(path: str | Path, comm: MPI.Intracomm = MPI.COMM_WORLD) -> C
     )
 
 
-def _write_sets(path: Path, domain: Domain, group: str, sets: Mapping[str, Indices]) -> None:
-    """Write named sets of facets or cells: which of them meet, a number each entity. Collective.
+def _combined(
+    domain: Domain, group: str, sets: Mapping[str, Indices]
+) -> tuple[fem.Function, dict[str, Indices]]:
+    """Return which of named sets of facets or cells meet, a number each entity. Collective.
 
-    A function carries the numbers: adios4dolfinx 0.9 divides by zero where it writes tags and a
-    rank has none.
+    Returns
+    -------
+    The numbers, and those that belong to each name. A function carries the former: adios4dolfinx
+    0.9 divides by zero where it writes tags and a rank has none.
     """
     numbers, dofs = _numbers(domain.mesh, group)
     labels, here = combinations(dofs.size, sets.values())
     there = sorted(set().union(*domain.comm.allgather(here)))
     numbers.x.array[dofs] = np.array([there.index(combined) for combined in here])[labels]
     numbers.x.scatter_forward()
-    adios = _adios()
-    adios.write_function(path, numbers, name=group)
-    names = {
-        NAME + name: np.array([k for k, combined in enumerate(there) if i in combined])
+    return numbers, {
+        NAME + name: np.array(
+            [k for k, combined in enumerate(there) if i in combined], dtype=np.int32
+        )
         for i, name in enumerate(sets)
     }
-    adios.write_attributes(path, domain.comm, group, names)
+
+
+def _write_sets(
+    path: Path, group: str, numbers: fem.Function, names: Mapping[str, Indices]
+) -> None:
+    """Write what `_combined` returned. Collective."""
+    adios = _adios()
+    adios.write_function(path, numbers, name=group)
+    adios.write_attributes(path, numbers.function_space.mesh.comm, group, names)
 
 
 def _read_sets(path: Path, mesh: dmesh.Mesh, group: str) -> dict[str, Indices]:

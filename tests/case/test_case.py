@@ -542,7 +542,9 @@ def test_bad_command_lines_leave_with_status_2(bar, capsys, monkeypatch, line, f
 def test_exit_status_and_outputs_of_a_solve(bar, capsys, monkeypatch, limit, status):
     written = []
     output = types.ModuleType("contact.output.files")
-    output.write_outputs = lambda solution, out: written.append((solution.converged, out))
+    output.write_outputs = lambda solution, out, figures: written.append(
+        (solution.converged, out.path)
+    )
     monkeypatch.setitem(sys.modules, "contact.output.files", output)
     changes = ["--set", "solver.method=uzawa", "--set", f"solver.max_outer={limit}"]
     assert main(["solve", str(bar), "--out", str(bar.parent / "out"), *changes]) == status

@@ -263,6 +263,25 @@ def test_signals_reach_the_command(launcher, kind):
     assert (process.returncode, out) == (9, "caught\n")
 
 
+@pytest.mark.parametrize("kind", [signal.SIGTERM, signal.SIGINT])
+@pytest.mark.parametrize("status", [0, 1])
+def test_signals_reach_the_ranks_and_not_their_launcher(launcher, kind, status):
+    """Open MPI's would kill them before they have written anything, and leave with 1."""
+    launcher.fake("python3")
+    rank = f"trap 'echo written; exit {status or 128 + kind}' {kind.name[3:]}; echo ready; "
+    launcher.fake(
+        "mpirun",
+        "[[ ${1-} != --version ]] || exit 0; trap 'echo killed; exit 1' INT TERM\n"
+        f'env --default-signal=INT bash -c "{rank} while :; do sleep 0.05; done" & wait $!',
+    )
+    process = launcher.start("mpirun", "-n", "1")
+    assert process.stdout is not None
+    assert process.stdout.readline() == "ready\n"
+    process.send_signal(kind)
+    out, _ = process.communicate(timeout=30)
+    assert (process.returncode, out) == (128 + kind, "written\n")
+
+
 def test_one_floor_and_one_package_list():
     project = tomllib.loads((CLONE / "pyproject.toml").read_text())["project"]
     (dolfinx,) = [d for d in project["dependencies"] if d.startswith("fenics-dolfinx")]

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-import os
+from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -13,13 +14,17 @@ from contact.output.figures.body import Picture, draw_plane, picture
 from contact.output.figures.contact import draw_line, draw_surface
 from contact.output.figures.space import draw_space
 from contact.output.solution import Solution
-from contact.output.table import contact_table, held_points
+from contact.output.table import Table, contact_table, held_points
+from contact.typing import Array
 
 #: Quantities drawn on the deformed body: name of the figure, field, label.
 DEFORMED = (
     ("deformed", "von_mises", "von Mises stress (units of the case)"),
     ("potential", "potential", r"potential $\varphi$ (units of the case)"),
 )
+
+#: Characters of a title that fit on a figure.
+WIDTH = 70
 
 #: Settings of all figures.
 STYLE: dict[str, Any] = {
@@ -34,6 +39,76 @@ STYLE: dict[str, Any] = {
     "savefig.dpi": 200,
     "figure.constrained_layout.use": True,
 }
+
+
+@dataclass(frozen=True)
+class Drawing:
+    """What the figures show, from all ranks.
+
+    Attributes
+    ----------
+    title
+        Of all figures.
+    plane
+        Whether the body is plane.
+    table, held
+        The contact nodes, and the other nodes of Gamma_3.
+    pictures
+        Names of the figures of the deformed body, and what they show.
+    """
+
+    title: str
+    plane: bool
+    table: Table
+    held: Array
+    pictures: Sequence[tuple[str, Picture]]
+
+    def draw(self, folder: Path) -> list[Path]:
+        """Draw the figures into a folder. On one rank.
+
+        Returns
+        -------
+        The files, in the order in which they were drawn; one that fails is not left half done.
+        """
+        with matplotlib.rc_context(STYLE):
+            figures: dict[str, Figure | None] = {
+                "contact": draw_line(self.table, self.title, self.held)
+                if self.plane
+                else draw_surface(self.table, self.title)
+            }
+            for name, made in self.pictures:
+                figures[name] = (
+                    draw_plane(made, self.table, self.title)
+                    if self.plane
+                    else draw_space(made, self.title)
+                )
+            return [
+                _save(figure, folder / f"figure-{name}.png")
+                for name, figure in figures.items()
+                if figure is not None
+            ]
+
+
+def collect(solution: Solution) -> Drawing | None:
+    """Gather on rank 0 what the figures of a solution show; None elsewhere. Collective."""
+    table, held = contact_table(solution), held_points(solution.problem)
+    pictures: list[tuple[str, Picture]] = []
+    for name, field, label in DEFORMED:
+        if field != "potential" or solution.problem.piezoelectric:
+            made = picture(solution, field, label)
+            if made is not None:
+                pictures.append((name, made))
+    if solution.problem.comm.rank > 0 or table is None:
+        return None
+    return Drawing(heading(solution.title), solution.problem.dim == 2, table, held, pictures)
+
+
+def heading(title: str) -> str:
+    """Return the title of a case as one line that fits on a figure, to be shown as it is."""
+    line = " ".join(title.split())
+    if len(line) > WIDTH:
+        line = line[: WIDTH - 1] + "…"
+    return line.replace("$", r"\$")
 
 
 def write_figures(solution: Solution, folder: str | Path) -> list[Path]:
@@ -55,35 +130,18 @@ def write_figures(solution: Solution, folder: str | Path) -> list[Path]:
     -------
     The files, in the order in which they were drawn; none on ranks other than 0.
     """
-    folder, comm = Path(folder), solution.problem.comm
-    table, held = contact_table(solution), held_points(solution.problem)
-    pictures: list[tuple[str, Picture]] = []
-    for name, field, label in DEFORMED:
-        if field != "potential" or solution.problem.piezoelectric:
-            made = picture(solution, field, label)
-            if made is not None:
-                pictures.append((name, made))
-    if comm.rank > 0 or table is None:
+    folder, drawing = Path(folder), collect(solution)
+    if drawing is None:
         return []
     folder.mkdir(parents=True, exist_ok=True)
-    plane, title = solution.problem.dim == 2, solution.title
-    with matplotlib.rc_context(STYLE):
-        figures: dict[str, Figure | None] = {
-            "contact": draw_line(table, title, held) if plane else draw_surface(table, title)
-        }
-        for name, made in pictures:
-            drawn = draw_plane(made, table, title) if plane else draw_space(made, title)
-            figures[name] = drawn
-        return [
-            _save(figure, folder / f"figure-{name}.png")
-            for name, figure in figures.items()
-            if figure is not None
-        ]
+    return drawing.draw(folder)
 
 
 def _save(figure: Figure, path: Path) -> Path:
-    """Save a figure made without pyplot, under another name first."""
-    partial = path.with_name(f".part-{path.name}")
-    figure.savefig(partial)
-    os.replace(partial, path)
+    """Save a figure made without pyplot."""
+    try:
+        figure.savefig(path)
+    except BaseException:
+        path.unlink(missing_ok=True)
+        raise
     return path

@@ -1,0 +1,92 @@
+"""What ``summary.json`` says."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import asdict
+from typing import Any
+
+import numpy as np
+from mpi4py import MPI
+
+from contact.output import environment
+from contact.output.balances import charge_balance
+from contact.output.solution import Solution
+from contact.output.table import Table
+
+
+def summarise(solution: Solution, table: Table | None) -> dict[str, Any]:
+    """Return the contents of ``summary.json``. Collective.
+
+    Parameters
+    ----------
+    solution
+        The solution.
+    table
+        Its contact table, None on ranks other than 0.
+    """
+    problem, records = solution.problem, solution.history.records
+    status = np.array([]) if table is None else table["status"]
+    counts = problem.comm.bcast({s: int(np.sum(status == s)) for s in ("open", "stick", "slip")})
+    mesh, counters = problem.domain.mesh, solution.counters
+    kkt = solution.outcome.kkt
+    summary: dict[str, Any] = {
+        "title": solution.title,
+        "converged": solution.converged,
+        "reason": solution.outcome.reason,
+        "method": solution.method,
+        "dofs": problem.equilibrium.layout.unknowns,
+        "cells": mesh.topology.index_map(mesh.topology.dim).size_global,
+        "ranks": problem.comm.size,
+        "outer_iterations": len(records),
+        "inner_iterations": [record.inner for record in records],
+        "linear_solves": counters.linear_solves,
+        "linear_iterations": counters.linear_iterations,
+        "factorizations": counters.factorizations,
+        "contact_solves": counters.contact_solves,
+        "kkt": {"equilibrium": kkt.equilibrium, "contact": kkt.contact, "friction": kkt.friction},
+        "max_pressure": problem.nodes.maximum(solution.pressure),
+        "contact_force": solution.contact_force.tolist(),
+        "max_displacement": _largest_displacement(solution),
+        "max_dev_strain": solution.max_dev_strain,
+        "contact_nodes": counts["stick"] + counts["slip"],
+        "stick_nodes": counts["stick"],
+        "slip_nodes": counts["slip"],
+        "contact_direction": problem.contact.foundation.direction,
+        "notes": solution.notes,
+        "warnings": solution.warnings,
+    }
+    if problem.piezoelectric:
+        summary |= _electric(solution)
+    summary |= {"seconds": solution.seconds, "versions": environment.versions()}
+    return {key: _finite(value) for key, value in summary.items()}
+
+
+def _largest_displacement(solution: Solution) -> float:
+    problem = solution.problem
+    body = problem.equilibrium
+    u = solution.state.x[: body.owned].reshape(-1, body.block_size)[:, : problem.dim]
+    largest = float(np.linalg.norm(u, axis=1).max(initial=0.0))
+    return float(problem.comm.allreduce(largest, op=MPI.MAX))
+
+
+def _electric(solution: Solution) -> dict[str, Any]:
+    problem, body = solution.problem, solution.problem.equilibrium
+    scaled = solution.state.x[: body.owned].reshape(-1, body.block_size)[:, -1]
+    phi = body.phi_scale * scaled
+    charges = charge_balance(problem, solution.state)
+    return {
+        "phi_min": problem.comm.allreduce(float(phi.min(initial=math.inf)), op=MPI.MIN),
+        "phi_max": problem.comm.allreduce(float(phi.max(initial=-math.inf)), op=MPI.MAX),
+        "total_charge": charges.total,
+        "charges": asdict(charges),
+    }
+
+
+def _finite(value: Any) -> Any:
+    """Return a value with null for what JSON cannot say: NaN and infinity."""
+    if isinstance(value, dict):
+        return {key: _finite(item) for key, item in value.items()}
+    if isinstance(value, list):
+        return [_finite(item) for item in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value

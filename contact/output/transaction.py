@@ -1,0 +1,227 @@
+"""Put the results of a run in the place of an earlier run's, all of them or none.
+
+A run writes its members into ``.contact-new/new`` of the folder, ``summary.json`` the last: from
+then on they are complete. Then each member takes its place, the earlier one of its name, and the
+earlier ones that have no successor, going to ``.contact-new/old``. The order of the renames says
+at every moment what is left to do:
+
+1. the earlier ``summary.json`` goes first: no summary stands beside members of another run;
+2. the other members change places one by one, a new one that is still in ``new`` not having
+   moved yet, so that what stands under its name is the earlier one;
+3. the new ``summary.json`` comes last.
+
+Whoever finds ``new/summary.json`` continues at 2 (`recover`); whoever finds none has nothing to
+continue: what is under ``.contact-new`` is either not complete or not needed any more.
+
+``summary.json`` names the members under "files". These alone are removed by a later run.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import shutil
+import stat
+from collections.abc import Iterator
+from contextlib import suppress
+from pathlib import Path
+
+from contact.errors import InputError
+
+STAGE = ".contact-new"
+SUMMARY = "summary.json"
+#: Key of the summary under which the names of the members stand.
+MANIFEST = "files"
+
+#: What runs may write. A summary is data of whoever wrote it: no other names are taken from it.
+_MEMBER = re.compile(r"[A-Za-z0-9][\w-]*\.(json|csv|bp|xdmf|h5|vtkhdf|pvd|vtu|png)")
+#: What ADIOS2 leaves in a folder of fields.
+_ADIOS = re.compile(r"(data|md|mmd)\.(\d+|idx)|profiling\.json|active")
+
+#: Names that every run writes or may write.
+MEMBERS = (
+    SUMMARY,
+    "contact.csv",
+    "history.csv",
+    "fields.bp",
+    "cells.bp",
+    "fields.xdmf",
+    "fields.h5",
+    "checkpoint.bp",
+    "figure-contact.png",
+    "figure-deformed.png",
+    "figure-potential.png",
+)
+
+
+def check_members(folder: Path, names: tuple[str, ...] = MEMBERS) -> None:
+    """Check that what stands under the names of members may be replaced.
+
+    Raises
+    ------
+    InputError
+        If something is no file where a file is expected, or no folder of ADIOS2's files where
+        a folder is: nothing of that kind is ours, and it is neither followed nor overwritten.
+    """
+    for name in names:
+        _check_member(folder / name)
+
+
+def begin(folder: Path) -> Path:
+    """Make an empty place for new members and return it."""
+    recover(folder)
+    for name in ("old", "new"):  # before anything is written: a full disk refuses folders too
+        (folder / STAGE / name).mkdir(parents=True)
+    return folder / STAGE / "new"
+
+
+def complete(folder: Path, summary: dict[str, object]) -> None:
+    """Write the summary of the new members, by which they are complete, with their names."""
+    new = folder / STAGE / "new"
+    members = sorted({path.name for path in new.iterdir()} | {SUMMARY})
+    for path in _files(new):
+        # What a disk or a server refuses, it may refuse as late as here.
+        _sync(path)
+    # Not in `new`, where its presence would say that it is whole.
+    draft = folder / STAGE / SUMMARY
+    text = json.dumps(summary | {MANIFEST: members}, indent=2, allow_nan=False)
+    draft.write_text(text + "\n", encoding="utf-8")
+    _sync(draft)
+    check_members(folder, tuple(members))
+    os.replace(draft, new / SUMMARY)
+
+
+def swap(folder: Path) -> None:
+    """Put the complete new members in their places, and remove what they replace.
+
+    Raises
+    ------
+    OSError
+        If that is refused: the earlier members are in their places again.
+    """
+    try:
+        _advance(folder)
+    except (OSError, InputError):
+        _return(folder)
+        raise
+    discard(folder)
+
+
+def recover(folder: Path) -> None:
+    """Continue what an interrupted run has begun: its members, if complete, take their places.
+
+    Raises
+    ------
+    InputError
+        If something that is not ours stands under the name of our temporary folder.
+    """
+    stage = folder / STAGE
+    kind = _kind(stage)
+    if kind is None:
+        return
+    if kind != "a folder" or not all(_is_stage(path) for path in stage.iterdir()):
+        raise InputError(
+            f"{stage}: given {kind} that no run has left there; accepted: a folder without it"
+        )
+    if _kind(stage / "new" / SUMMARY) == "a file":
+        names = tuple(path.name for path in (stage / "new").iterdir())
+        check_members(stage / "new", names)
+        swap(folder)
+    discard(folder)
+
+
+def discard(folder: Path) -> None:
+    """Remove the temporary folder, and before the rest what says that it is complete."""
+    with suppress(OSError):
+        (folder / STAGE / "new" / SUMMARY).unlink()
+    shutil.rmtree(folder / STAGE, ignore_errors=True)
+
+
+def _advance(folder: Path) -> None:
+    new, old = folder / STAGE / "new", folder / STAGE / "old"
+    left = {path.name for path in new.iterdir()}
+    arrived = set(_members(new / SUMMARY)) - left
+    earlier = _members(folder / SUMMARY) or _members(old / SUMMARY)
+    leaving = (set(earlier) - arrived) | left
+    for name in sorted(leaving, key=lambda name: name != SUMMARY):
+        _check_member(folder / name)
+        if _kind(folder / name) is not None:
+            os.rename(folder / name, old / name)
+        if name in left and name != SUMMARY:
+            os.rename(new / name, folder / name)
+    os.rename(new / SUMMARY, folder / SUMMARY)
+
+
+def _return(folder: Path) -> None:
+    """Undo `_advance`, from wherever it has come to."""
+    new, old = folder / STAGE / "new", folder / STAGE / "old"
+    for name in _members(new / SUMMARY):
+        if _kind(new / name) is None and _kind(folder / name) is not None:
+            os.rename(folder / name, new / name)
+    if old.is_dir():
+        for path in sorted(old.iterdir(), key=lambda path: path.name == SUMMARY):
+            os.rename(path, folder / path.name)
+    discard(folder)
+
+
+def _is_stage(path: Path) -> bool:
+    """Whether a run may have left this in its temporary folder."""
+    if path.name == SUMMARY:
+        return _kind(path) == "a file"
+    if path.name not in ("new", "old") or _kind(path) != "a folder":
+        return False
+    return all(_MEMBER.fullmatch(member.name) for member in path.iterdir())
+
+
+def _members(summary: Path) -> list[str]:
+    """Return the members that a summary names; none if it is not there or not ours."""
+    if _kind(summary) != "a file":
+        return []
+    with suppress(ValueError, RecursionError):
+        content = json.loads(summary.read_bytes())
+        names = content.get(MANIFEST) if isinstance(content, dict) else None
+        if isinstance(names, list):
+            return [n for n in names if isinstance(n, str) and _MEMBER.fullmatch(n)]
+    return []
+
+
+def _check_member(path: Path) -> None:
+    kind, expected = _kind(path), "a folder" if path.suffix == ".bp" else "a file"
+    if kind not in (None, expected):
+        raise InputError(
+            f"{path}: given {kind} where the results have {expected}; accepted: a folder without it"
+        )
+    if kind == "a folder":
+        for inner in path.iterdir():
+            if not _ADIOS.fullmatch(inner.name) or _kind(inner) != "a file":
+                raise InputError(
+                    f"{path}: given a folder with {inner.name} in it, which is not of a run; "
+                    "accepted: a folder without it"
+                )
+
+
+def _kind(path: Path) -> str | None:
+    """Say what stands under a name, without following or opening it."""
+    try:
+        mode = path.lstat().st_mode
+    except FileNotFoundError:
+        return None
+    for test, words in (
+        (stat.S_ISREG, "a file"),
+        (stat.S_ISDIR, "a folder"),
+        (stat.S_ISLNK, "a symbolic link"),
+        (stat.S_ISFIFO, "a named pipe"),
+    ):
+        if test(mode):
+            return words
+    return "a device or socket"
+
+
+def _files(folder: Path) -> Iterator[Path]:
+    return (path for path in folder.rglob("*") if path.is_file())
+
+
+def _sync(path: Path) -> None:
+    with path.open("rb") as file:
+        os.fsync(file.fileno())

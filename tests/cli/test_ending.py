@@ -1,0 +1,175 @@
+"""How the command line begins and ends: PETSc's options, exit statuses, processes."""
+
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from contact import case
+
+CLONE = Path(case.__file__).parents[2]
+BAR = CLONE / "scripts/cases/bar.toml"
+SMALL = ["--set", "mesh.cells=[16, 4]", "--quiet"]
+BOX = """
+title = "Box"
+[mesh]
+generator = "box"
+size = [2.0, 1.0, 1.0]
+cells = [24, 12, 12]
+[material]
+young = 10.0
+poisson = 0.3
+[[fixed]]
+on = "top"
+displacement = [0.02, 0.0, -0.02]
+[contact]
+on = "bottom"
+[friction]
+law = "coulomb"
+mu = 0.3
+[solver]
+linear = "lu"
+"""
+RANKS = pytest.mark.parametrize("ranks", [1, 2])
+
+
+def environment() -> dict[str, str]:
+    """Return the environment without what says that this is a rank itself."""
+    kept = {k: v for k, v in os.environ.items() if not k.startswith(("OMPI_", "PMIX_", "PRTE_"))}
+    own = {"btl": "self,sm", "topo": "basic", "mpi_yield_when_idle": "1"}
+    root = {"OMPI_ALLOW_RUN_AS_ROOT": "1", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1"}
+    mca = {f"OMPI_MCA_{key}": value for key, value in own.items()}
+    return kept | root | mca | {"PYTHONPATH": str(CLONE), "OMP_NUM_THREADS": "1"}
+
+
+def start(*arguments: str, ranks: int = 1, before: str = "") -> subprocess.Popen[str]:
+    """Start the command line, after some Python, in a session of its own."""
+    if ranks > 1 and shutil.which("mpirun") is None:
+        pytest.skip("there is no mpirun")
+    program = f"import sys\n{before}\nfrom contact.cli.main import main\nsys.exit(main())"
+    launch = [] if ranks == 1 else ["mpirun", "--oversubscribe", "-n", str(ranks)]
+    return subprocess.Popen(
+        [*launch, sys.executable, "-c", program, *arguments],
+        env=environment(),
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+        start_new_session=True,
+    )
+
+
+def run(*arguments: str, ranks: int = 1, before: str = "") -> tuple[int, str]:
+    """Run the command line; return its status and what it said."""
+    process = start(*arguments, ranks=ranks, before=before)
+    text, _ = process.communicate(timeout=120)
+    return process.returncode, text
+
+
+def test_petsc_is_loaded_after_its_options() -> None:
+    """Loaded before, it would not look at those of the command line."""
+    program = "import sys, contact.cli.main; sys.exit('petsc4py.PETSc' in sys.modules)"
+    assert subprocess.run([sys.executable, "-c", program]).returncode == 0
+
+
+@pytest.mark.parametrize("method", ["newton", "uzawa"])
+def test_too_little_memory_for_mumps_is_no_free_body(method: str, tmp_path: Path) -> None:
+    file = tmp_path / "box.toml"
+    file.write_text(BOX)
+    options = ["--set", f"solver.method={method}", "-contact_mat_mumps_icntl_23", "1"]
+    status, text = run("solve", str(file), "--out", str(tmp_path / "out"), *options)
+    assert status == 2
+    assert "out of memory in the factorisation" in text and "icntl_23" in text
+
+
+FAULTS = {
+    "exception": "raise ZeroDivisionError('wrong')",
+    "library": "import ctypes; ctypes.CDLL('libstdc++.so.6')['_ZSt9terminatev']()",
+}
+
+
+@RANKS
+@pytest.mark.parametrize("kind", FAULTS)
+def test_a_crash_has_a_status_of_its_own(ranks: int, kind: str, tmp_path: Path) -> None:
+    """On any rank; 1 would say that a solve has not converged."""
+    before = (
+        "import contact.build, contact.errors\n"
+        "from mpi4py import MPI\n"
+        "def build(*_, **__):\n"
+        f"    if MPI.COMM_WORLD.rank == {ranks - 1}: {FAULTS[kind]}\n"
+        "    MPI.COMM_WORLD.barrier()\n"
+        "contact.build.build_problem = build\n"
+    )
+    out = tmp_path / "out"
+    status, text = run("solve", str(BAR), "--out", str(out), *SMALL, ranks=ranks, before=before)
+    assert status == 70, text
+    assert ("ZeroDivisionError" in text) == (kind == "exception")
+    assert "contact: " in text
+    assert not (out / "summary.json").exists()
+
+
+@pytest.mark.parametrize(
+    "title",
+    [
+        pytest.param("long " * 1000, id="words"),
+        pytest.param("x" * 5000, id="word"),
+        pytest.param("a $ b $ \\\\frac", id="formula"),
+        pytest.param("two\\nlines", id="lines"),
+    ],
+)
+def test_any_title_can_be_drawn(title: str, tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    options = ["--plot", "--set", f'title="{title}"']
+    status, text = run("solve", str(BAR), "--out", str(out), *SMALL, *options)
+    assert status == 0, text
+    assert len(list(out.glob("figure-*.png"))) == 2
+
+
+def test_a_figure_that_fails_costs_nothing_else(tmp_path: Path) -> None:
+    before = "import matplotlib.figure; matplotlib.figure.Figure.savefig = lambda *_: 1 / 0"
+    out = tmp_path / "out"
+    status, text = run("solve", str(BAR), "--out", str(out), *SMALL, "--plot", before=before)
+    assert status == 70, text
+    assert (out / "summary.json").exists() and (out / "fields.bp").is_dir()
+
+
+def test_ranks_end_with_a_killed_launcher(tmp_path: Path) -> None:
+    """Nobody else would end them."""
+    options = ["--out", str(tmp_path / "out"), "--set", "mesh.cells=[512, 128]"]
+    process = start("solve", str(BAR), *options, ranks=2)
+    assert process.stdout is not None
+    while "iteration 0" not in process.stdout.readline():
+        assert process.poll() is None
+    ranks = children(process.pid)
+    assert len(ranks) == 2
+    process.send_signal(signal.SIGKILL)
+    process.communicate(timeout=60)
+    end = time.monotonic() + 10
+    while any(alive(rank) for rank in ranks) and time.monotonic() < end:
+        time.sleep(0.05)
+    assert not any(alive(rank) for rank in ranks)
+
+
+def children(parent: int) -> list[int]:
+    """Return the processes that a process has started."""
+    found = []
+    for stat in Path("/proc").glob("[0-9]*/stat"):
+        try:
+            fields = stat.read_text().rpartition(")")[2].split()
+        except OSError:
+            continue
+        if int(fields[1]) == parent:
+            found.append(int(stat.parent.name))
+    return found
+
+
+def alive(pid: int) -> bool:
+    """Whether a process is there and no zombie."""
+    try:
+        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
+    except OSError:
+        return False
