@@ -194,19 +194,29 @@ class Newton:
     def _convex(
         self, problem: CondensedProblem, loop: NewtonLoop, iterate: Iterate, outcome: Outcome
     ) -> tuple[Iterate, Outcome]:
-        """Solve convex problems for sure, and let Newton's loop finish what they leave."""
-        start = problem.start() if self._best is None else self._best.state
-        found = solve_convex(problem, start, self.history.poll)
-        if found is None:
-            return iterate, outcome
-        residuals = evaluate(problem, found.state)
-        sure = self._started(found.state)
-        self._see(sure, residuals)
-        self.history.record(residuals, INTERIOR_POINT, found.steps)
-        outcome = Outcome(residuals, self.options.allowed, found.words)
-        if outcome.converged or self._left <= 0:
-            return sure, outcome
-        return loop.run(sure, INTERIOR_POINT)
+        """Solve convex problems for sure, and let Newton's loop finish what they leave.
+
+        Without friction first: where the body touches, Newton's method mostly finds the rest.
+        """
+        patience = loop.options.patience
+        for friction in (False, True) if problem.interface.friction.acts else (False,):
+            start = problem.start() if self._best is None else self._best.state
+            found = solve_convex(problem, start, self.history.poll, friction)
+            if found is None:
+                break
+            residuals = evaluate(problem, found.state)
+            iterate = self._started(found.state)
+            self._see(iterate, residuals)
+            self.history.record(residuals, INTERIOR_POINT, found.steps)
+            outcome = Outcome(residuals, self.options.allowed, found.words)
+            if outcome.converged or self._left <= 0:
+                break
+            loop.options = replace(loop.options, patience=patience if friction else SHORT)
+            iterate, outcome = loop.run(iterate, INTERIOR_POINT)
+            if outcome.converged:
+                break
+        loop.options = replace(loop.options, patience=patience)
+        return iterate, outcome
 
     def _whole_loop(self, patience: int) -> NewtonLoop:
         options = replace(self.options, patience=patience)

@@ -55,7 +55,9 @@ class Found:
     words: str
 
 
-def solve_convex(problem: CondensedProblem, state: State, poll: Callable[[], None]) -> Found | None:
+def solve_convex(
+    problem: CondensedProblem, state: State, poll: Callable[[], None], friction: bool = True
+) -> Found | None:
     """Solve a condensed problem; None where it is not convex. Collective.
 
     Parameters
@@ -65,10 +67,14 @@ def solve_convex(problem: CondensedProblem, state: State, poll: Callable[[], Non
         bound are taken.
     poll
         Called between the convex problems, on all ranks.
+    friction
+        Whether friction acts. Without it there is one small problem, of the normals alone.
     """
     steps, found = 0, None
     for _ in range(MOST_ANSWERS if problem.interface.response.active else 1):
-        found = _solve_linearised(problem, state, poll)
+        found = _solve_linearised(
+            problem, state, poll, friction and problem.interface.friction.acts
+        )
         if found is None:
             return None
         steps += found.steps
@@ -86,7 +92,7 @@ def _largest(problem: CondensedProblem, values: Array) -> float:
 
 
 def _solve_linearised(
-    problem: CondensedProblem, state: State, poll: Callable[[], None]
+    problem: CondensedProblem, state: State, poll: Callable[[], None], friction: bool
 ) -> Found | None:
     """Solve with layer and current linearised at a state; rank 0 does it for all."""
     body, interface, comm = problem.equilibrium, problem.interface, problem.equilibrium.comm
@@ -110,7 +116,7 @@ def _solve_linearised(
     answer = None
     if comm.rank == 0:
         try:
-            answer = gathered.solve(bound, interface.friction.acts)
+            answer = gathered.solve(bound, friction)
         except NotConvexError:
             answer = None
         comm.bcast(None)
@@ -120,10 +126,10 @@ def _solve_linearised(
     answer = comm.bcast(answer)
     if answer is None:
         return None
-    x, pressure, friction, steps, certified, words = answer
+    x, pressure, tangential, steps, certified, words = answer
     begin = body.own.start // body.block_size
     own = slice(begin, begin + layer.size)
-    forces = Multipliers(pressure[own].copy(), friction[own].copy())
+    forces = Multipliers(pressure[own].copy(), tangential[own].copy())
     return Found(State(x[body.own].copy(), forces, state.load), steps, certified, words)
 
 
