@@ -23,6 +23,7 @@ from typing import Any
 import numpy as np
 
 from meshes import write
+from scripts.cases import TABLE_8_4
 from scripts.reporting import Report, parser, subplots
 
 #: Seconds after which a run of the peer is ended: it is then shown as one of infinite length.
@@ -106,7 +107,7 @@ def thesis_rows(coarse: bool) -> list[tuple[str, str, str, list[str], float]]:
             changes = [piezo, f"electric.phi_f={float(phi)}"]
             found.append((table, f"phi_F = {phi}", case, changes, 0.25 * 58.7102))
     layer = "mesh.cells=[48, 8]" if coarse else "mesh.cells=[96, 16]"
-    for small in (6e-1, 2e-1, 6.8e-2, 5.1e-3, 6.2e-4, 1.4e-5, 3.5e-6, 8.5e-7):
+    for small in TABLE_8_4:
         changes = [layer, f"friction.mu={small}", f"electric.k_e={small}"]
         found.append(("8.4", f"mu = k_e = {small}", "compliance-8-4.toml", changes, 0.25 * 58.7102))
     return found

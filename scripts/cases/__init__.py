@@ -9,6 +9,9 @@ from contact import Case, load_case
 #: Where the case files are.
 CASES = Path(__file__).parent
 
+#: mu = k_e of Table 8.4, for Example 8.4.
+TABLE_8_4 = (6e-1, 2e-1, 6.8e-2, 5.1e-3, 6.2e-4, 1.4e-5, 3.5e-6, 8.5e-7)
+
 
 def bar(n: int, load: float = -0.005, rho: float = 1e5, *changes: str) -> Case:
     """Return Example 7.2 with n cells per unit length, solved by Newton's method.

@@ -21,7 +21,7 @@ from contact.problem.problem import ContactProblem
 from contact.problem.state import State
 from contact.solving import METHODS
 from contact.typing import Array
-from scripts.studies.limit_theorem import ProductNorm
+from scripts.studies.product_norm import ProductNorm
 
 #: Relative difference up to which two solutions are the same.
 AGREE = 1e-7

@@ -19,7 +19,7 @@ from contact.methods.options import FixedPointOptions
 from contact.typing import Array
 from scripts.cases import CASES
 from scripts.reporting import Report, iterates, options, subplots
-from scripts.studies.limit_theorem import ProductNorm
+from scripts.studies.product_norm import ProductNorm
 
 #: k_e of the figure.
 SHOWN = (0.1, 0.5, 1.0, 2.0)

@@ -14,8 +14,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import ufl
-from dolfinx import fem
 from matplotlib.figure import Figure
 
 from contact import Case, InputError, build_problem, load_case
@@ -23,13 +21,10 @@ from contact.interface.layer import Layer
 from contact.interface.obstacle import GapFunction
 from contact.problem.problem import Contact, ContactProblem
 from contact.typing import Array
-from forms.kinematics import strain
 from forms.laws import Compliance, PotentialFactor
-from scripts.cases import CASES
+from scripts.cases import CASES, TABLE_8_4
 from scripts.reporting import Report, iterates, observed_orders, options, solved, subplots
-
-#: mu = k_e of Table 8.4.
-TABLE_8_4 = (6e-1, 2e-1, 6.8e-2, 5.1e-3, 6.2e-4, 1.4e-5, 3.5e-6, 8.5e-7)
+from scripts.studies.product_norm import ProductNorm
 
 #: mu = k_e of the limit: those of the table and some between them.
 SMALLEST = TABLE_8_4[-1]
@@ -46,32 +41,6 @@ SYMBOLS = {
 TOUCH = 0.5
 STIFFNESS = tuple(10.0 ** np.arange(2, 8))
 THICKNESS = (0.0, 0.05, 0.1, 0.2, 0.3, 0.4, 0.6)
-
-
-class ProductNorm:
-    """The norms of X = V x W, (5.15): |eps(u)| and |grad(phi)| in L2(Omega).
-
-    Parameters
-    ----------
-    problem
-        Whose local unknowns are measured.
-    """
-
-    def __init__(self, problem: ContactProblem) -> None:
-        body = problem.equilibrium
-        self._x = fem.Function(body.space)
-        u, phi = body.split(self._x)
-        parts = [ufl.inner(strain(u), strain(u))]
-        if phi is not None:
-            parts.append(ufl.inner(ufl.grad(phi), ufl.grad(phi)))
-        self._forms = [fem.form(part * problem.domain.dx) for part in parts]
-        self._comm = problem.comm
-
-    def __call__(self, x: Array) -> tuple[float, ...]:
-        """Return the norms in V and, with a potential, W of local unknowns. Collective."""
-        self._x.x.array[:] = x
-        squares = [self._comm.allreduce(fem.assemble_scalar(form)) for form in self._forms]
-        return tuple(float(np.sqrt(square)) for square in squares)
 
 
 def case_of(name: str, cells: Sequence[int], changes: Sequence[str] = ()) -> Case:

@@ -14,7 +14,7 @@ from contact.interface.layer import Layer
 from contact.output.table import contact_table
 from contact.problem.problem import ContactProblem
 from forms.laws import Compliance, PotentialFactor, SlipCoefficient
-from scripts.cases import CASES
+from scripts.cases import CASES, TABLE_8_4
 from scripts.studies import limit_theorem
 from scripts.thesis import figures_compliance, tables_compliance
 
@@ -116,7 +116,7 @@ def test_example_8_3_takes_two_iterations_as_in_the_thesis():
 
 
 @pytest.mark.parametrize("suffix", ["", "-layer"])
-@pytest.mark.parametrize("value", [6e-1, 2e-1, 6.8e-2, 5.1e-3, 6.2e-4, 1.4e-5, 3.5e-6, 8.5e-7])
+@pytest.mark.parametrize("value", TABLE_8_4)
 def test_rows_of_table_8_4(suffix, value):
     changes = f"friction.mu={value}", f"electric.k_e={value}"
     uzawa = solved(f"8-4{suffix}", 48, *changes)
