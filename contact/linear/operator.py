@@ -263,7 +263,8 @@ class SparseOperator:
         if reason == PETSc.KSP.ConvergedReason.DIVERGED_PCSETUP_FAILED or not finite:
             check_overflow(self.layout, self.matrix.norm(), self._rhs.norm())
             raise no_solution(self.ksp.getPC(), self._prefix)
-        return self._solution.array.copy()
+        # An iterative solver leaves fixed unknowns to its tolerance.
+        return self.layout.mask(self._solution.array)
 
 
 def balance(matrix: PETSc.Mat, layout: Layout) -> None:

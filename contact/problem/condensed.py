@@ -28,6 +28,9 @@ from contact.typing import Array
 #: Unknowns that are kept at most: the dense matrix then takes 130 MB.
 LARGEST = 4200
 
+#: Unknowns up to which a direct solver is thought of in space: it then takes some gigabytes.
+DIRECT = 150_000
+
 #: Unknowns up to which dense steps take no time to speak of.
 ALWAYS = 1000
 
@@ -244,6 +247,8 @@ def pays(problem: ContactProblem) -> bool:
     Of a slender body the contact nodes are too large a part.
     """
     layout = problem.equilibrium.layout
+    if multigrid.is_large(layout):
+        return False
     kept, unknowns = problem.nodes.size * layout.block_size, layout.unknowns
     front = unknowns / kept * layout.block_size if layout.dim == 2 else unknowns**0.5
     return kept <= ALWAYS or kept**3 <= DENSE_IS_FASTER * unknowns * front**2
@@ -252,14 +257,15 @@ def pays(problem: ContactProblem) -> bool:
 def condensation(problem: ContactProblem, counters: Counters, kind: str) -> Condensation | None:
     """Return the problem condensed onto its contact nodes, where that is possible. Collective.
 
-    That is where a direct solver pays, with the contact nodes few, unless options of PETSc ask
-    for a solver of the user's.
+    That is where the contact nodes are few and a direct solver has the memory, unless the user
+    or his options of PETSc ask for another.
     """
     options = PETSc.Options(PREFIX)
     names = ("ksp_type", "pc_type", "pc_factor_mat_solver_type")
     chosen = any(options.hasName(name) for name in names)
-    body = problem.equilibrium
-    iterative = kind == "iterative" or (kind == "auto" and multigrid.is_large(body.layout))
-    if chosen or iterative or problem.nodes.size * body.block_size > LARGEST:
+    layout = problem.equilibrium.layout
+    large = kind == "auto" and layout.dim == 3 and layout.unknowns > DIRECT
+    many = problem.nodes.size * layout.block_size > LARGEST
+    if chosen or kind == "iterative" or large or many:
         return None
     return Condensation(problem, counters)
