@@ -170,7 +170,7 @@ class Newton:
                 return iterate, outcome
             logger.info("%s; going on with the whole body", outcome.ended)
         surer = self._condensed is not None and not self._pays
-        loop = self._whole_loop(SHORT if surer else self.options.patience)
+        loop = self._whole_loop(SHORT if surer else None)
         iterate, outcome = loop.run(iterate)
         if not outcome.converged and self._condensed is not None and not self._pays:
             logger.info("%s; going on at the contact nodes", outcome.ended)
@@ -218,8 +218,8 @@ class Newton:
         loop.options = replace(loop.options, patience=patience)
         return iterate, outcome
 
-    def _whole_loop(self, patience: int) -> NewtonLoop:
-        options = replace(self.options, patience=patience)
+    def _whole_loop(self, patience: int | None = None) -> NewtonLoop:
+        options = replace(self.options, patience=patience or self.options.patience)
         return NewtonLoop(
             self.problem, options, self.whole, self.history, self._see, options.secant_until
         )

@@ -268,4 +268,4 @@ def test_mean_pressure_of_the_review_does_not_count_rounding():
         assert np.any(solution.status == "open")
         notes += [text for text in solution.notes if "Theorem 3.1" in text]
     assert notes[0] == notes[1]
-    assert "mean pressure" in notes[0]
+    assert "under the pressure" in notes[0]
