@@ -18,7 +18,7 @@ from contact.errors import InputError
 from contact.interface.current import Conductor
 from contact.interface.friction import Friction
 from contact.interface.layer import Layer
-from contact.interface.obstacle import GapFunction, Obstacle, Plane, Sphere
+from contact.interface.obstacle import GapFunction, Obstacle
 from contact.mesh.domain import Domain
 from contact.meshing import make_domain
 from contact.problem.held import check_held
@@ -35,7 +35,6 @@ from forms.laws import (
     PotentialFactor,
     RampConductivity,
     ShiftedConductivity,
-    SlipCoefficient,
     Truncation,
 )
 from forms.piezo import Piezo, from_voigt
@@ -225,14 +224,8 @@ def _field(
 
 
 def _foundation(section: sections.Contact, domain: Domain) -> Obstacle:
-    match section.foundation:
-        case sections.Plane() as plane:
-            _check_range("contact.foundation.point", max(map(abs, plane.point)), least=0.0)
-            return Plane(plane.point, plane.normal, section.direction)
-        case sections.Sphere() as sphere:
-            _check_range("contact.foundation.centre", max(map(abs, sphere.centre)), least=0.0)
-            _check_range("contact.foundation.radius", sphere.radius)
-            return Sphere(sphere.centre, sphere.radius, sphere.inside, section.direction)
+    if section.foundation is not None:
+        return section.foundation.obstacle(section.direction)
     assert section.gap is not None  # filled in by the section
     rounding = -1e-12 * domain.size
     return GapFunction(NodalField("contact.gap", section.gap, domain.comm, rounding).numpy)
@@ -261,9 +254,9 @@ def _friction(
     if section.law == "tresca":
         return Friction(tresca=_field("friction.bound", section.bound, comm, 0.0))
     mu = section.mu
-    if isinstance(mu, sections.SlipLaw):
-        return Friction(SlipCoefficient(mu.a, mu.b, mu.rho), radius=section.radius)
     assert mu is not None  # demanded by the section
+    if not isinstance(mu, Expression):
+        return Friction(mu.coefficient(), radius=section.radius)
     if mu.is_constant:
         return Friction(ConstantCoefficient(mu.value), radius=section.radius)
     field = NodalField("friction.mu", mu, comm, 0.0)
