@@ -31,6 +31,7 @@ from forms.laws import (
     Conductivity,
     ConstantCoefficient,
     FrictionCoefficient,
+    FrictionLaw,
     PerfectConductivity,
     PotentialFactor,
     RampConductivity,
@@ -47,6 +48,7 @@ def build_problem(
     domain: Domain | None = None,
     law: Hencky | None = None,
     coefficient: FrictionCoefficient | None = None,
+    friction: FrictionLaw | None = None,
     foundation: Obstacle | None = None,
     layer: Layer | None = None,
 ) -> ContactProblem:
@@ -58,9 +60,9 @@ def build_problem(
         The case.
     comm
         Communicator of the mesh.
-    domain, law, coefficient, foundation, layer
-        Objects that replace the case's mesh, material law, Coulomb's mu, foundation and
-        compliant layer (own p_nu and h_nu).
+    domain, law, coefficient, friction, foundation, layer
+        Objects that replace the case's mesh, material law, Coulomb's mu(|u_tau|) or the whole
+        friction law, foundation and compliant layer (own p_nu and h_nu).
 
     Raises
     ------
@@ -86,7 +88,7 @@ def build_problem(
             domain,
             body,
             Contact(case.contact.on, obstacle, _layer(case.contact) if layer is None else layer),
-            _friction(case.friction, domain.comm, coefficient),
+            _friction(case.friction, domain.comm, coefficient, friction),
             None if case.electric is None else _conductor(case.electric, domain.size),
             case.space.degree,
         )
@@ -245,8 +247,13 @@ def _layer(section: sections.Contact) -> Layer | None:
 
 
 def _friction(
-    section: sections.Friction, comm: MPI.Intracomm, coefficient: FrictionCoefficient | None
+    section: sections.Friction,
+    comm: MPI.Intracomm,
+    coefficient: FrictionCoefficient | None,
+    law: FrictionLaw | None,
 ) -> Friction:
+    if law is not None:
+        return Friction(law=law, radius=section.radius)
     if coefficient is not None:
         return Friction(coefficient, radius=section.radius)
     if section.law == "none":
@@ -256,7 +263,7 @@ def _friction(
     mu = section.mu
     assert mu is not None  # demanded by the section
     if not isinstance(mu, Expression):
-        return Friction(mu.coefficient(), radius=section.radius)
+        return Friction(law=mu.friction(), radius=section.radius)
     if mu.is_constant:
         return Friction(ConstantCoefficient(mu.value), radius=section.radius)
     field = NodalField("friction.mu", mu, comm, 0.0)

@@ -22,7 +22,7 @@ from contact.case.types import (
 from contact.interface import obstacle
 from contact.interface.obstacle import Obstacle
 from contact.settings import Accepted, Positive, Switch
-from forms.laws import FrictionCoefficient, SlipCoefficient
+from forms.laws import Coulomb, FrictionLaw, SlipCoefficient
 
 
 class Shape(Section):
@@ -166,8 +166,8 @@ class Contact(Section):
 class Coefficient(Section):
     """A coefficient of friction. A new one is a section like that below, entered in `Mu`."""
 
-    def coefficient(self) -> FrictionCoefficient:
-        """Return the coefficient itself."""
+    def friction(self) -> FrictionLaw:
+        """Return the friction law that has it."""
         raise NotImplementedError
 
 
@@ -179,9 +179,9 @@ class SlipLaw(Coefficient):
     b: NonNegative = Field(default=0.2, description="Twice the excess at rest.")
     rho: NonNegative = Field(description="Decay rate (1/length).")
 
-    def coefficient(self) -> SlipCoefficient:
-        """Return the coefficient."""
-        return SlipCoefficient(self.a, self.b, self.rho)
+    def friction(self) -> Coulomb:
+        """Return Coulomb's law."""
+        return Coulomb(SlipCoefficient(self.a, self.b, self.rho))
 
 
 if TYPE_CHECKING:

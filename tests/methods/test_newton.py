@@ -1,6 +1,6 @@
 """Semismooth Newton: against the block relaxation, its rate, its fall-backs, nested meshes."""
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
@@ -23,7 +23,7 @@ from contact.problem.problem import ContactProblem
 from contact.problem.state import State
 from contact.solving import solve
 from forms.hencky import Linear, Log
-from forms.laws import ConstantCoefficient, SlipCoefficient
+from forms.laws import ConstantCoefficient, Coulomb, SlipCoefficient
 from scripts.cases import bar
 from tests.problems import mechanics
 
@@ -114,6 +114,40 @@ def test_a_body_that_only_contact_holds_is_solved():
     assert np.allclose(method.state.forces.pressure, 0.02, rtol=1e-9)
 
 
+@dataclass(frozen=True)
+class Fading:
+    """s = mu p / (1 + p/p_0): the harder a node presses, the less of it is friction."""
+
+    mu: float
+    p_0: float
+
+    lipschitz = 0.0
+
+    @property
+    def maximum(self):
+        return self.mu
+
+    def __call__(self, slip, pressure):
+        return self.mu * pressure / (1 + pressure / self.p_0)
+
+    def by_slip(self, slip, pressure):
+        return 0 * slip
+
+    def by_pressure(self, slip, pressure):
+        return self.mu / (1 + pressure / self.p_0) ** 2
+
+
+def test_friction_whose_coefficient_depends_on_the_pressure():
+    law = Fading(0.6, 0.01)
+    pair = [mechanics.bar(SELF, 8, -0.05, friction=Friction(law=law)) for _ in range(2)]
+    compare(*pair, 1e-7)
+    solution = solve(bar(8, -0.05, 1.0), friction=law)
+    slides = solution.status == "slip"
+    assert slides.any()
+    size, pressure = np.linalg.norm(solution.friction, axis=1), solution.pressure
+    assert np.allclose(size[slides], law(0.0, pressure[slides]), rtol=1e-6)
+
+
 def test_the_iterative_solver_finds_the_same_solution():
     direct, iterative = mechanics.leaning_block(SELF, 4), mechanics.leaning_block(SELF, 4)
     exact = newton(direct, linear="lu")
@@ -126,7 +160,7 @@ def test_the_iterative_solver_finds_the_same_solution():
 def test_blocks_are_the_derivative_of_the_contact_forces(dimension):
     """Compare with finite differences at a sliding and sticking iterate, away from kinks."""
     problem = mechanics.bar(SELF, 4) if dimension == 2 else mechanics.leaning_block(SELF, 2)
-    friction = replace(problem.interface.friction, coefficient=ConstantCoefficient(0.4))
+    friction = replace(problem.interface.friction, law=Coulomb(ConstantCoefficient(0.4)))
     interface = replace(problem.interface, friction=friction)
     rng = np.random.default_rng(3)
     nodal = 1e-3 * rng.standard_normal((problem.nodes.gap.size, dimension))
