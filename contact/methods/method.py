@@ -12,8 +12,10 @@ from contact.problem.state import State
 class Method(Protocol):
     """A solver of one problem: from a state to another one, and how that went.
 
-    A new one is a class with these, its options in `contact.methods.options`, and an entry in
-    `contact.solving.METHODS`.
+    A new one is a class with these that is made of a problem, its options and a monitor; its
+    options, with an entry in `contact.methods.options.OPTIONS`; and an entry in
+    `contact.solving.METHODS`. One that uses others makes their options by `with_method`, and hands
+    on the monitor, the counters and the records of all of them.
 
     Attributes
     ----------
