@@ -164,10 +164,10 @@ def test_blocks_are_the_derivative_of_the_contact_forces(dimension):
     interface = replace(problem.interface, friction=friction)
     rng = np.random.default_rng(3)
     nodal = 1e-3 * rng.standard_normal((problem.nodes.gap.size, dimension))
-    n, trace = nodal.shape[0], problem.nodes
+    n, nodes = nodal.shape[0], problem.nodes
     forces = Multipliers(
         rng.uniform(0.5, 1.0, n),
-        np.einsum("nij,nj->ni", trace.tangent, 0.3 * rng.standard_normal((n, dimension))),
+        np.einsum("nij,nj->ni", nodes.tangent, 0.3 * rng.standard_normal((n, dimension))),
     )
     moduli = Moduli(20.0, 20.0, 20.0)
     before = np.full(n, FREE, dtype=np.int8)
@@ -180,21 +180,21 @@ def test_blocks_are_the_derivative_of_the_contact_forces(dimension):
     difference = moved.forces.vectors(problem.nodes) - base.forces.vectors(problem.nodes)
     predicted = np.einsum("nij,nj->ni", base.blocks, direction)[:, :dimension]
     assert np.allclose(difference[sticks], predicted[sticks], rtol=1e-6, atol=1e-12)
-    normal = trace.normal_component(difference)
-    assert np.allclose(normal, trace.normal_component(predicted), rtol=1e-6, atol=1e-12)
+    normal = nodes.normal_component(difference)
+    assert np.allclose(normal, nodes.normal_component(predicted), rtol=1e-6, atol=1e-12)
 
 
 @pytest.mark.parametrize("softening", [0.25, np.inf])
 def test_falling_friction_is_followed_as_far_as_allowed(softening):
     """With no limit, the block is the derivative of mu(|u_tau|) p along the slip."""
     problem = mechanics.bar(SELF, 4, friction=Friction(SlipCoefficient(0.5, 0.2, 1e3)))
-    trace = problem.nodes
-    nodal = np.zeros((trace.nodes.size, 2))
+    nodes = problem.nodes
+    nodal = np.zeros((nodes.nodes.size, 2))
     nodal[:, 0] = 1e-3
-    pressure = np.full(trace.nodes.size, 0.5)
+    pressure = np.full(nodes.nodes.size, 0.5)
     forces = Multipliers(pressure, 0.3 * pressure[:, None] * [1.0, 0.0])
     moduli = Moduli(200.0, 20.0, 1e6)
-    before = np.full(trace.nodes.size, CLOSED + SLIDES, dtype=np.int8)
+    before = np.full(nodes.nodes.size, CLOSED + SLIDES, dtype=np.int8)
     base = linearise(problem.interface, nodal, forces, moduli, before, softening=softening)
     assert base.settled
     step = np.array([1e-8, 0.0])
