@@ -16,20 +16,19 @@ class Method(Protocol):
     options, with an entry in `contact.methods.options.OPTIONS`; and an entry in
     `contact.solving.METHODS`. One that uses others makes their options by `with_method`, and hands
     on the monitor, the counters and the records of all of them.
-
-    Attributes
-    ----------
-    options
-        What it was told; `allowed` among it, how large each residual may be at the end.
-    history
-        The outer iterations.
-    counters
-        Factorisations and solves.
     """
 
-    options: Any
-    history: History
-    counters: Counters
+    @property
+    def options(self) -> Any:
+        """What it was told; `allowed` among it, how large each residual may be at the end."""
+
+    @property
+    def history(self) -> History:
+        """The outer iterations."""
+
+    @property
+    def counters(self) -> Counters:
+        """Factorisations and solves."""
 
     @property
     def state(self) -> State:
