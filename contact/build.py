@@ -18,7 +18,7 @@ from contact.errors import InputError
 from contact.interface.current import Conductor
 from contact.interface.friction import Friction
 from contact.interface.layer import Layer
-from contact.interface.obstacle import GapFunction, Obstacle, Plane, Sphere
+from contact.interface.obstacle import GapFunction, Obstacle
 from contact.mesh.domain import Domain
 from contact.meshing import make_domain
 from contact.problem.held import check_held
@@ -31,11 +31,11 @@ from forms.laws import (
     Conductivity,
     ConstantCoefficient,
     FrictionCoefficient,
+    FrictionLaw,
     PerfectConductivity,
     PotentialFactor,
     RampConductivity,
     ShiftedConductivity,
-    SlipCoefficient,
     Truncation,
 )
 from forms.piezo import Piezo, from_voigt
@@ -48,6 +48,7 @@ def build_problem(
     domain: Domain | None = None,
     law: Hencky | None = None,
     coefficient: FrictionCoefficient | None = None,
+    friction: FrictionLaw | None = None,
     foundation: Obstacle | None = None,
     layer: Layer | None = None,
 ) -> ContactProblem:
@@ -59,9 +60,9 @@ def build_problem(
         The case.
     comm
         Communicator of the mesh.
-    domain, law, coefficient, foundation, layer
-        Objects that replace the case's mesh, material law, Coulomb's mu, foundation and
-        compliant layer (own p_nu and h_nu).
+    domain, law, coefficient, friction, foundation, layer
+        Objects that replace the case's mesh, material law, Coulomb's mu(|u_tau|) or the whole
+        friction law, foundation and compliant layer (own p_nu and h_nu).
 
     Raises
     ------
@@ -87,7 +88,7 @@ def build_problem(
             domain,
             body,
             Contact(case.contact.on, obstacle, _layer(case.contact) if layer is None else layer),
-            _friction(case.friction, domain.comm, coefficient),
+            _friction(case.friction, domain.comm, coefficient, friction),
             None if case.electric is None else _conductor(case.electric, domain.size),
             case.space.degree,
         )
@@ -225,14 +226,8 @@ def _field(
 
 
 def _foundation(section: sections.Contact, domain: Domain) -> Obstacle:
-    match section.foundation:
-        case sections.Plane() as plane:
-            _check_range("contact.foundation.point", max(map(abs, plane.point)), least=0.0)
-            return Plane(plane.point, plane.normal, section.direction)
-        case sections.Sphere() as sphere:
-            _check_range("contact.foundation.centre", max(map(abs, sphere.centre)), least=0.0)
-            _check_range("contact.foundation.radius", sphere.radius)
-            return Sphere(sphere.centre, sphere.radius, sphere.inside, section.direction)
+    if section.foundation is not None:
+        return section.foundation.obstacle(section.direction)
     assert section.gap is not None  # filled in by the section
     rounding = -1e-12 * domain.size
     return GapFunction(NodalField("contact.gap", section.gap, domain.comm, rounding).numpy)
@@ -252,8 +247,13 @@ def _layer(section: sections.Contact) -> Layer | None:
 
 
 def _friction(
-    section: sections.Friction, comm: MPI.Intracomm, coefficient: FrictionCoefficient | None
+    section: sections.Friction,
+    comm: MPI.Intracomm,
+    coefficient: FrictionCoefficient | None,
+    law: FrictionLaw | None,
 ) -> Friction:
+    if law is not None:
+        return Friction(law=law, radius=section.radius)
     if coefficient is not None:
         return Friction(coefficient, radius=section.radius)
     if section.law == "none":
@@ -261,9 +261,9 @@ def _friction(
     if section.law == "tresca":
         return Friction(tresca=_field("friction.bound", section.bound, comm, 0.0))
     mu = section.mu
-    if isinstance(mu, sections.SlipLaw):
-        return Friction(SlipCoefficient(mu.a, mu.b, mu.rho), radius=section.radius)
     assert mu is not None  # demanded by the section
+    if not isinstance(mu, Expression):
+        return Friction(law=mu.friction(), radius=section.radius)
     if mu.is_constant:
         return Friction(ConstantCoefficient(mu.value), radius=section.radius)
     field = NodalField("friction.mu", mu, comm, 0.0)

@@ -94,6 +94,81 @@ class SlipCoefficient:
         return -self.b * self.rho / (self.rho * slip + 2) ** 2
 
 
+class FrictionLaw(Protocol):
+    """A friction bound s that depends on the slip |u_tau| >= 0 and the pressure p >= 0.
+
+    Coulomb's is `Coulomb`. One whose coefficient depends on the pressure is a class with these.
+    """
+
+    @property
+    def maximum(self) -> float:
+        """Upper bound of s/p, infinity if there is none."""
+
+    @property
+    def lipschitz(self) -> float:
+        """Lipschitz constant of s/p in the slip (1/length)."""
+
+    def __call__(self, slip: Value, pressure: Value) -> Value:
+        """Return the bound s >= 0."""
+
+    def by_slip(self, slip: Value, pressure: Value) -> Value:
+        """Return ds/d|u_tau|."""
+
+    def by_pressure(self, slip: Value, pressure: Value) -> Value:
+        """Return ds/dp."""
+
+
+@dataclass(frozen=True)
+class Coulomb:
+    """Coulomb's law s = mu(|u_tau|) p, (1.36)."""
+
+    coefficient: FrictionCoefficient
+
+    @property
+    def maximum(self) -> float:
+        """Upper bound mu*."""
+        return self.coefficient.maximum
+
+    @property
+    def lipschitz(self) -> float:
+        """Lipschitz constant L_mu (1/length)."""
+        return self.coefficient.lipschitz
+
+    def __call__(self, slip: Value, pressure: Value) -> Value:
+        """Return mu p."""
+        return self.coefficient(slip) * pressure
+
+    def by_slip(self, slip: Value, pressure: Value) -> Value:
+        """Return mu' p."""
+        return self.coefficient.derivative(slip) * pressure
+
+    def by_pressure(self, slip: Value, pressure: Value) -> Value:
+        """Return mu."""
+        return self.coefficient(slip)
+
+
+@dataclass(frozen=True)
+class Tresca:
+    """Tresca's law: a bound S that depends on nothing, a number or one value a node."""
+
+    bound: Value
+
+    maximum = np.inf
+    lipschitz = 0.0
+
+    def __call__(self, slip: Value, pressure: Value) -> Value:
+        """Return S, shaped like the slip."""
+        return self.bound + 0 * slip
+
+    def by_slip(self, slip: Value, pressure: Value) -> Value:
+        """Return 0."""
+        return 0 * slip
+
+    def by_pressure(self, slip: Value, pressure: Value) -> Value:
+        """Return 0."""
+        return 0 * slip
+
+
 def _unlimited(limit: Value) -> bool:
     """Tell whether a limit is infinite: compiled forms know no infinity."""
     return isinstance(limit, float) and limit == np.inf

@@ -211,10 +211,3 @@ class BodyEquilibrium:
     def load_size(self, load: float = 1.0) -> float:
         """Return the Euclidean norm of the nodal loads. Collective."""
         return abs(load) * self.norm(self._external)
-
-    @property
-    def largest_prescribed(self) -> float:
-        """Largest component of a prescribed displacement, at the whole load. Collective."""
-        values = self.prescribe(self.rest()).reshape(-1, self.block_size)
-        largest = float(np.abs(values[:, : self.dim]).max(initial=0.0))
-        return float(self.comm.allreduce(largest, op=MPI.MAX))

@@ -12,7 +12,6 @@ from pydantic import BaseModel
 
 from contact.case.body import Piezo
 from contact.case.formula import Expression
-from contact.case.interface import Plane, Sphere
 from contact.case.showing import listed
 from contact.case.types import Words, fault
 from contact.tolerances import HUGE
@@ -138,12 +137,9 @@ def _vectors(case: Case) -> Iterator[tuple[str, tuple[Any, ...] | None]]:
     for i, load in enumerate(case.load):
         yield f"load.{i}.traction", load.traction
         yield f"load.{i}.body_force", load.body_force
-    match case.contact.foundation:
-        case Plane() as plane:
-            yield "contact.foundation.point", plane.point
-            yield "contact.foundation.normal", plane.normal
-        case Sphere() as sphere:
-            yield "contact.foundation.centre", sphere.centre
+    if case.contact.foundation is not None:
+        for key, vector in case.contact.foundation.vectors.items():
+            yield f"contact.foundation.{key}", vector
 
 
 def _formulas(case: Case) -> Iterator[tuple[str, Any]]:

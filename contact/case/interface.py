@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Annotated, Any, Literal, TypeAlias
+from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeAlias
 
-from pydantic import BeforeValidator, Discriminator, Field, Tag, model_validator
+from pydantic import Field, model_validator
 
 from contact.case.formula import Expression
 from contact.case.types import (
@@ -17,16 +17,31 @@ from contact.case.types import (
     Vector,
     Words,
     fault,
+    one_of,
 )
+from contact.interface import obstacle
+from contact.interface.obstacle import Obstacle
 from contact.settings import Accepted, Positive, Switch
+from forms.laws import Coulomb, FrictionLaw, SlipCoefficient
 
-SHAPES = Accepted('"plane" or "sphere"')
+
+class Shape(Section):
+    """A rigid shape. A new one is a section like those below, entered in `Foundation`."""
+
+    @property
+    def vectors(self) -> dict[str, tuple[float, ...]]:
+        """The keys that hold a point or a direction: each has as many numbers as space."""
+        return {key: value for key, value in self if isinstance(value, tuple)}
+
+    def obstacle(self, direction: str) -> Obstacle:
+        """Return the shape itself, for a contact direction."""
+        raise NotImplementedError
 
 
-class Plane(Section):
+class Plane(Shape):
     """`foundation = { shape = "plane", ... }`: rigid half space."""
 
-    shape: Annotated[Literal["plane"], SHAPES] = Field(description="A plane.")
+    shape: Literal["plane"] = Field(description="A plane.")
     point: Vector = Field(description="A point of the plane.")
     normal: Vector = Field(description="Normal towards the body, of any length.")
 
@@ -38,36 +53,28 @@ class Plane(Section):
             raise fault("normal", self.normal, f"{len(self.point)} numbers, as point has")
         return self
 
+    def obstacle(self, direction: str) -> obstacle.Plane:
+        """Return the plane."""
+        return obstacle.Plane(self.point, self.normal, direction)
 
-class Sphere(Section):
+
+class Sphere(Shape):
     """`foundation = { shape = "sphere", ... }`: rigid sphere, in the plane a circle."""
 
-    shape: Annotated[Literal["sphere"], SHAPES] = Field(description="A sphere or circle.")
+    shape: Literal["sphere"] = Field(description="A sphere or circle.")
     centre: Vector = Field(description="Centre.")
     radius: Positive = Field(description="Radius.")
     inside: Switch = Field(default=False, description="`true`: the body lies inside the sphere.")
 
-
-def _shape(given: Any) -> str:
-    shape = given.get("shape") if isinstance(given, Mapping) else getattr(given, "shape", None)
-    # Anything else is refused by Plane, in words.
-    return "Sphere" if shape == "sphere" else "Plane"
+    def obstacle(self, direction: str) -> obstacle.Sphere:
+        """Return the sphere."""
+        return obstacle.Sphere(self.centre, self.radius, self.inside, direction)
 
 
-def _with_shape(given: Any) -> Any:
-    if isinstance(given, Mapping) and "shape" not in given:
-        raise fault("shape", Words("missing"), SHAPES.text)
-    return given
-
-
-Foundation: TypeAlias = Annotated[
-    Annotated[Plane, Tag("Plane")] | Annotated[Sphere, Tag("Sphere")],
-    Discriminator(_shape),
-    BeforeValidator(_with_shape),
-    Accepted(
-        'a table { shape = "plane", point, normal } or { shape = "sphere", centre, radius, inside }'
-    ),
-]
+if TYPE_CHECKING:
+    Foundation: TypeAlias = Shape
+else:
+    Foundation = one_of("shape", Plane, Sphere)
 
 #: Constants of the compliant layer that the thesis does not give (section 8.1.2).
 LAYER = {
@@ -156,7 +163,15 @@ class Contact(Section):
         return self
 
 
-class SlipLaw(Section):
+class Coefficient(Section):
+    """A coefficient of friction. A new one is a section like that below, entered in `Mu`."""
+
+    def friction(self) -> FrictionLaw:
+        """Return the friction law that has it."""
+        raise NotImplementedError
+
+
+class SlipLaw(Coefficient):
     """`mu = { law = "slip", ... }`: coefficient a + b/(rho s + 2) at the slip s, (7.16)."""
 
     law: Literal["slip"] = Field(description="The slip-dependent law.")
@@ -164,9 +179,15 @@ class SlipLaw(Section):
     b: NonNegative = Field(default=0.2, description="Twice the excess at rest.")
     rho: NonNegative = Field(description="Decay rate (1/length).")
 
+    def friction(self) -> Coulomb:
+        """Return Coulomb's law."""
+        return Coulomb(SlipCoefficient(self.a, self.b, self.rho))
 
-def _mu(given: Any) -> str:
-    return "SlipLaw" if isinstance(given, Mapping | SlipLaw) else "Formula"
+
+if TYPE_CHECKING:
+    Mu: TypeAlias = Expression | Coefficient
+else:
+    Mu = one_of("law", SlipLaw, formula=NonNegativeFormula)
 
 
 class Friction(Section):
@@ -179,16 +200,9 @@ class Friction(Section):
     bound: NonNegativeFormula | None = Field(
         default=None, description="Bound S of the tangential stress. Tresca only, required there."
     )
-    mu: (
-        Annotated[
-            Annotated[NonNegativeFormula, Tag("Formula")] | Annotated[SlipLaw, Tag("SlipLaw")],
-            Discriminator(_mu),
-            Accepted(
-                'a number >= 0, a formula, or a table { law = "slip", a, b, rho }',
-            ),
-        ]
-        | None
-    ) = Field(default=None, description="Coefficient of friction. Coulomb only, required there.")
+    mu: Mu | None = Field(
+        default=None, description="Coefficient of friction. Coulomb only, required there."
+    )
     radius: NonNegative = Field(
         default=0.0,
         description="Radius of the smoothing operator R; 0: the pressure itself. Coulomb only.",

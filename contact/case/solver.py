@@ -4,18 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import fields
-from typing import Annotated, Any, TypeAlias
+from typing import TYPE_CHECKING, Annotated, Any, TypeAlias
 
-from pydantic import AfterValidator, BeforeValidator, Discriminator, PlainSerializer, Tag
+from pydantic import AfterValidator, BeforeValidator, Discriminator, PlainSerializer
 
 from contact.case.showing import shown
-from contact.case.types import UNKNOWN, FromTable, either, fault
+from contact.case.types import UNKNOWN, FromTable, either, fault, union_of
 from contact.methods.options import (
     OPTIONS,
     FixedPointOptions,
     NewtonOptions,
     Options,
-    PenaltyOptions,
 )
 from contact.settings import Accepted, read_by, settings_of
 
@@ -71,14 +70,15 @@ def _read(options: Options) -> dict[str, Any]:
     return {key: value for key, value in read_by(options).items() if value is not None}
 
 
-#: `[solver]`: the options of one method, by its name.
-Solver: TypeAlias = Annotated[
-    Annotated[FixedPointOptions, FromTable, Tag("FixedPointOptions")]
-    | Annotated[PenaltyOptions, FromTable, Tag("PenaltyOptions")]
-    | Annotated[NewtonOptions, FromTable, Tag("NewtonOptions")],
-    Discriminator(_member),
-    BeforeValidator(_refuse_unread),
-    AfterValidator(_check),
-    PlainSerializer(_read),
-    Accepted("a table"),
-]
+#: `[solver]`: the options of one method, by its name: one of those that `OPTIONS` lists.
+if TYPE_CHECKING:
+    Solver: TypeAlias = Options
+else:
+    Solver = Annotated[
+        union_of(OPTIONS.values(), FromTable),
+        Discriminator(_member),
+        BeforeValidator(_refuse_unread),
+        AfterValidator(_check),
+        PlainSerializer(_read),
+        Accepted("a table"),
+    ]

@@ -7,11 +7,21 @@ are both made from these words.
 from __future__ import annotations
 
 import types
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import is_dataclass
+from functools import reduce
+from operator import or_
 from typing import Annotated, Any, Literal, TypeAlias, Union, get_args, get_origin
 
-from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field
+from pydantic import (
+    AfterValidator,
+    BaseModel,
+    BeforeValidator,
+    ConfigDict,
+    Discriminator,
+    Field,
+    Tag,
+)
 from pydantic.fields import FieldInfo
 from pydantic_core import PydanticCustomError, core_schema
 
@@ -122,6 +132,55 @@ def fault(key: str, given: Any, accepted: str) -> PydanticCustomError:
         What is accepted, in words.
     """
     return PydanticCustomError("fault", "fault", {"key": key, "given": given, "accepted": accepted})
+
+
+def union_of(kinds: Iterable[type], *marks: Any) -> Any:
+    """Return the union of classes that are read from tables, each tagged by its name."""
+    return reduce(or_, (Annotated[kind, *marks, Tag(kind.__name__)] for kind in kinds))
+
+
+def one_of(key: str, *kinds: type[Section], formula: Any = None) -> Any:
+    """Return what reads a table as one of several sections.
+
+    Parameters
+    ----------
+    key
+        The key that tells them apart: each section has it with one value of its own.
+    kinds
+        The sections.
+    formula
+        What reads anything that is no table; by default nothing does.
+    """
+    by_value = {get_args(kind.model_fields[key].annotation)[0]: kind for kind in kinds}
+    accepted = either([f'"{value}"' for value in by_value])
+
+    def tag(given: Any) -> str | None:
+        if isinstance(given, Mapping):
+            return by_value[given[key]].__name__
+        if isinstance(given, kinds):
+            return type(given).__name__
+        return None if formula is None else "formula"
+
+    def check(given: Any) -> Any:
+        if isinstance(given, Mapping):
+            if key not in given:
+                raise fault(key, Words("missing"), accepted)
+            if not isinstance(given[key], str) or given[key] not in by_value:
+                raise fault(key, given[key], accepted)
+        return given
+
+    read = union_of(kinds)
+    words = "a table " + " or ".join(_table(key, *pair) for pair in by_value.items())
+    if formula is not None:
+        read |= Annotated[formula, Tag("formula")]
+        words = f"{accepted_by(formula)}, or {words}"
+    return Annotated[read, Discriminator(tag), BeforeValidator(check), Accepted(words)]
+
+
+def _table(key: str, value: str, kind: type[Section]) -> str:
+    """Write a section as a table, all but one of its keys without their values."""
+    others = [name for name in kind.model_fields if name != key]
+    return "{ " + ", ".join([f'{key} = "{value}"', *others]) + " }"
 
 
 def sections_of(annotation: Any) -> Mapping[str, type]:

@@ -10,29 +10,40 @@ from contact.body.description import Field
 from contact.interface.nodes import ContactNodes
 from contact.interface.smoothing import Smoothing
 from contact.typing import Array
-from forms.laws import ConstantCoefficient, FrictionCoefficient
+from forms.laws import ConstantCoefficient, Coulomb, FrictionCoefficient, FrictionLaw, Tresca
 
 
 @dataclass(frozen=True)
 class Friction:
-    """Friction on the contact part.
+    """Friction on the contact part: none, or what one of the first four says.
 
     Attributes
     ----------
     coefficient
-        Coulomb's mu(|u_tau|); None without Coulomb friction.
+        Coulomb's mu(|u_tau|).
     tresca
         A fixed bound S (stress), used instead of mu times the pressure.
     radius
         Radius of the smoothing operator R; 0 for R = identity.
     mu
         Coulomb's mu as a function of position, instead of `coefficient`.
+    law
+        Any other law, for instance with a coefficient that depends on the pressure.
     """
 
     coefficient: FrictionCoefficient | None = None
     tresca: Field | None = None
     radius: float = 0.0
     mu: Field | None = None
+    law: FrictionLaw | None = None
+
+    def law_at(self, points: Array) -> FrictionLaw | None:
+        """Return the law at nodes of coordinates (n, d); None without friction. Collective."""
+        if self.tresca is not None:
+            return Tresca(np.asarray(self.tresca.numpy(points), dtype=float))
+        if self.mu is not None:
+            return Coulomb(ConstantCoefficient(np.asarray(self.mu.numpy(points))))
+        return self.law if self.coefficient is None else Coulomb(self.coefficient)
 
 
 @dataclass(frozen=True)
@@ -41,32 +52,24 @@ class NodalFriction:
 
     Attributes
     ----------
-    coefficient
-        Coulomb's mu(|u_tau|), for all nodes at once; None without.
-    tresca
-        A fixed bound, shape (n,); None without.
+    law
+        The friction bound, for all nodes at once; None without friction.
     smoothing
         The operator R.
     """
 
-    coefficient: FrictionCoefficient | None
-    tresca: Array | None
+    law: FrictionLaw | None
     smoothing: Smoothing
 
     @staticmethod
     def at(nodes: ContactNodes, friction: Friction) -> NodalFriction:
         """Evaluate friction at contact nodes. Collective."""
-        coefficient, tresca = friction.coefficient, None
-        if friction.mu is not None:
-            coefficient = ConstantCoefficient(np.asarray(friction.mu.numpy(nodes.points)))
-        if friction.tresca is not None:
-            tresca = np.asarray(friction.tresca.numpy(nodes.points), dtype=float)
-        return NodalFriction(coefficient, tresca, Smoothing(nodes, friction.radius))
+        return NodalFriction(friction.law_at(nodes.points), Smoothing(nodes, friction.radius))
 
     @property
     def acts(self) -> bool:
         """Whether a tangential force can act."""
-        return self.coefficient is not None or self.tresca is not None
+        return self.law is not None
 
     @property
     def local(self) -> bool:
@@ -74,12 +77,26 @@ class NodalFriction:
         return self.smoothing.radius == 0
 
     def bound(self, pressure: Array, slip: Array) -> Array:
-        """Return s = mu(|u_tau|) |R p|, Tresca's S, or 0, shape (n,). Collective."""
-        if self.tresca is not None:
-            return np.broadcast_to(self.tresca, slip.shape)
-        if self.coefficient is None:
+        """Return s, mu(|u_tau|) |R p| by Coulomb's law, shape (n,). Collective."""
+        if self.law is None:
             return np.zeros_like(slip)
-        return np.asarray(self.coefficient(slip) * self.smooth(pressure), dtype=float)
+        return np.asarray(self.law(slip, self.smooth(pressure)), dtype=float)
+
+    def by_slip(self, pressure: Array, slip: Array) -> Array:
+        """Return the derivative of the bound by |u_tau|, shape (n,). Collective."""
+        if self.law is None:
+            return np.zeros_like(slip)
+        return np.asarray(self.law.by_slip(slip, self.smooth(pressure)), dtype=float)
+
+    def by_pressure(self, pressure: Array, slip: Array) -> Array:
+        """Return the derivative of the bound by the pressure at the node, shape (n,).
+
+        0 for a smoothed pressure, which couples all nodes within the radius and would fill the
+        matrix: it is lagged.
+        """
+        if self.law is None or not self.local:
+            return np.zeros_like(slip)
+        return np.asarray(self.law.by_pressure(slip, self.smooth(pressure)), dtype=float)
 
     def smooth(self, pressure: Array) -> Array:
         """Return |R p|, shape (n,). Collective."""

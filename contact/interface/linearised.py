@@ -133,7 +133,7 @@ def linearise(
             limit = softening * moduli.nodal if settled else None
             rate = _bound_gradient(interface, total, slip, length, limit)
             ahead, follows = _follow_pressure(
-                interface, nodal, length, slope, opening, moduli, closed
+                interface, nodal, total, length, slope, opening, moduli, closed
             )
             friction[slides] += (ahead[:, None] * along)[slides]
             rate = rate + follows
@@ -160,17 +160,15 @@ def _foreseen_bound(
 def _bound_gradient(
     interface: Interface, total: Array, slip: Array, length: Array, limit: float | None
 ) -> Array:
-    """Return the derivative of mu(|u_tau|) R p by the slip, shape (n, block size).
+    """Return the derivative of the friction bound by the slip, shape (n, block size).
 
     Taken only when the sliding zone has settled, and limited: where friction falls faster
     than the node's own stiffness, the linearised node would snap.
     """
     gradient = np.zeros((length.size, interface.jump.block_size))
-    coefficient = interface.friction.coefficient
-    if coefficient is None or limit is None:
+    if limit is None:
         return gradient
-    smooth = interface.friction.smooth(total)
-    fall = np.maximum(coefficient.derivative(length) * smooth, -limit)
+    fall = np.maximum(interface.friction.by_slip(total, length), -limit)
     direction = slip / np.maximum(length, 1e-300)[:, None]
     gradient[:, : interface.dim] = fall[:, None] * direction
     return gradient
@@ -179,22 +177,16 @@ def _bound_gradient(
 def _follow_pressure(
     interface: Interface,
     nodal: Array,
+    total: Array,
     length: Array,
     slope: Array,
     opening: Array,
     moduli: Moduli,
     closed: NDArray[np.bool_],
 ) -> tuple[Array, Array]:
-    """Return how the bound follows the pressure of this very step: change and gradient.
-
-    A smoothed pressure (R other than the identity) couples all nodes within the radius and
-    would fill the matrix: it is lagged.
-    """
-    coefficient = interface.friction.coefficient
+    """Return how the bound follows the pressure of this very step: change and gradient."""
+    rate = interface.friction.by_pressure(total, length)
     gradient = np.zeros((length.size, interface.jump.block_size))
-    if coefficient is None or not interface.friction.local:
-        return np.zeros_like(length), gradient
-    mu = coefficient(length)
-    gradient[:, : interface.dim] = mu[:, None] * slope
-    gradient += mu[:, None] * interface.response.layer_gradient(nodal)
-    return np.where(closed, mu * moduli.gamma * opening, 0.0), gradient
+    gradient[:, : interface.dim] = rate[:, None] * slope
+    gradient += rate[:, None] * interface.response.layer_gradient(nodal)
+    return np.where(closed, rate * moduli.gamma * opening, 0.0), gradient

@@ -128,15 +128,9 @@ class Implicit:
         # Unit vectors of the slip; zero where there is none, as are the terms with it.
         tangential = jump.tangential_component(nodal)
         unit = tangential / np.where(slip > 0, slip, 1.0)[:, None]
-        along = -modulus * slip / (slip + eps)
-        across = np.zeros_like(slip)
-        coefficient = interface.friction.coefficient
-        if interface.friction.tresca is None and coefficient is not None:
-            at_rest = np.asarray(coefficient(slip))
-            ratio = np.divide(bound, at_rest, out=np.zeros_like(bound), where=at_rest > 0)
-            along += np.asarray(coefficient.derivative(slip)) * ratio * slip / (slip + eps)
-            if interface.friction.local:
-                across = at_rest * slope * slip / (slip + eps)
+        total, share = interface.pressure(nodal, forces), slip / (slip + eps)
+        along = (interface.friction.by_slip(total, slip) - modulus) * share
+        across = interface.friction.by_pressure(total, slip) * slope * share
         block = slope[:, None, None] * outer(jump.normal, jump.normal)
         block = block + modulus[:, None, None] * jump.tangent
         block = block + along[:, None, None] * outer(unit, unit)

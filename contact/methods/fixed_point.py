@@ -87,8 +87,7 @@ class FixedPoint:
         self.state = self.problem.start()
         thesis = options.stopping == "thesis"
         inner = options.inner_tolerance or max(options.tolerance / 10, PRECISION)
-        self._stalled = False
-        self._following = Following(NEAR)
+        self._forget()
         self._relaxation = Relaxation(
             self.r,
             inner,
@@ -102,6 +101,13 @@ class FixedPoint:
         if thesis:
             assert isinstance(body, BodyEquilibrium)  # the thesis's rules are those of the whole
             self._norm = domain_norm(body)
+
+    def _forget(self) -> None:
+        """Begin a solve: it does not depend on an earlier one."""
+        self._stalled, self._residual = False, np.inf
+        self._following = Following(NEAR)
+        if not self.operator.symmetric:
+            self.operator = self._new_operator(symmetric=True)
 
     def _new_operator(self, symmetric: bool) -> Operator:
         return self.problem.equilibrium.operator(
@@ -119,6 +125,7 @@ class FixedPoint:
         start
             Where from; from rest by default.
         """
+        self._forget()
         problem, interface = self.problem, self.problem.interface
         jump, frictional = interface.jump, interface.friction.acts
         if start is None:
@@ -154,6 +161,7 @@ class FixedPoint:
             inner, z = self._step(bound, z, friction, kind, secant_at)
             secant_at = self.state.x
             residuals = evaluate(problem, self.state)
+            self._residual = residuals.largest
             change, bound = self._update_bound(bound, iteration == 0)
             note = "tangent" if kind == "tangent" else ""
             self.history.add(
@@ -207,9 +215,8 @@ class FixedPoint:
 
         Frozen, a steep ramp costs many iterations there; followed from afar, it overshoots.
         """
-        response, records = self.problem.interface.response, self.history.records
-        residual = records[-1].kkt.largest if records else np.inf
-        if not response.follows_gap or not self._following(residual):
+        response = self.problem.interface.response
+        if not response.follows_gap or not self._following(self._residual):
             return response.current_block(nodal, pressure)
         if self.operator.symmetric:
             self.operator = self._new_operator(symmetric=False)

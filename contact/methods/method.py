@@ -12,22 +12,23 @@ from contact.problem.state import State
 class Method(Protocol):
     """A solver of one problem: from a state to another one, and how that went.
 
-    A new one is a class with these, its options in `contact.methods.options`, and an entry in
-    `contact.solving.METHODS`.
-
-    Attributes
-    ----------
-    options
-        What it was told; `allowed` among it, how large each residual may be at the end.
-    history
-        The outer iterations.
-    counters
-        Factorisations and solves.
+    A new one is a class with these that is made of a problem, its options and a monitor; its
+    options, with an entry in `contact.methods.options.OPTIONS`; and an entry in
+    `contact.solving.METHODS`. One that uses others makes their options by `with_method`, and hands
+    on the monitor, the counters and the records of all of them.
     """
 
-    options: Any
-    history: History
-    counters: Counters
+    @property
+    def options(self) -> Any:
+        """What it was told; `allowed` among it, how large each residual may be at the end."""
+
+    @property
+    def history(self) -> History:
+        """The outer iterations."""
+
+    @property
+    def counters(self) -> Counters:
+        """Factorisations and solves."""
 
     @property
     def state(self) -> State:

@@ -20,7 +20,7 @@ from contact.typing import Array
 class PenalisedProblem:
     """The nonlinear problem of an outer iteration, in the owned unknowns.
 
-    SNES asks `LinearOperator` for its linear solves, through a shell preconditioner. Its
+    SNES asks `SparseOperator` for its linear solves, through a shell preconditioner. Its
     options have the prefix ``penalty_``, for instance ``-penalty_snes_monitor``.
     """
 

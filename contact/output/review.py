@@ -49,12 +49,14 @@ def _uniqueness(solution: Solution) -> tuple[str, bool]:
     all s if L_mu < G/(p H), and only then is s unique for every U. A pressure that is uneven is
     larger where most of it acts: there it counts with its own weight, and half of G.
     """
-    problem, coefficient = solution.problem, solution.problem.interface.friction.coefficient
-    if coefficient is None:
+    problem, law = solution.problem, solution.problem.interface.friction.law
+    if law is None:
         return "", True
     comm, nodes = problem.comm, problem.nodes
-    own = (coefficient.maximum, coefficient.lipschitz) if nodes.nodes.size else (0.0, 0.0)
+    own = (law.maximum, law.lipschitz) if nodes.nodes.size else (0.0, 0.0)
     maximum, lipschitz = (comm.allreduce(value, op=MPI.MAX) for value in own)
+    if not np.isfinite(maximum):
+        return "", True
     pressure = solution.pressure
     total = nodes.sum(pressure)
     mean = nodes.sum(pressure**2) / total if total > 0 else 0.0

@@ -164,11 +164,10 @@ def _check_loads(
     are not bounded by the pressure at the node: such problems are left to the solver.
     """
     friction = problem.interface.friction
-    coefficient = friction.coefficient
-    if friction.tresca is not None or not friction.local:
-        return
-    mu = 0.0 if coefficient is None else coefficient.maximum
+    mu = 0.0 if friction.law is None else friction.law.maximum
     mu = problem.comm.allreduce(mu, op=MPI.MAX)
+    if not np.isfinite(mu) or not friction.local:
+        return
     d, comm = problem.dim, problem.comm
     local = np.einsum("ni,nim->m", external, rigid_motions(points))
     work = comm.allreduce(local, op=MPI.SUM) @ free

@@ -105,6 +105,10 @@ FILES = {
         ('on = "bottom"', 'on = "bottom"\nfoundation = {shape = "sphere", raduis = 1}'),
         'contact.foundation.raduis: unknown key with shape = "sphere", did you mean radius?',
     ),
+    "an unknown shape": (
+        ('on = "bottom"', 'on = "bottom"\nfoundation = {shape = "cone", centre = [0, 0]}'),
+        'contact.foundation.shape: given "cone"; accepted: "plane" or "sphere"',
+    ),
     "no shape": (
         ('on = "bottom"', 'on = "bottom"\nfoundation = {centre = [0, 0]}'),
         'contact.foundation.shape: missing; accepted: "plane" or "sphere"',

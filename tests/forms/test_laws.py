@@ -11,11 +11,13 @@ from mpi4py import MPI
 from forms.laws import (
     Compliance,
     ConstantCoefficient,
+    Coulomb,
     PerfectConductivity,
     PotentialFactor,
     RampConductivity,
     ShiftedConductivity,
     SlipCoefficient,
+    Tresca,
     Truncation,
 )
 
@@ -70,6 +72,18 @@ def test_a_coefficient_may_differ_from_node_to_node():
     assert mu.maximum == 0.4
     assert mu(np.zeros(3)).tolist() == [0.1, 0.4, 0.2]
     assert ConstantCoefficient(np.array([])).maximum == 0.0  # a rank without contact nodes
+
+
+@pytest.mark.parametrize(
+    "law", [Coulomb(SlipCoefficient(0.5, 0.2, 10.0)), Tresca(np.array([0.1, 0.4]))], ids=name
+)
+def test_friction_laws_know_their_derivatives(law):
+    slip, pressure, h = np.array([0.02, 0.3]), np.array([0.5, 2.0]), 1e-6
+    by_slip = (law(slip + h, pressure) - law(slip - h, pressure)) / (2 * h)
+    by_pressure = (law(slip, pressure + h) - law(slip, pressure - h)) / (2 * h)
+    assert np.allclose(law.by_slip(slip, pressure), by_slip, rtol=1e-6)
+    assert np.allclose(law.by_pressure(slip, pressure), by_pressure, rtol=1e-6)
+    assert np.all(law(slip, pressure) <= law.maximum * pressure)
 
 
 def slopes(law, s, h=1e-6):

@@ -64,6 +64,19 @@ def test_a_node_opens_along_the_ramp():
     assert np.allclose(found[1][0], found[2][0], rtol=1e-7)
 
 
+def test_a_solve_does_not_depend_on_an_earlier_one():
+    """Psi is followed near the solution only, however near an earlier solve has ended."""
+    friction = Friction(SlipCoefficient(0.5, 0.2, 1.0))
+    solver = FixedPoint(
+        example(MPI.COMM_WORLD, friction=friction, phi_f=116.0, delta=5.0), FixedPointOptions()
+    )
+    first, _ = solver.solve()
+    steps = [record.inner for record in solver.history.records]
+    again, _ = solver.solve()
+    assert [record.inner for record in solver.history.records] == 2 * steps
+    assert np.array_equal(again.x, first.x)
+
+
 def test_a_step_that_is_taken_back():
     """The iterate before it is as good as it was: psi stays frozen until it is much better."""
     follow = Following()

@@ -1,6 +1,6 @@
 """Semismooth Newton: against the block relaxation, its rate, its fall-backs, nested meshes."""
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
@@ -23,7 +23,7 @@ from contact.problem.problem import ContactProblem
 from contact.problem.state import State
 from contact.solving import solve
 from forms.hencky import Linear, Log
-from forms.laws import ConstantCoefficient, SlipCoefficient
+from forms.laws import ConstantCoefficient, Coulomb, SlipCoefficient
 from scripts.cases import bar
 from tests.problems import mechanics
 
@@ -114,6 +114,40 @@ def test_a_body_that_only_contact_holds_is_solved():
     assert np.allclose(method.state.forces.pressure, 0.02, rtol=1e-9)
 
 
+@dataclass(frozen=True)
+class Fading:
+    """s = mu p / (1 + p/p_0): the harder a node presses, the less of it is friction."""
+
+    mu: float
+    p_0: float
+
+    lipschitz = 0.0
+
+    @property
+    def maximum(self):
+        return self.mu
+
+    def __call__(self, slip, pressure):
+        return self.mu * pressure / (1 + pressure / self.p_0)
+
+    def by_slip(self, slip, pressure):
+        return 0 * slip
+
+    def by_pressure(self, slip, pressure):
+        return self.mu / (1 + pressure / self.p_0) ** 2
+
+
+def test_friction_whose_coefficient_depends_on_the_pressure():
+    law = Fading(0.6, 0.01)
+    pair = [mechanics.bar(SELF, 8, -0.05, friction=Friction(law=law)) for _ in range(2)]
+    compare(*pair, 1e-7)
+    solution = solve(bar(8, -0.05, 1.0), friction=law)
+    slides = solution.status == "slip"
+    assert slides.any()
+    size, pressure = np.linalg.norm(solution.friction, axis=1), solution.pressure
+    assert np.allclose(size[slides], law(0.0, pressure[slides]), rtol=1e-6)
+
+
 def test_the_iterative_solver_finds_the_same_solution():
     direct, iterative = mechanics.leaning_block(SELF, 4), mechanics.leaning_block(SELF, 4)
     exact = newton(direct, linear="lu")
@@ -126,14 +160,14 @@ def test_the_iterative_solver_finds_the_same_solution():
 def test_blocks_are_the_derivative_of_the_contact_forces(dimension):
     """Compare with finite differences at a sliding and sticking iterate, away from kinks."""
     problem = mechanics.bar(SELF, 4) if dimension == 2 else mechanics.leaning_block(SELF, 2)
-    friction = replace(problem.interface.friction, coefficient=ConstantCoefficient(0.4))
+    friction = replace(problem.interface.friction, law=Coulomb(ConstantCoefficient(0.4)))
     interface = replace(problem.interface, friction=friction)
     rng = np.random.default_rng(3)
     nodal = 1e-3 * rng.standard_normal((problem.nodes.gap.size, dimension))
-    n, trace = nodal.shape[0], problem.nodes
+    n, nodes = nodal.shape[0], problem.nodes
     forces = Multipliers(
         rng.uniform(0.5, 1.0, n),
-        np.einsum("nij,nj->ni", trace.tangent, 0.3 * rng.standard_normal((n, dimension))),
+        np.einsum("nij,nj->ni", nodes.tangent, 0.3 * rng.standard_normal((n, dimension))),
     )
     moduli = Moduli(20.0, 20.0, 20.0)
     before = np.full(n, FREE, dtype=np.int8)
@@ -146,21 +180,21 @@ def test_blocks_are_the_derivative_of_the_contact_forces(dimension):
     difference = moved.forces.vectors(problem.nodes) - base.forces.vectors(problem.nodes)
     predicted = np.einsum("nij,nj->ni", base.blocks, direction)[:, :dimension]
     assert np.allclose(difference[sticks], predicted[sticks], rtol=1e-6, atol=1e-12)
-    normal = trace.normal_component(difference)
-    assert np.allclose(normal, trace.normal_component(predicted), rtol=1e-6, atol=1e-12)
+    normal = nodes.normal_component(difference)
+    assert np.allclose(normal, nodes.normal_component(predicted), rtol=1e-6, atol=1e-12)
 
 
 @pytest.mark.parametrize("softening", [0.25, np.inf])
 def test_falling_friction_is_followed_as_far_as_allowed(softening):
     """With no limit, the block is the derivative of mu(|u_tau|) p along the slip."""
     problem = mechanics.bar(SELF, 4, friction=Friction(SlipCoefficient(0.5, 0.2, 1e3)))
-    trace = problem.nodes
-    nodal = np.zeros((trace.nodes.size, 2))
+    nodes = problem.nodes
+    nodal = np.zeros((nodes.nodes.size, 2))
     nodal[:, 0] = 1e-3
-    pressure = np.full(trace.nodes.size, 0.5)
+    pressure = np.full(nodes.nodes.size, 0.5)
     forces = Multipliers(pressure, 0.3 * pressure[:, None] * [1.0, 0.0])
     moduli = Moduli(200.0, 20.0, 1e6)
-    before = np.full(trace.nodes.size, CLOSED + SLIDES, dtype=np.int8)
+    before = np.full(nodes.nodes.size, CLOSED + SLIDES, dtype=np.int8)
     base = linearise(problem.interface, nodal, forces, moduli, before, softening=softening)
     assert base.settled
     step = np.array([1e-8, 0.0])

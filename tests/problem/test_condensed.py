@@ -111,7 +111,7 @@ def test_what_is_left_of_a_problem_has_the_same_residuals():
 
 
 def test_a_condensed_body_is_no_body_that_has_lost_its_mesh():
-    """An inherited `apply_load` made the loads longer than the unknowns."""
+    """Loads are as long as the unknowns; once, inherited ones were those of the whole body."""
     problem = bar(SELF, law=Linear(1.0, 0.3))
     left = condensed.Condensation(problem, Counters()).linearise("secant", problem.start())
     assert left is not None

@@ -36,7 +36,7 @@ class Solved:
 
     def __init__(self, problem):
         self.loop = solve(problem, SMALL)
-        self.problem, self.trace = problem, problem.nodes
+        self.problem, self.nodes = problem, problem.nodes
         self.state, self.forces = self.loop.state, self.loop.state.forces
         self.base = self.residuals()
         self.nodal = problem.nodal(self.state)
@@ -59,7 +59,7 @@ class Solved:
         friction = self.forces.friction
         size = np.linalg.norm(friction, axis=1)[:, None]
         unit = np.where(size > 0, friction / np.where(size > 0, size, 1), 0.0)
-        directions = self.trace.normal if component == "normal" else unit
+        directions = self.nodes.normal if component == "normal" else unit
         return directions * chosen[:, None]
 
 
@@ -145,7 +145,7 @@ def test_slip_of_a_sticking_node_and_slip_the_wrong_way(solved):
         assert found.friction > 1e-6
         assert found.contact <= SMALL
     if solved.slides.any():
-        back = -2 * solved.trace.tangential_component(solved.nodal) * solved.slides[:, None]
+        back = -2 * solved.nodes.tangential_component(solved.nodal) * solved.slides[:, None]
         assert solved.residuals(nodal=back).friction > 1e-5
 
 

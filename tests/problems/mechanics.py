@@ -202,21 +202,21 @@ def attempt(problem: ContactProblem, **options) -> tuple[FixedPoint, Outcome]:
 
 def contact_data(loop: FixedPoint) -> dict[str, Array]:
     """Return what there is at all contact nodes, sorted by position."""
-    problem, trace, forces = loop.problem, loop.problem.nodes, loop.state.forces
+    problem, nodes, forces = loop.problem, loop.problem.nodes, loop.state.forces
     nodal = problem.nodal(loop.state)
-    slip = trace.tangential_component(nodal)
+    slip = nodes.tangential_component(nodal)
     bound = problem.interface.friction.bound(forces.pressure, np.linalg.norm(slip, axis=1))
     size = np.linalg.norm(forces.friction, axis=1)
     local = {
-        "points": trace.points,
-        "u_n": trace.normal_component(nodal),
+        "points": nodes.points,
+        "u_n": nodes.normal_component(nodal),
         "u_t": slip,
         "pressure": forces.pressure,
         "friction": forces.friction,
         "bound": np.asarray(bound, dtype=float),
-        "open": forces.pressure <= 1e-6 * trace.maximum(forces.pressure),
+        "open": forces.pressure <= 1e-6 * nodes.maximum(forces.pressure),
         "sticks": size < 0.9999 * bound,
     }
-    data = {name: trace.gather(values) for name, values in local.items()}
+    data = {name: nodes.gather(values) for name, values in local.items()}
     order = np.lexsort(np.round(data["points"], 9).T)
     return {name: values[order] for name, values in data.items()}
