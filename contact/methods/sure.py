@@ -28,7 +28,10 @@ from contact.typing import Array
 INTERIOR_POINT = "interior point"
 
 #: Times that a layer and a current are linearised anew, and the change that ends it.
-MOST_ANSWERS, SETTLED = 30, 1e-10
+MOST_ANSWERS, SETTLED = 60, 1e-10
+
+#: Least share of a step that is taken between two of these times.
+LEAST_SHARE = 1 / 16
 
 Bound = Callable[[Array, Array], Array]
 
@@ -70,7 +73,7 @@ def solve_convex(
     friction
         Whether friction acts. Without it there is one small problem, of the normals alone.
     """
-    steps, found = 0, None
+    steps, found, last, share = 0, None, np.inf, 1.0
     for _ in range(MOST_ANSWERS if problem.interface.response.active else 1):
         found = _solve_linearised(
             problem, state, poll, friction and problem.interface.friction.acts
@@ -79,11 +82,15 @@ def solve_convex(
             return None
         steps += found.steps
         change = _largest(problem, found.state.x - state.x)
-        state = found.state
-        if change <= SETTLED * _largest(problem, state.x):
+        if change <= SETTLED * _largest(problem, found.state.x):
             break
+        # What the current answers may open a gap that closes it: go there more carefully.
+        share = max(share / 2, LEAST_SHARE) if change > last else share
+        last = change
+        x = state.x + share * (found.state.x - state.x)
+        state = State(x, found.state.forces, state.load)
     assert found is not None
-    return Found(state, steps, found.certified, found.words)
+    return Found(found.state, steps, found.certified, found.words)
 
 
 def _largest(problem: CondensedProblem, values: Array) -> float:
