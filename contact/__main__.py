@@ -8,8 +8,8 @@ if __name__ == "__main__":
     # No traceback of the import below: until `main` has its handlers, Ctrl-C just ends this.
     signal.signal(signal.SIGINT, signal.SIG_DFL)
     try:
-        from contact.cli.main import main
+        from contact.cli.main import run
     except Exception:  # Python's own status would say that a solve has not converged
         traceback.print_exc()
         sys.exit(70)
-    sys.exit(main())
+    run()

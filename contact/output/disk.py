@@ -67,6 +67,10 @@ def library_errors(path: Path) -> Iterator[None]:
         raise OSError(number, os.strerror(number), str(path)) from error
 
 
+#: Writers that have failed. Some libraries abort the process where they clean up after these.
+abandoned: list[str] = []
+
+
 @contextmanager
 def closing(open_: Callable[[], Any]) -> Iterator[Any]:
     """Yield what writes a file, and close it; where that fails, it is left as it is.
@@ -82,4 +86,5 @@ def closing(open_: Callable[[], Any]) -> Iterator[Any]:
         writer.close()
     except RuntimeError:
         ctypes.pythonapi.Py_IncRef(ctypes.py_object(writer))  # not to be destroyed
+        abandoned.append(type(writer).__name__)
         raise

@@ -264,7 +264,7 @@ def test_a_reader_settles_what_was_interrupted(tmp_path: Path) -> None:
 
 def command(out: Path, *options: str, ranks: int = 1, before: str = "") -> list[str]:
     """Return a command that solves a small case, after some Python."""
-    program = f"import sys\n{before}\nfrom contact.cli.main import main\nsys.exit(main())"
+    program = f"import sys\n{before}\nfrom contact.cli.main import run\nrun()"
     launch = [] if ranks == 1 else ["mpirun", "--oversubscribe", "-n", str(ranks)]
     arguments = ["solve", str(BAR), "--out", str(out), *SMALL, *options]
     return [*launch, sys.executable, "-c", program, *arguments]
