@@ -174,8 +174,9 @@ class Newton:
         iterate, outcome = loop.run(iterate)
         if not outcome.converged and self._condensed is not None and not self._pays:
             logger.info("%s; going on at the contact nodes", outcome.ended)
-            start = Iterate(self.problem.start()) if self._best is None else self._best
-            iterate, outcome = self._at_contact(self._condensed, replace(start, status=None))
+            # From rest: where Newton's method has failed, the body may have flown away.
+            start = Iterate(self.problem.start())
+            iterate, outcome = self._at_contact(self._condensed, start)
         if not outcome.converged and isinstance(self.problem, CondensedProblem):
             iterate, outcome = self._convex(self.problem, loop, iterate, outcome)
         if not outcome.converged and self.problem.interface.friction.acts and self._left > 0:
