@@ -8,7 +8,7 @@ the argument, used by Newton's method.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Protocol
+from typing import ClassVar, Protocol
 
 import numpy as np
 
@@ -228,15 +228,31 @@ class Conductivity(Protocol):
         """Return the derivative by s, 0 where the rigid part presses."""
 
 
-class _Ramp:
-    """What the two ramps share."""
+@dataclass(frozen=True)
+class RampConductivity:
+    """psi(s) = k_e clip(delta s, 0, 1), equation (1.34) as printed, s = u_nu - rho.
+
+    With a unilateral constraint s never exceeds 0 and the ramp never conducts.
+    """
 
     k_e: float
+    delta: float
+
+    #: Value of the ramp at the closing gap, over k_e.
+    at_closing: ClassVar[float] = 0.0
 
     @property
     def follows_gap(self) -> bool:
         """True, unless nothing is conducted."""
         return self.k_e > 0
+
+    def __call__(self, s: Value) -> Value:
+        """Return the conductivity at s = u_nu - rho."""
+        return self.k_e * clip(self.at_closing + self.delta * s, 0.0, 1.0)
+
+    def derivative(self, s: Value) -> Value:
+        """Return the generalised derivative, 0 at the kinks."""
+        return _ramp_slope(self.at_closing + self.delta * s, self.k_e * self.delta)
 
     def at(self, s: Value, pressed: Value, loaded: Value | None = None) -> Value:
         """Return the conductivity: that of s = 0 where the rigid part presses."""
@@ -246,51 +262,14 @@ class _Ramp:
         """Return the generalised derivative by s, 0 where the rigid part presses."""
         return where(pressed, 0.0, self.derivative(s))
 
-    def __call__(self, s: Value) -> Value:
-        """Return the conductivity at s = u_nu - rho."""
-        raise NotImplementedError
 
-    def derivative(self, s: Value) -> Value:
-        """Return the generalised derivative."""
-        raise NotImplementedError
-
-
-@dataclass(frozen=True)
-class RampConductivity(_Ramp):
-    """psi(s) = k_e clip(delta s, 0, 1), equation (1.34) as printed, s = u_nu - rho.
-
-    With a unilateral constraint s never exceeds 0 and the ramp never conducts.
-    """
-
-    k_e: float
-    delta: float
-
-    def __call__(self, s: Value) -> Value:
-        """Return the conductivity at s = u_nu - rho."""
-        return self.k_e * clip(self.delta * s, 0.0, 1.0)
-
-    def derivative(self, s: Value) -> Value:
-        """Return the generalised derivative, 0 at the kinks."""
-        return _ramp_slope(self.delta * s, self.k_e * self.delta)
-
-
-@dataclass(frozen=True)
-class ShiftedConductivity(_Ramp):
+class ShiftedConductivity(RampConductivity):
     """psi(s) = k_e clip(1 + delta s, 0, 1): the ramp moved to the closing gap.
 
     Full conductivity in contact, none beyond the distance 1/delta; Lipschitz, as (h5) asks.
     """
 
-    k_e: float
-    delta: float
-
-    def __call__(self, s: Value) -> Value:
-        """Return the conductivity at s = u_nu - rho."""
-        return self.k_e * clip(1 + self.delta * s, 0.0, 1.0)
-
-    def derivative(self, s: Value) -> Value:
-        """Return the generalised derivative, 0 at the kinks."""
-        return _ramp_slope(1 + self.delta * s, self.k_e * self.delta)
+    at_closing = 1.0
 
 
 @dataclass(frozen=True)

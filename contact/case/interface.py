@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import abstractmethod
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeAlias
 
@@ -33,9 +34,9 @@ class Shape(Section):
         """The keys that hold a point or a direction: each has as many numbers as space."""
         return {key: value for key, value in self if isinstance(value, tuple)}
 
+    @abstractmethod
     def obstacle(self, direction: str) -> Obstacle:
         """Return the shape itself, for a contact direction."""
-        raise NotImplementedError
 
 
 class Plane(Shape):
@@ -166,9 +167,9 @@ class Contact(Section):
 class Coefficient(Section):
     """A coefficient of friction. A new one is a section like that below, entered in `Mu`."""
 
+    @abstractmethod
     def friction(self) -> FrictionLaw:
         """Return the friction law that has it."""
-        raise NotImplementedError
 
 
 class SlipLaw(Coefficient):

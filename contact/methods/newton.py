@@ -1,9 +1,10 @@
 """Newton's method, and the roads that are taken where it fails.
 
-First the condensed body, where the contact nodes are few, then the whole one. Where a loop
-cycles, friction is frozen and updated outside (Algorithm 1 with Newton inside); where that fails
-too, the block relaxation takes over, and at last the load is applied in steps. The history says
-which.
+First the condensed body, where the contact nodes are few, then the whole one. Where Newton's loop
+cycles at the contact nodes of a condensed body, an interior-point method takes over. Where that
+fails, and for the whole body, friction is frozen and updated outside (Algorithm 1 with Newton
+inside); then the block relaxation takes over, and at last the load is applied in steps. The
+history says which.
 
 References
 ----------
@@ -169,16 +170,16 @@ class Newton:
             if outcome.converged or self._left <= 0:
                 return iterate, outcome
             logger.info("%s; going on with the whole body", outcome.ended)
-        surer = self._condensed is not None and not self._pays
-        loop = self._whole_loop(SHORT if surer else None)
+        surer = None if self._pays else self._condensed
+        loop = self._whole_loop(SHORT if surer is not None else None)
         iterate, outcome = loop.run(iterate)
-        if not outcome.converged and self._condensed is not None and not self._pays:
+        if not outcome.converged and surer is not None:
             logger.info("%s; going on at the contact nodes", outcome.ended)
             # From rest: where Newton's method has failed, the body may have flown away.
             start = Iterate(self.problem.start())
-            iterate, outcome = self._at_contact(self._condensed, start)
+            iterate, outcome = self._at_contact(surer, start)
         if not outcome.converged and isinstance(self.problem, CondensedProblem):
-            iterate, outcome = self._convex(self.problem, loop, iterate, outcome)
+            iterate, outcome = self._convex(self.problem, iterate, outcome)
         if not outcome.converged and self.problem.interface.friction.acts and self._left > 0:
             iterate, outcome = self._frozen_friction(loop, iterate)
         if not outcome.converged and self._left > 0:
@@ -193,13 +194,12 @@ class Newton:
         return loop.run(iterate)
 
     def _convex(
-        self, problem: CondensedProblem, loop: NewtonLoop, iterate: Iterate, outcome: Outcome
+        self, problem: CondensedProblem, iterate: Iterate, outcome: Outcome
     ) -> tuple[Iterate, Outcome]:
         """Solve convex problems for sure, and let Newton's loop finish what they leave.
 
         Without friction first: where the body touches, Newton's method mostly finds the rest.
         """
-        patience = loop.options.patience
         for friction in (False, True) if problem.interface.friction.acts else (False,):
             start = problem.start() if self._best is None else self._best.state
             found = solve_convex(problem, start, self.history.poll, friction)
@@ -212,11 +212,10 @@ class Newton:
             outcome = Outcome(residuals, self.options.allowed, found.words)
             if outcome.converged or self._left <= 0:
                 break
-            loop.options = replace(loop.options, patience=patience if friction else SHORT)
+            loop = self._whole_loop(None if friction else SHORT)
             iterate, outcome = loop.run(iterate, INTERIOR_POINT)
             if outcome.converged:
                 break
-        loop.options = replace(loop.options, patience=patience)
         return iterate, outcome
 
     def _whole_loop(self, patience: int | None = None) -> NewtonLoop:

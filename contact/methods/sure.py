@@ -46,15 +46,12 @@ class Found:
         Unknowns and contact forces.
     steps
         Steps of the interior-point method.
-    certified
-        Whether the last convex problem, and the friction bound, are settled.
     words
         How it ended.
     """
 
     state: State
     steps: int
-    certified: bool
     words: str
 
 
@@ -90,7 +87,7 @@ def solve_convex(
         x = state.x + share * (found.state.x - state.x)
         state = State(x, found.state.forces, state.load)
     assert found is not None
-    return Found(found.state, steps, found.certified, found.words)
+    return Found(found.state, steps, found.words)
 
 
 def _largest(problem: CondensedProblem, values: Array) -> float:
@@ -133,11 +130,11 @@ def _solve_linearised(
     answer = comm.bcast(answer)
     if answer is None:
         return None
-    x, pressure, tangential, steps, certified, words = answer
+    x, pressure, tangential, steps, words = answer
     begin = body.own.start // body.block_size
     own = slice(begin, begin + layer.size)
     forces = Multipliers(pressure[own].copy(), tangential[own].copy())
-    return Found(State(x[body.own].copy(), forces, state.load), steps, certified, words)
+    return Found(State(x[body.own].copy(), forces, state.load), steps, words)
 
 
 @dataclass(frozen=True)
@@ -176,8 +173,8 @@ class _Gathered:
         load = np.where(free.ravel(), total @ moved - base, 0.0)
         return _Gathered(total, load, fixed, free, normal, tangent, gap, weight)
 
-    def solve(self, bound: Bound, frictional: bool) -> tuple[Array, Array, Array, int, bool, str]:
-        """Return unknowns, pressure, friction, steps, whether it is certified, and words."""
+    def solve(self, bound: Bound, frictional: bool) -> tuple[Array, Array, Array, int, str]:
+        """Return unknowns, pressure, friction, steps and words."""
         n, d = self.normal.shape
         stiffness, load, complete = self.stiffness, self.load, None
         if self.free.shape[1] > d:
@@ -189,15 +186,13 @@ class _Gathered:
         )
         if frictional:
             loop = coulomb(solver, load, bound)
-            result, steps, certified, words = (
-                loop.result, loop.iterations, loop.converged, loop.message
-            )  # fmt: skip
+            result, steps, words = loop.result, loop.iterations, loop.message
         else:
             result = solver.solve(load, np.zeros(n))
-            steps, certified, words = result.iterations, result.certified, result.message
+            steps, words = result.iterations, result.message
         moved = result.displacement if complete is None else complete(result.displacement)
         x = self.fixed + moved.ravel()
-        return x, result.pressure, result.friction, steps, certified, words
+        return x, result.pressure, result.friction, steps, words
 
 
 def _kept_nodes(interface: Interface, count: int) -> tuple[Array, Array, Array, Array]:
