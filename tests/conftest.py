@@ -10,6 +10,8 @@ import pytest
 from hypothesis import HealthCheck, settings
 from mpi4py import MPI
 
+from tests.problems.bar import BAR
+
 os.environ.setdefault("MPLBACKEND", "Agg")
 
 # The same examples on every rank and in every run; forms compile at the first one, so no deadline.
@@ -20,6 +22,14 @@ settings.load_profile("contact")
 
 # messages of the hooks below must not meet those of a test that failed half way
 _comm = MPI.COMM_WORLD.Dup()
+
+
+@pytest.fixture
+def bar(tmp_path: Path) -> Path:
+    """Return the path of the bar's case file."""
+    path = tmp_path / "bar.toml"
+    path.write_text(BAR)
+    return path
 
 
 @pytest.hookimpl(tryfirst=True)
