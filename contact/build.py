@@ -11,7 +11,7 @@ from mpi4py import MPI
 from ufl.core.expr import Expr
 
 from contact.blame import to_blame
-from contact.body.description import Body, Fixed, Load
+from contact.body.description import Body, Fixed, Load, Material
 from contact.case import file as sections
 from contact.case.formula import Expression
 from contact.errors import InputError
@@ -75,13 +75,10 @@ def build_problem(
         _check_range("mesh", domain.size)
         case.check_mesh(domain.dim, domain.names)
         _check_loads(case, domain)
-        law = material_law(case.material) if law is None else law
-        _check_range("material.young", float(law.young))
-        body = Body(
-            law,
+        body = Body.piecewise(
+            _materials(case, domain.dim, law),
             [_fixed(i, fixed, domain.comm) for i, fixed in enumerate(case.fixed)],
             [_load(i, load, domain.comm) for i, load in enumerate(case.load)],
-            None if case.material.piezo is None else piezo(case.material.piezo, domain.dim),
         )
         obstacle = _foundation(case.contact, domain) if foundation is None else foundation
         problem = ContactProblem(
@@ -165,6 +162,18 @@ class NodalField:
                 f"{self.key}: {self.expression} is {least:g} at a node; accepted: values >= 0"
             )
         return values
+
+
+def _materials(case: sections.Case, dim: int, law: Hencky | None) -> list[Material]:
+    if law is not None and len(case.materials) > 1:
+        raise InputError("law: a law given beside the case replaces one material, not several")
+    made = []
+    for key, section in case.materials:
+        this = material_law(section) if law is None else law
+        _check_range(f"{key}.young", float(this.young))
+        tensors = None if section.piezo is None else piezo(section.piezo, dim)
+        made.append(Material(this, tensors, section.on or ()))
+    return made
 
 
 def material_law(section: sections.Material) -> Hencky:

@@ -55,6 +55,25 @@ class Load:
 
 
 @dataclass(frozen=True)
+class Material:
+    """A material and where it is.
+
+    Attributes
+    ----------
+    law
+        Hencky law of the stress.
+    piezo
+        Piezoelectric tensors in the body's axes, or None.
+    on
+        Names of the regions that consist of it; none for the whole mesh.
+    """
+
+    law: Hencky
+    piezo: Piezo | None = None
+    on: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
 class Body:
     """Material and supports.
 
@@ -64,17 +83,40 @@ class Body:
         Hencky law of the stress.
     piezo
         Piezoelectric tensors in the body's axes, or None.
+    regions
+        Several materials, by region; none where `law` and `piezo` are those of the whole mesh.
+        With them `law` and `piezo` stand for all where a size is asked for: see `piecewise`.
     """
 
     law: Hencky
     fixed: Sequence[Fixed]
     loads: Sequence[Load] = field(default_factory=tuple)
     piezo: Piezo | None = None
+    regions: tuple[Material, ...] = ()
+
+    @staticmethod
+    def piecewise(
+        materials: Sequence[Material], fixed: Sequence[Fixed], loads: Sequence[Load] = ()
+    ) -> Body:
+        """Return a body of several materials.
+
+        The softest one gives its elastic constants to the scales: where a stiff and a soft part
+        press on each other, that one yields. The first piezoelectric one gives the permittivity
+        to the unit of the potential.
+        """
+        softest = min((material.law for material in materials), key=lambda law: law.young)
+        piezo = next((m.piezo for m in materials if m.piezo is not None), None)
+        return Body(softest, fixed, loads, piezo, tuple(materials))
+
+    @property
+    def materials(self) -> tuple[Material, ...]:
+        """The materials, each with its regions."""
+        return self.regions or (Material(self.law, self.piezo),)
 
     @property
     def linear(self) -> bool:
         """Whether the stress is a linear function of the strain."""
-        return isinstance(self.law, Linear)
+        return all(isinstance(material.law, Linear) for material in self.materials)
 
     @property
     def phi_scale(self) -> float:
@@ -92,11 +134,12 @@ class Body:
         InputError
             If they are not.
         """
-        if self.piezo is None:
-            return
-        try:
-            self.piezo.check()
-            if dim == 2:
-                self.piezo.check_plane()
-        except ValueError as error:
-            raise InputError(f"piezoelectric material: {error}") from error
+        for piezo in (material.piezo for material in self.materials):
+            if piezo is None:
+                continue
+            try:
+                piezo.check()
+                if dim == 2:
+                    piezo.check_plane()
+            except ValueError as error:
+                raise InputError(f"piezoelectric material: {error}") from error

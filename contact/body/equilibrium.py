@@ -22,10 +22,10 @@ from numpy.typing import NDArray
 from petsc4py import PETSc
 from ufl.core.expr import Expr
 
-from contact.body.constants import law_with_constants, piezo_with_constants
 from contact.body.description import Body
 from contact.body.loads import external_work
-from contact.body.supports import dirichlet, free_components
+from contact.body.materials import cells_of, pieces
+from contact.body.supports import dirichlet, free_components, without_field
 from contact.linear.layout import Layout
 from contact.linear.operator import Counters, SparseOperator
 from contact.mesh.domain import Domain
@@ -61,7 +61,13 @@ class BodyEquilibrium:
         self.block_size = self.dim + (body.piezo is not None)
         mesh = domain.mesh
         self.space = fem.functionspace(mesh, ("Lagrange", degree, (self.block_size,)))
+        #: The owned cells of each material.
+        self.cells = cells_of(domain, body.materials)
         self.bcs = dirichlet(domain, self.space, body)
+        coupled = [material.piezo is not None for material in body.materials]
+        if any(coupled) and not all(coupled):
+            charged = np.concatenate([self.cells[i] for i in np.flatnonzero(coupled)])
+            self.bcs.append(without_field(self.space, charged))
         index_map = self.space.dofmap.index_map
         self.layout = Layout(
             domain.comm,
@@ -113,20 +119,21 @@ class BodyEquilibrium:
         return made
 
     def _compile(self) -> None:
-        mesh, body = self.domain.mesh, self.body
-        law = law_with_constants(body.law, mesh)
-        piezo = None if body.piezo is None else piezo_with_constants(body.piezo, mesh)
+        body = self.body
         trial, test = ufl.TrialFunction(self.space), ufl.TestFunction(self.space)
         degree = 1 if self.degree == 1 else (2 if self.linear else 4)
-        dx = self.domain.dx(metadata={"quadrature_degree": degree})
+        materials = list(pieces(self.domain, body.materials, self.cells, degree))
         v, xi = self.split(test)
 
         def internal(secant_at: Any, x: Any) -> ufl.Form:
             u, phi = self.split(x)
             u_0, _ = self.split(secant_at)
-            if piezo is None:
-                return secant_form(law, u_0, u, v) * dx
-            return symmetrised_form(law, piezo, u_0, u, phi, v, xi) * dx
+            return sum(
+                secant_form(law, u_0, u, v) * dx
+                if piezo is None
+                else symmetrised_form(law, piezo, u_0, u, phi, v, xi) * dx
+                for law, piezo, dx in materials
+            )
 
         self._internal = fem.form(internal(self._secant_at, self._at))
         self._forms = {"secant": fem.form(internal(self._secant_at, trial))}

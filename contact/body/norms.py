@@ -12,8 +12,9 @@ from dolfinx.fem.petsc import assemble_matrix
 from mpi4py import MPI
 from ufl.core.expr import Expr
 
-from contact.body.constants import constant, law_with_constants
+from contact.body.constants import constant
 from contact.body.equilibrium import BodyEquilibrium
+from contact.body.materials import pieces
 from contact.mesh.domain import Domain
 from contact.typing import Array
 from forms.hencky import secant_form
@@ -85,13 +86,12 @@ def errors(
         e = u
     else:
         e = u - other(ufl.SpatialCoordinate(body.domain.mesh))
-    law = law_with_constants(body.body.law, body.domain.mesh)
+    materials = list(pieces(body.domain, body.body.materials, body.cells, 2 * body.degree + 4))
     squares = (
-        ufl.inner(e, e),
-        ufl.inner(ufl.grad(e), ufl.grad(e)),
-        secant_form(law, u, e, e),
+        sum(ufl.inner(e, e) * dx for _, _, dx in materials),
+        sum(ufl.inner(ufl.grad(e), ufl.grad(e)) * dx for _, _, dx in materials),
+        sum(secant_form(law, u, e, e) * dx for law, _, dx in materials),
     )
-    dx = body.domain.dx(metadata={"quadrature_degree": 2 * body.degree + 4})
-    integrals = [fem.assemble_scalar(fem.form(square * dx)) for square in squares]
+    integrals = [fem.assemble_scalar(fem.form(square)) for square in squares]
     totals = body.comm.allreduce(np.array(integrals), op=MPI.SUM)
     return Errors(*(float(np.sqrt(max(total, 0.0))) for total in totals))

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 from dolfinx import fem
+from dolfinx.la import InsertMode
 from numpy.typing import NDArray
 
 from contact.body.description import Body, Field
@@ -64,6 +65,30 @@ def _condition(
     points = scalar.tabulate_dof_coordinates()[dofs[1], :dim]
     data.x.array[dofs[1]] = np.asarray(value.numpy(points)) / scale
     return fem.dirichletbc(data, dofs, subspace)
+
+
+def without_field(space: fem.FunctionSpace, cells: NDArray[np.int32]) -> fem.DirichletBC:
+    """Return the condition phi = 0 at the nodes that belong to no piezoelectric cell. Collective.
+
+    There is no electric field in what is not piezoelectric: a current that reaches its surface
+    ends there, as at that of an insulator.
+
+    Parameters
+    ----------
+    space
+        Of displacement and potential.
+    cells
+        Owned piezoelectric cells.
+    """
+    subspace = space.sub(space.dofmap.index_map_bs - 1)
+    scalar, to_whole = subspace.collapse()
+    inside = fem.Function(scalar)
+    inside.x.array[scalar.dofmap.list[cells].ravel()] = 1.0
+    inside.x.scatter_reverse(InsertMode.add)
+    inside.x.scatter_forward()
+    nodes = np.flatnonzero(inside.x.array == 0).astype(np.int32)
+    dofs = [np.asarray(to_whole, dtype=np.int32)[nodes], nodes]
+    return fem.dirichletbc(fem.Function(scalar), dofs, subspace)
 
 
 def free_components(

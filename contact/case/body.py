@@ -12,6 +12,7 @@ from contact.case.types import (
     Formula,
     FormulaVector,
     Name,
+    Names,
     NonNegative,
     Number,
     Section,
@@ -104,8 +105,16 @@ class Piezo(Section):
 
 
 class Material(Section):
-    """`[material]`: isotropic Hencky material, sigma = k0 tr(eps) I + 2 g dev(eps)."""
+    """`[material]`: isotropic Hencky material, sigma = k0 tr(eps) I + 2 g dev(eps).
 
+    Several materials are a list of tables `[[material]]`, each with its regions.
+    """
+
+    on: Names | None = Field(
+        default=None,
+        description="Regions of the mesh (its named groups of cells) that consist of it. Default: "
+        "the whole mesh, where this is the only material.",
+    )
     law: Literal["linear", "log"] = Field(
         default="linear",
         description="`linear`: g = mu1; `log`: (7.8), g = mu1 (s/t)(ln(t/s) + 1) "

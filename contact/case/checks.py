@@ -23,10 +23,11 @@ Case: TypeAlias = Any
 def check_sections(case: Case) -> None:
     """Raise a fault if sections contradict each other."""
     check_sizes(case)
-    if case.material.piezo is None:
-        _check_mechanical(case)
-    else:
+    if any(material.piezo is not None for _, material in case.materials):
         _check_potential(case)
+    else:
+        _check_mechanical(case)
+    _check_regions(case)
     if not any(
         component != "free" for fixed in case.fixed for component in fixed.displacement or ()
     ):
@@ -89,6 +90,17 @@ def _check_mechanical(case: Case) -> None:
                 raise fault(f"load.{i}.{key}", getattr(load, key).source, accepted)
     if case.electric is not None:
         raise fault("electric", Words("given a table"), accepted)
+
+
+def _check_regions(case: Case) -> None:
+    """Several materials need regions, each region one of them."""
+    seen: dict[str, str] = {}
+    for path, material in case.materials:
+        if material.on is None and len(case.materials) > 1:
+            raise fault(f"{path}.on", Words("missing"), "regions for each of several materials")
+        for name in material.on or ():
+            if seen.setdefault(name, path) != path:
+                raise fault(f"{path}.on", name, f"regions that {seen[name]} does not have")
 
 
 def _check_lagged(case: Case) -> None:
@@ -166,11 +178,12 @@ def _check_vectors(case: Case, dimension: int) -> None:
             raise fault(path, formula.source, "formulas in x and y in the plane")
     if dimension == 2 and case.mesh.axis is not None:
         raise fault("mesh.axis", case.mesh.axis, "no axis in the plane")
-    piezo = case.material.piezo
-    if isinstance(piezo, Piezo) and piezo.poling is not None:
-        if isinstance(piezo.poling, tuple) != (dimension == 3):
-            accepted = "an angle in the plane" if dimension == 2 else "3 numbers in space"
-            raise fault("material.piezo.poling", piezo.poling, accepted)
+    for path, material in case.materials:
+        piezo = material.piezo
+        if isinstance(piezo, Piezo) and piezo.poling is not None:
+            if isinstance(piezo.poling, tuple) != (dimension == 3):
+                accepted = "an angle in the plane" if dimension == 2 else "3 numbers in space"
+                raise fault(f"{path}.piezo.poling", piezo.poling, accepted)
 
 
 def _check_parts(case: Case, parts: list[str]) -> None:

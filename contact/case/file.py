@@ -11,7 +11,7 @@ import sys
 import tomllib
 from collections.abc import Iterable, Mapping
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, TypeAlias
 
 from pydantic import Field, PrivateAttr, ValidationError, model_validator
 from pydantic_core import PydanticCustomError
@@ -25,7 +25,7 @@ from contact.case.messages import describe, describe_fault
 from contact.case.overrides import override
 from contact.case.showing import clipped
 from contact.case.solver import DEFAULT, Solver
-from contact.case.types import FromTable, Section, Text, as_tuple
+from contact.case.types import FromTable, Section, Text, as_tuple, entries, one_or_more
 from contact.errors import InputError
 from contact.output.options import OutputOptions
 from contact.settings import Accepted
@@ -52,13 +52,21 @@ __all__ = [
 ]
 
 
+if TYPE_CHECKING:
+    Materials: TypeAlias = Material | tuple[Material, ...]
+else:
+    Materials = one_or_more(Material, "material")
+
+
 class Case(Section):
     """A case file."""
 
     title: Text = Field(default="", description="Title, for reports and figures.")
     mesh: Mesh = Field(description="The body: `[mesh]`.")
     space: Space = Field(default=Space(), description="Finite elements: `[space]`.")
-    material: Material = Field(description="The material: `[material]`.")
+    material: Materials = Field(
+        description="The material: `[material]`; several: `[[material]]`, each with its regions."
+    )
     fixed: Annotated[
         tuple[Fixed, ...],
         Field(min_length=1),
@@ -86,6 +94,11 @@ class Case(Section):
     def source(self) -> str:
         """Name of the file that the case was read from, for messages."""
         return self._source
+
+    @property
+    def materials(self) -> tuple[tuple[str, Material], ...]:
+        """The materials, each with its key in the file."""
+        return entries("material", self.material)
 
     @model_validator(mode="after")
     def _check(self) -> Case:

@@ -11,7 +11,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import is_dataclass
 from functools import reduce
 from operator import or_
-from typing import Annotated, Any, Literal, TypeAlias, Union, get_args, get_origin
+from typing import Annotated, Any, Literal, TypeAlias, TypeVar, Union, get_args, get_origin
 
 from pydantic import (
     AfterValidator,
@@ -77,6 +77,8 @@ def _not_negative(expression: expressions.Expression) -> expressions.Expression:
     return expression
 
 
+Kind = TypeVar("Kind", bound=Section)
+
 FORMULA = "a number or a formula"
 
 Formula: TypeAlias = Annotated[expressions.Expression, _FormulaSchema, Accepted(FORMULA)]
@@ -132,6 +134,46 @@ def fault(key: str, given: Any, accepted: str) -> PydanticCustomError:
         What is accepted, in words.
     """
     return PydanticCustomError("fault", "fault", {"key": key, "given": given, "accepted": accepted})
+
+
+def _as_names(given: Any) -> Any:
+    return (given,) if isinstance(given, str) else _as_tuple(given)
+
+
+Names: TypeAlias = Annotated[
+    tuple[Name, ...],
+    Field(min_length=1),
+    BeforeValidator(_as_names),
+    Accepted("a name, or a list of names"),
+]
+
+
+def one_or_more(kind: type[Section], key: str) -> Any:
+    """Return what reads a table as one section, and a list of tables as several.
+
+    Parameters
+    ----------
+    kind
+        The section.
+    key
+        Its key in the case file.
+    """
+    entry: Any = kind
+    many = Annotated[tuple[entry, ...], Field(min_length=1), as_tuple]
+
+    def tag(given: Any) -> str:
+        return "many" if isinstance(given, list | tuple) else kind.__name__
+
+    read = Annotated[entry, Tag(kind.__name__)] | Annotated[many, Tag("many")]
+    words = Accepted(f"a table [{key}], or tables [[{key}]]")
+    return Annotated[read, Discriminator(tag), words]
+
+
+def entries(key: str, given: Kind | tuple[Kind, ...]) -> tuple[tuple[str, Kind], ...]:
+    """Return what `one_or_more` has read as several sections, each with its path."""
+    if isinstance(given, tuple):
+        return tuple((f"{key}.{i}", section) for i, section in enumerate(given))
+    return ((key, given),)
 
 
 def union_of(kinds: Iterable[type], *marks: Any) -> Any:

@@ -117,6 +117,12 @@ class Domain:
         self.cells(name)
         return self.dx(list(self.regions).index(name))
 
+    def divided(self, groups: Sequence[Indices]) -> list[ufl.Measure]:
+        """Measures over groups of owned cells, which the integrals of one form can share."""
+        data = list(enumerate(groups))
+        dx = ufl.Measure("dx", domain=self.mesh, subdomain_data=data)
+        return [dx(i) for i, _ in data]
+
     # The integrals of a form must share one object of subdomain data for each kind of integral.
 
     @cached_property

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from contact import _compat
 from contact.body.constants import law_with_constants, piezo_with_constants
+from contact.body.description import Material
 from contact.body.equilibrium import BodyEquilibrium
 from contact.typing import Array
 from forms.hencky import stress
@@ -120,19 +121,24 @@ class DerivedFields:
         return np.asarray(element.basix_element.points)
 
     @cached_property
-    def expression(self) -> fem.Expression:
-        """All components, one after the other."""
-        body, mesh, piezo = self.body, self.body.domain.mesh, self.body.body.piezo
+    def expressions(self) -> list[fem.Expression]:
+        """All components, one after the other, for each material."""
+        return [self._expression(material) for material in self.body.body.materials]
+
+    def _expression(self, material: Material) -> fem.Expression:
+        body, mesh = self.body, self.body.domain.mesh
         u, phi = body.split(self._x)
         eps = strain(u)
-        sigma = stress(law_with_constants(body.body.law, mesh), eps)
+        sigma = stress(law_with_constants(material.law, mesh), eps)
         induced: list[ufl.core.expr.Expr] = []
-        if piezo is not None:
-            constants = piezo_with_constants(piezo, mesh)
+        if material.piezo is not None:
+            constants = piezo_with_constants(material.piezo, mesh)
             sigma = sigma + coupling_stress(constants, phi)
             d = electric_displacement(constants, eps, phi)
             induced = [d[i] for i in range(body.dim)]
             induced += [-ufl.grad(phi)[i] for i in range(body.dim)]
+        elif phi is not None:
+            induced = [ufl.as_ufl(0.0)] * (2 * body.dim)
         values = [sigma[i, j] for i in range(3) for j in range(3)]
         # Rounding can make |dev eps|^2 slightly negative.
         values += [von_mises(sigma), sqrt(maximum(deviator_squared(eps), 0.0))]
@@ -140,18 +146,33 @@ class DerivedFields:
 
     def _chunks(self) -> Iterator[tuple[NDArray[np.int32], Array]]:
         """Yield owned cells and the values there, shape (cells, points, components)."""
-        mesh = self.body.domain.mesh
-        cells = np.arange(mesh.topology.index_map(mesh.topology.dim).size_local, dtype=np.int32)
+        for material in range(len(self.expressions)):
+            yield from self._chunks_of(material)
+
+    def _chunks_of(self, material: int) -> Iterator[tuple[NDArray[np.int32], Array]]:
+        """Yield the owned cells of one material, likewise."""
+        mesh, cells = self.body.domain.mesh, self.body.cells[material]
+        expression = self.expressions[material]
         components = sum(math.prod(shape) for shape in self.shapes.values())
         for chosen in np.array_split(cells, cells.size // CHUNK + 1):
-            values = self.expression.eval(mesh, chosen)
+            values = expression.eval(mesh, chosen)
             yield chosen, values.reshape(chosen.size, len(self.points), components)
 
-    def largest_strain(self) -> float:
-        """Return the largest |dev eps| over the cells (their nodes, for degree 2)."""
+    def largest_strains(self) -> Array:
+        """Return the largest |dev eps| over the cells (their nodes, for degree 2), a material."""
         column = self.columns["dev_strain"]
-        largest = max(float(v[..., column].max(initial=0.0)) for _, v in self._chunks())
-        return float(self.body.comm.allreduce(largest, op=MPI.MAX))
+        largest = np.array(
+            [
+                max(v[..., column].max(initial=0.0) for _, v in self._chunks_of(material))
+                for material in range(len(self.expressions))
+            ]
+        )
+        self.body.comm.Allreduce(MPI.IN_PLACE, largest, op=MPI.MAX)
+        return largest
+
+    def largest_strain(self) -> float:
+        """Return the largest of these."""
+        return float(self.largest_strains().max())
 
     def cells(self) -> dict[str, fem.Function]:
         """Return the fields as they are: discontinuous, of degree 0 for P1 and 1 for P2."""

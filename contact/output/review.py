@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from mpi4py import MPI
 
+from contact.body.description import Material
 from contact.output.fields import DerivedFields
 from contact.output.solution import Solution
 from forms.hencky import check_monotonicity
@@ -12,11 +13,14 @@ from forms.hencky import check_monotonicity
 
 def review(solution: Solution) -> None:
     """Add what there is to say to the notes and warnings of a solution. Collective."""
-    solution.max_dev_strain = DerivedFields(
-        solution.problem.equilibrium, solution.state.x
-    ).largest_strain()
+    fields = DerivedFields(solution.problem.equilibrium, solution.state.x)
+    strains = fields.largest_strains()
+    solution.max_dev_strain = float(strains.max())
     for text, good in (
-        _monotonicity(solution),
+        *(
+            _monotonicity(material, strain)
+            for material, strain in zip(solution.problem.body.materials, strains, strict=True)
+        ),
         _uniqueness(solution),
         _electric_uniqueness(solution),
         _chords(solution),
@@ -27,15 +31,16 @@ def review(solution: Solution) -> None:
             (solution.notes if good else solution.warnings).append(text)
 
 
-def _monotonicity(solution: Solution) -> tuple[str, bool]:
-    """Check (h1) on the strains of the solution."""
-    problem, strain = solution.problem, solution.max_dev_strain
+def _monotonicity(material: Material, strain: float) -> tuple[str, bool]:
+    """Check (h1) on the strains that the solution has in a material."""
     if not np.isfinite(strain):
         return "", True
-    report = check_monotonicity(problem.body.law, strain)
+    report = check_monotonicity(material.law, strain)
     verdict = "holds" if report.holds else "does not hold: the material softens"
+    place = f" in {', '.join(material.on)}" if material.on else ""
+    where = f"{place} on the strains of this solution, |dev eps| <= {strain:.4g}"
     text = (
-        f"assumption (h1) {verdict} on the strains of this solution, |dev eps| <= {strain:.4g}: "
+        f"assumption (h1) {verdict}{where}: "
         f"g <= g_0 = {report.g_0:.4g}, alpha = {report.alpha:.4g}, beta = {report.beta:.4g}"
     )
     return text, report.holds

@@ -1,0 +1,96 @@
+"""Where the materials of a body are: each cell has one."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import TypeAlias
+
+import numpy as np
+import ufl
+from mpi4py import MPI
+
+from contact.body.constants import law_with_constants, piezo_with_constants
+from contact.body.description import Material
+from contact.errors import InputError
+from contact.mesh.domain import Domain, Indices
+from forms.hencky import Hencky
+from forms.piezo import Piezo
+
+#: A material with form constants for its numbers, and the measure of its cells.
+Piece: TypeAlias = tuple[Hencky, Piezo | None, ufl.Measure]
+
+
+def cells_of(domain: Domain, materials: Sequence[Material]) -> list[Indices]:
+    """Return the owned cells of each material, ascending. Collective.
+
+    Raises
+    ------
+    InputError
+        If a region is missing, belongs to two materials or to none, or cells are in no region.
+    """
+    if len(materials) == 1 and not materials[0].on:
+        return [np.arange(_count(domain), dtype=np.int32)]
+    owner = np.full(_count(domain), -1, dtype=np.int32)
+    found = []
+    for i, material in enumerate(materials):
+        if not material.on:
+            raise InputError(
+                f"material.{i}.on: missing; accepted: with several materials, the regions of "
+                f"each ({', '.join(sorted(domain.regions))})"
+            )
+        cells = np.unique(np.concatenate([domain.cells(name) for name in material.on]))
+        both = owner[cells].max(initial=-1)
+        other = domain.comm.allreduce(int(both), op=MPI.MAX)
+        if other >= 0:
+            raise InputError(
+                f"material.{i}.on: {', '.join(material.on)} shares cells with the regions of "
+                f"material.{other} ({', '.join(materials[other].on)}); accepted: each cell in one"
+            )
+        owner[cells] = i
+        found.append(cells.astype(np.int32))
+    _check_all(domain, owner)
+    return found
+
+
+def _check_all(domain: Domain, owner: Indices) -> None:
+    """Refuse cells without a material, and name their region."""
+    left = domain.comm.allreduce(int(np.count_nonzero(owner < 0)), op=MPI.SUM)
+    if left == 0:
+        return
+    for name, cells in domain.regions.items():
+        without = domain.comm.allreduce(int(np.count_nonzero(owner[cells] < 0)), op=MPI.SUM)
+        if without > 0:
+            raise InputError(
+                f"material: the region {name!r} has none; accepted: a [[material]] with "
+                f"on = {name!r}, or one without `on` for the whole mesh"
+            )
+    raise InputError(
+        f"material: {left} cells of the mesh are in no region and have none; accepted: a region "
+        "(physical group) for each cell, or one material without `on` for the whole mesh"
+    )
+
+
+def _count(domain: Domain) -> int:
+    return int(domain.mesh.topology.index_map(domain.dim).size_local)
+
+
+def pieces(
+    domain: Domain, materials: Sequence[Material], cells: Sequence[Indices], degree: int
+) -> Iterator[Piece]:
+    """Yield each material with the measure of its cells.
+
+    Parameters
+    ----------
+    domain, materials, cells
+        As in and from `cells_of`.
+    degree
+        Of the quadrature.
+    """
+    metadata = {"quadrature_degree": degree}
+    whole = len(cells) == 1
+    measures = [domain.dx] if whole else domain.divided(cells)
+    for material, dx in zip(materials, measures, strict=True):
+        law = law_with_constants(material.law, domain.mesh)
+        piezo = material.piezo
+        constants = None if piezo is None else piezo_with_constants(piezo, domain.mesh)
+        yield law, constants, dx(metadata=metadata)

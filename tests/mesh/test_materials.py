@@ -1,0 +1,158 @@
+"""Several materials by region: closed forms of layers, and what is refused."""
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+
+from contact import parse_case, solve
+from contact.body.description import Body, Fixed, Load, Material
+from contact.body.equilibrium import BodyEquilibrium
+from contact.body.norms import errors
+from contact.build import build_problem
+from contact.errors import InputError
+from contact.mesh.domain import from_mesh
+from contact.mesh.grid import rectangle
+from contact.output.fields import DerivedFields
+from forms.hencky import Linear
+from forms.piezo import hexagonal
+from tests.problems.mechanics import constant
+
+COMM = MPI.COMM_WORLD
+LOWER, UPPER = 2.0, 1000.0
+
+
+def two_layers(split: float = 0.5, name: str = "upper"):
+    """Return a square with the regions ``lower`` and ``upper``, which share their nodes."""
+    mesh = rectangle(COMM, (0.0, 0.0), (1.0, 1.0), (8, 8)).mesh
+    sides = {
+        "bottom": lambda x: np.isclose(x[1], 0.0),
+        "top": lambda x: np.isclose(x[1], 1.0),
+        "left": lambda x: np.isclose(x[0], 0.0),
+        "right": lambda x: np.isclose(x[0], 1.0),
+    }
+    regions = {"lower": lambda x: x[1] < split + 1e-9, name: lambda x: x[1] > split - 1e-9}
+    return from_mesh(mesh, sides, regions=regions)
+
+
+def case(material, **more):
+    return parse_case(
+        {
+            "mesh": {"generator": "rectangle", "size": [1.0, 1.0], "cells": [8, 8]},
+            "material": material,
+            "fixed": [{"on": side, "displacement": [0.0, "free"]} for side in ("left", "right")],
+            "load": [{"on": "top", "pressure": 0.1}],
+            "contact": {"on": "bottom"},
+            **more,
+        }
+    )
+
+
+def materials(first=None, second=None):
+    return [
+        {"on": "lower", "young": LOWER, "poisson": 0.3, **(first or {})},
+        {"on": ["upper"], "young": UPPER, "poisson": 0.1, **(second or {})},
+    ]
+
+
+@pytest.mark.parallel
+@pytest.mark.parametrize("law", ["linear", "log"])
+@pytest.mark.parametrize("degree", [1, 2])
+def test_layers_in_series(law: str, degree: int) -> None:
+    """Held at its sides, each layer is compressed by p/(K + 4G/3): by its own material."""
+    log = {"law": "log", "yield_strain": 10.0} if law == "log" else {}
+    given = case(materials(first=log), space={"degree": degree})
+    solution = solve(given, domain=two_layers())
+    assert solution.converged
+    problem = solution.problem
+    laws = [material.law for material in problem.body.materials]
+    moduli = [float(law.bulk + 4 / 3 * law.shear) for law in laws]
+    assert problem.scales.young == LOWER
+    y = problem.equilibrium.space.tabulate_dof_coordinates()[:, 1]
+    depth = 0.1 * (np.minimum(y, 0.5) / moduli[0] + np.maximum(y - 0.5, 0) / moduli[1])
+    u = solution.state.x.reshape(-1, 2)
+    np.testing.assert_allclose(u[:, 1], -depth, rtol=0, atol=1e-10)
+    across = DerivedFields(problem.equilibrium, solution.state.x).cells()["stress"]
+    expected = [
+        -0.1 * float(law.bulk - 2 / 3 * law.shear) / m for law, m in zip(laws, moduli, strict=True)
+    ]
+    stress = across.x.array.reshape(-1, 9)
+    nearest = np.abs(stress[:, :1] - expected).min(axis=1, initial=np.inf)
+    assert nearest.max(initial=0.0) < 1e-9
+    np.testing.assert_allclose(stress[:, 4], -0.1, rtol=1e-8)
+    strains = DerivedFields(problem.equilibrium, solution.state.x).largest_strains()
+    np.testing.assert_allclose(strains, 0.1 / np.array(moduli) * np.sqrt(2 / 3), rtol=1e-8)
+
+
+def test_the_energy_norm_knows_the_materials() -> None:
+    laws = Linear(LOWER, 0.3), Linear(UPPER, 0.1)
+    zero = constant(0.0, 2)
+    body = Body.piecewise(
+        [Material(laws[0], on=("lower",)), Material(laws[1], on=("upper",))],
+        [Fixed("bottom", [zero, zero])],
+        [Load("top", pressure=constant(0.1, 2))],
+    )
+    equilibrium = BodyEquilibrium(two_layers(0.25), body)
+    points = equilibrium.space.tabulate_dof_coordinates()
+    x = np.zeros_like(equilibrium.rest())
+    x[::2] = 0.1 * points[:, 1]
+    energy = 0.01 * (0.25 * laws[0].shear + 0.75 * laws[1].shear)
+    assert errors(equilibrium, x, None).energy == pytest.approx(np.sqrt(energy), rel=1e-12)
+    # The nodal forces do this work.
+    work = float(x @ equilibrium.internal_forces(x))
+    assert COMM.allreduce(work) == pytest.approx(energy, rel=1e-12)
+
+
+def test_one_material_for_both_regions_is_one_material() -> None:
+    whole = solve(case({"young": LOWER, "poisson": 0.3}), domain=two_layers())
+    both = {"on": ["lower", "upper"], "young": LOWER, "poisson": 0.3}
+    for material in (both, [both], [{"young": LOWER, "poisson": 0.3}]):
+        again = solve(case(material), domain=two_layers())
+        np.testing.assert_array_equal(again.state.x, whole.state.x)
+
+
+@pytest.mark.parallel
+def test_an_elastic_part_carries_no_field() -> None:
+    """An elastic layer under a piezoelectric one: the potential ends where that one ends."""
+    piezo = hexagonal(-1.0, 3.0, 2.0, 8.0, 7.0).in_plane()
+    zero, one = constant(0.0, 2), constant(1.0, 2)
+    law = Linear(10.0, 0.3)
+    body = Body.piecewise(
+        [Material(law, on=("lower",)), Material(law, piezo, ("upper",))],
+        [Fixed("bottom", [zero, zero]), Fixed("top", None, one)],
+    )
+    equilibrium = BodyEquilibrium(two_layers(), body)
+    free = equilibrium.free[:, -1]
+    y = equilibrium.layout.points[:, 1]
+    np.testing.assert_array_equal(free, (y > 0.49) & (y < 0.99))
+    x = equilibrium.prescribe(equilibrium.rest())
+    assert np.abs(equilibrium.internal_forces(x)).max(initial=0.0) < np.inf
+
+
+@pytest.mark.parametrize(
+    ("material", "message"),
+    [
+        (materials()[:1], r"the region 'upper' has none; accepted: a \[\[material\]\] with on"),
+        ([*materials()[:1], {"young": 1.0, "poisson": 0.3}], r"material\.1\.on: missing"),
+        (materials(second={"on": "lower"}), r'material\.1\.on: given "lower"; accepted: regions'),
+        (materials(second={"on": "uper"}), "no region 'uper'; did you mean 'upper'"),
+        (materials(second={"on": "upper", "yung": 1}), r"material\.1\.yung: unknown key"),
+        (materials(second={"on": []}), r"material\.1\.on: given \[\]; accepted: a name, or a list"),
+        ([], r"material: given \[\]; accepted: a table \[material\], or tables \[\[material\]\]"),
+    ],
+)
+def test_what_is_refused(material, message: str) -> None:
+    with pytest.raises(InputError, match=message):
+        build_problem(case(material), domain=two_layers())
+
+
+def test_a_cell_has_one_material() -> None:
+    given = case([{**materials()[0], "on": "lower"}, {**materials()[1], "on": "all"}])
+    mesh = two_layers().mesh
+    sides = {name: facets for name, facets in two_layers().parts.items()}
+    regions = {"lower": lambda x: x[1] < 0.51, "all": lambda x: x[1] < 2.0}
+    with pytest.raises(InputError, match=r"material\.1\.on: all shares cells with .* material\.0"):
+        build_problem(given, domain=from_mesh(mesh, sides, regions=regions))
+    del regions["all"]
+    alone = case([{**materials()[0], "on": "lower"}])
+    with pytest.raises(InputError, match="64 cells of the mesh are in no region"):
+        build_problem(alone, domain=from_mesh(mesh, sides, regions=regions))
