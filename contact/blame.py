@@ -9,11 +9,12 @@ import ufl
 from dolfinx import fem
 from mpi4py import MPI
 
+from contact.body.amplitude import at_time
 from contact.mesh.domain import Domain
 from contact.tolerances import HUGE
 
 
-def to_blame(loads: Sequence[Any], domain: Domain) -> str:
+def to_blame(loads: Sequence[Any], domain: Domain, time: float = 1.0) -> str:
     """Return the key of the first load whose integral is not finite, or too large. Collective.
 
     Where none is, for the quadrature meets other points with the test functions, the answer is
@@ -25,10 +26,12 @@ def to_blame(loads: Sequence[Any], domain: Domain) -> str:
         Loads of the body, whose fields know their keys in the case file (`build.NodalField`).
     domain
         The domain.
+    time
+        When they act.
     """
     x = ufl.SpatialCoordinate(domain.mesh)
     for on, field in _fields(loads):
-        form = fem.form(field.ufl(x) * (domain.dx if on is None else domain.ds(on)))
+        form = fem.form(at_time(field, time).ufl(x) * (domain.dx if on is None else domain.ds(on)))
         value = domain.comm.allreduce(float(fem.assemble_scalar(form)), op=MPI.SUM)
         if not abs(value) <= HUGE:
             return str(field.key)
@@ -37,6 +40,5 @@ def to_blame(loads: Sequence[Any], domain: Domain) -> str:
 
 def _fields(loads: Sequence[Any]) -> Iterator[tuple[str | None, Any]]:
     for load in loads:
-        for field in (*(load.force or ()), load.pressure, load.charge):
-            if field is not None:
-                yield load.on, field
+        for field in load.fields:
+            yield load.on, field

@@ -119,7 +119,8 @@ def solve_problem(
             state = method.state
             outcome = Outcome(NOTHING, NOTHING, str(interrupt), interrupt.number)
     # From scratch and at the whole load, whatever the method says and wherever it has stopped.
-    state = State(problem.equilibrium.prescribe(state.x), state.forces)
+    x = problem.equilibrium.prescribe(state.x, problem.time)
+    state = replace(state, x=x, time=problem.time)
     outcome = replace(outcome, kkt=evaluate(problem, state), allowed=method.options.allowed)
     check_potential(problem, state)
     solution = Solution(

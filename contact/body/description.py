@@ -9,6 +9,7 @@ from typing import Protocol
 import numpy as np
 from ufl.core.expr import Expr
 
+from contact.body.amplitude import Amplitude, Moving, amplitude_of
 from contact.errors import InputError
 from contact.typing import Array
 from forms.hencky import Hencky, Linear
@@ -27,11 +28,21 @@ class Field(Protocol):
 
 @dataclass(frozen=True)
 class Fixed:
-    """Prescribed values on a part; None leaves a component free."""
+    """Prescribed values on a part; None leaves a component free.
+
+    They are multiplied by the amplitude, a function of time: see `amplitude.amplitude_of`.
+    """
 
     on: str
-    displacement: Sequence[Field | None] | None = None
-    potential: Field | None = None
+    displacement: Sequence[Field | Moving | None] | None = None
+    potential: Field | Moving | None = None
+    amplitude: Amplitude | None = None
+
+    @property
+    def factor(self) -> Amplitude:
+        """The amplitude, also where none is given."""
+        fields = [*(self.displacement or ()), self.potential]
+        return amplitude_of(self.amplitude, fields)
 
 
 @dataclass(frozen=True)
@@ -46,12 +57,26 @@ class Load:
         Pressure against the outward normal of the part (force/area).
     charge
         Surface charge q_2 = D.nu on a part, body charge q_0 in the body.
+    amplitude
+        Function of time that multiplies all of them: see `amplitude.amplitude_of`.
     """
 
     on: str | None
-    force: Sequence[Field] | None = None
-    pressure: Field | None = None
-    charge: Field | None = None
+    force: Sequence[Field | Moving] | None = None
+    pressure: Field | Moving | None = None
+    charge: Field | Moving | None = None
+    amplitude: Amplitude | None = None
+
+    @property
+    def fields(self) -> list[Field | Moving]:
+        """All that is given."""
+        given = [*(self.force or ()), self.pressure, self.charge]
+        return [field for field in given if field is not None]
+
+    @property
+    def factor(self) -> Amplitude:
+        """The amplitude, also where none is given."""
+        return amplitude_of(self.amplitude, self.fields)
 
 
 @dataclass(frozen=True)

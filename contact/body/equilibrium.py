@@ -23,9 +23,9 @@ from petsc4py import PETSc
 from ufl.core.expr import Expr
 
 from contact.body.description import Body
-from contact.body.loads import external_work
+from contact.body.loads import Loads
 from contact.body.materials import cells_of, pieces
-from contact.body.supports import dirichlet, free_components, without_field
+from contact.body.supports import free_components, supports_of, without_field
 from contact.linear.layout import Layout
 from contact.linear.operator import Counters, SparseOperator
 from contact.mesh.domain import Domain
@@ -63,17 +63,17 @@ class BodyEquilibrium:
         self.space = fem.functionspace(mesh, ("Lagrange", degree, (self.block_size,)))
         #: The owned cells of each material.
         self.cells = cells_of(domain, body.materials)
-        self.bcs = dirichlet(domain, self.space, body)
+        self.supports = supports_of(domain, self.space, body)
         coupled = [material.piezo is not None for material in body.materials]
         if any(coupled) and not all(coupled):
             charged = np.concatenate([self.cells[i] for i in np.flatnonzero(coupled)])
-            self.bcs.append(without_field(self.space, charged))
+            self.supports.append(without_field(self.space, charged))
         index_map = self.space.dofmap.index_map
         self.layout = Layout(
             domain.comm,
             index_map,
             self.space.tabulate_dof_coordinates()[: index_map.size_local, : self.dim],
-            free_components(self.space, self.bcs),
+            free_components(self.space, self.supports),
             domain.size,
             float(body.law.young),
         )
@@ -141,10 +141,7 @@ class BodyEquilibrium:
         if not self.linear:
             derivative = ufl.derivative(internal(self._at, self._at), self._at, trial)
             self._forms["tangent"] = fem.form(derivative)
-        work = external_work(self.domain, body, v, xi)
-        self._external: Array = np.zeros(self.owned)
-        if work is not None:
-            self._external = self._assembled(fem.form(work))
+        self._loads = Loads(self.domain, body, v, xi, self._assembled, self.owned)
 
     def _assembled(self, form: fem.Form) -> Array:
         """Return the owned part of an assembled vector."""
@@ -156,12 +153,12 @@ class BodyEquilibrium:
         """Return the unknowns of the body at rest, without prescribed values."""
         return np.zeros_like(self._at.x.array)
 
-    def prescribe(self, x: Array, load: float = 1.0) -> Array:
-        """Return unknowns with the prescribed values, times the part of the load that acts."""
+    def prescribe(self, x: Array, time: float = 1.0) -> Array:
+        """Return unknowns with the prescribed values at a time. Collective."""
         at = self._at.x
         at.array[:] = x
-        for bc in self.bcs:
-            bc.set(at.array, None, load)
+        for support in self.supports:
+            support.set(at.array, time)
         at.scatter_forward()
         return np.asarray(at.array.copy())
 
@@ -190,9 +187,9 @@ class BodyEquilibrium:
         self._secant_at.x.array[:] = x if secant_at is None else secant_at
         return self._assembled(self._internal)
 
-    def external(self, load: float = 1.0) -> Array:
-        """Return the owned nodal loads, times the part of them that acts."""
-        return load * self._external
+    def external(self, time: float = 1.0) -> Array:
+        """Return the owned nodal loads at a time. Collective."""
+        return self._loads.at(time)
 
     def create_matrix(self) -> PETSc.Mat:
         """Return an empty matrix with the pattern of the body. Collective."""
@@ -202,7 +199,7 @@ class BodyEquilibrium:
         """Assemble Kacanov's "secant" or Newton's "tangent" at local unknowns. Collective."""
         self._at.x.array[:] = self._secant_at.x.array[:] = x
         matrix.zeroEntries()
-        assemble_matrix(matrix, self._forms[kind], bcs=self.bcs)
+        assemble_matrix(matrix, self._forms[kind], bcs=[s.condition for s in self.supports])
         matrix.assemble()
 
     def operator(
@@ -215,6 +212,6 @@ class BodyEquilibrium:
         """Return the Euclidean norm of owned values. Collective."""
         return float(np.sqrt(self.comm.allreduce(np.dot(values, values), op=MPI.SUM)))
 
-    def load_size(self, load: float = 1.0) -> float:
-        """Return the Euclidean norm of the nodal loads. Collective."""
-        return abs(load) * self.norm(self._external)
+    def load_size(self, time: float = 1.0) -> float:
+        """Return the Euclidean norm of the nodal loads at a time. Collective."""
+        return self.norm(self.external(time))

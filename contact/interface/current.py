@@ -8,7 +8,8 @@ electric contact.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -36,12 +37,19 @@ class Conductor:
         Whether the charge is taken from the previous outer iterate, as Algorithm 4 of the
         thesis does: it then converges for small k_e only (Theorem 5.2). Else the block
         relaxation of Algorithm 5 has phi implicit, as a Robin term, and only psi is lagged.
+    phi_f_at
+        phi_f as a function of time; None where it is always the same.
     """
 
     psi: Conductivity
     phi_f: float
     phi_l: Truncation = field(default_factory=lambda: Truncation(np.inf))
     lagged: bool = False
+    phi_f_at: Callable[[float], float] | None = None
+
+    def at(self, time: float) -> Conductor:
+        """Return the foundation at a time."""
+        return self if self.phi_f_at is None else replace(self, phi_f=self.phi_f_at(time))
 
 
 @dataclass(frozen=True)
@@ -69,6 +77,10 @@ class HeldCurrent:
     conductor: Conductor
     phi_scale: float
     block_size: int
+
+    def at(self, time: float) -> HeldCurrent:
+        """Return the same nodes in front of the foundation at a time."""
+        return replace(self, conductor=self.conductor.at(time))
 
     def _at_nodes(self, x: Array) -> tuple[Array, Array]:
         """Return psi and phi - phi_F for a local dof array."""

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from contact.body.description import Field
+from contact.interface.history import SlipHistory
 from contact.interface.nodes import ContactNodes
 from contact.interface.smoothing import Smoothing
 from contact.typing import Array
@@ -48,7 +49,9 @@ class Friction:
 
 @dataclass(frozen=True)
 class NodalFriction:
-    """Friction at the owned contact nodes.
+    """Friction at the owned contact nodes, in a step of an evolution.
+
+    The slips that its methods take are those of the step; the law is given all that has slipped.
 
     Attributes
     ----------
@@ -56,15 +59,19 @@ class NodalFriction:
         The friction bound, for all nodes at once; None without friction.
     smoothing
         The operator R.
+    history
+        What has slipped before the step.
     """
 
     law: FrictionLaw | None
     smoothing: Smoothing
+    history: SlipHistory
 
     @staticmethod
     def at(nodes: ContactNodes, friction: Friction) -> NodalFriction:
         """Evaluate friction at contact nodes. Collective."""
-        return NodalFriction(friction.law_at(nodes.points), Smoothing(nodes, friction.radius))
+        law, smoothing = friction.law_at(nodes.points), Smoothing(nodes, friction.radius)
+        return NodalFriction(law, smoothing, SlipHistory.rest(nodes))
 
     @property
     def acts(self) -> bool:
@@ -76,17 +83,21 @@ class NodalFriction:
         """Whether the bound at a node depends on what happens there alone: R = identity."""
         return self.smoothing.radius == 0
 
+    def _all(self, slip: Array) -> Array:
+        """Return what has slipped at the end of a step with this slip, shape (n,)."""
+        return self.history.accumulated + slip
+
     def bound(self, pressure: Array, slip: Array) -> Array:
-        """Return s, mu(|u_tau|) |R p| by Coulomb's law, shape (n,). Collective."""
+        """Return s, mu |R p| by Coulomb's law, shape (n,). Collective."""
         if self.law is None:
             return np.zeros_like(slip)
-        return np.asarray(self.law(slip, self.smooth(pressure)), dtype=float)
+        return np.asarray(self.law(self._all(slip), self.smooth(pressure)), dtype=float)
 
     def by_slip(self, pressure: Array, slip: Array) -> Array:
-        """Return the derivative of the bound by |u_tau|, shape (n,). Collective."""
+        """Return the derivative of the bound by the slip, shape (n,). Collective."""
         if self.law is None:
             return np.zeros_like(slip)
-        return np.asarray(self.law.by_slip(slip, self.smooth(pressure)), dtype=float)
+        return np.asarray(self.law.by_slip(self._all(slip), self.smooth(pressure)), dtype=float)
 
     def by_pressure(self, pressure: Array, slip: Array) -> Array:
         """Return the derivative of the bound by the pressure at the node, shape (n,).
@@ -96,7 +107,7 @@ class NodalFriction:
         """
         if self.law is None or not self.local:
             return np.zeros_like(slip)
-        return np.asarray(self.law.by_pressure(slip, self.smooth(pressure)), dtype=float)
+        return np.asarray(self.law.by_pressure(self._all(slip), self.smooth(pressure)), dtype=float)
 
     def smooth(self, pressure: Array) -> Array:
         """Return |R p|, shape (n,). Collective."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from mpi4py import MPI
@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from contact.interface.current import HeldCurrent
 from contact.interface.friction import NodalFriction
+from contact.interface.history import SlipHistory
 from contact.interface.multipliers import Multipliers
 from contact.interface.nodes import ContactNodes
 from contact.interface.response import FoundationResponse
@@ -56,13 +57,35 @@ class Interface:
         """Number of displacement components."""
         return self.jump.dim
 
+    def at(self, time: float, history: SlipHistory) -> Interface:
+        """Return the interface of a step that ends at a time and remembers what was before."""
+        return replace(
+            self,
+            response=self.response.at(time),
+            friction=replace(self.friction, history=history),
+            held=None if self.held is None else self.held.at(time),
+        )
+
     def opening(self, nodal: Array) -> Array:
         """Return u_nu - rho, shape (n,)."""
         return self.jump.normal_component(nodal) - self.jump.gap
 
     def slip(self, nodal: Array) -> Array:
-        """Return |u_tau|, shape (n,)."""
-        return np.linalg.norm(self.jump.tangential_component(nodal), axis=1)
+        """Return what slips in the step, u_tau less that at its beginning, shape (n, d).
+
+        All that friction does looks at this. For a static problem, one step from rest, it is
+        u_tau itself.
+        """
+        return self.jump.tangential_component(nodal) - self.friction.history.jump
+
+    def remembered(self, nodal: Array) -> SlipHistory:
+        """Return the history of the next step, where this one ends at nodal unknowns."""
+        accumulated = self.friction.history.accumulated + self.slip_length(nodal)
+        return SlipHistory(self.jump.tangential_component(nodal), accumulated)
+
+    def slip_length(self, nodal: Array) -> Array:
+        """Return the lengths of `slip`, shape (n,)."""
+        return np.linalg.norm(self.slip(nodal), axis=1)
 
     def pressure(self, nodal: Array, forces: Multipliers) -> Array:
         """Return -sigma_nu, the multiplier and the layer's pressure, shape (n,)."""
@@ -70,7 +93,7 @@ class Interface:
 
     def bound(self, nodal: Array, forces: Multipliers) -> Array:
         """Return the friction bound s, shape (n,). Collective."""
-        return self.friction.bound(self.pressure(nodal, forces), self.slip(nodal))
+        return self.friction.bound(self.pressure(nodal, forces), self.slip_length(nodal))
 
     def stress(self, nodal: Array, forces: Multipliers) -> Array:
         """Return -sigma nu, layer included, shape (n, d)."""
@@ -98,8 +121,7 @@ class Interface:
         closed = touching(forces.pressure, self.opening(nodal), c, rounding)
         if not self.friction.acts:
             return (CLOSED * closed).astype(np.int8)
-        slip = self.jump.tangential_component(nodal)
-        return node_status(closed, forces.friction, slip, bound, c, rounding)
+        return node_status(closed, forces.friction, self.slip(nodal), bound, c, rounding)
 
     def add_forces(self, residual: Array, x: Array, forces: Multipliers) -> None:
         """Add all that the foundation does to the body at local unknowns, to owned values."""

@@ -91,7 +91,7 @@ def linearise(
     """
     jump, frictional, c = interface.jump, interface.friction.acts, moduli.status
     p, lam, n, d = forces.pressure, forces.friction, jump.normal, jump.dim
-    opening, slip = interface.opening(nodal), jump.tangential_component(nodal)
+    opening, slip = interface.opening(nodal), interface.slip(nodal)
     length = np.linalg.norm(slip, axis=1)
     total = interface.pressure(nodal, forces)
     bound = interface.friction.bound(total, length) if frozen_bound is None else frozen_bound

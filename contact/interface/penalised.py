@@ -80,12 +80,13 @@ class Lagged:
         pressure, _ = _pressure(interface, iterate, eps)
         forces = Multipliers(pressure, np.zeros((iterate.shape[0], interface.dim)))
         bound = interface.bound(iterate, forces)
-        self._modulus = penalty_friction_modulus(bound, interface.slip(iterate), eps.slip)
+        slip = interface.slip_length(iterate)
+        self._modulus = penalty_friction_modulus(bound, slip, eps.slip)
 
     def forces(self, nodal: Array) -> Multipliers:
         """Return the forces."""
         pressure, _ = _pressure(self._interface, nodal, self._eps)
-        tangential = self._interface.jump.tangential_component(nodal)
+        tangential = self._interface.slip(nodal)
         return Multipliers(pressure, self._modulus[:, None] * tangential)
 
     def block(self, nodal: Array) -> Array:
@@ -110,9 +111,9 @@ class Implicit:
         """Return the forces. Collective."""
         interface = self._interface
         pressure, _ = _pressure(interface, nodal, self._eps)
-        tangential = interface.jump.tangential_component(nodal)
+        tangential = interface.slip(nodal)
         forces = Multipliers(pressure, np.zeros_like(tangential))
-        slip = interface.slip(nodal)
+        slip = interface.slip_length(nodal)
         modulus = penalty_friction_modulus(interface.bound(nodal, forces), slip, self._eps.slip)
         return Multipliers(pressure, modulus[:, None] * tangential)
 
@@ -123,10 +124,10 @@ class Implicit:
         pressure, slope = _pressure(interface, nodal, self._eps)
         forces = Multipliers(pressure, np.zeros((nodal.shape[0], interface.dim)))
         bound = interface.bound(nodal, forces)
-        slip = interface.slip(nodal)
+        slip = interface.slip_length(nodal)
         modulus = penalty_friction_modulus(bound, slip, eps)
         # Unit vectors of the slip; zero where there is none, as are the terms with it.
-        tangential = jump.tangential_component(nodal)
+        tangential = interface.slip(nodal)
         unit = tangential / np.where(slip > 0, slip, 1.0)[:, None]
         total, share = interface.pressure(nodal, forces), slip / (slip + eps)
         along = (interface.friction.by_slip(total, slip) - modulus) * share

@@ -12,7 +12,6 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 
 from contact.body.equilibrium import BodyEquilibrium
-from contact.body.supports import prescribed_values
 from contact.errors import InputError
 from contact.interface.nodes import ContactNodes
 from contact.interface.obstacle import Obstacle
@@ -155,7 +154,7 @@ def find_nodes(
         gap, cut = _place(domain, space, (part, obstacle), found, direction, gap)
 
     free = body.free[nodes, :d]
-    fixed = prescribed_values(space, body.bcs)[nodes, :d]
+    fixed = body.prescribe(body.rest()).reshape(-1, body.block_size)[nodes, :d]
     gap = gap - np.einsum("ni,ni->n", direction, fixed)
     admissible = direction * free
     length = np.linalg.norm(admissible, axis=1)

@@ -17,7 +17,7 @@ def interface_residuals(
     jump, c = interface.jump, interface.stiffness
     opening = interface.opening(nodal)
     contact = forces.pressure - project_half_line(forces.pressure + c * opening)
-    trial = forces.friction + c * jump.tangential_component(nodal)
+    trial = forces.friction + c * interface.slip(nodal)
     friction = forces.friction - project_disc(trial, bound)
     # Where next to nothing presses, rounding is compared with the stress that closing would take.
     closing = c * jump.norm(np.minimum(np.abs(opening), interface.size))

@@ -64,6 +64,12 @@ class FoundationResponse:
         depth = self.layer.thickness
         return self.jump.gap - (depth if np.isfinite(depth) else 0.0)
 
+    def at(self, time: float) -> FoundationResponse:
+        """Return the foundation at a time."""
+        if self.conductor is None:
+            return self
+        return replace(self, conductor=self.conductor.at(time))
+
     def normal_law(self, x: Array) -> NormalLaw | None:
         """Return the layer and the constraint as one graph, h_nu frozen at the nodal unknowns.
 

@@ -44,7 +44,7 @@ def node_status(
     closed
         Where the rigid part presses, shape (n,).
     friction, slip
-        lambda_f and u_tau, shape (n, d).
+        lambda_f and what slips in the step, shape (n, d).
     bound
         Friction bound s, shape (n,).
     c, rounding

@@ -17,7 +17,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -141,7 +141,7 @@ class FixedPoint:
         if interface.response.normal_law(nodal) is not None:
             pressure = interface.pressure(nodal, start.forces)
         z = np.column_stack([pressure, start.forces.friction])
-        z = z + self.r * split(jump, nodal, frictional)
+        z = z + self.r * split(interface, nodal, frictional)
         return self._solve(z, interface.bound(nodal, start.forces), 1, start.x)
 
     def _solve(self, z: Array, bound: Array, first: int, secant_at: Array) -> tuple[State, Outcome]:
@@ -207,7 +207,8 @@ class FixedPoint:
         poll = self.poll or self.history.poll
         result = block_relaxation(interface, step, z, self._relaxation, self._norm, poll)
         self._stalled = result.stalled
-        self.state = State(body.moved(state.x, result.increment), result.forces, state.load)
+        x = body.moved(state.x, result.increment)
+        self.state = replace(state, x=x, forces=result.forces)
         return result.iterations, result.z
 
     def _current_block(self, nodal: Array, pressure: Array) -> Array:

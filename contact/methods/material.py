@@ -18,7 +18,6 @@ from contact.methods.options import NewtonOptions
 from contact.methods.report import History, Outcome
 from contact.methods.step import NEAR, Iterate, Taken
 from contact.problem.condensed import Condensation, CondensedProblem
-from contact.problem.state import State
 from contact.typing import Array
 
 #: How much more accurately than the material is linearised the contact problem is solved.
@@ -93,14 +92,14 @@ class MaterialStep:
             load_steps=False,
         )
         history = History(self._history.quiet(), level=logging.DEBUG)
-        begin = replace(iterate, state=State(condensed.equilibrium.at, state.forces, state.load))
+        begin = replace(iterate, state=replace(state, x=condensed.equilibrium.at))
         end, outcome = self._solve(condensed, options, self.moduli, history, begin)
         solves = sum(record.inner for record in history.records)
         self.counters.contact_solves += solves
         if outcome.kkt.largest > max(enough, NEAR * reached):
             return None
         increment = self.condensation.expand(condensed, end.state.x)
-        new = State(body.moved(state.x, increment), end.state.forces, state.load)
+        new = replace(state, x=body.moved(state.x, increment), forces=end.state.forces)
         notes = [record.note for record in history.records]
         slower = [word for word in self._slower if any(word in note for note in notes)]
         return Taken(replace(end, state=new), ", ".join(slower), solves)

@@ -24,7 +24,7 @@ def prolong(coarse: ContactProblem, state: State, fine: ContactProblem) -> State
     values = _interpolate(points, coarse.nodes.gather(forces), fine.nodes.points)
     friction = np.einsum("nij,nj->ni", fine.nodes.tangent, values[:, 1:])
     multipliers = Multipliers(project_half_line(values[:, 0]), friction)
-    return State(body.prescribe(x), multipliers)
+    return State(body.prescribe(x, fine.time), multipliers, fine.time)
 
 
 def _interpolate(points: Array, values: Array, at: Array) -> Array:

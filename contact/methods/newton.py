@@ -140,7 +140,7 @@ class Newton:
         forces = Multipliers(pressure, start.forces.friction)
         bound = interface.bound(nodal, forces)
         status = interface.status(nodal, forces, bound, c)
-        return Iterate(State(start.x, forces, start.load), status)
+        return Iterate(replace(start, forces=forces), status)
 
     def run(self, iterate: Iterate) -> tuple[Iterate, Outcome]:
         """Take one road after the other from an iterate; the best iterate if all fail."""
@@ -156,7 +156,7 @@ class Newton:
     def _see(self, iterate: Iterate, residuals: KKT) -> None:
         """Remember where the method is, and which iterate meets the whole load best."""
         self._at = iterate
-        if iterate.state.load == 1.0 and residuals.largest < self._least:
+        if iterate.state.time == self.problem.time and residuals.largest < self._least:
             self._best, self._least = iterate, residuals.largest
 
     @property
@@ -253,13 +253,16 @@ class Newton:
         return Iterate(state), outcome
 
     def _load_steps(self, loop: NewtonLoop) -> tuple[Iterate, Outcome]:
-        """Apply loads and prescribed displacements in steps, halved where they are too large."""
+        """Apply loads and prescribed displacements in steps, halved where they are too large.
+
+        For a static problem, whose loads grow with time from 0 to 1.
+        """
         body, step, reached = self.problem.equilibrium, FIRST_STEP, 0.0
         iterate = Iterate(self.problem.start(0.0))
         while reached < 1.0 and step > LEAST_STEP and self._left > 0:
             load = min(1.0, reached + step)
             state = iterate.state
-            loaded = State(body.prescribe(state.x, load), state.forces, load)
+            loaded = replace(state, x=body.prescribe(state.x, load), time=load)
             tried, outcome = loop.run(replace(iterate, state=loaded), f"load {load:.3g}")
             if not outcome.converged and self.problem.interface.friction.acts:
                 tried, outcome = self._frozen_friction(loop, tried)
@@ -268,7 +271,9 @@ class Newton:
             else:
                 step /= 2
         state = iterate.state
-        iterate = replace(iterate, state=State(body.prescribe(state.x), state.forces))
+        time = self.problem.time
+        whole = replace(state, x=body.prescribe(state.x, time), time=time)
+        iterate = replace(iterate, state=whole)
         residuals = evaluate(self.problem, iterate.state)
         self._see(iterate, residuals)
         ended = "" if reached == 1.0 else f"load steps ended at {reached:.3g} of the load"

@@ -91,7 +91,7 @@ class PenalisedProblem:
         if self._layer is not None:
             # Like the unilateral [.]^+ it is that of the new iterate, but for h_nu.
             self._response[:, : body.dim] = 0.0
-        scale = body.load_size(state.load) + body.norm(residual_forces(self._problem, state))
+        scale = body.load_size(state.time) + body.norm(residual_forces(self._problem, state))
         vectors = interface.jump.weight[:, None] * state.forces.vectors(interface.jump)
         scale += body.norm(vectors.ravel())
         self.snes.setTolerances(
@@ -127,7 +127,7 @@ class PenalisedProblem:
         blocks = np.zeros((n, jump.block_size, jump.block_size))
         blocks[:, :d, :d] = spring[:, None, None] * outer(jump.normal, jump.normal)
         self.operator.update("secant", state.x, interface.weighted(blocks, state.x))
-        rhs = body.external(state.load) - body.internal_forces(state.x)
+        rhs = body.external(state.time) - body.internal_forces(state.x)
         jump.transpose(-(jump.weight * spring * opening)[:, None] * jump.normal, rhs)
         return self.operator.solve(rhs)
 
@@ -139,7 +139,7 @@ class PenalisedProblem:
         body, jump, x = self._body, self._interface.jump, self._unknowns(iterate)
         nodal = jump.apply(x)
         secant_at = None if self._implicit else self._state.x
-        values = body.internal_forces(x, secant_at) - body.external(self._state.load)
+        values = body.internal_forces(x, secant_at) - body.external(self._state.time)
         jump.transpose(jump.weight[:, None] * self._law.forces(nodal).vectors(jump), values)
         change = np.einsum("nij,nj->ni", self._current_block, nodal - self._nodal)
         if self._layer is not None:

@@ -18,7 +18,7 @@ has been solved says nothing of contact, and the run has not converged.
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from mpi4py import MPI
@@ -68,7 +68,7 @@ def automatic_eps(problem: Problem) -> Regularisation:
     body's size.
     """
     body, scales = problem.equilibrium, problem.scales
-    loads = np.abs(body.external().reshape(-1, body.block_size)[:, : body.dim]).sum()
+    loads = np.abs(body.external(problem.time).reshape(-1, body.block_size)[:, : body.dim]).sum()
     prescribed = np.abs(problem.start().x.reshape(-1, body.block_size)[:, : body.dim])
     stress = body.comm.allreduce(float(loads), op=MPI.SUM) / scales.area
     largest = body.comm.allreduce(float(prescribed.max(initial=0.0)), op=MPI.MAX)
@@ -141,7 +141,8 @@ class Penalty:
             # Where Newton's method failed its step is given up, for Algorithm 3 to go on a while.
             x = previous.x if failed else x
             nodal = interface.jump.apply(x)
-            self.state = State(x, penalised_forces(interface, nodal, self._eps), previous.load)
+            forces = penalised_forces(interface, nodal, self._eps)
+            self.state = replace(previous, x=x, forces=forces)
             residuals = evaluate(problem, self.state)
             old, bound = bound, interface.bound(nodal, self.state.forces)
             change = self._change(old, bound)

@@ -6,7 +6,7 @@ size and the pattern of the elastic ones.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Protocol
 
 import numpy as np
@@ -147,7 +147,7 @@ class WholeStep:
         kind = "tangent" if tangent else "secant"
         blocks = interface.weighted(blocks, state.x)
         self.operator.update(kind, state.x, blocks, constant=body.linear)
-        here = State(state.x, contact.forces, state.load)
+        here = replace(state, forces=contact.forces)
         residual = residual_forces(self.problem, here)
         jump.transpose((jump.weight * shift)[:, None] * jump.normal, residual)
         # Gamma leaves this part of an interface residual in any case. A goal that depended on the
@@ -160,7 +160,7 @@ class WholeStep:
         forces = Multipliers(jump.normal_component(vectors), jump.tangential_component(vectors))
         pressed = jump.normal_component(np.einsum("nij,nj->ni", layer, moved))
         known = interface.response.layer_pressure(nodal) + shift + pressed
-        new = State(body.moved(state.x, increment), forces, state.load)
+        new = replace(state, x=body.moved(state.x, increment), forces=forces)
         return Taken(Iterate(new, contact.status, known))
 
     def _current(self, nodal: Array, contact: LinearisedContact, reached: float) -> Array | float:

@@ -9,7 +9,7 @@ flexibilities differ by many orders of magnitude, are solved like any other.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -85,7 +85,7 @@ def solve_convex(
         share = max(share / 2, LEAST_SHARE) if change > last else share
         last = change
         x = state.x + share * (found.state.x - state.x)
-        state = State(x, found.state.forces, state.load)
+        state = replace(found.state, x=x)
     assert found is not None
     return Found(found.state, steps, found.words)
 
@@ -134,16 +134,16 @@ def _solve_linearised(
     begin = body.own.start // body.block_size
     own = slice(begin, begin + layer.size)
     forces = Multipliers(pressure[own].copy(), tangential[own].copy())
-    return Found(State(x[body.own].copy(), forces, state.load), steps, words)
+    return Found(replace(state, x=x[body.own].copy(), forces=forces), steps, words)
 
 
 @dataclass(frozen=True)
 class _Gathered:
-    """The linearised problem of all ranks: kept nodes in rank order, fixed values taken off."""
+    """The linearised problem of all ranks: kept nodes in rank order, counted from `origin`."""
 
     stiffness: Array
     load: Array
-    fixed: Array
+    origin: Array
     free: NDArray[np.bool_]
     normal: Array
     tangent: Array
@@ -158,11 +158,13 @@ class _Gathered:
         blocks = response.block(nodal, interface.pressure(nodal, state.forces))
         base = residual_forces(problem, state)
         jump.transpose(-jump.weight[:, None] * state.forces.vectors(jump), base)
-        fixed = body.prescribe(body.rest())
+        # Slips are counted from where the step begins: there u_tau = 0 for the convex problem.
+        origin = body.prescribe(body.rest())
+        jump.transpose(interface.friction.history.jump, origin)
         kept = _kept_nodes(interface, body.free.shape[0])
         weighted = interface.weighted(blocks, state.x)
-        local = (state.x - fixed, base, fixed, body.free, weighted, *kept)
-        moved, base, fixed, free, weighted, normal, tangent, gap, weight = (
+        local = (state.x - origin, base, origin, body.free, weighted, *kept)
+        moved, base, origin, free, weighted, normal, tangent, gap, weight = (
             np.concatenate(body.comm.allgather(part)) for part in local
         )
         total = body.stiffness.copy()
@@ -171,7 +173,7 @@ class _Gathered:
         masked = weighted * free[:, :, None] * free[:, None, :]
         total[rows[:, :, None], rows[:, None, :]] += masked
         load = np.where(free.ravel(), total @ moved - base, 0.0)
-        return _Gathered(total, load, fixed, free, normal, tangent, gap, weight)
+        return _Gathered(total, load, origin, free, normal, tangent, gap, weight)
 
     def solve(self, bound: Bound, frictional: bool) -> tuple[Array, Array, Array, int, str]:
         """Return unknowns, pressure, friction, steps and words."""
@@ -191,7 +193,7 @@ class _Gathered:
             result = solver.solve(load, np.zeros(n))
             steps, words = result.iterations, result.message
         moved = result.displacement if complete is None else complete(result.displacement)
-        x = self.fixed + moved.ravel()
+        x = self.origin + moved.ravel()
         return x, result.pressure, result.friction, steps, words
 
 

@@ -143,15 +143,15 @@ def augmentation(jump: Jump, r: float, friction: bool) -> Array:
     return r * blocks
 
 
-def split(jump: Jump, nodal: Array, friction: bool) -> Array:
-    """Return normal and tangential displacements side by side, shape (n, 1 + d).
+def split(interface: Interface, nodal: Array, friction: bool) -> Array:
+    """Return normal displacements and what slips side by side, shape (n, 1 + d).
 
-    Without friction the tangential ones are no unknowns of the relaxation, and 0 here.
+    Without friction the slips are no unknowns of the relaxation, and 0 here.
     """
-    tangential = jump.tangential_component(nodal)
+    slip = interface.slip(nodal)
     if not friction:
-        tangential = np.zeros_like(tangential)
-    return np.column_stack([jump.normal_component(nodal), tangential])
+        slip = np.zeros_like(slip)
+    return np.column_stack([interface.jump.normal_component(nodal), slip])
 
 
 def _project(jump: Jump, z: Array, r: float, bound: Array, law: NormalLaw | None) -> Array:
@@ -231,7 +231,7 @@ def block_relaxation(
     old_phi: Array | None = None
     residual, forces = np.inf, Multipliers.zero(jump)
     increment: Array = np.zeros(step.x.size)
-    start = split(jump, step.nodal, step.friction)
+    start = split(interface, step.nodal, step.friction)
     stagnation = Stagnation(PATIENCE_PLAIN if accelerator is None else PATIENCE, PROGRESS)
     for iteration in range(1, parameters.max_iterations + 1):
         if poll is not None:
@@ -242,7 +242,7 @@ def block_relaxation(
         jump.transpose(-jump.weight[:, None] * _vectors(jump, q + r * start), rhs)
         increment = step.operator.solve(rhs, guess=increment)
         nodal = step.nodal + jump.apply(increment)
-        u = split(jump, nodal, step.friction)
+        u = split(interface, nodal, step.friction)
         # q + r u is the force that the foundation exerted in this very solve.
         total = q + r * u
         layer = 0.0 if law is None else law.layer(u[:, 0])

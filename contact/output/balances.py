@@ -118,6 +118,7 @@ def charge_balance(problem: ContactProblem, state: State) -> ChargeBalance:
     equilibrium = problem.equilibrium
     d, bs = problem.dim, equilibrium.block_size
     residual = residual_forces(problem, state) / equilibrium.phi_scale
+    time = state.time
     electrodes: dict[str, float] = {}
     magnitude = 0.0
     taken = np.zeros(equilibrium.owned, dtype=bool)
@@ -137,10 +138,10 @@ def charge_balance(problem: ContactProblem, state: State) -> ChargeBalance:
         if load.charge is None:
             continue
         measure = problem.domain.dx if load.on is None else problem.domain.ds(load.on)
-        density = expression(problem.domain, load.charge, x)
+        density = expression(problem.domain, load.charge, x, constant(problem.domain.mesh, time))
         vector = fem.assemble_vector(fem.form(density * test[d] * measure))
         vector.scatter_reverse(InsertMode.add)
-        nodal = vector.array[: equilibrium.owned].reshape(-1, bs)[:, d]
+        nodal = load.factor(time) * vector.array[: equilibrium.owned].reshape(-1, bs)[:, d]
         charge = _sum(problem, nodal)
         magnitude += _sum(problem, np.abs(nodal))
         if load.on is None:
@@ -169,7 +170,7 @@ def force_balance(problem: ContactProblem, state: State) -> ForceBalance:
     residual = residual_forces(problem, state).reshape(-1, body.block_size)[:, :d]
     supports = np.where(problem.free[:, :d], 0.0, residual).sum(axis=0)
     stress = problem.interface.stress(problem.nodal(state), state.forces)
-    given = body.external(state.load).reshape(-1, body.block_size)[:, :d].sum(axis=0)
+    given = body.external(state.time).reshape(-1, body.block_size)[:, :d].sum(axis=0)
     local = np.stack([given, supports, -problem.nodes.weight @ stress])
     applied, supports, contact = problem.comm.allreduce(local, op=MPI.SUM)
     return ForceBalance(applied, supports, contact)

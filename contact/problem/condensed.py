@@ -90,7 +90,7 @@ class CondensedBody:
         """Return unknowns of zero."""
         return np.zeros(self.owned)
 
-    def prescribe(self, x: Array, load: float = 1.0) -> Array:
+    def prescribe(self, x: Array, time: float = 1.0) -> Array:
         """Return unknowns with the fixed ones as they were: the load has been condensed."""
         return np.where(self.free.ravel(), x, self.at)
 
@@ -103,11 +103,11 @@ class CondensedBody:
         moved = np.concatenate(self.comm.allgather(x - self.at))
         return np.asarray(self.stiffness[self.own] @ moved + self.residual[self.own])
 
-    def external(self, load: float = 1.0) -> Array:
+    def external(self, time: float = 1.0) -> Array:
         """Return zero: the loads are part of the forces."""
         return np.zeros(self.owned)
 
-    def load_size(self, load: float = 1.0) -> float:
+    def load_size(self, time: float = 1.0) -> float:
         """Return the norm of the loads and reactions of the whole body."""
         return self.size
 
@@ -129,11 +129,12 @@ class CondensedProblem:
     equilibrium: CondensedBody
     interface: Interface
     scales: Scales
+    time: float = 1.0
 
-    def start(self, load: float = 1.0) -> State:
+    def start(self, time: float | None = None) -> State:
         """Return the state with the free unknowns at zero."""
         x = self.equilibrium.prescribe(self.equilibrium.rest())
-        return State(x, Multipliers.zero(self.interface.jump), load)
+        return State(x, Multipliers.zero(self.interface.jump), self.time)
 
 
 class Condensation:
@@ -148,12 +149,17 @@ class Condensation:
     """
 
     def __init__(self, full: ContactProblem, counters: Counters) -> None:
-        self.full, self.counters = full, counters
+        self.counters = counters
         self.nodes = full.interface.coupled
-        self._interface = _at_kept_nodes(full.interface)
+        self.turn_to(full)
         self._matrix = full.equilibrium.create_matrix()
         self._kind = ""
         self._schur: SchurComplement | None = None
+
+    def turn_to(self, full: ContactProblem) -> None:
+        """Go on with another step of the same problem; what is factorised remains."""
+        self.full = full
+        self._interface = _at_kept_nodes(full.interface)
 
     def linearise(self, kind: str, state: State) -> CondensedProblem | None:
         """Condense the body, linearised at a state of the full problem. Collective.
@@ -187,7 +193,7 @@ class Condensation:
                 self._stiffness = self._schur.factorise(self._matrix)
             self._kind = kind
             self.counters.factorizations += 1
-        residual = body.internal_forces(state.x) - body.external(state.load)
+        residual = body.internal_forces(state.x) - body.external(state.time)
         check_overflow(body.layout, self._matrix.norm(), body.norm(residual))
         reactions = body.norm(np.where(body.free.ravel(), 0.0, residual))
         forces = -self._schur.condense(body.layout.mask(-residual))
@@ -202,9 +208,9 @@ class Condensation:
             forces,
             at,
             slice(self._schur.offset, self._schur.offset + at.size),
-            body.load_size(state.load) + reactions,
+            body.load_size(state.time) + reactions,
         )
-        return CondensedProblem(condensed, self._interface, self.full.scales)
+        return CondensedProblem(condensed, self._interface, self.full.scales, state.time)
 
     def _kept(self) -> NDArray[np.int32]:
         bs = self.full.equilibrium.block_size

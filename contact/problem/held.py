@@ -67,7 +67,7 @@ def _check_piece(problem: ContactProblem, inside: NDArray[np.bool_], count: int)
             + (", or regions that share the nodes between them" if count > 1 else "")
         )
     body = problem.equilibrium
-    loads = body.external().reshape(-1, body.block_size)[:, :d] * inside[:, None]
+    loads = body.external(problem.time).reshape(-1, body.block_size)[:, :d] * inside[:, None]
     _check_loads(problem, loads, free, normal, tangential, (points - centre) / size)
 
 

@@ -69,7 +69,7 @@ def residual_forces(problem: Problem, state: State, secant_at: Array | None = No
         default.
     """
     body = problem.equilibrium
-    residual = body.internal_forces(state.x, secant_at) - body.external(state.load)
+    residual = body.internal_forces(state.x, secant_at) - body.external(state.time)
     problem.interface.add_forces(residual, state.x, state.forces)
     return residual
 
@@ -93,7 +93,7 @@ def evaluate(problem: Problem, state: State) -> KKT:
     contact_forces = np.zeros_like(residual)
     stress = interface.stress(nodal, state.forces)
     jump.transpose(jump.weight[:, None] * stress, contact_forces)
-    loads, pushes = body.load_size(state.load), body.norm(contact_forces)
+    loads, pushes = body.load_size(state.time), body.norm(contact_forces)
     scale = loads + pushes + body.norm(np.where(free, 0.0, residual))
     least = _least_force(problem, state)
     if loads > 0 or pushes > 1e-6 * least:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from copy import copy
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,6 +14,7 @@ from contact.body.equilibrium import BodyEquilibrium
 from contact.body.norms import volume
 from contact.interface.current import Conductor, HeldCurrent, held_current
 from contact.interface.friction import Friction, NodalFriction
+from contact.interface.history import SlipHistory
 from contact.interface.interface import Interface
 from contact.interface.layer import Layer
 from contact.interface.multipliers import Multipliers
@@ -61,6 +63,8 @@ class ContactProblem:
         Gamma_3 with its laws.
     scales
         Sizes of the body and its stiffness.
+    time
+        When its loads and prescribed values act: 1, unless `at` has made it another step.
 
     Raises
     ------
@@ -83,6 +87,22 @@ class ContactProblem:
         self.equilibrium = BodyEquilibrium(domain, body, degree)
         self.interface = self._interface()
         self.scales = self._scales()
+        self.time = 1.0
+
+    def at(self, time: float, history: SlipHistory | None = None) -> ContactProblem:
+        """Return a step of an evolution: the same body with other loads and another history.
+
+        Parameters
+        ----------
+        time
+            End of the step.
+        history
+            What friction remembers; that of this problem by default.
+        """
+        step = copy(self)
+        step.time = time
+        step.interface = self.interface.at(time, history or self.interface.friction.history)
+        return step
 
     def _interface(self) -> Interface:
         contact, body, size = self.contact, self.equilibrium, self.domain.size
@@ -161,15 +181,15 @@ class ContactProblem:
         """Return the unknowns at the owned contact nodes, shape (n, block size)."""
         return self.nodes.apply(state.x)
 
-    def start(self, load: float = 1.0) -> State:
-        """Return the state to start from: at rest, but for the prescribed values.
+    def start(self, time: float | None = None) -> State:
+        """Return the state to start from: at rest, but for the prescribed values at a time.
 
         Where no potential is prescribed, it starts from that of the conductive foundation, which
         alone determines it: far from phi_F a truncated charge has no derivative.
         """
-        body = self.equilibrium
-        x = body.rest()
-        if self.piezoelectric and self.conductor is not None:
+        body, time = self.equilibrium, self.time if time is None else time
+        x, conductor = body.rest(), self.interface.response.conductor
+        if self.piezoelectric and conductor is not None:
             if all(fixed.potential is None for fixed in self.body.fixed):
-                x.reshape(-1, body.block_size)[:, -1] = self.conductor.phi_f / body.phi_scale
-        return State(body.prescribe(x, load), Multipliers.zero(self.nodes), load)
+                x.reshape(-1, body.block_size)[:, -1] = conductor.phi_f / body.phi_scale
+        return State(body.prescribe(x, time), Multipliers.zero(self.nodes), time)

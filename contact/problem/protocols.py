@@ -56,8 +56,8 @@ class Equilibrium(Protocol):
     def rest(self) -> Array:
         """Return the local unknowns of the body at rest."""
 
-    def prescribe(self, x: Array, load: float = 1.0) -> Array:
-        """Return unknowns with the prescribed values, times the part of the load that acts."""
+    def prescribe(self, x: Array, time: float = 1.0) -> Array:
+        """Return unknowns with the prescribed values at a time. Collective."""
 
     def moved(self, x: Array, increment: Array) -> Array:
         """Return unknowns plus an increment of the owned ones. Collective."""
@@ -65,11 +65,11 @@ class Equilibrium(Protocol):
     def internal_forces(self, x: Array, secant_at: Array | None = None) -> Array:
         """Return the owned nodal forces of the stresses. Collective."""
 
-    def external(self, load: float = 1.0) -> Array:
-        """Return the owned nodal loads."""
+    def external(self, time: float = 1.0) -> Array:
+        """Return the owned nodal loads at a time. Collective."""
 
-    def load_size(self, load: float = 1.0) -> float:
-        """Return the norm of the loads. Collective."""
+    def load_size(self, time: float = 1.0) -> float:
+        """Return the norm of the loads at a time. Collective."""
 
     def operator(
         self, nodes: NDArray[np.int32], *, symmetric: bool, counters: Counters, kind: str
@@ -95,5 +95,12 @@ class Problem(Protocol):
     def scales(self) -> Scales:
         """Sizes of the body and its stiffness."""
 
-    def start(self, load: float = 1.0) -> State:
-        """Return the state to start from: at rest, but for the prescribed values."""
+    @property
+    def time(self) -> float:
+        """When its loads and prescribed values act; 1 for a static problem."""
+
+    def start(self, time: float | None = None) -> State:
+        """Return the state to start from: at rest, but for the prescribed values.
+
+        Those of another time than the problem's, where one is given.
+        """

@@ -6,13 +6,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from contact.interface.history import SlipHistory
 from contact.interface.multipliers import Multipliers
 from contact.typing import Array
 
 
 @dataclass(frozen=True)
 class State:
-    """Unknowns and contact forces, and how much of the load acts.
+    """Unknowns and contact forces at a time.
 
     Its arrays are not to be written to (they are marked so): a new state has new ones.
 
@@ -23,13 +24,17 @@ class State:
         potential, node by node.
     forces
         Multipliers of the unilateral constraint and of friction.
-    load
-        Part of the loads and prescribed values that acts; 1 for all.
+    time
+        When: loads and prescribed values are those of this time. What is given without a time
+        grows with it, so that 1 stands for all of it (`contact.body.amplitude`).
+    history
+        What friction remembered in the step that led here; None from rest.
     """
 
     x: Array
     forces: Multipliers
-    load: float = 1.0
+    time: float = 1.0
+    history: SlipHistory | None = None
 
     def __post_init__(self) -> None:
         """Keep whoever holds the state from changing it."""
@@ -43,6 +48,12 @@ class State:
             (self.forces.pressure, other.forces.pressure),
             (self.forces.friction, other.forces.friction),
         )
-        return self.load == other.load and all(
-            np.allclose(one, two, rtol=rtol, atol=atol) for one, two in pairs
+        if self.history is not None and other.history is not None:
+            alike = self.history.near(other.history, rtol, atol)
+        else:
+            alike = self.history is other.history
+        return (
+            alike
+            and self.time == other.time
+            and all(np.allclose(one, two, rtol=rtol, atol=atol) for one, two in pairs)
         )

@@ -276,8 +276,8 @@ def test_load_steps_that_end_early_have_not_converged():
         """Two steps of load, the second of which fails."""
 
         def run(self, iterate, note="", bound=None, goal=0.0):
-            loads.append(iterate.state.load)
-            residual = 0.0 if iterate.state.load <= 0.25 else 1.0
+            loads.append(iterate.state.time)
+            residual = 0.0 if iterate.state.time <= 0.25 else 1.0
             kkt = KKT(residual, residual, residual)
             return iterate, Outcome(kkt, method.options.allowed, "" if residual == 0 else "no")
 
@@ -285,7 +285,7 @@ def test_load_steps_that_end_early_have_not_converged():
     assert max(loads) > 0.25
     assert not outcome.converged
     assert "load steps ended at 0.25 of the load" in outcome.reason
-    assert iterate.state.load == 1.0
+    assert iterate.state.time == 1.0
     assert outcome.kkt == evaluate(problem, iterate.state)
 
 
@@ -300,7 +300,7 @@ def test_a_method_cannot_call_itself_converged(monkeypatch):
     solution = solve(bar_case(4), comm=SELF)
     assert not solution.converged
     assert solution.outcome.kkt == evaluate(solution.problem, solution.state)
-    assert solution.state.load == 1.0
+    assert solution.state.time == 1.0
     assert "all is well, but the equilibrium residual is 1.00e+00" in solution.outcome.reason
 
 

@@ -420,7 +420,7 @@ def test_an_interrupted_load_step_is_judged_by_the_full_load(
     assert solution.outcome.signal == signal.SIGINT
     assert [note.split()[:2] for note in notes] == [["load", "0.25"]]
     state = solution.state
-    assert state.load == 1.0
+    assert state.time == 1.0
     np.testing.assert_array_equal(state.x, problem.equilibrium.prescribe(state.x))
     assert solution.outcome.kkt == evaluate(problem, state)
 

@@ -1,0 +1,48 @@
+"""What friction remembers between the steps of an evolution.
+
+Friction acts against what has slipped since the end of the last step, and a coefficient
+mu(slip) looks at all that has slipped so far. A static problem is one step from rest.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from contact.interface.jump import Jump
+from contact.typing import Array
+
+
+@dataclass(frozen=True)
+class SlipHistory:
+    """The tangential jump at the end of the last step, and the way that it has gone.
+
+    Its arrays are not to be written to (they are marked so). Open nodes have them too: one that
+    touches again slips from where it was at the end of the last step.
+
+    Attributes
+    ----------
+    jump
+        j_tau at the end of the last step, tangential vectors, shape (n, d) (length).
+    accumulated
+        Sum of |Delta j_tau| over all steps, shape (n,) (length).
+    """
+
+    jump: Array
+    accumulated: Array
+
+    def __post_init__(self) -> None:
+        """Keep whoever holds it from changing it."""
+        self.jump.flags.writeable = self.accumulated.flags.writeable = False
+
+    @staticmethod
+    def rest(jump: Jump) -> SlipHistory:
+        """Return that of a body that has never slipped."""
+        return SlipHistory(np.zeros(jump.normal.shape), np.zeros(jump.gap.size))
+
+    def near(self, other: SlipHistory, rtol: float = 0.0, atol: float = 0.0) -> bool:
+        """Tell whether another history of the same nodes has the same values on this rank."""
+        return np.allclose(self.jump, other.jump, rtol=rtol, atol=atol) and np.allclose(
+            self.accumulated, other.accumulated, rtol=rtol, atol=atol
+        )
