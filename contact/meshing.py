@@ -14,6 +14,7 @@ from contact.mesh.domain import Domain, rotate
 from contact.mesh.grid import box, rectangle
 from contact.mesh.reader import from_msh, from_recipe
 from contact.mesh.refinement import refined
+from contact.methods.interrupt import deaf
 
 #: Bytes that making the mesh takes for a cell, without any unknowns (seen: 235 to 345).
 CELL_MEMORY = 200
@@ -54,7 +55,8 @@ def make_domain(section: Mesh, comm: MPI.Intracomm) -> Domain:
             domain = box(comm, *grid)
     else:
         assert section.generator is not None
-        domain = from_recipe(comm, section.generator, **section.parameters)
+        with deaf():
+            domain = from_recipe(comm, section.generator, **section.parameters)
     axis = section.axis or (0.0, 1.0, 0.0)
     rotate(domain.mesh, section.rotation, axis if domain.dim == 3 else (0.0, 0.0, 1.0))
     if not section.sides:

@@ -195,3 +195,24 @@ def ending_on_signal() -> Iterator[Ending]:
     finally:
         for number, handler in before.items():
             signal.signal(number, handler)
+
+
+@contextmanager
+def deaf() -> Iterator[None]:
+    """Let SIGINT and SIGTERM end the process at once, where `ending_on_signal` would end the run.
+
+    For work of a library that takes minutes without returning to Python, before anything has
+    been computed.
+    """
+    before: dict[int, Ending] = {}
+    if threading.current_thread() is threading.main_thread():
+        for kind in (signal.SIGINT, signal.SIGTERM):
+            handler = signal.getsignal(kind)
+            if isinstance(handler, Ending):
+                before[kind] = handler
+                signal.signal(kind, signal.SIG_DFL)
+    try:
+        yield
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)

@@ -154,6 +154,35 @@ def test_ranks_end_with_a_killed_launcher(tmp_path: Path) -> None:
     assert not any(alive(rank) for rank in ranks)
 
 
+MESHING = """
+[mesh]
+generator = "quarter_disc"
+size = 0.003
+contact_size = 0.003
+[material]
+young = 1.0
+poisson = 0.3
+[[fixed]]
+on = "top"
+displacement = [0.0, 0.0]
+[contact]
+on = "contact"
+"""
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_ends_a_long_meshing_at_once(number: int, tmp_path: Path) -> None:
+    """Gmsh hears none."""
+    file = tmp_path / "disc.toml"
+    file.write_text(MESHING)
+    process = start("check", str(file))
+    assert process.stdout is not None
+    assert "take Gmsh" in process.stdout.readline()
+    process.send_signal(number)
+    process.communicate(timeout=10)
+    assert process.returncode == -number
+
+
 def children(parent: int) -> list[int]:
     """Return the processes that a process has started."""
     found = []
