@@ -174,6 +174,16 @@ def _unlimited(limit: Value) -> bool:
     return isinstance(limit, float) and limit == np.inf
 
 
+class PotentialLaw(Protocol):
+    """phi_L: what drives the current at the potential difference s = phi - phi_F."""
+
+    def __call__(self, s: Value) -> Value:
+        """Return phi_L at the potential difference."""
+
+    def derivative(self, s: Value) -> Value:
+        """Return d phi_L / ds, one-sided at kinks."""
+
+
 @dataclass(frozen=True)
 class Truncation:
     """phi_L(s) = s limited to [-L, L], equation (1.34); L = infinity for none."""

@@ -19,7 +19,7 @@ LAYERS = (
     {"methods"},
     {"output"},
     {"case"},
-    {"blame", "build", "meshing", "nesting", "solving"},
+    {"blame", "build", "contacts", "given", "meshing", "nesting", "solving"},
     {"cli"},
 )
 

@@ -34,9 +34,7 @@ def check_sections(case: Case) -> None:
         raise fault("fixed", Words("no displacement fixed"), "at least one component on a part")
     _check_contradictions(case)
     _check_lagged(case)
-    for i, fixed in enumerate(case.fixed):
-        if fixed.on == case.contact.on and fixed.is_clamped:
-            raise fault("contact.on", case.contact.on, f"a part that fixed.{i} does not fix wholly")
+    _check_contacts(case)
     if case.mesh.dimension is not None:
         _check_vectors(case, case.mesh.dimension)
         _check_parts(case, [*case.mesh.sides, *case.mesh.parts])
@@ -88,8 +86,26 @@ def _check_mechanical(case: Case) -> None:
         for key in ("charge", "body_charge"):
             if getattr(load, key) is not None:
                 raise fault(f"load.{i}.{key}", getattr(load, key).source, accepted)
-    if case.electric is not None:
-        raise fault("electric", Words("given a table"), accepted)
+    for path, contact in case.contacts:
+        key, electric = case.electric_of(path, contact)
+        if electric is not None:
+            raise fault(key, Words("given a table"), accepted)
+
+
+def _check_contacts(case: Case) -> None:
+    """Each contact is of a part of its own, which can move."""
+    seen: dict[str, str] = {}
+    for path, contact in case.contacts:
+        for i, fixed in enumerate(case.fixed):
+            if fixed.on == contact.on and fixed.is_clamped:
+                accepted = f"a part that fixed.{i} does not fix wholly"
+                raise fault(f"{path}.on", contact.on, accepted)
+        if seen.setdefault(contact.on, path) != path:
+            raise fault(f"{path}.on", contact.on, f"a part that {seen[contact.on]} does not have")
+    for key in ("friction", "electric"):
+        own = [getattr(contact, key) is not None for _, contact in case.contacts]
+        if all(own) and getattr(case, key) is not None:
+            raise fault(key, Words(f"beside {key} of every contact"), "one of them")
 
 
 def _check_regions(case: Case) -> None:
@@ -105,7 +121,8 @@ def _check_regions(case: Case) -> None:
 
 def _check_lagged(case: Case) -> None:
     """Newton's method linearises layer and current; it has no previous outer iteration."""
-    for key, section in (("contact", case.contact), ("electric", case.electric)):
+    sections = [*case.contacts, *(case.electric_of(*entry) for entry in case.contacts)]
+    for key, section in sections:
         if section is not None and section.lagged and case.solver.method == "newton":
             accepted = 'lagged with solver.method = "uzawa" or "penalty"'
             raise fault(f"{key}.lagged", section.lagged, accepted)
@@ -114,7 +131,8 @@ def _check_lagged(case: Case) -> None:
 def _check_potential(case: Case) -> None:
     """Without a fixed value the potential is known but for a constant."""
     grounded = any(fixed.potential is not None for fixed in case.fixed)
-    conductive = case.electric is not None and case.electric.k_e > 0
+    electric = [case.electric_of(*entry)[1] for entry in case.contacts]
+    conductive = any(section is not None and section.k_e > 0 for section in electric)
     if not grounded and not conductive:
         raise fault(
             "fixed",
@@ -149,9 +167,10 @@ def _vectors(case: Case) -> Iterator[tuple[str, tuple[Any, ...] | None]]:
     for i, load in enumerate(case.load):
         yield f"load.{i}.traction", load.traction
         yield f"load.{i}.body_force", load.body_force
-    if case.contact.foundation is not None:
-        for key, vector in case.contact.foundation.vectors.items():
-            yield f"contact.foundation.{key}", vector
+    for path, contact in case.contacts:
+        if contact.foundation is not None:
+            for key, vector in contact.foundation.vectors.items():
+                yield f"{path}.foundation.{key}", vector
 
 
 def _formulas(case: Case) -> Iterator[tuple[str, Any]]:
@@ -162,9 +181,11 @@ def _formulas(case: Case) -> Iterator[tuple[str, Any]]:
     for i, load in enumerate(case.load):
         for key in ("pressure", "charge", "body_charge"):
             yield f"load.{i}.{key}", getattr(load, key)
-    yield "contact.gap", case.contact.gap
-    yield "friction.bound", case.friction.bound
-    yield "friction.mu", case.friction.mu
+    for path, contact in case.contacts:
+        yield f"{path}.gap", contact.gap
+        key, friction = case.friction_of(path, contact)
+        yield f"{key}.bound", friction.bound
+        yield f"{key}.mu", friction.mu
 
 
 def _check_vectors(case: Case, dimension: int) -> None:
@@ -189,7 +210,8 @@ def _check_vectors(case: Case, dimension: int) -> None:
 def _check_parts(case: Case, parts: list[str]) -> None:
     used = [(f"fixed.{i}.on", fixed.on) for i, fixed in enumerate(case.fixed)]
     used += [(f"load.{i}.on", load.on) for i, load in enumerate(case.load) if load.on is not None]
-    for path, name in [*used, ("contact.on", case.contact.on)]:
+    used += [(f"{path}.on", contact.on) for path, contact in case.contacts]
+    for path, name in used:
         if name not in parts:
             near = difflib.get_close_matches(name, parts, n=1)
             hint = f" (did you mean {near[0]}?)" if near else ""

@@ -54,8 +54,10 @@ __all__ = [
 
 if TYPE_CHECKING:
     Materials: TypeAlias = Material | tuple[Material, ...]
+    Contacts: TypeAlias = Contact | tuple[Contact, ...]
 else:
     Materials = one_or_more(Material, "material")
+    Contacts = one_or_more(Contact, "contact")
 
 
 class Case(Section):
@@ -76,9 +78,11 @@ class Case(Section):
     load: Annotated[tuple[Load, ...], as_tuple, Accepted("tables [[load]]")] = Field(
         default=(), description="Forces and charges: any number of `[[load]]`."
     )
-    contact: Contact = Field(description="The foundation: `[contact]`.")
-    friction: Friction = Field(
-        default=Friction(), description="Friction: `[friction]`. Default: none."
+    contact: Contacts = Field(
+        description="The foundation: `[contact]`; several: `[[contact]]`, each with its part."
+    )
+    friction: Friction | None = Field(
+        default=None, description="Friction: `[friction]`. Default: none."
     )
     electric: Electric | None = Field(
         default=None, description="Conductive foundation: `[electric]`. Absent: insulated."
@@ -99,6 +103,23 @@ class Case(Section):
     def materials(self) -> tuple[tuple[str, Material], ...]:
         """The materials, each with its key in the file."""
         return entries("material", self.material)
+
+    @property
+    def contacts(self) -> tuple[tuple[str, Contact], ...]:
+        """The contacts, each with its key in the file."""
+        return entries("contact", self.contact)
+
+    def friction_of(self, key: str, contact: Contact) -> tuple[str, Friction]:
+        """Return the friction of a contact, with its key in the file."""
+        if contact.friction is not None:
+            return f"{key}.friction", contact.friction
+        return "friction", self.friction or Friction()
+
+    def electric_of(self, key: str, contact: Contact) -> tuple[str, Electric | None]:
+        """Return the electric contact of a contact, likewise."""
+        if contact.electric is not None:
+            return f"{key}.electric", contact.electric
+        return "electric", self.electric
 
     @model_validator(mode="after")
     def _check(self) -> Case:

@@ -77,92 +77,6 @@ if TYPE_CHECKING:
 else:
     Foundation = one_of("shape", Plane, Sphere)
 
-#: Constants of the compliant layer that the thesis does not give (section 8.1.2).
-LAYER = {
-    "layer": 0.0,
-    "stiffness": 10.0,
-    "limit": 0.1,
-    "potential_factor": 2.0,
-    "potential_range": 128.0,
-}
-
-
-class Contact(Section):
-    """`[contact]`: where and on what the body may rest."""
-
-    on: Name = Field(description="Part of the boundary that may touch the foundation.")
-    law: Literal["signorini", "compliance"] = Field(
-        default="signorini",
-        description="`signorini`: rigid foundation; `compliance`: with a compliant layer in front.",
-    )
-    gap: NonNegativeFormula | None = Field(
-        default=None,
-        description="Gap rho to the rigid foundation along the body's normal. Default: 0 without "
-        "`foundation`.",
-    )
-    foundation: Foundation | None = Field(
-        default=None, description="Rigid shape, instead of a gap: `[contact.foundation]`."
-    )
-    direction: Literal["foundation", "body"] = Field(
-        default="foundation",
-        description="Contact direction on a rigid shape: normal of the foundation or of the body. "
-        "With a gap it is the body's.",
-    )
-    layer: (
-        Annotated[float, Field(ge=0, allow_inf_nan=True), Accepted("a number >= 0, or inf")] | None
-    ) = Field(
-        default=None,
-        description="Thickness of the layer: first touch at gap - layer; one thicker than the gap "
-        "presses on the body at rest. `inf`: no rigid part, first touch at gap, law (1.27). "
-        f"Compliance only, default {LAYER['layer']}.",
-    )
-    stiffness: NonNegative | None = Field(
-        default=None, description=f"c_nu. Compliance only, default {LAYER['stiffness']}."
-    )
-    limit: (
-        Annotated[float, Field(gt=0, allow_inf_nan=True), Accepted("a number > 0, or inf")] | None
-    ) = Field(
-        default=None,
-        description="n_nu: depth at which the layer's pressure saturates; `inf`: never, (1.28). "
-        f"Compliance only, default {LAYER['limit']}.",
-    )
-    potential_factor: Annotated[float, Field(ge=1), Accepted("a number >= 1")] | None = Field(
-        default=None,
-        description="alpha_nu: growth of the layer's stiffness with the potential difference; 1: "
-        f"none. Compliance only, default {LAYER['potential_factor']}.",
-    )
-    potential_range: Positive | None = Field(
-        default=None,
-        description="Potential difference at which the growth ends. Compliance only, default "
-        f"{LAYER['potential_range']}.",
-    )
-    lagged: Switch = Field(
-        default=False,
-        description="`true`: the layer's force is taken from the previous outer iteration, as in "
-        "Algorithms 6 and 8; not with method `newton`.",
-    )
-
-    @model_validator(mode="before")
-    @classmethod
-    def _fill_in(cls, given: Any) -> Any:
-        """Fill in the defaults that depend on other keys."""
-        if not isinstance(given, Mapping):
-            return given
-        defaults: dict[str, Any] = dict(LAYER) if given.get("law") == "compliance" else {}
-        if "foundation" not in given:
-            defaults["gap"] = Expression(0.0)
-        return {**defaults, **given}
-
-    @model_validator(mode="after")
-    def _check(self) -> Contact:
-        if self.gap is not None and self.foundation is not None:
-            raise fault("gap", Words("both gap and foundation"), "one of them")
-        for key in (*LAYER, "lagged") if self.law == "signorini" else ():
-            value = getattr(self, key)
-            if value is not None and value is not False:
-                raise fault(key, value, f'{key} with law = "compliance" only')
-        return self
-
 
 class Coefficient(Section):
     """A coefficient of friction. A new one is a section like that below, entered in `Mu`."""
@@ -192,7 +106,7 @@ else:
 
 
 class Friction(Section):
-    """`[friction]`: friction on the contact part. Absent: none."""
+    """`[friction]`: friction on the contact parts that have none of their own. Absent: none."""
 
     law: Literal["none", "tresca", "coulomb"] = Field(
         default="none",
@@ -252,4 +166,101 @@ class Electric(Section):
     def _check(self) -> Electric:
         if self.delta is not None and self.law == "perfect":
             raise fault("delta", self.delta, 'delta with law = "shifted" or "ramp"')
+        return self
+
+
+#: Constants of the compliant layer that the thesis does not give (section 8.1.2).
+LAYER = {
+    "layer": 0.0,
+    "stiffness": 10.0,
+    "limit": 0.1,
+    "potential_factor": 2.0,
+    "potential_range": 128.0,
+}
+
+
+class Contact(Section):
+    """`[contact]`: where and on what the body may rest.
+
+    Several contacts are a list of tables `[[contact]]`, each a foundation of its own. Their parts
+    share no nodes.
+    """
+
+    on: Name = Field(description="Part of the boundary that may touch the foundation.")
+    law: Literal["signorini", "compliance"] = Field(
+        default="signorini",
+        description="`signorini`: rigid foundation; `compliance`: with a compliant layer in front.",
+    )
+    gap: NonNegativeFormula | None = Field(
+        default=None,
+        description="Gap rho to the rigid foundation along the body's normal. Default: 0 without "
+        "`foundation`.",
+    )
+    foundation: Foundation | None = Field(
+        default=None, description="Rigid shape, instead of a gap: `[contact.foundation]`."
+    )
+    direction: Literal["foundation", "body"] = Field(
+        default="foundation",
+        description="Contact direction on a rigid shape: normal of the foundation or of the body. "
+        "With a gap it is the body's.",
+    )
+    layer: (
+        Annotated[float, Field(ge=0, allow_inf_nan=True), Accepted("a number >= 0, or inf")] | None
+    ) = Field(
+        default=None,
+        description="Thickness of the layer: first touch at gap - layer; one thicker than the gap "
+        "presses on the body at rest. `inf`: no rigid part, first touch at gap, law (1.27). "
+        f"Compliance only, default {LAYER['layer']}.",
+    )
+    stiffness: NonNegative | None = Field(
+        default=None, description=f"c_nu. Compliance only, default {LAYER['stiffness']}."
+    )
+    limit: (
+        Annotated[float, Field(gt=0, allow_inf_nan=True), Accepted("a number > 0, or inf")] | None
+    ) = Field(
+        default=None,
+        description="n_nu: depth at which the layer's pressure saturates; `inf`: never, (1.28). "
+        f"Compliance only, default {LAYER['limit']}.",
+    )
+    potential_factor: Annotated[float, Field(ge=1), Accepted("a number >= 1")] | None = Field(
+        default=None,
+        description="alpha_nu: growth of the layer's stiffness with the potential difference; 1: "
+        f"none. Compliance only, default {LAYER['potential_factor']}.",
+    )
+    potential_range: Positive | None = Field(
+        default=None,
+        description="Potential difference at which the growth ends. Compliance only, default "
+        f"{LAYER['potential_range']}.",
+    )
+    lagged: Switch = Field(
+        default=False,
+        description="`true`: the layer's force is taken from the previous outer iteration, as in "
+        "Algorithms 6 and 8; not with method `newton`.",
+    )
+    friction: Friction | None = Field(
+        default=None, description="Friction on this part. Default: that of `[friction]`."
+    )
+    electric: Electric | None = Field(
+        default=None, description="Electric contact of this part. Default: that of `[electric]`."
+    )
+
+    @model_validator(mode="before")
+    @classmethod
+    def _fill_in(cls, given: Any) -> Any:
+        """Fill in the defaults that depend on other keys."""
+        if not isinstance(given, Mapping):
+            return given
+        defaults: dict[str, Any] = dict(LAYER) if given.get("law") == "compliance" else {}
+        if "foundation" not in given:
+            defaults["gap"] = Expression(0.0)
+        return {**defaults, **given}
+
+    @model_validator(mode="after")
+    def _check(self) -> Contact:
+        if self.gap is not None and self.foundation is not None:
+            raise fault("gap", Words("both gap and foundation"), "one of them")
+        for key in (*LAYER, "lagged") if self.law == "signorini" else ():
+            value = getattr(self, key)
+            if value is not None and value is not False:
+                raise fault(key, value, f'{key} with law = "compliance" only')
         return self

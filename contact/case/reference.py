@@ -8,6 +8,7 @@ from __future__ import annotations
 import inspect
 import sys
 from collections.abc import Iterator
+from collections.abc import Set as AbstractSet
 from dataclasses import is_dataclass
 from pathlib import Path
 
@@ -53,24 +54,34 @@ arguments or more. A comparison counts as 1 or 0. Formulas are parsed, never exe
 def page() -> str:
     """Return the reference page (Markdown)."""
     lines = [INTRODUCTION, "## Top level", "", *_rows(Case)]
-    for key, field in keys_of(Case).items():
-        sections = list(sections_of(field.annotation).values())
+    described = [list(sections_of(field.annotation).values()) for field in keys_of(Case).values()]
+    top = {section for sections in described for section in sections}
+    for key, sections in zip(keys_of(Case), described, strict=True):
         if any(is_dataclass(section) for section in sections):
             lines += _options(key, sections)
         else:
-            lines += [line for section in sections for line in _describe(section)]
+            lines += [line for section in sections for line in _describe(section, top)]
         if key == "mesh":
             lines += _recipes()
     return "\n".join(lines) + "\n"
 
 
-def _describe(section: type[Section]) -> Iterator[str]:
-    """Describe a section and those in it. Its docstring is ``heading: text``."""
+def _describe(section: type[Section], elsewhere: AbstractSet[type]) -> Iterator[str]:
+    """Describe a section and those in it. Its docstring is ``heading: text``.
+
+    Parameters
+    ----------
+    section
+        The section.
+    elsewhere
+        Sections that have a place of their own.
+    """
     heading, text = (inspect.getdoc(section) or "").split(": ", 1)
     yield from ("", f"## {heading}", "", text[0].upper() + text[1:], "", *_rows(section))
     for field in section.model_fields.values():
         for inner in sections_of(field.annotation).values():
-            yield from _describe(inner)
+            if inner not in elsewhere:
+                yield from _describe(inner, elsewhere)
 
 
 def _rows(section: type) -> Iterator[str]:

@@ -18,7 +18,8 @@ from contact.interface.nodes import ContactNodes
 from contact.interface.obstacle import Obstacle
 from contact.interface.placing import Candidates
 from contact.typing import Array
-from forms.laws import Conductivity, Truncation
+from forms.laws import Conductivity, PotentialLaw, Truncation
+from forms.ops import Value
 
 
 @dataclass(frozen=True)
@@ -30,7 +31,7 @@ class Conductor:
     psi
         Conductivity law.
     phi_f
-        Potential of the foundation.
+        Potential of the foundation; several conductors as one have one value a node.
     phi_l
         Truncation of the potential difference.
     lagged
@@ -42,10 +43,10 @@ class Conductor:
     """
 
     psi: Conductivity
-    phi_f: float
-    phi_l: Truncation = field(default_factory=lambda: Truncation(np.inf))
+    phi_f: Value
+    phi_l: PotentialLaw = field(default_factory=lambda: Truncation(np.inf))
     lagged: bool = False
-    phi_f_at: Callable[[float], float] | None = None
+    phi_f_at: Callable[[float], Value] | None = None
 
     def at(self, time: float) -> Conductor:
         """Return the foundation at a time."""

@@ -9,6 +9,7 @@ import numpy as np
 from contact.body.description import Field
 from contact.interface.history import SlipHistory
 from contact.interface.nodes import ContactNodes
+from contact.interface.piecewise import SmoothingPieces
 from contact.interface.smoothing import Smoothing
 from contact.typing import Array
 from forms.laws import ConstantCoefficient, Coulomb, FrictionCoefficient, FrictionLaw, Tresca
@@ -64,7 +65,7 @@ class NodalFriction:
     """
 
     law: FrictionLaw | None
-    smoothing: Smoothing
+    smoothing: Smoothing | SmoothingPieces
     history: SlipHistory
 
     @staticmethod

@@ -12,6 +12,7 @@ import numpy as np
 from contact.errors import InputError
 from contact.typing import Array
 from forms.laws import PenetrationLaw, StiffnessLaw
+from forms.ops import Value
 
 EPS = float(np.finfo(float).eps)
 
@@ -24,7 +25,8 @@ class Layer:
     ----------
     thickness
         rho - rho_0 >= 0: the layer is touched before the rigid part (length). Infinity: there
-        is no rigid part, law (1.27), and the contact's gap is that of the first touch.
+        is no rigid part, law (1.27), and the contact's gap is that of the first touch. Several
+        layers as one have one value a node.
     p_nu, h_nu
         Penetration law and stiffness of section 8.1.2, or any others with their derivative.
         They are vectorised functions; p_nu must vanish for negative arguments.
@@ -32,7 +34,7 @@ class Layer:
         Whether the force is taken from the previous outer iterate, as in the thesis.
     """
 
-    thickness: float
+    thickness: Value
     p_nu: PenetrationLaw
     h_nu: StiffnessLaw
     lagged: bool = False

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 
 import numpy as np
@@ -77,6 +79,15 @@ def _chord_depth(domain: Domain, part: str, obstacle: Obstacle) -> float:
     return 1.1 * obstacle.chord_depth(length)
 
 
+@contextmanager
+def _naming(key: str) -> Iterator[None]:
+    """Let messages begin with the key of the contact that they are about."""
+    try:
+        yield
+    except InputError as error:
+        raise InputError(f"{key}.{error}") from None
+
+
 def _place(
     domain: Domain,
     space: fem.FunctionSpace,
@@ -101,7 +112,7 @@ def _place(
     best = domain.comm.allreduce(np.max(facing[seen], initial=-np.inf), op=MPI.MAX)
     if np.isfinite(best) and best <= 1e-9:
         raise InputError(
-            "contact.foundation: it lies behind the contact part: the contact direction points "
+            "foundation: it lies behind the contact part: the contact direction points "
             "into the body at every node; accepted: a normal towards the body, a sphere in front "
             "of it, or inside = true for a body within"
         )
@@ -116,7 +127,7 @@ def _place(
     cut = domain.comm.allreduce(np.max(depth, initial=0.0), op=MPI.MAX)
     if domain.comm.allreduce(bool(np.any(depth > tolerance)), op=MPI.LOR):
         raise InputError(
-            f"contact.foundation: the body cuts it at rest, by up to {cut:.3g}; accepted: gaps "
+            f"foundation: the body cuts it at rest, by up to {cut:.3g}; accepted: gaps "
             f">= 0 but for {rounding:.1g} (rounding), and what straight facets take off a curve"
         )
     return np.where(facing > 0, np.maximum(gap, 0.0), gap), float(cut)
@@ -126,6 +137,7 @@ def find_nodes(
     body: BodyEquilibrium,
     part: str,
     obstacle: Obstacle,
+    key: str = "contact",
 ) -> ContactNodes:
     """Collect the contact nodes of a boundary part. Collective.
 
@@ -133,6 +145,13 @@ def find_nodes(
     tangential component is removed from its tangent projector. On a symmetry line the
     direction is turned into the free components, and what the fixed ones contribute to
     u_nu is taken off the gap.
+
+    Parameters
+    ----------
+    body, part, obstacle
+        Whose nodes, and what they may touch.
+    key
+        What messages call the contact.
 
     Raises
     ------
@@ -146,12 +165,12 @@ def find_nodes(
     direction, gap = obstacle.measure(points, found.normal)
     if domain.comm.allreduce(bool(np.isnan(direction).any()), op=MPI.LOR):
         raise InputError(
-            "contact.foundation: a contact node has no contact direction "
-            "(it is the sphere's centre)"
+            f"{key}.foundation: a contact node has no contact direction (it is the sphere's centre)"
         )
     cut = 0.0
     if obstacle.is_shape:
-        gap, cut = _place(domain, space, (part, obstacle), found, direction, gap)
+        with _naming(key):
+            gap, cut = _place(domain, space, (part, obstacle), found, direction, gap)
 
     free = body.free[nodes, :d]
     fixed = body.prescribe(body.rest()).reshape(-1, body.block_size)[nodes, :d]
@@ -179,6 +198,6 @@ def find_nodes(
     )
     if jump.size == 0:
         raise InputError(
-            f"contact.on: part {part!r} has no node that is free to move towards the foundation"
+            f"{key}.on: part {part!r} has no node that is free to move towards the foundation"
         )
     return jump

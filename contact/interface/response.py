@@ -53,16 +53,17 @@ class FoundationResponse:
     @property
     def constrained(self) -> ContactNodes:
         """The contact nodes with the gap of the unilateral constraint: infinite without one."""
-        if self.layer is None or np.isfinite(self.layer.thickness):
+        rigid = self.layer is None or np.isfinite(self.layer.thickness)
+        if np.all(rigid):
             return self.jump
-        return replace(self.jump, gap=np.full_like(self.jump.gap, np.inf))
+        return replace(self.jump, gap=np.where(rigid, self.jump.gap, np.inf))
 
     @property
     def touch(self) -> Array:
         """The gap rho_0 of the layer's first touch, shape (n,)."""
         assert self.layer is not None
         depth = self.layer.thickness
-        return self.jump.gap - (depth if np.isfinite(depth) else 0.0)
+        return self.jump.gap - np.where(np.isfinite(depth), depth, 0.0)
 
     def at(self, time: float) -> FoundationResponse:
         """Return the foundation at a time."""

@@ -84,8 +84,8 @@ def _electric_uniqueness(solution: Solution) -> tuple[str, bool]:
     presses with e/H. A gap that opens by less than 1/delta thus opens itself further where
     delta |phi - phi_F| (e/C) Bi/(1 + Bi) exceeds 1: several solutions may then exist.
     """
-    problem, conductor = solution.problem, solution.problem.conductor
-    piezo = problem.body.piezo
+    problem = solution.problem
+    conductor, piezo = problem.interface.response.conductor, problem.body.piezo
     if conductor is None or piezo is None or not conductor.psi.follows_gap:
         return "", True
     scales = problem.scales
@@ -122,9 +122,10 @@ def _chords(solution: Solution) -> tuple[str, bool]:
 def _preload(solution: Solution) -> tuple[str, bool]:
     """Say where a layer is thicker than the gap, and presses on the body at rest."""
     problem = solution.problem
-    if problem.contact.layer is None:
+    response = problem.interface.response
+    if response.layer is None:
         return "", True
-    least = -problem.nodes.maximum(-problem.interface.response.touch, -np.inf)
+    least = -problem.nodes.maximum(-response.touch, -np.inf)
     if least >= -1e-9 * problem.domain.size:
         return "", True
     return (
@@ -135,8 +136,8 @@ def _preload(solution: Solution) -> tuple[str, bool]:
 
 def _falling(solution: Solution) -> tuple[str, bool]:
     """Say where p_nu falls: (h6) asks for less, uniqueness for a law that does not."""
-    layer, size = solution.problem.contact.layer, solution.problem.domain.size
-    if layer is None or not layer.falls(size):
+    layers, size = [c.layer for c in solution.problem.contacts], solution.problem.domain.size
+    if not any(layer is not None and layer.falls(size) for layer in layers):
         return "", True
     text = "p_nu falls with the penetration: several solutions may exist, and this is one of them"
     return text, False

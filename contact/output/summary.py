@@ -52,7 +52,9 @@ def summarise(solution: Solution, table: Table | None) -> dict[str, Any]:
         "contact_nodes": counts["stick"] + counts["slip"],
         "stick_nodes": counts["stick"],
         "slip_nodes": counts["slip"],
-        "contact_direction": problem.contact.foundation.direction,
+        "contact_direction": ", ".join(
+            dict.fromkeys(contact.foundation.direction for contact in problem.contacts)
+        ),
         "notes": solution.notes,
         "warnings": solution.warnings,
     }

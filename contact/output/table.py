@@ -37,13 +37,20 @@ def contact_table(solution: Solution) -> Table | None:
     lambda_f = -sigma_tau along `tangent_of` the contact direction. In space they are vectors
     and the rows are sorted by x, then y, then z. ``u_n`` and ``gap`` are taken along the
     contact direction; ``pressure`` and ``bound`` are -sigma_nu and the friction bound;
-    ``d_n`` is the charge D.nu that leaves through the foundation.
+    ``d_n`` is the charge D.nu that leaves through the foundation. Of several contacts the rows
+    of one follow those of another, and the first column says which part they belong to.
     """
     problem, nodes = solution.problem, solution.problem.nodes
     nodal, pressure = solution.nodal, solution.pressure
     # Mesh generators leave coordinates such as -3e-19.
     points = np.where(np.abs(nodes.points) < 1e-15 * problem.domain.size, 0.0, nodes.points)
-    columns: dict[str, NDArray[Any]] = dict(zip("xyz", points.T, strict=False))
+    entry = np.repeat(
+        np.arange(len(problem.entries)), [entry.nodes.nodes.size for entry in problem.entries]
+    )
+    columns: dict[str, NDArray[Any]] = {}
+    if len(problem.entries) > 1:
+        columns["on"] = np.array([e.on for e in problem.entries])[entry]
+    columns |= dict(zip("xyz", points.T, strict=False))
     # The gap without a rigid part is that of the layer's first touch.
     response = problem.interface.response
     gap = response.jump.gap
@@ -65,10 +72,11 @@ def contact_table(solution: Solution) -> Table | None:
         columns["phi"] = problem.equilibrium.phi_scale * nodal[:, -1]
         columns["d_n"] = response.charge(nodal, pressure)
     columns |= {f"nu_{axis}": nodes.normal[:, i] for i, axis in enumerate("xyz"[: problem.dim])}
-    order = _order(problem)
+    order, entries = _order(problem), problem.comm.gather(entry)
     gathered = {name: problem.comm.gather(values) for name, values in columns.items()}
-    if order is None:
+    if order is None or entries is None:
         return None
+    order = order[np.argsort(np.concatenate(entries)[order], kind="stable")]
     return {name: np.concatenate(values)[order] for name, values in gathered.items()}
 
 
@@ -79,9 +87,11 @@ def csv_columns(table: Table) -> Table:
 
 def held_points(problem: ContactProblem) -> Array:
     """Return the nodes of Gamma_3 that are no contact nodes, (n, d), from all ranks. Collective."""
-    found = candidates(problem.domain, problem.equilibrium.space, problem.contact.on)
-    points = found.points[~np.isin(found.nodes, problem.nodes.nodes)]
-    return np.concatenate(problem.comm.allgather(points))
+    parts = []
+    for contact in problem.contacts:
+        found = candidates(problem.domain, problem.equilibrium.space, contact.on)
+        parts.append(found.points[~np.isin(found.nodes, problem.nodes.nodes)])
+    return np.concatenate(problem.comm.allgather(np.concatenate(parts)))
 
 
 def _order(problem: ContactProblem) -> NDArray[np.intp] | None:
@@ -105,7 +115,7 @@ def _order(problem: ContactProblem) -> NDArray[np.intp] | None:
 def _links(problem: ContactProblem) -> NDArray[np.int64]:
     """Return the global numbers of neighbours on the owned facets of Gamma_3, shape (m, 2)."""
     mesh, space = problem.domain.mesh, problem.equilibrium.space
-    facets = problem.domain.facets(problem.contact.on)
+    facets = np.concatenate([problem.domain.facets(contact.on) for contact in problem.contacts])
     topology = mesh.topology
     topology.create_connectivity(1, 2)
     topology.create_connectivity(2, 1)

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from copy import copy
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from mpi4py import MPI
@@ -13,7 +14,15 @@ from contact.body.description import Body
 from contact.body.equilibrium import BodyEquilibrium
 from contact.body.norms import volume
 from contact.interface.current import Conductor, HeldCurrent, held_current
-from contact.interface.friction import Friction, NodalFriction
+from contact.interface.entries import (
+    Entry,
+    joined_conductor,
+    joined_friction,
+    joined_held,
+    joined_layer,
+    joined_nodes,
+)
+from contact.interface.friction import Friction
 from contact.interface.history import SlipHistory
 from contact.interface.interface import Interface
 from contact.interface.layer import Layer
@@ -30,15 +39,29 @@ from contact.typing import Array
 
 @dataclass(frozen=True)
 class Contact:
-    """The part that may touch, the obstacle, and the compliant layer in front of it."""
+    """A part that may touch an obstacle, and what acts between them.
+
+    Attributes
+    ----------
+    on
+        The part.
+    foundation
+        The obstacle.
+    layer
+        The compliant layer in front of it.
+    friction, conductor
+        Friction and electric contact; None for those that the problem is given for all.
+    """
 
     on: str
     foundation: Obstacle
     layer: Layer | None = None
+    friction: Friction | None = None
+    conductor: Conductor | None = None
 
 
 class ContactProblem:
-    """One body in front of one foundation.
+    """A body in front of rigid foundations.
 
     Parameters
     ----------
@@ -47,18 +70,22 @@ class ContactProblem:
     body
         Material, supports and loads.
     contact
-        Contact part and foundation.
+        Contact part and foundation, or several.
     friction
-        Friction law; none by default.
+        Friction law of contacts that have none of their own; none by default.
     conductor
-        Electric contact; None for an insulated foundation.
+        Electric contact, likewise; None for an insulated foundation.
     degree
         Degree of the Lagrange elements, 1 or 2.
 
     Attributes
     ----------
+    contacts
+        The contacts, each with its friction and conductor.
     equilibrium
         The body: its space, forms, forces and operators.
+    entries
+        The contacts with their nodes, which stand one after the other in the interface.
     interface
         Gamma_3 with its laws.
     scales
@@ -77,13 +104,21 @@ class ContactProblem:
         self,
         domain: Domain,
         body: Body,
-        contact: Contact,
+        contact: Contact | Sequence[Contact],
         friction: Friction | None = None,
         conductor: Conductor | None = None,
         degree: int = 1,
     ) -> None:
-        self.domain, self.body, self.contact = domain, body, contact
-        self.friction, self.conductor = friction or Friction(), conductor
+        self.domain, self.body = domain, body
+        given = [contact] if isinstance(contact, Contact) else contact
+        self.contacts = tuple(
+            replace(
+                contact,
+                friction=contact.friction or friction or Friction(),
+                conductor=contact.conductor or conductor,
+            )
+            for contact in given
+        )
         self.equilibrium = BodyEquilibrium(domain, body, degree)
         self.interface = self._interface()
         self.scales = self._scales()
@@ -105,34 +140,43 @@ class ContactProblem:
         return step
 
     def _interface(self) -> Interface:
-        contact, body, size = self.contact, self.equilibrium, self.domain.size
-        if contact.layer is not None:
-            contact.layer.check(size)
-        found = find_nodes(body, contact.on, contact.foundation)
+        size, one = self.domain.size, len(self.contacts) == 1
         stiffness = float(self.body.law.young) / size
-        response = FoundationResponse(
-            found, contact.layer, self.conductor, body.phi_scale, stiffness
+        self.entries = tuple(
+            self._entry("contact" if one else f"contact.{i}", contact)
+            for i, contact in enumerate(self.contacts)
         )
-        jump = response.constrained
-        friction = NodalFriction.at(jump, self.friction)
-        return Interface(jump, response, friction, self._held(jump), stiffness, size)
+        found = joined_nodes(self.entries)
+        layer, conductor = joined_layer(self.entries), joined_conductor(self.entries)
+        scale = self.equilibrium.phi_scale
+        response = FoundationResponse(found, layer, conductor, scale, stiffness)
+        friction, held = joined_friction(self.entries, found), joined_held(self.entries)
+        return Interface(response.constrained, response, friction, held, stiffness, size)
 
-    def _held(self, jump: ContactNodes) -> HeldCurrent | None:
-        if self.conductor is None or not self.piezoelectric:
+    def _entry(self, key: str, contact: Contact) -> Entry:
+        if contact.layer is not None:
+            contact.layer.check(self.domain.size)
+        assert contact.friction is not None  # filled in above
+        nodes = find_nodes(self.equilibrium, contact.on, contact.foundation, key)
+        held = self._held(contact, nodes)
+        return Entry(contact.on, nodes, contact.friction, contact.layer, contact.conductor, held)
+
+    def _held(self, contact: Contact, nodes: ContactNodes) -> HeldCurrent | None:
+        if contact.conductor is None or not self.piezoelectric:
             return None
-        body, contact = self.equilibrium, self.contact
+        body = self.equilibrium
         return held_current(
             candidates(self.domain, body.space, contact.on),
             contact.foundation,
             body.free,
-            jump,
-            self.conductor,
+            nodes,
+            contact.conductor,
             body.phi_scale,
         )
 
     def _scales(self) -> Scales:
         domain, law, d = self.domain, self.body.law, self.dim
-        area = volume(domain, domain.ds(self.contact.on))
+        area = sum(volume(domain, domain.ds(contact.on)) for contact in self.contacts)
         whole = volume(domain, domain.dx)
         cell = (whole / self.equilibrium.layout.index_map.size_global) ** (1 / d)
         return Scales(
@@ -184,12 +228,14 @@ class ContactProblem:
     def start(self, time: float | None = None) -> State:
         """Return the state to start from: at rest, but for the prescribed values at a time.
 
-        Where no potential is prescribed, it starts from that of the conductive foundation, which
-        alone determines it: far from phi_F a truncated charge has no derivative.
+        Where no potential is prescribed, it starts from that of the first conductive foundation,
+        as these alone determine it: far from phi_F a truncated charge has no derivative.
         """
         body, time = self.equilibrium, self.time if time is None else time
-        x, conductor = body.rest(), self.interface.response.conductor
-        if self.piezoelectric and conductor is not None:
+        x = body.rest()
+        conductors = [c.conductor for c in self.contacts if c.conductor is not None]
+        if self.piezoelectric and conductors:
             if all(fixed.potential is None for fixed in self.body.fixed):
-                x.reshape(-1, body.block_size)[:, -1] = conductor.phi_f / body.phi_scale
+                phi_f = conductors[0].at(self.time).phi_f
+                x.reshape(-1, body.block_size)[:, -1] = phi_f / body.phi_scale
         return State(body.prescribe(x, time), Multipliers.zero(self.nodes), time)

@@ -60,10 +60,8 @@ def loaded(problem: ContactProblem, factor: float) -> ContactProblem:
     return ContactProblem(
         problem.domain,
         body,
-        problem.contact,
-        problem.friction,
-        problem.conductor,
-        problem.equilibrium.degree,
+        problem.contacts,
+        degree=problem.equilibrium.degree,
     )
 
 

@@ -146,7 +146,7 @@ def with_layer(problem: ContactProblem, c: float, thickness: float = np.inf) -> 
     gap = TOUCH + (thickness if np.isfinite(thickness) else 0.0)
     foundation = GapFunction(lambda points: np.full(len(points), gap))
     layer = Layer(thickness, Compliance(np.inf), PotentialFactor(c))
-    contact = Contact(problem.contact.on, foundation, layer)
+    contact = Contact(problem.contacts[0].on, foundation, layer)
     return ContactProblem(problem.domain, problem.body, contact)
 
 

@@ -73,7 +73,7 @@ FILES = {
         ("[mesh.parts.loaded]", '[mesh.parts."a\\nb"]\nside = "base"\n[mesh.parts.loaded]'),
         r"mesh.parts.a\nb.side: given",
     ),
-    "a long key": (("young", f"{LONG} = 1\nyoung"), "kkk...: unknown key; accepted: law, young"),
+    "a long key": (("young", f"{LONG} = 1\nyoung"), "kkk...: unknown key; accepted: on, law"),
     "a long part": (
         ("[mesh.parts.loaded]", f'[mesh.parts.{LONG}]\nside = "base"\n[mesh.parts.loaded]'),
         'side: given "base"',
@@ -117,9 +117,17 @@ FILES = {
         ("traction", "force"),
         "load.0.force: unknown key: a load is given per area, traction = resultant / area of the",
     ),
+    "material of the contact": (
+        ('on = "bottom"', 'on = "bottom"\nmaterial = {young = 0.3}'),
+        "contact.material: unknown key here: [material] is a table of its own, at the top level",
+    ),
     "friction of the contact": (
         ('on = "bottom"', 'on = "bottom"\nfriction = {mu = 0.3}'),
-        "contact.friction: unknown key here: [friction] is a table of its own, at the top level",
+        'contact.friction.mu: given with law = "none"; accepted: law = "coulomb"',
+    ),
+    "friction twice": (
+        ('on = "bottom"', 'on = "bottom"\nfriction = {law = "coulomb", mu = 0.3}'),
+        "friction: beside friction of every contact; accepted: one of them",
     ),
 }
 

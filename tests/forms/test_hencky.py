@@ -212,7 +212,7 @@ def problems():
     held = Body(LAWS["norm"], [Fixed("left", [Affine((0.0,) * 3)] * 3)])
     yield (
         "norm in space P1",
-        ContactProblem(floating.domain, held, Contact("bottom", floating.contact.foundation)),
+        ContactProblem(floating.domain, held, Contact("bottom", floating.contacts[0].foundation)),
     )
 
 

@@ -234,7 +234,7 @@ NO_LAYERS = {
 @pytest.mark.parametrize("words", NO_LAYERS)
 def test_what_is_no_layer_is_refused(words):
     bare = leaning_block(MPI.COMM_SELF, 2)
-    contact = replace(bare.contact, layer=NO_LAYERS[words])
+    contact = replace(bare.contacts[0], layer=NO_LAYERS[words])
     with pytest.raises(InputError, match=words):
         ContactProblem(bare.domain, bare.body, contact)
 
@@ -340,8 +340,8 @@ def test_ranks_agree_on_a_layer_in_space(comm):
     def problem(comm):
         bare = leaning_block(comm, 3)
         layer = Layer(0.004, Compliance(0.003), PotentialFactor(4.0))
-        contact = replace(bare.contact, foundation=flat(0.005), layer=layer)
-        return ContactProblem(bare.domain, bare.body, contact, bare.friction)
+        contact = replace(bare.contacts[0], foundation=flat(0.005), layer=layer)
+        return ContactProblem(bare.domain, bare.body, contact)
 
     found = []
     for ranks in (comm, MPI.COMM_SELF):

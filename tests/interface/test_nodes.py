@@ -138,12 +138,13 @@ def test_two_bodies_that_differ_by_a_rotation_have_the_same_contact():
         [Load("top", [constant(c, 2) for c in q @ [0.0, -0.01]])],
     )
     plane = Plane((0.0, 0.0), tuple(q @ [0.0, 1.0]))
-    turned = ContactProblem(domain, body, Contact("bottom", plane), straight.friction)
+    friction = straight.contacts[0].friction
+    turned = ContactProblem(domain, body, Contact("bottom", plane), friction)
     upright = ContactProblem(
         rectangle(MPI.COMM_SELF, [0.0, 0.0], [4.0, 1.0], [32, 8]),
         Body(body.law, body.fixed, [Load("top", [ZERO, constant(-0.01, 2)])]),
         Contact("bottom", flat()),
-        straight.friction,
+        friction,
     )
     ours, theirs = contact_data(solve(turned, 1e-11)), solve(upright, 1e-11)
     order = np.argsort(ours["points"] @ q[:, 0])

@@ -1,5 +1,7 @@
 """Block relaxation and the fixed point around it: counts, options, and honest ends."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from mpi4py import MPI
@@ -204,9 +206,8 @@ def test_nothing_to_do():
     for gap in (0.0, 1.0):
         example = bar(MPI.COMM_SELF, 4)
         body = Body(example.body.law, example.body.fixed)
-        problem = ContactProblem(
-            example.domain, body, Contact("bottom", flat(gap)), example.friction
-        )
+        contact = replace(example.contacts[0], foundation=flat(gap))
+        problem = ContactProblem(example.domain, body, contact)
         loop = solve(problem)
         assert np.abs(loop.state.x).max() < 1e-14
         assert np.abs(loop.state.forces.pressure).max() < 1e-14

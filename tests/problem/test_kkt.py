@@ -152,9 +152,9 @@ def test_slip_of_a_sticking_node_and_slip_the_wrong_way(solved):
 def test_the_bound_is_that_of_the_final_pressure_and_slip(solved):
     """A solution for another coefficient does not pass."""
     problem = solved.problem
-    other = ContactProblem(
-        problem.domain, problem.body, problem.contact, Friction(SlipCoefficient(0.15, 0.1, 10.0))
-    )
+    friction = Friction(SlipCoefficient(0.15, 0.1, 10.0))
+    contact = replace(problem.contacts[0], friction=friction)
+    other = ContactProblem(problem.domain, problem.body, contact)
     assert evaluate(other, solved.state).friction > 1e-4
     assert evaluate(problem, solved.state).largest <= SMALL
 

@@ -368,9 +368,7 @@ def test_given_charges_balance():
     problem = ContactProblem(
         problem.domain,
         replace(problem.body, loads=[*problem.body.loads, *charges]),
-        problem.contact,
-        problem.friction,
-        problem.conductor,
+        problem.contacts,
     )
     solver = solve(problem)
     charges = charge_balance(problem, solver.state)

@@ -1,7 +1,7 @@
 """Small contact problems that several tests solve, and fields and rotations to state them."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import ufl
@@ -78,7 +78,8 @@ def bar(
     built = build_problem(case, comm, law=law)
     if friction is None:
         return built
-    return ContactProblem(built.domain, built.body, built.contact, friction, degree=degree)
+    contact = replace(built.contacts[0], friction=friction)
+    return ContactProblem(built.domain, built.body, contact, degree=degree)
 
 
 def leaning_block(comm: MPI.Comm, n: int = 3, degree: int = 1, mu: float = 0.3) -> ContactProblem:

@@ -79,9 +79,7 @@ def test_layer_without_stiffness_is_signorini(name, method):
     bare = ContactProblem(
         soft.domain,
         soft.body,
-        replace(soft.contact, layer=None),
-        soft.friction,
-        soft.conductor,
+        replace(soft.contacts[0], layer=None),
     )
     a, b = (solve_problem(problem, case.solver) for problem in (soft, bare))
     assert a.converged
@@ -185,9 +183,7 @@ def test_other_friction_laws_on_a_layer(law):
     problem = ContactProblem(
         problem.domain,
         problem.body,
-        problem.contact,
-        laws[law],
-        problem.conductor,
+        replace(problem.contacts[0], friction=laws[law]),
     )
     solution = solve_problem(problem, case.solver)
     assert solution.converged, solution.outcome

@@ -1,0 +1,130 @@
+"""From the sections about contact to obstacles, friction, layers and conductors."""
+
+from __future__ import annotations
+
+import numpy as np
+from mpi4py import MPI
+
+from contact.case import file as sections
+from contact.case.formula import Expression
+from contact.errors import InputError
+from contact.given import NodalField, given_field
+from contact.interface.current import Conductor
+from contact.interface.friction import Friction
+from contact.interface.layer import Layer
+from contact.interface.obstacle import GapFunction, Obstacle
+from contact.mesh.domain import Domain
+from contact.problem.problem import Contact
+from forms.laws import (
+    Compliance,
+    Conductivity,
+    ConstantCoefficient,
+    FrictionCoefficient,
+    FrictionLaw,
+    PerfectConductivity,
+    PotentialFactor,
+    RampConductivity,
+    ShiftedConductivity,
+    Truncation,
+)
+
+
+def make_contacts(
+    case: sections.Case,
+    domain: Domain,
+    coefficient: FrictionCoefficient | None = None,
+    friction: FrictionLaw | None = None,
+    foundation: Obstacle | None = None,
+    layer: Layer | None = None,
+) -> list[Contact]:
+    """Return the contacts of a case.
+
+    Parameters
+    ----------
+    case, domain
+        The case and its mesh.
+    coefficient, friction, foundation, layer
+        Objects that replace those of the case, where it has one contact.
+
+    Raises
+    ------
+    InputError
+        If there are replacements for one of several contacts.
+    """
+    given = foundation, layer, coefficient, friction
+    if len(case.contacts) > 1 and any(replacement is not None for replacement in given):
+        raise InputError(
+            "contact: foundation, layer, coefficient and friction given beside the case "
+            "replace those of one contact, not of several"
+        )
+    return [
+        Contact(
+            contact.on,
+            _foundation(key, contact, domain) if foundation is None else foundation,
+            _layer(contact) if layer is None else layer,
+            _friction(*case.friction_of(key, contact), domain.comm, coefficient, friction),
+            _conductor(case.electric_of(key, contact)[1], domain.size),
+        )
+        for key, contact in case.contacts
+    ]
+
+
+def _foundation(key: str, section: sections.Contact, domain: Domain) -> Obstacle:
+    if section.foundation is not None:
+        return section.foundation.obstacle(section.direction)
+    assert section.gap is not None  # filled in by the section
+    rounding = -1e-12 * domain.size
+    return GapFunction(NodalField(f"{key}.gap", section.gap, domain.comm, rounding).numpy)
+
+
+def _layer(section: sections.Contact) -> Layer | None:
+    if section.law == "signorini":
+        return None
+    # Filled in by the section.
+    assert section.layer is not None
+    assert section.limit is not None
+    assert section.stiffness is not None
+    assert section.potential_factor is not None
+    assert section.potential_range is not None
+    factor = PotentialFactor(section.stiffness, section.potential_factor, section.potential_range)
+    return Layer(section.layer, Compliance(section.limit), factor, section.lagged)
+
+
+def _friction(
+    key: str,
+    section: sections.Friction,
+    comm: MPI.Intracomm,
+    coefficient: FrictionCoefficient | None,
+    law: FrictionLaw | None,
+) -> Friction:
+    if law is not None:
+        return Friction(law=law, radius=section.radius)
+    if coefficient is not None:
+        return Friction(coefficient, radius=section.radius)
+    if section.law == "none":
+        return Friction()
+    if section.law == "tresca":
+        return Friction(tresca=given_field(f"{key}.bound", section.bound, comm, 0.0))
+    mu = section.mu
+    assert mu is not None  # demanded by the section
+    if not isinstance(mu, Expression):
+        return Friction(law=mu.friction(), radius=section.radius)
+    if mu.is_constant:
+        return Friction(ConstantCoefficient(mu.value), radius=section.radius)
+    field = NodalField(f"{key}.mu", mu, comm, 0.0)
+    return Friction(mu=field, radius=section.radius)
+
+
+def _conductor(section: sections.Electric | None, size: float) -> Conductor | None:
+    if section is None:
+        return None
+    delta = 1e3 / size if section.delta is None else section.delta
+    psi: Conductivity
+    if section.law == "shifted":
+        psi = ShiftedConductivity(section.k_e, delta)
+    elif section.law == "ramp":
+        psi = RampConductivity(section.k_e, delta)
+    else:
+        psi = PerfectConductivity(section.k_e)
+    limit = np.inf if section.limit is None else section.limit
+    return Conductor(psi, section.phi_f, Truncation(limit), section.lagged)

@@ -1,0 +1,59 @@
+"""Given functions of position, and sizes that numbers can hold."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from mpi4py import MPI
+from ufl.core.expr import Expr
+
+from contact.case.formula import Expression
+from contact.errors import InputError
+from contact.tolerances import HUGE
+from contact.typing import Array
+
+
+def check_range(key: str, value: float, least: float = 1 / HUGE) -> None:
+    """Refuse a size whose square is no number any more, or nothing."""
+    if not least <= value <= HUGE:
+        raise InputError(
+            f"{key}: a size of {value:.3g} leads to numbers that overflow; accepted: units that "
+            f"keep sizes between {1 / HUGE:g} and {HUGE:g}"
+        )
+
+
+@dataclass(frozen=True)
+class NodalField:
+    """A formula of the case file, evaluated on all ranks together; messages name its key."""
+
+    key: str
+    expression: Expression
+    comm: MPI.Intracomm
+    minimum: float = -np.inf
+
+    def ufl(self, x: Expr) -> Expr:
+        """Return the formula as a UFL expression of the coordinates."""
+        return self.expression.ufl(x)
+
+    def numpy(self, points: Array) -> Array:
+        """Return the values at points of shape (n, d). Collective."""
+        try:
+            values = self.expression.numpy(points, self.comm)
+        except InputError as error:
+            raise InputError(f"{self.key}: {error}") from None
+        largest = float(np.abs(values).max(initial=0.0))
+        check_range(self.key, self.comm.allreduce(largest, op=MPI.MAX), least=0.0)
+        least = self.comm.allreduce(float(values.min(initial=np.inf)), op=MPI.MIN)
+        if least < self.minimum:
+            raise InputError(
+                f"{self.key}: {self.expression} is {least:g} at a node; accepted: values >= 0"
+            )
+        return values
+
+
+def given_field(
+    key: str, expression: Expression | None, comm: MPI.Intracomm, minimum: float = -np.inf
+) -> NodalField | None:
+    """Return a formula of the case file as a field; None where none is given."""
+    return None if expression is None else NodalField(key, expression, comm, minimum)

@@ -1,0 +1,177 @@
+"""Several obstacles in front of one body: their nodes as one array, their laws as one law.
+
+What is built on it (`contact.interface.interface`) knows no number of obstacles.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from mpi4py import MPI
+
+from contact.errors import InputError
+from contact.interface.current import Conductor, HeldCurrent
+from contact.interface.friction import Friction, NodalFriction
+from contact.interface.history import SlipHistory
+from contact.interface.layer import Layer
+from contact.interface.nodes import ContactNodes
+from contact.interface.piecewise import (
+    ConductivityPieces,
+    FrictionPieces,
+    Pieces,
+    PointwisePieces,
+    SmoothingPieces,
+)
+from contact.interface.smoothing import Smoothing
+from contact.typing import Array
+from forms.laws import (
+    Compliance,
+    ConstantCoefficient,
+    Coulomb,
+    PerfectConductivity,
+    PotentialFactor,
+    Truncation,
+)
+
+#: What an obstacle has that has none of these.
+NO_FRICTION = Coulomb(ConstantCoefficient(0.0))
+NO_LAYER = Layer(0.0, Compliance(np.inf), PotentialFactor(0.0))
+NO_CONDUCTOR = Conductor(PerfectConductivity(0.0), 0.0, Truncation(np.inf))
+
+
+@dataclass(frozen=True)
+class Entry:
+    """One obstacle in front of the body.
+
+    Attributes
+    ----------
+    on
+        The part that may touch it.
+    nodes
+        Its contact nodes.
+    friction, layer, conductor
+        What acts there.
+    held
+        The current through nodes of the part that cannot move; None without.
+    """
+
+    on: str
+    nodes: ContactNodes
+    friction: Friction
+    layer: Layer | None = None
+    conductor: Conductor | None = None
+    held: HeldCurrent | None = None
+
+
+def joined_nodes(entries: Sequence[Entry]) -> ContactNodes:
+    """Return the nodes of all entries, one entry after the other. Collective.
+
+    Raises
+    ------
+    InputError
+        If two entries share nodes.
+    """
+    first = entries[0].nodes
+    if len(entries) == 1:
+        return first
+    every = np.concatenate([entry.nodes.nodes for entry in entries])
+    shared = every.size - np.unique(every).size
+    if first.comm.allreduce(shared, op=MPI.SUM) > 0:
+        names = ", ".join(entry.on for entry in entries)
+        raise InputError(
+            f"contact: the parts {names} share nodes, which one obstacle alone can hold; "
+            "accepted: parts without common nodes, such as pieces of a side with a gap between"
+        )
+    together = {
+        name: np.concatenate([getattr(entry.nodes, name) for entry in entries])
+        for name in ("nodes", "points", "weight", "normal", "tangent", "gap")
+    }
+    return replace(first, **together, cut=max(entry.nodes.cut for entry in entries))
+
+
+def joined_friction(entries: Sequence[Entry], nodes: ContactNodes) -> NodalFriction:
+    """Return friction at the nodes of all entries, joined before. Collective."""
+    if len(entries) == 1:
+        return NodalFriction.at(entries[0].nodes, entries[0].friction)
+    bounds = _bounds(entries)
+    smoothing = tuple(Smoothing(entry.nodes, entry.friction.radius) for entry in entries)
+    laws = [entry.friction.law_at(entry.nodes.points) for entry in entries]
+    law = None
+    if any(laws):
+        law = FrictionPieces(tuple(NO_FRICTION if own is None else own for own in laws), bounds)
+    return NodalFriction(law, SmoothingPieces(smoothing, bounds), SlipHistory.rest(nodes))
+
+
+def joined_layer(entries: Sequence[Entry]) -> Layer | None:
+    """Return the layers of all entries as one.
+
+    Raises
+    ------
+    InputError
+        If some are lagged and others not.
+    """
+    given = [entry.layer for entry in entries]
+    if len(given) == 1 or not any(given):
+        return given[0]
+    layers, bounds = [layer or NO_LAYER for layer in given], _bounds(entries)
+    return Layer(
+        np.repeat([layer.thickness for layer in layers], np.diff(bounds)),
+        PointwisePieces(tuple(layer.p_nu for layer in layers), bounds),
+        PointwisePieces(tuple(layer.h_nu for layer in layers), bounds),
+        _alike([layer.lagged for layer in given if layer is not None]),
+    )
+
+
+def joined_conductor(entries: Sequence[Entry]) -> Conductor | None:
+    """Return the conductors of all entries as one; raises as `joined_layer`."""
+    given = [entry.conductor for entry in entries]
+    return _joined_conductors(given, _bounds(entries))
+
+
+def _joined_conductors(
+    given: Sequence[Conductor | None], bounds: tuple[int, ...]
+) -> Conductor | None:
+    if len(given) == 1 or not any(given):
+        return given[0]
+    conductors = [conductor or NO_CONDUCTOR for conductor in given]
+
+    def phi_f(time: float) -> Array:
+        """Return the potentials of the foundations at a time."""
+        values = [conductor.at(time).phi_f for conductor in conductors]
+        return np.repeat(values, np.diff(bounds))
+
+    moving = any(conductor.phi_f_at is not None for conductor in conductors)
+    return Conductor(
+        ConductivityPieces(tuple(conductor.psi for conductor in conductors), bounds),
+        np.repeat([conductor.phi_f for conductor in conductors], np.diff(bounds)),
+        PointwisePieces(tuple(conductor.phi_l for conductor in conductors), bounds),
+        _alike([conductor.lagged for conductor in given if conductor is not None]),
+        phi_f if moving else None,
+    )
+
+
+def joined_held(entries: Sequence[Entry]) -> HeldCurrent | None:
+    """Return the current through the held nodes of all entries."""
+    given = [entry.held for entry in entries if entry.held is not None]
+    if len(given) <= 1:
+        return given[0] if given else None
+    together = {
+        name: np.concatenate([getattr(held, name) for held in given])
+        for name in ("nodes", "weight", "direction", "gap")
+    }
+    bounds = Pieces.bounds_of(held.nodes.size for held in given)
+    conductor = _joined_conductors([held.conductor for held in given], bounds)
+    assert conductor is not None
+    return replace(given[0], **together, conductor=conductor)
+
+
+def _bounds(entries: Sequence[Entry]) -> tuple[int, ...]:
+    return Pieces.bounds_of(entry.nodes.nodes.size for entry in entries)
+
+
+def _alike(lagged: Sequence[bool]) -> bool:
+    if len(set(lagged)) > 1:
+        raise InputError("contact: lagged is true for some and false for others; accepted: one way")
+    return lagged[0]
