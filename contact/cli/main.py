@@ -1,4 +1,4 @@
-"""The command line: ``python3 -m contact solve CASE.toml --out DIR`` and ``... check CASE.toml``.
+"""The command line: ``python3 -m contact solve CASE.toml --out DIR``, ``check``, ``plot``.
 
 Exit status: 0 converged, 1 not converged (outputs are written), 2 bad input, or no place for the
 results (one message, nothing is written), 70 a fault of the program, 130 stopped by Ctrl-C, 143
@@ -21,6 +21,7 @@ from typing import TYPE_CHECKING, Any, NoReturn
 
 from mpi4py import MPI
 
+from contact.cli import plot
 from contact.cli.ending import (
     BAD_INPUT,
     CONVERGED,
@@ -58,7 +59,7 @@ def _parser() -> _Parser:
     common: dict[str, Any] = {"add_help": False, "allow_abbrev": False}
     parser = _Parser(prog="contact", description=__doc__, **common)
     parser.add_argument("--help", action="help", help="show this help and leave")
-    commands = parser.add_subparsers(dest="command", required=True, metavar="solve|check")
+    commands = parser.add_subparsers(dest="command", required=True, metavar="solve|check|plot")
     for name, text in (
         ("solve", "solve a case and write the results"),
         ("check", "validate a case and print it with its mesh parts and unknowns"),
@@ -79,6 +80,7 @@ def _parser() -> _Parser:
             command.add_argument("--out", required=True, metavar="DIR", help="folder for results")
             command.add_argument("--plot", action="store_true", help="draw the figures too")
             command.add_argument("--quiet", action="store_true", help="show no progress")
+    plot.add_parser(commands, common)
     return parser
 
 
@@ -93,7 +95,8 @@ def parse(arguments: Sequence[str]) -> tuple[argparse.Namespace, list[str]]:
     if "-h" in arguments:
         arguments = ["--help" if argument == "-h" else argument for argument in arguments]
     options, rest = _parser().parse_known_args(arguments)
-    known = ["--set", "--out", "--plot", "--quiet", "--help"]
+    known = [f"--{name}" for name in vars(options) if name not in ("command", "case", "folder")]
+    known.append("--help")
     for i, argument in enumerate(rest):
         follows = i > 0 and rest[i - 1].startswith("-")
         if argument.startswith("--"):
@@ -190,6 +193,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
                 import petsc4py
 
                 petsc4py.init([sys.argv[0], *_own_options(), *petsc])
+                if options.command == "plot":
+                    return plot.run(options, comm)
                 from contact.case.file import load_case  # after PETSc's options
 
                 case = on_root(comm, lambda: load_case(options.case, options.set))

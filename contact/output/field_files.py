@@ -2,50 +2,140 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from dolfinx import fem, has_adios2, io
+from mpi4py import MPI
 
+from contact.errors import InputError
 from contact.output.disk import OVERHEAD, claim_room, closing, library_errors
 from contact.output.fields import DerivedFields, linear, unknowns
 from contact.output.solution import Solution
+from contact.output.vtu import VTU, Grid, Values, write_vtu
+from contact.problem.problem import ContactProblem
+from contact.problem.state import State
 
 
 def write_fields(solution: Solution, folder: Path) -> None:
-    """Write ``fields.bp`` and ``cells.bp``, or ``fields.xdmf``. Collective.
+    """Write the fields in the format that is asked for. Collective.
 
-    ``fields.bp`` holds all fields at the nodes, the derived ones averaged there; ``cells.bp``
-    the derived ones as they are, cell by cell: one VTX file has one kind of elements only.
-    Without ADIOS2, or on demand, both go to ``fields.xdmf``, of degree 1 at most.
+    ``fields.vtu`` holds all of them, the derived ones both averaged at the nodes and as they
+    are in the cells. So do ``fields.bp``, at the nodes, and ``cells.bp``, in the cells: one VTX
+    file has one kind of elements only. ``fields.xdmf`` has those at the nodes, of degree 1 at
+    most.
 
     Raises
     ------
     InputError
-        If there is no room for them.
+        If there is no room for them, or dolfinx has no ADIOS2 for VTX files.
     OSError
         On a rank where the library fails all the same; others may wait for it.
     """
-    problem, x = solution.problem, solution.state.x
-    derived = DerivedFields(problem.equilibrium, x)
-    comm = problem.comm
-    at_nodes = [*unknowns(problem.equilibrium, x).values(), *derived.nodes().values()]
-    if has_adios2 and solution.output.fields == "vtx":
-        in_cells = list(derived.cells().values())
-        claim_room(comm, folder, _bytes(at_nodes) + _bytes(in_cells))
-        for name, functions in (("fields.bp", at_nodes), ("cells.bp", in_cells)):
-            path = folder / name
-            with library_errors(path), closing(_vtx(path, functions)) as file:
-                file.write(0.0)
-        return
-    at_corners = [linear(function) for function in at_nodes]
-    claim_room(comm, folder, _bytes(at_corners))
+    problem, state = solution.problem, solution.state
+    match solution.output.fields:
+        case "vtu":
+            write_share(problem.comm, body_share(problem, state), folder / "fields.vtu")
+        case "vtx":
+            _write_vtx(problem, state, folder)
+        case "xdmf":
+            _write_xdmf(problem, state, folder)
+
+
+def body_share(problem: ContactProblem, state: State, names: Collection[str] | None = None) -> VTU:
+    """Return a body at a state with its fields: this rank's share. Collective.
+
+    Parameters
+    ----------
+    problem, state
+        The problem, and where it is.
+    names
+        Which fields; all of them by default.
+    """
+    body, d = problem.equilibrium, problem.dim
+    space = body.space
+    links, index_map = space.dofmap.list, space.dofmap.index_map
+    owned = body.domain.mesh.topology.index_map(d).size_local
+    cells = index_map.local_to_global(links[:owned].reshape(-1)).reshape(owned, links.shape[1])
+    points = space.tabulate_dof_coordinates()[: index_map.size_local, :d]
+
+    def nodal(function: fem.Function) -> Values:
+        """Return a function's values at the owned nodes of the body's space."""
+        dofmap = function.function_space.dofmap
+        values = np.empty((index_map.size_local + index_map.num_ghosts, dofmap.index_map_bs))
+        values[links] = function.x.array.reshape(-1, dofmap.index_map_bs)[dofmap.list]
+        return _rows(values[: index_map.size_local])
+
+    def mean(function: fem.Function) -> Values:
+        """Return a discontinuous function's means over the owned cells."""
+        dofmap = function.function_space.dofmap
+        values = function.x.array.reshape(-1, dofmap.index_map_bs)[dofmap.list[:owned]]
+        return _rows(values.mean(axis=1))
+
+    derived = DerivedFields(body, state.x)
+    at_points, in_cells = unknowns(body, state.x), {}
+    if names is None or set(names) - set(at_points):
+        at_points |= derived.nodes()
+        in_cells = derived.cells()
+    return VTU(
+        Grid(points, cells, d),
+        {k: nodal(f) for k, f in at_points.items() if names is None or k in names},
+        {f"{k}_cell": mean(f) for k, f in in_cells.items() if names is None or k in names},
+    )
+
+
+def _rows(values: Values) -> Values:
+    return values[:, 0] if values.shape[1] == 1 else values
+
+
+def write_share(comm: MPI.Intracomm, share: VTU, path: Path) -> None:
+    """Write a grid with its fields into a VTU file, if there is room. Collective.
+
+    Raises
+    ------
+    InputError, OSError
+        As `write_fields`.
+    """
+    grid = share.grid
+    arrays = [grid.points, grid.cells, *share.at_points.values(), *share.in_cells.values()]
+    # Vectors of the plane get a third component, cells their ends and kinds, and three bytes
+    # are written as four letters.
+    claim_room(comm, path.parent, OVERHEAD + sum(2 * array.nbytes for array in arrays))
+    write_vtu(comm, path, share)
+
+
+def _write_vtx(problem: ContactProblem, state: State, folder: Path) -> None:
+    if not has_adios2:
+        raise InputError(
+            'output.fields: "vtx" needs a dolfinx with ADIOS2, and this one has none; accepted: '
+            '"vtu", "xdmf" or "none"'
+        )
+    at_nodes, derived = _at_nodes(problem, state)
+    in_cells = list(derived.cells().values())
+    claim_room(problem.comm, folder, _bytes(at_nodes) + _bytes(in_cells))
+    for name, functions in (("fields.bp", at_nodes), ("cells.bp", in_cells)):
+        path = folder / name
+        with library_errors(path), closing(_vtx(path, functions)) as file:
+            file.write(0.0)
+
+
+def _write_xdmf(problem: ContactProblem, state: State, folder: Path) -> None:
+    at_corners = [linear(function) for function in _at_nodes(problem, state)[0]]
+    claim_room(problem.comm, folder, _bytes(at_corners))
     path = folder / "fields.xdmf"
-    with library_errors(path), closing(lambda: io.XDMFFile(comm, path, "w")) as file:
+    with library_errors(path), closing(lambda: io.XDMFFile(problem.comm, path, "w")) as file:
         file.write_mesh(problem.domain.mesh)
         for function in at_corners:
             file.write_function(function)
+
+
+def _at_nodes(problem: ContactProblem, state: State) -> tuple[list[fem.Function], DerivedFields]:
+    """Return all fields at the nodes, and the derived ones to be asked for those in the cells."""
+    derived = DerivedFields(problem.equilibrium, state.x)
+    found = unknowns(problem.equilibrium, state.x) | derived.nodes()
+    return list(found.values()), derived
 
 
 def _vtx(path: Path, functions: Sequence[fem.Function]) -> Callable[[], Any]:

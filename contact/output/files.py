@@ -7,10 +7,13 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from contact.output.field_files import write_fields
+from mpi4py import MPI
+
+from contact.output.field_files import write_fields, write_share
 from contact.output.folder import ResultFolder, on_root, result_folder
 from contact.output.solution import Solution
 from contact.output.summary import summarise
+from contact.output.surface import contact_surface
 from contact.output.table import contact_table
 from contact.output.tables import write_tables
 
@@ -54,7 +57,15 @@ def _replace(solution: Solution, folder: ResultFolder, figures: bool) -> None:
 
     def write(new: Path) -> Mapping[str, Any]:
         table = contact_table(solution)
-        on_root(comm, lambda: write_tables(solution, table, new) if table is not None else None)
+        surface = contact_surface(solution, table)
+
+        def write_contact() -> None:
+            assert table is not None
+            assert surface is not None
+            write_tables(solution, table, new)
+            write_share(MPI.COMM_SELF, surface, new / "contact.vtu")
+
+        on_root(comm, write_contact)
         if solution.output.fields != "none":
             write_fields(solution, new)
         if solution.output.checkpoint:

@@ -15,10 +15,11 @@ class OutputOptions:
     Attributes
     ----------
     fields
-        Format of the fields: `vtx` (fields.bp), `xdmf` or none.
+        Format of the fields: `vtu` (fields.vtu), which ParaView, pyvista and meshio open; `vtx`
+        (fields.bp and cells.bp, by ADIOS2); `xdmf` (fields.xdmf); or none.
     checkpoint
         `true`: write a checkpoint from which a computation can go on.
     """
 
-    fields: Literal["vtx", "xdmf", "none"] = "vtx"
+    fields: Literal["vtu", "vtx", "xdmf", "none"] = "vtu"
     checkpoint: Switch = False

@@ -30,7 +30,8 @@ def tangent_of(normal: Array) -> Array:
 def contact_table(solution: Solution) -> Table | None:
     """Return a column a quantity on rank 0 and None elsewhere. Collective.
 
-    These are the columns of ``contact.csv`` (`csv_columns`) and the contact direction ``nu_x``...
+    These are the columns of ``contact.csv`` (`csv_columns`), the contact direction ``nu_x``...
+    and the numbers of the node, over all ranks, and of the contact: ``node``, ``entry``.
 
     In the plane the rows follow Gamma_3 from node to node, each connected piece from its end
     with the smaller x (then y), and ``u_t`` and ``tau`` are the components of u_tau and
@@ -72,17 +73,23 @@ def contact_table(solution: Solution) -> Table | None:
         columns["phi"] = problem.equilibrium.phi_scale * nodal[:, -1]
         columns["d_n"] = response.charge(nodal, pressure)
     columns |= {f"nu_{axis}": nodes.normal[:, i] for i, axis in enumerate("xyz"[: problem.dim])}
-    order, entries = _order(problem), problem.comm.gather(entry)
+    columns |= {
+        "node": problem.equilibrium.layout.index_map.local_to_global(nodes.nodes),
+        "entry": entry,
+    }
+    order = _order(problem)
     gathered = {name: problem.comm.gather(values) for name, values in columns.items()}
-    if order is None or entries is None:
+    if order is None:
         return None
-    order = order[np.argsort(np.concatenate(entries)[order], kind="stable")]
-    return {name: np.concatenate(values)[order] for name, values in gathered.items()}
+    whole = {name: np.concatenate(values)[order] for name, values in gathered.items()}
+    by_entry = np.argsort(whole["entry"], kind="stable")
+    return {name: values[by_entry] for name, values in whole.items()}
 
 
 def csv_columns(table: Table) -> Table:
-    """Return the columns of ``contact.csv``: all but the contact direction."""
-    return {name: values for name, values in table.items() if not name.startswith("nu_")}
+    """Return the columns of ``contact.csv``: all but contact direction and numbers."""
+    inner = ("nu_x", "nu_y", "nu_z", "node", "entry")
+    return {name: values for name, values in table.items() if name not in inner}
 
 
 def held_points(problem: ContactProblem) -> Array:

@@ -23,7 +23,7 @@ import os
 import re
 import shutil
 import stat
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from pathlib import Path
 
@@ -35,7 +35,7 @@ SUMMARY = "summary.json"
 MANIFEST = "files"
 
 #: What runs may write. A summary is data of whoever wrote it: no other names are taken from it.
-_MEMBER = re.compile(r"[A-Za-z0-9][\w-]*\.(json|csv|bp|xdmf|h5|vtkhdf|pvd|vtu|png)")
+_MEMBER = re.compile(r"[A-Za-z0-9][\w-]*\.(json|csv|bp|xdmf|h5|vtkhdf|pvd|vtu|png|pdf|svg)")
 #: What ADIOS2 leaves in a folder of fields.
 _ADIOS = re.compile(r"(data|md|mmd)\.(\d+|idx)|profiling\.json|active")
 
@@ -44,6 +44,8 @@ MEMBERS = (
     SUMMARY,
     "contact.csv",
     "history.csv",
+    "contact.vtu",
+    "fields.vtu",
     "fields.bp",
     "cells.bp",
     "fields.xdmf",
@@ -90,6 +92,24 @@ def complete(folder: Path, summary: dict[str, object]) -> None:
     _sync(draft)
     check_members(folder, tuple(members))
     os.replace(draft, new / SUMMARY)
+
+
+def add(folder: Path, files: Sequence[Path]) -> None:
+    """Put further members, which stand in ``new``, beside those of a complete run.
+
+    The summary names them before they are there: a name without a file does no harm, but a
+    later run would leave a file without a name.
+    """
+    names = tuple(path.name for path in files)
+    check_members(folder, names)
+    summary = json.loads((folder / SUMMARY).read_bytes())
+    summary[MANIFEST] = sorted({*_members(folder / SUMMARY), *names})
+    draft = folder / STAGE / SUMMARY
+    draft.write_text(json.dumps(summary, indent=2, allow_nan=False) + "\n", encoding="utf-8")
+    _sync(draft)
+    os.replace(draft, folder / SUMMARY)
+    for path in files:
+        os.replace(path, folder / path.name)
 
 
 def swap(folder: Path) -> None:

@@ -299,7 +299,7 @@ BAD = {
     ),
     "iterations": ({"solver__max_outer": 0}, "solver.max_outer: given 0"),
     "levels": ({"solver__nested_levels": 3}, "nested_levels with nested = true"),
-    "output": ({"output": {"fields": "vtk"}}, '"vtx", "xdmf" or "none"'),
+    "output": ({"output": {"fields": "vtk"}}, '"vtu", "vtx", "xdmf" or "none"'),
     "unknown output": ({"output": {"feilds": "vtx"}}, "output.feilds: unknown key, did you mean f"),
     "output as a number": ({"output": 3}, "output: given 3; accepted: a table"),
     "title": ({"title": 3}, "title: given 3; accepted: a text"),

@@ -97,8 +97,8 @@ def test_fixed_formats(dim: int, degree: int, shared_tmp_path: Path) -> None:
     history = (shared_tmp_path / "history.csv").read_text().splitlines()
     assert len(history) == 1 + summary["outer_iterations"]
     assert len(summary["inner_iterations"]) == summary["outer_iterations"]
-    for name in ("fields.bp", "cells.bp"):
-        assert (shared_tmp_path / name).is_dir()
+    for name in ("fields.vtu", "contact.vtu"):
+        assert (shared_tmp_path / name).is_file()
     assert not list(shared_tmp_path.glob(".*")), "nothing half written is left"
 
 
@@ -198,6 +198,7 @@ def test_fields_can_be_read_back(shared_tmp_path: Path) -> None:
     """fields.bp holds all fields at the nodes, with the values of the solution."""
     adios2 = pytest.importorskip("adios2")
     solution = solve(block(2))
+    solution.output = OutputOptions(fields="vtx")
     written(solution, shared_tmp_path)
     with adios2.FileReader(str(shared_tmp_path / "fields.bp"), MPI.COMM_SELF) as file:
         names = set(file.available_variables())
@@ -218,6 +219,7 @@ def test_xdmf(shared_tmp_path: Path) -> None:
     assert all(name in text for name in ("displacement", "stress", "von_mises", "dev_strain"))
     assert sorted(path.name for path in shared_tmp_path.iterdir()) == [
         "contact.csv",
+        "contact.vtu",
         "fields.h5",
         "fields.xdmf",
         "history.csv",
@@ -300,9 +302,9 @@ def test_outputs_are_replaced(shared_tmp_path: Path) -> None:
     (shared_tmp_path / "notes.txt").write_text("mine")
     summary, rows = written(second, shared_tmp_path)
     assert sorted(path.name for path in shared_tmp_path.iterdir()) == [
-        "cells.bp",
         "contact.csv",
-        "fields.bp",
+        "contact.vtu",
+        "fields.vtu",
         "history.csv",
         "notes.txt",
         "summary.json",

@@ -333,7 +333,7 @@ def small_disk(tmp_path: Path) -> Iterator[Path]:
 
 
 @RANKS
-@pytest.mark.parametrize("format_", ["vtx", "xdmf"])
+@pytest.mark.parametrize("format_", ["vtu", "vtx", "xdmf"])
 def test_a_full_disk_keeps_the_earlier_results(
     ranks: int, format_: str, good: Path, small_disk: Path
 ) -> None:
@@ -357,7 +357,7 @@ def test_a_full_disk_keeps_the_earlier_results(
 
 
 @RANKS
-@pytest.mark.parametrize("format_", ["vtx", "xdmf", "checkpoint"])
+@pytest.mark.parametrize("format_", ["vtu", "vtx", "xdmf", "checkpoint"])
 def test_a_library_that_fails_to_write_does_not_end_in_an_abort(
     ranks: int, format_: str, good: Path, tmp_path: Path
 ) -> None:

@@ -5,20 +5,19 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any, TypeAlias
 
+import matplotlib
 import numpy as np
-from dolfinx import mesh as dmesh
 from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection, PolyCollection
 from matplotlib.figure import Figure
-from mpi4py import MPI
 from numpy.typing import NDArray
 
-from contact import _compat
-from contact.mesh.domain import Domain, exterior_facets
-from contact.output.fields import DerivedFields, linear
+from contact.errors import InputError
+from contact.output.field_files import body_share
 from contact.output.figures.contact import BLUE, ends
 from contact.output.solution import Solution
 from contact.output.table import Table, held_points
+from contact.output.vtu import VTU, Grid, gathered
 from contact.typing import Array
 
 Indices: TypeAlias = NDArray[np.integer[Any]]
@@ -88,78 +87,107 @@ def picture(solution: Solution, field: str, label: str) -> Picture | None:
     label
         Of the colours.
     """
-    problem, d = solution.problem, solution.problem.dim
-    domain, comm = problem.domain, problem.comm
-    u = linear(solution.displacement)
-    if field == "potential":
-        assert solution.potential is not None
-        values = linear(solution.potential)
-    else:
-        values = DerivedFields(problem.equilibrium, solution.state.x).cells()[field]
-    cells, places = _triangles(domain)
-    x = domain.mesh.geometry.x[_compat.geometry_dofmap(domain.mesh)]
-    corners = np.take_along_axis(x[cells][:, :, :d], places[:, :, None], axis=1)
-    nodes = np.take_along_axis(u.function_space.dofmap.list[cells], places, axis=1)
-    moved = u.x.array.reshape(-1, d)[nodes]
-    dofs = values.function_space.dofmap.list[cells]
-    # One value for P1, else one a corner.
-    colours = values.x.array[dofs[:, 0] if dofs.shape[1] == 1 else _take(dofs, places)]
-    largest = comm.allreduce(float(np.linalg.norm(moved, axis=-1).max(initial=0.0)), op=MPI.MAX)
-    scale = magnification(domain.size, largest)
-    drawn = corners + scale * moved
-    low = drawn.min(axis=(0, 1), initial=np.inf)
-    high = drawn.max(axis=(0, 1), initial=-np.inf)
-    comm.Allreduce(MPI.IN_PLACE, low, MPI.MIN)
-    comm.Allreduce(MPI.IN_PLACE, high, MPI.MAX)
-    box = np.array([low, high])
-    outline, held = _outline(domain), held_points(problem)
-    if d == 2 and comm.allreduce(len(cells), op=MPI.SUM) > MOST_CELLS:
-        image = _pixels(comm, drawn, colours, box)
+    problem = solution.problem
+    share = body_share(problem, solution.state, ("displacement", field))
+    body, held = gathered(problem.comm, share), held_points(problem)
+    return None if body is None else drawn(body, held, field, label)
+
+
+def drawn(body: VTU, held: Array, field: str, label: str) -> Picture:
+    """Make a picture of a body coloured by a field. On one rank.
+
+    Parameters
+    ----------
+    body
+        The body with its fields.
+    held
+        Nodes of Gamma_3 that are no contact nodes, shape (n, d).
+    field
+        Name of a field, as `scalar` takes it.
+    label
+        Of the colours.
+    """
+    grid, d = body.grid, body.grid.dimension
+    u = np.asarray(body.at_points["displacement"])[:, :d]
+    points = grid.points[:, :d]
+    cells, nodes = _triangles(grid)
+    corners, moved = points[nodes], u[nodes]
+    values, in_cells = scalar(body, field)
+    colours = values[cells] if in_cells else values[nodes]
+    used = np.unique(grid.corners)
+    size = float(np.ptp(points[used], axis=0).max())
+    scale = magnification(size, float(np.linalg.norm(u[used], axis=1).max()))
+    places = points[used] + scale * u[used]
+    box = np.array([places.min(axis=0), places.max(axis=0)])
+    outline = points[_boundary(grid.corners)] if d == 2 else np.empty((0, 2, 3))
+    if d == 2 and len(cells) > MOST_CELLS:
+        image = _pixels(corners + scale * moved, colours, box)
         empty = np.empty((0, 3, d))
-        made = Picture(empty, empty, np.empty(0), outline, image, box, scale, label, held)
-        return made if comm.rank == 0 else None
-    gathered = [comm.gather(array) for array in (corners, moved, colours)]
-    if comm.rank > 0:
-        return None
-    corners, moved, colours = (np.concatenate(arrays) for arrays in gathered if arrays is not None)
+        return Picture(empty, empty, np.empty(0), outline, image, box, scale, label, held)
     return Picture(corners, moved, colours, outline, None, box, scale, label, held)
 
 
-def _take(dofs: Indices, places: Indices) -> Indices:
-    return np.take_along_axis(dofs, places, axis=1)
+def scalar(body: VTU, field: str) -> tuple[Array, bool]:
+    """Return a scalar field of a body, and whether its values are those of the cells.
+
+    Derived fields are taken as they are in cells of degree 1, and averaged at the nodes of
+    others. ``displacement``, ``stress``... are the lengths of these vectors and tensors, and
+    ``displacement_y``, ``stress_xy``... their components.
+
+    Raises
+    ------
+    InputError
+        If the body has no such field.
+    """
+    name, _, component = field.rpartition("_")
+    for whole, part in ((field, ""), (name, component)):
+        linear = body.grid.cells.shape[1] == body.grid.dimension + 1
+        in_cells = linear and f"{whole}_cell" in body.in_cells
+        fields, key = (body.in_cells, f"{whole}_cell") if in_cells else (body.at_points, whole)
+        if key not in fields or not set(part) <= set("xyz"):
+            continue
+        values = np.asarray(fields[key])
+        if not part and values.ndim > 1:
+            return np.asarray(np.linalg.norm(values, axis=1)), in_cells
+        if not part:
+            return values, in_cells
+        if values.ndim > 1 and len(part) == (2 if values.shape[1] == 9 else 1):
+            return values[:, int("".join(str("xyz".index(i)) for i in part), 3)], in_cells
+    accepted = [name if np.ndim(v) == 1 else f"{name}[_x..]" for name, v in body.at_points.items()]
+    raise InputError(f"--field {field}: no such field; accepted: {', '.join(sorted(accepted))}")
 
 
-def _triangles(domain: Domain) -> tuple[Indices, Indices]:
-    """Return cells and three corners of each: the cells in the plane, the surface in space."""
-    mesh, d = domain.mesh, domain.dim
-    if d == 2:
-        cells = np.arange(mesh.topology.index_map(2).size_local)
-        return cells, np.broadcast_to([0, 1, 2], (cells.size, 3))
-    facets = exterior_facets(mesh)
-    mesh.topology.create_connectivity(2, 3)
-    mesh.topology.create_connectivity(3, 2)
-    to_cell, to_facet = mesh.topology.connectivity(2, 3), mesh.topology.connectivity(3, 2)
-    cells = to_cell.array[to_cell.offsets[facets]]
-    opposite = np.argmax(to_facet.array.reshape(-1, 4)[cells] == facets[:, None], axis=1)
-    # Facet i of a tetrahedron lies opposite to its corner i.
-    others = np.array([[1, 2, 3], [0, 2, 3], [0, 1, 3], [0, 1, 2]])
-    return cells, others[opposite]
+def _triangles(grid: Grid) -> tuple[Indices, Indices]:
+    """Return cells and three nodes of each: the cells in the plane, the surface in space."""
+    if grid.dimension == 2:
+        return np.arange(len(grid.cells)), grid.corners
+    faces = _faces(grid.corners)
+    chosen = _single(faces)
+    return chosen % len(grid.cells), faces[chosen]
 
 
-def _outline(domain: Domain) -> Array:
-    """Return the boundary edges of a plane mesh, from all ranks; nothing in space."""
-    mesh = domain.mesh
-    if domain.dim == 3:
-        return np.empty((0, 2, 3))
-    facets = exterior_facets(mesh)
-    ends = np.empty((0, 2), dtype=np.int32)
-    if facets.size > 0:  # dolfinx divides by their number
-        ends = dmesh.entities_to_geometry(mesh, 1, facets)
-    return np.concatenate(domain.comm.allgather(mesh.geometry.x[ends][:, :, :2]))
+def _faces(corners: Indices) -> Indices:
+    """Return the faces of simplices by their corners, the first of all, then the second..."""
+    size = corners.shape[1]
+    return np.concatenate([np.delete(corners, k, axis=1) for k in range(size)])
 
 
-def _pixels(comm: MPI.Intracomm, drawn: Array, colours: Array, box: Array) -> Array:
-    """Return the means over pixels, NaN outside the body: no rank holds the whole mesh."""
+def _single(faces: Indices) -> Indices:
+    """Return the places of the faces that occur once."""
+    _, first, count = np.unique(
+        np.sort(faces, axis=1), axis=0, return_index=True, return_counts=True
+    )
+    return np.sort(first[count == 1])
+
+
+def _boundary(corners: Indices) -> Indices:
+    """Return the edges on the boundary of triangles, by their ends."""
+    edges = _faces(corners)
+    return edges[_single(edges)]
+
+
+def _pixels(drawn: Array, colours: Array, box: Array) -> Array:
+    """Return the means over pixels, NaN outside the body."""
     extent = box[1] - box[0]
     shape = np.maximum(np.rint(PIXELS * extent / extent.max()).astype(int), 1)
     corners = (drawn - box[0]) / extent * shape
@@ -176,7 +204,6 @@ def _pixels(comm: MPI.Intracomm, drawn: Array, colours: Array, box: Array) -> Ar
             weights = (barycentric @ values[cells].T).ravel()
             sums[0] += np.bincount(flat.ravel(), weights, shape.prod())
             sums[1] += np.bincount(flat.ravel(), minlength=shape.prod())
-    comm.Allreduce(MPI.IN_PLACE, sums)
     with np.errstate(invalid="ignore"):
         return np.asarray((sums[0] / sums[1]).reshape(shape).T)
 
@@ -193,7 +220,9 @@ def _samples(n: int) -> Array:
 def draw_plane(picture: Picture, table: Table, title: str = "") -> Figure:
     """Draw a plane body over its outline at rest and the foundation."""
     width, height = picture.box[1] - picture.box[0]
-    figure = Figure(figsize=(6.3, float(np.clip(5.8 * height / width, 1.2, 5.5)) + 1.4))
+    inches = float(matplotlib.rcParams["figure.figsize"][0])
+    tall = float(np.clip(0.92 * height / width, 0.19, 0.87))
+    figure = Figure(figsize=(inches, tall * inches + 1.4))
     ax = figure.subplots()
     drawn = picture.corners + picture.scale * picture.displacement
     if picture.image is not None:
@@ -219,7 +248,7 @@ def draw_plane(picture: Picture, table: Table, title: str = "") -> Figure:
     ax.autoscale_view()
     ax.set_xlabel("$x$ (mesh units)")
     ax.set_ylabel("$y$ (mesh units)")
-    ax.set_title(with_scale(title, picture.scale), fontsize=9)
+    ax.set_title(with_scale(title, picture.scale), fontsize="medium")
     return figure
 
 

@@ -5,16 +5,22 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Any
 
+import matplotlib
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
+from contact.output.surface import STATUS
 from contact.output.table import Table
+from contact.output.vtu import VTU
 from contact.typing import Array
 
 #: Okabe and Ito's palette: told apart by colour-blind readers, and in grey.
-BLUE, ORANGE, GREY, LIGHT = "#0072B2", "#D55E00", "#555555", "#BBBBBB"
+BLUE, ORANGE, GREY = "#0072B2", "#D55E00", "#555555"
+#: Figures narrower than this (inches) have small letters and legends of two columns.
+NARROW = 4.5
 ZONES = {
     "stick": ("#CDE7F0", "sticking"),
     "slip": ("#FBE3C8", "sliding"),
@@ -82,7 +88,9 @@ def draw_line(table: Table, title: str = "", held: Array | None = None) -> Figur
     where, name = position(table)
     bound, tau = table["bound"], table["tau"]
     frictional = bool(np.any(bound > 0))
-    figure = Figure(figsize=(6.3, 5.0 if frictional else 3.0))
+    width = float(matplotlib.rcParams["figure.figsize"][0])
+    tall = 0.8 if frictional else 0.48
+    figure = Figure(figsize=(width, (tall if width > NARROW else 1.5 * tall) * width))
     axes = figure.subplots(2 if frictional else 1, sharex=True, squeeze=False)[:, 0]
     for ax in axes:
         for zone, start, stop in zones(table["status"], where):
@@ -108,9 +116,10 @@ def draw_line(table: Table, title: str = "", held: Array | None = None) -> Figur
         _focus(axes[1], bound, -1.0)
     for k, ax in enumerate(axes):
         handles = ax.get_legend_handles_labels()[0] + (shown if k == 0 else [])
-        ax.legend(handles=handles, ncols=len(handles), loc="lower left", bbox_to_anchor=(0, 1))
+        columns = len(handles) if width > NARROW else 2
+        ax.legend(handles=handles, ncols=columns, loc="lower left", bbox_to_anchor=(0, 1))
     if title:
-        figure.suptitle(title, fontsize=10)
+        figure.suptitle(title, fontsize="large")
     return figure
 
 
@@ -137,58 +146,101 @@ def _focus(ax: Axes, values: Array, low: float) -> None:
         ax.annotate(text, (0.99, 0.97), xycoords="axes fraction", ha="right", va="top", fontsize=7)
 
 
-def draw_surface(table: Table, title: str = "") -> Figure:
-    """Draw pressure, status and friction arrows on Gamma_3 in space."""
-    points = np.column_stack([table[axis] for axis in "xyz"])
-    flat, names = _flatten(points)
-    figure = Figure(figsize=(6.3, 3.8))
+def draw_surface(surface: VTU, title: str = "") -> Figure:
+    """Draw pressure, status and friction arrows on Gamma_3 in space, facet by facet."""
+    view, names = _view(surface)
+    flat = surface.grid.points @ view.T
+    triangles = _triangles(surface)
+    pressure = np.asarray(surface.at_points["pressure"])
+    width = float(matplotlib.rcParams["figure.figsize"][0])
+    figure = Figure(figsize=(width, 0.6 * width))
     # Placed by hand: the automatic layouts leave no room below axes of equal scale.
     figure.set_layout_engine("none")
     left, right = (figure.add_axes((x, 0.34, 0.38, 0.5)) for x in (0.1, 0.6))
-    if np.linalg.matrix_rank(flat - flat[0]) == 2:
-        shown = left.tripcolor(*flat.T, table["pressure"], shading="gouraud", cmap="viridis")
-    else:  # too few nodes for triangles
-        shown = left.scatter(*flat.T, c=table["pressure"], cmap="viridis")
+    for ax in (left, right):
+        ax.add_collection(PolyCollection(list(flat[triangles]), facecolor="#F2F2F2", lw=0))
+    known = np.isfinite(pressure[triangles]).all(axis=1)
+    drawn = triangles[known] if known.any() else triangles
+    shown = left.tripcolor(
+        *flat.T, drawn, np.nan_to_num(pressure), shading="gouraud", cmap="viridis"
+    )
     bar = figure.add_axes((0.1, 0.15, 0.38, 0.03))
     figure.colorbar(
         shown, cax=bar, orientation="horizontal", label=r"$-\sigma_\nu$ (units of the case)"
     )
-    size = float(np.clip(2e3 / len(points), 0.5, 12))
-    for zone, colour in (("open", LIGHT), ("stick", BLUE), ("slip", ORANGE)):
-        chosen = table["status"] == zone
+    status = np.asarray(surface.at_points["status"])
+    size = float(np.clip(2e3 / len(flat), 0.5, 12))
+    for zone, colour in (("open", "#DDDDDD"), ("stick", BLUE), ("slip", ORANGE)):
+        chosen = status == STATUS[zone]
         if np.any(chosen):
             right.scatter(*flat[chosen].T, color=colour, s=size, lw=0, label=ZONES[zone][1])
-    friction = _flatten(points, np.column_stack([table[f"tau_{axis}"] for axis in "xyz"]))[0]
-    if np.any(friction):
-        chosen = _thinned(flat, 16)
-        arrows = {"color": "black", "width": 0.004, "clip_on": False}
-        right.quiver(*flat[chosen].T, *friction[chosen].T, **arrows)
+    _arrows(right, surface, flat, view)
     figure.legend(ncols=3, handletextpad=0.2, loc="center", bbox_to_anchor=(0.79, 0.165))
     for ax, name in ((left, "contact pressure"), (right, "status, friction (arrows)")):
         ax.set_aspect("equal")
-        ax.margins(0.08)
-        ax.set_title(name, fontsize=9)
+        ax.margins(0.04)
+        _zoom(ax, surface, flat)
+        ax.set_title(name, fontsize="medium")
         ax.set_xlabel(f"${names[0]}$ (mesh units)")
     left.set_ylabel(f"${names[1]}$ (mesh units)")
     if title:
-        figure.suptitle(title, fontsize=10)
+        figure.suptitle(title, fontsize="large")
     return figure
 
 
-def _flatten(points: Array, vectors: Array | None = None) -> tuple[Array, tuple[str, str]]:
-    """Return points, or vectors there, in the two coordinates along which Gamma_3 extends.
+def _triangles(surface: VTU) -> Any:
+    """Return the facets as triangles of nodes, those of degree 2 as four each."""
+    cells = surface.grid.cells
+    if cells.shape[1] == 3:
+        return cells
+    quarters = [[0, 5, 4], [5, 1, 3], [4, 3, 2], [3, 4, 5]]
+    return np.concatenate([cells[:, corners] for corners in quarters])
 
-    These are two axes if Gamma_3 is flat along them, else its principal directions x_1, x_2.
+
+def _arrows(ax: Axes, surface: VTU, flat: Array, view: Array) -> None:
+    """Draw the friction stress, its largest arrow a tenth of the contact part, within the axes."""
+    traction, normal = (np.asarray(surface.at_points[name]) for name in ("traction", "normal"))
+    along = traction - np.einsum("ni,ni->n", traction, normal)[:, None] * normal
+    friction = np.nan_to_num(along @ view.T)
+    size = np.linalg.norm(friction, axis=1)
+    acting = np.flatnonzero(size > 1e-6 * size.max(initial=0.0))
+    if not acting.size:
+        return
+    chosen = acting[_thinned(flat[acting], 16)]
+    scale = size[chosen].max() / (0.1 * np.ptp(flat, axis=0).max())
+    ends = flat[chosen] + friction[chosen] / scale
+    exact = {"angles": "xy", "scale_units": "xy", "scale": scale}
+    ax.quiver(*flat[chosen].T, *friction[chosen].T, color="black", width=0.004, **exact)
+    ax.update_datalim(ends)
+
+
+def _view(surface: VTU) -> tuple[Array, tuple[str, str]]:
+    """Return two directions across the mean contact direction, shape (2, 3), and their names.
+
+    These are axes where it lies along the third, else directions x_1, x_2.
     """
-    extent = np.ptp(points, axis=0)
-    given = points if vectors is None else vectors
-    thin = int(np.argmin(extent))
-    if extent[thin] <= 0.2 * np.sort(extent)[1]:
-        kept = [k for k in range(3) if k != thin]
-        return given[:, kept], ("xyz"[kept[0]], "xyz"[kept[1]])
-    centred = points - points.mean(axis=0)
-    directions = np.linalg.eigh(centred.T @ centred)[1][:, :0:-1]
-    return given @ directions, ("x_1", "x_2")
+    normal = np.asarray(surface.at_points["normal"])
+    touching = np.asarray(surface.at_points["status"]) > STATUS["open"]
+    mean = np.nanmean(normal[touching if touching.any() else slice(None)], axis=0)
+    mean = mean / np.linalg.norm(mean)
+    thin = int(np.argmax(np.abs(mean)))
+    kept = [k for k in range(3) if k != thin]
+    if abs(mean[thin]) > 0.98:
+        return np.eye(3)[kept], ("xyz"[kept[0]], "xyz"[kept[1]])
+    first = np.cross(np.eye(3)[kept[0]], mean)
+    first /= np.linalg.norm(first)
+    return np.array([first, np.cross(mean, first)]), ("x_1", "x_2")
+
+
+def _zoom(ax: Axes, surface: VTU, flat: Array) -> None:
+    """Show what touches and as much around it, where that is a small piece of the whole."""
+    touching = flat[np.asarray(surface.at_points["status"]) > STATUS["open"]]
+    whole = np.ptp(flat, axis=0).max()
+    if len(touching) and (size := np.ptp(touching, axis=0).max()) < 0.3 * whole:
+        low, high = touching.min(axis=0), touching.max(axis=0)
+        margin = max(0.4 * size, 0.02 * whole)
+        ax.set_xlim(low[0] - margin, high[0] + margin)
+        ax.set_ylim(low[1] - margin, high[1] + margin)
 
 
 def _thinned(flat: Array, count: int) -> Array:

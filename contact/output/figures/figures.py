@@ -1,4 +1,4 @@
-"""Figures of a solution, as PNG files: contact, deformed body, potential."""
+"""Figures of a solution: contact, deformed body, potential."""
 
 from __future__ import annotations
 
@@ -11,10 +11,12 @@ import matplotlib
 from matplotlib.figure import Figure
 
 from contact.output.figures.body import Picture, draw_plane, picture
-from contact.output.figures.contact import draw_line, draw_surface
+from contact.output.figures.contact import NARROW, draw_line, draw_surface
 from contact.output.figures.space import draw_space
 from contact.output.solution import Solution
+from contact.output.surface import contact_surface
 from contact.output.table import Table, contact_table, held_points
+from contact.output.vtu import VTU
 from contact.typing import Array
 
 #: Quantities drawn on the deformed body: name of the figure, field, label.
@@ -28,6 +30,7 @@ WIDTH = 70
 
 #: Settings of all figures.
 STYLE: dict[str, Any] = {
+    "figure.figsize": (6.3, 4.0),
     "font.size": 9,
     "font.family": "serif",
     "mathtext.fontset": "dejavuserif",
@@ -53,6 +56,8 @@ class Drawing:
         Whether the body is plane.
     table, held
         The contact nodes, and the other nodes of Gamma_3.
+    surface
+        Gamma_3 with its fields; drawn in space.
     pictures
         Names of the figures of the deformed body, and what they show.
     """
@@ -61,21 +66,41 @@ class Drawing:
     plane: bool
     table: Table
     held: Array
+    surface: VTU
     pictures: Sequence[tuple[str, Picture]]
 
-    def draw(self, folder: Path) -> list[Path]:
+    def draw(
+        self,
+        folder: Path,
+        formats: Sequence[str] = ("png",),
+        width: float | None = None,
+        contact: bool = True,
+    ) -> list[Path]:
         """Draw the figures into a folder. On one rank.
+
+        Parameters
+        ----------
+        folder
+            Where to.
+        formats
+            Endings of the files: png, pdf or svg.
+        width
+            Of the figures (inches); by default that of a page.
+        contact
+            Whether to draw the contact part too.
 
         Returns
         -------
         The files, in the order in which they were drawn; one that fails is not left half done.
         """
-        with matplotlib.rc_context(STYLE):
-            figures: dict[str, Figure | None] = {
-                "contact": draw_line(self.table, self.title, self.held)
-                if self.plane
-                else draw_surface(self.table, self.title)
-            }
+        with matplotlib.rc_context(STYLE | ({} if width is None else sized(width))):
+            figures: dict[str, Figure | None] = {}
+            if contact:
+                figures["contact"] = (
+                    draw_line(self.table, self.title, self.held)
+                    if self.plane
+                    else draw_surface(self.surface, self.title)
+                )
             for name, made in self.pictures:
                 figures[name] = (
                     draw_plane(made, self.table, self.title)
@@ -83,24 +108,33 @@ class Drawing:
                     else draw_space(made, self.title)
                 )
             return [
-                _save(figure, folder / f"figure-{name}.png")
+                _save(figure, folder / f"figure-{name}.{ending}")
                 for name, figure in figures.items()
                 if figure is not None
+                for ending in formats
             ]
+
+
+def sized(width: float) -> dict[str, Any]:
+    """Return the settings of figures of another width (inches): narrow ones have small letters."""
+    small = {"font.size": 7, "legend.fontsize": 6} if width < NARROW else {}
+    return {"figure.figsize": (width, width)} | small
 
 
 def collect(solution: Solution) -> Drawing | None:
     """Gather on rank 0 what the figures of a solution show; None elsewhere. Collective."""
     table, held = contact_table(solution), held_points(solution.problem)
+    surface = contact_surface(solution, table)
     pictures: list[tuple[str, Picture]] = []
     for name, field, label in DEFORMED:
         if field != "potential" or solution.problem.piezoelectric:
             made = picture(solution, field, label)
             if made is not None:
                 pictures.append((name, made))
-    if solution.problem.comm.rank > 0 or table is None:
+    if table is None or surface is None:
         return None
-    return Drawing(heading(solution.title), solution.problem.dim == 2, table, held, pictures)
+    title, plane = heading(solution.title), solution.problem.dim == 2
+    return Drawing(title, plane, table, held, surface, pictures)
 
 
 def heading(title: str) -> str:

@@ -6,6 +6,7 @@ import logging
 import os
 from types import ModuleType
 
+import matplotlib
 import numpy as np
 from matplotlib.cm import ScalarMappable
 from matplotlib.colors import Normalize
@@ -32,7 +33,8 @@ def draw_space(picture: Picture, title: str = "") -> Figure | None:
     surface = pyvista.PolyData(drawn, faces.ravel())
     place = surface.cell_data if picture.values.ndim == 1 else surface.point_data
     place["values"] = picture.values.ravel()
-    figure = Figure(figsize=(6.3, 3.3))
+    width = float(matplotlib.rcParams["figure.figsize"][0])
+    figure = Figure(figsize=(width, 0.52 * width))
     norm = Normalize(picture.values.min(), picture.values.max())
     axes = figure.subplots(1, 2)
     for ax, name, height in zip(axes, ("from above", "from below"), (0.8, -0.8), strict=True):
@@ -53,11 +55,11 @@ def draw_space(picture: Picture, title: str = "") -> Figure | None:
         plotter.view_vector((1.0, -1.6, height))
         ax.imshow(plotter.screenshot(return_img=True))
         plotter.close()
-        ax.set_title(name, fontsize=9)
+        ax.set_title(name, fontsize="medium")
         ax.axis("off")
     colours = ScalarMappable(norm, "viridis")
     figure.colorbar(colours, ax=axes, location="bottom", label=picture.label, aspect=40, shrink=0.8)
-    figure.suptitle(with_scale(title, picture.scale), fontsize=10)
+    figure.suptitle(with_scale(title, picture.scale), fontsize="large")
     return figure
 
 

@@ -1,0 +1,120 @@
+"""Figures of a run that is over, from the files that it has left."""
+
+from __future__ import annotations
+
+import csv
+import json
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from mpi4py import MPI
+from numpy.typing import NDArray
+
+from contact.errors import InputError
+from contact.output import transaction
+from contact.output.figures.body import drawn
+from contact.output.figures.figures import DEFORMED, Drawing, heading
+from contact.output.folder import refused, result_folder
+from contact.output.table import Table
+from contact.output.vtu import VTU, read_vtu
+
+#: Endings of files that figures may have.
+FORMATS = ("png", "pdf", "svg")
+
+
+def read_drawing(folder: Path, fields: Sequence[str] = ()) -> Drawing:
+    """Read what the figures of a run show. On one rank.
+
+    Parameters
+    ----------
+    folder
+        The results of the run.
+    fields
+        Fields to colour the body by, as `figures.body.scalar` takes them; by default those of
+        ``contact solve --plot``.
+
+    Raises
+    ------
+    InputError
+        If the folder has not all that is needed, or no such field.
+    """
+    summary = _read(folder, "summary.json", lambda path: json.loads(path.read_bytes()))
+    surface = _read(folder, "contact.vtu", read_vtu)
+    body = _read(folder, "fields.vtu", read_vtu)
+    table = _read(folder, "contact.csv", lambda path: _table(path, surface))
+    d = body.grid.dimension
+    held = surface.grid.points[np.asarray(surface.at_points["row"]) < 0, :d]
+    known = {field: (name, label) for name, field, label in DEFORMED}
+    pictures = []
+    for field in fields or [f for f in known if f in body.at_points]:
+        name, label = known.get(field, (field, field.replace("_", " ") + " (units of the case)"))
+        pictures.append((name, drawn(body, held, field, label)))
+    return Drawing(heading(summary["title"]), d == 2, table, held, surface, pictures)
+
+
+def plot(
+    folder: Path,
+    fields: Sequence[str] = (),
+    formats: Sequence[str] = ("png",),
+    width: float | None = None,
+) -> list[Path]:
+    """Draw the figures of a run once more, into its folder. On one rank.
+
+    Parameters
+    ----------
+    folder, fields
+        As `read_drawing` takes them; with fields the contact part is not drawn.
+    formats, width
+        As `Drawing.draw` takes them.
+
+    Returns
+    -------
+    The files.
+
+    Raises
+    ------
+    InputError
+        As `read_drawing`, and if the folder cannot be written to or another run works in it.
+    """
+    if not (folder / "summary.json").is_file():
+        raise InputError(f"{folder}: no results there; accepted: a folder that a run has left")
+    with result_folder(folder, MPI.COMM_SELF):
+        drawing = read_drawing(folder, fields)
+        try:
+            new = transaction.begin(folder)
+            files = drawing.draw(new, formats, width, contact=not fields)
+            transaction.add(folder, files)
+        except OSError as error:
+            raise refused(error) from None
+        finally:
+            transaction.discard(folder)
+    return [folder / path.name for path in files]
+
+
+def _read(folder: Path, name: str, reader: Any) -> Any:
+    path = folder / name
+    try:
+        return reader(path)
+    except FileNotFoundError:
+        hint = ', written with output.fields = "vtu"' if name == "fields.vtu" else ""
+        raise InputError(f"{path}: no such file; accepted: a run's results{hint}") from None
+    except OSError as error:
+        raise refused(error) from None
+    except (ValueError, KeyError, IndexError) as error:
+        raise InputError(f"{path}: not as a run has left it ({error})") from None
+
+
+def _table(path: Path, surface: VTU) -> Table:
+    """Read ``contact.csv``, and the contact directions of its nodes from the surface."""
+    with path.open(newline="", encoding="utf-8") as file:
+        header, *rows = csv.reader(file)
+    columns: dict[str, NDArray[Any]] = {}
+    for name, *values in zip(header, *rows, strict=True):
+        texts = np.array(values)
+        columns[name] = texts if name in ("status", "on") else texts.astype(float)
+    row = np.asarray(surface.at_points["row"])
+    nodes = np.argsort(row)[np.count_nonzero(row < 0) :]
+    normal = np.asarray(surface.at_points["normal"])[nodes]
+    return columns | {f"nu_{axis}": normal[:, i] for i, axis in enumerate("xyz")}

@@ -1,0 +1,121 @@
+"""The contact part as a surface of its own: its facets, with what the contact nodes say."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from contact.output.solution import Solution
+from contact.output.table import Table, tangent_of
+from contact.output.vtu import VTU, Grid, Values
+from contact.problem.problem import ContactProblem
+from contact.typing import Array
+
+#: Status of a node -> its number in the file.
+STATUS = {"none": -1, "open": 0, "stick": 1, "slip": 2}
+
+
+def _facet_nodes(problem: ContactProblem, part: str) -> NDArray[np.int32]:
+    """Return the local nodes of each owned facet of a part, corners first, shape (m, k)."""
+    mesh, space = problem.domain.mesh, problem.equilibrium.space
+    facets = problem.domain.facets(part)
+    topology, dim = mesh.topology, mesh.topology.dim
+    topology.create_connectivity(dim - 1, dim)
+    topology.create_connectivity(dim, dim - 1)
+    to_cell, to_facet = topology.connectivity(dim - 1, dim), topology.connectivity(dim, dim - 1)
+    cells = to_cell.array[to_cell.offsets[facets]]
+    place = np.argmax(to_facet.array.reshape(-1, dim + 1)[cells] == facets[:, None], axis=1)
+    layout = space.dofmap.dof_layout
+    closure = np.array([sorted(layout.entity_closure_dofs(dim - 1, i)) for i in range(dim + 1)])
+    return np.take_along_axis(space.dofmap.list[cells], closure[place], axis=1)
+
+
+def contact_surface(solution: Solution, table: Table | None) -> VTU | None:
+    """Return the contact part on rank 0, None elsewhere. Collective.
+
+    Parameters
+    ----------
+    solution
+        The solution.
+    table
+        Its contact table, None on ranks other than 0.
+    """
+    problem, comm, d = solution.problem, solution.problem.comm, solution.problem.dim
+    body = problem.equilibrium
+    index_map = body.space.dofmap.index_map
+    shares = []
+    for i, entry in enumerate(problem.entries):
+        facets = _facet_nodes(problem, entry.on)
+        nodes, inverse = np.unique(facets, return_inverse=True)
+        # A node of two contacts is one of each.
+        names = i * index_map.size_global + index_map.local_to_global(nodes.astype(np.int32))
+        x = solution.state.x.reshape(-1, body.block_size)[nodes]
+        points = body.space.tabulate_dof_coordinates()[nodes, :d]
+        shares.append((names[inverse.reshape(facets.shape)], names, points, x))
+    gathered = comm.gather([np.concatenate(arrays) for arrays in zip(*shares, strict=True)])
+    if table is None or gathered is None:
+        return None
+    cells, names, points, x = (np.concatenate(arrays) for arrays in zip(*gathered, strict=True))
+    names, first = np.unique(names, return_index=True)
+    grid = Grid(points[first], np.searchsorted(names, cells), d - 1)
+    fields = _fields(problem, table, names, x[first])
+    if len(problem.entries) > 1:
+        fields["entry"] = (names // index_map.size_global).astype(np.int32)
+    return VTU(grid, {name: _completed(values, grid) for name, values in fields.items()}, {})
+
+
+def _fields(
+    problem: ContactProblem, table: Table, names: NDArray[np.int64], x: Array
+) -> dict[str, Values]:
+    """Return the fields at nodes of given global names and unknowns."""
+    d, size = problem.dim, problem.equilibrium.space.dofmap.index_map.size_global
+    rows = np.searchsorted(names, table["entry"] * size + table["node"])
+    normal = np.column_stack([table[f"nu_{axis}"] for axis in "xyz"[:d]])
+    if d == 2:
+        tangent = tangent_of(normal)
+        slip, friction = (table[name][:, None] * tangent for name in ("u_t", "tau"))
+    else:
+        slip = np.column_stack([table[f"u_t{axis}"] for axis in "xyz"])
+        friction = np.column_stack([table[f"tau_{axis}"] for axis in "xyz"])
+
+    def spread(values: Values) -> Values:
+        """Put the values of the contact nodes in their places, NaN in the others."""
+        whole = np.full((len(names), *values.shape[1:]), np.nan)
+        whole[rows] = values
+        return whole
+
+    fields: dict[str, Values] = {"displacement": x[:, :d]}
+    fields |= {
+        "pressure": spread(table["pressure"]),
+        "traction": spread(table["pressure"][:, None] * normal + friction),
+        "gap": spread(table["gap"]),
+        "opening": spread(table["gap"] - table["u_n"]),
+        "slip": spread(slip),
+        "friction_bound": spread(table["bound"]),
+        "normal": spread(normal),
+        "weight": spread(table["weight"]),
+    }
+    if problem.piezoelectric:
+        fields["potential"] = problem.equilibrium.phi_scale * x[:, d]
+        fields["charge"] = spread(table["d_n"])
+    numbers = np.full((2, len(names)), -1, dtype=np.int32)
+    numbers[0, rows] = [STATUS[name] for name in table["status"]]
+    numbers[1, rows] = np.arange(len(rows))
+    return fields | {"status": numbers[0], "row": numbers[1]}
+
+
+def _completed(values: Values, grid: Grid) -> Values:
+    """Give the corners of facets of degree 2 in space the mean of the nodes beside them.
+
+    They are no contact nodes, as their basis functions have no mean on a facet, and one
+    with unknown corners could not be drawn.
+    """
+    if grid.cells.shape[1] < 6 or values.dtype.kind != "f":
+        return values
+    sums, counts = np.zeros_like(values), np.zeros_like(values)
+    for corner, beside in enumerate(([4, 5], [3, 5], [3, 4])):
+        near = values[grid.cells[:, beside]]
+        np.add.at(sums, grid.cells[:, corner], np.nansum(near, axis=1))
+        np.add.at(counts, grid.cells[:, corner], np.isfinite(near).sum(axis=1))
+    missing = np.isnan(values) & (counts > 0)
+    return np.where(missing, sums / np.maximum(counts, 1), values)
