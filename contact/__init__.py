@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from contact.build import build_problem
     from contact.case.file import Case, load_case, parse_case
     from contact.errors import InputError
+    from contact.evolving import evolve
     from contact.output.files import write_outputs
     from contact.output.solution import Solution
     from contact.solving import solve, solve_problem
@@ -26,6 +27,7 @@ _HOMES = {
     "InputError": "errors",
     "Solution": "output.solution",
     "build_problem": "build",
+    "evolve": "evolving",
     "load_case": "case.file",
     "parse_case": "case.file",
     "solve": "solving",
@@ -38,6 +40,7 @@ __all__ = [
     "InputError",
     "Solution",
     "build_problem",
+    "evolve",
     "load_case",
     "parse_case",
     "solve",

@@ -5,35 +5,30 @@ from __future__ import annotations
 import logging
 import time
 from collections.abc import Callable, Mapping
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 from mpi4py import MPI
 
 from contact.build import build_problem, named
 from contact.case.file import Case, load_case
 from contact.methods.fixed_point import FixedPoint
-from contact.methods.interrupt import Interrupted, stop_on_signal
+from contact.methods.interrupt import stop_on_signal
 from contact.methods.method import Method
 from contact.methods.nested import prolong
 from contact.methods.newton import Newton
 from contact.methods.options import NewtonOptions, Options
 from contact.methods.penalty import Penalty
-from contact.methods.report import Monitor, Outcome
+from contact.methods.report import Monitor
+from contact.methods.steps import solve_step
 from contact.nesting import coarse_solution
 from contact.output.review import review
 from contact.output.solution import Solution
 from contact.problem.held import check_potential
-from contact.problem.kkt import KKT, evaluate
 from contact.problem.problem import ContactProblem
 from contact.problem.state import State
 
 logger = logging.getLogger("contact.solve")
-
-#: Stands for residuals until they are measured.
-NOTHING = KKT(np.inf, np.inf, np.inf)
 
 
 #: Name of a method -> its class.
@@ -113,15 +108,8 @@ def solve_problem(
     with stop_on_signal(problem.comm, monitor) as stop:
         method = METHODS[settings.method](problem, settings, stop)
         setup = time.perf_counter() - begin
-        try:
-            state, outcome = method.solve(None if start is None else prolong(*start, problem))
-        except Interrupted as interrupt:
-            state = method.state
-            outcome = Outcome(NOTHING, NOTHING, str(interrupt), interrupt.number)
-    # From scratch and at the whole load, whatever the method says and wherever it has stopped.
-    x = problem.equilibrium.prescribe(state.x, problem.time)
-    state = replace(state, x=x, time=problem.time)
-    outcome = replace(outcome, kkt=evaluate(problem, state), allowed=method.options.allowed)
+        begun = None if start is None else prolong(*start, problem)
+        state, outcome = solve_step(problem, method, begun)
     check_potential(problem, state)
     solution = Solution(
         problem=problem,

@@ -102,6 +102,11 @@ class FixedPoint:
             assert isinstance(body, BodyEquilibrium)  # the thesis's rules are those of the whole
             self._norm = domain_norm(body)
 
+    def turn_to(self, problem: Problem) -> None:
+        """Go on with another step of the same problem; what is factorised remains."""
+        self.problem, self.state = problem, problem.start()
+        self.history = History(self.monitor)
+
     def _forget(self) -> None:
         """Begin a solve: it does not depend on an earlier one."""
         self._stalled, self._residual = False, np.inf

@@ -18,6 +18,7 @@ from contact.methods.options import NewtonOptions
 from contact.methods.report import History, Outcome
 from contact.methods.step import NEAR, Iterate, Taken
 from contact.problem.condensed import Condensation, CondensedProblem
+from contact.problem.problem import ContactProblem
 from contact.typing import Array
 
 #: How much more accurately than the material is linearised the contact problem is solved.
@@ -68,6 +69,11 @@ class MaterialStep:
         self.condensation, self.options, self.moduli = condensation, options, moduli
         self.counters, self.following = counters, Following()
         self._solve, self._history, self._slower = solve, history, slower
+
+    def turn_to(self, problem: ContactProblem, history: History) -> None:
+        """Go on with another step of the same problem."""
+        self.condensation.turn_to(problem)
+        self._history = history
 
     def begin(self) -> None:
         """Do nothing: each step begins anew."""

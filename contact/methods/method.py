@@ -6,6 +6,7 @@ from typing import Any, Protocol
 
 from contact.linear.operator import Counters
 from contact.methods.report import History, Outcome
+from contact.problem.problem import ContactProblem
 from contact.problem.state import State
 
 
@@ -33,6 +34,12 @@ class Method(Protocol):
     @property
     def state(self) -> State:
         """What the last outer iteration has left, for a solve that is ended by a signal."""
+
+    def turn_to(self, problem: ContactProblem) -> None:
+        """Go on with another step of the same problem, with a history of its own.
+
+        What has been factorised is kept: the body is the same.
+        """
 
     def solve(self, start: State | None = None) -> tuple[State, Outcome]:
         """Iterate until convergence or a limit; from rest by default. Collective.

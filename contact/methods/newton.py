@@ -106,6 +106,15 @@ class Newton:
                 )  # fmt: skip
                 self._pays = pays(problem)
 
+    def turn_to(self, problem: Problem) -> None:
+        """Go on with another step of the same problem; what is factorised remains."""
+        self.problem = self.whole.problem = problem
+        self.history = History(self.monitor)
+        if self._condensed is not None:
+            assert isinstance(problem, ContactProblem)
+            self._condensed.turn_to(problem, self.history)
+        self._forget()
+
     def _forget(self) -> None:
         self._at = Iterate(self.problem.start())
         self._best: Iterate | None = None

@@ -68,6 +68,10 @@ class PenalisedProblem:
             if default:
                 given.delValue(name)
 
+    def turn_to(self, problem: ContactProblem, eps: Regularisation) -> None:
+        """Go on with another step of the same problem."""
+        self._problem, self._interface, self._eps = problem, problem.interface, eps
+
     def apply(self, _: Any, rhs: PETSc.Vec, solution: PETSc.Vec) -> None:
         """Solve with the operator: the preconditioner of SNES's KSP."""
         try:

@@ -38,7 +38,6 @@ from contact.methods.report import History, Monitor, Outcome, Record
 from contact.methods.stagnation import Stagnation
 from contact.problem.kkt import KKT, evaluate
 from contact.problem.problem import ContactProblem
-from contact.problem.protocols import Problem
 from contact.problem.state import State
 from contact.tolerances import LAWS_HOLD
 from contact.typing import Array
@@ -46,11 +45,14 @@ from contact.typing import Array
 #: What to do about an end without convergence.
 HARDER = "the larger eps_contact and eps_slip, the easier the problem"
 
+#: Least part of the displacement that a step is taken to add to it.
+LEAST_ADDED = 1e-2
+
 #: Outer iterations in which the residual has to fall by 1 %.
 PATIENCE, PROGRESS = 100, 0.99
 
 
-def regularisation(problem: Problem, options: PenaltyOptions) -> Regularisation:
+def regularisation(problem: ContactProblem, options: PenaltyOptions) -> Regularisation:
     """Return the parameters of the penalised laws. Collective."""
     automatic = automatic_eps(problem)
     if options.eps_contact is None:
@@ -60,21 +62,32 @@ def regularisation(problem: Problem, options: PenaltyOptions) -> Regularisation:
     return Regularisation(contact, slip if options.eps_slip is None else options.eps_slip)
 
 
-def automatic_eps(problem: Problem) -> Regularisation:
+def automatic_eps(problem: ContactProblem) -> Regularisation:
     """Return parameters that fit the body, its mesh and its loads, in any units. Collective.
 
     The foundation is a hundred times stiffer than a layer of elements, E/h. The slip length is a
     hundredth of the displacement that the loads, as a stress on Gamma_3, give a block of the
-    body's size.
+    body's size; in a step of an evolution, of what they add to it there.
     """
     body, scales = problem.equilibrium, problem.scales
-    loads = np.abs(body.external(problem.time).reshape(-1, body.block_size)[:, : body.dim]).sum()
-    prescribed = np.abs(problem.start().x.reshape(-1, body.block_size)[:, : body.dim])
-    stress = body.comm.allreduce(float(loads), op=MPI.SUM) / scales.area
-    largest = body.comm.allreduce(float(prescribed.max(initial=0.0)), op=MPI.MAX)
-    displacement = max(stress / scales.young * scales.size, largest)
+    loads, prescribed = body.external(problem.time), problem.start().x
+    displacement = _moved(problem, loads, prescribed)
+    if problem.since is not None:
+        before = problem.start(problem.since).x
+        added = _moved(problem, loads - body.external(problem.since), prescribed - before)
+        displacement = max(added, LEAST_ADDED * displacement)
     slip = 1e-2 * displacement or 1e-6 * scales.size
     return Regularisation(1e-2 * scales.spacing / scales.young, slip)
+
+
+def _moved(problem: ContactProblem, loads: Array, prescribed: Array) -> float:
+    """Return how far loads, as a stress on Gamma_3, or prescribed values move a body."""
+    body, scales = problem.equilibrium, problem.scales
+    force = np.abs(loads.reshape(-1, body.block_size)[:, : body.dim]).sum()
+    given = np.abs(prescribed.reshape(-1, body.block_size)[:, : body.dim])
+    stress = body.comm.allreduce(float(force), op=MPI.SUM) / scales.area
+    largest = body.comm.allreduce(float(given.max(initial=0.0)), op=MPI.MAX)
+    return max(stress / scales.young * scales.size, largest)
 
 
 @dataclass
@@ -109,6 +122,14 @@ class Penalty:
         self._solvers: dict[bool, PenalisedProblem] = {}
         thesis = self.options.stopping == "thesis"
         self._norm = domain_norm(self.problem.equilibrium) if thesis else None
+
+    def turn_to(self, problem: ContactProblem) -> None:
+        """Go on with another step of the same problem; what is factorised remains."""
+        self.problem, self.state = problem, problem.start()
+        self.history = History(self.monitor)
+        self._eps = regularisation(problem, self.options)
+        for solver in self._solvers.values():
+            solver.turn_to(problem, self._eps)
 
     def solve(self, start: State | None = None) -> tuple[State, Outcome]:
         """Iterate until convergence, stagnation or the limit. Collective.

@@ -92,6 +92,8 @@ class ContactProblem:
         Sizes of the body and its stiffness.
     time
         When its loads and prescribed values act: 1, unless `at` has made it another step.
+    since
+        When that step begins; None where nothing has acted before.
 
     Raises
     ------
@@ -123,8 +125,11 @@ class ContactProblem:
         self.interface = self._interface()
         self.scales = self._scales()
         self.time = 1.0
+        self.since: float | None = None
 
-    def at(self, time: float, history: SlipHistory | None = None) -> ContactProblem:
+    def at(
+        self, time: float, history: SlipHistory | None = None, since: float | None = None
+    ) -> ContactProblem:
         """Return a step of an evolution: the same body with other loads and another history.
 
         Parameters
@@ -133,9 +138,11 @@ class ContactProblem:
             End of the step.
         history
             What friction remembers; that of this problem by default.
+        since
+            Beginning of the step; None where nothing has acted before.
         """
         step = copy(self)
-        step.time = time
+        step.time, step.since = time, since
         step.interface = self.interface.at(time, history or self.interface.friction.history)
         return step
 

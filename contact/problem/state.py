@@ -28,7 +28,7 @@ class State:
         When: loads and prescribed values are those of this time. What is given without a time
         grows with it, so that 1 stands for all of it (`contact.body.amplitude`).
     history
-        What friction remembered in the step that led here; None from rest.
+        What friction remembered in the step that led here; None for nothing.
     """
 
     x: Array

@@ -1,0 +1,192 @@
+"""Quasi-static evolution: one step after the other, with friction that remembers.
+
+A step is a static problem with the loads of its end and the history of the last step's. It
+starts from a prediction, and a method that has factorised a linear body does not do so again. A
+step that fails is halved; what has been reached stays.
+"""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from mpi4py import MPI
+
+from contact.interface.history import SlipHistory
+from contact.linear.operator import Counters
+from contact.methods.interrupt import Interrupted
+from contact.methods.method import Method
+from contact.methods.report import History, Outcome
+from contact.problem.kkt import KKT, evaluate
+from contact.problem.problem import ContactProblem
+from contact.problem.state import State
+from contact.typing import Array
+
+logger = logging.getLogger("contact.solver")
+
+#: How often a step that fails is halved.
+HALVINGS = 4
+
+#: Largest part of the last step's way that the prediction adds to it.
+FARTHEST = 2.0
+
+#: Stands for residuals until they are measured.
+NOTHING = KKT(np.inf, np.inf, np.inf)
+
+
+@dataclass(frozen=True)
+class LoadStep:
+    """A step of an evolution.
+
+    Attributes
+    ----------
+    problem
+        The problem with the loads of the step's end and what friction remembers in it.
+    state, outcome
+        Its solution, and how that was found.
+    history
+        The outer iterations.
+    counters
+        Factorisations and solves of this step alone.
+    """
+
+    problem: ContactProblem
+    state: State
+    outcome: Outcome
+    history: History
+    counters: Counters
+
+
+class Evolution:
+    """The steps of a problem in time.
+
+    Parameters
+    ----------
+    problem
+        The problem; its history is where friction begins.
+    method
+        Solves one step after the other.
+    start
+        State to go on from: that of an earlier step. From rest by default.
+    before
+        The state of the step before it, for the prediction.
+    """
+
+    def __init__(
+        self,
+        problem: ContactProblem,
+        method: Method,
+        start: State | None = None,
+        before: State | None = None,
+    ) -> None:
+        self.problem, self.method = problem, method
+        self._last, self._before = start, before
+
+    def run(self, times: Sequence[float], begin: float = 0.0) -> Iterator[LoadStep]:
+        """Take the steps; the last one given has not converged if that has ended them. Collective.
+
+        Parameters
+        ----------
+        times
+            Ends of the steps, increasing. Those that the start has passed are left out.
+        begin
+            Time at rest.
+        """
+        for k, end in enumerate(times):
+            whole = end - (times[k - 1] if k > 0 else begin)
+            while (now := begin if self._last is None else self._last.time) < end:
+                step = self._step(now, end, whole)
+                if step.outcome.converged:
+                    self._before, self._last = self._last, step.state
+                yield step
+                if not step.outcome.converged:
+                    return
+
+    def _step(self, now: float, end: float, whole: float) -> LoadStep:
+        """Take a step: of what is left to its end the whole, or a half, a quarter ... of it all."""
+        left = end - now
+        sizes = [whole / 2**k for k in range(HALVINGS + 1)]
+        for size in [size for size in sizes if size <= left * (1 + 1e-9)] or [left]:
+            time = end if size >= left * (1 - 1e-9) else now + size
+            step = self._solve(time)
+            if step.outcome.converged or step.outcome.signal:
+                break
+            logger.info("no step to %g: %s", time, step.outcome.reason)
+        return step
+
+    def _solve(self, time: float) -> LoadStep:
+        last, method = self._last, self.method
+        problem = self.problem.at(time) if last is None else after(self.problem, last, time)
+        method.turn_to(problem)
+        counted = replace(method.counters)
+        start = None if last is None else self._predicted(problem, last)
+        state, outcome = solve_step(problem, method, start)
+        return LoadStep(problem, state, outcome, method.history, _since(method.counters, counted))
+
+    def _predicted(self, problem: ContactProblem, last: State) -> State:
+        """Return where a step starts from: the last one's end, moved on as its loads have."""
+        share = 0.0 if self._before is None else _share(problem, self._before, last)
+        x = last.x if self._before is None else last.x + share * (last.x - self._before.x)
+        x = problem.equilibrium.prescribe(x, problem.time)
+        return State(x, last.forces, problem.time)
+
+
+def solve_step(
+    problem: ContactProblem, method: Method, start: State | None
+) -> tuple[State, Outcome]:
+    """Solve by a method, and measure what that has left. Collective.
+
+    From scratch and at the whole load, whatever the method says and wherever it has stopped.
+    """
+    try:
+        state, outcome = method.solve(start)
+    except Interrupted as interrupt:
+        state = method.state
+        outcome = Outcome(NOTHING, NOTHING, str(interrupt), interrupt.number)
+    x = problem.equilibrium.prescribe(state.x, problem.time)
+    history = problem.interface.friction.history
+    state = replace(state, x=x, time=problem.time, history=history)
+    return state, replace(outcome, kkt=evaluate(problem, state), allowed=method.options.allowed)
+
+
+def after(problem: ContactProblem, state: State, time: float) -> ContactProblem:
+    """Return the step of a problem that follows a state.
+
+    Parameters
+    ----------
+    problem
+        The problem at any step.
+    state
+        Where it is, and what friction remembered on the way there.
+    time
+        End of the step.
+    """
+    here = problem.at(state.time, state.history or SlipHistory.rest(problem.nodes))
+    history = here.interface.remembered(here.nodal(state))
+    return problem.at(time, history, since=state.time)
+
+
+def _share(problem: ContactProblem, before: State, last: State) -> float:
+    """Return how far the loads go on the way they have come, over that way. Collective."""
+    given = [_given(problem, time) for time in (before.time, last.time, problem.time)]
+    comm, shares = problem.comm, []
+    for first, second, third in zip(*given, strict=True):
+        come, going = second - first, third - second
+        local = np.array([come @ come, come @ going])
+        square, product = comm.allreduce(local, op=MPI.SUM)
+        if square > 0:
+            shares.append(product / square)
+    return float(np.clip(min(shares, default=0.0), 0.0, FARTHEST))
+
+
+def _given(problem: ContactProblem, time: float) -> tuple[Array, Array]:
+    """Return the owned loads and prescribed values at a time. Collective."""
+    body = problem.equilibrium
+    return body.external(time), body.prescribe(body.rest(), time)[: body.owned]
+
+
+def _since(now: Counters, before: Counters) -> Counters:
+    """Return what has been counted since."""
+    return Counters(**{name: count - vars(before)[name] for name, count in vars(now).items()})

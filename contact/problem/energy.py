@@ -1,0 +1,112 @@
+"""The energy balance of a step: what is put in, what is stored, and what friction takes.
+
+Work is that of all but the unilateral constraint and friction: loads, supports, electrodes, and
+what a layer and a conductive foundation do to the body, by the trapezoidal rule. What is stored
+is that of the body. Per step
+
+    work - change of energy = dissipation + O(step^2),
+
+and the dissipation, sum w lambda_f . Delta j_tau with the friction at the end of the step, is
+never negative. For a body that was at rest nothing has acted before.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from mpi4py import MPI
+
+from contact.problem.kkt import residual_forces
+from contact.problem.problem import ContactProblem
+from contact.problem.state import State
+from contact.typing import Array
+
+#: Points at which the stress power of a step is taken where the material is not linear.
+_POINTS, _WEIGHTS = np.polynomial.legendre.leggauss(4)
+
+
+@dataclass(frozen=True)
+class Moment:
+    """What the balance has to know of the end of a step.
+
+    Attributes
+    ----------
+    x
+        Local unknowns.
+    given, internal
+        Forces and charges on the owned unknowns: those that do work, and those of the stresses.
+    enthalpy
+        Stored energy, less charges times potentials of a piezoelectric body (all ranks).
+    """
+
+    x: Array
+    given: Array
+    internal: Array
+    enthalpy: float
+
+    @staticmethod
+    def rest(problem: ContactProblem) -> Moment:
+        """Return that of a body to which nothing has been done."""
+        body = problem.equilibrium
+        zero = np.zeros(body.owned)
+        return Moment(body.rest(), zero, zero, 0.0)
+
+
+@dataclass(frozen=True)
+class Balance:
+    """Energies of a step (force times length; in the plane by unit thickness).
+
+    Attributes
+    ----------
+    work
+        Put in during the step.
+    energy
+        Stored at its end.
+    dissipation
+        Taken by friction during the step.
+    """
+
+    work: float
+    energy: float
+    dissipation: float
+
+
+def moment(problem: ContactProblem, state: State, before: Moment) -> Moment:
+    """Return what the balance has to know of a step that began at another moment. Collective."""
+    body, interface = problem.equilibrium, problem.interface
+    external, free = body.external(state.time), body.free.ravel()
+    residual = residual_forces(problem, state)
+    foundation = np.zeros_like(residual)
+    interface.add_forces(foundation, state.x, state.forces)
+    internal = residual + external - foundation
+    vectors = interface.jump.weight[:, None] * state.forces.vectors(interface.jump)
+    interface.jump.transpose(-vectors, foundation)
+    given = external - foundation + np.where(free, 0.0, residual)
+    moved = state.x[: body.owned] - before.x[: body.owned]
+    if body.linear:
+        power = 0.5 * (internal + before.internal) @ moved
+    else:
+        forces = [
+            body.internal_forces(0.5 * ((1 - s) * before.x + (1 + s) * state.x)) for s in _POINTS
+        ]
+        power = 0.5 * _WEIGHTS @ np.array(forces) @ moved
+    change = problem.comm.allreduce(float(power), op=MPI.SUM)
+    return Moment(state.x, given, internal, before.enthalpy + change)
+
+
+def balance(problem: ContactProblem, state: State, before: Moment, now: Moment) -> Balance:
+    """Return the energies of a step from one moment to another. Collective."""
+    body, interface = problem.equilibrium, problem.interface
+    size, d = body.block_size, body.dim
+    x, x_before = (m.x[: body.owned].reshape(-1, size) for m in (now, before))
+    given, given_before = (m.given.reshape(-1, size) for m in (now, before))
+    mechanical = 0.5 * (given + given_before)[:, :d] * (x - x_before)[:, :d]
+    # The enthalpy's work is that of charges on changing potentials: potentials move charges.
+    electric = -0.5 * (x + x_before)[:, d:] * (given - given_before)[:, d:]
+    stored = x[:, d:] * now.internal.reshape(-1, size)[:, d:]
+    slip = interface.slip(interface.jump.apply(state.x))
+    friction = interface.jump.weight @ np.einsum("ni,ni->n", state.forces.friction, slip)
+    local = np.array([mechanical.sum() + electric.sum(), stored.sum(), friction])
+    work, charges, dissipation = problem.comm.allreduce(local, op=MPI.SUM)
+    return Balance(float(work), now.enthalpy - float(charges), float(dissipation))

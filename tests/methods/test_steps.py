@@ -1,0 +1,249 @@
+"""Load steps: friction remembers, methods agree, steps are halved, a state can be gone on from."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+
+from contact import evolve
+from contact.body.amplitude import Tabulated
+from contact.body.description import Body, Fixed
+from contact.errors import InputError
+from contact.evolving import NotConvergedError
+from contact.interface.friction import Friction
+from contact.interface.obstacle import GapFunction
+from contact.mesh.grid import rectangle
+from contact.methods.options import FixedPointOptions, NewtonOptions, PenaltyOptions
+from contact.methods.report import Outcome
+from contact.methods.steps import Evolution, LoadStep
+from contact.problem.energy import Moment, balance, moment
+from contact.problem.kkt import KKT, evaluate
+from contact.problem.problem import Contact, ContactProblem
+from contact.solving import METHODS, solve
+from forms.hencky import Linear, Log
+from forms.laws import ConstantCoefficient, SlipCoefficient
+from tests.problems import mechanics
+from tests.problems.mechanics import SlidingBlock, constant
+from tests.problems.stepped import SteppedBlock, to_and_fro
+
+SELF = MPI.COMM_SELF
+TIGHT = {"newton": NewtonOptions(tolerance=1e-12), "uzawa": FixedPointOptions(tolerance=1e-12)}
+
+#: The stress p mu is that of the shear 0.0175: with pushes of 0.00875 no step both sticks and
+#: slides.
+COULOMB = SlidingBlock(Linear(1.0, 0.3), ConstantCoefficient(0.5), 0.01, 0.0, 0.0)
+BLOCKS = {
+    "coulomb": SteppedBlock(COULOMB, to_and_fro(0.035, 0.00875)),
+    "slip-dependent": SteppedBlock(
+        replace(COULOMB, mu=SlipCoefficient(0.5, 0.2, 100.0)), to_and_fro(0.06, 0.02)
+    ),
+    "hencky": SteppedBlock(
+        SlidingBlock(Log(1.0, 0.3, yield_strain=0.05), ConstantCoefficient(0.3), 0.08, 0.0, 0.0),
+        to_and_fro(0.2, 0.1),
+    ),
+}
+
+
+def steps_of(problem, times, options=TIGHT["newton"], start=None) -> list[LoadStep]:
+    """Return all steps, which have to converge."""
+    method = METHODS[options.method](problem, options, None)
+    steps = list(Evolution(problem, method, start).run(times))
+    assert all(step.outcome.converged for step in steps)
+    return steps
+
+
+#: Press, shear to and fro, unload.
+STAGES = [0.0, 1.0, 2.0, 3.0, 4.0]
+PRESS = Tabulated(tuple(STAGES), (0.0, 1.0, 1.0, 1.0, 0.1))
+SHEAR = Tabulated(tuple(STAGES), (0.0, 0.0, 1.0, -1.0, 0.0))
+
+
+def shaken(law=None, degree=1, mu=0.4, comm=SELF) -> ContactProblem:
+    """Return a block whose top is pressed down, then moved to and fro."""
+    down, along = constant(-0.01, 2), constant(0.006, 2)
+    held = [
+        Fixed("top", [None, down], amplitude=PRESS),
+        Fixed("top", [along, None], amplitude=SHEAR),
+    ]
+    return ContactProblem(
+        rectangle(comm, [0.0, 0.0], [2.0, 1.0], [16, 6]),
+        Body(law or Linear(1.0, 0.3), held),
+        Contact("bottom", GapFunction(lambda x: 0.001 * (x[:, 0] - 1) ** 2)),
+        Friction(ConstantCoefficient(mu)),
+        degree=degree,
+    )
+
+
+def times(count: int) -> list[float]:
+    """Return the ends of `count` steps in each stage."""
+    return [(k + 1) / count for k in range(count * (len(STAGES) - 1))]
+
+
+def test_the_block_slides_by_the_closed_form():
+    """s_n = clip(s_(n-1), U - H tau_c/G, U + H tau_c/G)."""
+    stepped, slip = BLOCKS["coulomb"], 0.0
+    for push, step in zip(stepped.pushes, stepped.steps, strict=True):
+        slip = float(np.clip(slip, push - 0.0175, push + 0.0175))
+        assert step.slip == pytest.approx(slip, abs=1e-14)
+
+
+@pytest.mark.parametrize(
+    ("dim", "degree", "method"),
+    [(2, 1, "newton"), (2, 2, "newton"), (3, 1, "newton"), (2, 1, "uzawa")],
+)
+@pytest.mark.parametrize("name", BLOCKS)
+def test_stepped_block(name, dim, degree, method):
+    stepped = BLOCKS[name]
+    problem = stepped.problem(SELF, dim, degree)
+    steps = steps_of(problem, stepped.times, TIGHT[method])
+    for found, exact, way in zip(steps, stepped.steps, stepped.ways, strict=True):
+        nodal = found.problem.nodal(found.state)
+        assert np.abs(nodal[:, 0] - exact.slip).max() < 1e-10
+        assert np.abs(found.state.forces.friction[:, 0] - exact.stress).max() < 1e-10
+        assert np.abs(found.state.forces.pressure - exact.pressure).max() < 1e-10
+        history = found.problem.interface.remembered(nodal)
+        assert np.abs(history.accumulated - way).max() < 1e-10
+    assert steps[-1].counters.factorizations <= 1 or name == "hencky" or method == "uzawa"
+
+
+def test_one_step_from_rest_is_the_static_problem():
+    """Bit for bit: with a load that grows with time, and slip-dependent friction."""
+    problem = mechanics.bar(SELF, 8)
+    static = solve(problem, NewtonOptions()).state
+    (state,) = evolve(problem, [1.0])
+    assert np.array_equal(state.x, static.x)
+    assert np.array_equal(state.forces.friction, static.forces.friction)
+
+
+def balances(problem, steps):
+    """Return the energies of all steps."""
+    before, found = Moment.rest(problem), []
+    for step in steps:
+        now = moment(step.problem, step.state, before)
+        found.append(balance(step.problem, step.state, before, now))
+        before = now
+    return found
+
+
+def test_the_area_of_the_loop_is_what_friction_takes():
+    """Around the loop +U -> -U -> +U the energy comes back, and work is dissipation."""
+    stepped = BLOCKS["coulomb"]
+    problem = stepped.problem(SELF)
+    found = balances(problem, steps_of(problem, stepped.times))
+    # The block's two corners are held, and half a cell of each side with them.
+    width = problem.nodes.weight.sum()
+    exact = width * stepped.dissipation
+    np.testing.assert_allclose([b.dissipation for b in found], exact, rtol=1e-9, atol=1e-15)
+    loop = found[len(found) // 5 :]
+    assert loop[-1].energy == pytest.approx(found[len(found) // 5 - 1].energy, rel=1e-9)
+    work = sum(b.work for b in loop)
+    assert work == pytest.approx(sum(b.dissipation for b in loop), rel=1e-6)
+    assert work > 0.1 * max(b.energy for b in loop)
+
+
+@pytest.mark.parametrize("law", [Linear(1.0, 0.3), Log(1.0, 0.3, yield_strain=0.003)])
+def test_methods_agree_at_every_step(law):
+    newton, uzawa = (steps_of(shaken(law), times(2), options) for options in TIGHT.values())
+    kinds = set()
+    for one, two in zip(newton, uzawa, strict=True):
+        assert np.abs(one.state.x - two.state.x).max() < 1e-7 * np.abs(one.state.x).max()
+        size = np.abs(one.state.forces.pressure).max()
+        difference = one.state.forces.friction - two.state.forces.friction
+        assert np.abs(difference).max() < 1e-7 * size
+        interface, nodal = one.problem.interface, one.problem.nodal(one.state)
+        bound = interface.bound(nodal, one.state.forces)
+        kinds |= set(interface.status(nodal, one.state.forces, bound, rounding=1e-9).tolist())
+    assert len(kinds) == 3  # open, sticking and sliding nodes have been met
+
+
+def test_penalty_comes_near():
+    options = PenaltyOptions(eps_contact=1e-3, eps_slip=1e-6)
+    exact, near = (steps_of(shaken(), times(4), told) for told in (TIGHT["newton"], options))
+    for one, two in zip(exact, near, strict=True):
+        assert np.abs(one.state.x - two.state.x).max() < 1e-4
+
+
+def test_unloaded_in_one_step_or_two_is_not_the_same():
+    """Friction remembers: where the load has been matters, not only where it is."""
+    there = steps_of(shaken(), [1.0, 2.0, 2.5])[-1].state
+    at_once = steps_of(shaken(), [2.5])[-1].state
+    assert np.abs(there.x - at_once.x).max() > 1e-4
+
+
+@pytest.mark.parametrize("law", [Linear(1.0, 0.3), Log(1.0, 0.3, yield_strain=0.003)])
+def test_the_balance_closes_with_the_steps(law):
+    """Work - change of energy - dissipation = O(step^2) a step; no dissipation is negative."""
+    defects = []
+    for count in (4, 8, 16):
+        problem = shaken(law)
+        found = balances(problem, steps_of(problem, times(count)))
+        assert min(each.dissipation for each in found) >= -1e-18
+        energy = np.array([0.0, *(each.energy for each in found)])
+        defect = [b.work - b.dissipation for b in found] - np.diff(energy)
+        assert np.abs(defect).sum() < 0.03 * energy.max() * 4 / count
+        defects.append(np.abs(defect[count : 2 * count]).max())  # pushed from the middle
+    ratios = np.divide(defects[:-1], defects[1:])
+    np.testing.assert_allclose(ratios, 4.0, rtol=0.35)
+
+
+def test_a_state_can_be_gone_on_from():
+    problem = shaken(Log(1.0, 0.3, yield_strain=0.003))
+    ends = times(2)
+    whole = list(evolve(problem, ends, TIGHT["newton"]))
+    rest = list(evolve(problem, ends[3:], TIGHT["newton"], start=whole[2]))
+    for one, two in zip(whole[3:], rest, strict=True):
+        assert one.near(two, atol=1e-10)
+    assert not whole[3].near(rest[1], atol=1e-10)
+    for state in whole:
+        assert evaluate(problem.at(state.time, state.history), state).largest < 1e-12
+
+
+def test_a_linear_body_is_factorised_once():
+    steps = steps_of(shaken(), times(4))
+    assert [step.counters.factorizations for step in steps] == [1] + 15 * [0]
+
+
+def failing(problem, largest: float, options=TIGHT["newton"]):
+    """Return Newton's method that fails for steps longer than `largest`."""
+
+    class Careful(type(METHODS[options.method](problem, options, None))):
+        def solve(self, start=None):
+            state, outcome = super().solve(start)
+            since = self.problem.since or 0.0
+            if self.problem.time - since > largest * (1 + 1e-9):
+                kkt = KKT(1.0, 1.0, 1.0)
+                outcome = Outcome(kkt, outcome.allowed, "too long")
+                state = replace(state, x=state.x + 1.0)
+            return state, outcome
+
+    return Careful(problem, options, None)
+
+
+@pytest.mark.parametrize("parts", [1, 2, 16])
+def test_a_step_that_fails_is_halved(parts):
+    problem = shaken()
+    steps = list(Evolution(problem, failing(problem, 1 / parts)).run([1.0, 2.0]))
+    assert all(step.outcome.converged for step in steps)
+    assert [step.state.time for step in steps] == [(k + 1) / parts for k in range(2 * parts)]
+
+
+def test_an_evolution_ends_with_what_it_has():
+    problem = shaken()
+    steps = list(Evolution(problem, failing(problem, 1 / 17)).run([0.05, 1.05, 2.0]))
+    assert [step.outcome.converged for step in steps] == [True, False]
+    assert steps[0].state.time == 0.05
+    assert steps[1].state.time == 0.05 + 1 / 16
+
+
+def test_evolve_says_that_a_step_fails():
+    options = NewtonOptions(tolerance=1e-12, max_outer=1, max_iterations=1, condense=False)
+    states = evolve(shaken(), [1.0, 2.0], options)
+    with pytest.raises(NotConvergedError, match=r"no step to 0\.0625: .*"):
+        list(states)
+
+
+@pytest.mark.parametrize("ends", [[1.0, 1.0], [0.0, 1.0], [1.0, np.nan], [2.0, 1.0]])
+def test_times_have_to_increase(ends):
+    with pytest.raises(InputError, match=r"times: given .*; accepted: numbers that increase"):
+        list(evolve(shaken(), ends))
