@@ -1,0 +1,72 @@
+"""Whether `converged` can be believed: random cases, methods and limits of iterations.
+
+`python3 -m scripts.studies.random_ends [--out DIR] [--coarse] [--count N]`. Cases of both sweeps
+are solved by a random method with a random `max_outer`. What `summary.json` then says is held
+against the residuals of the state in a problem that was built anew, at the whole load.
+"""
+
+from __future__ import annotations
+
+import json
+import sys
+import tempfile
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from contact import build_problem, solve_problem
+from contact.methods.options import with_method
+from contact.output.files import write_outputs
+from contact.output.options import OutputOptions
+from contact.problem.kkt import evaluate
+from scripts.reporting import Report, parser
+from scripts.studies.sweep import problems
+
+COUNT, COARSE_COUNT, SEED = 500, 10, 21
+METHODS = "newton", "uzawa", "penalty"
+#: Rounding of a residual that is computed once more.
+ROUNDING = 1.01
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Solve random cases and list what is said to have converged and has not."""
+    command = parser(__doc__, "random_ends")
+    command.add_argument("--count", type=int, help="number of cases")
+    given = command.parse_args(arguments)
+    count = given.count or (COARSE_COUNT if given.coarse else COUNT)
+    rng = np.random.default_rng(SEED)
+    drawn = [case for hard in (False, True) for _, case in problems(False, hard=hard)]
+    ends = Counter[str]()
+    columns = ("case", "method", "max_outer", "converged", "residuals", "allowed")
+    rows: dict[str, list[Any]] = {name: [] for name in columns}
+    with tempfile.TemporaryDirectory() as folder:
+        for number in rng.integers(len(drawn), size=count):
+            case, method = drawn[number], str(rng.choice(METHODS))
+            limit = int(rng.choice([1, 2, 3, 5, 8, 20]))
+            settings = replace(with_method(case.solver, method), max_outer=limit)
+            solution = solve_problem(build_problem(case), settings)
+            solution.output = OutputOptions(fields="none")
+            write_outputs(solution, folder)
+            summary = json.loads(Path(folder, "summary.json").read_text())
+            residuals = evaluate(build_problem(case), solution.state)
+            allowed = solution.outcome.allowed
+            ends[f"{method}: {'converged' if summary['converged'] else 'not converged'}"] += 1
+            pairs = [(getattr(residuals, name), getattr(allowed, name)) for name in summary["kkt"]]
+            holds = all(value <= ROUNDING * most for value, most in pairs)
+            if summary["converged"] and not holds:
+                shown = [" ".join(f"{pair[i]:.2e}" for pair in pairs) for i in (0, 1)]
+                row = (case.source, method, limit, True, *shown)
+                print(*row, flush=True)
+                for key, value in zip(columns, row, strict=True):
+                    rows[key].append(value)
+    print("endings:", dict(sorted(ends.items())))
+    Report(given.out).table("random_ends", f"False ends among {count} cases", rows)
+    return 1 if rows["case"] else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
