@@ -92,8 +92,7 @@ class SteppedBlock:
         return ContactProblem(
             first.domain,
             replace(first.body, fixed=fixed),
-            first.contact,
-            first.friction,
+            first.contacts,
             degree=degree,
         )
 
