@@ -126,6 +126,11 @@ class Log(Isotropic):
         """The value of q at first yield."""
         return self.yield_strain**2 if self.argument == "norm" else self.yield_strain
 
+    @property
+    def first_yield(self) -> float:
+        """The strain |dev eps| at first yield."""
+        return float(np.sqrt(self._limit))
+
     def _bare_modulus(self, q: Value) -> Value:
         # Evaluated at max(q, limit), where the elastic branch and the logarithm meet with
         # equal slopes: no case distinction, and no division by a vanishing strain.

@@ -6,6 +6,7 @@ import math
 from collections.abc import Iterator, Mapping
 from functools import cached_property
 from itertools import accumulate
+from typing import NamedTuple
 
 import basix.ufl
 import numpy as np
@@ -73,6 +74,26 @@ def unknowns(body: BodyEquilibrium, x: Array) -> dict[str, fem.Function]:
         potential = body.phi_scale * values[:, d:]
         made["potential"] = nodal_function("potential", body.space, potential, ())
     return made
+
+
+class Extremes(NamedTuple):
+    """The largest values in a material.
+
+    Attributes
+    ----------
+    strain, von_mises
+        The largest |dev eps| and von Mises stress.
+    yielded, volume
+        Volume in which |dev eps| is beyond first yield, and that of all of it.
+    yields
+        Whether the law has such a limit.
+    """
+
+    strain: float
+    von_mises: float
+    yielded: float
+    volume: float
+    yields: bool
 
 
 class DerivedFields:
@@ -158,21 +179,23 @@ class DerivedFields:
             values = expression.eval(mesh, chosen)
             yield chosen, values.reshape(chosen.size, len(self.points), components)
 
-    def largest_strains(self) -> Array:
-        """Return the largest |dev eps| over the cells (their nodes, for degree 2), a material."""
-        column = self.columns["dev_strain"]
-        largest = np.array(
-            [
-                max(v[..., column].max(initial=0.0) for _, v in self._chunks_of(material))
-                for material in range(len(self.expressions))
-            ]
-        )
-        self.body.comm.Allreduce(MPI.IN_PLACE, largest, op=MPI.MAX)
-        return largest
-
-    def largest_strain(self) -> float:
-        """Return the largest of these."""
-        return float(self.largest_strains().max())
+    def extremes(self) -> list[Extremes]:
+        """Return the largest values over the cells (their nodes, for degree 2), a material."""
+        volume, found = self._volumes(), []
+        strain, mises = self.columns["dev_strain"], self.columns["von_mises"]
+        for index, material in enumerate(self.body.body.materials):
+            limit = getattr(material.law, "first_yield", np.inf)
+            largest, sums = np.zeros(2), np.zeros(2)
+            for chosen, values in self._chunks_of(index):
+                largest[0] = max(largest[0], values[..., strain].max(initial=0.0))
+                largest[1] = max(largest[1], values[..., mises].max(initial=0.0))
+                beyond = (values[..., strain] > limit).mean(axis=(1, 2))
+                sums += volume[chosen] @ np.column_stack([beyond, np.ones(chosen.size)])
+            self.body.comm.Allreduce(MPI.IN_PLACE, largest, op=MPI.MAX)
+            self.body.comm.Allreduce(MPI.IN_PLACE, sums, op=MPI.SUM)
+            yields = bool(np.isfinite(limit))
+            found.append(Extremes(*map(float, (*largest, *sums)), yields))
+        return found
 
     def cells(self) -> dict[str, fem.Function]:
         """Return the fields as they are: discontinuous, of degree 0 for P1 and 1 for P2."""

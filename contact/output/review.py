@@ -14,12 +14,17 @@ from forms.hencky import check_monotonicity
 def review(solution: Solution) -> None:
     """Add what there is to say to the notes and warnings of a solution. Collective."""
     fields = DerivedFields(solution.problem.equilibrium, solution.state.x)
-    strains = fields.largest_strains()
-    solution.max_dev_strain = float(strains.max())
+    extremes = fields.extremes()
+    solution.max_dev_strain = max(largest.strain for largest in extremes)
+    solution.max_von_mises = max(largest.von_mises for largest in extremes)
+    if any(largest.yields for largest in extremes):
+        solution.share_beyond_yield = sum(largest.yielded for largest in extremes) / sum(
+            largest.volume for largest in extremes
+        )
     for text, good in (
         *(
-            _monotonicity(material, strain)
-            for material, strain in zip(solution.problem.body.materials, strains, strict=True)
+            _monotonicity(material, largest.strain)
+            for material, largest in zip(solution.problem.body.materials, extremes, strict=True)
         ),
         _uniqueness(solution),
         _electric_uniqueness(solution),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 
@@ -9,12 +10,14 @@ import numpy as np
 from dolfinx import fem
 from mpi4py import MPI
 
+from contact.errors import InputError
 from contact.interface.multipliers import Multipliers
 from contact.interface.status import CLOSED, STICKS
 from contact.linear.operator import Counters
 from contact.methods.report import History, Outcome
 from contact.output.fields import unknowns
 from contact.output.options import OutputOptions
+from contact.output.supports import Support, moment, supports
 from contact.problem.problem import ContactProblem
 from contact.problem.state import State
 from contact.typing import Array
@@ -45,8 +48,11 @@ class Solution:
         Spent on setup, solve and output.
     notes, warnings
         What there is to say about the solution.
-    max_dev_strain
-        The largest |dev eps|.
+    max_dev_strain, max_von_mises
+        The largest |dev eps| and von Mises stress over the cells (their nodes, for degree 2).
+    share_beyond_yield
+        Share of the body's volume in which |dev eps| is beyond the material's first yield; None
+        where no material has such a limit.
     start
         From where the iteration started, in words.
     title
@@ -65,6 +71,8 @@ class Solution:
     notes: list[str] = field(default_factory=list)
     warnings: list[str] = field(default_factory=list)
     max_dev_strain: float = np.nan
+    max_von_mises: float = np.nan
+    share_beyond_yield: float | None = None
     start: str = "zero slip"
     title: str = ""
     output: OutputOptions = field(default_factory=OutputOptions)
@@ -129,6 +137,42 @@ class Solution:
         nodes = self.problem.nodes
         stress = self.problem.interface.stress(self.nodal, self.forces)
         return np.asarray(nodes.comm.allreduce(nodes.weight @ stress, op=MPI.SUM))
+
+    @property
+    def contact_moment(self) -> Array:
+        """The moment of `contact_force` about the origin of coordinates. Collective.
+
+        Shape (1,) in the plane, about z, and (3,) in space.
+        """
+        nodes = self.problem.nodes
+        stress = self.problem.interface.stress(self.nodal, self.forces)
+        local = moment(nodes.points, nodes.weight[:, None] * stress)
+        return np.asarray(nodes.comm.allreduce(local, op=MPI.SUM))
+
+    @property
+    def contact_area(self) -> float:
+        """The area of what touches: the sum of the weights of its nodes. Collective."""
+        return self.problem.nodes.sum(np.where(self.status == "open", 0.0, 1.0))
+
+    @cached_property
+    def supports(self) -> Mapping[str, Support]:
+        """What each part with prescribed displacements exerts on the body. Collective."""
+        return supports(self.problem, self.state)
+
+    def reaction(self, part: str) -> Array:
+        """Return the force that a support exerts on the body, shape (d,). Collective.
+
+        Raises
+        ------
+        InputError
+            If no displacement is prescribed on the part.
+        """
+        if part not in self.supports:
+            raise InputError(
+                f"reaction({part!r}): no displacement is prescribed there; accepted: "
+                f"{', '.join(self.supports) or 'none, for nothing is held'}"
+            )
+        return self.supports[part].force
 
     @property
     def status(self) -> Array:

@@ -46,9 +46,17 @@ def summarise(solution: Solution, table: Table | None) -> dict[str, Any]:
         "contact_solves": counters.contact_solves,
         "kkt": {"equilibrium": kkt.equilibrium, "contact": kkt.contact, "friction": kkt.friction},
         "max_pressure": problem.nodes.maximum(solution.pressure),
+        "contact_area": solution.contact_area,
         "contact_force": solution.contact_force.tolist(),
+        "contact_moment": solution.contact_moment.tolist(),
+        "reactions": {part: held.force.tolist() for part, held in solution.supports.items()},
+        "reaction_moments": {
+            part: held.moment.tolist() for part, held in solution.supports.items()
+        },
         "max_displacement": _largest_displacement(solution),
         "max_dev_strain": solution.max_dev_strain,
+        "max_von_mises": solution.max_von_mises,
+        "share_beyond_yield": solution.share_beyond_yield,
         "contact_nodes": counts["stick"] + counts["slip"],
         "stick_nodes": counts["stick"],
         "slip_nodes": counts["slip"],

@@ -288,7 +288,11 @@ def watched(iteration: Iteration, n: int) -> tuple[Array, float, float]:
     body, last, kkt = problem.equilibrium, found[-1].x, outcome.kkt
     distances = [errors(body, last, body.function(state.x)).energy for state in found[:-1]]
     residual = kkt.largest if iteration.eps is None else kkt.equilibrium
-    return np.array(distances), DerivedFields(body, last).largest_strain(), residual
+    return (
+        np.array(distances),
+        max(e.strain for e in DerivedFields(body, last).extremes()),
+        residual,
+    )
 
 
 def _settings(iteration: Iteration) -> Options:
