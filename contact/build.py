@@ -19,6 +19,7 @@ from contact.given import NodalField, check_range, given_field
 from contact.interface.layer import Layer
 from contact.interface.obstacle import Obstacle
 from contact.mesh.domain import Domain
+from contact.mesh.revolution import revolved
 from contact.meshing import make_domain
 from contact.problem.held import check_held
 from contact.problem.problem import ContactProblem
@@ -59,6 +60,8 @@ def build_problem(
     """
     with named(case.source):
         domain = make_domain(case.mesh, comm) if domain is None else domain
+        if case.space.kinematics == "axisymmetric":
+            domain = revolved(domain)
         check_range("mesh", domain.size)
         case.check_mesh(domain.dim, domain.names)
         _check_loads(case, domain)

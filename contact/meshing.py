@@ -10,10 +10,11 @@ from mpi4py import MPI
 
 from contact.case.mesh import Mesh
 from contact.errors import InputError
-from contact.mesh.domain import Domain, rotate
+from contact.mesh.domain import Domain
 from contact.mesh.grid import box, rectangle
 from contact.mesh.reader import from_msh, from_recipe
 from contact.mesh.refinement import refined
+from contact.mesh.rotation import rotate
 from contact.methods.interrupt import deaf
 
 #: Bytes that making the mesh takes for a cell, without any unknowns (seen: 235 to 345).

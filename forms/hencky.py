@@ -18,7 +18,7 @@ import ufl
 from scipy.optimize import brentq
 from ufl.core.expr import Expr
 
-from forms.kinematics import deviator_squared, embed, strain
+from forms.kinematics import CARTESIAN, Kinematics, deviator_squared, embed, strain
 from forms.ops import Value, log, maximum, sqrt
 
 
@@ -224,9 +224,10 @@ def energy_density(law: Hencky, eps: Expr) -> Expr:
     return law.bulk / 2 * ufl.tr(eps) ** 2 + law.shear_energy(deviator_squared(eps))
 
 
-def secant_form(law: Hencky, u: Expr, v: Expr, w: Expr) -> Expr:
+def secant_form(law: Hencky, u: Expr, v: Expr, w: Expr, kinematics: Kinematics = CARTESIAN) -> Expr:
     """Return the integrand of the Kacanov form B(u; v, w) of section 3.4."""
-    return ufl.inner(secant_stress(law, strain(u), strain(v)), embed(strain(w)))
+    frozen, eps, test = (strain(f, kinematics) for f in (u, v, w))
+    return ufl.inner(secant_stress(law, frozen, eps), test)
 
 
 @dataclass(frozen=True)

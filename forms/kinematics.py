@@ -1,14 +1,86 @@
-"""Small strains, the three-dimensional deviator, and the normal/tangential split."""
+"""Kinematics: small strains, the deviator, and the normal/tangential split.
+
+Strains are 3 x 3 tensors whatever the body: in space, in plane strain, or of a body of revolution,
+whose half plane is meshed. How a displacement is differentiated there, and how much of the body
+a piece of the mesh stands for, is what a `Kinematics` says.
+"""
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+from typing import Protocol
+
 import ufl
 from ufl.core.expr import Expr
+from ufl.domain import extract_unique_domain
 
 
-def strain(u: Expr) -> Expr:
-    """Return the linearised strain eps(u) = (grad u + grad u^T)/2, a d x d tensor."""
-    return ufl.sym(ufl.grad(u))
+class Kinematics(Protocol):
+    """How the displacement of a mesh deforms the body that it stands for."""
+
+    @property
+    def added_degree(self) -> int:
+        """What the extent adds to the degree that a quadrature rule must integrate."""
+
+    def gradient(self, u: Expr) -> Expr:
+        """Return the displacement gradient, a 3 x 3 tensor."""
+
+    def extent(self, x: Expr) -> Expr | None:
+        """Return how much of the body a unit of the mesh stands for; None for a unit of it."""
+
+
+@dataclass(frozen=True)
+class Cartesian:
+    """A body in space, or a plane one in plane strain, of thickness 1."""
+
+    added_degree = 0
+
+    def gradient(self, u: Expr) -> Expr:
+        """Return grad u, in the plane with zeros in the third row and column."""
+        return embed(ufl.grad(u))
+
+    def extent(self, x: Expr) -> None:
+        """Return None: the mesh is the body."""
+        return None
+
+
+@dataclass(frozen=True)
+class Axisymmetric:
+    """A body of revolution without torsion: x is r, y is z, and the third axis that of theta.
+
+    Parameters
+    ----------
+    on_axis
+        Whether points on the axis are asked for, where u_r/r is its limit u_r,r. The points of
+        a quadrature rule lie inside the cells.
+    """
+
+    on_axis: bool = False
+
+    added_degree = 1
+
+    def gradient(self, u: Expr) -> Expr:
+        """Return the gradient in cylindrical coordinates: eps_theta = u_r/r."""
+        grad, r = ufl.grad(u), ufl.SpatialCoordinate(extract_unique_domain(u))[0]
+        hoop = u[0] / r
+        if self.on_axis:
+            # Rounding may put points a little beside the axis.
+            rounding = 1e-9 * ufl.CellDiameter(extract_unique_domain(u))
+            hoop = ufl.conditional(ufl.gt(r, rounding), hoop, grad[0, 0])
+        return embed(grad, hoop)
+
+    def extent(self, x: Expr) -> Expr:
+        """Return 2 pi r, the length of the ring through a point of the half plane."""
+        return 2 * ufl.pi * x[0]
+
+
+#: The kinematics of a mesh that is the body.
+CARTESIAN = Cartesian()
+
+
+def strain(u: Expr, kinematics: Kinematics = CARTESIAN) -> Expr:
+    """Return the linearised strain eps(u) = (grad u + grad u^T)/2, a 3 x 3 tensor."""
+    return ufl.sym(kinematics.gradient(u))
 
 
 def embed(tensor: Expr, out_of_plane: Expr | float = 0.0) -> Expr:
@@ -19,7 +91,7 @@ def embed(tensor: Expr, out_of_plane: Expr | float = 0.0) -> Expr:
     tensor
         A 2 x 2 or 3 x 3 tensor.
     out_of_plane
-        The zz component: 0 for the strain of a body in plane strain.
+        The component 33: 0 for a body in plane strain, u_r/r for one of revolution.
     """
     if tensor.ufl_shape == (3, 3):
         return tensor

@@ -14,7 +14,8 @@ The stored energy is (1/2) eps : F eps + (1/2) E . beta E with E = -grad(phi): t
 does no work on its own, so that it is positive if F and beta are, whatever e.
 
 Tensors are three-dimensional. A plane body lies in (x, y) = (X2, X3) of the crystal, whose
-axis X3 is that of poling; X1 points out of the plane.
+axis X3 is that of poling; X1 points out of the plane. The half plane of a body of revolution
+lies alike, with X1 along theta.
 """
 
 from __future__ import annotations
@@ -27,7 +28,7 @@ from numpy.typing import ArrayLike, NDArray
 from ufl.core.expr import Expr
 
 from forms.hencky import Hencky, secant_stress
-from forms.kinematics import embed, strain
+from forms.kinematics import CARTESIAN, Kinematics, embed, strain
 
 #: Pairs of tensor indices in the order of Voigt's notation.
 VOIGT = ((0, 0), (1, 1), (2, 2), (1, 2), (0, 2), (0, 1))
@@ -202,29 +203,42 @@ def electric_displacement(piezo: Piezo, eps: Expr, phi: Expr) -> Expr:
     return induced - ufl.dot(beta, gradient(phi))
 
 
-def _mechanical(law: Hencky, piezo: Piezo, u: Expr, v: Expr, eta: Expr, w: Expr) -> Expr:
-    sigma = secant_stress(law, strain(u), strain(v)) + coupling_stress(piezo, eta)
-    return ufl.inner(sigma, embed(strain(w)))
-
-
-def saddle_form(law: Hencky, piezo: Piezo, u: Expr, v: Expr, eta: Expr, w: Expr, xi: Expr) -> Expr:
+def saddle_form(
+    law: Hencky,
+    piezo: Piezo,
+    u: Expr,
+    v: Expr,
+    eta: Expr,
+    w: Expr,
+    xi: Expr,
+    kinematics: Kinematics = CARTESIAN,
+) -> Expr:
     """Return the integrand of B(x; y, z): positive, not symmetric, equation (5.16).
 
     x = (u, .) is where the secant modulus is frozen, y = (v, eta) the unknown and
     z = (w, xi) the test function.
     """
-    d = electric_displacement(piezo, strain(v), eta)
-    return _mechanical(law, piezo, u, v, eta, w) - ufl.inner(d, gradient(xi))
+    frozen, eps, test = (strain(f, kinematics) for f in (u, v, w))
+    sigma = secant_stress(law, frozen, eps) + coupling_stress(piezo, eta)
+    d = electric_displacement(piezo, eps, eta)
+    return ufl.inner(sigma, test) - ufl.inner(d, gradient(xi))
 
 
 def symmetrised_form(
-    law: Hencky, piezo: Piezo, u: Expr, v: Expr, eta: Expr, w: Expr, xi: Expr
+    law: Hencky,
+    piezo: Piezo,
+    u: Expr,
+    v: Expr,
+    eta: Expr,
+    w: Expr,
+    xi: Expr,
+    kinematics: Kinematics = CARTESIAN,
 ) -> Expr:
     """Return the integrand of B-check(x; y, z) = B(x; y, (w, -xi)), equations (5.27), (5.31).
 
     Symmetric and indefinite: convex in v, concave in eta.
     """
-    return saddle_form(law, piezo, u, v, eta, w, -xi)
+    return saddle_form(law, piezo, u, v, eta, w, -xi, kinematics)
 
 
 def electric_load(xi: Expr, surface: Expr | float = 0.0, body: Expr | float = 0.0) -> Expr:

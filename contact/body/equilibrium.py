@@ -76,6 +76,7 @@ class BodyEquilibrium:
             free_components(self.space, self.supports),
             domain.size,
             float(body.law.young),
+            domain.revolved,
         )
         # Where the forms are evaluated; written anew by each query.
         self._at = fem.Function(self.space)
@@ -121,7 +122,9 @@ class BodyEquilibrium:
     def _compile(self) -> None:
         body = self.body
         trial, test = ufl.TrialFunction(self.space), ufl.TestFunction(self.space)
+        kinematics = self.domain.kinematics
         degree = 1 if self.degree == 1 else (2 if self.linear else 4)
+        degree += kinematics.added_degree
         materials = list(pieces(self.domain, body.materials, self.cells, degree))
         v, xi = self.split(test)
 
@@ -129,9 +132,9 @@ class BodyEquilibrium:
             u, phi = self.split(x)
             u_0, _ = self.split(secant_at)
             return sum(
-                secant_form(law, u_0, u, v) * dx
+                secant_form(law, u_0, u, v, kinematics) * dx
                 if piezo is None
-                else symmetrised_form(law, piezo, u_0, u, phi, v, xi) * dx
+                else symmetrised_form(law, piezo, u_0, u, phi, v, xi, kinematics) * dx
                 for law, piezo, dx in materials
             )
 

@@ -6,18 +6,18 @@ from collections.abc import Iterator, Sequence
 from typing import TypeAlias
 
 import numpy as np
-import ufl
 from mpi4py import MPI
 
 from contact.body.constants import law_with_constants, piezo_with_constants
 from contact.body.description import Material
 from contact.errors import InputError
 from contact.mesh.domain import Domain, Indices
+from contact.mesh.measure import Measure
 from forms.hencky import Hencky
 from forms.piezo import Piezo
 
 #: A material with form constants for its numbers, and the measure of its cells.
-Piece: TypeAlias = tuple[Hencky, Piezo | None, ufl.Measure]
+Piece: TypeAlias = tuple[Hencky, Piezo | None, Measure]
 
 
 def cells_of(domain: Domain, materials: Sequence[Material]) -> list[Indices]:

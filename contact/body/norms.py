@@ -16,11 +16,12 @@ from contact.body.constants import constant
 from contact.body.equilibrium import BodyEquilibrium
 from contact.body.materials import pieces
 from contact.mesh.domain import Domain
+from contact.mesh.measure import Measure
 from contact.typing import Array
 from forms.hencky import secant_form
 
 
-def volume(domain: Domain, measure: ufl.Measure) -> float:
+def volume(domain: Domain, measure: Measure) -> float:
     """Return the volume or area that a UFL measure covers, over all ranks. Collective."""
     form = fem.form(constant(domain.mesh, 1.0) * measure)
     return float(domain.comm.allreduce(fem.assemble_scalar(form), op=MPI.SUM))
@@ -87,10 +88,12 @@ def errors(
     else:
         e = u - other(ufl.SpatialCoordinate(body.domain.mesh))
     materials = list(pieces(body.domain, body.body.materials, body.cells, 2 * body.degree + 4))
+    kinematics = body.domain.kinematics
+    gradient = kinematics.gradient(e)
     squares = (
         sum(ufl.inner(e, e) * dx for _, _, dx in materials),
-        sum(ufl.inner(ufl.grad(e), ufl.grad(e)) * dx for _, _, dx in materials),
-        sum(secant_form(law, u, e, e) * dx for law, _, dx in materials),
+        sum(ufl.inner(gradient, gradient) * dx for _, _, dx in materials),
+        sum(secant_form(law, u, e, e, kinematics) * dx for law, _, dx in materials),
     )
     integrals = [fem.assemble_scalar(fem.form(square)) for square in squares]
     totals = body.comm.allreduce(np.array(integrals), op=MPI.SUM)

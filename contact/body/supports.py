@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from dolfinx import fem
 from dolfinx.la import InsertMode
+from mpi4py import MPI
 from numpy.typing import NDArray
 
 from contact.body.amplitude import Amplitude, Moving, steady, values_at
 from contact.body.description import Body, Field
 from contact.errors import InputError
 from contact.mesh.domain import Domain
+from contact.mesh.revolution import on_axis
 from contact.typing import Array
 
 
@@ -35,6 +37,8 @@ class Support:
         Which of these, shape (n,), and their coordinates, shape (n, d).
     scale
         Unit of the component in the unknowns.
+    check
+        What refuses values that cannot be prescribed, on all ranks together; None for any.
     """
 
     condition: fem.DirichletBC
@@ -44,12 +48,15 @@ class Support:
     dofs: NDArray[np.int32]
     points: Array
     scale: float
+    check: Callable[[Array], None] | None = None
 
     def evaluate(self, time: float) -> None:
         """Give the condition its values at a time. Collective where the field is."""
         if self.field is None:
             return
         given = values_at(self.field, self.points, time)
+        if self.check is not None:
+            self.check(given)
         self.values.x.array[self.dofs] = given / self.scale
 
     def set(self, into: Array, time: float) -> None:
@@ -62,11 +69,13 @@ class Support:
 def supports_of(domain: Domain, space: fem.FunctionSpace, body: Body) -> list[Support]:
     """Return a body's supports and electrodes, one a component. Collective.
 
+    On the axis of a body of revolution u_r = 0, without being asked for.
+
     Raises
     ------
     InputError
-        If a part is missing, a vector has the wrong length, or a potential is prescribed for a
-        body without.
+        If a part is missing, a vector has the wrong length, a potential is prescribed for a
+        body without, or a radial displacement on the axis.
     """
     supports, dim = [], domain.dim
     domain.mesh.topology.create_connectivity(dim - 1, dim)
@@ -85,23 +94,60 @@ def supports_of(domain: Domain, space: fem.FunctionSpace, body: Body) -> list[Su
                     f"fixed on {fixed.on!r}: a potential needs a piezoelectric material"
                 )
             given.append(fixed.potential)
-        facets = domain.facets(fixed.on)
         for component, value in enumerate(given):
             if value is not None:
                 scale = body.phi_scale if component == dim else 1.0
-                supports.append(_support(space, component, facets, value, scale, fixed.factor))
+                supports.append(
+                    _support(domain, space, component, fixed.on, value, scale, fixed.factor)
+                )
+    if domain.revolved:
+        supports.append(_axis(domain, space))
     return supports
 
 
+def _axis(domain: Domain, space: fem.FunctionSpace) -> Support:
+    """Return u_r = 0 where r = 0."""
+    subspace = space.sub(0)
+    scalar, _ = subspace.collapse()
+    dofs = fem.locate_dofs_geometrical((subspace, scalar), lambda x: on_axis(domain, x.T))
+    return _nothing(subspace, fem.Function(scalar), dofs)
+
+
+def _nothing(
+    subspace: fem.FunctionSpace, zero: fem.Function, dofs: Sequence[NDArray[np.int32]]
+) -> Support:
+    """Return the condition that a component is 0 at some of its dofs."""
+    condition = fem.dirichletbc(zero, dofs, subspace)
+    return Support(condition, steady, None, zero, dofs[1], np.zeros((dofs[1].size, 0)), 1.0)
+
+
+def _off_axis(domain: Domain, part: str, points: Array) -> Callable[[Array], None]:
+    """Return what refuses a radial displacement of points on the axis. Collective."""
+    inside = on_axis(domain, points)
+
+    def check(radial: Array) -> None:
+        here = float(np.abs(radial[inside]).max(initial=0.0))
+        largest = domain.comm.allreduce(here, op=MPI.MAX)
+        if largest > 1e-12 * domain.size:
+            raise InputError(
+                f"fixed on {part!r}: a radial displacement of {largest:.4g} where the part meets "
+                'the axis; accepted: 0 at x = 0, for instance "0.1*x", or "free": there u_r = 0 '
+                "anyway"
+            )
+
+    return check
+
+
 def _support(
+    domain: Domain,
     space: fem.FunctionSpace,
     component: int,
-    facets: NDArray[np.int32],
+    part: str,
     value: Field | Moving,
     scale: float,
     amplitude: Amplitude,
 ) -> Support:
-    dim = space.mesh.topology.dim
+    dim, facets = domain.dim, domain.facets(part)
     subspace = space.sub(component)
     scalar, _ = subspace.collapse()
     data = fem.Function(scalar)
@@ -109,7 +155,8 @@ def _support(
     # On the part alone: a formula need not make sense elsewhere.
     points = scalar.tabulate_dof_coordinates()[dofs[1], :dim]
     condition = fem.dirichletbc(data, dofs, subspace)
-    made = Support(condition, amplitude, value, data, dofs[1], points, scale)
+    check = _off_axis(domain, part, points) if domain.revolved and component == 0 else None
+    made = Support(condition, amplitude, value, data, dofs[1], points, scale, check)
     made.evaluate(0.0)
     return made
 
@@ -135,9 +182,7 @@ def without_field(space: fem.FunctionSpace, cells: NDArray[np.int32]) -> Support
     inside.x.scatter_forward()
     nodes = np.flatnonzero(inside.x.array == 0).astype(np.int32)
     dofs = [np.asarray(to_whole, dtype=np.int32)[nodes], nodes]
-    zero = fem.Function(scalar)
-    condition = fem.dirichletbc(zero, dofs, subspace)
-    return Support(condition, steady, None, zero, nodes, np.zeros((nodes.size, 0)), 1.0)
+    return _nothing(subspace, fem.Function(scalar), dofs)
 
 
 def free_components(space: fem.FunctionSpace, supports: Sequence[Support]) -> NDArray[np.bool_]:

@@ -26,11 +26,18 @@ from forms.piezo import hexagonal_voigt
 
 
 class Space(Section):
-    """`[space]`: finite elements."""
+    """`[space]`: finite elements, and what the mesh stands for."""
 
     degree: Annotated[int, Field(ge=1, le=2), Accepted("1 or 2")] = Field(
         default=1,
         description="Degree of the Lagrange elements of the displacement and the potential.",
+    )
+    kinematics: Literal["plane_strain", "axisymmetric"] = Field(
+        default="plane_strain",
+        description="What a mesh in the plane stands for: a body in plane strain, or the half "
+        "plane of a body of revolution, x the radius and y the axis. There displacements are "
+        "0 across the axis without being asked for, and loads, forces and charges are those of the "
+        "full turn.",
     )
 
 

@@ -197,6 +197,9 @@ def _check_vectors(case: Case, dimension: int) -> None:
     for path, formula in _formulas(case):
         if isinstance(formula, Expression) and dimension == 2 and "z" in formula.names:
             raise fault(path, formula.source, "formulas in x and y in the plane")
+    if dimension == 3 and case.space.kinematics == "axisymmetric":
+        accepted = '"plane_strain" with a mesh in space, where it has no effect'
+        raise fault("space.kinematics", case.space.kinematics, accepted)
     if dimension == 2 and case.mesh.axis is not None:
         raise fault("mesh.axis", case.mesh.axis, "no axis in the plane")
     for path, material in case.materials:

@@ -35,6 +35,9 @@ def add_parser(commands: Any, common: dict[str, Any]) -> None:
         "--format", default="png", metavar="pdf,png", help="formats of the files: png, pdf, svg"
     )
     command.add_argument("--width", metavar="85mm", help="width of the figures, in mm, cm or in")
+    command.add_argument(
+        "--mirror", action="store_true", help="show both halves of a body of revolution"
+    )
     command.add_argument("--help", action="help", help="show this help and leave")
 
 
@@ -50,7 +53,8 @@ def run(options: argparse.Namespace, comm: MPI.Intracomm) -> int:
                 f"{', '.join(FORMATS)}, or several with commas"
             )
     width = None if options.width is None else inches(options.width)
-    files = on_root(comm, lambda: plot(Path(options.folder), options.field, formats, width))
+    folder = Path(options.folder)
+    files = on_root(comm, lambda: plot(folder, options.field, formats, width, options.mirror))
     if comm.rank == 0:
         print(*files, sep="\n")
     return CONVERGED

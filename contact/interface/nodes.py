@@ -42,6 +42,8 @@ class ContactNodes:
     cut
         Largest depth in the foundation, at rest, of a node on a straight facet of a curved
         part; the gap of these nodes is 0 (length).
+    revolved
+        Whether the nodes stand for the rings through them, about the axis x = 0.
     """
 
     comm: MPI.Comm
@@ -53,6 +55,7 @@ class ContactNodes:
     gap: Array
     block_size: int
     cut: float = 0.0
+    revolved: bool = False
 
     @property
     def dim(self) -> int:

@@ -56,7 +56,8 @@ def candidates(domain: Domain, space: fem.FunctionSpace, part: str) -> Candidate
 
     measure = domain.comm.allreduce(weight.sum(), op=MPI.SUM)
     count = domain.comm.allreduce(int(np.count_nonzero(weight)), op=MPI.SUM)
-    # Nodes whose basis function has no mean on Gamma_3 (P2 vertices of triangles) carry none.
+    # Nodes whose basis function has no mean on Gamma_3 carry none: P2 vertices of triangles, and
+    # of edges where they meet the axis of a body of revolution.
     nodes = np.flatnonzero(weight > 1e-9 * measure / max(count, 1)).astype(np.int32)
     points = space.tabulate_dof_coordinates()[nodes, :d]
     normal = normal[nodes] / np.linalg.norm(normal[nodes], axis=1)[:, None]
@@ -195,6 +196,7 @@ def find_nodes(
         gap,
         space.dofmap.index_map_bs,
         cut if cut > 1e-5 * domain.size else 0.0,
+        domain.revolved,
     )
     if jump.size == 0:
         raise InputError(

@@ -30,6 +30,9 @@ class Layout:
         Largest extent of the body (length).
     stiffness
         Young's modulus, the unit of the operator (stress).
+    revolved
+        Whether the nodes are those of the half plane of a body of revolution, x its radius: it
+        then moves along y alone.
     """
 
     comm: MPI.Intracomm
@@ -38,6 +41,7 @@ class Layout:
     free: NDArray[np.bool_]
     size: float
     stiffness: float
+    revolved: bool = False
 
     @property
     def dim(self) -> int:

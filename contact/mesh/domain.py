@@ -18,6 +18,8 @@ from mpi4py import MPI
 
 from contact import _compat
 from contact.errors import InputError
+from contact.mesh.measure import ExtendedMeasure, Measure
+from forms.kinematics import CARTESIAN, Axisymmetric, Kinematics
 
 #: Indices of facets or cells that this rank owns, ascending.
 Indices: TypeAlias = npt.NDArray[np.int32]
@@ -50,6 +52,9 @@ class Domain:
         Name of a group of facets that cannot be a part -> what is wrong with it.
     notes
         What else the source of the mesh held, one sentence each.
+    revolved
+        Whether the mesh is the half plane of a body of revolution, x its radius and y its axis
+        (see `contact.mesh.revolution`). Measures then are those of the whole body.
     """
 
     mesh: dmesh.Mesh
@@ -59,6 +64,7 @@ class Domain:
     levels: int = 0
     unusable: Mapping[str, str] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
+    revolved: bool = False
 
     @property
     def comm(self) -> MPI.Intracomm:
@@ -97,30 +103,48 @@ class Domain:
         """
         return self.regions[_known("region", name, self.regions)]
 
-    def ds(self, name: str) -> ufl.Measure:
+    @property
+    def kinematics(self) -> Kinematics:
+        """How displacements of the mesh deform the body."""
+        return Axisymmetric() if self.revolved else CARTESIAN
+
+    def ds(self, name: str) -> Measure:
         """Measure over the facets of part ``name``; raises as `facets`."""
         self.facets(name)
-        return ufl.Measure(
-            "ds",
-            domain=self.mesh,
-            subdomain_data=self._facet_data,
-            subdomain_id=list(self.parts).index(name),
+        return self._extended(
+            ufl.Measure(
+                "ds",
+                domain=self.mesh,
+                subdomain_data=self._facet_data,
+                subdomain_id=list(self.parts).index(name),
+            )
         )
 
     @property
-    def dx(self) -> ufl.Measure:
+    def dx(self) -> Measure:
         """Measure over all cells."""
-        return ufl.Measure("dx", domain=self.mesh, subdomain_data=self._cell_data)
+        return self._extended(ufl.Measure("dx", domain=self.mesh, subdomain_data=self._cell_data))
 
-    def dx_in(self, name: str) -> ufl.Measure:
+    def _extended(self, measure: ufl.Measure) -> Measure:
+        extent = self.kinematics.extent(ufl.SpatialCoordinate(self.mesh))
+        return measure if extent is None else ExtendedMeasure(measure, extent)
+
+    def resultant(self, vector: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
+        """Return sums of forces, shape (..., d), as those on the whole body.
+
+        Over the full turn radial forces cancel.
+        """
+        return np.where([self.revolved, *[False] * (self.dim - 1)], 0.0, vector)
+
+    def dx_in(self, name: str) -> Measure:
         """Measure over the cells of region ``name``; raises as `cells`."""
         self.cells(name)
         return self.dx(list(self.regions).index(name))
 
-    def divided(self, groups: Sequence[Indices]) -> list[ufl.Measure]:
+    def divided(self, groups: Sequence[Indices]) -> list[Measure]:
         """Measures over groups of owned cells, which the integrals of one form can share."""
         data = list(enumerate(groups))
-        dx = ufl.Measure("dx", domain=self.mesh, subdomain_data=data)
+        dx = self._extended(ufl.Measure("dx", domain=self.mesh, subdomain_data=data))
         return [dx(i) for i, _ in data]
 
     # The integrals of a form must share one object of subdomain data for each kind of integral.
@@ -271,14 +295,3 @@ def exterior_facets(mesh: dmesh.Mesh) -> Indices:
     mesh.topology.create_connectivity(tdim, tdim - 1)
     mesh.topology.create_connectivity(tdim - 1, 0)
     return np.sort(dmesh.exterior_facet_indices(mesh.topology))
-
-
-def rotate(mesh: dmesh.Mesh, degrees: float, axis: Sequence[float] = (0.0, 1.0, 0.0)) -> None:
-    """Turn a mesh in place about an axis through the origin (Rodrigues' formula)."""
-    if degrees == 0.0:
-        return
-    a, b, c = np.asarray(axis, dtype=np.float64) / np.linalg.norm(axis)
-    cross = np.array([[0.0, -c, b], [c, 0.0, -a], [-b, a, 0.0]])
-    angle = np.deg2rad(degrees)
-    turn = np.eye(3) + np.sin(angle) * cross + (1.0 - np.cos(angle)) * cross @ cross
-    mesh.geometry.x[:] = mesh.geometry.x @ turn.T

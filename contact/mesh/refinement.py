@@ -42,4 +42,10 @@ def refined(domain: Domain) -> Domain:
         for name, old in domain.regions.items()
     }
     made_of = with_names(fine, parts, regions, domain.size)
-    return replace(made_of, levels=domain.levels + 1, unusable=domain.unusable, notes=domain.notes)
+    return replace(
+        made_of,
+        levels=domain.levels + 1,
+        unusable=domain.unusable,
+        notes=domain.notes,
+        revolved=domain.revolved,
+    )

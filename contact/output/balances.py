@@ -66,7 +66,7 @@ class ChargeBalance:
 
 @dataclass(frozen=True)
 class ForceBalance:
-    """Resultants of the forces on a body, each of shape (d,).
+    """Resultants of the forces on a body, each of shape (d,); of one of revolution along its axis.
 
     Attributes
     ----------
@@ -172,7 +172,8 @@ def force_balance(problem: ContactProblem, state: State) -> ForceBalance:
     stress = problem.interface.stress(problem.nodal(state), state.forces)
     given = body.external(state.time).reshape(-1, body.block_size)[:, :d].sum(axis=0)
     local = np.stack([given, supports, -problem.nodes.weight @ stress])
-    applied, supports, contact = problem.comm.allreduce(local, op=MPI.SUM)
+    total = problem.comm.allreduce(local, op=MPI.SUM)
+    applied, supports, contact = problem.domain.resultant(total)
     return ForceBalance(applied, supports, contact)
 
 

@@ -16,6 +16,7 @@ from mpi4py import MPI
 from contact.errors import InputError
 from contact.interface.multipliers import Multipliers
 from contact.mesh.domain import Domain, Indices, combinations, exterior_facets, from_mesh
+from contact.mesh.revolution import revolved
 from contact.output.disk import OVERHEAD, claim_room, library_errors
 from contact.output.fields import nodal_function, unknowns
 from contact.output.folder import settle
@@ -97,6 +98,7 @@ def write_checkpoint(solution: Solution, path: str | Path) -> None:
     functions = {**unknowns(body, state.x), "contact_forces": forces}
     kind = {"degree": np.array([body.degree]), "size": np.array([domain.size])}
     kind["piezoelectric"] = np.array([int(problem.piezoelectric)])
+    kind["revolved"] = np.array([int(domain.revolved)])
     for function in functions.values():
         function.x.scatter_forward()
     written = [*functions.values(), *(numbers for numbers, _ in sets.values())]
@@ -140,6 +142,8 @@ def read_checkpoint(path: str | Path, comm: MPI.Intracomm = MPI.COMM_WORLD) -> C
     kind = adios.read_attributes(path, comm, KIND)
     parts, regions = (_read_sets(path, mesh, group) for group in (PARTS, REGIONS))
     domain = from_mesh(mesh, parts, float(kind["size"][0]), regions)
+    if kind.get("revolved", [0])[0]:
+        domain = revolved(domain)
     degree = int(kind["degree"][0])
 
     def function(name: str, shape: tuple[int, ...]) -> fem.Function:

@@ -22,7 +22,7 @@ from contact.body.description import Material
 from contact.body.equilibrium import BodyEquilibrium
 from contact.typing import Array
 from forms.hencky import stress
-from forms.kinematics import deviator_squared, strain, von_mises
+from forms.kinematics import Axisymmetric, deviator_squared, strain, von_mises
 from forms.ops import maximum, sqrt
 from forms.piezo import coupling_stress, electric_displacement
 
@@ -108,7 +108,8 @@ class DerivedFields:
     ----------
     shapes
         Name -> shape of the value: stress (3, 3), von_mises (), dev_strain () and, for a
-        piezoelectric body, electric_displacement (d,) and electric_field (d,).
+        piezoelectric body, electric_displacement (d,) and electric_field (d,). The third axis of
+        the stress of a body of revolution is that of theta.
     """
 
     def __init__(self, body: BodyEquilibrium, x: Array) -> None:
@@ -149,7 +150,10 @@ class DerivedFields:
     def _expression(self, material: Material) -> fem.Expression:
         body, mesh = self.body, self.body.domain.mesh
         u, phi = body.split(self._x)
-        eps = strain(u)
+        # The nodes may lie on the axis.
+        revolved = body.domain.revolved
+        kinematics = Axisymmetric(on_axis=True) if revolved else body.domain.kinematics
+        eps = strain(u, kinematics)
         sigma = stress(law_with_constants(material.law, mesh), eps)
         induced: list[ufl.core.expr.Expr] = []
         if material.piezo is not None:
@@ -236,8 +240,11 @@ class DerivedFields:
         }
 
     def _volumes(self) -> Array:
-        """Return the volumes of the local cells, which are straight simplices."""
+        """Return the volumes of the local cells: straight simplices, or rings of them."""
         mesh, d = self.body.domain.mesh, self.body.dim
         corners = mesh.geometry.x[_compat.geometry_dofmap(mesh)][:, : d + 1, :d]
         edges = corners[:, 1:] - corners[:, :1]
-        return np.asarray(np.abs(np.linalg.det(edges)) / math.factorial(d))
+        volumes = np.abs(np.linalg.det(edges)) / math.factorial(d)
+        if self.body.domain.revolved:
+            volumes *= 2 * np.pi * corners[:, :, 0].mean(axis=1)
+        return np.asarray(volumes)

@@ -19,7 +19,10 @@ class OutputOptions:
         (fields.bp and cells.bp, by ADIOS2); `xdmf` (fields.xdmf); or none.
     checkpoint
         `true`: write a checkpoint from which a computation can go on.
+    mirror
+        `true`: figures show both halves of a body of revolution.
     """
 
     fields: Literal["vtu", "vtx", "xdmf", "none"] = "vtu"
     checkpoint: Switch = False
+    mirror: Switch = False

@@ -133,10 +133,14 @@ class Solution:
 
     @property
     def contact_force(self) -> Array:
-        """The force that the body exerts on the foundation, shape (d,). Collective."""
+        """The force that the body exerts on the foundation, shape (d,). Collective.
+
+        Of a body of revolution it is that of the full turn, along the axis.
+        """
         nodes = self.problem.nodes
         stress = self.problem.interface.stress(self.nodal, self.forces)
-        return np.asarray(nodes.comm.allreduce(nodes.weight @ stress, op=MPI.SUM))
+        total = np.asarray(nodes.comm.allreduce(nodes.weight @ stress, op=MPI.SUM))
+        return self.problem.domain.resultant(total)
 
     @property
     def contact_moment(self) -> Array:

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from mpi4py import MPI
 
+from contact.mesh.domain import Domain
 from contact.output import environment
 from contact.output.balances import charge_balance
 from contact.output.solution import Solution
@@ -35,6 +36,7 @@ def summarise(solution: Solution, table: Table | None) -> dict[str, Any]:
         "converged": solution.converged,
         "reason": solution.outcome.reason,
         "method": solution.method,
+        "kinematics": _kinematics(problem.domain),
         "dofs": problem.equilibrium.layout.unknowns,
         "cells": mesh.topology.index_map(mesh.topology.dim).size_global,
         "ranks": problem.comm.size,
@@ -70,6 +72,12 @@ def summarise(solution: Solution, table: Table | None) -> dict[str, Any]:
         summary |= _electric(solution)
     summary |= {"seconds": solution.seconds, "versions": environment.versions()}
     return {key: _finite(value) for key, value in summary.items()}
+
+
+def _kinematics(domain: Domain) -> str:
+    if domain.revolved:
+        return "axisymmetric"
+    return "plane_strain" if domain.dim == 2 else "solid"
 
 
 def _largest_displacement(solution: Solution) -> float:

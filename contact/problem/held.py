@@ -44,12 +44,14 @@ def _check_piece(problem: ContactProblem, inside: NDArray[np.bool_], count: int)
         centre, size = _middle(problem, points[inside])
     fixed = ~problem.free[:, :d]
     held = np.flatnonzero(fixed.any(axis=1) & inside)
-    motions = rigid_motions((points[held] - centre) / size) * fixed[held][:, :, None]
+    revolved = problem.domain.revolved
+    motions = rigid_motions((points[held] - centre) / size, revolved) * fixed[held][:, :, None]
     supports = _gram(problem, motions)
     free = _null_space(supports)
     if free.shape[1] == 0:
         return
-    at_contact = rigid_motions((nodes.points - centre) / size) * touching_here[:, None, None]
+    at_contact = rigid_motions((nodes.points - centre) / size, revolved)
+    at_contact *= touching_here[:, None, None]
     normal = np.einsum("ni,nim->nm", nodes.normal, at_contact)
     touching = _gram(problem, normal[:, None, :])
     tangential = np.einsum("nij,njm->nim", nodes.tangent, at_contact)
@@ -62,7 +64,7 @@ def _check_piece(problem: ContactProblem, inside: NDArray[np.bool_], count: int)
             where = ", ".join(f"{x:.4g}" for x in centre)
             whole = f"the mesh has {count} pieces that share no nodes, and the one about ({where})"
         raise InputError(
-            f"{whole} is not held: it can move as a rigid body ({_describe(loose, d)}); "
+            f"{whole} is not held: it can move as a rigid body ({_describe(loose, d, revolved)}); "
             "accepted: displacement components fixed so that it cannot"
             + (", or regions that share the nodes between them" if count > 1 else "")
         )
@@ -98,17 +100,18 @@ def check_potential(problem: ContactProblem, state: State) -> None:
         )
 
 
-def rigid_motions(points: NDArray[np.floating]) -> Array:
+def rigid_motions(points: NDArray[np.floating], revolved: bool = False) -> Array:
     """Return the rigid motions at points of shape (n, d): shape (n, d, 3 or 6).
 
     Translations come first, then rotations: about z in the plane, about x, y and z in space.
+    A body of revolution has one, along its axis: shape (n, 2, 1).
     """
     n, d = points.shape
     motions = np.zeros((n, d, 3 if d == 2 else 6))
     motions[:, np.arange(d), np.arange(d)] = 1.0
     for k, (i, j) in enumerate([(0, 1)] if d == 2 else [(1, 2), (2, 0), (0, 1)]):
         motions[:, i, d + k], motions[:, j, d + k] = -points[:, j], points[:, i]
-    return motions
+    return motions[:, :, 1:2] if revolved else motions
 
 
 def _centre(problem: ContactProblem) -> Array:
@@ -139,8 +142,10 @@ def _null_space(gram: Array) -> Array:
     return vectors[:, values < ROUNDING]
 
 
-def _describe(motions: Array, d: int) -> str:
+def _describe(motions: Array, d: int, revolved: bool) -> str:
     """Name the axis motions that a space of rigid motions contains, or count it."""
+    if revolved:
+        return "translation along y, its axis"
     names = ["translation along x", "translation along y"]
     names += ["rotation"] if d == 2 else ["translation along z"]
     names += [] if d == 2 else [f"rotation about {axis}" for axis in "xyz"]
@@ -169,7 +174,7 @@ def _check_loads(
     if not np.isfinite(mu) or not friction.local:
         return
     d, comm = problem.dim, problem.comm
-    local = np.einsum("ni,nim->m", external, rigid_motions(points))
+    local = np.einsum("ni,nim->m", external, rigid_motions(points, problem.domain.revolved))
     work = comm.allreduce(local, op=MPI.SUM) @ free
     scale = comm.allreduce(float(np.abs(external).sum()), op=MPI.SUM)
     # |m_tau| <= sqrt(d) times its largest component: a cone of planes inside the cone.

@@ -181,11 +181,20 @@ class ContactProblem:
             body.phi_scale,
         )
 
+    def _extents(self, domain: Domain) -> tuple[float, float]:
+        """Return the area of Gamma_3 and the volume of the body."""
+        area = sum(volume(domain, domain.ds(contact.on)) for contact in self.contacts)
+        return area, volume(domain, domain.dx)
+
     def _scales(self) -> Scales:
         domain, law, d = self.domain, self.body.law, self.dim
-        area = sum(volume(domain, domain.ds(contact.on)) for contact in self.contacts)
-        whole = volume(domain, domain.dx)
-        cell = (whole / self.equilibrium.layout.index_map.size_global) ** (1 / d)
+        area, whole = self._extents(domain)
+        mesh_area, mesh_whole = area, whole
+        if domain.revolved:
+            # Of the mesh itself, which is but the half plane of the body.
+            mesh_area, mesh_whole = self._extents(replace(domain, revolved=False))
+        nodes = self.equilibrium.layout.index_map.size_global
+        cell = (mesh_whole / nodes) ** (1 / d)
         return Scales(
             young=float(law.young),
             poisson=float(law.poisson),
@@ -194,8 +203,8 @@ class ContactProblem:
             size=domain.size,
             height=whole / area,
             area=area,
-            spacing=(area / self.nodes.size) ** (1 / (d - 1)),
-            stiffness=float(law.bulk + 4 / 3 * law.shear) * cell ** (d - 2),
+            spacing=(mesh_area / self.nodes.size) ** (1 / (d - 1)),
+            stiffness=float(law.bulk + 4 / 3 * law.shear) * whole / mesh_whole * cell ** (d - 2),
         )
 
     @property

@@ -18,7 +18,7 @@ class Scales:
     height
         Volume over the area of Gamma_3 (length).
     area
-        Of Gamma_3 (length^(d - 1)).
+        Of Gamma_3 (length^(d - 1)); of a body of revolution over the full turn (length^2).
     spacing
         Of the contact nodes (length).
     stiffness

@@ -25,6 +25,7 @@ from tests.problems.mechanics import (
     pressed_block,
     solve,
 )
+from tests.problems.revolution import pressed_cylinder
 
 pytestmark = pytest.mark.parallel
 
@@ -77,6 +78,11 @@ def test_in_space(comm, degree):
 
 def test_a_body_that_only_the_foundation_holds(comm):
     agree(comm, lambda c: pressed_block(c, 3, 2, gap=0.05))
+
+
+@pytest.mark.parametrize("degree", [1, 2])
+def test_a_body_of_revolution(comm, degree):
+    agree(comm, lambda c: pressed_cylinder(c, 6, degree, radius=0.3))
 
 
 def tower(comm, cells=(2, 24)):

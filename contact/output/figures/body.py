@@ -217,48 +217,71 @@ def _samples(n: int) -> Array:
     return np.column_stack([first, second, 1 - first - second])
 
 
-def draw_plane(picture: Picture, table: Table, title: str = "") -> Figure:
-    """Draw a plane body over its outline at rest and the foundation."""
+def draw_plane(
+    picture: Picture, table: Table, title: str = "", axes: str = "xy", mirrored: bool = False
+) -> Figure:
+    """Draw a plane body over its outline at rest and the foundation.
+
+    Parameters
+    ----------
+    picture, table
+        The body, and its contact nodes.
+    title
+        Of the figure.
+    axes
+        Names of the coordinates.
+    mirrored
+        Whether the other half of a body of revolution is drawn too.
+    """
     width, height = picture.box[1] - picture.box[0]
+    if mirrored:
+        width = 2 * picture.box[1, 0]
     inches = float(matplotlib.rcParams["figure.figsize"][0])
     tall = float(np.clip(0.92 * height / width, 0.19, 0.87))
     figure = Figure(figsize=(inches, tall * inches + 1.4))
     ax = figure.subplots()
-    drawn = picture.corners + picture.scale * picture.displacement
-    if picture.image is not None:
-        (left, low), (right, top) = picture.box
-        shown = ax.imshow(picture.image, extent=(left, right, low, top), origin="lower")
-    elif picture.values.ndim == 1:
-        shown = ax.add_collection(PolyCollection(list(drawn), array=picture.values, lw=0))
-        # Smoothed edges of neighbours would let the background shine through.
-        shown.set_antialiased(False)
-    else:
-        points = drawn.reshape(-1, 2)
-        triangles = np.arange(len(points)).reshape(-1, 3)
-        values = picture.values.ravel()
-        shown = ax.tripcolor(*points.T, triangles, values, shading="gouraud")
-    shown.set_cmap("viridis")
     rest = {"colors": "black", "lw": 0.5, "ls": (0, (6, 4))}
-    ax.add_collection(LineCollection(list(picture.outline), **rest))
-    _foundation(ax, table, picture.scale, ends(table, picture.held))
+    for side in (-1, 1) if mirrored else (1,):
+        shown = _body(ax, picture, side)
+        shown.set_cmap("viridis")
+        ax.add_collection(LineCollection(list(picture.outline * [side, 1]), **rest))
+        _foundation(ax, table, picture.scale, ends(table, picture.held), side)
     figure.colorbar(shown, ax=ax, location="bottom", label=picture.label, aspect=40, shrink=0.8)
     ax.set_aspect("equal")
     ax.use_sticky_edges = False
     ax.margins(0.02)
     ax.autoscale_view()
-    ax.set_xlabel("$x$ (mesh units)")
-    ax.set_ylabel("$y$ (mesh units)")
+    ax.set_xlabel(f"${axes[0]}$ (mesh units)")
+    ax.set_ylabel(f"${axes[1]}$ (mesh units)")
     ax.set_title(with_scale(title, picture.scale), fontsize="medium")
     return figure
 
 
-def _foundation(ax: Axes, table: Table, scale: float, edges: Array) -> None:
+def _body(ax: Axes, picture: Picture, side: int) -> Any:
+    """Draw the coloured body, or its mirror image where the side is -1."""
+    if picture.image is not None:
+        (left, low), (right, top) = picture.box
+        extent = (side * left, side * right, low, top)
+        return ax.imshow(picture.image, extent=extent, origin="lower")
+    drawn = (picture.corners + picture.scale * picture.displacement) * [side, 1]
+    if picture.values.ndim == 1:
+        shown = ax.add_collection(PolyCollection(list(drawn), array=picture.values, lw=0))
+        # Smoothed edges of neighbours would let the background shine through.
+        shown.set_antialiased(False)
+        return shown
+    points = drawn.reshape(-1, 2)
+    triangles = np.arange(len(points)).reshape(-1, 3)
+    return ax.tripcolor(*points.T, triangles, picture.values.ravel(), shading="gouraud")
+
+
+def _foundation(ax: Axes, table: Table, scale: float, edges: Array, side: int) -> None:
     """Draw the foundation as far as it faces Gamma_3, moved as the displacements are scaled."""
     points = np.column_stack([table["x"], table["y"]])
     normal, gap = np.column_stack([table["nu_x"], table["nu_y"]]), table["gap"]
     points = np.concatenate([edges[:1], points, edges[1:]])
     normal = np.concatenate([normal[:1], normal, normal[-1:]])
     gap = np.concatenate([gap[:1], gap, gap[-1:]])
+    points, normal = points * [side, 1], normal * [side, 1]
     surface = points + scale * gap[:, None] * normal
     ax.plot(*surface.T, color="black", lw=1.0)
     thick = 0.03 * np.ptp(points, axis=0).max()

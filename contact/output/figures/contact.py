@@ -28,14 +28,14 @@ ZONES = {
 }
 
 
-def position(table: Table) -> tuple[Array, str]:
+def position(table: Table, axes: str = "xy") -> tuple[Array, str]:
     """Return where the nodes lie along Gamma_3 and what to call it.
 
     That is a coordinate where Gamma_3 lies along an axis, and the arc length elsewhere.
     """
     points = np.column_stack([table["x"], table["y"]])
     extent = np.ptp(points, axis=0)
-    for axis, name in enumerate("xy"):
+    for axis, name in enumerate(axes):
         if extent[1 - axis] <= 1e-9 * extent[axis]:
             return points[:, axis], name
     steps = np.linalg.norm(np.diff(points, axis=0), axis=1)
@@ -73,7 +73,7 @@ def zones(status: Any, where: Array) -> Iterator[tuple[str, float, float]]:
         yield str(status[start]), float(edges[start]), float(edges[stop])
 
 
-def draw_line(table: Table, title: str = "", held: Array | None = None) -> Figure:
+def draw_line(table: Table, title: str = "", held: Array | None = None, axes: str = "xy") -> Figure:
     """Draw pressure, tangential stress and friction bound along Gamma_3 in the plane.
 
     Parameters
@@ -84,15 +84,17 @@ def draw_line(table: Table, title: str = "", held: Array | None = None) -> Figur
         Of the figure.
     held
         Nodes of Gamma_3 that are no contact nodes, shape (n, 2), to begin and end at.
+    axes
+        Names of the coordinates.
     """
-    where, name = position(table)
+    where, name = position(table, axes)
     bound, tau = table["bound"], table["tau"]
     frictional = bool(np.any(bound > 0))
     width = float(matplotlib.rcParams["figure.figsize"][0])
     tall = 0.8 if frictional else 0.48
     figure = Figure(figsize=(width, (tall if width > NARROW else 1.5 * tall) * width))
-    axes = figure.subplots(2 if frictional else 1, sharex=True, squeeze=False)[:, 0]
-    for ax in axes:
+    rows = figure.subplots(2 if frictional else 1, sharex=True, squeeze=False)[:, 0]
+    for ax in rows:
         for zone, start, stop in zones(table["status"], where):
             ax.axvspan(start, stop, color=ZONES[zone][0], lw=0, zorder=0)
     shown = [
@@ -100,21 +102,21 @@ def draw_line(table: Table, title: str = "", held: Array | None = None) -> Figur
         for zone, (colour, label) in ZONES.items()
         if np.any(table["status"] == zone)
     ]
-    axes[0].plot(where, table["pressure"], color=BLUE, label=r"pressure $-\sigma_\nu$")
-    axes[0].set_ylabel(r"$-\sigma_\nu$ (units of the case)")
+    rows[0].plot(where, table["pressure"], color=BLUE, label=r"pressure $-\sigma_\nu$")
+    rows[0].set_ylabel(r"$-\sigma_\nu$ (units of the case)")
     if frictional:
-        axes[1].plot(where, tau, color=ORANGE, label=r"tangential stress $-\sigma_\tau\cdot t$")
-        axes[1].plot(where, bound, "--", color=GREY, lw=0.8, label=r"friction bound $\pm s$")
-        axes[1].plot(where, -bound, "--", color=GREY, lw=0.8)
-        axes[1].axhline(0.0, color="black", lw=0.4)
-        axes[1].set_ylabel(r"$-\sigma_\tau\cdot t$ (units of the case)")
-    axes[-1].set_xlabel(f"${name}$ along $\\Gamma_3$ (mesh units)")
+        rows[1].plot(where, tau, color=ORANGE, label=r"tangential stress $-\sigma_\tau\cdot t$")
+        rows[1].plot(where, bound, "--", color=GREY, lw=0.8, label=r"friction bound $\pm s$")
+        rows[1].plot(where, -bound, "--", color=GREY, lw=0.8)
+        rows[1].axhline(0.0, color="black", lw=0.4)
+        rows[1].set_ylabel(r"$-\sigma_\tau\cdot t$ (units of the case)")
+    rows[-1].set_xlabel(f"${name}$ along $\\Gamma_3$ (mesh units)")
     before, after = _margins(table, held)
-    axes[0].set_xlim(where.min() - before, where.max() + after)
-    _focus(axes[0], table["pressure"], 0.0)
+    rows[0].set_xlim(where.min() - before, where.max() + after)
+    _focus(rows[0], table["pressure"], 0.0)
     if frictional:
-        _focus(axes[1], bound, -1.0)
-    for k, ax in enumerate(axes):
+        _focus(rows[1], bound, -1.0)
+    for k, ax in enumerate(rows):
         handles = ax.get_legend_handles_labels()[0] + (shown if k == 0 else [])
         columns = len(handles) if width > NARROW else 2
         ax.legend(handles=handles, ncols=columns, loc="lower left", bbox_to_anchor=(0, 1))

@@ -60,6 +60,10 @@ class Drawing:
         Gamma_3 with its fields; drawn in space.
     pictures
         Names of the figures of the deformed body, and what they show.
+    axes
+        Names of the coordinates of a plane mesh.
+    mirror
+        Whether both halves of a body of revolution are drawn.
     """
 
     title: str
@@ -68,6 +72,12 @@ class Drawing:
     held: Array
     surface: VTU
     pictures: Sequence[tuple[str, Picture]]
+    axes: str = "xy"
+    mirror: bool = False
+
+    @property
+    def _mirrored(self) -> bool:
+        return self.mirror and self.axes == "rz"
 
     def draw(
         self,
@@ -97,13 +107,13 @@ class Drawing:
             figures: dict[str, Figure | None] = {}
             if contact:
                 figures["contact"] = (
-                    draw_line(self.table, self.title, self.held)
+                    draw_line(self.table, self.title, self.held, self.axes)
                     if self.plane
                     else draw_surface(self.surface, self.title)
                 )
             for name, made in self.pictures:
                 figures[name] = (
-                    draw_plane(made, self.table, self.title)
+                    draw_plane(made, self.table, self.title, self.axes, self._mirrored)
                     if self.plane
                     else draw_space(made, self.title)
                 )
@@ -134,7 +144,13 @@ def collect(solution: Solution) -> Drawing | None:
     if table is None or surface is None:
         return None
     title, plane = heading(solution.title), solution.problem.dim == 2
-    return Drawing(title, plane, table, held, surface, pictures)
+    axes, mirror = axes_of(solution.problem.domain.revolved), solution.output.mirror
+    return Drawing(title, plane, table, held, surface, pictures, axes, mirror)
+
+
+def axes_of(revolved: bool) -> str:
+    """Return the names of the coordinates of a plane mesh, or of the half plane of a body."""
+    return "rz" if revolved else "xy"
 
 
 def heading(title: str) -> str:

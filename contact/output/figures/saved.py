@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from contact.errors import InputError
 from contact.output import transaction
 from contact.output.figures.body import drawn
-from contact.output.figures.figures import DEFORMED, Drawing, heading
+from contact.output.figures.figures import DEFORMED, Drawing, axes_of, heading
 from contact.output.folder import refused, result_folder
 from contact.output.table import Table
 from contact.output.vtu import VTU, read_vtu
@@ -24,7 +24,7 @@ from contact.output.vtu import VTU, read_vtu
 FORMATS = ("png", "pdf", "svg")
 
 
-def read_drawing(folder: Path, fields: Sequence[str] = ()) -> Drawing:
+def read_drawing(folder: Path, fields: Sequence[str] = (), mirror: bool = False) -> Drawing:
     """Read what the figures of a run show. On one rank.
 
     Parameters
@@ -34,6 +34,8 @@ def read_drawing(folder: Path, fields: Sequence[str] = ()) -> Drawing:
     fields
         Fields to colour the body by, as `figures.body.scalar` takes them; by default those of
         ``contact solve --plot``.
+    mirror
+        Whether to show both halves of a body of revolution.
 
     Raises
     ------
@@ -51,7 +53,8 @@ def read_drawing(folder: Path, fields: Sequence[str] = ()) -> Drawing:
     for field in fields or [f for f in known if f in body.at_points]:
         name, label = known.get(field, (field, field.replace("_", " ") + " (units of the case)"))
         pictures.append((name, drawn(body, held, field, label)))
-    return Drawing(heading(summary["title"]), d == 2, table, held, surface, pictures)
+    title, axes = heading(summary["title"]), axes_of(summary.get("kinematics") == "axisymmetric")
+    return Drawing(title, d == 2, table, held, surface, pictures, axes, mirror)
 
 
 def plot(
@@ -59,12 +62,13 @@ def plot(
     fields: Sequence[str] = (),
     formats: Sequence[str] = ("png",),
     width: float | None = None,
+    mirror: bool = False,
 ) -> list[Path]:
     """Draw the figures of a run once more, into its folder. On one rank.
 
     Parameters
     ----------
-    folder, fields
+    folder, fields, mirror
         As `read_drawing` takes them; with fields the contact part is not drawn.
     formats, width
         As `Drawing.draw` takes them.
@@ -81,7 +85,7 @@ def plot(
     if not (folder / "summary.json").is_file():
         raise InputError(f"{folder}: no results there; accepted: a folder that a run has left")
     with result_folder(folder, MPI.COMM_SELF):
-        drawing = read_drawing(folder, fields)
+        drawing = read_drawing(folder, fields, mirror)
         try:
             new = transaction.begin(folder)
             files = drawing.draw(new, formats, width, contact=not fields)

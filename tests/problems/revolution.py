@@ -1,0 +1,172 @@
+"""Bodies of revolution whose solution is known."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+import ufl
+from mpi4py import MPI
+
+from contact.body.description import Body, Fixed, Load
+from contact.interface.friction import Friction
+from contact.interface.obstacle import GapFunction
+from contact.mesh.domain import Domain
+from contact.mesh.grid import rectangle
+from contact.mesh.revolution import revolved
+from contact.problem.problem import Contact, ContactProblem
+from forms.hencky import Hencky, Linear, Log
+from forms.laws import ConstantCoefficient
+from forms.piezo import Piezo
+from scripts.studies.exact_solutions import Given
+from tests.problems.mechanics import constant, flat
+
+ZERO = constant(0.0, 2)
+
+
+def half_plane(comm: MPI.Comm, inner: float, outer: float, height: float, n: int) -> Domain:
+    """Return a tube, or a cylinder, of n cells along the radius."""
+    cells = [n, max(1, round(n * height / (outer - inner)))]
+    return revolved(rectangle(comm, [inner, 0.0], [outer - inner, height], cells))
+
+
+@dataclass(frozen=True)
+class Tube:
+    """Lame's thick tube in plane strain along its axis: inner pressure, outer rigid casing."""
+
+    law: Linear = field(default_factory=lambda: Linear(1.0, 0.3))
+    inner: float = 1.0
+    outer: float = 2.0
+    pressure: float = 0.2
+    gap: float = 0.05
+
+    @property
+    def constants(self) -> tuple[float, float]:
+        """A and B of u_r = A r + B/r: sigma_r(inner) = -pressure, u_r(outer) = gap."""
+        a, b = self.inner, self.outer
+        volumetric = 2 * (self.law.bulk + self.law.shear / 3)
+        matrix = [[volumetric, -2 * self.law.shear / a**2], [b, 1 / b]]
+        first, second = np.linalg.solve(matrix, [-self.pressure, self.gap])
+        return float(first), float(second)
+
+    @property
+    def casing(self) -> float:
+        """Pressure on the casing."""
+        first, second = self.constants
+        volumetric = 2 * (self.law.bulk + self.law.shear / 3)
+        return 2 * self.law.shear * second / self.outer**2 - volumetric * first
+
+    def displacement(self, x: Any) -> Any:
+        """Return the displacement as a UFL vector."""
+        first, second = self.constants
+        return ufl.as_vector([first * x[0] + second / x[0], 0.0])
+
+    def problem(self, n: int, degree: int = 1, comm: MPI.Comm = MPI.COMM_WORLD) -> ContactProblem:
+        domain = half_plane(comm, self.inner, self.outer, 0.5, n)
+        held = [Fixed(side, [None, ZERO]) for side in ("bottom", "top")]
+        load = Load("left", pressure=constant(self.pressure, 2))
+        body = Body(self.law, held, [load])
+        return ContactProblem(domain, body, Contact("right", flat(self.gap)), degree=degree)
+
+
+@dataclass(frozen=True)
+class Drum:
+    """A solid cylinder r < 1, 0 < z < 1 with u_r = a r (1 + (z-1)^2), u_z = b z (3/2 - z).
+
+    The top presses on a rigid plate without friction: it is not sheared. Side and bottom follow
+    the displacement.
+    """
+
+    law: Hencky = field(default_factory=lambda: Log(1.0, 0.3, yield_strain=0.06))
+    a: float = 0.05
+    b: float = 0.3
+
+    def displacement(self, x: Any) -> Any:
+        """Return the displacement as a UFL vector."""
+        return ufl.as_vector([self._radial(x), self._axial(x)])
+
+    def _radial(self, x: Any) -> Any:
+        return self.a * x[0] * (1 + (x[1] - 1) ** 2)
+
+    def _axial(self, x: Any) -> Any:
+        return self.b * x[1] * (1.5 - x[1])
+
+    def stresses(self, x: Any) -> tuple[Any, Any, Any, Any]:
+        """Return sigma_r, sigma_theta, sigma_z, sigma_rz, written by hand in (r, z)."""
+        radial = self.a * (1 + (x[1] - 1) ** 2)
+        axial = self.b * (1.5 - 2 * x[1])
+        shear = self.a * x[0] * (x[1] - 1)
+        volume = 2 * radial + axial
+        q = 2 * radial**2 + axial**2 + 2 * shear**2 - volume**2 / 3
+        g = self.law.secant_modulus(q)
+        mean = (self.law.bulk - 2 * g / 3) * volume
+        hoop = mean + 2 * g * radial
+        return hoop, hoop, mean + 2 * g * axial, 2 * g * shear
+
+    def problem(self, n: int, degree: int = 1, comm: MPI.Comm = MPI.COMM_WORLD) -> ContactProblem:
+        domain = half_plane(comm, 0.0, 1.0, 1.0, n)
+        x = ufl.SpatialCoordinate(domain.mesh)
+        s_r, s_theta, s_z, s_rz = self.stresses(x)
+        force = [
+            -(s_r.dx(0) + s_rz.dx(1) + (s_r - s_theta) / x[0]),
+            -(s_rz.dx(0) + s_z.dx(1) + s_rz / x[0]),
+        ]
+        load = Load(None, [Given(lambda _, f=f: f) for f in force])
+        given = [Given(self._radial), Given(self._axial)]
+        body = Body(self.law, [Fixed("right", given), Fixed("bottom", given)], [load])
+        gap = GapFunction(lambda points: self._axial(points.T))
+        return ContactProblem(domain, body, Contact("top", gap), degree=degree)
+
+
+def pressed_cylinder(
+    comm: MPI.Comm, n: int = 6, degree: int = 1, radius: float = 0.0, mu: float = 0.3
+) -> ContactProblem:
+    """Return a solid cylinder pressed on a rough plate by a pressure that grows outwards."""
+    domain = half_plane(comm, 0.0, 1.0, 1.0, n)
+    load = Load("top", pressure=Given(lambda x: 0.02 + 0.03 * x[0] ** 2))
+    law = Log(1.0, 0.3, yield_strain=0.02)
+    friction = Friction(ConstantCoefficient(mu), radius=radius)
+    body = Body(law, [Fixed("left", [ZERO, None])], [load])
+    return ContactProblem(domain, body, Contact("bottom", flat()), friction, degree=degree)
+
+
+@dataclass(frozen=True)
+class PoledCylinder:
+    """A piezoelectric cylinder poled along its axis, lifted by u_z < 0 onto a plate; free side.
+
+    The fields are uniform: eps_r = eps_theta, eps_z, E_z.
+    """
+
+    law: Linear
+    piezo: Piezo
+    squeeze: float = 1e-2
+    voltage: float = 2e-3
+
+    @property
+    def radial(self) -> float:
+        """The radial strain: sigma_r = 0."""
+        lam = self.law.bulk - 2 * self.law.shear / 3
+        e31 = float(self.piezo.e[1, 0, 0])
+        return (lam * self.squeeze - e31 * self.voltage) / (2 * (lam + self.law.shear))
+
+    @property
+    def force(self) -> float:
+        """Force on the plate, over the full turn."""
+        lam = self.law.bulk - 2 * self.law.shear / 3
+        e33 = float(self.piezo.e[1, 1, 1])
+        axial = 2 * lam * self.radial - (lam + 2 * self.law.shear) * self.squeeze
+        return -np.pi * (axial + e33 * self.voltage)
+
+    @property
+    def charge(self) -> float:
+        """D.nu of the upper electrode, over the full turn."""
+        e, beta = self.piezo.e, np.asarray(self.piezo.beta)
+        d = 2 * e[1, 0, 0] * self.radial - e[1, 1, 1] * self.squeeze - beta[1, 1] * self.voltage
+        return float(np.pi * d)
+
+    def problem(self, degree: int = 1, comm: MPI.Comm = MPI.COMM_WORLD) -> ContactProblem:
+        domain = half_plane(comm, 0.0, 1.0, 1.0, 4)
+        top = Fixed("top", [None, constant(-self.squeeze, 2)], constant(self.voltage, 2))
+        body = Body(self.law, [top, Fixed("bottom", None, ZERO)], (), self.piezo)
+        return ContactProblem(domain, body, Contact("bottom", flat()), degree=degree)

@@ -1,0 +1,215 @@
+"""Bodies of revolution against closed forms, manufactured solutions and rings in space."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import ufl
+from dolfinx import fem
+
+import contact
+from contact.body.description import Body, Fixed
+from contact.body.norms import errors, volume
+from contact.case.file import parse_case
+from contact.errors import InputError
+from contact.interface.smoothing import Smoothing
+from contact.mesh.grid import box, rectangle
+from contact.mesh.refinement import refined
+from contact.mesh.revolution import revolved
+from contact.methods.newton import Newton
+from contact.methods.options import FixedPointOptions, NewtonOptions, PenaltyOptions
+from contact.output.balances import charge_balance, force_balance
+from contact.output.fields import DerivedFields
+from contact.output.figures.body import draw_plane
+from contact.output.figures.figures import collect
+from contact.problem.held import check_held
+from contact.problem.problem import Contact, ContactProblem
+from contact.solving import solve_problem
+from forms.hencky import Linear
+from tests.problems.mechanics import Affine, constant, flat
+from tests.problems.piezo import SCALED, pzt
+from tests.problems.revolution import Drum, PoledCylinder, Tube, half_plane, pressed_cylinder
+
+pytestmark = pytest.mark.parallel
+
+
+def solve(problem, options=None):
+    solution = solve_problem(problem, options or NewtonOptions(tolerance=1e-10))
+    assert solution.converged, solution.outcome.reason
+    return solution
+
+
+def orders(make, cells, degree):
+    found = []
+    for n in cells:
+        problem = make.problem(n, degree)
+        solution = solve(problem)
+        e = errors(problem.equilibrium, solution.state.x, make.displacement)
+        found.append((e.h1, e.energy, e.l2))
+    return np.log2(np.array(found[-2]) / np.array(found[-1])), solution
+
+
+@pytest.mark.parametrize(("degree", "cells"), [(1, (16, 32)), (2, (8, 16))])
+def test_lame(degree, cells):
+    tube = Tube()
+    order, solution = orders(tube, cells, degree)
+    assert np.all(order > np.array([degree, degree, degree + 1]) - 0.1), order
+    assert solution.pressure == pytest.approx(tube.casing, rel=0.02 / degree**3)
+    assert solution.contact_force == pytest.approx([0.0, 0.0], abs=1e-12)
+
+
+@pytest.mark.parametrize(("degree", "cells"), [(1, (8, 16)), (2, (4, 8))])
+def test_a_hencky_cylinder_with_its_axis(degree, cells):
+    drum = Drum()
+    order, solution = orders(drum, cells, degree)
+    assert np.all(order > np.array([degree, degree, degree + 1]) - 0.15), order
+    problem = solution.problem
+    strains = DerivedFields(problem.equilibrium, solution.state.x).cells()["dev_strain"].x.array
+    assert strains.min() < 0.9 * drum.law.yield_strain
+    assert strains.max() > 1.25 * drum.law.yield_strain
+    pressure = -drum.stresses(problem.nodes.points.T)[2]
+    assert problem.nodes.norm(solution.pressure - pressure) < 0.02 * problem.nodes.norm(pressure)
+    assert force_balance(problem, solution.state).imbalance < 1e-12
+
+
+@pytest.mark.parametrize("degree", [1, 2])
+def test_a_poled_cylinder(degree):
+    column = PoledCylinder(SCALED.law(), pzt(2))
+    solution = solve(column.problem(degree))
+    assert solution.contact_force == pytest.approx([0.0, -column.force], rel=1e-8, abs=1e-9)
+    balance = charge_balance(solution.problem, solution.state)
+    assert balance.electrodes["top"] == pytest.approx(column.charge, rel=1e-8)
+    assert balance.imbalance < 1e-12
+    assert force_balance(solution.problem, solution.state).imbalance < 1e-12
+    stress = DerivedFields(solution.problem.equilibrium, solution.state.x).nodes()["stress"]
+    hoop = stress.x.array.reshape(-1, 3, 3)[:, 2, 2]
+    assert np.abs(hoop).max(initial=0.0) < 1e-8 * column.force
+
+
+@pytest.mark.parametrize("degree", [1, 2])
+def test_methods_agree(comm, degree):
+    """A rough plate, a smoothed pressure, a material that yields."""
+    newton = solve(pressed_cylinder(comm, 6, degree, 0.3))
+    status = np.concatenate(comm.allgather(newton.status))
+    assert {"stick", "slip"} <= set(status)
+    assert force_balance(newton.problem, newton.state).imbalance < 1e-12
+    # 2 pi times the integral of (0.02 + 0.03 r^2) r.
+    assert newton.contact_force == pytest.approx([0.0, -np.pi * 0.035], rel=1e-9)
+    uzawa = solve(pressed_cylinder(comm, 6, degree, 0.3), FixedPointOptions(tolerance=1e-9))
+    scale = newton.problem.nodes.maximum(newton.pressure)
+    assert np.abs(uzawa.pressure - newton.pressure).max(initial=0.0) < 1e-6 * scale
+    given = PenaltyOptions(eps_contact=1e-6, eps_slip=1e-8, tolerance=1e-4)
+    penalty = solve_problem(pressed_cylinder(comm, 6, degree, 0.3), given)
+    assert np.abs(penalty.pressure - newton.pressure).max(initial=0.0) < 1e-2 * scale
+
+
+def test_volumes_of_the_full_turn(comm):
+    domain = half_plane(comm, 0.5, 1.5, 2.0, 4)
+    for body in (domain, refined(domain)):
+        assert volume(body, body.dx) == pytest.approx(2 * np.pi * 2.0, rel=1e-12)
+        assert volume(body, body.ds("right")) == pytest.approx(2 * np.pi * 1.5 * 2, rel=1e-12)
+        assert volume(body, body.ds("top")) == pytest.approx(np.pi * 2.0, rel=1e-12)
+
+
+def test_the_mollifier_is_averaged_over_rings(comm):
+    """In the disc's interior R adds to r^2 the mean of s^2 under omega, whatever r."""
+    radius = 0.35
+    nodes = pressed_cylinder(comm, 64).nodes
+    r = nodes.points[:, 0]
+    s = np.linspace(0, radius, 20001)[:-1]
+    omega = np.exp(radius**2 / (s**2 - radius**2)) * s
+    added = (omega @ s**2) / omega.sum()
+    smooth = Smoothing(nodes, radius)(r**2)
+    inside = r < 1 - radius - 0.02
+    assert np.abs(smooth - r**2 - added)[inside].max(initial=0.0) < 2e-3 * added
+    assert np.abs(Smoothing(nodes, radius)(np.ones_like(r)) - 1).max(initial=0.0) < 1e-13
+
+
+def test_p2_has_no_contact_node_on_the_axis(comm):
+    """Its basis function has no mean over the disc; total areas are exact all the same."""
+    for degree, least in ((1, 0.0), (2, 1 / 12)):
+        nodes = pressed_cylinder(comm, 6, degree).nodes
+        first = -nodes.maximum(-nodes.points[:, 0], -np.inf)
+        assert first == pytest.approx(least, abs=1e-12)
+        assert nodes.sum(np.ones(nodes.nodes.size)) == pytest.approx(np.pi, rel=1e-12)
+
+
+def test_the_iterative_solver_knows_the_one_rigid_motion(comm):
+    direct = solve(pressed_cylinder(comm, 12))
+    problem = pressed_cylinder(comm, 12)
+    loop = Newton(problem, NewtonOptions(tolerance=1e-9, linear="iterative", condense=False))
+    state, outcome = loop.solve()
+    assert outcome.converged
+    scale = direct.problem.nodes.maximum(direct.pressure)
+    assert np.abs(state.forces.pressure - direct.pressure).max(initial=0.0) < 1e-6 * scale
+
+
+def test_strain_on_the_axis(comm):
+    """Where r = 0 the hoop strain is the radial one, at the nodes of P2 elements too."""
+    problem = Drum().problem(4, 2)
+    x = fem.Function(problem.equilibrium.space)
+    x.interpolate(lambda x: np.array([0.3 * x[0] * (1 + x[0]), 0 * x[0]]))
+    stress = DerivedFields(problem.equilibrium, x.x.array).cells()["stress"]
+    points = stress.function_space.tabulate_dof_coordinates()
+    sigma = stress.x.array.reshape(-1, 3, 3)
+    on_axis = points[:, 0] < 1e-12
+    assert np.all(np.isfinite(sigma))
+    assert np.allclose(sigma[on_axis, 0, 0], sigma[on_axis, 2, 2], rtol=1e-12)
+
+
+def test_the_radial_gradient_is_part_of_norms(comm):
+    problem = Tube().problem(8)
+    e = errors(problem.equilibrium, problem.equilibrium.rest(), lambda x: ufl.as_vector([x[0], 0]))
+    measure = np.pi * 0.5 * (2.0**2 - 1.0)
+    assert e.h1**2 == pytest.approx(2 * measure, rel=1e-12)
+
+
+def test_a_radial_displacement_on_the_axis_is_refused(comm):
+    domain = half_plane(comm, 0.0, 1.0, 1.0, 3)
+    for given, wrong in ((constant(0.1, 2), True), (Affine((0.1, 0.0)), False)):
+        body = Body(Linear(1.0, 0.3), [Fixed("top", [given, constant(0.0, 2)])])
+        if wrong:
+            with pytest.raises(InputError, match=r"'top': a radial displacement of 0\.1"):
+                ContactProblem(domain, body, Contact("bottom", flat()))
+        else:
+            ContactProblem(domain, body, Contact("bottom", flat()))
+
+
+def test_a_body_that_nothing_holds_along_its_axis(comm):
+    domain = half_plane(comm, 1.0, 2.0, 1.0, 3)
+    body = Body(Linear(1.0, 0.3), [Fixed("left", [constant(0.0, 2), None])])
+    with pytest.raises(InputError, match="along y, its axis"):
+        check_held(ContactProblem(domain, body, Contact("right", flat())))
+
+
+def test_the_case_file_and_its_figures(tmp_path):
+    data = {
+        "mesh": {"generator": "rectangle", "size": [1.0, 1.0], "cells": [4, 4]},
+        "space": {"kinematics": "axisymmetric"},
+        "material": {"young": 1.0, "poisson": 0.3},
+        "fixed": [{"on": "top", "displacement": ["free", -0.01]}],
+        "contact": {"on": "bottom"},
+        "output": {"mirror": True},
+    }
+    solution = contact.solve(parse_case(data))
+    # Uniform pressure E eps under the area pi: the side is free.
+    assert solution.contact_force == pytest.approx([0.0, -0.01 * np.pi], rel=1e-8)
+    drawing = collect(solution)
+    if drawing is not None:
+        (_, drawn), *_ = drawing.pictures
+        assert (drawing.axes, drawing.mirror) == ("rz", True)
+        ax = draw_plane(drawn, drawing.table, "", drawing.axes, drawing.mirror).axes[0]
+        assert ax.get_xlabel().startswith("$r$")
+        assert ax.get_ylabel().startswith("$z$")
+        assert ax.get_xlim()[0] < -1
+    space = {"generator": "box", "size": [1.0, 1.0, 1.0], "cells": [1, 1, 1]}
+    fixed = [{"on": "top", "displacement": [0.0, 0.0, 0.0]}]
+    with pytest.raises(InputError, match=r"space\.kinematics"):
+        parse_case({**data, "mesh": space, "fixed": fixed})
+
+
+def test_what_is_no_half_plane_is_refused(comm):
+    with pytest.raises(InputError, match="x >= 0"):
+        revolved(rectangle(comm, [-1.0, 0.0], [2.0, 1.0], [4, 2]))
+    with pytest.raises(InputError, match="mesh in the plane"):
+        revolved(box(comm, [0.0] * 3, [1.0] * 3, [1, 1, 1]))
