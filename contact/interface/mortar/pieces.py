@@ -1,0 +1,128 @@
+"""Where two facets face each other: quadrature points on the pieces that they have in common.
+
+A master facet is projected along the normal of a slave facet onto that one's line or plane. What
+both have in common is a segment or a convex polygon, on which all integrands are polynomials: the
+rules are exact there.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from contact.interface.mortar.basis import rule, size_of
+from contact.interface.mortar.clipping import clipped
+from contact.interface.mortar.surface import Surface
+from contact.typing import Array
+
+#: Pieces smaller than this share of the slave facet are rounding.
+SMALLEST = 1e-12
+
+
+@dataclass(frozen=True)
+class Points:
+    """Quadrature points on common pieces.
+
+    Attributes
+    ----------
+    slave, master
+        The facets that each point belongs to, shape (p,).
+    on_slave, on_master
+        Barycentric coordinates there, shape (p, d).
+    weight
+        Quadrature weights, lengths or areas on the slave facet, shape (p,).
+    gap
+        Distance from the slave to the master facet along the slave's normal, shape (p,).
+    """
+
+    slave: NDArray[np.intp]
+    master: NDArray[np.intp]
+    on_slave: Array
+    on_master: Array
+    weight: Array
+    gap: Array
+
+
+def common_points(
+    slave: Surface, master: Surface, i: NDArray[np.intp], j: NDArray[np.intp], degree: int
+) -> Points:
+    """Return quadrature points on what pairs of facets have in common.
+
+    Parameters
+    ----------
+    slave, master
+        The two sides.
+    i, j
+        The facets of each pair, shape (n,).
+    degree
+        Of the polynomials that are integrated exactly, 2 or 4.
+    """
+    corners, normal = slave.corners[i], slave.normal[i]
+    # Barycentric coordinates of the master's corners, projected, on the slave: (n, d, d).
+    projected, height = _on_plane(corners, normal, master.corners[j])
+    d = corners.shape[1]
+    parts, share = (_segments if d == 2 else _triangles)(projected)
+    # Parts of the slave facet by barycentric coordinates of their corners: (n, parts, d, d).
+    pair, part = np.nonzero(share > SMALLEST)
+    places, weights = rule(d, degree)
+    on_slave = np.einsum("qc,pcb->pqb", places, parts[pair, part])
+    # The projection is affine: x = sum_c lambda_c x_c on both.
+    inverse = np.linalg.inv(projected[pair])
+    on_master = np.einsum("pqb,pbc->pqc", on_slave, inverse)
+    gap = np.einsum("pqc,pc->pq", on_master, height[pair])
+    size = (size_of(corners)[pair] * share[pair, part])[:, None] * weights
+    points = np.repeat(pair, weights.size)
+    return Points(
+        i[points],
+        j[points],
+        on_slave.reshape(-1, d),
+        on_master.reshape(-1, d),
+        size.ravel(),
+        gap.ravel(),
+    )
+
+
+def _on_plane(corners: Array, normal: Array, x: Array) -> tuple[Array, Array]:
+    """Return barycentric coordinates of projected points on facets, and their heights.
+
+    Parameters
+    ----------
+    corners, normal
+        Of the facets, shapes (n, d, d) and (n, d).
+    x
+        Points, shape (n, m, d).
+
+    Returns
+    -------
+    Shapes (n, m, d) and (n, m).
+    """
+    offset = x - corners[:, :1]
+    height = np.einsum("nmd,nd->nm", offset, normal)
+    edges = corners[:, 1:] - corners[:, :1]
+    gram = np.einsum("nid,njd->nij", edges, edges)
+    # The projection takes nothing off the products with the edges, which lie in the plane.
+    products = np.einsum("nid,nmd->nim", edges, offset)
+    others = np.linalg.solve(gram, products).transpose(0, 2, 1)
+    first = 1 - others.sum(axis=2, keepdims=True)
+    return np.concatenate([first, others], axis=2), height
+
+
+def _segments(projected: Array) -> tuple[Array, Array]:
+    """Return the common segment of each pair, shape (n, 1, 2, 2), and its share, (n, 1)."""
+    s = projected[:, :, 1]
+    low, high = np.maximum(s.min(axis=1), 0.0), np.minimum(s.max(axis=1), 1.0)
+    ends = np.stack([low, high], axis=1)
+    return np.stack([1 - ends, ends], axis=2)[:, None], (high - low)[:, None]
+
+
+def _triangles(projected: Array) -> tuple[Array, Array]:
+    """Return the triangles of each pair's common polygon, (n, 4, 3, 3), and their shares."""
+    polygon, count = clipped(projected)
+    # A fan about the first corner; coordinates are barycentric on the slave.
+    fan = [polygon[:, [0, k, k + 1]] for k in range(1, polygon.shape[1] - 1)]
+    parts = np.stack(fan, axis=1)
+    share = np.abs(np.linalg.det(parts))
+    share[np.arange(2, polygon.shape[1])[None, :] >= count[:, None]] = 0.0
+    return parts, share

@@ -1,0 +1,123 @@
+"""The facets of a part of the boundary as plain arrays, on this rank or on all."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+
+import basix
+import numpy as np
+from dolfinx import fem
+from mpi4py import MPI
+from numpy.typing import NDArray
+
+from contact import _compat
+from contact.mesh.domain import Domain
+from contact.typing import Array
+
+
+@dataclass(frozen=True)
+class Surface:
+    """Straight facets with the nodes of a Lagrange space.
+
+    Attributes
+    ----------
+    nodes
+        Global numbers of the nodes, in the order of `contact.interface.mortar.basis`, shape
+        (f, k).
+    corners
+        Coordinates of the corners, shape (f, d, d) (length).
+    normal
+        Unit normals out of the body, shape (f, d).
+    degree
+        Of the space.
+    """
+
+    nodes: NDArray[np.int64]
+    corners: Array
+    normal: Array
+    degree: int
+
+    @property
+    def count(self) -> int:
+        """Number of facets."""
+        return self.nodes.shape[0]
+
+    @property
+    def centres(self) -> Array:
+        """Their centres, shape (f, d)."""
+        return np.asarray(self.corners.mean(axis=1))
+
+    @property
+    def radii(self) -> Array:
+        """The farthest distance of a corner from the centre, shape (f,)."""
+        spread = np.linalg.norm(self.corners - self.centres[:, None], axis=2)
+        return np.asarray(spread.max(axis=1, initial=0.0))
+
+    def gathered(self, comm: MPI.Intracomm) -> Surface:
+        """Return the facets of all ranks. Collective."""
+        arrays = {
+            f.name: np.concatenate(comm.allgather(getattr(self, f.name)))
+            for f in fields(self)
+            if f.name != "degree"
+        }
+        return Surface(**arrays, degree=self.degree)
+
+
+def surface_of(domain: Domain, space: fem.FunctionSpace, part: str) -> Surface:
+    """Return the facets of a part that this rank owns.
+
+    Raises
+    ------
+    InputError
+        If there is no such part.
+    """
+    mesh, d = domain.mesh, domain.dim
+    facets = domain.facets(part)
+    mesh.topology.create_connectivity(d - 1, d)
+    mesh.topology.create_connectivity(d, d - 1)
+    to_cell, to_facet = mesh.topology.connectivity(d - 1, d), mesh.topology.connectivity(d, d - 1)
+    cells = to_cell.array[to_cell.offsets[facets]]
+    place = np.argmax(to_facet.array.reshape(-1, d + 1)[cells] == facets[:, None], axis=1)
+    degree = space.ufl_element().embedded_superdegree
+    local = _local_nodes(space, degree)[place]
+    nodes = np.take_along_axis(space.dofmap.list[cells], local, axis=1)
+    # Vertex i of a simplex is opposite to facet i.
+    vertices = np.array([[j for j in range(d + 1) if j != i] for i in range(d + 1)])[place]
+    x = mesh.geometry.x[_compat.geometry_dofmap(mesh)[cells]][:, : d + 1, :d]
+    corners = np.take_along_axis(x, vertices[:, :, None], axis=1)
+    inside = np.take_along_axis(x, place[:, None, None], axis=1)[:, 0]
+    numbers = space.dofmap.index_map.local_to_global(nodes.ravel().astype(np.int32))
+    return Surface(
+        np.asarray(numbers, dtype=np.int64).reshape(nodes.shape),
+        corners,
+        _outward(corners, inside),
+        degree,
+    )
+
+
+def _local_nodes(space: fem.FunctionSpace, degree: int) -> NDArray[np.intp]:
+    """Return the nodes of each facet of a cell in the order of the basis, (d + 1, k)."""
+    cell = space.mesh.basix_cell()
+    layout, topology = space.dofmap.dof_layout, basix.topology(cell)
+    d = len(topology) - 1
+    rows = []
+    for facet in topology[d - 1]:
+        nodes = [layout.entity_dofs(0, vertex)[0] for vertex in facet]
+        if degree == 2:
+            ends = [facet] if d == 2 else [[facet[1], facet[2]], [facet[0], facet[2]], facet[:2]]
+            edges = [sorted(edge) for edge in topology[1]]
+            nodes += [layout.entity_dofs(1, edges.index(sorted(pair)))[0] for pair in ends]
+        rows.append(nodes)
+    return np.array(rows, dtype=np.intp)
+
+
+def _outward(corners: Array, inside: Array) -> Array:
+    """Return unit normals that point away from a point of the body, shape (f, d)."""
+    edges = corners[:, 1:] - corners[:, :1]
+    if corners.shape[2] == 2:
+        across = np.column_stack([-edges[:, 0, 1], edges[:, 0, 0]])
+    else:
+        across = np.cross(edges[:, 0], edges[:, 1])
+    normal = across / np.linalg.norm(across, axis=1)[:, None]
+    away = np.einsum("fd,fd->f", normal, corners[:, 0] - inside)
+    return np.asarray(normal * np.sign(away)[:, None])

@@ -1,0 +1,229 @@
+"""The dual mortar operator by itself: exact on any pair of meshes."""
+
+import time
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+
+from contact.body.description import Body, Fixed
+from contact.body.equilibrium import BodyEquilibrium
+from contact.interface.mortar.basis import basis, positive_change, rule, size_of
+from contact.interface.mortar.clipping import clipped
+from contact.interface.mortar.coupling import couple
+from contact.interface.mortar.surface import Surface, surface_of
+from contact.mesh.grid import box, rectangle
+from forms.hencky import Linear
+from tests.problems.mechanics import constant
+
+KINDS = [(2, 1), (2, 2), (3, 1), (3, 2)]
+NAMES = [f"{d}d-P{p}" for d, p in KINDS]
+FIRST = 100_000
+
+
+def edges(n, degree, rng):
+    """Return corner points in [0, 1] and the edges between them."""
+    x = np.linspace(0, 1, n + 1)
+    x[1:-1] += rng.uniform(-0.3, 0.3, n - 1) / n
+    return x[:, None], np.column_stack([np.arange(n), np.arange(1, n + 1)])
+
+
+def triangles(n, degree, rng):
+    """Return corner points in the unit square and triangles of them."""
+    g = np.linspace(0, 1, n + 1)
+    p = np.stack(np.meshgrid(g, g, indexing="ij"), axis=-1).reshape(-1, 2)
+    inside = np.all((p > 1e-9) & (p < 1 - 1e-9), axis=1)
+    p[inside] += rng.uniform(-0.3, 0.3, (inside.sum(), 2)) / n
+    i = np.arange((n + 1) ** 2).reshape(n + 1, n + 1)
+    a, b, c, d = (part.ravel() for part in (i[:-1, :-1], i[1:, :-1], i[:-1, 1:], i[1:, 1:]))
+    return p, np.concatenate([np.stack([a, b, d], 1), np.stack([a, d, c], 1)])
+
+
+def flat(dim, degree, n, height, up, seed, first=0, turn=None, size=1.0):
+    """Return a flat side at a height with its nodes' coordinates, by their number."""
+    rng = np.random.default_rng(seed)
+    p, corners = (edges if dim == 2 else triangles)(n, degree, rng)
+    x = np.column_stack([size * p, np.full(len(p), height)])
+    x = x if turn is None else x @ turn.T
+    normal = np.zeros(dim)
+    normal[-1] = up
+    nodes, points = corners, x
+    if degree == 2:
+        pairs = [[0, 1]] if dim == 2 else [[1, 2], [0, 2], [0, 1]]
+        every = np.sort(corners[:, pairs].reshape(-1, 2), axis=1)
+        unique, number = np.unique(every, axis=0, return_inverse=True)
+        nodes = np.column_stack([corners, len(p) + number.reshape(len(corners), -1)])
+        points = np.concatenate([x, x[unique].mean(axis=1)])
+    normal = normal if turn is None else turn @ normal
+    side = Surface(nodes + first, x[corners], np.tile(normal, (len(corners), 1)), degree)
+    return side, points
+
+
+def loads(side, nodes):
+    """Return the nodal loads of a unit pressure."""
+    places, weights = rule(side.corners.shape[1], 4)
+    share = weights @ basis(places, side.degree)
+    total = np.zeros(nodes.size)
+    np.add.at(total, np.searchsorted(nodes, side.nodes), size_of(side.corners)[:, None] * share)
+    return total
+
+
+def rotation(dim):
+    c, s = np.cos(0.5), np.sin(0.5)
+    turn = np.eye(dim)
+    turn[:2, :2] = [[c, -s], [s, c]]
+    if dim == 3:
+        turn = turn @ np.array([[1, 0, 0], [0, c, -s], [0, s, c]])
+    return turn
+
+
+@pytest.mark.parametrize("turned", [False, True], ids=["straight", "turned"])
+@pytest.mark.parametrize(("dim", "degree"), KINDS, ids=NAMES)
+def test_constant_pressure_and_linear_fields_pass(dim, degree, turned) -> None:
+    """To rounding: a pressure's loads on both sides, and any linear field, on jittered meshes."""
+    turn = rotation(dim) if turned else None
+    slave, x = flat(dim, degree, 7, 1.0, 1.0, 1, turn=turn)
+    master, y = flat(dim, degree, 11, 1.1, -1.0, 2, FIRST, turn)
+    found = couple(slave, master, 1.0)
+    assert found.nodes.size == len(x) and np.abs(found.covered - 1).max() < 1e-12
+    np.testing.assert_allclose(found.gap, 0.1, atol=1e-14)
+    np.testing.assert_allclose(found.normal, np.broadcast_to(slave.normal[0], x.shape), atol=1e-14)
+    assert found.weight.min() > 0
+    forces = found.other.T @ found.weight
+    np.testing.assert_allclose(forces, loads(master, found.masters), rtol=0, atol=3e-15)
+    on_slave = found.own.T @ found.weight
+    np.testing.assert_allclose(on_slave, loads(slave, found.slaves), rtol=0, atol=3e-15)
+    # A linear field of both has the jump of the gap alone.
+    field = np.random.default_rng(3).normal(size=(dim, dim))
+    jump = found.own @ (x[found.slaves] @ field) - found.other @ (y[found.masters - FIRST] @ field)
+    apart = -0.1 * slave.normal[0] @ field
+    np.testing.assert_allclose(jump, np.broadcast_to(apart, jump.shape), atol=1e-13)
+
+
+@pytest.mark.parametrize(("dim", "degree"), KINDS, ids=NAMES)
+def test_matching_meshes_are_tied_node_by_node(dim, degree) -> None:
+    slave, _ = flat(dim, degree, 5, 0.0, 1.0, 4)
+    master, _ = flat(dim, degree, 5, 0.0, -1.0, 4, FIRST)
+    found = couple(slave, master, 1.0)
+    np.testing.assert_array_equal(found.masters - FIRST, found.slaves)
+    np.testing.assert_allclose((found.own - found.other).toarray(), 0, atol=1e-12)
+
+
+@pytest.mark.parametrize(("dim", "degree"), KINDS, ids=NAMES)
+def test_what_is_partly_covered_still_reproduces_linear_fields(dim, degree) -> None:
+    """The master is smaller: nodes far from it drop out, the others extrapolate exactly."""
+    slave, x = flat(dim, degree, 7, 0.0, 1.0, 1)
+    master, y = flat(dim, degree, 5, 0.05, -1.0, 2, FIRST, size=0.61)
+    found = couple(slave, master, 1.0)
+    # But for the share of the nodes that drop out.
+    assert found.weight.sum() == pytest.approx(0.61 ** (dim - 1), rel=1e-3)
+    assert 0 < found.nodes.size < len(x)
+    assert found.covered.min() < 0.9 < found.covered.max() < 1 + 1e-12
+    jump = found.own @ x[found.slaves] - found.other @ y[found.masters - FIRST]
+    np.testing.assert_allclose(jump[:, :-1], 0, atol=1e-9)
+    np.testing.assert_allclose(jump[:, -1], -0.05, atol=1e-9)
+    np.testing.assert_allclose(found.gap, 0.05, atol=1e-9)
+
+
+def test_clipped_triangles_have_the_area_in_common() -> None:
+    """Against the share of random points that lie in both triangles."""
+    rng = np.random.default_rng(0)
+    first = rng.uniform(-0.6, 1.2, (200, 3, 2))
+    given = np.concatenate([1 - first.sum(axis=2, keepdims=True), first], axis=2)
+    polygon, count = clipped(given)
+    assert set(np.unique(count)) <= {0, 3, 4, 5, 6}
+    assert polygon.min() >= -1e-12
+    x, y = polygon[:, :, 1], polygon[:, :, 2]
+    area = np.zeros(200)
+    for i, n in enumerate(count):
+        k, before = np.arange(n), np.roll(np.arange(n), 1)
+        area[i] = abs(np.sum(x[i, k] * y[i, before] - x[i, before] * y[i, k])) / 2
+    sample = rng.uniform(0, 1, (40_000, 2))
+    sample = sample[sample.sum(axis=1) < 1]
+    places = np.column_stack([1 - sample.sum(axis=1), sample])
+    inside = np.all(np.einsum("pb,nbc->npc", places, np.linalg.inv(given)) >= 0, axis=2)
+    np.testing.assert_allclose(area, 0.5 * inside.mean(axis=1), atol=0.012)
+
+
+@pytest.mark.parametrize("degree", [1, 2])
+def test_concentric_arcs(degree) -> None:
+    """Chords of two circles: normals are radial and gaps right to the order of the chords."""
+
+    def arc(n, radius, sign, first):
+        a = np.linspace(0.5, 1.5, n + 1)
+        x = radius * np.column_stack([np.cos(a), np.sin(a)])
+        c = np.stack([x[:-1], x[1:]], axis=1)
+        out = c.mean(axis=1)
+        out = sign * out / np.linalg.norm(out, axis=1)[:, None]
+        nodes = np.column_stack([np.arange(n), np.arange(1, n + 1)])
+        nodes = nodes if degree == 1 else np.column_stack([nodes, n + 1 + np.arange(n)])
+        return Surface(nodes + first, c, out, degree), a
+
+    errors = []
+    for n in (20, 40):
+        (slave, a), (master, _) = arc(n, 1.0, 1.0, 0), arc(3 * n // 2, 1.05, -1.0, FIRST)
+        found = couple(slave, master, 1.0)
+        inner = (found.nodes > 0) & (found.nodes < n)
+        angle = a[found.nodes[inner]]
+        radial = np.column_stack([np.cos(angle), np.sin(angle)])
+        errors.append(np.abs(found.gap[inner] - 0.05).max())
+        np.testing.assert_allclose(found.normal[inner], radial, atol=1e-12)
+    assert errors[0] < (1 / 20) ** 2 / 4 and errors[1] < errors[0] / 3
+
+
+def test_surfaces_that_do_not_face_each_other_have_nothing_in_common() -> None:
+    slave, _ = flat(3, 1, 3, 0.0, 1.0, 1)
+    for master in (
+        flat(3, 1, 3, 0.1, 1.0, 2, FIRST)[0],  # looks the same way
+        flat(3, 1, 3, 5.0, -1.0, 2, FIRST)[0],  # too far
+    ):
+        assert couple(slave, master, 1.0).nodes.size == 0
+
+
+@pytest.mark.parametrize(("dim", "degree"), KINDS, ids=NAMES)
+def test_surfaces_of_meshes(dim, degree) -> None:
+    """The nodes of facets are where the basis says, and normals point out of the body."""
+    domain = (
+        rectangle(MPI.COMM_SELF, (0.0, 0.0), (1.0, 1.0), (3, 3))
+        if dim == 2
+        else box(MPI.COMM_SELF, (0.0,) * 3, (1.0,) * 3, (2, 2, 2))
+    )
+    zero = constant(0.0, dim)
+    space = BodyEquilibrium(
+        domain, Body(Linear(1.0, 0.3), [Fixed("left", [zero] * dim)]), degree
+    ).space
+    points = space.tabulate_dof_coordinates()[:, :dim]
+    for part in ("top", "right"):
+        side = surface_of(domain, space, part)
+        corners = np.eye(dim)
+        mids = {2: [[0.5, 0.5]], 3: [[0, 0.5, 0.5], [0.5, 0, 0.5], [0.5, 0.5, 0]]}[dim]
+        places = corners if degree == 1 else np.concatenate([corners, mids])
+        expected = np.einsum("kc,fcd->fkd", places, side.corners)
+        np.testing.assert_allclose(points[side.nodes], expected, atol=1e-14)
+        axis = 0 if part == "right" else dim - 1
+        np.testing.assert_allclose(side.normal, np.tile(np.eye(dim)[axis], (side.count, 1)))
+        # Nodal basis: 1 at its node and 0 at the others.
+        np.testing.assert_allclose(basis(places, degree), np.eye(len(places)), atol=1e-15)
+
+
+@pytest.mark.parametrize(("dim", "degree"), KINDS, ids=NAMES)
+def test_the_changed_basis_has_positive_integrals(dim, degree) -> None:
+    change = positive_change(dim, degree)
+    places, weights = rule(dim, 4)
+    changed = basis(places, degree) @ change.T
+    np.testing.assert_allclose(changed.sum(axis=1), 1, atol=1e-14)
+    expected = {
+        (2, 1): [1 / 2] * 2,
+        (2, 2): [1 / 6, 1 / 6, 2 / 3],
+        (3, 1): [1 / 3] * 3,
+        (3, 2): [2 / 15] * 3 + [1 / 5] * 3,
+    }
+    np.testing.assert_allclose(weights @ changed, expected[dim, degree], atol=1e-15)
+
+
+def test_ten_thousand_facets_in_seconds() -> None:
+    slave, _ = flat(3, 1, 71, 1.0, 1.0, 1)
+    master, _ = flat(3, 1, 71, 1.0, -1.0, 2, FIRST)
+    begin = time.process_time()
+    couple(slave, master, 1.0)
+    assert time.process_time() - begin < 5.0
