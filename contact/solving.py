@@ -12,6 +12,7 @@ from mpi4py import MPI
 
 from contact.build import build_problem, named
 from contact.case.file import Case, load_case
+from contact.case.text import to_toml
 from contact.methods.fixed_point import FixedPoint
 from contact.methods.interrupt import stop_on_signal
 from contact.methods.method import Method
@@ -77,6 +78,8 @@ def solve(
         start = coarse_solution(case, comm, **replacements) if nested else None
         solution = solve_problem(problem, settings, monitor, start)
     solution.title, solution.output = case.title, case.output
+    if not replacements:
+        solution.case = to_toml(case)
     solution.seconds["setup"] += time.perf_counter() - begin - sum(solution.seconds.values())
     return solution
 

@@ -10,6 +10,7 @@ from __future__ import annotations
 import argparse
 import difflib
 import io
+import logging
 import os
 import signal
 import sys
@@ -35,6 +36,7 @@ from contact.cli.ending import (
 from contact.errors import InputError
 from contact.methods.interrupt import Terminated, ending_on_signal, signals_held
 from contact.output.folder import on_root, refused, result_folder
+from contact.output.rerun import check_rerun
 
 if TYPE_CHECKING:  # it loads dolfinx, which PETSc's options have to precede
     from contact.case.file import Case
@@ -80,6 +82,12 @@ def _parser() -> _Parser:
             command.add_argument("--out", required=True, metavar="DIR", help="folder for results")
             command.add_argument("--plot", action="store_true", help="draw the figures too")
             command.add_argument("--quiet", action="store_true", help="show no progress")
+            command.add_argument("--log", metavar="FILE", help="write a log to the end of a file")
+            command.add_argument(
+                "--overwrite",
+                action="store_true",
+                help="replace results of another case, if DIR has any",
+            )
     plot.add_parser(commands, common)
     return parser
 
@@ -128,13 +136,17 @@ def _solve(case: Case, options: argparse.Namespace, comm: MPI.Intracomm) -> int:
     if not options.out:  # the present folder is "."; this is rather a variable that is not set
         raise InputError('--out "": no folder; accepted: a folder to write to')
     # Not earlier: these load dolfinx, which PETSc's options have to precede.
+    from contact.case.text import to_toml
     from contact.cli.progress import progress
     from contact.output.files import write_outputs
     from contact.solving import solve
 
     with result_folder(options.out, comm) as folder:
-        with progress(comm, options.quiet) as monitor:
+        if not options.overwrite:
+            on_root(comm, lambda: check_rerun(folder.path, to_toml(case)))
+        with progress(comm, options.quiet, options.log) as monitor:
             solution = solve(case, monitor=monitor, comm=comm)
+            logging.getLogger("contact").debug(solution.outcome.reason)
         # What has taken long to compute is written, signal or not.
         with signals_held(PATIENCE) as caught:
             write_outputs(solution, folder, figures=options.plot)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from typing import Any
 
 import numpy as np
@@ -15,6 +16,8 @@ from contact.problem.kkt import residual_forces
 from contact.problem.problem import ContactProblem
 from contact.problem.state import State
 from contact.typing import Array
+
+logger = logging.getLogger("contact.inner")
 
 
 class PenalisedProblem:
@@ -45,6 +48,7 @@ class PenalisedProblem:
         self.snes.setOptionsPrefix("penalty_")
         self.snes.setFunction(self._function, self._residual)
         self.snes.setJacobian(self._jacobian, matrix)
+        self.snes.setMonitor(self._tell)
         self.snes.getKSP().setType("preonly")
         pc = self.snes.getKSP().getPC()
         pc.setType("python")
@@ -98,6 +102,7 @@ class PenalisedProblem:
         scale = body.load_size(state.time) + body.norm(residual_forces(self._problem, state))
         vectors = interface.jump.weight[:, None] * state.forces.vectors(interface.jump)
         scale += body.norm(vectors.ravel())
+        self._scale = scale or 1.0
         self.snes.setTolerances(
             rtol=1e-14,
             # Rounding is magnified by 1/eps: the residual may stay above any tolerance.
@@ -138,6 +143,9 @@ class PenalisedProblem:
     def _unknowns(self, iterate: PETSc.Vec) -> Array:
         """Return the local unknowns of an iterate of SNES. Collective."""
         return self._body.local(iterate.array_r)
+
+    def _tell(self, _: PETSc.SNES, iteration: int, norm: float) -> None:
+        logger.debug("inner iteration %d: residual %.2e", iteration, norm / self._scale)
 
     def _function(self, _: PETSc.SNES, iterate: PETSc.Vec, residual: PETSc.Vec) -> None:
         body, jump, x = self._body, self._interface.jump, self._unknowns(iterate)

@@ -8,6 +8,7 @@ which `acceleration` speeds up.
 
 from __future__ import annotations
 
+import logging
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -27,6 +28,8 @@ from contact.methods.stagnation import Stagnation
 from contact.problem.scales import Scales
 from contact.typing import Array
 from forms.foundation import contact_multiplier
+
+logger = logging.getLogger("contact.inner")
 
 #: Iterations without progress, that is 1 %, after which the relaxation is given up: accelerated,
 #: and plain. With r far from r* the plain one creeps by 1e-4 an iteration, and still gets there.
@@ -250,6 +253,7 @@ def block_relaxation(
         if parameters.single_loop and step.friction:
             bound = interface.bound(nodal, forces)
         residual = max(interface_residuals(interface, nodal, forces, bound))
+        logger.debug("inner iteration %d: residual %.2e", iteration, residual)
         phi = (z - multiplier) * (1 / r)
         image = multiplier + r * (phi + parameters.over_relaxation * (u - phi))
         measured = residual

@@ -198,7 +198,11 @@ class DerivedFields:
             self.body.comm.Allreduce(MPI.IN_PLACE, largest, op=MPI.MAX)
             self.body.comm.Allreduce(MPI.IN_PLACE, sums, op=MPI.SUM)
             yields = bool(np.isfinite(limit))
-            found.append(Extremes(*map(float, (*largest, *sums)), yields))
+            found.append(
+                Extremes(
+                    float(largest[0]), float(largest[1]), float(sums[0]), float(sums[1]), yields
+                )
+            )
         return found
 
     def cells(self) -> dict[str, fem.Function]:

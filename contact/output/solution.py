@@ -55,8 +55,8 @@ class Solution:
         where no material has such a limit.
     start
         From where the iteration started, in words.
-    title
-        Of the case.
+    title, case
+        Of the case; and the case itself as `contact check` prints it, empty where there is none.
     output
         What is written besides the summary and the tables.
     """
@@ -75,6 +75,7 @@ class Solution:
     share_beyond_yield: float | None = None
     start: str = "zero slip"
     title: str = ""
+    case: str = ""
     output: OutputOptions = field(default_factory=OutputOptions)
 
     @property

@@ -70,6 +70,7 @@ def summarise(solution: Solution, table: Table | None) -> dict[str, Any]:
     }
     if problem.piezoelectric:
         summary |= _electric(solution)
+    summary["case"] = solution.case
     summary |= {"seconds": solution.seconds, "versions": environment.versions()}
     return {key: _finite(value) for key, value in summary.items()}
 

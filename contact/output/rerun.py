@@ -1,0 +1,82 @@
+"""What a run may replace: results of the same problem, and others where that is asked for."""
+
+from __future__ import annotations
+
+import json
+import tomllib
+from collections.abc import Iterator, Mapping
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+from contact.errors import InputError
+from contact.output.transaction import SUMMARY
+
+#: Sections of the case file that say how a problem is solved and shown, not which one it is.
+MANNER = ("title", "solver", "output")
+_SHOWN = 60
+
+
+def check_rerun(folder: Path, case: str) -> None:
+    """Refuse to replace results of another case. On one rank.
+
+    Parameters
+    ----------
+    folder
+        Where the results are to go.
+    case
+        The case that is about to be solved, as `contact check` prints it.
+
+    Raises
+    ------
+    InputError
+        If the folder has results of another problem, or of one that it does not tell.
+    """
+    try:
+        summary = json.loads((folder / SUMMARY).read_bytes())
+    except FileNotFoundError:
+        return
+    except (ValueError, RecursionError):
+        summary = None
+    before: Mapping[str, Any] | None = None
+    if isinstance(summary, dict) and isinstance(summary.get("case"), str):
+        with suppress(tomllib.TOMLDecodeError, ValueError, RecursionError):
+            before = tomllib.loads(summary["case"])
+    given = "results that do not say of which case they are"
+    if before is not None:
+        now = tomllib.loads(case)
+        place = next(_differences(_without(before), _without(now)), None)
+        if place is None:
+            return
+        given = f"results of another case: there {place}"
+    raise InputError(
+        f"--out {folder}: given a folder with {given}; accepted: --overwrite to replace them, or "
+        "another folder"
+    )
+
+
+def _without(case: Mapping[str, Any]) -> dict[str, Any]:
+    return {key: value for key, value in case.items() if key not in MANNER}
+
+
+def _differences(before: Any, now: Any, path: str = "") -> Iterator[str]:
+    """Yield what differs in words, key by key."""
+    if isinstance(before, dict) and isinstance(now, dict):
+        for key in (*before, *(key for key in now if key not in before)):
+            missing = object()
+            pair = before.get(key, missing), now.get(key, missing)
+            place = f"{path}.{key}" if path else key
+            if pair[0] is missing or pair[1] is missing:
+                yield f"{place} is {'missing' if pair[0] is missing else 'given'}"
+            else:
+                yield from _differences(*pair, place)
+    elif isinstance(before, list) and isinstance(now, list) and len(before) == len(now):
+        for i, pair in enumerate(zip(before, now, strict=True)):
+            yield from _differences(*pair, f"{path}.{i}")
+    elif before != now and not (before != before and now != now):
+        yield f"{path} is {_short(before)}, here {_short(now)}"
+
+
+def _short(value: Any) -> str:
+    text = " ".join(json.dumps(value, ensure_ascii=False).split())
+    return text if len(text) <= _SHOWN else text[:_SHOWN] + "..."
