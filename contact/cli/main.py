@@ -36,6 +36,7 @@ from contact.cli.ending import (
 from contact.errors import InputError
 from contact.methods.interrupt import Terminated, ending_on_signal, signals_held
 from contact.output.folder import on_root, refused, result_folder
+from contact.output.reference import summary_help
 from contact.output.rerun import check_rerun
 
 if TYPE_CHECKING:  # it loads dolfinx, which PETSc's options have to precede
@@ -79,6 +80,8 @@ def _parser() -> _Parser:
         command.add_argument("--help", action="help", help="show this help and leave")
         if name == "solve":
             command.usage = f"contact {name} CASE.toml --out DIR [options] [PETSc options]"
+            command.epilog = summary_help()
+            command.formatter_class = argparse.RawDescriptionHelpFormatter
             command.add_argument("--out", required=True, metavar="DIR", help="folder for results")
             command.add_argument("--plot", action="store_true", help="draw the figures too")
             command.add_argument("--quiet", action="store_true", help="show no progress")

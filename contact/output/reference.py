@@ -1,0 +1,130 @@
+"""The reference page of the output files, made from what is said of each key.
+
+``python3 -m contact.output.reference`` writes ``docs/output.md``.
+"""
+
+from __future__ import annotations
+
+import textwrap
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+
+from contact.output.described import BODY, SUMMARY, SURFACE, TABLES, Item
+
+PAGE = Path(__file__).parents[2] / "docs" / "output.md"
+
+INTRODUCTION = """\
+# Output files
+
+<!-- Made by `python3 -m contact.output.reference`; edit contact/output/described.py instead. -->
+
+`contact solve CASE.toml --out DIR` leaves in DIR:
+
+| file | what it holds |
+|---|---|
+| `summary.json` | the numbers of the run as a whole |
+| `contact.csv` | one row a contact node |
+| `history.csv` | one row an outer iteration |
+| `fields.vtu` | all fields of the body, for ParaView, pyvista and meshio |
+| `contact.vtu` | the contact part alone, a surface (in the plane a line) |
+| `fields.bp`, `cells.bp` | instead of `fields.vtu`, with `output.fields = "vtx"`: needs ADIOS2 |
+| `fields.xdmf`, `fields.h5` | likewise with `output.fields = "xdmf"`: degree 1 at most |
+| `checkpoint.bp` | with `output.checkpoint = true` |
+| `figure-*.png` | with `--plot`, and by `contact plot DIR` |
+
+They replace those of an earlier run all together, once they are complete; other files in DIR are
+left alone. Results of another problem are replaced with `--overwrite` only: the same one may be
+solved again by another method, to another tolerance, with other outputs.
+
+**Units.** All is in the units of the case: with millimetres and newtons, stresses are in MPa. In
+the plane, forces and charges are those of a unit of depth; of bodies of revolution they are those
+of the full turn (along r the sum of the radial ones, which is no resultant).
+
+**Signs.** ν points out of the body, to the foundation. Pressure is positive; contact forces and
+friction stresses are what the body exerts *on the foundation*; reactions are what the supports
+exert *on the body*. Stresses in the body are positive in tension. In the plane tangential numbers
+count along ν turned counter-clockwise by 90 degrees: at the bottom of a body, where ν points down,
+along x.
+
+## Opening them
+
+```python
+import json, csv
+import pyvista
+
+summary = json.load(open("results/summary.json"))
+print(summary["converged"], summary["max_pressure"], summary["contact_force"])
+
+with open("results/contact.csv") as file:
+    rows = list(csv.DictReader(file))
+print(max(float(row["pressure"]) for row in rows))
+
+body = pyvista.read("results/fields.vtu")
+print(body["displacement"].shape, body.cell_data["von_mises_cell"].max())
+surface = pyvista.read("results/contact.vtu")
+touching = surface["status"] > 0
+print(surface["pressure"][touching].mean())
+```
+
+`pyvista.read("results/fields.vtu").warp_by_vector("displacement").plot(scalars="von_mises")` shows
+the deformed body; `meshio.read` reads the same files. In ParaView: open, Apply, and the filter
+*Warp By Vector*.
+
+Figures are drawn again from these files, without a solve, in other formats and of other fields:
+
+```sh
+contact plot results --format pdf --width 85mm
+contact plot results --field stress_xy --field displacement
+```
+"""
+
+
+def page() -> str:
+    """Return the reference page (Markdown)."""
+    lines = [INTRODUCTION, "## summary.json", "", *_rows(SUMMARY, "key")]
+    for name, columns in TABLES.items():
+        lines += ["", f"## {name}", "", *_rows(columns, "column")]
+    lines += [
+        "",
+        "## fields.vtu",
+        "",
+        "At the nodes. All but displacement and potential are averages of the cells around a "
+        "node, weighted by volume; as they are, they stand in the cells under NAME`_cell`.",
+        "",
+        *_rows(BODY, "field"),
+        "",
+        "## contact.vtu",
+        "",
+        "At the nodes; `nan` where a node is held and hence no contact node.",
+        "",
+        *_rows(SURFACE, "field"),
+    ]
+    return "\n".join(lines) + "\n"
+
+
+def _rows(items: Mapping[str, Item], what: str) -> Iterator[str]:
+    yield from (f"| {what} | unit | meaning |", "|---|---|---|")
+    for name, item in items.items():
+        text = item.text.replace("|", r"\|")
+        yield f"| `{name}` | {item.unit or '—'} | {text} |"
+
+
+def summary_help() -> str:
+    """Return the keys of the summary with their meanings, for the command line's help."""
+    lines = ["keys of summary.json (signs, units and the other files: docs/output.md):"]
+    for name, item in SUMMARY.items():
+        unit = f" ({item.unit})" if item.unit else ""
+        text = f"{_first(item.text)}{unit}"
+        lines += textwrap.wrap(f"  {name:<20}{text}", 98, subsequent_indent=22 * " ")
+    return "\n".join(lines)
+
+
+def _first(text: str) -> str:
+    """Return the first statement of a text, without Markdown."""
+    for end in (". ", ": ", "; "):
+        text = text.partition(end)[0]
+    return text.rstrip(".").replace("`", "")
+
+
+if __name__ == "__main__":
+    PAGE.write_text(page(), encoding="utf-8")
