@@ -31,6 +31,8 @@ DEFAULTS = {
     **SMOOTHER,
     "mg_coarse_pc_type": "redundant",
     "mg_coarse_redundant_pc_type": "lu",
+    # PETSc's own is a size, and would call a body singular in units in which it is soft and small.
+    "mg_coarse_redundant_pc_factor_zeropivot": "1e-300",
 }
 
 
