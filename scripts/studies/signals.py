@@ -44,7 +44,7 @@ def command(folder: Path, number: int, ranks: int) -> list[str]:
     }
     pairs = [f"--set={key}={value}" for key, value in settings.items()]
     run = [sys.executable, "-m", "contact", "solve", str(CASE), "--out", str(folder), *pairs]
-    return [*launcher, *run, "--quiet", "--plot"]
+    return [*launcher, *run, "--quiet", "--plot", "--overwrite"]
 
 
 def load_of(number: int) -> float:
