@@ -12,10 +12,9 @@ from mpi4py import MPI
 from contact.blame import to_blame
 from contact.body.description import Body, Fixed, Load, Material
 from contact.case import file as sections
-from contact.case.formula import Expression
 from contact.contacts import make_contacts
 from contact.errors import InputError
-from contact.given import NodalField, check_range, given_field
+from contact.given import amplitude, check_range, loading_field
 from contact.interface.layer import Layer
 from contact.interface.obstacle import Obstacle
 from contact.mesh.domain import Domain
@@ -67,22 +66,29 @@ def build_problem(
         _check_loads(case, domain)
         body = Body.piecewise(
             _materials(case, domain.dim, law),
-            [_fixed(i, fixed, domain.comm) for i, fixed in enumerate(case.fixed)],
-            [_load(i, load, domain.comm) for i, load in enumerate(case.load)],
+            [_fixed(case, i, domain.comm) for i in range(len(case.fixed))],
+            [_load(case, i, domain.comm) for i in range(len(case.load))],
         )
         contacts = make_contacts(case, domain, coefficient, friction, foundation, layer)
         problem = ContactProblem(domain, body, contacts, degree=case.space.degree)
-        loads = problem.equilibrium.external()
-        finite = bool(np.isfinite(loads).all())
-        if not domain.comm.allreduce(finite, op=MPI.LAND):
-            key = to_blame(body.loads, domain)
-            raise InputError(f"{key}: a formula is not finite everywhere on its part")
-        largest = float(np.abs(loads).max(initial=0.0))
-        largest = domain.comm.allreduce(largest, op=MPI.MAX)
-        if largest > HUGE:
-            check_range(to_blame(body.loads, domain), largest)
-        check_held(problem)
+        for time in (1.0,) if case.evolution is None else case.evolution.times[1:]:
+            _check_step(problem.at(time))
     return problem
+
+
+def _check_step(problem: ContactProblem) -> None:
+    """Refuse loads that are no numbers, or that nothing holds."""
+    body, domain, time = problem.body, problem.domain, problem.time
+    loads = problem.equilibrium.external(time)
+    finite = bool(np.isfinite(loads).all())
+    if not domain.comm.allreduce(finite, op=MPI.LAND):
+        key = to_blame(body.loads, domain, time)
+        raise InputError(f"{key}: a formula is not finite everywhere on its part")
+    largest = float(np.abs(loads).max(initial=0.0))
+    largest = domain.comm.allreduce(largest, op=MPI.MAX)
+    if largest > HUGE:
+        check_range(to_blame(body.loads, domain, time), largest)
+    check_held(problem)
 
 
 def _check_loads(case: sections.Case, domain: Domain) -> None:
@@ -147,26 +153,28 @@ def piezo(section: sections.Piezo, dim: int) -> Piezo:
     return material.poled_along(section.poling)
 
 
-def _fixed(i: int, section: sections.Fixed, comm: MPI.Intracomm) -> Fixed:
-    key = f"fixed.{i}"
+def _fixed(case: sections.Case, i: int, comm: MPI.Intracomm) -> Fixed:
+    key, section = f"fixed.{i}", case.fixed[i]
     displacement = None
     if section.displacement is not None:
         displacement = [
-            NodalField(f"{key}.displacement.{k}", c, comm) if isinstance(c, Expression) else None
-            for k, c in enumerate(section.displacement)
+            loading_field(f"{key}.displacement.{k}", component, comm)
+            for k, component in enumerate(section.displacement)
         ]
-    return Fixed(section.on, displacement, given_field(f"{key}.potential", section.potential, comm))
+    potential = loading_field(f"{key}.potential", section.potential, comm)
+    return Fixed(section.on, displacement, potential, amplitude(case, section.amplitude))
 
 
-def _load(i: int, section: sections.Load, comm: MPI.Intracomm) -> Load:
-    key = f"load.{i}"
+def _load(case: sections.Case, i: int, comm: MPI.Intracomm) -> Load:
+    key, section = f"load.{i}", case.load[i]
     force = section.body_force if section.everywhere else section.traction
     charge = section.body_charge if section.everywhere else section.charge
     names = ("body_force", "body_charge") if section.everywhere else ("traction", "charge")
-    along = [NodalField(f"{key}.{names[0]}.{k}", f, comm) for k, f in enumerate(force or ())]
+    along = [loading_field(f"{key}.{names[0]}.{k}", f, comm) for k, f in enumerate(force or ())]
     return Load(
         None if section.everywhere else section.on,
-        along or None,
-        given_field(f"{key}.pressure", section.pressure, comm),
-        given_field(f"{key}.{names[1]}", charge, comm),
+        [component for component in along if component is not None] or None,
+        loading_field(f"{key}.pressure", section.pressure, comm),
+        loading_field(f"{key}.{names[1]}", charge, comm),
+        amplitude(case, section.amplitude),
     )

@@ -5,10 +5,11 @@ from __future__ import annotations
 import numpy as np
 from mpi4py import MPI
 
+from contact.body.amplitude import steady
 from contact.case import file as sections
 from contact.case.formula import Expression
 from contact.errors import InputError
-from contact.given import NodalField, given_field
+from contact.given import NodalField, amplitude, given_field
 from contact.interface.current import Conductor
 from contact.interface.friction import Friction
 from contact.interface.layer import Layer
@@ -63,7 +64,7 @@ def make_contacts(
             _foundation(key, contact, domain) if foundation is None else foundation,
             _layer(contact) if layer is None else layer,
             _friction(*case.friction_of(key, contact), domain.comm, coefficient, friction),
-            _conductor(case.electric_of(key, contact)[1], domain.size),
+            _conductor(case, case.electric_of(key, contact)[1], domain.size),
         )
         for key, contact in case.contacts
     ]
@@ -115,7 +116,9 @@ def _friction(
     return Friction(mu=field, radius=section.radius)
 
 
-def _conductor(section: sections.Electric | None, size: float) -> Conductor | None:
+def _conductor(
+    case: sections.Case, section: sections.Electric | None, size: float
+) -> Conductor | None:
     if section is None:
         return None
     delta = 1e3 / size if section.delta is None else section.delta
@@ -127,4 +130,13 @@ def _conductor(section: sections.Electric | None, size: float) -> Conductor | No
     else:
         psi = PerfectConductivity(section.k_e)
     limit = np.inf if section.limit is None else section.limit
-    return Conductor(psi, section.phi_f, Truncation(limit), section.lagged)
+    phi_f, truncation = section.phi_f, Truncation(limit)
+    if phi_f.is_constant and section.amplitude is None:
+        return Conductor(psi, phi_f.value, truncation, section.lagged)
+    factor = amplitude(case, section.amplitude) or steady
+
+    def phi_f_at(time: float) -> float:
+        """Return the potential of the foundation at a time."""
+        return factor(time) * phi_f.number(time)
+
+    return Conductor(psi, phi_f_at(0.0), truncation, section.lagged, phi_f_at)

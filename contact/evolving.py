@@ -1,19 +1,26 @@
-"""Evolutions in Python: the states of a problem in time, one after the other."""
+"""Evolutions: the states of a problem in time, one after the other."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+import time
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
 
 from contact.errors import InputError
+from contact.methods.every import METHODS
+from contact.methods.interrupt import stop_on_signal
 from contact.methods.options import NewtonOptions, Options
-from contact.methods.report import Monitor
-from contact.methods.steps import Evolution
+from contact.methods.report import History, Monitor, Outcome
+from contact.methods.steps import Evolution, LoadStep
+from contact.output.record import StepRecord
+from contact.output.review import announce
+from contact.output.solution import Solution
+from contact.output.steps import StepRecorder
+from contact.problem.held import check_potential
 from contact.problem.problem import ContactProblem
 from contact.problem.state import State
-from contact.solving import METHODS
 
 
 class NotConvergedError(RuntimeError):
@@ -76,3 +83,86 @@ def in_steps(settings: Options) -> Options:
     if isinstance(settings, NewtonOptions):
         return replace(settings, load_steps=False)
     return settings
+
+
+def solve_steps(
+    problem: ContactProblem,
+    times: Sequence[float],
+    settings: Options,
+    monitor: Monitor | None = None,
+    begin: float = 0.0,
+    keep: Callable[[StepRecord], None] | None = None,
+) -> Solution:
+    """Solve a problem in steps, and keep what there is to say of each. Collective.
+
+    An interrupt ends it after the running iteration: all complete steps remain, as where a step
+    fails.
+
+    Parameters
+    ----------
+    problem, times, settings, monitor
+        As those of `evolve`.
+    begin
+        Time at rest.
+    keep
+        Told of every step.
+
+    Returns
+    -------
+    The last step that has converged, with the outcome of the one that has ended it all.
+
+    Raises
+    ------
+    InputError
+        If a linear system is singular, or the potential is not determined.
+    """
+    clock = time.perf_counter()
+    history, records = History(), []
+    last: LoadStep | None = None
+    with stop_on_signal(problem.comm, monitor) as stop:
+        method = METHODS[settings.method](problem, in_steps(settings), stop)
+        setup = time.perf_counter() - clock
+        recorder = StepRecorder(problem)
+        for step in Evolution(problem, method).run(times, begin):
+            note = f"t = {step.problem.time:g}"
+            history.records += [
+                replace(record, note=f"{note} {record.note}".strip())
+                for record in step.history.records
+            ]
+            if not step.outcome.converged:
+                break
+            last = step
+            records.append(recorder.record(step))
+            if keep is not None:
+                keep(records[-1])
+    reached = begin if last is None else last.problem.time
+    end = step if last is None else last
+    check_potential(end.problem, end.state)
+    solution = Solution(
+        problem=end.problem,
+        state=end.state,
+        outcome=_outcome(step, reached, times[-1]),
+        history=history,
+        counters=method.counters,
+        method=settings.method,
+        start="rest" if last is None else "the step before",
+        seconds={"setup": setup, "solve": time.perf_counter() - clock - setup, "output": 0.0},
+        steps=records,
+    )
+    if recorder.unloaded > 0:
+        solution.warnings.append(
+            f"{recorder.unloaded:.1%} of the body unload from beyond the yield strain in a step: "
+            "Hencky's law is nonlinear elasticity, and they come back the way they went; a metal "
+            "would keep a part of its strain"
+        )
+    announce(solution)
+    return solution
+
+
+def _outcome(step: LoadStep, reached: float, end: float) -> Outcome:
+    """Say how an evolution ended: with its last step, or where that has failed."""
+    if step.outcome.converged:
+        return step.outcome
+    words = f"the steps end at t = {reached:g} of {end:g}"
+    ended = f"{words}: {step.outcome.ended or f'the one to {step.problem.time:g} fails'}"
+    return replace(step.outcome, ended=ended)

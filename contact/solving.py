@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import logging
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -13,31 +12,20 @@ from mpi4py import MPI
 from contact.build import build_problem, named
 from contact.case.file import Case, load_case
 from contact.case.text import to_toml
-from contact.methods.fixed_point import FixedPoint
+from contact.evolving import solve_steps
+from contact.methods.every import METHODS
 from contact.methods.interrupt import stop_on_signal
-from contact.methods.method import Method
 from contact.methods.nested import prolong
-from contact.methods.newton import Newton
 from contact.methods.options import NewtonOptions, Options
-from contact.methods.penalty import Penalty
 from contact.methods.report import Monitor
 from contact.methods.steps import solve_step
 from contact.nesting import coarse_solution
-from contact.output.review import review
+from contact.output.record import StepRecord
+from contact.output.review import announce
 from contact.output.solution import Solution
 from contact.problem.held import check_potential
 from contact.problem.problem import ContactProblem
 from contact.problem.state import State
-
-logger = logging.getLogger("contact.solve")
-
-
-#: Name of a method -> its class.
-METHODS: Mapping[str, Callable[[ContactProblem, Any, Monitor | None], Method]] = {
-    "uzawa": FixedPoint,
-    "penalty": Penalty,
-    "newton": Newton,
-}
 
 
 def solve(
@@ -45,9 +33,10 @@ def solve(
     settings: Options | None = None,
     monitor: Monitor | None = None,
     comm: MPI.Intracomm = MPI.COMM_WORLD,
+    keep: Callable[[StepRecord], None] | None = None,
     **replacements: Any,
 ) -> Solution:
-    """Build and solve a case. Collective.
+    """Build and solve a case, in steps if it says so. Collective.
 
     Parameters
     ----------
@@ -59,6 +48,8 @@ def solve(
         Told of every outer iteration.
     comm
         Communicator of the mesh.
+    keep
+        Told of every step of an evolution.
     replacements
         Objects that take the place of parts of the case; see `build.build_problem`.
 
@@ -76,7 +67,11 @@ def solve(
     with named(case.source):
         nested = isinstance(settings, NewtonOptions) and settings.nested
         start = coarse_solution(case, comm, **replacements) if nested else None
-        solution = solve_problem(problem, settings, monitor, start)
+        if case.evolution is None:
+            solution = solve_problem(problem, settings, monitor, start)
+        else:
+            times = case.evolution.ends
+            solution = solve_steps(problem, times, settings, monitor, case.evolution.times[0], keep)
     solution.title, solution.output = case.title, case.output
     if not replacements:
         solution.case = to_toml(case)
@@ -128,10 +123,5 @@ def solve_problem(
             "output": 0.0,
         },
     )
-    review(solution)
-    if problem.comm.rank == 0:
-        for note in solution.notes:
-            logger.info(note)
-        for warning in solution.warnings:
-            logger.warning(warning)
+    announce(solution)
     return solution

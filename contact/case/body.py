@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from pydantic import Discriminator, Field, Tag, model_validator
 
 from contact.case.types import (
+    AmplitudeName,
     Formula,
     FormulaVector,
     Name,
@@ -193,6 +194,10 @@ class Fixed(Section):
         description='Displacement of the part; "free" for a component that is not fixed.',
     )
     potential: Formula | None = Field(default=None, description="Electric potential of the part.")
+    amplitude: AmplitudeName | None = Field(
+        default=None,
+        description="Factor of all that is prescribed as a function of time, see `[evolution]`.",
+    )
 
     @property
     def is_clamped(self) -> bool:
@@ -228,6 +233,10 @@ class Load(Section):
     charge: Formula | None = Field(default=None, description="Charge per area of the part.")
     body_force: FormulaVector | None = Field(default=None, description="Force per volume.")
     body_charge: Formula | None = Field(default=None, description="Charge per volume.")
+    amplitude: AmplitudeName | None = Field(
+        default=None,
+        description="Factor of all of these as a function of time, see `[evolution]`.",
+    )
 
     @model_validator(mode="after")
     def _check(self) -> Load:

@@ -11,6 +11,7 @@ from typing import Any, TypeAlias
 from pydantic import BaseModel
 
 from contact.case.body import Piezo
+from contact.case.evolution import check_evolution, check_time
 from contact.case.formula import Expression
 from contact.case.showing import listed
 from contact.case.types import Words, fault
@@ -34,6 +35,10 @@ def check_sections(case: Case) -> None:
         raise fault("fixed", Words("no displacement fixed"), "at least one component on a part")
     _check_contradictions(case)
     _check_lagged(case)
+    check_evolution(case)
+    for path, formula in _formulas(case):
+        if isinstance(formula, Expression):
+            check_time(case, path, formula)
     _check_contacts(case)
     if case.mesh.dimension is not None:
         _check_vectors(case, case.mesh.dimension)
@@ -186,6 +191,8 @@ def _formulas(case: Case) -> Iterator[tuple[str, Any]]:
         key, friction = case.friction_of(path, contact)
         yield f"{key}.bound", friction.bound
         yield f"{key}.mu", friction.mu
+        key, electric = case.electric_of(path, contact)
+        yield f"{key}.phi_f", None if electric is None else electric.phi_f
 
 
 def _check_vectors(case: Case, dimension: int) -> None:

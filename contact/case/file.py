@@ -18,6 +18,7 @@ from pydantic_core import PydanticCustomError
 
 from contact.case.body import Fixed, Load, Material, Piezo, Space
 from contact.case.checks import check_mesh, check_sections
+from contact.case.evolution import Evolution
 from contact.case.formula import Expression
 from contact.case.interface import Contact, Electric, Friction, Plane, SlipLaw, Sphere
 from contact.case.mesh import Mesh, Piece
@@ -34,6 +35,7 @@ __all__ = [
     "Case",
     "Contact",
     "Electric",
+    "Evolution",
     "Expression",
     "Fixed",
     "Friction",
@@ -86,6 +88,9 @@ class Case(Section):
     )
     electric: Electric | None = Field(
         default=None, description="Conductive foundation: `[electric]`. Absent: insulated."
+    )
+    evolution: Evolution | None = Field(
+        default=None, description="Load steps: `[evolution]`. Absent: one static step."
     )
     solver: Solver = Field(default=DEFAULT, description="Method and tolerances: `[solver]`.")
     output: Annotated[OutputOptions, FromTable] = Field(

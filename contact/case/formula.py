@@ -1,19 +1,19 @@
-"""Formulas of the case file, such as ``"-10*x"``, as functions of the coordinates."""
+"""Formulas of the case file, such as ``"-10*x"``, as functions of the coordinates and the time."""
 
 from __future__ import annotations
 
 import itertools
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from contact.case.grammar import (
-    COORDINATES,
+    VARIABLES,
     Number,
-    coordinates,
     evaluate,
     parse,
+    variables,
 )
 from contact.case.showing import shown
 from contact.errors import InputError
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 
 class Expression:
-    """A scalar function of the coordinates, given as a number or a formula.
+    """A scalar function of the coordinates and the time, given as a number or a formula.
 
     Formulas have NumPy's meaning: ``log`` is natural, angles are in radians, ``min`` and
     ``max`` take two arguments or more, and a comparison counts as 1 or 0.
@@ -33,7 +33,7 @@ class Expression:
     Parameters
     ----------
     source
-        A finite number or a formula in x, y and z.
+        A finite number or a formula in x, y, z and t.
 
     Raises
     ------
@@ -44,7 +44,7 @@ class Expression:
     __slots__ = ("_tree", "names", "source")
 
     source: float | str
-    #: Coordinates that the formula uses.
+    #: Coordinates that the formula uses, and "t" if it uses the time.
     names: frozenset[str]
 
     def __init__(self, source: float | str) -> None:
@@ -56,11 +56,11 @@ class Expression:
             # A whole number may be as long as it likes.
             raise InputError(f"{shown(source)} is not finite; accepted: finite numbers") from None
         self._tree = parse(self.source)
-        self.names = frozenset(COORDINATES[i] for i in coordinates(self._tree))
+        self.names = frozenset(VARIABLES[i] for i in variables(self._tree))
 
     @property
     def is_constant(self) -> bool:
-        """True if the value is the same everywhere."""
+        """True if the value is the same everywhere at all times."""
         return isinstance(self._tree, Number)
 
     @property
@@ -70,13 +70,19 @@ class Expression:
         Raises
         ------
         ValueError
-            If the expression depends on the coordinates.
+            If the expression depends on the coordinates or the time.
         """
         if not isinstance(self._tree, Number):
-            raise ValueError(f"{self} depends on the coordinates")
+            raise ValueError(f"{self} depends on the coordinates or the time")
         return self._tree.value
 
-    def numpy(self, points: ArrayLike, comm: MPI.Comm | None = None) -> NDArray[np.float64]:
+    def number(self, time: float) -> float:
+        """Return the value of an expression that depends on the time alone."""
+        return float(self.numpy(np.zeros((1, 3)), time=time)[0])
+
+    def numpy(
+        self, points: ArrayLike, comm: MPI.Comm | None = None, time: float | None = None
+    ) -> NDArray[np.float64]:
         """Evaluate at points.
 
         Parameters
@@ -85,6 +91,8 @@ class Expression:
             Coordinates, shape (n, 2) or (n, 3).
         comm
             If given, the call is collective, and a bad value on one rank raises on all.
+        time
+            The time, for a formula in t.
 
         Returns
         -------
@@ -98,7 +106,7 @@ class Expression:
         points = np.asarray(points, dtype=np.float64)
         self.check_dimension(points.shape[1])
         with np.errstate(all="ignore"):
-            result = evaluate(self._tree, points.T)
+            result = evaluate(self._tree, self._variables(points.T, time))
         values = np.array(np.broadcast_to(result, points.shape[:1]), dtype=np.float64)
         bad = points[~np.isfinite(values)][:1].tolist()
         # The lowest rank that has a bad point speaks for all.
@@ -108,8 +116,15 @@ class Expression:
             raise InputError(f"{self} is not finite at ({place}); accepted: a formula that is")
         return values
 
-    def ufl(self, x: Expr) -> Expr:
-        """Return the scalar UFL expression at ``x``, a vector of length 2 or 3.
+    def _variables(self, x: Any, time: Any) -> list[Any]:
+        """Return the values of the variables: the time stands behind three coordinates."""
+        if time is None and "t" in self.names:
+            raise InputError(f"{self} uses t; accepted in a static problem: formulas without")
+        given = list(x)
+        return [*given, *[None] * (3 - len(given)), time]
+
+    def ufl(self, x: Expr, time: Any = None) -> Expr:
+        """Return the scalar UFL expression at ``x``, a vector of length 2 or 3, and a time.
 
         Raises
         ------
@@ -118,7 +133,9 @@ class Expression:
         """
         (dimension,) = x.ufl_shape
         self.check_dimension(dimension)
-        return ops.symbolic(evaluate(self._tree, x))
+        return ops.symbolic(
+            evaluate(self._tree, self._variables([x[i] for i in range(dimension)], time))
+        )
 
     def check_dimension(self, dimension: int) -> None:
         """Raise an InputError if z is used in the plane."""

@@ -21,7 +21,7 @@ from forms import ops
 
 #: What a formula may contain, for messages and the reference page.
 ACCEPTED = (
-    "numbers, x, y, z, pi, + - * / **, comparisons, and sin, cos, tan, exp, log, sqrt, abs, "
+    "numbers, x, y, z, t, pi, + - * / **, comparisons, and sin, cos, tan, exp, log, sqrt, abs, "
     "min, max, where(condition, a, b)"
 )
 
@@ -30,7 +30,8 @@ ACCEPTED = (
 MAX_LENGTH = 1000
 MAX_DEPTH = 100
 
-COORDINATES = ("x", "y", "z")
+#: What a formula may depend on: the coordinates, and the time.
+VARIABLES = ("x", "y", "z", "t")
 
 _FUNCTIONS: Mapping[str, Callable[[Any], Any]] = {
     "sin": ops.sin,
@@ -67,8 +68,8 @@ class Number:
 
 
 @dataclass(frozen=True)
-class Coordinate:
-    """A coordinate, by its index in `COORDINATES`."""
+class Variable:
+    """A coordinate or the time, by its index in `VARIABLES`."""
 
     index: int
 
@@ -82,7 +83,7 @@ class Call:
     condition: bool = False
 
 
-Tree: TypeAlias = Number | Coordinate | Call
+Tree: TypeAlias = Number | Variable | Call
 
 
 def parse(source: float | str) -> Tree:
@@ -123,8 +124,8 @@ def _build(node: ast.AST) -> Tree:
             return _number(value)
         case ast.Name(id="pi"):
             return Number(math.pi)
-        case ast.Name(id=name) if name in COORDINATES:
-            return Coordinate(COORDINATES.index(name))
+        case ast.Name(id=name) if name in VARIABLES:
+            return Variable(VARIABLES.index(name))
         case ast.Name(id=name):
             raise InputError(f"unknown name {name}; accepted: {ACCEPTED}")
         case ast.UnaryOp(op=ast.UAdd(), operand=operand):
@@ -237,21 +238,21 @@ def _number(value: Any) -> Number:
 
 
 def evaluate(tree: Tree, x: Any) -> Any:
-    """Evaluate on ``x[0]``, ``x[1]`` ...: rows of an array or components of a UFL vector."""
+    """Evaluate on ``x[0]``, ``x[1]`` ...: values of the variables, arrays or UFL expressions."""
     match tree:
         case Number(value):
             return value
-        case Coordinate(index):
+        case Variable(index):
             return x[index]
         case Call(function, arguments):
             return function(*(evaluate(argument, x) for argument in arguments))
 
 
-def coordinates(tree: Tree) -> set[int]:
-    """Return the indices of the coordinates that a tree uses."""
+def variables(tree: Tree) -> set[int]:
+    """Return the indices of the variables that a tree uses."""
     match tree:
-        case Coordinate(index):
+        case Variable(index):
             return {index}
         case Call(_, arguments):
-            return set().union(*(coordinates(argument) for argument in arguments))
+            return set().union(*(variables(argument) for argument in arguments))
     return set()

@@ -10,11 +10,12 @@ from pydantic import Field, model_validator
 
 from contact.case.formula import Expression
 from contact.case.types import (
+    AmplitudeName,
     Name,
     NonNegative,
     NonNegativeFormula,
-    Number,
     Section,
+    TimeFormula,
     Vector,
     Words,
     fault,
@@ -147,7 +148,12 @@ class Electric(Section):
         "contact, (1.33); `ramp`, (1.34) as printed, zero where u_nu <= rho.",
     )
     k_e: NonNegative = Field(description="Conductivity k_e of the foundation.")
-    phi_f: Number = Field(default=0.0, description="Potential phi_F of the foundation.")
+    phi_f: TimeFormula = Field(
+        default=Expression(0.0), description="Potential phi_F of the foundation."
+    )
+    amplitude: AmplitudeName | None = Field(
+        default=None, description="Factor of phi_f as a function of time, see `[evolution]`."
+    )
     delta: Positive | None = Field(
         default=None,
         description="Slope of psi (1/length), `shifted` and `ramp` only. Default: 1000 / size of "

@@ -79,6 +79,13 @@ def _not_negative(expression: expressions.Expression) -> expressions.Expression:
 
 Kind = TypeVar("Kind", bound=Section)
 
+
+def _of_time(expression: expressions.Expression) -> expressions.Expression:
+    if expression.names - {"t"}:
+        raise InputError(f"{expression} depends on the place; accepted: a number or a formula in t")
+    return expression
+
+
 FORMULA = "a number or a formula"
 
 Formula: TypeAlias = Annotated[expressions.Expression, _FormulaSchema, Accepted(FORMULA)]
@@ -88,10 +95,19 @@ NonNegativeFormula: TypeAlias = Annotated[
     AfterValidator(_not_negative),
     Accepted("a number >= 0 or a formula"),
 ]
+TimeFormula: TypeAlias = Annotated[
+    expressions.Expression,
+    _FormulaSchema,
+    AfterValidator(_of_time),
+    Accepted("a number or a formula in t"),
+]
 Number: TypeAlias = Annotated[float, Accepted("a number")]
 NonNegative: TypeAlias = Annotated[float, Field(ge=0), Accepted("a number >= 0")]
 Text: TypeAlias = Annotated[str, Accepted("a text")]
 Name: TypeAlias = Annotated[str, Field(min_length=1), Accepted("the name of a part")]
+AmplitudeName: TypeAlias = Annotated[
+    str, Field(min_length=1), Accepted("a name below evolution.amplitudes")
+]
 Vector: TypeAlias = Annotated[
     tuple[Number, ...],
     Field(min_length=2, max_length=3),

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Collection, Iterable, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 from dolfinx import fem, has_adios2, io
@@ -18,6 +18,12 @@ from contact.output.vtu import VTU, Grid, Values, write_vtu
 from contact.problem.problem import ContactProblem
 from contact.problem.state import State
 
+#: A time, and the state then.
+Frame: TypeAlias = tuple[float, State]
+
+#: Fields that are written for every step.
+SERIES = ("displacement", "potential", "von_mises")
+
 
 def write_fields(solution: Solution, folder: Path) -> None:
     """Write the fields in the format that is asked for. Collective.
@@ -25,7 +31,8 @@ def write_fields(solution: Solution, folder: Path) -> None:
     ``fields.vtu`` holds all of them, the derived ones both averaged at the nodes and as they
     are in the cells. So do ``fields.bp``, at the nodes, and ``cells.bp``, in the cells: one VTX
     file has one kind of elements only. ``fields.xdmf`` has those at the nodes, of degree 1 at
-    most.
+    most. Of an evolution each has all steps; ``fields.vtu`` has the last one, and ``fields.pvd``
+    names files with the main fields of all.
 
     Raises
     ------
@@ -34,17 +41,47 @@ def write_fields(solution: Solution, folder: Path) -> None:
     OSError
         On a rank where the library fails all the same; others may wait for it.
     """
-    problem, state = solution.problem, solution.state
+    problem, frames = solution.problem, _frames(solution)
     match solution.output.fields:
         case "vtu":
-            write_share(problem.comm, body_share(problem, state), folder / "fields.vtu")
+            share = body_share(problem, solution.state)
+            write_share(problem.comm, share, folder / "fields.vtu")
+            if solution.steps:
+                _write_series(problem, frames, folder)
         case "vtx":
-            _write_vtx(problem, state, folder)
+            _write_vtx(problem, frames, folder)
         case "xdmf":
-            _write_xdmf(problem, state, folder)
+            _write_xdmf(problem, frames, folder)
 
 
-def body_share(problem: ContactProblem, state: State, names: Collection[str] | None = None) -> VTU:
+def _frames(solution: Solution) -> list[Frame]:
+    """Return the times and states whose fields are written: the last one always."""
+    if not solution.steps:
+        return [(0.0, solution.state)]
+    every = [(record.state.time, record.state) for record in solution.steps]
+    return every[:: -solution.output.every][::-1]
+
+
+def _write_series(problem: ContactProblem, frames: Sequence[Frame], folder: Path) -> None:
+    """Write a file of the main fields for each step, and ``fields.pvd``, which names them."""
+    derived = DerivedFields(problem.equilibrium, problem.equilibrium.rest())
+    lines = []
+    for k, (time, state) in enumerate(frames):
+        name = f"fields-{k:04d}.vtu"
+        derived.move_to(state.x)
+        write_share(problem.comm, body_share(problem, state, SERIES, derived), folder / name)
+        lines.append(f'<DataSet timestep="{time!r}" file="{name}"/>')
+    collection = "\n".join(['<VTKFile type="Collection">', "<Collection>", *lines, "</Collection>"])
+    if problem.comm.rank == 0:
+        (folder / "fields.pvd").write_text(collection + "\n</VTKFile>\n", encoding="utf-8")
+
+
+def body_share(
+    problem: ContactProblem,
+    state: State,
+    names: Collection[str] | None = None,
+    derived: DerivedFields | None = None,
+) -> VTU:
     """Return a body at a state with its fields: this rank's share. Collective.
 
     Parameters
@@ -53,6 +90,8 @@ def body_share(problem: ContactProblem, state: State, names: Collection[str] | N
         The problem, and where it is.
     names
         Which fields; all of them by default.
+    derived
+        The derived fields at the state, where they are at hand.
     """
     body, d = problem.equilibrium, problem.dim
     space = body.space
@@ -74,7 +113,7 @@ def body_share(problem: ContactProblem, state: State, names: Collection[str] | N
         values = function.x.array.reshape(-1, dofmap.index_map_bs)[dofmap.list[:owned]]
         return _rows(values.mean(axis=1))
 
-    derived = DerivedFields(body, state.x)
+    derived = derived or DerivedFields(body, state.x)
     at_points, in_cells = unknowns(body, state.x), {}
     if names is None or set(names) - set(at_points):
         at_points |= derived.nodes()
@@ -106,36 +145,50 @@ def write_share(comm: MPI.Intracomm, share: VTU, path: Path) -> None:
     write_vtu(comm, path, share)
 
 
-def _write_vtx(problem: ContactProblem, state: State, folder: Path) -> None:
+def _write_vtx(problem: ContactProblem, frames: Sequence[Frame], folder: Path) -> None:
     if not has_adios2:
         raise InputError(
             'output.fields: "vtx" needs a dolfinx with ADIOS2, and this one has none; accepted: '
             '"vtu", "xdmf" or "none"'
         )
-    at_nodes, derived = _at_nodes(problem, state)
-    in_cells = list(derived.cells().values())
-    claim_room(problem.comm, folder, _bytes(at_nodes) + _bytes(in_cells))
-    for name, functions in (("fields.bp", at_nodes), ("cells.bp", in_cells)):
-        path = folder / name
-        with library_errors(path), closing(_vtx(path, functions)) as file:
-            file.write(0.0)
+    derived = DerivedFields(problem.equilibrium, frames[0][1].x)
+    at_nodes, in_cells = _at_nodes(problem, frames[0][1], derived), list(derived.cells().values())
+    claim_room(problem.comm, folder, len(frames) * (_bytes(at_nodes) + _bytes(in_cells)))
+    paths = folder / "fields.bp", folder / "cells.bp"
+    with (
+        library_errors(paths[0]),
+        closing(_vtx(paths[0], at_nodes)) as nodal,
+        closing(_vtx(paths[1], in_cells)) as cellwise,
+    ):
+        for time, state in frames:
+            derived.move_to(state.x)
+            _copy(_at_nodes(problem, state, derived), at_nodes)
+            _copy(derived.cells().values(), in_cells)
+            nodal.write(time)
+            cellwise.write(time)
 
 
-def _write_xdmf(problem: ContactProblem, state: State, folder: Path) -> None:
-    at_corners = [linear(function) for function in _at_nodes(problem, state)[0]]
-    claim_room(problem.comm, folder, _bytes(at_corners))
+def _copy(given: Iterable[fem.Function], into: Iterable[fem.Function]) -> None:
+    for source, target in zip(given, into, strict=True):
+        target.x.array[:] = source.x.array
+
+
+def _write_xdmf(problem: ContactProblem, frames: Sequence[Frame], folder: Path) -> None:
+    derived = DerivedFields(problem.equilibrium, frames[0][1].x)
+    at_corners = [linear(f) for f in _at_nodes(problem, frames[0][1], derived)]
+    claim_room(problem.comm, folder, len(frames) * _bytes(at_corners))
     path = folder / "fields.xdmf"
     with library_errors(path), closing(lambda: io.XDMFFile(problem.comm, path, "w")) as file:
         file.write_mesh(problem.domain.mesh)
-        for function in at_corners:
-            file.write_function(function)
+        for time, state in frames:
+            derived.move_to(state.x)
+            for function in _at_nodes(problem, state, derived):
+                file.write_function(linear(function), time)
 
 
-def _at_nodes(problem: ContactProblem, state: State) -> tuple[list[fem.Function], DerivedFields]:
-    """Return all fields at the nodes, and the derived ones to be asked for those in the cells."""
-    derived = DerivedFields(problem.equilibrium, state.x)
-    found = unknowns(problem.equilibrium, state.x) | derived.nodes()
-    return list(found.values()), derived
+def _at_nodes(problem: ContactProblem, state: State, derived: DerivedFields) -> list[fem.Function]:
+    """Return all fields at the nodes."""
+    return list((unknowns(problem.equilibrium, state.x) | derived.nodes()).values())
 
 
 def _vtx(path: Path, functions: Sequence[fem.Function]) -> Callable[[], Any]:

@@ -183,6 +183,23 @@ class DerivedFields:
             values = expression.eval(mesh, chosen)
             yield chosen, values.reshape(chosen.size, len(self.points), components)
 
+    def move_to(self, x: Array) -> None:
+        """Look at the fields of other unknowns of the same body from now on."""
+        self._x.x.array[:] = x
+
+    def strains(self) -> list[Array]:
+        """Return |dev eps| in the owned cells of each material, shape (cells, points)."""
+        column = self.columns["dev_strain"]
+        return [
+            np.concatenate([values[..., column][..., 0] for _, values in self._chunks_of(material)])
+            for material in range(len(self.expressions))
+        ]
+
+    def volumes_of_materials(self) -> list[Array]:
+        """Return the volumes of these cells, shape (cells,) each."""
+        volumes = self._volumes()
+        return [volumes[cells] for cells in self.body.cells]
+
     def extremes(self) -> list[Extremes]:
         """Return the largest values over the cells (their nodes, for degree 2), a material."""
         volume, found = self._volumes(), []

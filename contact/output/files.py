@@ -12,6 +12,7 @@ from mpi4py import MPI
 from contact.output.field_files import write_fields, write_share
 from contact.output.folder import ResultFolder, on_root, result_folder
 from contact.output.solution import Solution
+from contact.output.steps import write_steps
 from contact.output.summary import summarise
 from contact.output.surface import contact_surface
 from contact.output.table import contact_table
@@ -63,6 +64,8 @@ def _replace(solution: Solution, folder: ResultFolder, figures: bool) -> None:
             assert table is not None
             assert surface is not None
             write_tables(solution, table, new)
+            if solution.steps:
+                write_steps(solution.steps, new)
             write_share(MPI.COMM_SELF, surface, new / "contact.vtu")
 
         on_root(comm, write_contact)

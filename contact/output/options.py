@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
-from contact.settings import Switch
+from contact.settings import Count, Switch
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -17,6 +17,8 @@ class OutputOptions:
     fields
         Format of the fields: `vtu` (fields.vtu), which ParaView, pyvista and meshio open; `vtx`
         (fields.bp and cells.bp, by ADIOS2); `xdmf` (fields.xdmf); or none.
+    every
+        Steps of an evolution from one whose fields are written to the next.
     checkpoint
         `true`: write a checkpoint from which a computation can go on.
     mirror
@@ -24,5 +26,6 @@ class OutputOptions:
     """
 
     fields: Literal["vtu", "vtx", "xdmf", "none"] = "vtu"
+    every: Count = 1
     checkpoint: Switch = False
     mirror: Switch = False

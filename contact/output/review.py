@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import logging
+
 import numpy as np
 from mpi4py import MPI
 
@@ -9,6 +11,18 @@ from contact.body.description import Material
 from contact.output.fields import DerivedFields
 from contact.output.solution import Solution
 from forms.hencky import check_monotonicity
+
+logger = logging.getLogger("contact.solve")
+
+
+def announce(solution: Solution) -> None:
+    """Review a solution, and log what there is to say about it. Collective."""
+    review(solution)
+    if solution.problem.comm.rank == 0:
+        for note in solution.notes:
+            logger.info(note)
+        for warning in solution.warnings:
+            logger.warning(warning)
 
 
 def review(solution: Solution) -> None:

@@ -17,6 +17,7 @@ from contact.linear.operator import Counters
 from contact.methods.report import History, Outcome
 from contact.output.fields import unknowns
 from contact.output.options import OutputOptions
+from contact.output.record import StepRecord
 from contact.output.supports import Support, moment, supports
 from contact.problem.problem import ContactProblem
 from contact.problem.state import State
@@ -59,6 +60,8 @@ class Solution:
         Of the case; and the case itself as `contact check` prints it, empty where there is none.
     output
         What is written besides the summary and the tables.
+    steps
+        What is kept of each step of an evolution, the last of which this is.
     """
 
     problem: ContactProblem
@@ -77,6 +80,7 @@ class Solution:
     title: str = ""
     case: str = ""
     output: OutputOptions = field(default_factory=OutputOptions)
+    steps: list[StepRecord] = field(default_factory=list)
 
     @property
     def converged(self) -> bool:

@@ -27,8 +27,7 @@ def summarise(solution: Solution, table: Table | None) -> dict[str, Any]:
         Its contact table, None on ranks other than 0.
     """
     problem, records = solution.problem, solution.history.records
-    status = np.array([]) if table is None else table["status"]
-    counts = problem.comm.bcast({s: int(np.sum(status == s)) for s in ("open", "stick", "slip")})
+    counts = count(problem.comm, table)
     mesh, counters = problem.domain.mesh, solution.counters
     kkt = solution.outcome.kkt
     summary: dict[str, Any] = {
@@ -55,7 +54,7 @@ def summarise(solution: Solution, table: Table | None) -> dict[str, Any]:
         "reaction_moments": {
             part: held.moment.tolist() for part, held in solution.supports.items()
         },
-        "max_displacement": _largest_displacement(solution),
+        "max_displacement": largest_displacement(solution),
         "max_dev_strain": solution.max_dev_strain,
         "max_von_mises": solution.max_von_mises,
         "share_beyond_yield": solution.share_beyond_yield,
@@ -81,7 +80,14 @@ def _kinematics(domain: Domain) -> str:
     return "plane_strain" if domain.dim == 2 else "solid"
 
 
-def _largest_displacement(solution: Solution) -> float:
+def count(comm: MPI.Intracomm, table: Table | None) -> dict[str, int]:
+    """Return how many contact nodes are open, stick and slip. Collective."""
+    status = np.array([]) if table is None else table["status"]
+    return comm.bcast({s: int(np.sum(status == s)) for s in ("open", "stick", "slip")})
+
+
+def largest_displacement(solution: Solution) -> float:
+    """Return the largest Euclidean norm of the displacement over the nodes. Collective."""
     problem = solution.problem
     body = problem.equilibrium
     u = solution.state.x[: body.owned].reshape(-1, body.block_size)[:, : problem.dim]

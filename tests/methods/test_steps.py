@@ -14,13 +14,14 @@ from contact.evolving import NotConvergedError
 from contact.interface.friction import Friction
 from contact.interface.obstacle import GapFunction
 from contact.mesh.grid import rectangle
+from contact.methods.every import METHODS
 from contact.methods.options import FixedPointOptions, NewtonOptions, PenaltyOptions
 from contact.methods.report import Outcome
 from contact.methods.steps import Evolution, LoadStep
 from contact.problem.energy import Moment, balance, moment
 from contact.problem.kkt import KKT, evaluate
 from contact.problem.problem import Contact, ContactProblem
-from contact.solving import METHODS, solve
+from contact.solving import solve
 from forms.hencky import Linear, Log
 from forms.laws import ConstantCoefficient, SlipCoefficient
 from tests.problems import mechanics

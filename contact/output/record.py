@@ -1,0 +1,33 @@
+"""What is kept of a step of an evolution."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from numpy.typing import NDArray
+
+from contact.problem.state import State
+
+
+@dataclass(frozen=True)
+class StepRecord:
+    """What is kept of a step.
+
+    Attributes
+    ----------
+    state
+        Its solution.
+    row
+        The columns of ``steps.csv``.
+    table
+        The contact nodes, as `table.contact_table` returns them; None on ranks other than 0.
+    enthalpy
+        What the energy balance of the next step begins with, see `problem.energy.Moment`.
+    """
+
+    state: State
+    row: Mapping[str, float]
+    table: Mapping[str, NDArray[Any]] | None
+    enthalpy: float

@@ -1,0 +1,162 @@
+"""What the steps of an evolution leave: a row each, and the contact nodes at the end of each."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from mpi4py import MPI
+
+from contact.body.amplitude import Moving, steady
+from contact.methods.steps import LoadStep
+from contact.output.balances import charge_balance
+from contact.output.record import StepRecord
+from contact.output.solution import Solution
+from contact.output.summary import count, largest_displacement
+from contact.output.table import Table, contact_table, csv_columns
+from contact.output.tables import write_csv
+from contact.output.unloading import Unloading
+from contact.problem.energy import Balance, Moment, balance, moment
+from contact.problem.problem import ContactProblem
+from contact.typing import Array
+
+
+class StepRecorder:
+    """Makes the records of one step after the other.
+
+    Parameters
+    ----------
+    problem
+        The problem of the evolution.
+    before
+        Where it begins; at rest by default.
+    """
+
+    def __init__(self, problem: ContactProblem, before: Moment | None = None) -> None:
+        self._before = before or Moment.rest(problem)
+        self._unloading = Unloading(problem, self._before.x)
+        self._driven = driven_part(problem)
+        self._nodes = None if self._driven is None else _nodes_of(problem, self._driven)
+
+    @property
+    def unloaded(self) -> float:
+        """Largest share of the body that has unloaded from beyond yield in a step."""
+        return self._unloading.share
+
+    def record(self, step: LoadStep) -> StepRecord:
+        """Return the record of a step that follows the last one. Collective."""
+        problem, state = step.problem, step.state
+        now = moment(problem, state, self._before)
+        energies = balance(problem, state, self._before, now)
+        self._before = now
+        self._unloading.follow(state.x)
+        solution = solution_of(step)
+        table = contact_table(solution)
+        row = self._row(step, solution, table, energies, now)
+        return StepRecord(state, row, table, now.enthalpy)
+
+    def _row(
+        self,
+        step: LoadStep,
+        solution: Solution,
+        table: Table | None,
+        energies: Balance,
+        now: Moment,
+    ) -> dict[str, float]:
+        problem, counts = step.problem, count(step.problem.comm, table)
+        axes = "xyz"[: problem.dim]
+        force = solution.contact_force
+        row: dict[str, float] = {"t": step.state.time}
+        row |= {f"contact_force_{axis}": float(f) for axis, f in zip(axes, force, strict=True)}
+        row |= {
+            "max_pressure": problem.nodes.maximum(solution.pressure),
+            "contact_nodes": counts["stick"] + counts["slip"],
+            "stick_nodes": counts["stick"],
+            "slip_nodes": counts["slip"],
+            "max_displacement": largest_displacement(solution),
+            "work": energies.work,
+            "energy": energies.energy,
+            "dissipation": energies.dissipation,
+            "linear_solves": step.counters.linear_solves,
+            "factorizations": step.counters.factorizations,
+            "kkt": step.outcome.kkt.largest,
+        }
+        if self._nodes is not None:
+            moved, driving = _driven(problem, self._nodes, now)
+            row |= {f"driven_{axis}": float(u) for axis, u in zip(axes, moved, strict=True)}
+            row |= {f"driven_force_{a}": float(f) for a, f in zip(axes, driving, strict=True)}
+        if problem.piezoelectric:
+            charges = charge_balance(problem, step.state)
+            row |= {f"charge_{part}": charge for part, charge in charges.electrodes.items()}
+            row["charge_foundation"] = charges.foundation
+        return row
+
+
+def solution_of(step: LoadStep) -> Solution:
+    """Return a step as a solution of its own."""
+    return Solution(
+        problem=step.problem,
+        state=step.state,
+        outcome=step.outcome,
+        history=step.history,
+        counters=step.counters,
+        method="",
+        seconds={},
+        start="the step before",
+    )
+
+
+def driven_part(problem: ContactProblem) -> str | None:
+    """Return the part that is moved or loaded in time: its way and its force make a loop.
+
+    That is the first one whose displacement is prescribed as a function of time, or the first
+    one with a load; None without any.
+    """
+    for fixed in problem.body.fixed:
+        given = [component for component in fixed.displacement or () if component is not None]
+        moving = any(isinstance(component, Moving) for component in given)
+        if given and (moving or fixed.factor is not steady):
+            return fixed.on
+    loaded = [load.on for load in problem.body.loads if load.on is not None]
+    return loaded[0] if loaded else None
+
+
+def _nodes_of(problem: ContactProblem, part: str) -> Array:
+    """Return the owned nodes of a part."""
+    from dolfinx import fem
+
+    body, d = problem.equilibrium, problem.dim
+    dofs = fem.locate_dofs_topological(body.space, d - 1, problem.domain.facets(part))
+    return dofs[dofs < body.owned // body.block_size]
+
+
+def _driven(problem: ContactProblem, nodes: Array, now: Moment) -> tuple[Array, Array]:
+    """Return the mean displacement of nodes, and the force that drives them. Collective."""
+    body, d = problem.equilibrium, problem.dim
+    x = now.x[: body.owned].reshape(-1, body.block_size)[nodes, :d]
+    given = now.given.reshape(-1, body.block_size)[nodes, :d]
+    local = np.concatenate([x.sum(axis=0), given.sum(axis=0), [nodes.size]])
+    total = problem.comm.allreduce(local, op=MPI.SUM)
+    return total[:d] / max(total[-1], 1.0), total[d:-1]
+
+
+def write_steps(records: Iterable[StepRecord], folder: Path) -> None:
+    """Write ``steps.csv`` and ``contact-steps.csv``. On one rank."""
+    kept = list(records)
+    write_csv(folder / "steps.csv", kept[0].row, (record.row.values() for record in kept))
+    header = ["t", *csv_columns(_table(kept[0]))]
+    write_csv(folder / "contact-steps.csv", header, _contact_rows(kept))
+
+
+def _contact_rows(records: Iterable[StepRecord]) -> Iterator[list[Any]]:
+    for record in records:
+        columns = [column.tolist() for column in csv_columns(_table(record)).values()]
+        for values in zip(*columns, strict=True):
+            yield [record.state.time, *values]
+
+
+def _table(record: StepRecord) -> Table:
+    assert record.table is not None  # rank 0 has it
+    return record.table
