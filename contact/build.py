@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from itertools import product
 
 import numpy as np
@@ -20,6 +21,7 @@ from contact.interface.obstacle import Obstacle
 from contact.mesh.domain import Domain
 from contact.mesh.revolution import revolved
 from contact.meshing import make_domain
+from contact.moving import make_electrodes, make_rigid
 from contact.problem.held import check_held
 from contact.problem.problem import ContactProblem
 from contact.tolerances import HUGE
@@ -69,6 +71,8 @@ def build_problem(
             [_fixed(case, i, domain.comm) for i in range(len(case.fixed))],
             [_load(case, i, domain.comm) for i in range(len(case.load))],
         )
+        rigid, electrodes = make_rigid(case, domain.dim), make_electrodes(case)
+        body = replace(body, rigid=rigid, electrodes=electrodes)
         contacts = make_contacts(case, domain, coefficient, friction, foundation, layer)
         problem = ContactProblem(domain, body, contacts, degree=case.space.degree)
         for time in (1.0,) if case.evolution is None else case.evolution.times[1:]:

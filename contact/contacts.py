@@ -65,6 +65,7 @@ def make_contacts(
             _layer(contact) if layer is None else layer,
             _friction(*case.friction_of(key, contact), domain.comm, coefficient, friction),
             _conductor(case, case.electric_of(key, contact)[1], domain.size),
+            contact.overlap == "press",
         )
         for key, contact in case.contacts
     ]

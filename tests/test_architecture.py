@@ -19,7 +19,7 @@ LAYERS = (
     {"methods"},
     {"output"},
     {"case"},
-    {"blame", "build", "contacts", "evolving", "given", "meshing", "nesting", "solving"},
+    {"blame", "build", "contacts", "evolving", "given", "meshing", "moving", "nesting", "solving"},
     {"cli"},
 )
 

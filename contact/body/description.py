@@ -10,6 +10,7 @@ import numpy as np
 from ufl.core.expr import Expr
 
 from contact.body.amplitude import Amplitude, Moving, amplitude_of
+from contact.body.rigid import Electrode, Rigid
 from contact.errors import InputError
 from contact.typing import Array
 from forms.hencky import Hencky, Linear
@@ -111,6 +112,8 @@ class Body:
     regions
         Several materials, by region; none where `law` and `piezo` are those of the whole mesh.
         With them `law` and `piezo` stand for all where a size is asked for: see `piecewise`.
+    rigid, electrodes
+        What moves as a rigid body, foundations included, and parts of one unknown potential.
     """
 
     law: Hencky
@@ -118,6 +121,8 @@ class Body:
     loads: Sequence[Load] = field(default_factory=tuple)
     piezo: Piezo | None = None
     regions: tuple[Material, ...] = ()
+    rigid: tuple[Rigid, ...] = ()
+    electrodes: tuple[Electrode, ...] = ()
 
     @staticmethod
     def piecewise(

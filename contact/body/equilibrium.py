@@ -4,8 +4,9 @@ Unknowns are held in one blocked Lagrange space: d displacement components a nod
 piezoelectric body, the potential divided by `phi_scale` = sqrt(mu1/beta). In these units both
 blocks of the operator have the same size, whatever the unit system.
 
-A state's unknowns are a local array, those of the ghosts behind the owned ones. Nothing here
-remembers one: every query is given the state that it is about.
+A state's unknowns are a local array, those of the ghosts behind the owned ones, and at the end
+global ones, if there are any (`contact.body.masters`). Nothing here remembers one: every query is
+given the state that it is about.
 """
 
 from __future__ import annotations
@@ -20,12 +21,15 @@ from dolfinx.la import InsertMode
 from mpi4py import MPI
 from numpy.typing import NDArray
 from petsc4py import PETSc
+from scipy import sparse
 from ufl.core.expr import Expr
 
 from contact.body.description import Body
 from contact.body.loads import Loads
+from contact.body.masters import make_masters
 from contact.body.materials import cells_of, pieces
 from contact.body.supports import free_components, supports_of, without_field
+from contact.linear.bordered import BorderedBulk, BorderedOperator
 from contact.linear.layout import Layout
 from contact.linear.operator import Counters, SparseOperator
 from contact.mesh.domain import Domain
@@ -69,11 +73,14 @@ class BodyEquilibrium:
             charged = np.concatenate([self.cells[i] for i in np.flatnonzero(coupled)])
             self.supports.append(without_field(self.space, charged))
         index_map = self.space.dofmap.index_map
+        #: Which unknowns of the owned nodes no support holds, shape (nodes, block size).
+        self.unsupported = free_components(self.space, self.supports)
+        self.masters = make_masters(domain, self.space, body, self.unsupported)
         self.layout = Layout(
             domain.comm,
             index_map,
             self.space.tabulate_dof_coordinates()[: index_map.size_local, : self.dim],
-            free_components(self.space, self.supports),
+            self.unsupported & ~self.masters.tied,
             domain.size,
             float(body.law.young),
             domain.revolved,
@@ -90,12 +97,15 @@ class BodyEquilibrium:
 
     @property
     def free(self) -> NDArray[np.bool_]:
-        """Which unknowns of the owned nodes are not fixed, shape (nodes, block size)."""
+        """Which unknowns of the owned nodes are their own, shape (nodes, block size).
+
+        They are neither fixed nor do they follow a rigid part or an electrode.
+        """
         return self.layout.free
 
     @property
     def owned(self) -> int:
-        """Number of unknowns that this rank owns."""
+        """Number of unknowns of the nodes that this rank owns."""
         return self.free.size
 
     @property
@@ -116,8 +126,26 @@ class BodyEquilibrium:
     def function(self, x: Array, name: str = "x") -> fem.Function:
         """Return local unknowns as a function in `space`."""
         made = fem.Function(self.space, name=name)
-        made.x.array[:] = x
+        made.x.array[:] = self.nodal(x).ravel()
         return made
+
+    def nodal(self, values: Array) -> Array:
+        """Return what belongs to nodes of local or owned values, shape (nodes, block size)."""
+        return values[: values.size - self.masters.size].reshape(-1, self.block_size)
+
+    def motion(self, values: Array) -> Array:
+        """Return what belongs to the global unknowns, shape (m,)."""
+        return values[values.size - self.masters.size :]
+
+    @property
+    def mechanical(self) -> NDArray[np.bool_]:
+        """Which of owned values, global ones behind them, are displacements or forces."""
+        nodal = np.broadcast_to(np.arange(self.block_size) < self.dim, self.free.shape)
+        return np.concatenate([nodal.ravel(), self.masters.mechanical])
+
+    def owned_part(self, x: Array) -> Array:
+        """Return the owned ones of local unknowns, and the global ones behind them."""
+        return np.concatenate([x[: self.owned], self.motion(x)])
 
     def _compile(self) -> None:
         body = self.body
@@ -154,27 +182,30 @@ class BodyEquilibrium:
 
     def rest(self) -> Array:
         """Return the unknowns of the body at rest, without prescribed values."""
-        return np.zeros_like(self._at.x.array)
+        return np.zeros(self._at.x.array.size + self.masters.size)
 
     def prescribe(self, x: Array, time: float = 1.0) -> Array:
         """Return unknowns with the prescribed values at a time. Collective."""
-        at = self._at.x
-        at.array[:] = x
+        at, q = self._at.x, self.masters.prescribe(self.motion(x), time)
+        at.array[:] = self.nodal(x).ravel()
+        if self.masters.tying:
+            own = at.array[: self.owned]
+            own[self.masters.tied.ravel()] = (self.masters.ties @ q)[self.masters.tied.ravel()]
         for support in self.supports:
             support.set(at.array, time)
         at.scatter_forward()
-        return np.asarray(at.array.copy())
+        return np.concatenate([at.array, q])
 
     def local(self, owned: Array) -> Array:
         """Return owned unknowns with those of the ghosts behind them. Collective."""
         at = self._at.x
-        at.array[: self.owned] = owned
+        at.array[: self.owned] = owned[: self.owned]
         at.scatter_forward()
-        return np.asarray(at.array.copy())
+        return np.concatenate([at.array, self.motion(owned)])
 
     def moved(self, x: Array, increment: Array) -> Array:
         """Return unknowns plus an increment of the owned ones. Collective."""
-        return self.local(x[: self.owned] + increment)
+        return self.local(self.owned_part(x) + increment)
 
     def internal_forces(self, x: Array, secant_at: Array | None = None) -> Array:
         """Return the owned nodal forces of the stresses at local unknowns. Collective.
@@ -186,13 +217,29 @@ class BodyEquilibrium:
         secant_at
             Where the secant modulus is taken; at `x` by default: the material law itself.
         """
-        self._at.x.array[:] = x
-        self._secant_at.x.array[:] = x if secant_at is None else secant_at
-        return self._assembled(self._internal)
+        at = self.nodal(x).ravel()
+        self._at.x.array[:] = at
+        self._secant_at.x.array[:] = at if secant_at is None else self.nodal(secant_at).ravel()
+        return np.concatenate([self._assembled(self._internal), np.zeros(self.masters.size)])
 
     def external(self, time: float = 1.0) -> Array:
         """Return the owned nodal loads at a time. Collective."""
-        return self._loads.at(time)
+        return np.concatenate([self._loads.at(time), self.masters.forces(time)])
+
+    def unbalanced(self, forces: Array) -> Array:
+        """Return what of forces has to vanish in equilibrium. Collective.
+
+        What acts on nodes that follow a rigid part or an electrode acts on that.
+        """
+        masters, own = self.masters, forces[: self.owned]
+        q = np.where(masters.free, self.motion(forces) + masters.gathered(own), 0.0)
+        return np.concatenate([self.layout.mask(own), q])
+
+    def reactions(self, forces: Array) -> Array:
+        """Return what of forces the supports bear, and what holds given motions. Collective."""
+        masters, own = self.masters, forces[: self.owned]
+        q = np.where(masters.free, 0.0, self.motion(forces) + masters.gathered(own))
+        return np.concatenate([np.where(self.unsupported.ravel(), 0.0, own), q])
 
     def create_matrix(self) -> PETSc.Mat:
         """Return an empty matrix with the pattern of the body. Collective."""
@@ -200,20 +247,53 @@ class BodyEquilibrium:
 
     def assemble(self, matrix: PETSc.Mat, kind: str, x: Array) -> None:
         """Assemble Kacanov's "secant" or Newton's "tangent" at local unknowns. Collective."""
-        self._at.x.array[:] = self._secant_at.x.array[:] = x
+        self._at.x.array[:] = self._secant_at.x.array[:] = self.nodal(x).ravel()
         matrix.zeroEntries()
         assemble_matrix(matrix, self._forms[kind], bcs=[s.condition for s in self.supports])
         matrix.assemble()
 
     def operator(
-        self, nodes: NDArray[np.int32], *, symmetric: bool, counters: Counters, kind: str
-    ) -> SparseOperator:
-        """Return the operator of the body with blocks at nodes."""
-        return SparseOperator(self, nodes, symmetric=symmetric, counters=counters, kind=kind)
+        self,
+        nodes: NDArray[np.int32],
+        motion: Array | None = None,
+        *,
+        symmetric: bool,
+        counters: Counters,
+        kind: str,
+    ) -> SparseOperator | BorderedOperator:
+        """Return the operator of the body with blocks at nodes.
+
+        Parameters
+        ----------
+        nodes
+            Contact nodes, then others that have blocks, local numbers.
+        motion
+            How the foundation moves at the contact nodes with the global unknowns, shape
+            (n, block size, m); None where nothing moves.
+        symmetric, counters, kind
+            As of `SparseOperator`.
+        """
+        masters = self.masters
+        if masters.size == 0:
+            return SparseOperator(self, nodes, symmetric=symmetric, counters=counters, kind=kind)
+        bordered = BorderedBulk(self, self.motions(nodes, motion), masters.free)
+        return BorderedOperator(bordered, nodes, symmetric=symmetric, counters=counters, kind=kind)
+
+    def motions(self, nodes: NDArray[np.int32], motion: Array | None) -> sparse.csr_array:
+        """Return u = R q at what follows and at contact nodes, shape (owned, m)."""
+        if motion is None:
+            return self.masters.ties
+        dofs = nodes[: motion.shape[0], None] * self.block_size + np.arange(self.block_size)
+        return self.masters.with_foundations(dofs, motion)
 
     def norm(self, values: Array) -> float:
         """Return the Euclidean norm of owned values. Collective."""
-        return float(np.sqrt(self.comm.allreduce(np.dot(values, values), op=MPI.SUM)))
+        return float(np.sqrt(self.product(values, values)))
+
+    def product(self, one: Array, other: Array) -> float:
+        """Return the inner product of owned values, global ones behind them. Collective."""
+        own, n = np.dot(one[: self.owned], other[: self.owned]), self.owned
+        return float(self.comm.allreduce(own, op=MPI.SUM) + np.dot(one[n:], other[n:]))
 
     def load_size(self, time: float = 1.0) -> float:
         """Return the Euclidean norm of the nodal loads at a time. Collective."""

@@ -35,7 +35,7 @@ def domain_norm(body: BodyEquilibrium) -> Callable[[Array], float]:
     vector, image = mass.createVecs()
 
     def norm(values: Array) -> float:
-        vector.array[:] = values
+        vector.array[:] = values[: body.owned]
         mass.mult(vector, image)
         return float(np.sqrt(max(vector.dot(image), 0.0)))
 

@@ -13,6 +13,7 @@ from pydantic import BaseModel
 from contact.case.body import Piezo
 from contact.case.evolution import check_evolution, check_time
 from contact.case.formula import Expression
+from contact.case.moving import check_moving, moving
 from contact.case.showing import listed
 from contact.case.types import Words, fault
 from contact.tolerances import HUGE
@@ -29,9 +30,9 @@ def check_sections(case: Case) -> None:
     else:
         _check_mechanical(case)
     _check_regions(case)
-    if not any(
-        component != "free" for fixed in case.fixed for component in fixed.displacement or ()
-    ):
+    given = [fixed.displacement or () for fixed in case.fixed]
+    given += [part.displacement or (0.0,) for part in case.rigid]
+    if not any(component != "free" for components in given for component in components):
         raise fault("fixed", Words("no displacement fixed"), "at least one component on a part")
     _check_contradictions(case)
     _check_lagged(case)
@@ -40,6 +41,7 @@ def check_sections(case: Case) -> None:
         if isinstance(formula, Expression):
             check_time(case, path, formula)
     _check_contacts(case)
+    check_moving(case)
     if case.mesh.dimension is not None:
         _check_vectors(case, case.mesh.dimension)
         _check_parts(case, [*case.mesh.sides, *case.mesh.parts])
@@ -176,6 +178,8 @@ def _vectors(case: Case) -> Iterator[tuple[str, tuple[Any, ...] | None]]:
         if contact.foundation is not None:
             for key, vector in contact.foundation.vectors.items():
                 yield f"{path}.foundation.{key}", vector
+    for path, section in moving(case):
+        yield from ((f"{path}.{key}", vector) for key, vector in section.vectors())
 
 
 def _formulas(case: Case) -> Iterator[tuple[str, Any]]:
@@ -197,6 +201,8 @@ def _formulas(case: Case) -> Iterator[tuple[str, Any]]:
 
 def _check_vectors(case: Case, dimension: int) -> None:
     """Vectors have as many components as space, and the plane has no z."""
+    for path, section in moving(case):
+        section.check_dimension(path, dimension)
     for path, vector in _vectors(case):
         if vector is not None and len(vector) != dimension:
             given = [v.source if isinstance(v, Expression) else v for v in vector]
@@ -221,6 +227,8 @@ def _check_parts(case: Case, parts: list[str]) -> None:
     used = [(f"fixed.{i}.on", fixed.on) for i, fixed in enumerate(case.fixed)]
     used += [(f"load.{i}.on", load.on) for i, load in enumerate(case.load) if load.on is not None]
     used += [(f"{path}.on", contact.on) for path, contact in case.contacts]
+    used += [(f"rigid.{i}.on", part.on) for i, part in enumerate(case.rigid)]
+    used += [(f"electrode.{i}.on", part.on) for i, part in enumerate(case.electrode)]
     for path, name in used:
         if name not in parts:
             near = difflib.get_close_matches(name, parts, n=1)

@@ -24,6 +24,7 @@ from contact.case.interface import Contact, Electric, Friction, Plane, SlipLaw, 
 from contact.case.mesh import Mesh, Piece
 from contact.case.messages import describe, describe_fault
 from contact.case.overrides import override
+from contact.case.rigid import Electrode, RigidPart
 from contact.case.showing import clipped
 from contact.case.solver import DEFAULT, Solver
 from contact.case.types import FromTable, Section, Text, as_tuple, entries, one_or_more
@@ -79,6 +80,12 @@ class Case(Section):
     ] = Field(description="Supports and electrodes: one or more `[[fixed]]`.")
     load: Annotated[tuple[Load, ...], as_tuple, Accepted("tables [[load]]")] = Field(
         default=(), description="Forces and charges: any number of `[[load]]`."
+    )
+    rigid: Annotated[tuple[RigidPart, ...], as_tuple, Accepted("tables [[rigid]]")] = Field(
+        default=(), description="Parts that move as rigid bodies: any number of `[[rigid]]`."
+    )
+    electrode: Annotated[tuple[Electrode, ...], as_tuple, Accepted("tables [[electrode]]")] = Field(
+        default=(), description="Electrodes of unknown potential: any number of `[[electrode]]`."
     )
     contact: Contacts = Field(
         description="The foundation: `[contact]`; several: `[[contact]]`, each with its part."

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeAlias
 from pydantic import Field, model_validator
 
 from contact.case.formula import Expression
+from contact.case.rigid import Rigid
 from contact.case.types import (
     AmplitudeName,
     Name,
@@ -210,6 +211,14 @@ class Contact(Section):
         description="Contact direction on a rigid shape: normal of the foundation or of the body. "
         "With a gap it is the body's.",
     )
+    overlap: Literal["refuse", "press"] = Field(
+        default="refuse",
+        description="A shape that cuts the body at rest: `refuse` it, or `press` it out, as in a "
+        "press fit.",
+    )
+    rigid: Rigid | None = Field(
+        default=None, description="Motion of the foundation: `[contact.rigid]`. Absent: at rest."
+    )
     layer: (
         Annotated[float, Field(ge=0, allow_inf_nan=True), Accepted("a number >= 0, or inf")] | None
     ) = Field(
@@ -265,6 +274,8 @@ class Contact(Section):
     def _check(self) -> Contact:
         if self.gap is not None and self.foundation is not None:
             raise fault("gap", Words("both gap and foundation"), "one of them")
+        if self.overlap == "press" and self.foundation is None:
+            raise fault("overlap", self.overlap, "press with a foundation that is a shape")
         for key in (*LAYER, "lagged") if self.law == "signorini" else ():
             value = getattr(self, key)
             if value is not None and value is not False:

@@ -85,8 +85,7 @@ class HeldCurrent:
 
     def _at_nodes(self, x: Array) -> tuple[Array, Array]:
         """Return psi and phi - phi_F for a local dof array."""
-        size = self.block_size
-        nodal = x.reshape(-1, size)[self.nodes]
+        nodal = x[self.nodes[:, None] * self.block_size + np.arange(self.block_size)]
         opening = np.einsum("ni,ni->n", nodal[:, :-1], self.direction) - self.gap
         # Closed up to the rounding of the prescribed displacement.
         reach = np.abs(self.gap) + np.linalg.norm(nodal[:, :-1], axis=1)

@@ -88,6 +88,8 @@ def joined_nodes(entries: Sequence[Entry]) -> ContactNodes:
         name: np.concatenate([getattr(entry.nodes, name) for entry in entries])
         for name in ("nodes", "points", "weight", "normal", "tangent", "gap")
     }
+    if first.motion is not None:
+        together["motion"] = np.concatenate([entry.nodes.motion for entry in entries])
     return replace(first, **together, cut=max(entry.nodes.cut for entry in entries))
 
 

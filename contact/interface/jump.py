@@ -15,7 +15,8 @@ class Jump(Protocol):
     """Nodal values T x at the contact nodes, with their weights, directions and gaps.
 
     All that happens on Gamma_3 is written in them. In front of a rigid foundation T selects the
-    nodes of the body (`contact.interface.nodes.ContactNodes`).
+    nodes of the body (`contact.interface.nodes.ContactNodes`), and takes off how the foundation
+    moves there.
     """
 
     @property
@@ -50,7 +51,10 @@ class Jump(Protocol):
         """Return T x of local or owned unknowns, shape (n, block size)."""
 
     def transpose(self, nodal: Array, into: Array) -> None:
-        """Add T^T t of nodal vectors, shape (n, d) or (n, block size), to owned unknowns."""
+        """Add T^T t of nodal vectors, shape (n, d) or (n, block size), to owned unknowns.
+
+        Collective.
+        """
 
     def normal_component(self, u: Array) -> Array:
         """Return u . nu, shape (n,), of vectors of shape (n, >= d)."""

@@ -39,6 +39,9 @@ class ContactNodes:
         Distance to the foundation along the contact direction, shape (n,).
     block_size
         Unknowns a node: d, or d + 1 with the potential.
+    motion
+        How the foundation moves here with the m global unknowns (`contact.body.masters`), which
+        are behind those of the nodes, shape (n, block_size, m); None where nothing moves.
     cut
         Largest depth in the foundation, at rest, of a node on a straight facet of a curved
         part; the gap of these nodes is 0 (length).
@@ -56,6 +59,7 @@ class ContactNodes:
     block_size: int
     cut: float = 0.0
     revolved: bool = False
+    motion: Array | None = None
 
     @property
     def dim(self) -> int:
@@ -63,13 +67,25 @@ class ContactNodes:
         return self.normal.shape[1]
 
     def apply(self, x: Array) -> Array:
-        """Return the nodal unknowns, shape (n, block_size), of a local dof array."""
-        return x.reshape(-1, self.block_size)[self.nodes]
+        """Return the nodal unknowns of a local dof array, shape (n, block_size).
+
+        They are relative to the foundation where that moves.
+        """
+        nodal = x[self.nodes[:, None] * self.block_size + np.arange(self.block_size)]
+        if self.motion is None:
+            return nodal
+        return nodal - self.motion @ x[x.size - self.motion.shape[2] :]
 
     def transpose(self, nodal: Array, into: Array) -> None:
-        """Add nodal vectors of shape (n, d) or (n, block_size) to a local dof array."""
-        columns = np.arange(nodal.shape[1])
-        into[self.nodes[:, None] * self.block_size + columns] += nodal
+        """Add nodal vectors of shape (n, d) or (n, block_size) to a local dof array.
+
+        The opposite ones act on the foundation. Collective where that moves.
+        """
+        size = nodal.shape[1]
+        into[self.nodes[:, None] * self.block_size + np.arange(size)] += nodal
+        if self.motion is not None:
+            total = np.einsum("ni,nim->m", nodal, self.motion[:, :size])
+            into[into.size - total.size :] -= self.comm.allreduce(total, op=MPI.SUM)
 
     def normal_component(self, u: Array) -> Array:
         """Return u . nu, shape (n,), of vectors of shape (n, >= d)."""

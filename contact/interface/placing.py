@@ -96,12 +96,14 @@ def _place(
     found: Candidates,
     direction: Array,
     gap: Array,
+    press: bool,
 ) -> tuple[Array, float]:
     """Refuse a foundation behind the contact part, or one that the body cuts at rest.
 
     Nodes that face away are not looked at: all of a disc may be the contact part. Nodes on
     straight facets of a curved part may lie in a ball that the facets' corners touch: they
-    would be on its surface if the facets were curved, and their gap is 0.
+    would be on its surface if the facets were curved, and their gap is 0. Where the foundation
+    is to press on the body at rest, gaps are what they are.
 
     Returns
     -------
@@ -117,6 +119,8 @@ def _place(
             "into the body at every node; accepted: a normal towards the body, a sphere in front "
             "of it, or inside = true for a body within"
         )
+    if press:
+        return gap, 0.0
     rounding = 1e-5 * domain.size  # that of mesh files
     tolerance = np.full_like(gap, rounding)
     chord = max(rounding, _chord_depth(domain, *contact))
@@ -129,7 +133,8 @@ def _place(
     if domain.comm.allreduce(bool(np.any(depth > tolerance)), op=MPI.LOR):
         raise InputError(
             f"foundation: the body cuts it at rest, by up to {cut:.3g}; accepted: gaps "
-            f">= 0 but for {rounding:.1g} (rounding), and what straight facets take off a curve"
+            f">= 0 but for {rounding:.1g} (rounding), and what straight facets take off a curve, "
+            'or overlap = "press"'
         )
     return np.where(facing > 0, np.maximum(gap, 0.0), gap), float(cut)
 
@@ -139,13 +144,14 @@ def find_nodes(
     part: str,
     obstacle: Obstacle,
     key: str = "contact",
+    press: bool = False,
 ) -> ContactNodes:
     """Collect the contact nodes of a boundary part. Collective.
 
     A node whose contact direction is fixed by a Dirichlet condition is left out; a fixed
     tangential component is removed from its tangent projector. On a symmetry line the
     direction is turned into the free components, and what the fixed ones contribute to
-    u_nu is taken off the gap.
+    u_nu is taken off the gap. So it is with a foundation that moves.
 
     Parameters
     ----------
@@ -153,6 +159,8 @@ def find_nodes(
         Whose nodes, and what they may touch.
     key
         What messages call the contact.
+    press
+        Whether a shape may cut the body at rest.
 
     Raises
     ------
@@ -171,10 +179,13 @@ def find_nodes(
     cut = 0.0
     if obstacle.is_shape:
         with _naming(key):
-            gap, cut = _place(domain, space, (part, obstacle), found, direction, gap)
-
+            gap, cut = _place(domain, space, (part, obstacle), found, direction, gap, press)
+    if domain.comm.allreduce(bool(body.masters.tied[nodes, :d].any()), op=MPI.LOR):
+        raise InputError(
+            f"{key}.on: part {part!r} shares nodes with a rigid part; accepted: parts apart"
+        )
     free = body.free[nodes, :d]
-    fixed = body.prescribe(body.rest()).reshape(-1, body.block_size)[nodes, :d]
+    fixed = body.nodal(body.prescribe(body.rest()))[nodes, :d]
     gap = gap - np.einsum("ni,ni->n", direction, fixed)
     admissible = direction * free
     length = np.linalg.norm(admissible, axis=1)
@@ -182,6 +193,7 @@ def find_nodes(
     keep = (length > 0.5) & np.isfinite(gap)
     nodes, points, weight = nodes[keep], points[keep], weight[keep]
     gap, free = gap[keep], free[keep]
+    held = (direction * ~body.free[found.nodes, :d])[keep] / length[keep, None]
     direction = admissible[keep] / length[keep, None]
     gap = gap / length[keep]
     tangent = -direction[:, :, None] * direction[:, None, :]
@@ -197,9 +209,43 @@ def find_nodes(
         space.dofmap.index_map_bs,
         cut if cut > 1e-5 * domain.size else 0.0,
         domain.revolved,
+        _motion(body, part, points, direction, (free, held)),
     )
     if jump.size == 0:
         raise InputError(
             f"{key}.on: part {part!r} has no node that is free to move towards the foundation"
         )
     return jump
+
+
+def _motion(
+    body: BodyEquilibrium,
+    part: str,
+    points: Array,
+    direction: Array,
+    supports: tuple[NDArray[np.bool_], Array],
+) -> Array | None:
+    """Return how the foundation moves at contact nodes, shape (n, block size, m).
+
+    Parameters
+    ----------
+    body, part, points
+        The body, and the contact nodes of its part.
+    direction
+        What is left of the contact direction, of length 1, shape (n, d).
+    supports
+        Components that no support holds, and what they have taken from the direction, (n, d).
+    """
+    masters, (free, held) = body.masters, supports
+    if masters.size == 0:
+        return None
+    motion = np.zeros((points.shape[0], body.block_size, masters.size))
+    member = masters.member(part)
+    if member is not None:
+        own, d = member.motion(points, body.block_size), body.dim
+        # Along the supports nothing is seen of it but what closes the gap.
+        towards = np.einsum("ni,nik->nk", held, own[:, :d])
+        own[:, :d] *= free[:, :, None]
+        own[:, :d] += direction[:, :, None] * towards[:, None, :]
+        motion[:, :, member.columns] = own
+    return motion

@@ -50,7 +50,7 @@ class DenseOperator:
         self.bulk, self.counters = bulk, counters
         self._factors: tuple[Array, Array] | None = None
 
-    def update(self, kind: str, x: Array, blocks: Array, *, constant: bool = False) -> None:
+    def update(self, kind: str, x: Array, blocks: Array, *, constant: bool = False) -> bool:
         """Add up and factorise. Collective; see `operator.SparseOperator.update`."""
         bulk, free = self.bulk, self.bulk.free.astype(float)
         masked = _gather(bulk, blocks * free[:, :, None] * free[:, None, :])
@@ -61,6 +61,7 @@ class DenseOperator:
         factors, pivots, _ = dgetrf(total, overwrite_a=True)
         self._factors = factors, pivots
         self.counters.factorizations += 1
+        return True
 
     def solve(self, rhs: Array, rtol: float | None = None, guess: Array | None = None) -> Array:
         """Solve for the owned unknowns. Collective; see `operator.SparseOperator.solve`."""

@@ -88,9 +88,11 @@ class Counters:
 class Operator(Protocol):
     """Solves with a bulk matrix plus blocks at nodes, sparse or dense."""
 
-    symmetric: bool
+    @property
+    def symmetric(self) -> bool:
+        """Whether the blocks are symmetric too."""
 
-    def update(self, kind: str, x: Array, blocks: Array, *, constant: bool = False) -> None:
+    def update(self, kind: str, x: Array, blocks: Array, *, constant: bool = False) -> bool:
         """Assemble and factorise; see `SparseOperator.update`. Collective."""
 
     def solve(self, rhs: Array, rtol: float | None = None, guess: Array | None = None) -> Array:
@@ -153,7 +155,12 @@ class SparseOperator:
         with petsc_options(prefix):
             self.ksp.setFromOptions()
 
-    def update(self, kind: str, x: Array, blocks: Array, *, constant: bool = False) -> None:
+    @property
+    def jacobian(self) -> PETSc.Mat:
+        """The matrix itself."""
+        return self.matrix
+
+    def update(self, kind: str, x: Array, blocks: Array, *, constant: bool = False) -> bool:
         """Assemble the operator at local unknowns. Collective.
 
         Parameters
@@ -167,11 +174,15 @@ class SparseOperator:
         constant
             Whether the bulk matrix has not changed since the last call with the same kind:
             nothing is done when the blocks are the same too.
+
+        Returns
+        -------
+        Whether anything was done.
         """
         nodes = self._nodes
         last, same = self._blocks, constant and kind == self._kind
         if same and last is not None and self._all(np.array_equal(blocks, last)):
-            return
+            return False
         if same and self._bulk is not None:
             self._bulk.copy(self.matrix, PETSc.Mat.Structure.SAME_NONZERO_PATTERN)
         else:
@@ -192,6 +203,7 @@ class SparseOperator:
         self._set_up(self.symmetric)
         self._kind, self._blocks = kind, blocks.copy()
         self.counters.factorizations += 1
+        return True
 
     @property
     def _multigrid(self) -> bool:

@@ -117,6 +117,7 @@ class FixedPoint:
     def _new_operator(self, symmetric: bool) -> Operator:
         return self.problem.equilibrium.operator(
             self.problem.interface.coupled,
+            self.problem.interface.jump.motion,
             symmetric=symmetric,
             counters=self.counters,
             kind=self.options.linear,
@@ -203,7 +204,7 @@ class FixedPoint:
         step = Linearised(
             self.operator,
             self._base_residual(nodal, secant_at),
-            state.x[: body.owned],
+            body.owned_part(state.x),
             nodal,
             bound,
             interface.response.normal_law(nodal),
@@ -265,9 +266,9 @@ class FixedPoint:
         if self.problem.interface.friction.acts:
             return change < self.options.eps_fp
         assert self._norm is not None
-        owned = self.problem.equilibrium.owned
-        now = self.state.x[:owned]
-        return self._norm(now - previous.x[:owned]) < self.options.eps_fp * self._norm(now)
+        own = self.problem.equilibrium.owned_part
+        now, before = own(self.state.x), own(previous.x)
+        return self._norm(now - before) < self.options.eps_fp * self._norm(now)
 
     def _end(self, residuals: KKT, ended: str = "") -> tuple[State, Outcome]:
         return self.state, Outcome(residuals, self.options.allowed, ended)

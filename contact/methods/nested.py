@@ -15,10 +15,11 @@ from contact.typing import Array
 
 def prolong(coarse: ContactProblem, state: State, fine: ContactProblem) -> State:
     """Carry a state of a coarse problem to a finer one. Collective."""
-    body = fine.equilibrium
-    x = carry(coarse.equilibrium.function(state.x), body.space).x.array.copy()
+    body, before = fine.equilibrium, coarse.equilibrium
+    x = carry(before.function(state.x), body.space).x.array.copy()
     if coarse.piezoelectric:
-        x[coarse.dim :: body.block_size] *= coarse.equilibrium.phi_scale / body.phi_scale
+        x[coarse.dim :: body.block_size] *= before.phi_scale / body.phi_scale
+    x = np.concatenate([x, before.motion(state.x)])
     forces = np.column_stack([state.forces.pressure, state.forces.friction])
     points = coarse.nodes.gather(coarse.nodes.points)
     values = _interpolate(points, coarse.nodes.gather(forces), fine.nodes.points)

@@ -31,7 +31,8 @@ from contact.methods.report import History, Monitor, Outcome, Record
 from contact.methods.step import Iterate, WholeStep
 from contact.methods.sure import INTERIOR_POINT, solve_convex
 from contact.methods.uzawa import automatic_r
-from contact.problem.condensed import CondensedProblem, condensation, pays
+from contact.problem.condensed import CondensedProblem
+from contact.problem.condensing import condensation, pays
 from contact.problem.kkt import KKT, evaluate
 from contact.problem.problem import ContactProblem
 from contact.problem.protocols import Problem

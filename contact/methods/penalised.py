@@ -10,6 +10,7 @@ from petsc4py import PETSc
 
 from contact.errors import InputError
 from contact.interface.penalised import NodalLaw, Regularisation, outer
+from contact.linear.bordered import Packing
 from contact.linear.operator import Counters, petsc_options
 from contact.methods.options import PenaltyOptions
 from contact.problem.kkt import residual_forces
@@ -40,9 +41,14 @@ class PenalisedProblem:
         self._problem = problem
         self._body, self._interface = problem.equilibrium, problem.interface
         self.operator = self._body.operator(
-            self._interface.coupled, symmetric=symmetric, counters=counters, kind=options.linear
+            self._interface.coupled,
+            self._interface.jump.motion,
+            symmetric=symmetric,
+            counters=counters,
+            kind=options.linear,
         )
-        matrix = self.operator.matrix
+        self._packing = Packing(problem.comm, self._body.masters.size)
+        matrix = self.operator.jacobian
         self._iterate, self._residual = matrix.createVecs()
         self.snes = PETSc.SNES().create(problem.comm)
         self.snes.setOptionsPrefix("penalty_")
@@ -79,7 +85,8 @@ class PenalisedProblem:
     def apply(self, _: Any, rhs: PETSc.Vec, solution: PETSc.Vec) -> None:
         """Solve with the operator: the preconditioner of SNES's KSP."""
         try:
-            solution.array[:] = self.operator.solve(rhs.array_r)
+            found = self.operator.solve(self._packing.unpacked(rhs.array_r))
+            solution.array[:] = self._packing.packed(found)
         except InputError as error:
             # Not through PETSc, which would wrap it; SNES stops at a solution without numbers.
             self._error = error
@@ -111,7 +118,7 @@ class PenalisedProblem:
             max_it=min(self._options.max_inner, 20) if implicit else self._options.max_inner,
         )
         self._error = None
-        self._iterate.array[:] = state.x[: body.owned] + self._touch()
+        self._iterate.array[:] = self._packing.packed(body.owned_part(state.x) + self._touch())
         self.snes.solve(None, self._iterate)
         if self._error is not None and not implicit:
             raise self._error
@@ -130,7 +137,7 @@ class PenalisedProblem:
         opening = jump.normal_component(nodal) - interface.response.jump.gap
         closest = jump.maximum(opening, -np.inf)
         if closest >= 0:
-            return np.zeros(body.owned)
+            return np.zeros_like(body.owned_part(state.x))
         spring = (opening >= closest - 1e-9 * interface.size) / self._eps.contact
         n, d = jump.normal.shape
         blocks = np.zeros((n, jump.block_size, jump.block_size))
@@ -142,7 +149,7 @@ class PenalisedProblem:
 
     def _unknowns(self, iterate: PETSc.Vec) -> Array:
         """Return the local unknowns of an iterate of SNES. Collective."""
-        return self._body.local(iterate.array_r)
+        return self._body.local(self._packing.unpacked(iterate.array_r))
 
     def _tell(self, _: PETSc.SNES, iteration: int, norm: float) -> None:
         logger.debug("inner iteration %d: residual %.2e", iteration, norm / self._scale)
@@ -158,7 +165,7 @@ class PenalisedProblem:
             u_n = np.minimum(jump.normal_component(nodal), jump.gap)
             change[:, : jump.dim] += self._layer.layer(u_n)[:, None] * jump.normal
         jump.transpose(jump.weight[:, None] * (self._response + change), values)
-        residual.array[:] = body.layout.mask(values)
+        residual.array[:] = self._packing.packed(body.unbalanced(values))
 
     def _jacobian(
         self, _: PETSc.SNES, iterate: PETSc.Vec, matrix: PETSc.Mat, __: PETSc.Mat

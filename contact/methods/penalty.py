@@ -83,9 +83,10 @@ def automatic_eps(problem: ContactProblem) -> Regularisation:
 def _moved(problem: ContactProblem, loads: Array, prescribed: Array) -> float:
     """Return how far loads, as a stress on Gamma_3, or prescribed values move a body."""
     body, scales = problem.equilibrium, problem.scales
-    force = np.abs(loads.reshape(-1, body.block_size)[:, : body.dim]).sum()
-    given = np.abs(prescribed.reshape(-1, body.block_size)[:, : body.dim])
-    stress = body.comm.allreduce(float(force), op=MPI.SUM) / scales.area
+    nodal = np.abs(body.nodal(loads)[:, : body.dim]).sum()
+    force = body.comm.allreduce(float(nodal), op=MPI.SUM) + np.abs(body.motion(loads)).sum()
+    given = np.abs(np.append(body.nodal(prescribed)[:, : body.dim], body.motion(prescribed)))
+    stress = force / scales.area
     largest = body.comm.allreduce(float(given.max(initial=0.0)), op=MPI.MAX)
     return max(stress / scales.young * scales.size, largest)
 
@@ -212,9 +213,9 @@ class Penalty:
     def _thesis_criterion(self, previous: State) -> bool:
         """Tell whether (4.38) is met."""
         assert self._norm is not None
-        owned = self.problem.equilibrium.owned
-        now = self.state.x[:owned]
-        return self._norm(now - previous.x[:owned]) < self.options.eps_fp * self._norm(now)
+        own = self.problem.equilibrium.owned_part
+        now, before = own(self.state.x), own(previous.x)
+        return self._norm(now - before) < self.options.eps_fp * self._norm(now)
 
     def _outcome(self, residuals: KKT, words: str = "") -> Outcome:
         options, limit = self.options, max(residuals.contact, residuals.friction)

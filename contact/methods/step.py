@@ -124,6 +124,7 @@ class WholeStep:
             asymmetric = interface.friction.acts or interface.response.active
             self._operator = self.problem.equilibrium.operator(
                 interface.coupled,
+                interface.jump.motion,
                 symmetric=not asymmetric,
                 counters=self.counters,
                 kind=self.options.linear,

@@ -12,7 +12,6 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from mpi4py import MPI
 
 from contact.interface.history import SlipHistory
 from contact.linear.operator import Counters
@@ -171,20 +170,19 @@ def after(problem: ContactProblem, state: State, time: float) -> ContactProblem:
 def _share(problem: ContactProblem, before: State, last: State) -> float:
     """Return how far the loads go on the way they have come, over that way. Collective."""
     given = [_given(problem, time) for time in (before.time, last.time, problem.time)]
-    comm, shares = problem.comm, []
+    product, shares = problem.equilibrium.product, []
     for first, second, third in zip(*given, strict=True):
         come, going = second - first, third - second
-        local = np.array([come @ come, come @ going])
-        square, product = comm.allreduce(local, op=MPI.SUM)
+        square = product(come, come)
         if square > 0:
-            shares.append(product / square)
+            shares.append(product(come, going) / square)
     return float(np.clip(min(shares, default=0.0), 0.0, FARTHEST))
 
 
 def _given(problem: ContactProblem, time: float) -> tuple[Array, Array]:
     """Return the owned loads and prescribed values at a time. Collective."""
     body = problem.equilibrium
-    return body.external(time), body.prescribe(body.rest(), time)[: body.owned]
+    return body.external(time), body.owned_part(body.prescribe(body.rest(), time))
 
 
 def _since(now: Counters, before: Counters) -> Counters:

@@ -33,8 +33,8 @@ class ChargeBalance:
     Attributes
     ----------
     electrodes
-        Part with a prescribed potential -> its charge. A node of two such parts counts for
-        the one that is fixed first.
+        Part with a prescribed or one unknown potential -> its charge. A node of two parts with a
+        prescribed one counts for the one that is fixed first.
     given
         Part -> prescribed surface charge.
     foundation
@@ -73,7 +73,7 @@ class ForceBalance:
     applied
         Given tractions and body forces.
     supports
-        Reactions of the prescribed displacements.
+        Reactions of the prescribed displacements, and of rigid parts.
     contact
         What the foundation exerts on the body.
     """
@@ -131,6 +131,10 @@ def charge_balance(problem: ContactProblem, state: State) -> ChargeBalance:
         charge = electrodes.get(fixed.on, 0.0) + _sum(problem, residual[new])
         electrodes[fixed.on] = charge
         magnitude += _sum(problem, np.abs(residual[new]))
+    for electrode in problem.body.electrodes:
+        dofs = _electric_dofs(problem, electrode.on)
+        electrodes[electrode.on] = _sum(problem, residual[dofs])
+        magnitude += _sum(problem, np.abs(residual[dofs]))
     given: dict[str, float] = {}
     body = 0.0
     x, test = ufl.SpatialCoordinate(problem.domain.mesh), ufl.TestFunction(equilibrium.space)
@@ -167,10 +171,10 @@ def _foundation_charges(problem: ContactProblem, state: State) -> Array:
 def force_balance(problem: ContactProblem, state: State) -> ForceBalance:
     """Return the resultant forces at a state. Collective."""
     body, d = problem.equilibrium, problem.dim
-    residual = residual_forces(problem, state).reshape(-1, body.block_size)[:, :d]
+    residual = body.nodal(residual_forces(problem, state))[:, :d]
     supports = np.where(problem.free[:, :d], 0.0, residual).sum(axis=0)
     stress = problem.interface.stress(problem.nodal(state), state.forces)
-    given = body.external(state.time).reshape(-1, body.block_size)[:, :d].sum(axis=0)
+    given = body.nodal(body.external(state.time))[:, :d].sum(axis=0)
     local = np.stack([given, supports, -problem.nodes.weight @ stress])
     total = problem.comm.allreduce(local, op=MPI.SUM)
     applied, supports, contact = problem.domain.resultant(total)

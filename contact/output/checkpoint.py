@@ -23,6 +23,7 @@ from contact.output.folder import settle
 from contact.output.solution import Solution
 from contact.problem.problem import ContactProblem
 from contact.problem.state import State
+from contact.typing import Array
 
 #: Groups of attributes. adios4dolfinx 0.9 strips the letters of the group's name from the start
 #: of the attributes' names, so that the former are digits and the latter begin with letters.
@@ -39,12 +40,15 @@ class Checkpoint:
         Mesh and parts, to build the problem on: `build_problem(case, domain=checkpoint.domain)`.
     displacement, contact_forces, potential
         The solution; the contact forces lambda_c nu + lambda_f at the contact nodes, 0 elsewhere.
+    motion
+        The global unknowns, see `contact.body.masters`.
     """
 
     domain: Domain
     displacement: fem.Function
     contact_forces: fem.Function
     potential: fem.Function | None
+    motion: Array
 
     def restore(self, problem: ContactProblem) -> State:
         """Return the state of a problem on the checkpoint's domain.
@@ -57,14 +61,16 @@ class Checkpoint:
         given = self.displacement.function_space
         same = given.ufl_element().embedded_superdegree == problem.equilibrium.degree
         same &= problem.domain.mesh is self.domain.mesh
+        same &= problem.equilibrium.masters.size == self.motion.size
         if not same or problem.piezoelectric != (self.potential is not None):
             raise InputError(
                 "the checkpoint does not fit the problem; accepted: one built on the checkpoint's "
-                "domain, with the degree and the kind of material that it was written with"
+                "domain, with the degree, the kind of material and the rigid parts that it was "
+                "written with"
             )
         body, d = problem.equilibrium, problem.dim
         nodes = body.space.dofmap.list
-        x = body.rest().reshape(-1, body.block_size)
+        x = body.nodal(body.rest())
         x[nodes, :d] = self.displacement.x.array.reshape(-1, d)[given.dofmap.list]
         if self.potential is not None:
             dofs = self.potential.function_space.dofmap.list
@@ -74,7 +80,8 @@ class Checkpoint:
         jump = problem.nodes
         local = vectors[jump.nodes]
         forces = Multipliers(jump.normal_component(local), jump.tangential_component(local))
-        return State(body.local(x.ravel()[: body.owned]), forces)
+        owned = np.concatenate([x.ravel()[: body.owned], self.motion])
+        return State(body.local(owned), forces)
 
 
 def write_checkpoint(solution: Solution, path: str | Path) -> None:
@@ -92,13 +99,15 @@ def write_checkpoint(solution: Solution, path: str | Path) -> None:
     sets = {PARTS: _combined(domain, PARTS, domain.parts)}
     sets[REGIONS] = _combined(domain, REGIONS, domain.regions)
     body, state = problem.equilibrium, solution.state
-    vectors = np.zeros((state.x.size // body.block_size, d))
+    vectors = np.zeros((body.nodal(state.x).shape[0], d))
     vectors[problem.nodes.nodes] = state.forces.vectors(problem.nodes)
     forces = nodal_function("contact_forces", body.space, vectors, (d,))
     functions = {**unknowns(body, state.x), "contact_forces": forces}
     kind = {"degree": np.array([body.degree]), "size": np.array([domain.size])}
     kind["piezoelectric"] = np.array([int(problem.piezoelectric)])
     kind["revolved"] = np.array([int(domain.revolved)])
+    # An empty attribute cannot be written.
+    kind["motion"] = np.append(body.motion(state.x), 0.0)
     for function in functions.values():
         function.x.scatter_forward()
     written = [*functions.values(), *(numbers for numbers, _ in sets.values())]
@@ -156,6 +165,7 @@ def read_checkpoint(path: str | Path, comm: MPI.Intracomm = MPI.COMM_WORLD) -> C
         function("displacement", (domain.dim,)),
         function("contact_forces", (domain.dim,)),
         function("potential", ()) if kind["piezoelectric"][0] else None,
+        np.asarray(kind["motion"], dtype=float)[:-1],
     )
 
 

@@ -75,6 +75,15 @@ SUMMARY: Mapping[str, Item] = {
     "stick_nodes": Item("", "Number of those that stick."),
     "slip_nodes": Item("", "Number of those that slide; without friction all that touch."),
     "contact_direction": Item("", "`[contact]` `direction`: whose normal ν is."),
+    "rigid": Item(
+        "",
+        "The foundation that moves: its `displacement` and `rotation` (degrees), and the `force` "
+        "and `moment` on it from outside, given or held. Of several, one entry a part.",
+    ),
+    "rigid_parts": Item("", "The same of each part that moves as a rigid body, by part."),
+    "electrodes": Item(
+        "", "`potential` and `charge` of each electrode whose potential was unknown, by part."
+    ),
     "notes": Item("", "What has been looked at and found good, in words."),
     "warnings": Item("", "What there is to beware of, in words."),
     "phi_min": Item("potential", "Least potential at a node."),
@@ -103,7 +112,11 @@ _NODE: dict[str, Item] = {
     "z": Item("length", "The same; in space."),
     "weight": Item("area", "Area that the node stands for; sums with it are integrals over Γ₃."),
     "gap": Item("length", "Distance to the foundation at rest, along the contact direction ν."),
-    "u_n": Item("length", "Displacement along ν, out of the body; gap - u_n is what stays open."),
+    "u_n": Item(
+        "length",
+        "Displacement along ν, out of the body; gap - u_n is what stays open. Where "
+        "the foundation moves, relative to that; so are the tangential ones.",
+    ),
     "u_t": Item("length", "Tangential displacement u_τ; in the plane."),
     "u_tx": Item("length", "Its components; in space."),
     "u_ty": Item("length", "The same."),

@@ -68,7 +68,7 @@ def linear(function: fem.Function) -> fem.Function:
 
 def unknowns(body: BodyEquilibrium, x: Array) -> dict[str, fem.Function]:
     """Return the displacement and, for a piezoelectric body, the potential. Collective."""
-    values, d = x.reshape(-1, body.block_size), body.dim
+    values, d = body.nodal(x), body.dim
     made = {"displacement": nodal_function("displacement", body.space, values[:, :d], (d,))}
     if body.piezoelectric:
         potential = body.phi_scale * values[:, d:]

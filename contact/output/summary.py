@@ -12,6 +12,7 @@ from mpi4py import MPI
 from contact.mesh.domain import Domain
 from contact.output import environment
 from contact.output.balances import charge_balance
+from contact.output.motions import movements
 from contact.output.solution import Solution
 from contact.output.table import Table
 
@@ -64,6 +65,7 @@ def summarise(solution: Solution, table: Table | None) -> dict[str, Any]:
         "contact_direction": ", ".join(
             dict.fromkeys(contact.foundation.direction for contact in problem.contacts)
         ),
+        **movements(problem, solution.state),
         "notes": solution.notes,
         "warnings": solution.warnings,
     }

@@ -47,9 +47,9 @@ def supports(problem: ContactProblem, state: State) -> Mapping[str, Support]:
     first.
     """
     body, d, comm = problem.equilibrium, problem.dim, problem.comm
-    residual = residual_forces(problem, state).reshape(-1, body.block_size)[:, :d]
+    residual = body.nodal(residual_forces(problem, state))[:, :d]
     points = body.space.tabulate_dof_coordinates()[: len(residual), :d]
-    left = ~problem.free[:, :d]
+    left = ~body.unsupported[:, :d]
     totals: dict[str, Array] = {}
     for fixed in problem.body.fixed:
         if fixed.displacement is None:

@@ -49,7 +49,7 @@ def contact_surface(solution: Solution, table: Table | None) -> VTU | None:
         nodes, inverse = np.unique(facets, return_inverse=True)
         # A node of two contacts is one of each.
         names = i * index_map.size_global + index_map.local_to_global(nodes.astype(np.int32))
-        x = solution.state.x.reshape(-1, body.block_size)[nodes]
+        x = body.nodal(solution.state.x)[nodes]
         points = body.space.tabulate_dof_coordinates()[nodes, :d]
         shares.append((names[inverse.reshape(facets.shape)], names, points, x))
     gathered = comm.gather([np.concatenate(arrays) for arrays in zip(*shares, strict=True)])

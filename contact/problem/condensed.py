@@ -12,14 +12,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
-from petsc4py import PETSc
 
 from contact.interface.interface import Interface
 from contact.interface.multipliers import Multipliers
-from contact.linear import multigrid
 from contact.linear.dense import DenseOperator
-from contact.linear.operator import Counters, balance, check_overflow, petsc_options
+from contact.linear.operator import Bulk, Counters, balance, check_overflow, petsc_options
 from contact.linear.schur import SchurComplement
+from contact.problem.condensed_masters import CondensedMasters
 from contact.problem.problem import ContactProblem
 from contact.problem.scales import Scales
 from contact.problem.state import State
@@ -27,16 +26,6 @@ from contact.typing import Array
 
 #: Unknowns that are kept at most: the dense matrix then takes 130 MB.
 LARGEST = 4200
-
-#: Unknowns up to which a direct solver is thought of in space: it then takes some gigabytes.
-DIRECT = 150_000
-
-#: Unknowns up to which dense steps take no time to speak of.
-ALWAYS = 1000
-
-#: How much faster dense operations are than those of a sparse factorisation, and how many more of
-#: its steps Newton's method takes in the worst case.
-DENSE_IS_FASTER = 50.0
 
 PREFIX = "contact_"
 
@@ -98,6 +87,10 @@ class CondensedBody:
         """Return unknowns plus an increment."""
         return x + increment
 
+    def owned_part(self, x: Array) -> Array:
+        """Return all unknowns: there are no ghosts."""
+        return x
+
     def internal_forces(self, x: Array, secant_at: Array | None = None) -> Array:
         """Return the owned forces of the linear body, loads taken off. Collective."""
         moved = np.concatenate(self.comm.allgather(x - self.at))
@@ -107,12 +100,26 @@ class CondensedBody:
         """Return zero: the loads are part of the forces."""
         return np.zeros(self.owned)
 
+    def unbalanced(self, forces: Array) -> Array:
+        """Return what of forces acts on free unknowns."""
+        return np.where(self.free.ravel(), forces, 0.0)
+
+    def reactions(self, forces: Array) -> Array:
+        """Return what of forces acts on fixed unknowns."""
+        return np.where(self.free.ravel(), 0.0, forces)
+
     def load_size(self, time: float = 1.0) -> float:
         """Return the norm of the loads and reactions of the whole body."""
         return self.size
 
     def operator(
-        self, nodes: NDArray[np.int32], *, symmetric: bool, counters: Counters, kind: str
+        self,
+        nodes: NDArray[np.int32],
+        motion: Array | None = None,
+        *,
+        symmetric: bool,
+        counters: Counters,
+        kind: str,
     ) -> DenseOperator:
         """Return the dense operator; it has blocks at all nodes, in their order."""
         return DenseOperator(self, counters)
@@ -152,6 +159,8 @@ class Condensation:
         self.counters = counters
         self.nodes = full.interface.coupled
         self.turn_to(full)
+        self._masters = CondensedMasters.of(full.equilibrium, full.interface)
+        self._bulk: Bulk = full.equilibrium if self._masters is None else self._masters.bulk
         self._matrix = full.equilibrium.create_matrix()
         self._kind = ""
         self._schur: SchurComplement | None = None
@@ -183,7 +192,7 @@ class Condensation:
         """
         body = self.full.equilibrium
         if self._schur is None or kind != self._kind or not body.linear:
-            body.assemble(self._matrix, kind, state.x)
+            self._bulk.assemble(self._matrix, kind, state.x)
             balance(self._matrix, body.layout)
             if self._schur is None:
                 self._schur = SchurComplement(self._matrix, self._kept(), PREFIX)
@@ -191,15 +200,19 @@ class Condensation:
                 return None
             with petsc_options(PREFIX):
                 self._stiffness = self._schur.factorise(self._matrix)
+            if self._masters is not None:
+                self._stiffness = self._masters.eliminate(self._schur, self._stiffness)
             self._kind = kind
             self.counters.factorizations += 1
         residual = body.internal_forces(state.x) - body.external(state.time)
         check_overflow(body.layout, self._matrix.norm(), body.norm(residual))
-        reactions = body.norm(np.where(body.free.ravel(), 0.0, residual))
-        forces = -self._schur.condense(body.layout.mask(-residual))
+        reactions = body.norm(body.reactions(residual))
+        forces = -self._schur.condense(body.layout.mask(-residual[: body.owned]))
+        if self._masters is not None:
+            forces = self._masters.forces(forces, residual)
         if not (np.isfinite(self._stiffness).all() and np.isfinite(forces).all()):
             return None
-        at = state.x.reshape(-1, body.block_size)[self.nodes].ravel()
+        at = self._at(state.x)
         condensed = CondensedBody(
             body.comm,
             body.dim,
@@ -211,6 +224,12 @@ class Condensation:
             body.load_size(state.time) + reactions,
         )
         return CondensedProblem(condensed, self._interface, self.full.scales, state.time)
+
+    def _at(self, x: Array) -> Array:
+        """Return the owned kept unknowns: jumps, then what is at the other kept nodes."""
+        jump, body = self.full.interface.jump, self.full.equilibrium
+        others = body.nodal(x)[self.nodes[jump.nodes.size :]]
+        return np.concatenate([jump.apply(x), others]).ravel()
 
     def _kept(self) -> NDArray[np.int32]:
         bs = self.full.equilibrium.block_size
@@ -229,7 +248,10 @@ class Condensation:
         assert self._schur is not None
         self.counters.linear_solves += 1
         moved = x - condensed.equilibrium.at
-        return self._schur.expand(np.concatenate(self.full.comm.allgather(moved)))
+        everywhere = np.concatenate(self.full.comm.allgather(moved))
+        if self._masters is None:
+            return self._schur.expand(everywhere)
+        return self._masters.expand(self._schur, everywhere)
 
 
 def _at_kept_nodes(interface: Interface) -> Interface:
@@ -239,39 +261,6 @@ def _at_kept_nodes(interface: Interface) -> Interface:
     held = interface.held
     return replace(
         interface,
-        jump=replace(interface.jump, nodes=positions[:count]),
+        jump=replace(interface.jump, nodes=positions[:count], motion=None),
         held=None if held is None else replace(held, nodes=positions[count:]),
     )
-
-
-def pays(problem: ContactProblem) -> bool:
-    """Tell whether dense steps at the contact nodes cost less than sparse ones of the body.
-
-    A dense factorisation costs k^3 operations with k kept unknowns. A sparse one costs n b^2 with
-    n unknowns and fronts of b: in the plane the body's depth, n/k nodes, in
-    space some n^(1/2).
-    Of a slender body the contact nodes are too large a part.
-    """
-    layout = problem.equilibrium.layout
-    if multigrid.is_large(layout):
-        return False
-    kept, unknowns = problem.nodes.size * layout.block_size, layout.unknowns
-    front = unknowns / kept * layout.block_size if layout.dim == 2 else unknowns**0.5
-    return kept <= ALWAYS or kept**3 <= DENSE_IS_FASTER * unknowns * front**2
-
-
-def condensation(problem: ContactProblem, counters: Counters, kind: str) -> Condensation | None:
-    """Return the problem condensed onto its contact nodes, where that is possible. Collective.
-
-    That is where the contact nodes are few and a direct solver has the memory, unless the user
-    or his options of PETSc ask for another.
-    """
-    options = PETSc.Options(PREFIX)
-    names = ("ksp_type", "pc_type", "pc_factor_mat_solver_type")
-    chosen = any(options.hasName(name) for name in names)
-    layout = problem.equilibrium.layout
-    large = kind == "auto" and layout.dim == 3 and layout.unknowns > DIRECT
-    many = problem.nodes.size * layout.block_size > LARGEST
-    if chosen or kind == "iterative" or large or many:
-        return None
-    return Condensation(problem, counters)

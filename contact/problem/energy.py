@@ -49,7 +49,7 @@ class Moment:
     def rest(problem: ContactProblem) -> Moment:
         """Return that of a body to which nothing has been done."""
         body = problem.equilibrium
-        zero = np.zeros(body.owned)
+        zero = np.zeros_like(body.owned_part(body.rest()))
         return Moment(body.rest(), zero, zero, 0.0)
 
 
@@ -75,38 +75,38 @@ class Balance:
 def moment(problem: ContactProblem, state: State, before: Moment) -> Moment:
     """Return what the balance has to know of a step that began at another moment. Collective."""
     body, interface = problem.equilibrium, problem.interface
-    external, free = body.external(state.time), body.free.ravel()
+    external = body.external(state.time)
     residual = residual_forces(problem, state)
     foundation = np.zeros_like(residual)
     interface.add_forces(foundation, state.x, state.forces)
     internal = residual + external - foundation
     vectors = interface.jump.weight[:, None] * state.forces.vectors(interface.jump)
     interface.jump.transpose(-vectors, foundation)
-    given = external - foundation + np.where(free, 0.0, residual)
-    moved = state.x[: body.owned] - before.x[: body.owned]
+    given = external - foundation + body.reactions(residual)
+    moved = body.owned_part(state.x) - body.owned_part(before.x)
     if body.linear:
-        power = 0.5 * (internal + before.internal) @ moved
+        power = 0.5 * (internal + before.internal)
     else:
         forces = [
             body.internal_forces(0.5 * ((1 - s) * before.x + (1 + s) * state.x)) for s in _POINTS
         ]
-        power = 0.5 * _WEIGHTS @ np.array(forces) @ moved
-    change = problem.comm.allreduce(float(power), op=MPI.SUM)
-    return Moment(state.x, given, internal, before.enthalpy + change)
+        power = 0.5 * _WEIGHTS @ np.array(forces)
+    return Moment(state.x, given, internal, before.enthalpy + body.product(power, moved))
 
 
 def balance(problem: ContactProblem, state: State, before: Moment, now: Moment) -> Balance:
     """Return the energies of a step from one moment to another. Collective."""
     body, interface = problem.equilibrium, problem.interface
-    size, d = body.block_size, body.dim
-    x, x_before = (m.x[: body.owned].reshape(-1, size) for m in (now, before))
-    given, given_before = (m.given.reshape(-1, size) for m in (now, before))
-    mechanical = 0.5 * (given + given_before)[:, :d] * (x - x_before)[:, :d]
+    x, x_before = (body.owned_part(m.x) for m in (now, before))
     # The enthalpy's work is that of charges on changing potentials: potentials move charges.
-    electric = -0.5 * (x + x_before)[:, d:] * (given - given_before)[:, d:]
-    stored = x[:, d:] * now.internal.reshape(-1, size)[:, d:]
+    work = np.where(
+        body.mechanical,
+        0.5 * (now.given + before.given) * (x - x_before),
+        -0.5 * (x + x_before) * (now.given - before.given),
+    )
+    stored = body.product(np.where(body.mechanical, 0.0, x), now.internal)
     slip = interface.slip(interface.jump.apply(state.x))
     friction = interface.jump.weight @ np.einsum("ni,ni->n", state.forces.friction, slip)
-    local = np.array([mechanical.sum() + electric.sum(), stored.sum(), friction])
-    work, charges, dissipation = problem.comm.allreduce(local, op=MPI.SUM)
-    return Balance(float(work), now.enthalpy - float(charges), float(dissipation))
+    dissipation = float(problem.comm.allreduce(friction, op=MPI.SUM))
+    done = body.product(work, np.ones_like(work))
+    return Balance(done, now.enthalpy - stored, dissipation)

@@ -2,16 +2,27 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from types import MappingProxyType
+
 import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
 from scipy.optimize import linprog
 
+from contact.body.motions import rigid_motions
+from contact.body.rigid import Rigid
 from contact.errors import InputError
 from contact.mesh.pieces import connected_pieces
 from contact.problem.problem import ContactProblem
 from contact.problem.state import State
 from contact.typing import Array
+
+#: Rigid motions in the order of `rigid_motions`.
+NAMES = {
+    2: ["translation along x", "translation along y", "rotation"],
+    3: [f"{kind} {axis}" for kind in ("translation along", "rotation about") for axis in "xyz"],
+}
 
 #: Eigenvalues of the Gram matrices below are between 0 and about 1.
 ROUNDING = 1e-9
@@ -22,7 +33,8 @@ def check_held(problem: ContactProblem) -> None:
 
     Two things are asked for: supports and contact (in the tangential directions too if there
     is friction) leave no rigid motion at all, and the loads do not pull the body off the
-    foundation where that alone holds it. Pieces that are not connected are checked one by one.
+    foundation where that alone holds it. Pieces that are not connected are checked one by one,
+    but for those that a rigid part or a foundation joins: they are checked with its motion.
 
     Raises
     ------
@@ -30,47 +42,105 @@ def check_held(problem: ContactProblem) -> None:
         If the body can move freely or is pulled off.
     """
     piece, count = connected_pieces(problem.equilibrium.space)
-    for k in range(count):
-        _check_piece(problem, piece == k, count)
+    joined = _joined(problem, piece, count)
+    for k in np.flatnonzero(~joined):
+        _check_group(problem, piece, [k], count)
+    if joined.any():
+        _check_group(problem, piece, [*np.flatnonzero(joined)], count, _free_motions(problem))
 
 
-def _check_piece(problem: ContactProblem, inside: NDArray[np.bool_], count: int) -> None:
-    """Check one piece, of which there are `count`, given its owned nodes."""
-    nodes, d = problem.nodes, problem.dim
-    points = problem.equilibrium.layout.points
-    touching_here = inside[nodes.nodes]
-    centre, size = _centre(problem), problem.domain.size
-    if count > 1:
-        centre, size = _middle(problem, points[inside])
-    fixed = ~problem.free[:, :d]
-    held = np.flatnonzero(fixed.any(axis=1) & inside)
-    revolved = problem.domain.revolved
-    motions = rigid_motions((points[held] - centre) / size, revolved) * fixed[held][:, :, None]
-    supports = _gram(problem, motions)
+def _free_motions(problem: ContactProblem) -> dict[int, str]:
+    """Return the global unknowns that are motions and not given, with their names."""
+    return {
+        member.begin + k: f"{NAMES[problem.dim][k]} of what is rigid"
+        for member in problem.equilibrium.masters.members
+        if isinstance(member.what, Rigid)
+        for k in np.flatnonzero(member.free)
+    }
+
+
+def _joined(problem: ContactProblem, piece: NDArray[np.int32], count: int) -> NDArray[np.bool_]:
+    """Tell which pieces touch something that moves freely, shape (count,). Collective."""
+    free, nodes, ties = [*_free_motions(problem)], problem.nodes, problem.equilibrium.masters.ties
+    touched = np.zeros(count, dtype=np.intc)
+    if free and nodes.motion is not None:
+        moves = np.abs(nodes.motion[:, :, free]).max(axis=(1, 2), initial=0.0) > 0
+        touched[piece[nodes.nodes[moves]]] = 1
+        rows = np.flatnonzero(np.abs(ties[:, free]).sum(axis=1) > 0)
+        touched[piece[rows // problem.equilibrium.block_size]] = 1
+    return np.asarray(problem.comm.allreduce(touched, op=MPI.MAX)) > 0
+
+
+def _check_group(
+    problem: ContactProblem,
+    piece: NDArray[np.int32],
+    group: list[int],
+    count: int,
+    moving: Mapping[int, str] = MappingProxyType({}),
+) -> None:
+    """Check pieces of the mesh, with the global unknowns that move them. Collective.
+
+    Parameters
+    ----------
+    problem
+        The problem.
+    piece
+        The piece of each owned node, shape (nodes,).
+    group, count
+        The pieces that are checked, and how many there are in all.
+    moving
+        Global unknowns, with their names.
+    """
+    body, nodes, d = problem.equilibrium, problem.nodes, problem.dim
+    points, masters = body.layout.points, body.masters
+    columns, names, centre = [], [], _centre(problem)
+    own_names = NAMES[d][1:2] if problem.domain.revolved else NAMES[d]
+    for k in group:
+        inside, size = piece == k, problem.domain.size
+        if count > 1:
+            centre, size = _middle(problem, points[inside])
+        rigid = rigid_motions((points[inside] - centre) / size, problem.domain.revolved)
+        motions = np.zeros((*body.free.shape, rigid.shape[2]))
+        motions[inside, :d] = rigid
+        still = np.zeros(masters.size)
+        columns += [np.append(motion.ravel(), still) for motion in np.moveaxis(motions, 2, 0)]
+        names += own_names
+    for k, name in moving.items():
+        columns.append(np.append(np.zeros(body.owned), np.eye(masters.size)[k]))
+        names.append(name)
+    moved = np.stack(columns, axis=1)
+    # Relative to what holds it: supports, and rigid parts where nodes follow them.
+    apart = moved[: body.owned] - masters.ties @ moved[body.owned :]
+    fixed = ~body.free.copy()
+    fixed[:, d:] = False
+    supports = _gram(problem, apart[fixed.ravel()][:, None, :])
     free = _null_space(supports)
     if free.shape[1] == 0:
         return
-    at_contact = rigid_motions((nodes.points - centre) / size, revolved)
-    at_contact *= touching_here[:, None, None]
-    normal = np.einsum("ni,nim->nm", nodes.normal, at_contact)
+    at_contact = np.stack([nodes.apply(body.local(column)) for column in columns], axis=2)
+    normal = np.einsum("ni,nim->nm", nodes.normal, at_contact[:, :d])
     touching = _gram(problem, normal[:, None, :])
-    tangential = np.einsum("nij,njm->nim", nodes.tangent, at_contact)
+    tangential = np.einsum("nij,njm->nim", nodes.tangent, at_contact[:, :d])
     if problem.frictional:
         touching = touching + _gram(problem, tangential)
     loose = _null_space(supports + touching)
     if loose.shape[1] > 0:
-        whole = "the body"
+        whole = "the body" if len(names) == len(own_names) else "the body, or what is rigid,"
         if count > 1:
             where = ", ".join(f"{x:.4g}" for x in centre)
             whole = f"the mesh has {count} pieces that share no nodes, and the one about ({where})"
         raise InputError(
-            f"{whole} is not held: it can move as a rigid body ({_describe(loose, d, revolved)}); "
+            f"{whole} is not held: it can move as a rigid body ({_describe(loose, names)}); "
             "accepted: displacement components fixed so that it cannot"
             + (", or regions that share the nodes between them" if count > 1 else "")
         )
-    body = problem.equilibrium
-    loads = body.external(problem.time).reshape(-1, body.block_size)[:, :d] * inside[:, None]
-    _check_loads(problem, loads, free, normal, tangential, (points - centre) / size)
+    loads = body.external(problem.time)
+    on_masters = loads[body.owned :]
+    own = np.where(np.isin(piece, group)[:, None], body.nodal(loads), 0.0).ravel()
+    work = moved[: body.owned].T @ own
+    work = problem.comm.allreduce(work, op=MPI.SUM) + moved[body.owned :].T @ on_masters
+    scale = problem.comm.allreduce(float(np.abs(own).sum()), op=MPI.SUM)
+    _check_loads(problem, work, scale + np.abs(on_masters).sum(), free, normal, tangential)
 
 
 def check_potential(problem: ContactProblem, state: State) -> None:
@@ -89,7 +159,7 @@ def check_potential(problem: ContactProblem, state: State) -> None:
     interface, nodal, comm = problem.interface, problem.nodal(state), problem.comm
     pressure = interface.pressure(nodal, state.forces)
     slopes = interface.response.jacobian(nodal, pressure)[:, -1, -1]
-    known = bool(np.any(slopes != 0)) or not np.all(problem.free[:, -1])
+    known = bool(np.any(slopes != 0)) or not np.all(problem.equilibrium.unsupported[:, -1])
     if interface.held is not None:
         known = known or bool(np.any(interface.held.slope(state.x) != 0))
     if not comm.allreduce(known, op=MPI.LOR):
@@ -98,20 +168,6 @@ def check_potential(problem: ContactProblem, state: State) -> None:
             "conducts nowhere; accepted: a potential fixed on a part, or contact with a "
             "conductive foundation"
         )
-
-
-def rigid_motions(points: NDArray[np.floating], revolved: bool = False) -> Array:
-    """Return the rigid motions at points of shape (n, d): shape (n, d, 3 or 6).
-
-    Translations come first, then rotations: about z in the plane, about x, y and z in space.
-    A body of revolution has one, along its axis: shape (n, 2, 1).
-    """
-    n, d = points.shape
-    motions = np.zeros((n, d, 3 if d == 2 else 6))
-    motions[:, np.arange(d), np.arange(d)] = 1.0
-    for k, (i, j) in enumerate([(0, 1)] if d == 2 else [(1, 2), (2, 0), (0, 1)]):
-        motions[:, i, d + k], motions[:, j, d + k] = -points[:, j], points[:, i]
-    return motions[:, :, 1:2] if revolved else motions
 
 
 def _centre(problem: ContactProblem) -> Array:
@@ -142,13 +198,8 @@ def _null_space(gram: Array) -> Array:
     return vectors[:, values < ROUNDING]
 
 
-def _describe(motions: Array, d: int, revolved: bool) -> str:
+def _describe(motions: Array, names: list[str]) -> str:
     """Name the axis motions that a space of rigid motions contains, or count it."""
-    if revolved:
-        return "translation along y, its axis"
-    names = ["translation along x", "translation along y"]
-    names += ["rotation"] if d == 2 else ["translation along z"]
-    names += [] if d == 2 else [f"rotation about {axis}" for axis in "xyz"]
     contained = np.linalg.norm(motions, axis=1) > 1 - 1e-6
     found = [name for name, inside in zip(names, contained, strict=True) if inside]
     return ", ".join(found) or "translation and rotation combined"
@@ -156,29 +207,37 @@ def _describe(motions: Array, d: int, revolved: bool) -> str:
 
 def _check_loads(
     problem: ContactProblem,
-    external: Array,
+    work: Array,
+    scale: float,
     free: Array,
     normal: Array,
     tangential: Array,
-    points: NDArray[np.floating],
 ) -> None:
     """Refuse loads that no contact force can balance.
 
     That is so where they do work on a rigid motion m on which no admissible contact force can:
     m.nu <= -mu |m_tau| at every node (Farkas). A given friction bound, and a smoothed pressure,
     are not bounded by the pressure at the node: such problems are left to the solver.
+
+    Parameters
+    ----------
+    problem
+        The problem.
+    work, scale
+        Of the loads on the rigid motions, shape (m,), and the size of the loads.
+    free
+        The motions that no support holds, shape (m, k).
+    normal, tangential
+        All motions at the contact nodes, shapes (n, m) and (n, d, m).
     """
     friction = problem.interface.friction
     mu = 0.0 if friction.law is None else friction.law.maximum
     mu = problem.comm.allreduce(mu, op=MPI.MAX)
     if not np.isfinite(mu) or not friction.local:
         return
-    d, comm = problem.dim, problem.comm
-    local = np.einsum("ni,nim->m", external, rigid_motions(points, problem.domain.revolved))
-    work = comm.allreduce(local, op=MPI.SUM) @ free
-    scale = comm.allreduce(float(np.abs(external).sum()), op=MPI.SUM)
+    comm, work = problem.comm, work @ free
     # |m_tau| <= sqrt(d) times its largest component: a cone of planes inside the cone.
-    across = [np.sqrt(d) * mu * part @ free for part in np.moveaxis(tangential, 1, 0)]
+    across = [np.sqrt(problem.dim) * mu * part @ free for part in np.moveaxis(tangential, 1, 0)]
     rows = [normal @ free + sign * part for part in across for sign in (-1, 1)]
     cone = np.concatenate([problem.nodes.gather(row) for row in rows])
     pulled = False

@@ -82,24 +82,24 @@ def _least_force(problem: Problem, state: State) -> float:
     passes for nothing at any sensible tolerance.
     """
     body = problem.equilibrium
-    return 1e-6 * problem.scales.stiffness * body.norm(state.x[: body.owned])
+    return 1e-6 * problem.scales.stiffness * body.norm(body.owned_part(state.x))
 
 
 def evaluate(problem: Problem, state: State) -> KKT:
     """Return the residuals of a state. Collective; nothing is changed by it."""
     body, interface = problem.equilibrium, problem.interface
-    residual, free = residual_forces(problem, state), body.free.ravel()
+    residual = residual_forces(problem, state)
     jump, nodal = interface.jump, interface.jump.apply(state.x)
     contact_forces = np.zeros_like(residual)
     stress = interface.stress(nodal, state.forces)
     jump.transpose(jump.weight[:, None] * stress, contact_forces)
     loads, pushes = body.load_size(state.time), body.norm(contact_forces)
-    scale = loads + pushes + body.norm(np.where(free, 0.0, residual))
+    scale = loads + pushes + body.norm(body.reactions(residual))
     least = _least_force(problem, state)
     if loads > 0 or pushes > 1e-6 * least:
         # Not more than that: of a body that flies away all forces are rounding.
         least = min(least, body.cancelling * scale)
     scale = max(scale, least)
-    equilibrium = body.norm(np.where(free, residual, 0.0)) / (scale or 1.0)
+    equilibrium = body.norm(body.unbalanced(residual)) / (scale or 1.0)
     bound = interface.bound(nodal, state.forces)
     return KKT(equilibrium, *interface_residuals(interface, nodal, state.forces, bound))

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from contact.body.description import Body
 from contact.body.equilibrium import BodyEquilibrium
 from contact.body.norms import volume
+from contact.errors import InputError
 from contact.interface.current import Conductor, HeldCurrent, held_current
 from contact.interface.entries import (
     Entry,
@@ -32,6 +33,7 @@ from contact.interface.obstacle import Obstacle
 from contact.interface.placing import candidates, find_nodes
 from contact.interface.response import FoundationResponse
 from contact.mesh.domain import Domain
+from contact.problem.approach import approached
 from contact.problem.scales import Scales
 from contact.problem.state import State
 from contact.typing import Array
@@ -51,6 +53,8 @@ class Contact:
         The compliant layer in front of it.
     friction, conductor
         Friction and electric contact; None for those that the problem is given for all.
+    press
+        Whether the obstacle may cut the body at rest, and presses it out.
     """
 
     on: str
@@ -58,6 +62,7 @@ class Contact:
     layer: Layer | None = None
     friction: Friction | None = None
     conductor: Conductor | None = None
+    press: bool = False
 
 
 class ContactProblem:
@@ -164,22 +169,31 @@ class ContactProblem:
         if contact.layer is not None:
             contact.layer.check(self.domain.size)
         assert contact.friction is not None  # filled in above
-        nodes = find_nodes(self.equilibrium, contact.on, contact.foundation, key)
-        held = self._held(contact, nodes)
+        nodes = find_nodes(self.equilibrium, contact.on, contact.foundation, key, contact.press)
+        held = self._held(key, contact, nodes)
         return Entry(contact.on, nodes, contact.friction, contact.layer, contact.conductor, held)
 
-    def _held(self, contact: Contact, nodes: ContactNodes) -> HeldCurrent | None:
+    def _held(self, key: str, contact: Contact, nodes: ContactNodes) -> HeldCurrent | None:
         if contact.conductor is None or not self.piezoelectric:
             return None
-        body = self.equilibrium
-        return held_current(
-            candidates(self.domain, body.space, contact.on),
-            contact.foundation,
-            body.free,
-            nodes,
-            contact.conductor,
-            body.phi_scale,
+        body, masters = self.equilibrium, self.equilibrium.masters
+        found = candidates(self.domain, body.space, contact.on)
+        held = held_current(
+            found, contact.foundation, body.free, nodes, contact.conductor, body.phi_scale
         )
+        taken = bool(masters.tied[found.nodes, -1].any())
+        if self.comm.allreduce(taken, op=MPI.LOR):
+            raise InputError(
+                f"{key}.on: part {contact.on!r}, through which current flows, shares nodes with an "
+                "electrode of unknown potential; accepted: parts apart, or an insulated foundation"
+            )
+        moves = masters.member(contact.on) is not None
+        if self.comm.allreduce(held.nodes.size, op=MPI.SUM) > 0 and moves:
+            raise InputError(
+                f"{key}.rigid: supports hold nodes of part {contact.on!r}, through which current "
+                "flows as the foundation comes near; accepted: a part that can move everywhere"
+            )
+        return held
 
     def _extents(self, domain: Domain) -> tuple[float, float]:
         """Return the area of Gamma_3 and the volume of the body."""
@@ -252,6 +266,6 @@ class ContactProblem:
         conductors = [c.conductor for c in self.contacts if c.conductor is not None]
         if self.piezoelectric and conductors:
             if all(fixed.potential is None for fixed in self.body.fixed):
-                phi_f = conductors[0].at(self.time).phi_f
-                x.reshape(-1, body.block_size)[:, -1] = phi_f / body.phi_scale
-        return State(body.prescribe(x, time), Multipliers.zero(self.nodes), time)
+                body.nodal(x)[:, -1] = conductors[0].at(self.time).phi_f / body.phi_scale
+        x = approached(self.nodes, body.prescribe(x, time), body.masters, time)
+        return State(x, Multipliers.zero(self.nodes), time)

@@ -59,6 +59,9 @@ class Equilibrium(Protocol):
     def prescribe(self, x: Array, time: float = 1.0) -> Array:
         """Return unknowns with the prescribed values at a time. Collective."""
 
+    def owned_part(self, x: Array) -> Array:
+        """Return the owned ones of local unknowns, and the global ones behind them."""
+
     def moved(self, x: Array, increment: Array) -> Array:
         """Return unknowns plus an increment of the owned ones. Collective."""
 
@@ -68,13 +71,25 @@ class Equilibrium(Protocol):
     def external(self, time: float = 1.0) -> Array:
         """Return the owned nodal loads at a time. Collective."""
 
+    def unbalanced(self, forces: Array) -> Array:
+        """Return what of forces has to vanish in equilibrium. Collective."""
+
+    def reactions(self, forces: Array) -> Array:
+        """Return what of forces the supports bear."""
+
     def load_size(self, time: float = 1.0) -> float:
         """Return the norm of the loads at a time. Collective."""
 
     def operator(
-        self, nodes: NDArray[np.int32], *, symmetric: bool, counters: Counters, kind: str
+        self,
+        nodes: NDArray[np.int32],
+        motion: Array | None = None,
+        *,
+        symmetric: bool,
+        counters: Counters,
+        kind: str,
     ) -> Operator:
-        """Return an operator with blocks at nodes."""
+        """Return an operator with blocks at nodes, in front of which a foundation may move."""
 
     def norm(self, values: Array) -> float:
         """Return the Euclidean norm of owned values. Collective."""

@@ -12,6 +12,8 @@ from contact.output.reference import PAGE, page, summary_help
 from contact.output.vtu import read_vtu
 from contact.solving import solve
 from tests.output.test_output import block, electric
+from tests.problem.test_rigid import column, plate
+from tests.problems.rigid import indented
 
 #: Derived fields have a companion cell by cell.
 PLAIN = ("displacement", "potential")
@@ -27,11 +29,15 @@ def two_contacts():
     )
 
 
+def rigid():
+    return indented(n=4), plate(), column()
+
+
 @pytest.fixture(scope="module")
 def written(tmp_path_factory: pytest.TempPathFactory) -> list[Path]:
     """Return folders with the results of all kinds of problems."""
     folders = []
-    for case in (block(2), block(3), electric(2), electric(3), two_contacts()):
+    for case in (block(2), block(3), electric(2), electric(3), two_contacts(), *rigid()):
         folders.append(tmp_path_factory.mktemp("out"))
         write_outputs(solve(case), folders[-1])
     return folders

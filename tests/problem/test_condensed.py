@@ -10,7 +10,7 @@ from contact.linear.operator import Counters, SparseOperator
 from contact.linear.schur import SchurComplement
 from contact.methods.newton import Newton
 from contact.methods.options import NewtonOptions
-from contact.problem import condensed
+from contact.problem import condensed, condensing
 from contact.problem.kkt import evaluate
 from contact.problem.problem import ContactProblem
 from contact.problem.state import State
@@ -138,7 +138,7 @@ def test_slower_methods_work_at_the_contact_nodes_too():
 
 
 def condenses(problem: ContactProblem, kind: str = "auto") -> bool:
-    return condensed.condensation(problem, Counters(), kind) is not None
+    return condensing.condensation(problem, Counters(), kind) is not None
 
 
 def test_where_the_body_is_condensed(monkeypatch):

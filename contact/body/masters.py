@@ -1,0 +1,248 @@
+"""Global unknowns beside those of the nodes: rigid motions and potentials of electrodes.
+
+A rigid body moves by u = R q, R = [I, -(x - x_c) x]; an electrode has one potential. Each
+component of q is given, or free under a force, moment or charge that is given. Nodes of a rigid
+plate or of an electrode follow q: their unknowns are no longer their own. A foundation that moves
+takes nothing from the body: only its distance changes (`contact.interface.nodes`).
+
+A state's unknowns have q behind those of the ghosts; forces have what is dual to q at their end.
+All ranks hold the same values of both. Rotations count as lengths, times the size of the body, and
+potentials as those of the nodes: all of q is then of one kind.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from dolfinx import fem
+from mpi4py import MPI
+from numpy.typing import NDArray
+from scipy import sparse
+
+from contact.body.description import Body
+from contact.body.motions import rigid_motions
+from contact.body.rigid import Electrode, Rigid
+from contact.errors import InputError
+from contact.mesh.domain import Domain
+from contact.typing import Array
+
+#: Share of a motion that is taken for none.
+ROUNDING = 1e-9
+
+
+@dataclass(frozen=True)
+class Member:
+    """A rigid body or an electrode: its unknowns among the global ones.
+
+    Attributes
+    ----------
+    what
+        What was said of it.
+    begin
+        The first of its unknowns.
+    scale
+        How much a rotation of 1 counts (length), or the unit of the potential.
+    """
+
+    what: Rigid | Electrode
+    begin: int
+    scale: float
+
+    @property
+    def foundation(self) -> bool:
+        """Whether it is a foundation: no node follows it."""
+        return isinstance(self.what, Rigid) and self.what.foundation
+
+    @property
+    def columns(self) -> slice:
+        """Where its unknowns are."""
+        return slice(self.begin, self.begin + len(self.what.values))
+
+    @property
+    def units(self) -> Array:
+        """How much an unknown of 1 is of a translation, a rotation or a potential."""
+        if isinstance(self.what, Electrode):
+            return np.full(1, self.scale)
+        motion = self.what.motion
+        turns = np.full(len(motion.rotation), 1 / self.scale)
+        return np.concatenate([np.ones(len(motion.displacement)), turns])
+
+    @property
+    def free(self) -> NDArray[np.bool_]:
+        """Which of its unknowns are not given."""
+        return np.array([value is None for value in self.what.values])
+
+    def given(self, time: float) -> Array:
+        """Return the given values of its unknowns at a time, 0 where they are free."""
+        return self.what.at(self.what.values, time) / self.units
+
+    def forces(self, time: float) -> Array:
+        """Return the forces and moments, or the charge, on its free unknowns at a time."""
+        return np.where(self.free, self.what.at(self.what.forces, time) * self.units, 0.0)
+
+    def motion(self, points: Array, block_size: int) -> Array:
+        """Return R at points of shape (n, d): shape (n, block size, its unknowns)."""
+        n, d = points.shape
+        columns = np.zeros((n, block_size, self.units.size))
+        if isinstance(self.what, Electrode):
+            columns[:, -1, 0] = 1.0
+        else:
+            offset = points - np.asarray(self.what.motion.centre)
+            columns[:, :d] = rigid_motions(offset) * self.units
+        return columns
+
+
+@dataclass(frozen=True)
+class Masters:
+    """The global unknowns of a body and its foundations.
+
+    Attributes
+    ----------
+    comm
+        Communicator.
+    members
+        Rigid bodies and electrodes.
+    free
+        Which of the unknowns are not given, shape (m,).
+    ties
+        R at the owned unknowns that follow q, shape (owned, m).
+    tied
+        Which unknowns of the owned nodes follow, shape (nodes, block size).
+    """
+
+    comm: MPI.Intracomm
+    members: tuple[Member, ...]
+    free: NDArray[np.bool_]
+    ties: sparse.csr_array
+    tied: NDArray[np.bool_]
+
+    @property
+    def size(self) -> int:
+        """Number m of global unknowns."""
+        return self.free.size
+
+    @property
+    def mechanical(self) -> NDArray[np.bool_]:
+        """Which of them are motions, shape (m,)."""
+        flags = [np.full(m.free.size, isinstance(m.what, Rigid)) for m in self.members]
+        return np.concatenate([np.zeros(0, dtype=bool), *flags])
+
+    @property
+    def tying(self) -> bool:
+        """Whether any node follows."""
+        return any(not member.foundation for member in self.members)
+
+    def member(self, part: str) -> Member | None:
+        """Return the moving foundation in front of a part; None where it is at rest."""
+        found = (m for m in self.members if m.foundation and m.what.on == part)
+        return next(found, None)
+
+    def prescribe(self, q: Array, time: float) -> Array:
+        """Return q with the given values at a time."""
+        given = [member.given(time) for member in self.members]
+        return np.where(self.free, q, np.concatenate([np.zeros(0), *given]))
+
+    def forces(self, time: float) -> Array:
+        """Return what acts on the free ones at a time, shape (m,)."""
+        return np.concatenate([np.zeros(0), *(member.forces(time) for member in self.members)])
+
+    def gathered(self, forces: Array) -> Array:
+        """Return what forces on owned unknowns are to q: R^T f, shape (m,). Collective."""
+        if not self.tying:
+            return np.zeros(self.size)
+        return np.asarray(self.comm.allreduce(self.ties.T @ forces, op=MPI.SUM))
+
+    def with_foundations(self, dofs: NDArray[np.int32], motion: Array) -> sparse.csr_array:
+        """Return R at the nodes that follow and at contact nodes, shape (owned, m).
+
+        Parameters
+        ----------
+        dofs
+            Owned unknowns of the contact nodes, shape (n, block size).
+        motion
+            R there, shape (n, block size, m).
+        """
+        size = dofs.size * self.size
+        rows = np.repeat(dofs.ravel(), self.size)
+        columns = np.broadcast_to(np.arange(self.size), (dofs.size, self.size)).ravel()
+        there = sparse.coo_array((motion.reshape(size), (rows, columns)), shape=self.ties.shape)
+        return (self.ties + there).tocsr()
+
+
+def make_masters(
+    domain: Domain, space: fem.FunctionSpace, body: Body, free: NDArray[np.bool_]
+) -> Masters:
+    """Return the global unknowns of a body. Collective.
+
+    Parameters
+    ----------
+    domain, space
+        Mesh and space of the unknowns.
+    body
+        What was said of it.
+    free
+        Which unknowns of the owned nodes are not fixed, shape (nodes, block size).
+
+    Raises
+    ------
+    InputError
+        If parts that are tied to different things share nodes, or a support holds a node of a
+        part that is free to move.
+    """
+    members: list[Member] = []
+    described: list[Rigid | Electrode] = [*body.rigid, *body.electrodes]
+    for what in described:
+        begin = members[-1].columns.stop if members else 0
+        scale = body.phi_scale if isinstance(what, Electrode) else domain.size
+        members.append(Member(what, begin, scale))
+    size = members[-1].columns.stop if members else 0
+    unknown = np.concatenate([np.zeros(0, dtype=bool), *(member.free for member in members)])
+    tied = np.zeros(free.shape, dtype=bool)
+    ties = sparse.csr_array((free.size, size))
+    for member in members:
+        if not member.foundation:
+            ties = ties + _tie(domain, space, member, free, tied, size)
+    return Masters(domain.comm, tuple(members), unknown, ties, tied)
+
+
+def _tie(
+    domain: Domain,
+    space: fem.FunctionSpace,
+    member: Member,
+    free: NDArray[np.bool_],
+    tied: NDArray[np.bool_],
+    size: int,
+) -> sparse.csr_array:
+    """Return the rows of a plate or an electrode, and mark them as tied. Collective."""
+    d, key = domain.dim, f"{member.what.name} on {member.what.on!r}"
+    domain.mesh.topology.create_connectivity(d - 1, d)
+    nodes = fem.locate_dofs_topological(space, d - 1, domain.facets(member.what.on))
+    nodes = nodes[nodes < free.shape[0]]
+    points = space.tabulate_dof_coordinates()[nodes, :d]
+    motion = member.motion(points, free.shape[1])
+    follows = np.zeros((nodes.size, free.shape[1]), dtype=bool)
+    follows[:, slice(d, None) if isinstance(member.what, Electrode) else slice(0, d)] = True
+    if _anywhere(domain, tied[nodes] & follows):
+        raise InputError(
+            f"{key}: it shares nodes with another rigid part or electrode; accepted: parts apart"
+        )
+    # What a support holds cannot follow.
+    moves = np.abs(motion[:, :, member.free]).max(axis=2, initial=0.0) > ROUNDING
+    if _anywhere(domain, moves & follows & ~free[nodes]):
+        raise InputError(
+            f"{key}: a support fixes a component of one of its nodes that is free to move with it; "
+            "accepted: that component given there, or parts that share no nodes"
+        )
+    follows &= free[nodes]
+    tied[nodes] |= follows
+    motion[~follows] = 0.0
+    dofs = nodes[:, None] * free.shape[1] + np.arange(free.shape[1])
+    columns = np.arange(member.columns.start, member.columns.stop)
+    rows, columns = np.broadcast_arrays(dofs[:, :, None], columns)
+    places = rows.ravel(), columns.ravel()
+    return sparse.coo_array((motion.ravel(), places), shape=(free.size, size)).tocsr()
+
+
+def _anywhere(domain: Domain, flags: NDArray[np.bool_]) -> bool:
+    return bool(domain.comm.allreduce(bool(flags.any()), op=MPI.LOR))

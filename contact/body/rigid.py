@@ -1,0 +1,95 @@
+"""What is said of rigid bodies and electrodes: how they move, and what acts on them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TypeAlias
+
+import numpy as np
+
+from contact.body.amplitude import Amplitude, ramp, steady
+from contact.typing import Array
+
+#: A number, which grows with an amplitude, or a function of time.
+Timed: TypeAlias = float | Amplitude
+
+
+def _at(values: Sequence[Timed | None], given: Amplitude | None, time: float) -> Array:
+    """Return values at a time, 0 for None: times an amplitude, as `amplitude_of` has it."""
+    known = any(callable(value) for value in values)
+    factor = (given or (steady if known else ramp))(time)
+    numbers = [value(time) if callable(value) else (value or 0.0) for value in values]
+    return factor * np.array(numbers)
+
+
+@dataclass(frozen=True)
+class Motion:
+    """The motion of a rigid body; a component that is None is free.
+
+    Attributes
+    ----------
+    displacement
+        Components of the displacement, length d.
+    rotation
+        Rotation about the centre (radians): one angle in the plane, three in space.
+    force, moment
+        What acts on the free components, as long as the two above.
+    centre
+        Centre of rotation, about which moments are taken.
+    amplitude
+        Function of time that multiplies all of them; by default numbers grow with time.
+    """
+
+    displacement: Sequence[Timed | None]
+    rotation: Sequence[Timed | None]
+    force: Sequence[Timed]
+    moment: Sequence[Timed]
+    centre: Sequence[float]
+    amplitude: Amplitude | None = None
+
+
+@dataclass(frozen=True)
+class Rigid:
+    """A part that moves as a rigid body, or a foundation in front of it that does."""
+
+    on: str
+    motion: Motion
+    foundation: bool = False
+
+    name = "rigid"
+
+    @property
+    def values(self) -> tuple[Timed | None, ...]:
+        """Displacement and rotation."""
+        return (*self.motion.displacement, *self.motion.rotation)
+
+    @property
+    def forces(self) -> tuple[Timed | None, ...]:
+        """Force and moment."""
+        return (*self.motion.force, *self.motion.moment)
+
+    def at(self, values: Sequence[Timed | None], time: float) -> Array:
+        """Return some of these at a time."""
+        return _at(values, self.motion.amplitude, time)
+
+
+@dataclass(frozen=True)
+class Electrode:
+    """A part with one unknown potential, and its charge."""
+
+    on: str
+    charge: Timed = 0.0
+    amplitude: Amplitude | None = None
+
+    name = "electrode"
+    values = (None,)
+
+    @property
+    def forces(self) -> tuple[Timed | None, ...]:
+        """The charge."""
+        return (self.charge,)
+
+    def at(self, values: Sequence[Timed | None], time: float) -> Array:
+        """Return some of these at a time."""
+        return _at(values, self.amplitude, time)

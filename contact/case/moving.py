@@ -1,0 +1,40 @@
+"""Checks of what moves as a rigid body, and of electrodes."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any, TypeAlias
+
+from contact.case.rigid import Moving
+from contact.case.types import Words, fault
+
+#: `contact.case.file.Case`.
+Case: TypeAlias = Any
+
+
+def moving(case: Case) -> Iterator[tuple[str, Moving]]:
+    """Give the sections about rigid motions, with their keys."""
+    for path, contact in case.contacts:
+        if contact.rigid is not None:
+            yield f"{path}.rigid", contact.rigid
+    for i, part in enumerate(case.rigid):
+        yield f"rigid.{i}", part
+
+
+def check_moving(case: Case) -> None:
+    """Raise a fault if a part is rigid or an electrode twice, or an electrode has no field."""
+    touched = [contact.on for _, contact in case.contacts]
+    for i, part in enumerate(case.rigid):
+        if part.on in touched:
+            raise fault(f"rigid.{i}.on", part.on, "a part beside the contact part")
+    for key in ("rigid", "electrode"):
+        parts = [section.on for section in getattr(case, key)]
+        for i, on in enumerate(parts):
+            if on in parts[:i]:
+                raise fault(f"{key}.{i}.on", on, f"a part that no other [[{key}]] has")
+    if case.electrode and not any(material.piezo for _, material in case.materials):
+        raise fault("electrode", Words("given"), "electric quantities with [material.piezo] only")
+    held = {fixed.on for fixed in case.fixed if fixed.potential is not None}
+    for i, section in enumerate(case.electrode):
+        if section.on in held:
+            raise fault(f"electrode.{i}.on", section.on, "a part whose potential is not fixed")

@@ -1,0 +1,61 @@
+"""How rigid bodies have moved, the potentials of electrodes, and what acts on them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+
+from contact.body.masters import Member
+from contact.body.rigid import Electrode
+from contact.problem.kkt import residual_forces
+from contact.problem.problem import ContactProblem
+from contact.problem.state import State
+from contact.typing import Array
+
+
+def movements(problem: ContactProblem, state: State) -> dict[str, Any]:
+    """Return what a summary says of them, nothing where nothing moves. Collective.
+
+    ``rigid`` is the foundation that moves; of several it has one entry each, by part.
+    ``rigid_parts`` are the parts that move as rigid bodies, ``electrodes`` those of unknown
+    potential. Rotations are in degrees. Forces, moments and charges are what acts on them from
+    outside: those given, or what holds a component that is given.
+    """
+    foundations: dict[str, Any] = {}
+    parts: dict[str, Any] = {}
+    electrodes: dict[str, Any] = {}
+    for member, values, forces in _members(problem, state):
+        if isinstance(member.what, Electrode):
+            electrodes[member.what.on] = {"potential": values[0], "charge": forces[0]}
+            continue
+        d = len(member.what.motion.displacement)
+        said = {
+            "displacement": values[:d].tolist(),
+            "rotation": _one_or_more(np.rad2deg(values[d:])),
+            "force": forces[:d].tolist(),
+            "moment": _one_or_more(forces[d:]),
+        }
+        (foundations if member.foundation else parts)[member.what.on] = said
+    rigid = next(iter(foundations.values())) if len(foundations) == 1 else foundations
+    found = {"rigid": rigid, "rigid_parts": parts, "electrodes": electrodes}
+    return {key: value for key, value in found.items() if value}
+
+
+def _members(problem: ContactProblem, state: State) -> Iterator[tuple[Member, Array, Array]]:
+    """Give rigid bodies and electrodes with their values, and what acts on them."""
+    body = problem.equilibrium
+    masters, q = body.masters, body.motion(state.x)
+    if masters.size == 0:
+        return
+    residual = residual_forces(problem, state)
+    forces = body.motion(residual) + masters.gathered(residual[: body.owned])
+    forces += masters.forces(state.time)
+    for member in masters.members:
+        units = member.units
+        yield member, q[member.columns] * units, forces[member.columns] / units
+
+
+def _one_or_more(values: Array) -> Any:
+    return float(values[0]) if values.size == 1 else values.tolist()

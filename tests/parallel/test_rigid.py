@@ -1,0 +1,49 @@
+"""What is rigid moves alike on any number of ranks."""
+
+import pytest
+from mpi4py import MPI
+
+from contact.methods.options import FixedPointOptions, NewtonOptions, PenaltyOptions
+from tests.problem.test_rigid import column, plate
+from tests.problems.rigid import indented, solved
+
+pytestmark = pytest.mark.parallel
+
+
+def alike(case, settings, tolerance):
+    together, alone = (solved(case, comm, settings)[1] for comm in (MPI.COMM_WORLD, MPI.COMM_SELF))
+    assert flat(together) == pytest.approx(flat(alone), rel=tolerance, abs=1e-11)
+
+
+def flat(values):
+    """Return all numbers below a table, by their paths."""
+    if isinstance(values, dict):
+        return {(key, *path): v for key, part in values.items() for path, v in flat(part).items()}
+    if isinstance(values, list):
+        return flat(dict(enumerate(values)))
+    return {(): values}
+
+
+@pytest.mark.parametrize(
+    "settings",
+    [
+        NewtonOptions(tolerance=1e-11),
+        NewtonOptions(tolerance=1e-11, condense=False),
+        FixedPointOptions(tolerance=1e-11),
+        PenaltyOptions(tolerance=1e-10),
+    ],
+)
+def test_an_indenter_moves_alike(settings):
+    case = indented(n=8, displacement=["free", "free"], force=[0.002, -0.01], rotation=-0.5)
+    alike(case, settings, 1e-7)
+
+
+@pytest.mark.parametrize("condense", [True, False])
+@pytest.mark.parametrize("make", [plate, column])
+def test_plates_and_electrodes_move_alike(make, condense):
+    alike(make(), NewtonOptions(tolerance=1e-11, condense=condense), 1e-8)
+
+
+def test_a_ball_in_space_moves_alike():
+    case = indented(3, 3, displacement=[0.0, 0.0, "free"], force=[0.0, 0.0, -0.02])
+    alike(case, NewtonOptions(tolerance=1e-10, condense=False), 1e-7)

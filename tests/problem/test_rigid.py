@@ -1,0 +1,270 @@
+"""Foundations and parts that move as rigid bodies, and electrodes of unknown potential."""
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+
+from contact.case.file import parse_case
+from contact.errors import InputError
+from contact.interface.multipliers import Multipliers
+from contact.methods.newton import Newton
+from contact.methods.options import FixedPointOptions, NewtonOptions, PenaltyOptions
+from contact.output.balances import charge_balance
+from contact.problem.kkt import evaluate, residual_forces
+from contact.problem.state import State
+from contact.solving import build_problem
+from tests.problems.rigid import PIEZO, indented, solved
+
+SELF = MPI.COMM_SELF
+
+
+@pytest.mark.parametrize("dim", [2, 3])
+def test_force_and_displacement_control_agree(dim):
+    n = 10 if dim == 2 else 4
+    still = [0.0] * (dim - 1)
+    forced, moved = solved(
+        indented(dim, n, displacement=[*still, "free"], force=[*still, -0.01]), SELF
+    )
+    depth = moved["rigid"]["displacement"][-1]
+    assert depth < -0.005
+    driven, held = solved(indented(dim, n, displacement=[*still, depth]), SELF)
+    assert held["rigid"]["force"][-1] == pytest.approx(-0.01, rel=1e-10)
+    scale = np.abs(driven.state.x).max()
+    assert np.allclose(forced.state.x, driven.state.x, rtol=0, atol=1e-10 * scale)
+    # A linear body is solved for once, however the indenter is driven.
+    assert forced.counters.linear_solves == driven.counters.linear_solves == 1
+
+
+def test_a_ball_rolls_to_where_no_moment_is_left():
+    case = indented(displacement=[0.05, "free"], force=[0.0, -0.01], rotation="free", moment=0.0)
+    solution, moved = solved(case, SELF)
+    rigid, nodes = moved["rigid"], solution.problem.nodes
+    stress = solution.problem.interface.stress(solution.nodal, solution.forces)
+    force = nodes.weight[:, None] * stress
+    arm = nodes.points - np.array([1.0, 2.0])
+    moment = np.sum(arm[:, 0] * force[:, 1] - arm[:, 1] * force[:, 0])
+    size = np.sum(np.linalg.norm(arm, axis=1) * np.linalg.norm(force, axis=1))
+    assert abs(moment) < 1e-12 * size
+    assert force.sum(axis=0) == pytest.approx([-rigid["force"][0], 0.01], abs=1e-14)
+    # Rolling without sliding: the ball turns as far as its centre goes, but for the strain.
+    assert np.deg2rad(rigid["rotation"]) == pytest.approx(-0.05, rel=0.05)
+    assert (solution.status == "stick").any()
+
+
+@pytest.mark.parametrize(
+    ("solver", "tolerance"),
+    [
+        (NewtonOptions(tolerance=1e-10, condense=False), 1e-9),
+        (NewtonOptions(tolerance=1e-9, condense=False, linear="iterative"), 1e-7),
+        (FixedPointOptions(tolerance=1e-10), 1e-7),
+        (PenaltyOptions(eps_contact=1e-5, eps_slip=1e-6), 3e-3),
+    ],
+)
+@pytest.mark.parametrize("law", ["linear", "log"])
+def test_all_methods_find_the_same_motion(solver, tolerance, law):
+    case = indented(n=8, displacement=["free", "free"], force=[0.002, -0.01], rotation=-0.5)
+    if law == "log":
+        material = {"law": "log", "young": 1.0, "poisson": 0.3, "yield_strain": 0.01}
+        case = parse_case({**case.model_dump(exclude_unset=True), "material": material})
+    expected = solved(case, SELF)[1]["rigid"]
+    found = solved(case, SELF, solver)[1]["rigid"]
+    for key in ("displacement", "force"):
+        assert found[key] == pytest.approx(expected[key], rel=tolerance), key
+
+
+def test_residuals_see_an_indenter_out_of_balance():
+    case = indented(displacement=[0.0, "free"], force=[0.0, -0.01])
+    problem = build_problem(case, SELF)
+    state, outcome = Newton(problem, NewtonOptions()).solve()
+    assert outcome.converged
+    less = Multipliers(0.9 * state.forces.pressure, 0.9 * state.forces.friction)
+    residual = residual_forces(problem, State(state.x, less))
+    q = problem.equilibrium.motion(problem.equilibrium.unbalanced(residual))
+    # A tenth of the force is missing, and what is given bears its reaction.
+    assert q == pytest.approx([0.0, 0.1 * 0.01, 0.0], abs=1e-14)
+    assert evaluate(problem, State(state.x, less)).equilibrium > 1e-3
+
+
+@pytest.mark.parametrize("condense", [True, False])
+def test_supports_on_an_inclined_normal_take_their_share(condense):
+    # Half of the block: on the line of symmetry, which lies beside the ball's lowest point, the
+    # ball's normal leans towards the support.
+    whole = indented(n=8, displacement=[0.0, "free"], force=[0.0, -0.01]).model_dump(
+        exclude_unset=True
+    )
+    whole["mesh"] |= {"size": [1.0, 1.0], "cells": [8, 8]}
+    symmetry = {"on": "right", "displacement": [0.0, "free"]}
+    whole["fixed"] = [*whole["fixed"], symmetry]
+    whole["contact"]["foundation"]["centre"] = [0.9, 2.0]
+    case = parse_case(whole)
+    solution, moved = solved(case, SELF, NewtonOptions(tolerance=1e-10, condense=condense))
+    weight, nodes = solution.problem.nodes.weight, solution.problem.nodes
+    # The vertical motion of the ball does the work of its force, node by node.
+    rate = nodes.motion[:, 1, 1] * nodes.normal[:, 1] + nodes.motion[:, 0, 1] * nodes.normal[:, 0]
+    friction = np.einsum("ni,ni->n", solution.friction, nodes.motion[:, :2, 1])
+    assert weight @ (solution.pressure * rate + friction) == pytest.approx(0.01, rel=1e-10)
+    # The exact direction of the foundation, also where a support has turned it.
+    points = nodes.points
+    radial = (np.array([0.9, 2.0]) - points) / np.linalg.norm([0.9, 2.0] - points, axis=1)[:, None]
+    assert rate * np.where(points[:, 0] > 0.999, radial[:, 1], 1.0) == pytest.approx(radial[:, 1])
+    assert moved["rigid"]["force"][1] == pytest.approx(-0.01, rel=1e-10)
+
+
+def plate(**more):
+    """Return a block under a plate that stays plane, on a plane without friction."""
+    data = {
+        "mesh": {
+            "generator": "rectangle",
+            "origin": [0.0, 0.0],
+            "size": [2.0, 1.0],
+            "cells": [12, 6],
+        },
+        "material": {"young": 1.0, "poisson": 0.3},
+        "fixed": [{"on": "left", "displacement": [0.0, "free"]}],
+        "rigid": [
+            {
+                "on": "top",
+                "displacement": [0.0, "free"],
+                "force": [0.0, -0.02],
+                "rotation": "free",
+                "moment": 0.002,
+                "centre": [1.0, 1.0],
+            }
+        ],
+        "contact": {"on": "bottom"},
+    }
+    return parse_case({**data, **more})
+
+
+@pytest.mark.parametrize("condense", [True, False])
+def test_a_plate_stays_plane_and_balances_force_and_moment(condense):
+    solution, moved = solved(plate(), SELF, NewtonOptions(tolerance=1e-10, condense=condense))
+    part, problem = moved["rigid_parts"]["top"], solution.problem
+    points, u = problem.equilibrium.layout.points, problem.equilibrium.nodal(solution.state.x)
+    top = points[:, 1] > 1.0 - 1e-9
+    angle = np.deg2rad(part["rotation"])
+    assert u[top, 1] == pytest.approx(part["displacement"][1] + angle * (points[top, 0] - 1.0))
+    assert np.abs(u[top, 0]).max() < 1e-15
+    weight, x = problem.nodes.weight, problem.nodes.points[:, 0]
+    assert weight @ solution.pressure == pytest.approx(0.02, rel=1e-12)
+    # The moment of the pressure, of the plate and of what holds it and the symmetry line sideways.
+    assert part["force"][1] == pytest.approx(-0.02, rel=1e-12)
+    assert part["moment"] == pytest.approx(0.002, rel=1e-10)
+    assert weight @ (solution.pressure * (x - 1.0)) < 0
+
+
+def test_columns_under_a_plate_shorten_as_hooke_says():
+    data = plate().model_dump(exclude_unset=True)
+    data["rigid"] = [{"on": "top", "displacement": [0.0, "free"], "force": [0.0, -0.02]}]
+    data["material"]["poisson"] = 0.0
+    solution, moved = solved(parse_case(data), SELF)
+    assert moved["rigid_parts"]["top"]["displacement"] == pytest.approx([0.0, -0.01], abs=1e-12)
+    assert solution.pressure == pytest.approx(0.01, rel=1e-10)
+
+
+def column(**more):
+    """Return a piezoelectric column of height 2 on an electrode, pressed by 1e-3."""
+    data = {
+        "mesh": {"generator": "rectangle", "size": [1.0, 2.0], "cells": [3, 6]},
+        "material": {"young": 100.0, "poisson": 0.3, "piezo": PIEZO},
+        "fixed": [
+            {"on": "left", "displacement": [0.0, "free"]},
+            {"on": "right", "displacement": [0.0, "free"]},
+            {"on": "bottom", "potential": 0.0},
+        ],
+        "load": [{"on": "top", "traction": [0.0, -1e-3]}],
+        "electrode": [{"on": "top"}],
+        "contact": {"on": "bottom"},
+    }
+    return parse_case({**data, **more})
+
+
+@pytest.mark.parametrize("charge", [0.0, 2e-3])
+@pytest.mark.parametrize(
+    "solver",
+    [
+        NewtonOptions(tolerance=1e-10),
+        NewtonOptions(tolerance=1e-10, condense=False),
+        FixedPointOptions(tolerance=1e-10),
+        PenaltyOptions(eps_contact=1e-8),
+    ],
+)
+def test_an_open_electrode_reads_the_potential_of_a_column(charge, solver):
+    solution, moved = solved(column(electrode=[{"on": "top", "charge": charge}]), SELF, solver)
+    young, nu = 100.0, 0.3
+    c = young * (1 - nu) / ((1 + nu) * (1 - 2 * nu))
+    # sigma = c eps - e E, D = e eps + beta E, with D.nu = charge/width at the top.
+    matrix = np.array([[c, PIEZO["e33"]], [PIEZO["e33"], -PIEZO["beta33"]]])
+    strain, slope = np.linalg.solve(matrix, [-1e-3, charge])
+    found = moved["electrodes"]["top"]
+    assert found["potential"] == pytest.approx(2.0 * slope, rel=1e-8)
+    assert found["charge"] == pytest.approx(charge, rel=1e-8, abs=1e-12)
+    body = solution.problem.equilibrium
+    top = body.nodal(solution.state.x)[body.layout.points[:, 1] > 2.0 - 1e-9, 1]
+    assert top == pytest.approx(2.0 * strain, abs=1e-10)
+    charges = charge_balance(solution.problem, solution.state)
+    assert charges.electrodes["top"] == pytest.approx(charge, rel=1e-8, abs=1e-12)
+    assert charges.total == pytest.approx(0.0, abs=1e-12)
+
+
+def test_a_press_fit_presses():
+    data = indented(n=8, displacement=[0.0, 0.0]).model_dump(exclude_unset=True)
+    data["contact"]["foundation"]["centre"] = [1.0, 1.98]
+    with pytest.raises(InputError, match="overlap"):
+        build_problem(parse_case(data), SELF)
+    data["contact"]["overlap"] = "press"
+    pressed = solved(parse_case(data), SELF)[0]
+    driven = solved(indented(n=8, displacement=[0.0, -0.02]), SELF)[0]
+    # The ball that overlaps and the ball that is driven in differ in their normals alone.
+    assert pressed.contact_force[1] == pytest.approx(driven.contact_force[1], rel=0.03)
+    assert pressed.contact_force[1] > 0.004
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"force": [0.0, -1.0]}, r"contact.rigid.force.1: given -1.0; accepted: .* \"free\""),
+        ({"rotation": 1.0, "centre": None}, "contact.rigid.centre: missing"),
+        ({"rotation": [0.0, 0.0, 1.0]}, "contact.rigid.rotation: given"),
+        ({"displacement": [0.0, 0.0, 0.0]}, "2 components in 2-D"),
+        ({"displacement": [0.0, "fre"]}, 'accepted: a list of 2 .* or "free"'),
+        ({"displacement": [0.0, "free"], "force": [0.0, 0.01]}, "pull the body off"),
+        ({"rotation": "free"}, r"can move as a rigid body \(rotation of what is rigid\)"),
+    ],
+)
+def test_bad_motions_are_refused(changes, words):
+    data = indented().model_dump(exclude_unset=True)
+    data["friction"] = {"law": "none"}
+    rigid = {**data["contact"]["rigid"], **changes}
+    data["contact"]["rigid"] = {key: value for key, value in rigid.items() if value is not None}
+    with pytest.raises(InputError, match=words):
+        build_problem(parse_case(data), SELF)
+
+
+@pytest.mark.parametrize(
+    ("rigid", "words"),
+    [
+        ([{"on": "bottom"}], "rigid.0.on.*beside the contact part"),
+        ([{"on": "top"}, {"on": "top"}], "rigid.1.on"),
+        ([{"on": "top"}, {"on": "right"}], "shares nodes with another"),
+        ([{"on": "right"}], "contact.on.*shares nodes with a rigid part"),
+        ([{"on": "top", "displacement": ["free", 0.0]}], "a support fixes a component"),
+        ([{"on": "roof"}], "rigid.0.on.*a part of the mesh"),
+    ],
+)
+def test_bad_rigid_parts_are_refused(rigid, words):
+    with pytest.raises(InputError, match=words):
+        build_problem(plate(rigid=rigid), SELF)
+
+
+def test_bad_electrodes_are_refused():
+    with pytest.raises(InputError, match=r"electrode.0.on.*potential is not fixed"):
+        column(electrode=[{"on": "bottom"}])
+    with pytest.raises(InputError, match=r"electrode.*\[material.piezo\]"):
+        plate(electrode=[{"on": "top"}])
+    with pytest.raises(InputError, match="shares nodes with an electrode"):
+        build_problem(
+            column(electrode=[{"on": "right"}], electric={"k_e": 1.0}, fixed=[
+                {"on": "left", "displacement": [0.0, "free"], "potential": 0.0}]),
+            SELF,
+        )  # fmt: skip

@@ -1,0 +1,45 @@
+"""Blocks that rigid indenters, plates and electrodes act on."""
+
+from typing import Any
+
+from mpi4py import MPI
+
+from contact.case.file import Case, parse_case
+from contact.methods.options import NewtonOptions, Options
+from contact.output.motions import movements
+from contact.output.solution import Solution
+from contact.solving import solve
+
+#: Class 6mm of the thesis, in GPa, C/m2, nF/m.
+PIEZO = {"e31": -5.4, "e33": 15.8, "e15": 12.3, "beta11": 8.13866, "beta33": 7.37455}
+
+
+def indented(dim: int = 2, n: int = 12, **rigid: Any) -> Case:
+    """Return a block, 2 wide and 1 high, with a ball of radius 1 on it."""
+    middle = [1.0] * (dim - 1)
+    data: dict[str, Any] = {
+        "mesh": {
+            "generator": "rectangle" if dim == 2 else "box",
+            "origin": [0.0] * dim,
+            "size": [2.0] * (dim - 1) + [1.0],
+            "cells": [2 * n] * (dim - 1) + [n],
+        },
+        "material": {"young": 1.0, "poisson": 0.3},
+        "fixed": [{"on": "bottom", "displacement": [0.0] * dim}],
+        "contact": {
+            "on": "top",
+            "foundation": {"shape": "sphere", "centre": [*middle, 2.0], "radius": 1.0},
+            "rigid": {"centre": [*middle, 2.0], **rigid},
+        },
+        "friction": {"law": "coulomb", "mu": 0.4},
+    }
+    return parse_case(data)
+
+
+def solved(
+    case: Case, comm: MPI.Comm, settings: Options | None = None
+) -> tuple[Solution, dict[str, Any]]:
+    """Return the solution of a case, and how what is rigid has moved in it."""
+    solution = solve(case, settings or NewtonOptions(tolerance=1e-10), comm=comm)
+    assert solution.converged, solution.outcome.reason
+    return solution, movements(solution.problem, solution.state)
