@@ -6,6 +6,7 @@ import numpy as np
 from mpi4py import MPI
 
 from contact.body.amplitude import steady
+from contact.body.norms import volume
 from contact.case import file as sections
 from contact.case.formula import Expression
 from contact.errors import InputError
@@ -28,6 +29,9 @@ from forms.laws import (
     ShiftedConductivity,
     Truncation,
 )
+
+#: Width of the ramp of psi over the height of the body.
+RAMP = 0.1
 
 
 def make_contacts(
@@ -64,7 +68,7 @@ def make_contacts(
             _foundation(key, contact, domain) if foundation is None else foundation,
             _layer(contact) if layer is None else layer,
             _friction(*case.friction_of(key, contact), domain.comm, coefficient, friction),
-            _conductor(case, case.electric_of(key, contact)[1], domain.size),
+            _conductor(case, case.electric_of(key, contact)[1], domain, contact.on),
             contact.overlap == "press",
         )
         for key, contact in case.contacts
@@ -117,12 +121,23 @@ def _friction(
     return Friction(mu=field, radius=section.radius)
 
 
+def conduction_ramp(domain: Domain, part: str) -> float:
+    """Return how far in front of a foundation it conducts by default (length). Collective.
+
+    A tenth of the body's height over its contact part: of a length of the problem, so that
+    refined meshes resolve it and solutions have a limit. A fixed small number of the thesis's
+    delta means a wide ramp too.
+    """
+    height = volume(domain, domain.dx) / volume(domain, domain.ds(part))
+    return RAMP * min(height, domain.size)
+
+
 def _conductor(
-    case: sections.Case, section: sections.Electric | None, size: float
+    case: sections.Case, section: sections.Electric | None, domain: Domain, part: str
 ) -> Conductor | None:
     if section is None:
         return None
-    delta = 1e3 / size if section.delta is None else section.delta
+    delta = section.delta or 1 / conduction_ramp(domain, part)
     psi: Conductivity
     if section.law == "shifted":
         psi = ShiftedConductivity(section.k_e, delta)

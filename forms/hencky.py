@@ -236,25 +236,43 @@ class MonotonicityReport:
 
     Attributes
     ----------
-    g_0
-        Upper bound of g.
+    g_0, largest
+        Bounds of g from below and above.
+    ceiling
+        (d/2) k_0, which (h1)(a) allows g.
     alpha
-        Lower bound of d(g t)/dt: the strong monotonicity constant.
+        Lower bound of d(g t)/dt, (h1)(b): the material hardens where it is positive.
     beta
         Upper bound of d(g t)/dt.
-    holds
-        Whether alpha > 0.
     """
 
     t_max: float
     g_0: float
+    largest: float
+    ceiling: float
     alpha: float
     beta: float
-    holds: bool
+
+    @property
+    def bounded(self) -> bool:
+        """Whether 0 < g_0 <= g <= (d/2) k_0: (h1)(a)."""
+        return self.g_0 > 0 and self.largest <= self.ceiling
+
+    @property
+    def hardens(self) -> bool:
+        """Whether alpha > 0: (h1)(b)."""
+        return self.alpha > 0
+
+    @property
+    def holds(self) -> bool:
+        """Whether (h1) holds."""
+        return self.bounded and self.hardens
 
 
-def check_monotonicity(law: Hencky, t_max: float, samples: int = 2000) -> MonotonicityReport:
-    """Sample (h1): 0 < alpha <= d(g(t) t)/dt <= beta for 0 < t <= t_max.
+def check_monotonicity(
+    law: Hencky, t_max: float, samples: int = 2000, dim: int = 3
+) -> MonotonicityReport:
+    """Sample (h1): 0 < g_0 <= g <= (d/2) k_0 and 0 < alpha <= d(g t)/dt <= beta, 0 < t <= t_max.
 
     Parameters
     ----------
@@ -264,9 +282,17 @@ def check_monotonicity(law: Hencky, t_max: float, samples: int = 2000) -> Monoto
         The largest |dev eps| of interest, for instance that of a computed solution.
     samples
         Number of intervals; the slopes are those of the chords of g(t) t.
+    dim
+        The dimension d.
     """
     t = np.linspace(0.0, max(t_max, 1e-12), samples + 1)
     g = np.asarray(law.secant_modulus(t**2)) * np.ones_like(t)
     slopes = np.diff(g * t) / np.diff(t)
-    alpha, beta = float(slopes.min()), float(slopes.max())
-    return MonotonicityReport(float(t_max), float(g.max()), alpha, beta, alpha > 0)
+    return MonotonicityReport(
+        float(t_max),
+        float(g.min()),
+        float(g.max()),
+        dim / 2 * float(law.bulk),
+        float(slopes.min()),
+        float(slopes.max()),
+    )

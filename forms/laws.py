@@ -276,7 +276,9 @@ class RampConductivity:
 class ShiftedConductivity(RampConductivity):
     """psi(s) = k_e clip(1 + delta s, 0, 1): the ramp moved to the closing gap.
 
-    Full conductivity in contact, none beyond the distance 1/delta; Lipschitz, as (h5) asks.
+    Full conductivity in contact, none beyond the distance 1/delta. Bounded and Lipschitz, as
+    (h~5)(b) and (e) of the thesis ask; but (h~5)(d), psi = 0 for s <= 0, is given up: with it no
+    contact conducts, for s never exceeds 0.
     """
 
     at_closing = 1.0

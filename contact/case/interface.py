@@ -146,7 +146,8 @@ class Electric(Section):
     law: Literal["shifted", "perfect", "ramp"] = Field(
         default="shifted",
         description="psi: `shifted`, k_e clip(1 + delta (u_nu - rho), 0, 1); `perfect`, k_e in "
-        "contact, (1.33); `ramp`, (1.34) as printed, zero where u_nu <= rho.",
+        "contact, (1.33); `ramp`, (1.34) as printed, zero where u_nu <= rho. `shifted` gives up "
+        "(h~5)(d), psi = 0 for u_nu <= rho, with which no contact conducts.",
     )
     k_e: NonNegative = Field(description="Conductivity k_e of the foundation.")
     phi_f: TimeFormula = Field(
@@ -157,8 +158,10 @@ class Electric(Section):
     )
     delta: Positive | None = Field(
         default=None,
-        description="Slope of psi (1/length), `shifted` and `ramp` only. Default: 1000 / size of "
-        "the body.",
+        description="Slope of psi (1/length), `shifted` and `ramp` only: psi rises within 1/delta "
+        "of the gap. Default: 10 / H, H the volume of the body over the area of its contact part, "
+        "or its size where that is smaller. A warning says where 1/delta is below two spacings of "
+        "the contact nodes.",
     )
     limit: Positive | None = Field(
         default=None, description="Limit L of the truncation phi_L. Default: no truncation."

@@ -15,6 +15,7 @@ from contact.interface.multipliers import Multipliers
 from contact.interface.status import CLOSED, STICKS
 from contact.linear.operator import Counters
 from contact.methods.report import History, Outcome
+from contact.output.deformation import Deformation
 from contact.output.fields import unknowns
 from contact.output.options import OutputOptions
 from contact.output.record import StepRecord
@@ -54,6 +55,8 @@ class Solution:
     share_beyond_yield
         Share of the body's volume in which |dev eps| is beyond the material's first yield; None
         where no material has such a limit.
+    deformation
+        How large strains and changes of volume are; None before the solution is reviewed.
     start
         From where the iteration started, in words.
     title, case
@@ -76,6 +79,7 @@ class Solution:
     max_dev_strain: float = np.nan
     max_von_mises: float = np.nan
     share_beyond_yield: float | None = None
+    deformation: Deformation | None = None
     start: str = "zero slip"
     title: str = ""
     case: str = ""

@@ -57,6 +57,7 @@ def summarise(solution: Solution, table: Table | None) -> dict[str, Any]:
         },
         "max_displacement": largest_displacement(solution),
         "max_dev_strain": solution.max_dev_strain,
+        **_deformation(solution),
         "max_von_mises": solution.max_von_mises,
         "share_beyond_yield": solution.share_beyond_yield,
         "contact_nodes": counts["stick"] + counts["slip"],
@@ -107,6 +108,25 @@ def _electric(solution: Solution) -> dict[str, Any]:
         "phi_max": problem.comm.allreduce(float(phi.max(initial=-math.inf)), op=MPI.MAX),
         "total_charge": charges.total,
         "charges": asdict(charges),
+        "conduction_ramp": _ramp(solution),
+    }
+
+
+def _ramp(solution: Solution) -> float | None:
+    """Return how far in front of the closed gap the foundation conducts, 1/delta (length)."""
+    conductor = solution.problem.interface.response.conductor
+    if conductor is None or not conductor.psi.follows_gap:
+        return None
+    return 1 / conductor.psi.delta
+
+
+def _deformation(solution: Solution) -> dict[str, Any]:
+    made = solution.deformation
+    if made is None:
+        return {}
+    return {
+        "max_strain": made.largest_strain,
+        "volume_ratio": [made.least_volume, made.largest_volume],
     }
 
 

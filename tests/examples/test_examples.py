@@ -54,8 +54,9 @@ def test_warning_and_review(tmp_path: Path) -> None:
     arguments = ["solve", path, "--out", str(tmp_path), "--quiet", "--set", "mesh.cells=[64, 16]"]
     assert main(arguments) == CONVERGED
     summary = json.loads((tmp_path / "summary.json").read_text())
-    (warning,) = summary["warnings"]
-    assert "mu* + L_mu = 0.6 + 5000" in warning
+    (warning,) = [text for text in summary["warnings"] if "friction falls" in text]
+    assert "L_mu = 5000/length" in warning
+    assert any("mu* = 0.6 (a number), L_mu = 5000 (1/length)" in note for note in summary["notes"])
     assert "several solutions may exist" in warning
     assert any("(h1) holds" in note for note in summary["notes"])
     assert summary["max_dev_strain"] > 0.05

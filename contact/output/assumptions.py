@@ -1,0 +1,108 @@
+"""What the theory assumes of material, strains, gap and layer, held against a solution."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import TypeAlias
+
+import numpy as np
+
+from contact.body.description import Material
+from contact.output.solution import Solution
+from forms.hencky import check_monotonicity
+
+#: What there is to say, if anything, and whether it is good news.
+Remark: TypeAlias = tuple[str, bool]
+
+#: Largest |eps| of which eps is a good measure: the square of the strain is then 1 % of it.
+SMALL = 0.1
+
+
+def monotonicity(solution: Solution, strains: Sequence[float]) -> Iterator[Remark]:
+    """Check (h1) on the strains that the solution has in each material."""
+    dim = 3 if solution.problem.domain.revolved else solution.problem.dim
+    for material, strain in zip(solution.problem.body.materials, strains, strict=True):
+        if np.isfinite(strain):
+            yield _monotonicity(material, strain, dim)
+
+
+def _monotonicity(material: Material, strain: float, dim: int) -> Remark:
+    report = check_monotonicity(material.law, strain, dim=dim)
+    place = f" in {', '.join(material.on)}" if material.on else ""
+    text = (
+        f"assumption (h1) {'holds' if report.holds else 'does not hold'}{place} on the strains of "
+        f"this solution, |dev eps| <= {strain:.4g}: g_0 = {report.g_0:.4g} <= g <= "
+        f"{report.largest:.4g}, (d/2) k_0 = {report.ceiling:.4g}, alpha = {report.alpha:.4g}, "
+        f"beta = {report.beta:.4g}"
+    )
+    if not report.hardens:
+        text += "; alpha <= 0, the material softens: there may be several solutions or none"
+    if report.g_0 <= 0:
+        text += "; g_0 <= 0: the material has no stiffness in shear"
+    if report.largest > report.ceiling:
+        text += (
+            "; g exceeds (d/2) k_0, as for any linear material with a Poisson's ratio below "
+            f"{_least_poisson(dim):.3g}"
+        )
+        if report.hardens:
+            text += (
+                ": the proof of Theorem 3.1 does not cover it as printed, though with the deviator "
+                "in three dimensions the operator is strongly monotone, with the constant "
+                f"min(3 k_0, 2 alpha) = {min(6 * report.ceiling / dim, 2 * report.alpha):.4g}"
+            )
+    return text, report.holds
+
+
+def _least_poisson(dim: int) -> float:
+    """Return nu where mu_1 = (d/2) k_0."""
+    return (6 - 2 * dim) / (12 + 2 * dim)
+
+
+def small_strain(solution: Solution) -> Remark:
+    """Say where strains are no small ones, or the deformed body turns inside out."""
+    made = solution.deformation
+    if made is None or made.largest_strain <= SMALL:
+        return "", True
+    text = (
+        f"strains are not small: |eps| reaches {made.largest_strain:.3g}, and det(I + grad u) lies "
+        f"between {made.least_volume:.3g} and {made.largest_volume:.3g}"
+    )
+    if made.least_volume <= 0:
+        text += ": where it is not positive the deformed body would pass through itself"
+    return f"{text}; linear kinematics is a formal model there", False
+
+
+def chords(solution: Solution) -> Remark:
+    """Say where nodes on straight facets were found in the foundation, and put on it."""
+    cut = solution.problem.nodes.cut
+    if cut == 0:
+        return "", True
+    return (
+        f"straight facets of the curved contact part reach {cut:.3g} into the foundation at rest: "
+        "the gap there is taken as 0; a mesh that is finer from the beginning has less of it",
+        False,
+    )
+
+
+def preload(solution: Solution) -> Remark:
+    """Say where a layer is thicker than the gap, and presses on the body at rest."""
+    problem = solution.problem
+    response = problem.interface.response
+    if response.layer is None:
+        return "", True
+    least = -problem.nodes.maximum(-response.touch, -np.inf)
+    if least >= -1e-9 * problem.domain.size:
+        return "", True
+    return (
+        f"the layer is thicker than the gap, by up to {-least:.4g}: it presses on the body at rest",
+        False,
+    )
+
+
+def falling(solution: Solution) -> Remark:
+    """Say where p_nu falls: (h6) asks for less, uniqueness for a law that does not."""
+    layers, size = [c.layer for c in solution.problem.contacts], solution.problem.domain.size
+    if not any(layer is not None and layer.falls(size) for layer in layers):
+        return "", True
+    text = "p_nu falls with the penetration: several solutions may exist, and this is one of them"
+    return text, False

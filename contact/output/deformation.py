@@ -1,0 +1,59 @@
+"""How large the deformation is, beside what linear kinematics is made for."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import ufl
+from dolfinx import fem
+from mpi4py import MPI
+
+from contact.body.equilibrium import BodyEquilibrium
+from contact.output.fields import CHUNK
+from contact.typing import Array
+from forms.kinematics import strain
+
+
+@dataclass(frozen=True)
+class Deformation:
+    """Extremes over the middles of the cells.
+
+    Attributes
+    ----------
+    largest_strain
+        |eps|, the Frobenius norm.
+    least_volume, largest_volume
+        det(I + grad u), a deformed volume over the one at rest.
+    """
+
+    largest_strain: float
+    least_volume: float
+    largest_volume: float
+
+
+def deformation(body: BodyEquilibrium, x: Array) -> Deformation:
+    """Return how large the deformation is. Collective.
+
+    Parameters
+    ----------
+    body, x
+        The body, and its local unknowns.
+    """
+    mesh, kinematics = body.domain.mesh, body.domain.kinematics
+    u, _ = body.split(body.function(x))
+    eps, identity = strain(u, kinematics), ufl.Identity(3)
+    values = ufl.as_vector(
+        [ufl.sqrt(ufl.inner(eps, eps)), ufl.det(identity + kinematics.gradient(u))]
+    )
+    middle = np.full((1, body.dim), 1 / (body.dim + 1))
+    expression = fem.Expression(values, middle)
+    count = mesh.topology.index_map(mesh.topology.dim).size_local
+    extremes = np.array([0.0, -np.inf, -np.inf])
+    for begin in range(0, count, CHUNK):
+        cells = np.arange(begin, min(begin + CHUNK, count), dtype=np.int32)
+        found = expression.eval(mesh, cells).reshape(cells.size, 2)
+        here = [found[:, 0].max(), (-found[:, 1]).max(), found[:, 1].max()]
+        extremes = np.maximum(extremes, here)
+    body.comm.Allreduce(MPI.IN_PLACE, extremes, op=MPI.MAX)
+    return Deformation(float(extremes[0]), float(-extremes[1]), float(extremes[2]))

@@ -1,0 +1,93 @@
+"""What is said about a solution: assumptions, theorems with their constants, small strains."""
+
+import numpy as np
+import pytest
+
+from contact import Solution, load_case, solve
+from scripts.cases import CASES
+
+
+def reviewed(name: str, *overrides: str) -> Solution:
+    return solve(load_case(CASES / f"{name}.toml", ("solver.method=newton", *overrides)))
+
+
+def said(texts: list[str], words: str) -> str:
+    (found,) = [text for text in texts if words in text]
+    return found
+
+
+def test_an_auxetic_material_breaks_h1():
+    """With nu = -0.5, mu_1 = 1 is above (d/2) k_0 = 1/6."""
+    solution = reviewed("bar", "mesh.cells=[16, 4]", "material.poisson=-0.5")
+    warning = said(solution.warnings, "(h1) does not hold")
+    assert "g_0 = 1 <= g <= 1, (d/2) k_0 = 0.1667" in warning
+    assert "below 0.125" in warning
+    good = reviewed("bar", "mesh.cells=[16, 4]")
+    assert "g_0 = 0.3846" in said(good.notes, "(h1) holds")
+
+
+def test_each_problem_is_measured_by_its_own_theorem():
+    """Chapters 3, 5 and 6; what cannot conduct asks for nothing electric."""
+    bar = reviewed("bar", "mesh.cells=[16, 4]")
+    assert "mu* = 0.6 (a number), L_mu = 5000 (1/length)" in said(bar.notes, "Theorem 3.1")
+    cells = "mesh.cells=[16, 8]"
+    insulated = said(reviewed("piezo-8-1", cells).notes, "Theorem")
+    assert "Theorem 5.1" in insulated and "L_psi" not in insulated
+    conductive = reviewed("piezo-8-2", cells)
+    largest = np.abs(conductive.nodal[:, -1] * conductive.problem.equilibrium.phi_scale - 32).max()
+    text = said(conductive.notes, "Theorem 5.1")
+    assert f"L_psi L = k_e delta L = {2.5 * largest:.4g}" in text
+    assert "M_psi = k_e = 1 " in text
+    assert "electric.limit is not given" in text
+    limited = said(reviewed("piezo-8-2", cells, "electric.limit=100").notes, "Theorem 5.1")
+    assert "L_psi L = k_e delta L = 250" in limited and "is not given" not in limited
+
+
+def test_a_layer_adds_its_constants():
+    """M_h = 10, L_p = 1, L_h = 10/128, M_p = 0.1 with alpha_nu = 2 over |phi - phi_F| <= 32."""
+    cells = "mesh.cells=[24, 4]"
+    frictional = said(reviewed("compliance-8-4-layer", cells).notes, "Theorem 6.2")
+    m_h, l_h = 10 * (1 + 32 / 128), 10 / 128
+    assert f"(M_h L_p + L_h M_p) = {m_h + 0.1 * l_h:.4g}" in frictional
+    assert "L_mu" not in frictional
+    assert said(reviewed("compliance-8-3", cells).notes, "Theorem 6.1")
+
+
+@pytest.mark.parametrize(
+    ("law", "good", "words"),
+    [
+        ("shifted", True, "(h~5)(d)"),
+        ("ramp", False, "k_e has no effect"),
+        ("perfect", False, "(h~5)(e)"),
+    ],
+)
+def test_what_a_conductivity_gives_up_is_said(law, good, words):
+    solution = reviewed("piezo-8-1-conductive", "mesh.cells=[16, 8]", f"electric.law={law}")
+    assert said(solution.notes if good else solution.warnings, words)
+
+
+def test_large_strains_are_warned_of():
+    """A body that is compressed by more than its height, uniformly: det(I + grad u) < 0."""
+    small = reviewed("bar", "mesh.cells=[16, 4]")
+    assert not [text for text in small.warnings if "strains" in text]
+    assert 0 < small.deformation.largest_strain < 0.1
+    case = load_case(
+        CASES / "bar.toml",
+        {
+            "mesh.cells": "[4, 4]",
+            "mesh.size": "[1.0, 1.0]",
+            "mesh.parts": "{}",
+            "material": "{law = 'linear', young = 1.0, poisson = 0.3}",
+            "fixed": "[{on = 'left', displacement = [0.0, 'free']}, "
+            "{on = 'right', displacement = [0.0, 'free']}, "
+            "{on = 'top', displacement = ['free', -1.5]}]",
+            "load": "[]",
+            "friction": "{law = 'none'}",
+            "solver": "{method = 'newton'}",
+        },
+    )
+    large = solve(case)
+    made = large.deformation
+    assert made.largest_strain == pytest.approx(1.5, rel=1e-9)
+    assert made.least_volume == pytest.approx(-0.5, rel=1e-9)
+    assert "pass through itself" in said(large.warnings, "strains are not small")
