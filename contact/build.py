@@ -11,13 +11,14 @@ import numpy as np
 from mpi4py import MPI
 
 from contact.blame import to_blame
-from contact.body.description import Body, Fixed, Load, Material
+from contact.body.description import Body, Fixed, Load
 from contact.case import file as sections
 from contact.contacts import make_contacts
 from contact.errors import InputError
 from contact.given import amplitude, check_range, loading_field
 from contact.interface.layer import Layer
 from contact.interface.obstacle import Obstacle
+from contact.materials import make_materials
 from contact.mesh.domain import Domain
 from contact.mesh.revolution import revolved
 from contact.meshing import make_domain
@@ -25,9 +26,8 @@ from contact.moving import make_electrodes, make_rigid
 from contact.problem.held import check_held
 from contact.problem.problem import ContactProblem
 from contact.tolerances import HUGE
-from forms.hencky import Hencky, Linear, Log
+from forms.hencky import Law
 from forms.laws import FrictionCoefficient, FrictionLaw
-from forms.piezo import Piezo, from_voigt
 
 
 def build_problem(
@@ -35,7 +35,7 @@ def build_problem(
     comm: MPI.Intracomm = MPI.COMM_WORLD,
     *,
     domain: Domain | None = None,
-    law: Hencky | None = None,
+    law: Law | None = None,
     coefficient: FrictionCoefficient | None = None,
     friction: FrictionLaw | None = None,
     foundation: Obstacle | None = None,
@@ -67,7 +67,7 @@ def build_problem(
         case.check_mesh(domain.dim, domain.names)
         _check_loads(case, domain)
         body = Body.piecewise(
-            _materials(case, domain.dim, law),
+            make_materials(case, domain, law),
             [_fixed(case, i, domain.comm) for i in range(len(case.fixed))],
             [_load(case, i, domain.comm) for i in range(len(case.load))],
         )
@@ -116,45 +116,6 @@ def named(source: str) -> Iterator[None]:
     except InputError as error:
         text = str(error)
         raise InputError(text if text.startswith(source) else f"{source}: {text}") from error
-
-
-def _materials(case: sections.Case, dim: int, law: Hencky | None) -> list[Material]:
-    if law is not None and len(case.materials) > 1:
-        raise InputError("law: a law given beside the case replaces one material, not several")
-    made = []
-    for key, section in case.materials:
-        this = material_law(section) if law is None else law
-        check_range(f"{key}.young", float(this.young))
-        tensors = None if section.piezo is None else piezo(section.piezo, dim)
-        made.append(Material(this, tensors, section.on or ()))
-    return made
-
-
-def material_law(section: sections.Material) -> Hencky:
-    """Return the material law of `[material]`."""
-    if section.law == "linear":
-        return Linear(section.young, section.poisson)
-    assert section.yield_strain is not None  # demanded by the section
-    return Log(
-        section.young,
-        section.poisson,
-        yield_strain=section.yield_strain,
-        argument=section.argument,
-        g_min=section.g_min,
-    )
-
-
-def piezo(section: sections.Piezo, dim: int) -> Piezo:
-    """Return the piezoelectric tensors of `[material.piezo]` in the axes of the body."""
-    material = from_voigt(*section.voigt)
-    if dim == 2:
-        angle = 90.0 if section.poling is None else float(section.poling)  # type: ignore[arg-type]
-        turn = np.deg2rad(angle - 90.0)
-        c, s = np.cos(turn), np.sin(turn)
-        return material.in_plane().rotated([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
-    if section.poling is None:
-        return material
-    return material.poled_along(section.poling)
 
 
 def _fixed(case: sections.Case, i: int, comm: MPI.Intracomm) -> Fixed:

@@ -11,13 +11,14 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Protocol
+from typing import Protocol, TypeAlias
 
 import numpy as np
 import ufl
 from scipy.optimize import brentq
 from ufl.core.expr import Expr
 
+from forms.elasticity import Anisotropic
 from forms.kinematics import CARTESIAN, Kinematics, deviator_squared, embed, strain
 from forms.ops import Value, log, maximum, sqrt
 
@@ -204,27 +205,35 @@ class UserLaw(Isotropic):
         return total
 
 
-def secant_stress(law: Hencky, frozen: Expr, eps: Expr) -> Expr:
+#: What the forms take for the law of the stress.
+Law: TypeAlias = Hencky | Anisotropic
+
+
+def secant_stress(law: Law, frozen: Expr, eps: Expr) -> Expr:
     """Return (k0 - 2g/3) tr(eps) I + 2 g eps with g taken at the frozen strain, (1.13).
 
     A 3 x 3 stress: in plane strain sigma_zz = (k0 - 2g/3) tr eps, which is not zero
     (Remark 7.1 of the thesis says otherwise).
     """
+    if isinstance(law, Anisotropic):
+        return law.stress(eps)
     g = law.secant_modulus(deviator_squared(frozen))
     return (law.bulk - 2 * g / 3) * ufl.tr(eps) * ufl.Identity(3) + 2 * g * embed(eps)
 
 
-def stress(law: Hencky, eps: Expr) -> Expr:
+def stress(law: Law, eps: Expr) -> Expr:
     """Return the 3 x 3 stress sigma = (k0 - 2g/3) tr(eps) I + 2 g eps, equation (1.13)."""
     return secant_stress(law, eps, eps)
 
 
-def energy_density(law: Hencky, eps: Expr) -> Expr:
+def energy_density(law: Law, eps: Expr) -> Expr:
     """Return M(eps) = (k0/2) (tr eps)^2 + int_0^t 2 g(s) s ds, equation (1.11)."""
+    if isinstance(law, Anisotropic):
+        return law.energy_density(eps)
     return law.bulk / 2 * ufl.tr(eps) ** 2 + law.shear_energy(deviator_squared(eps))
 
 
-def secant_form(law: Hencky, u: Expr, v: Expr, w: Expr, kinematics: Kinematics = CARTESIAN) -> Expr:
+def secant_form(law: Law, u: Expr, v: Expr, w: Expr, kinematics: Kinematics = CARTESIAN) -> Expr:
     """Return the integrand of the Kacanov form B(u; v, w) of section 3.4."""
     frozen, eps, test = (strain(f, kinematics) for f in (u, v, w))
     return ufl.inner(secant_stress(law, frozen, eps), test)

@@ -13,9 +13,7 @@ negated, with the opposite signs (`electric_load`, and `forms.foundation.electri
 The stored energy is (1/2) eps : F eps + (1/2) E . beta E with E = -grad(phi): the coupling
 does no work on its own, so that it is positive if F and beta are, whatever e.
 
-Tensors are three-dimensional. A plane body lies in (x, y) = (X2, X3) of the crystal, whose
-axis X3 is that of poling; X1 points out of the plane. The half plane of a body of revolution
-lies alike, with X1 along theta.
+Tensors are three-dimensional; how a crystal lies in a plane body is said in `forms.crystal`.
 """
 
 from __future__ import annotations
@@ -27,14 +25,10 @@ import ufl
 from numpy.typing import ArrayLike, NDArray
 from ufl.core.expr import Expr
 
-from forms.hencky import Hencky, secant_stress
+from forms.crystal import PLANE, VOIGT, coupling_tensor, to_axis, turned
+from forms.elasticity import Anisotropic, isotropic, mandel
+from forms.hencky import Law, secant_stress
 from forms.kinematics import CARTESIAN, Kinematics, embed, strain
-
-#: Pairs of tensor indices in the order of Voigt's notation.
-VOIGT = ((0, 0), (1, 1), (2, 2), (1, 2), (0, 2), (0, 1))
-
-#: The crystal axes that a plane body's x, y and z stand for.
-PLANE_AXES = (1, 2, 0)
 
 
 @dataclass(frozen=True)
@@ -60,13 +54,7 @@ class Piezo:
         ValueError
             If the matrix is no rotation.
         """
-        q = np.asarray(rotation, dtype=float)
-        if q.shape != (3, 3) or not np.allclose(q @ q.T, np.eye(3), atol=1e-12):
-            raise ValueError("a rotation must be an orthogonal 3 x 3 matrix")
-        if np.linalg.det(q) < 0:
-            raise ValueError("a rotation must have the determinant +1, not -1")
-        e = np.einsum("ia,jb,kc,abc->ijk", q, q, q, self.e)
-        return Piezo(e, q @ np.asarray(self.beta) @ q.T)
+        return Piezo(turned(self.e, rotation), turned(self.beta, rotation))
 
     def poled_along(self, axis: ArrayLike) -> Piezo:
         """Return a material poled along z, turned the shortest way to another axis.
@@ -76,15 +64,7 @@ class Piezo:
         ValueError
             If the axis is no vector of three finite numbers, or zero.
         """
-        given = np.asarray(axis, dtype=float)
-        length = np.linalg.norm(given)
-        if given.shape != (3,) or not 0 < length < np.inf:
-            raise ValueError(f"a poling axis must be a vector (3 numbers, not all 0); got {given}")
-        x, y, z = given / length
-        if z < -1 + 1e-12:
-            return self.rotated(np.diag([1.0, -1.0, -1.0]))
-        cross = np.array([[0.0, 0.0, x], [0.0, 0.0, y], [-x, -y, 0.0]])
-        return self.rotated(np.eye(3) + cross + cross @ cross / (1 + z))
+        return self.rotated(to_axis(axis))
 
     def check(self) -> None:
         """Check the tensors, however they were made.
@@ -124,8 +104,7 @@ class Piezo:
 
     def in_plane(self) -> Piezo:
         """Return the material with the crystal's (X2, X3, X1) along the body's (x, y, z)."""
-        axes = np.array(PLANE_AXES)
-        return Piezo(np.asarray(self.e)[np.ix_(axes, axes, axes)], self.beta[np.ix_(axes, axes)])
+        return self.rotated(PLANE)
 
 
 def from_voigt(e: ArrayLike, beta: ArrayLike) -> Piezo:
@@ -140,10 +119,7 @@ def from_voigt(e: ArrayLike, beta: ArrayLike) -> Piezo:
     e, beta = np.asarray(e, dtype=float), np.asarray(beta, dtype=float)
     if e.shape != (3, 6) or beta.shape != (3, 3):
         raise ValueError(f"e must be 3 x 6 and beta 3 x 3; got {e.shape} and {beta.shape}")
-    tensor = np.zeros((3, 3, 3))
-    for column, (j, k) in enumerate(VOIGT):
-        tensor[:, j, k] = tensor[:, k, j] = e[:, column]
-    material = Piezo(tensor, beta)
+    material = Piezo(coupling_tensor(e), beta)
     material.check()
     return material
 
@@ -163,20 +139,20 @@ def hexagonal(e31: float, e33: float, e15: float, beta11: float, beta33: float) 
     return from_voigt(*hexagonal_voigt(e31, e33, e15, beta11, beta33))
 
 
-def coupling_number(law: Hencky, piezo: Piezo) -> float:
+def coupling_number(law: Law, piezo: Piezo) -> float:
     """Return the largest eps : e^T beta^-1 e eps / (eps : F eps) over all strains.
 
     It is the square of the electromechanical coupling: how much stiffer the body becomes
     without electrodes. diag(F, beta) preconditions the symmetrised form to a spectrum that it
     alone bounds, whatever the units and the mesh.
     """
-    # In the orthonormal (Mandel) basis of symmetric tensors, eps : F eps is a plain product.
-    basis = np.zeros((6, 3, 3))
-    for n, (j, k) in enumerate(VOIGT):
-        basis[n, j, k] = basis[n, k, j] = 1.0 if j == k else np.sqrt(0.5)
-    trace = np.trace(basis, axis1=1, axis2=2)
-    stiffness = 2 * law.shear * np.eye(6) + (law.bulk - 2 * law.shear / 3) * np.outer(trace, trace)
-    coupling = np.einsum("ijk,njk->in", np.asarray(piezo.e), basis)
+    if isinstance(law, Anisotropic):
+        stiffness = mandel(law.stiffness)
+    else:
+        stiffness = mandel(isotropic(law.young, law.poisson))
+    # e on the orthonormal (Mandel) basis of tensors, where eps : F eps is a plain product.
+    coupling = np.array([np.asarray(piezo.e)[:, j, k] for j, k in VOIGT]).T
+    coupling[:, 3:] *= np.sqrt(2.0)
     induced = coupling.T @ np.linalg.solve(np.asarray(piezo.beta), coupling)
     return float(np.linalg.eigvals(np.linalg.solve(stiffness, induced)).real.max())
 
@@ -204,7 +180,7 @@ def electric_displacement(piezo: Piezo, eps: Expr, phi: Expr) -> Expr:
 
 
 def saddle_form(
-    law: Hencky,
+    law: Law,
     piezo: Piezo,
     u: Expr,
     v: Expr,
@@ -225,7 +201,7 @@ def saddle_form(
 
 
 def symmetrised_form(
-    law: Hencky,
+    law: Law,
     piezo: Piezo,
     u: Expr,
     v: Expr,

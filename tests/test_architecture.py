@@ -11,7 +11,7 @@ ROOT = Path(__file__).parents[1]
 #: A package or module of contact/ imports its own line and those above it.
 LAYERS = (
     {"errors", "typing", "tolerances", "settings", "_compat"},
-    {"mesh"},
+    {"mesh", "library"},
     {"linear"},
     {"body"},
     {"interface"},
@@ -19,7 +19,18 @@ LAYERS = (
     {"methods"},
     {"output"},
     {"case"},
-    {"blame", "build", "contacts", "evolving", "given", "meshing", "moving", "nesting", "solving"},
+    {
+        "blame",
+        "build",
+        "contacts",
+        "evolving",
+        "given",
+        "materials",
+        "meshing",
+        "moving",
+        "nesting",
+        "solving",
+    },
     {"cli"},
 )
 

@@ -8,7 +8,8 @@ import numpy as np
 from dolfinx import fem
 from dolfinx.mesh import Mesh
 
-from forms.hencky import Hencky
+from forms.elasticity import Anisotropic
+from forms.hencky import Law
 from forms.piezo import Piezo
 
 
@@ -17,8 +18,10 @@ def constant(mesh: Mesh, value: float) -> fem.Constant:
     return fem.Constant(mesh, np.float64(value))
 
 
-def law_with_constants(law: Hencky, mesh: Mesh) -> Hencky:
+def law_with_constants(law: Law, mesh: Mesh) -> Law:
     """Return a law with form constants for its numbers."""
+    if isinstance(law, Anisotropic):
+        return Anisotropic(fem.Constant(mesh, np.asarray(law.stiffness, dtype=float)))
     if not is_dataclass(law) or getattr(law, "g_min", 0.0) > 0:
         return law
     numbers = {

@@ -13,7 +13,8 @@ from contact.body.amplitude import Amplitude, Moving, amplitude_of
 from contact.body.rigid import Electrode, Rigid
 from contact.errors import InputError
 from contact.typing import Array
-from forms.hencky import Hencky, Linear
+from forms.elasticity import Anisotropic
+from forms.hencky import Law, Linear
 from forms.piezo import Piezo
 
 
@@ -87,14 +88,14 @@ class Material:
     Attributes
     ----------
     law
-        Hencky law of the stress.
+        Law of the stress.
     piezo
         Piezoelectric tensors in the body's axes, or None.
     on
         Names of the regions that consist of it; none for the whole mesh.
     """
 
-    law: Hencky
+    law: Law
     piezo: Piezo | None = None
     on: tuple[str, ...] = ()
 
@@ -106,7 +107,7 @@ class Body:
     Attributes
     ----------
     law
-        Hencky law of the stress.
+        Law of the stress.
     piezo
         Piezoelectric tensors in the body's axes, or None.
     regions
@@ -116,7 +117,7 @@ class Body:
         What moves as a rigid body, foundations included, and parts of one unknown potential.
     """
 
-    law: Hencky
+    law: Law
     fixed: Sequence[Fixed]
     loads: Sequence[Load] = field(default_factory=tuple)
     piezo: Piezo | None = None
@@ -146,7 +147,7 @@ class Body:
     @property
     def linear(self) -> bool:
         """Whether the stress is a linear function of the strain."""
-        return all(isinstance(material.law, Linear) for material in self.materials)
+        return all(isinstance(material.law, Linear | Anisotropic) for material in self.materials)
 
     @property
     def phi_scale(self) -> float:
@@ -157,19 +158,20 @@ class Body:
         return float(np.sqrt(self.law.shear / permittivity))
 
     def check(self, dim: int) -> None:
-        """Refuse piezoelectric tensors that are none, or none of a plane body.
+        """Refuse tensors that are none of a material, or none of a plane body.
 
         Raises
         ------
         InputError
             If they are not.
         """
-        for piezo in (material.piezo for material in self.materials):
-            if piezo is None:
-                continue
-            try:
-                piezo.check()
-                if dim == 2:
-                    piezo.check_plane()
-            except ValueError as error:
-                raise InputError(f"piezoelectric material: {error}") from error
+        for material in self.materials:
+            for name, tensors in (("", material.law), ("piezoelectric ", material.piezo)):
+                if not isinstance(tensors, Anisotropic | Piezo):
+                    continue
+                try:
+                    tensors.check()
+                    if dim == 2:
+                        tensors.check_plane()
+                except ValueError as error:
+                    raise InputError(f"{name}material: {error}") from error

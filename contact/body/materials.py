@@ -13,11 +13,11 @@ from contact.body.description import Material
 from contact.errors import InputError
 from contact.mesh.domain import Domain, Indices
 from contact.mesh.measure import Measure
-from forms.hencky import Hencky
+from forms.hencky import Law
 from forms.piezo import Piezo
 
 #: A material with form constants for its numbers, and the measure of its cells.
-Piece: TypeAlias = tuple[Hencky, Piezo | None, Measure]
+Piece: TypeAlias = tuple[Law, Piezo | None, Measure]
 
 
 def cells_of(domain: Domain, materials: Sequence[Material]) -> list[Indices]:

@@ -10,7 +10,6 @@ from typing import Any, TypeAlias
 
 from pydantic import BaseModel
 
-from contact.case.body import Piezo
 from contact.case.evolution import check_evolution, check_time
 from contact.case.formula import Expression
 from contact.case.moving import check_moving, moving
@@ -25,7 +24,7 @@ Case: TypeAlias = Any
 def check_sections(case: Case) -> None:
     """Raise a fault if sections contradict each other."""
     check_sizes(case)
-    if any(material.piezo is not None for _, material in case.materials):
+    if any(material.piezoelectric for _, material in case.materials):
         _check_potential(case)
     else:
         _check_mechanical(case)
@@ -85,7 +84,7 @@ def check_mesh(case: Case, dimension: int, parts: Iterable[str]) -> None:
 
 def _check_mechanical(case: Case) -> None:
     """Nothing electric without piezoelectric constants."""
-    accepted = "electric quantities with [material.piezo] only"
+    accepted = "electric quantities with [material.piezo] only, or a piezoelectric material by name"
     for i, fixed in enumerate(case.fixed):
         if fixed.potential is not None:
             raise fault(f"fixed.{i}.potential", fixed.potential.source, accepted)
@@ -216,11 +215,10 @@ def _check_vectors(case: Case, dimension: int) -> None:
     if dimension == 2 and case.mesh.axis is not None:
         raise fault("mesh.axis", case.mesh.axis, "no axis in the plane")
     for path, material in case.materials:
-        piezo = material.piezo
-        if isinstance(piezo, Piezo) and piezo.poling is not None:
-            if isinstance(piezo.poling, tuple) != (dimension == 3):
-                accepted = "an angle in the plane" if dimension == 2 else "3 numbers in space"
-                raise fault(f"{path}.piezo.poling", piezo.poling, accepted)
+        key, poling = material.axis
+        if poling is not None and isinstance(poling, tuple) != (dimension == 3):
+            accepted = "an angle in the plane" if dimension == 2 else "3 numbers in space"
+            raise fault(f"{path}.{key}", poling, accepted)
 
 
 def _check_parts(case: Case, parts: list[str]) -> None:

@@ -16,11 +16,12 @@ from typing import TYPE_CHECKING, Annotated, Any, TypeAlias
 from pydantic import Field, PrivateAttr, ValidationError, model_validator
 from pydantic_core import PydanticCustomError
 
-from contact.case.body import Fixed, Load, Material, Piezo, Space
+from contact.case.body import Fixed, Load, Space
 from contact.case.checks import check_mesh, check_sections
 from contact.case.evolution import Evolution
 from contact.case.formula import Expression
 from contact.case.interface import Contact, Electric, Friction, Plane, SlipLaw, Sphere
+from contact.case.material import Material, Piezo
 from contact.case.mesh import Mesh, Piece
 from contact.case.messages import describe, describe_fault
 from contact.case.overrides import override
@@ -176,8 +177,9 @@ def parse_case(data: Mapping[str, Any], folder: str | Path = ".", source: str = 
     InputError
         On the first mistake; the message is one line.
     """
+    data = {**data, **_found(data, Path(folder))}
     try:
-        case = Case.model_validate(dict(data))
+        case = Case.model_validate(data)
     except ValidationError as error:
         raise InputError(describe(error, Case, source)) from None
     if case.mesh.file is not None:
@@ -188,6 +190,20 @@ def parse_case(data: Mapping[str, Any], folder: str | Path = ".", source: str = 
         case = case.model_copy(update={"mesh": mesh})
     case._source = source
     return case
+
+
+def _found(data: Mapping[str, Any], folder: Path) -> dict[str, Any]:
+    """Return the materials with the places of their libraries."""
+
+    def found(table: Any) -> Any:
+        if isinstance(table, Mapping) and isinstance(table.get("library"), str):
+            return {**table, "library": str(folder / table["library"])}
+        return table
+
+    given = data.get("material")
+    if isinstance(given, list | tuple):
+        return {"material": [found(table) for table in given]}
+    return {} if given is None else {"material": found(given)}
 
 
 def load_case(path: str | Path, overrides: Mapping[str, str] | Iterable[str] = ()) -> Case:

@@ -1,4 +1,4 @@
-"""The command line: ``python3 -m contact solve CASE.toml --out DIR``, ``check``, ``plot``.
+"""The command line: ``contact solve CASE.toml --out DIR``, ``check``, ``plot``, ``materials``.
 
 Exit status: 0 converged, 1 not converged (outputs are written), 2 bad input, or no place for the
 results (one message, nothing is written), 70 a fault of the program, 130 stopped by Ctrl-C, 143
@@ -22,7 +22,7 @@ from typing import TYPE_CHECKING, Any, NoReturn
 
 from mpi4py import MPI
 
-from contact.cli import plot
+from contact.cli import materials, plot
 from contact.cli.ending import (
     BAD_INPUT,
     CONVERGED,
@@ -41,6 +41,9 @@ from contact.output.rerun import check_rerun
 
 if TYPE_CHECKING:  # it loads dolfinx, which PETSc's options have to precede
     from contact.case.file import Case
+
+#: Commands that read no case.
+OTHERS = {"plot": plot.run, "materials": materials.run}
 
 #: Seconds after a signal from which on a second one ends the writing of results too.
 PATIENCE = 2.0
@@ -62,7 +65,9 @@ def _parser() -> _Parser:
     common: dict[str, Any] = {"add_help": False, "allow_abbrev": False}
     parser = _Parser(prog="contact", description=__doc__, **common)
     parser.add_argument("--help", action="help", help="show this help and leave")
-    commands = parser.add_subparsers(dest="command", required=True, metavar="solve|check|plot")
+    commands = parser.add_subparsers(
+        dest="command", required=True, metavar="solve|check|plot|materials"
+    )
     for name, text in (
         ("solve", "solve a case and write the results"),
         ("check", "validate a case and print it with its mesh parts and unknowns"),
@@ -92,6 +97,7 @@ def _parser() -> _Parser:
                 help="replace results of another case, if DIR has any",
             )
     plot.add_parser(commands, common)
+    materials.add_parser(commands, common)
     return parser
 
 
@@ -106,7 +112,9 @@ def parse(arguments: Sequence[str]) -> tuple[argparse.Namespace, list[str]]:
     if "-h" in arguments:
         arguments = ["--help" if argument == "-h" else argument for argument in arguments]
     options, rest = _parser().parse_known_args(arguments)
-    known = [f"--{name}" for name in vars(options) if name not in ("command", "case", "folder")]
+    known = [
+        f"--{name}" for name in vars(options) if name not in ("command", "case", "folder", "name")
+    ]
     known.append("--help")
     for i, argument in enumerate(rest):
         follows = i > 0 and rest[i - 1].startswith("-")
@@ -208,8 +216,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
                 import petsc4py
 
                 petsc4py.init([sys.argv[0], *_own_options(), *petsc])
-                if options.command == "plot":
-                    return plot.run(options, comm)
+                if options.command in OTHERS:
+                    return OTHERS[options.command](options, comm)
                 from contact.case.file import load_case  # after PETSc's options
 
                 case = on_root(comm, lambda: load_case(options.case, options.set))

@@ -132,7 +132,7 @@ class Domain:
     def resultant(self, vector: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
         """Return sums of forces, shape (..., d), as those on the whole body.
 
-        Over the full turn radial forces cancel.
+        Over the full turn radial forces cancel, and so do moments about a point of the axis.
         """
         return np.where([self.revolved, *[False] * (self.dim - 1)], 0.0, vector)
 

@@ -7,9 +7,9 @@ from typing import TypeAlias
 
 import numpy as np
 
-from contact.body.description import Material
 from contact.output.solution import Solution
-from forms.hencky import check_monotonicity
+from forms.elasticity import Anisotropic
+from forms.hencky import Hencky, check_monotonicity
 
 #: What there is to say, if anything, and whether it is good news.
 Remark: TypeAlias = tuple[str, bool]
@@ -22,13 +22,15 @@ def monotonicity(solution: Solution, strains: Sequence[float]) -> Iterator[Remar
     """Check (h1) on the strains that the solution has in each material."""
     dim = 3 if solution.problem.domain.revolved else solution.problem.dim
     for material, strain in zip(solution.problem.body.materials, strains, strict=True):
-        if np.isfinite(strain):
-            yield _monotonicity(material, strain, dim)
+        # (h1) speaks of Hencky laws; a crystal's stiffness is positive definite, or refused.
+        law = material.law
+        if np.isfinite(strain) and not isinstance(law, Anisotropic):
+            yield _monotonicity(law, material.on, strain, dim)
 
 
-def _monotonicity(material: Material, strain: float, dim: int) -> Remark:
-    report = check_monotonicity(material.law, strain, dim=dim)
-    place = f" in {', '.join(material.on)}" if material.on else ""
+def _monotonicity(law: Hencky, on: Sequence[str], strain: float, dim: int) -> Remark:
+    report = check_monotonicity(law, strain, dim=dim)
+    place = f" in {', '.join(on)}" if on else ""
     text = (
         f"assumption (h1) {'holds' if report.holds else 'does not hold'}{place} on the strains of "
         f"this solution, |dev eps| <= {strain:.4g}: g_0 = {report.g_0:.4g} <= g <= "

@@ -159,7 +159,8 @@ class Solution:
         """
         nodes = self.problem.nodes
         stress = self.problem.interface.stress(self.nodal, self.forces)
-        local = moment(nodes.points, nodes.weight[:, None] * stress)
+        revolved = self.problem.domain.revolved
+        local = moment(nodes.points, nodes.weight[:, None] * stress, revolved)
         return np.asarray(nodes.comm.allreduce(local, op=MPI.SUM))
 
     @property

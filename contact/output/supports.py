@@ -32,8 +32,13 @@ class Support:
     moment: Array
 
 
-def moment(points: Array, forces: Array) -> Array:
-    """Return the moment of forces at points, both of shape (n, d), about the origin."""
+def moment(points: Array, forces: Array, revolved: bool = False) -> Array:
+    """Return the moment of forces at points, both of shape (n, d), about the origin.
+
+    Over the full turn of a body of revolution moments cancel.
+    """
+    if revolved:
+        return np.zeros(1)
     if points.shape[1] == 3:
         return np.cross(points, forces).sum(axis=0)
     return np.array([np.sum(points[:, 0] * forces[:, 1] - points[:, 1] * forces[:, 0])])
@@ -60,6 +65,7 @@ def supports(problem: ContactProblem, state: State) -> Mapping[str, Support]:
         held = np.array([component is not None for component in fixed.displacement])
         forces = np.where(left[nodes] & held, residual[nodes], 0.0)
         left[nodes] &= ~held
-        local = np.concatenate([forces.sum(axis=0), moment(points[nodes], forces)])
+        whole = problem.domain.resultant(forces.sum(axis=0))
+        local = np.concatenate([whole, moment(points[nodes], forces, problem.domain.revolved)])
         totals[fixed.on] = totals.get(fixed.on, 0.0) + comm.allreduce(local, op=MPI.SUM)
     return {part: Support(total[:d], total[d:]) for part, total in totals.items()}

@@ -12,6 +12,7 @@ from mpi4py import MPI
 from contact.output.fields import DerivedFields
 from contact.problem.problem import ContactProblem
 from contact.typing import Array
+from forms.elasticity import Anisotropic
 
 #: Decrease of |dev eps|, over what it was, that counts as unloading; and of the secant modulus,
 #: over that of small strains, that counts as yielding.
@@ -54,6 +55,8 @@ class Unloading:
         for material, volumes, old, new in zip(
             self._body.body.materials, self._volumes, before, self._strains, strict=True
         ):
+            if isinstance(material.law, Anisotropic):
+                continue
             modulus = np.asarray(material.law.secant_modulus(old**2), dtype=float)
             yielded = modulus < (1 - SOFTENED) * float(material.law.shear)
             back += float(volumes @ (yielded & (new < (1 - DECREASE) * old)).mean(axis=1))

@@ -9,10 +9,10 @@ from dolfinx import fem, mesh
 from mpi4py import MPI
 
 from contact.body.description import Load
-from contact.build import piezo
-from contact.case.body import Piezo as PiezoSection
+from contact.case.material import Material
 from contact.errors import InputError
 from contact.interface.friction import Friction
+from contact.materials import piezo, rotation
 from contact.methods.fixed_point import FixedPoint
 from contact.methods.newton import Newton
 from contact.methods.options import FixedPointOptions, NewtonOptions
@@ -119,21 +119,25 @@ def test_bad_axis_is_refused(axis):
         CRYSTAL.poled_along(axis)
 
 
-def section(**changes) -> PiezoSection:
-    return PiezoSection(**COUPLING, **PERMITTIVITY, **changes)
+def crystal_of(dim: int, **changes) -> Piezo:
+    constants = {**COUPLING, **PERMITTIVITY, **changes}
+    section = Material(young=1.0, poisson=0.3, piezo=constants)
+    made = piezo(section, rotation(section.axis[1], dim))
+    assert made is not None
+    return made
 
 
 def test_poling_of_the_case_file():
-    assert np.array_equal(piezo(section(), 3).e, CRYSTAL.e)
+    assert np.array_equal(crystal_of(3).e, CRYSTAL.e)
     axis = np.array([1.0, -2.0, 0.5])
-    turned = piezo(section(poling=axis.tolist()), 3)
+    turned = crystal_of(3, poling=axis.tolist())
     unit = axis / np.linalg.norm(axis)
     along = np.einsum("ijk,i,j,k", turned.e, unit, unit, unit)
     assert along == pytest.approx(COUPLING["e33"], rel=1e-14)
     assert unit @ turned.beta @ unit == pytest.approx(PERMITTIVITY["beta33"], rel=1e-14)
     # In the plane by an angle from x; upwards unless said otherwise.
-    assert np.allclose(piezo(section(), 2).e, piezo(section(poling=90.0), 2).e, atol=1e-14)
-    right = piezo(section(poling=0.0), 2)
+    assert np.allclose(crystal_of(2).e, crystal_of(2, poling=90.0).e, atol=1e-14)
+    right = crystal_of(2, poling=0.0)
     assert right.e[0, 0, 0] == pytest.approx(COUPLING["e33"], rel=1e-14)
     assert right.e[0, 1, 1] == pytest.approx(COUPLING["e31"], rel=1e-14)
     assert right.e[1, 0, 1] == pytest.approx(COUPLING["e15"], rel=1e-14)

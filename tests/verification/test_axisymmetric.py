@@ -178,7 +178,7 @@ def test_a_radial_displacement_on_the_axis_is_refused(comm):
 def test_a_body_that_nothing_holds_along_its_axis(comm):
     domain = half_plane(comm, 1.0, 2.0, 1.0, 3)
     body = Body(Linear(1.0, 0.3), [Fixed("left", [constant(0.0, 2), None])])
-    with pytest.raises(InputError, match="along y, its axis"):
+    with pytest.raises(InputError, match="translation along y"):
         check_held(ContactProblem(domain, body, Contact("right", flat())))
 
 

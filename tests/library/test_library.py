@@ -1,0 +1,182 @@
+"""Materials by name: what they say of themselves, and that wrong ones are refused."""
+
+import numpy as np
+import pytest
+
+import contact
+from contact.case.file import load_case, parse_case
+from contact.case.text import to_toml
+from contact.cli.main import main
+from contact.errors import InputError
+from contact.library.reading import PACKAGED, find, library
+from forms.crystal import isotropic_about_x3, stiffness_tensor, turned
+
+CASE = {
+    "mesh": {"generator": "rectangle", "size": [1.0, 1.0], "cells": [4, 4]},
+    "fixed": [
+        {"on": "top", "displacement": [0.0, -0.01], "potential": 0.0},
+        {"on": "left", "potential": 0.0},
+    ],
+    "contact": {"on": "bottom"},
+}
+MINE = """
+[mine]
+class = "6mm"
+c = { c11 = 139.0, c12 = 77.8, c13 = 74.3, c33 = 115.0, c44 = 25.6 }
+e = { e31 = -5.2, e33 = 15.1, e15 = 12.7 }
+permittivity = { "11" = 6.463, "33" = 5.622 }
+d = { d33 = 289.0 }
+temperature = "room"
+condition = "any"
+source = "measured"
+"""
+
+
+def case(**material):
+    return parse_case({**CASE, "material": material})
+
+
+def test_the_packaged_library():
+    known = library()
+    wanted = "PZT-4 PZT-5A PZT-5H PZT-6B BaTiO3 PVDF ZnO AlN quartz LiNbO3 steel aluminium tungsten"
+    assert {*wanted.split(), "sapphire"} <= set(known)
+    for entry in known.values():
+        assert entry.source and entry.temperature and entry.condition
+        entry.check()
+        if entry.coupling is not None:
+            # d = e s and e = d c, eps^T = eps^S + d e^T is symmetric and larger.
+            assert np.allclose(entry.charge_constants @ entry.stiffness, entry.coupling, atol=1e-12)
+            more = entry.free_permittivity - entry.permittivity
+            assert np.allclose(more, more.T, atol=1e-9 * np.abs(more).max())
+            assert np.linalg.eigvalsh(more)[0] > -1e-12 * np.abs(more).max()
+
+
+def test_classes_32_and_3m_have_their_threefold_axis_and_their_diad_or_mirror():
+    third = [[-0.5, -np.sqrt(0.75), 0.0], [np.sqrt(0.75), -0.5, 0.0], [0.0, 0.0, 1.0]]
+    for name, diad in (
+        ("quartz", np.diag([1.0, -1.0, -1.0])),
+        ("LiNbO3", None),
+        ("sapphire", None),
+    ):
+        entry = find(name)
+        parts = [stiffness_tensor(entry.stiffness)]
+        parts += [] if entry.piezo is None else [entry.piezo.e]
+        for part in parts:
+            size = np.abs(part).max()
+            # Printed to four digits: c66 = (c11 - c12)/2 and the like hold to the last one.
+            assert np.allclose(turned(part, third), part, atol=2e-4 * size), name
+            if diad is not None:
+                assert np.allclose(turned(part, diad), part, atol=1e-12 * size)
+            assert not isotropic_about_x3(part)
+    e = find("LiNbO3").piezo.e
+    mirror = np.diag([-1.0, 1.0, 1.0])
+    assert np.allclose(np.einsum("ia,jb,kc,abc", mirror, mirror, mirror, e), e)
+
+
+def test_published_charge_constants_of_quartz_and_lithium_niobate():
+    assert find("quartz").charge_constants[0, [0, 3]] == pytest.approx(
+        [2.31e-12, 0.727e-12], rel=0.01
+    )
+    assert find("LiNbO3").charge_constants[0, 4] == pytest.approx(68e-12, rel=0.01)
+    assert find("PZT-5A").bar_coupling(2, 2) == pytest.approx(0.705, abs=0.005)
+    assert find("PZT-5A").bar_coupling(2, 0) == pytest.approx(0.344, abs=0.005)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        ("c33 = 115.0", "c33 = 15.0", "positive definite"),
+        ('"33" = 5.622', '"33" = -5.6', "positive definite"),
+        ("d33 = 289.0", "d33 = 189.0", "d33 = 189 pC/N is published"),
+        ('source = "measured"', "", "'source' is missing"),
+        ("c44 = 25.6", "c45 = 25.6", "c45"),
+        ('class = "6mm"', 'class = "6mm"\nyoung = 1.0', "one of young"),
+        ("[mine]", "mine = 3\n[theirs]", "no table"),
+        ("condition", "conditions", "conditions: unknown key"),
+    ],
+)
+def test_a_wrong_entry_is_refused_with_its_name(tmp_path, old, new, words):
+    path = tmp_path / "library.toml"
+    assert old in MINE
+    path.write_text(MINE.replace(old, new))
+    with pytest.raises(InputError, match=words) as caught:
+        library(path)
+    assert str(path) in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+def test_a_material_by_name_is_the_one_by_its_constants():
+    entry = find("PZT-4")
+    constants = {"c11": 139.0, "c12": 77.8, "c13": 74.3, "c33": 113.0, "c44": 25.6}
+    piezo = {"e31": -6.98, "e33": 13.84, "e15": 13.44, "beta11": 6.0, "beta33": 5.47}
+    named = contact.solve(case(name="PZT-4", units="GPa"))
+    given = contact.solve(case(law="anisotropic", **constants, piezo=piezo))
+    assert np.allclose(named.pressure, given.pressure, rtol=1e-12)
+    full = case(law="anisotropic", stiffness=(entry.stiffness / 1e9).tolist(), piezo=piezo)
+    assert np.allclose(contact.solve(full).pressure, named.pressure, rtol=1e-12)
+    si = contact.solve(case(name="PZT-4"))
+    assert np.allclose(si.pressure, 1e9 * named.pressure, rtol=1e-8)
+    assert np.allclose(si.potential.x.array, 1e9 * named.potential.x.array, rtol=1e-6, atol=1e-2)
+
+
+def test_a_library_of_ones_own(tmp_path, capsys):
+    (tmp_path / "mine.toml").write_text(MINE)
+    path = tmp_path / "case.toml"
+    data = {**CASE, "material": {"name": "mine", "library": "mine.toml"}}
+    path.write_text(to_toml(parse_case(data, tmp_path)))
+    again = load_case(path)
+    assert again.material.entry.source == "measured"
+    assert main(["materials", "mine", "--file", str(tmp_path / "mine.toml")]) == 0
+    text = capsys.readouterr().out
+    assert "d = e s (pC/N)" in text and "291.3" in text and "k33 = 0.69" in text
+
+
+def test_the_command_lists_and_shows(capsys):
+    assert main(["materials"]) == 0
+    listed = capsys.readouterr().out.splitlines()
+    assert len(listed) == len(library())
+    assert main(["materials", "quarz"]) == 2
+    assert "did you mean quartz?" in capsys.readouterr().err
+    assert main(["materials", "sapphire"]) == 0
+    assert "coupling" not in capsys.readouterr().out
+
+
+BAD = {
+    "unknown name": ({"name": "PZT4"}, 'material.name: given "PZT4"; accepted: PZT4: no such mat'),
+    "name and law": ({"name": "steel", "law": "linear"}, "material.law: given with name"),
+    "name and young": ({"name": "steel", "young": 1.0}, "material.young"),
+    "units alone": ({"young": 1.0, "poisson": 0.3, "units": "SI"}, "material.units"),
+    "no isotropic axis": ({"name": "steel", "poling": 0.0}, "material.poling"),
+    "poling without": ({"young": 1.0, "poisson": 0.3, "poling": 0.0}, "material.poling"),
+    "half of six": ({"law": "anisotropic", "c11": 1.0, "c12": 0.2}, "material.c13: only c11, c12"),
+    "nothing": ({"law": "anisotropic"}, "material.c11: only nothing"),
+    "isotropic too": ({"law": "anisotropic", "young": 1.0}, "material.young"),
+    "indefinite": (
+        {"law": "anisotropic", "c11": 1.0, "c12": 2.0, "c13": 0.0, "c33": 1.0, "c44": 1.0},
+        "positive definite",
+    ),
+    "not six": ({"law": "anisotropic", "stiffness": [[1.0]]}, "6 rows of 6"),
+    "no library": ({"name": "a", "library": "nowhere.toml"}, "nowhere.toml"),
+}
+
+
+@pytest.mark.parametrize("name", BAD)
+def test_bad_materials_get_one_line(name):
+    given, words = BAD[name]
+    with pytest.raises(InputError) as caught:
+        case(**given)
+    assert words in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+def test_quartz_is_no_body_of_revolution():
+    data = {**CASE, "material": {"name": "quartz"}, "space": {"kinematics": "axisymmetric"}}
+    data["fixed"] = [CASE["fixed"][0]]
+    with pytest.raises(InputError, match="all around its axis X3"):
+        contact.build_problem(parse_case(data))
+
+
+def test_the_library_is_part_of_the_package():
+    assert PACKAGED.is_file()
+    text = (PACKAGED.parents[2] / "pyproject.toml").read_text()
+    assert '"library/*.toml"' in text
