@@ -6,38 +6,52 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from contact.body.rigid import Electrode, Motion, Rigid
+from contact.body.rigid import Electrode, Motion, Rigid, Timed
 from contact.case import file as sections
-from contact.case.rigid import Moving
+from contact.case.formula import Expression
+from contact.case.rigid import NOTHING, Moving
+from contact.given import amplitude
 
 
 def make_rigid(case: sections.Case, dim: int) -> tuple[Rigid, ...]:
     """Return the foundations and parts that move as rigid bodies."""
     foundations = [
-        Rigid(contact.on, _motion(contact.rigid, dim), foundation=True)
+        Rigid(contact.on, _motion(case, contact.rigid, dim), foundation=True)
         for _, contact in case.contacts
         if contact.rigid is not None
     ]
-    return (*foundations, *(Rigid(part.on, _motion(part, dim)) for part in case.rigid))
+    return (*foundations, *(Rigid(part.on, _motion(case, part, dim)) for part in case.rigid))
 
 
 def make_electrodes(case: sections.Case) -> tuple[Electrode, ...]:
     """Return the electrodes whose potential is unknown."""
-    return tuple(Electrode(section.on, section.charge) for section in case.electrode)
-
-
-def _motion(section: Moving, dim: int) -> Motion:
-    turns = 2 * dim - 3
-    return Motion(
-        _given(section.displacement or (), dim),
-        [angle if angle is None else np.deg2rad(angle) for angle in _given(section.turns, turns)],
-        section.force or (0.0,) * dim,
-        (*section.moments, *(0.0,) * (turns - len(section.moments))),
-        section.centre or (0.0,) * dim,
+    return tuple(
+        Electrode(section.on, _timed(section.charge), amplitude(case, section.amplitude))
+        for section in case.electrode
     )
 
 
-def _given(values: Sequence[float | str], size: int) -> list[float | None]:
+def _motion(case: sections.Case, section: Moving, dim: int) -> Motion:
+    turns, force = 2 * dim - 3, section.force or ()
+    rotation = _given(section.turns, turns, np.pi / 180)
+    return Motion(
+        _given(section.displacement or (), dim),
+        rotation,
+        [_timed(value) for value in (*force, *(NOTHING,) * (dim - len(force)))],
+        [_timed(value) for value in (*section.moments, *(NOTHING,) * (turns - 1))[:turns]],
+        section.centre or (0.0,) * dim,
+        amplitude(case, section.amplitude),
+    )
+
+
+def _given(values: Sequence[Expression | str], size: int, unit: float = 1.0) -> list[Timed | None]:
     """Return components, None for those that are free, and 0 where none are given."""
-    known = [None if isinstance(value, str) else value for value in values]
+    known = [None if isinstance(value, str) else _timed(value, unit) for value in values]
     return [*known, *[0.0] * (size - len(known))]
+
+
+def _timed(value: Expression, unit: float = 1.0) -> Timed:
+    """Return a number, or a function of time."""
+    if value.is_constant:
+        return unit * value.value
+    return lambda time: unit * value.number(time)

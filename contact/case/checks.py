@@ -30,7 +30,7 @@ def check_sections(case: Case) -> None:
         _check_mechanical(case)
     _check_regions(case)
     given = [fixed.displacement or () for fixed in case.fixed]
-    given += [part.displacement or (0.0,) for part in case.rigid]
+    given += [part.displacement or ("held",) for part in case.rigid]
     if not any(component != "free" for components in given for component in components):
         raise fault("fixed", Words("no displacement fixed"), "at least one component on a part")
     _check_contradictions(case)
@@ -189,6 +189,10 @@ def _formulas(case: Case) -> Iterator[tuple[str, Any]]:
     for i, load in enumerate(case.load):
         for key in ("pressure", "charge", "body_charge"):
             yield f"load.{i}.{key}", getattr(load, key)
+    for i, electrode in enumerate(case.electrode):
+        yield f"electrode.{i}.charge", electrode.charge
+    for path, section in moving(case):
+        yield from ((f"{path}.{key}", value) for key, value in section.formulas())
     for path, contact in case.contacts:
         yield f"{path}.gap", contact.gap
         key, friction = case.friction_of(path, contact)

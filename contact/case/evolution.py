@@ -65,8 +65,9 @@ class Evolution(Section):
     ] = Field(description="Number of equal steps in each stage.")
     amplitudes: dict[Text, Amplitude] = Field(
         default={},
-        description="Factors by name, for the key `amplitude` of `[[fixed]]`, `[[load]]` and "
-        "`[electric]`. What has none acts all the time.",
+        description="Factors by name, for the key `amplitude` of `[[fixed]]`, `[[load]]`, "
+        "`[electric]`, `[contact.rigid]`, `[[rigid]]`, `[[electrode]]`. What has none acts all "
+        "the time.",
     )
 
     @model_validator(mode="after")
@@ -116,7 +117,8 @@ def check_time(case: Case, path: str, formula: Expression) -> None:
     """Raise a fault if a formula uses t where it has no meaning."""
     if "t" not in formula.names:
         return
-    if not path.startswith(("fixed.", "load.")) and not path.endswith(".phi_f"):
+    timed = path.startswith(("fixed.", "load.", "rigid.", "electrode.")) or ".rigid." in path
+    if not timed and not path.endswith(".phi_f"):
         raise fault(path, formula.source, "a formula without t")
     if case.evolution is None:
         raise fault(path, formula.source, "a formula in t with [evolution] only")
@@ -124,9 +126,11 @@ def check_time(case: Case, path: str, formula: Expression) -> None:
 
 def _loading(case: Case) -> Iterator[tuple[str, Any]]:
     """Give the sections that may have an amplitude, with their paths."""
-    for name in ("fixed", "load"):
+    for name in ("fixed", "load", "rigid", "electrode"):
         yield from ((f"{name}.{i}", section) for i, section in enumerate(getattr(case, name)))
     for key, contact in case.contacts:
+        if contact.rigid is not None:
+            yield f"{key}.rigid", contact.rigid
         path, electric = case.electric_of(key, contact)
         if electric is not None:
             yield path, electric

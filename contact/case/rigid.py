@@ -7,41 +7,59 @@ from typing import Annotated, Any, Literal, TypeAlias
 
 from pydantic import Discriminator, Field, Tag, model_validator
 
-from contact.case.types import Name, Number, Section, Vector, Words, as_tuple, fault
+from contact.case.formula import Expression
+from contact.case.types import (
+    AmplitudeName,
+    Name,
+    Section,
+    TimeFormula,
+    Vector,
+    Words,
+    as_tuple,
+    fault,
+)
 from contact.settings import Accepted
 
 
 def _kind(given: Any) -> str:
-    return "free" if given == "free" else "Number"
-
-
-Free: TypeAlias = Annotated[
-    Annotated[Number, Tag("Number")] | Annotated[Literal["free"], Tag("free")],
-    Discriminator(_kind),
-    Accepted('a number or "free"'),
-]
-Frees: TypeAlias = Annotated[
-    tuple[Free, ...],
-    Field(min_length=2, max_length=3),
-    as_tuple,
-    Accepted('a list of 2 components in the plane, 3 in space, each a number or "free"'),
-]
+    return "free" if given == "free" else "TimeFormula"
 
 
 def _shape(given: Any) -> str:
     return "list" if isinstance(given, list | tuple) else "one"
 
 
+Free: TypeAlias = Annotated[
+    Annotated[TimeFormula, Tag("TimeFormula")] | Annotated[Literal["free"], Tag("free")],
+    Discriminator(_kind),
+    Accepted('a number, a formula in t or "free"'),
+]
+Frees: TypeAlias = Annotated[
+    tuple[Free, ...],
+    Field(min_length=2, max_length=3),
+    as_tuple,
+    Accepted(
+        'a list of 2 components in the plane, 3 in space, each a number, a formula in t or "free"'
+    ),
+]
+Forces: TypeAlias = Annotated[
+    tuple[TimeFormula, ...],
+    Field(min_length=2, max_length=3),
+    as_tuple,
+    Accepted("a list of 2 numbers or formulas in t in the plane, 3 in space"),
+]
 Turn: TypeAlias = Annotated[
     Annotated[Free, Tag("one")] | Annotated[Frees, Tag("list")],
     Discriminator(_shape),
-    Accepted('an angle (degrees) or "free" in the plane, a list of 3 of them in space'),
+    Accepted('in the plane an angle, a formula in t or "free", in space a list of 3 of these'),
 ]
 Moment: TypeAlias = Annotated[
-    Annotated[Number, Tag("one")] | Annotated[Vector, Tag("list")],
+    Annotated[TimeFormula, Tag("one")] | Annotated[Forces, Tag("list")],
     Discriminator(_shape),
-    Accepted("a number in the plane, a list of 3 numbers in space"),
+    Accepted("in the plane a number or a formula in t, in space a list of 3 of these"),
 ]
+
+NOTHING = Expression(0.0)
 
 
 class Moving(Section):
@@ -51,25 +69,30 @@ class Moving(Section):
         default=None,
         description='Displacement; `"free"` for a component that its force determines. Default: 0.',
     )
-    force: Vector | None = Field(
+    force: Forces | None = Field(
         default=None,
         description="Force on the free components of the displacement. Default: 0.",
     )
     rotation: Turn = Field(
-        default=0.0, description='Rotation about `centre` (degrees, small), or `"free"`.'
+        default=NOTHING, description='Rotation about `centre` (degrees, small), or `"free"`.'
     )
-    moment: Moment = Field(default=0.0, description="Moment about `centre` on a free rotation.")
+    moment: Moment = Field(default=NOTHING, description="Moment about `centre` on a free rotation.")
     centre: Vector | None = Field(
         default=None, description="Centre of rotation. Required where something turns."
     )
 
+    amplitude: AmplitudeName | None = Field(
+        default=None,
+        description="Factor of all of these as a function of time, see `[evolution]`.",
+    )
+
     @property
-    def turns(self) -> tuple[float | str, ...]:
+    def turns(self) -> tuple[Expression | str, ...]:
         """The rotation, as a list."""
         return self.rotation if isinstance(self.rotation, tuple) else (self.rotation,)
 
     @property
-    def moments(self) -> tuple[float, ...]:
+    def moments(self) -> tuple[Expression, ...]:
         """The moment, as a list."""
         return self.moment if isinstance(self.moment, tuple) else (self.moment,)
 
@@ -78,13 +101,13 @@ class Moving(Section):
         moves = self.displacement or ()
         for k, force in enumerate(self.force or ()):
             free = k < len(moves) and moves[k] == "free"
-            if force != 0 and not free:
-                raise fault(f"force.{k}", force, 'a force where the displacement is "free"')
+            if force != NOTHING and not free:
+                raise fault(f"force.{k}", shown(force), 'a force where the displacement is "free"')
         for k, moment in enumerate(self.moments):
-            if moment != 0 and (k >= len(self.turns) or self.turns[k] != "free"):
+            if moment != NOTHING and (k >= len(self.turns) or self.turns[k] != "free"):
                 key = f"moment.{k}" if isinstance(self.moment, tuple) else "moment"
-                raise fault(key, moment, 'a moment where the rotation is "free"')
-        if self.centre is None and any(turn != 0 for turn in self.turns):
+                raise fault(key, shown(moment), 'a moment where the rotation is "free"')
+        if self.centre is None and any(turn != NOTHING for turn in self.turns):
             raise fault("centre", Words("missing"), "a point about which it turns")
         return self
 
@@ -93,6 +116,11 @@ class Moving(Section):
         for key in ("displacement", "force", "centre"):
             yield key, getattr(self, key)
 
+    def formulas(self) -> Iterator[tuple[str, Any]]:
+        """Give what may be a formula besides."""
+        for key, values in (("rotation", self.turns), ("moment", self.moments)):
+            yield from ((key, value) for value in values)
+
     def check_dimension(self, key: str, dimension: int) -> None:
         """Raise a fault if a rotation is none of the plane, or of space."""
         for name in ("rotation", "moment"):
@@ -100,10 +128,10 @@ class Moving(Section):
             if isinstance(value, tuple):
                 fits = dimension == 3 and len(value) == 3
             else:
-                fits = dimension == 2 or value == 0
+                fits = dimension == 2 or value == NOTHING
             if not fits:
                 accepted = "one angle or moment in the plane, a list of 3 in space"
-                raise fault(f"{key}.{name}", value, accepted)
+                raise fault(f"{key}.{name}", shown(value), accepted)
 
 
 class Rigid(Moving):
@@ -120,4 +148,14 @@ class Electrode(Section):
     """`[[electrode]]`: a part with one unknown potential, whose charge is given."""
 
     on: Name = Field(description="Part of the boundary.")
-    charge: Number = Field(default=0.0, description="Its charge; 0: open circuit.")
+    charge: TimeFormula = Field(default=NOTHING, description="Its charge; 0: open circuit.")
+    amplitude: AmplitudeName | None = Field(
+        default=None, description="Factor of the charge as a function of time, see `[evolution]`."
+    )
+
+
+def shown(given: Any) -> Any:
+    """Return a value of the case as a message shows it."""
+    if isinstance(given, tuple):
+        return [shown(value) for value in given]
+    return given.source if isinstance(given, Expression) else given

@@ -43,6 +43,28 @@ def movements(problem: ContactProblem, state: State) -> dict[str, Any]:
     return {key: value for key, value in found.items() if value}
 
 
+def rigid_columns(problem: ContactProblem, state: State) -> dict[str, float]:
+    """Return what a row of steps says of the foundations that move, and electrodes. Collective.
+
+    Of several foundations the names have that of the part behind them.
+    """
+    row: dict[str, float] = {}
+    several = sum(member.foundation for member in problem.equilibrium.masters.members) > 1
+    for member, values, forces in _members(problem, state):
+        part, d = member.what.on, problem.dim
+        if isinstance(member.what, Electrode):
+            row[f"potential_{part}"] = float(values[0])
+        elif member.foundation:
+            turns = ["rotation"] if d == 2 else [f"rotation_{axis}" for axis in "xyz"]
+            moments = ["moment"] if d == 2 else [f"moment_{axis}" for axis in "xyz"]
+            moved = [*"xyz"[:d], *turns], [*values[:d], *np.rad2deg(values[d:])]
+            acting = [*(f"force_{axis}" for axis in "xyz"[:d]), *moments], forces
+            for names, numbers in (moved, acting):
+                for name, number in zip(names, numbers, strict=True):
+                    row[f"rigid_{name}" + (f"_{part}" if several else "")] = float(number)
+    return row
+
+
 def _members(problem: ContactProblem, state: State) -> Iterator[tuple[Member, Array, Array]]:
     """Give rigid bodies and electrodes with their values, and what acts on them."""
     body = problem.equilibrium

@@ -12,6 +12,7 @@ from mpi4py import MPI
 from contact.body.amplitude import Moving, steady
 from contact.methods.steps import LoadStep
 from contact.output.balances import charge_balance
+from contact.output.motions import rigid_columns
 from contact.output.record import StepRecord
 from contact.output.solution import Solution
 from contact.output.summary import count, largest_displacement
@@ -83,6 +84,7 @@ class StepRecorder:
             "factorizations": step.counters.factorizations,
             "kkt": step.outcome.kkt.largest,
         }
+        row |= rigid_columns(problem, step.state)
         if self._nodes is not None:
             moved, driving = _driven(problem, self._nodes, now)
             row |= {f"driven_{axis}": float(u) for axis, u in zip(axes, moved, strict=True)}
@@ -135,8 +137,7 @@ def _nodes_of(problem: ContactProblem, part: str) -> Array:
 def _driven(problem: ContactProblem, nodes: Array, now: Moment) -> tuple[Array, Array]:
     """Return the mean displacement of nodes, and the force that drives them. Collective."""
     body, d = problem.equilibrium, problem.dim
-    x = now.x[: body.owned].reshape(-1, body.block_size)[nodes, :d]
-    given = now.given.reshape(-1, body.block_size)[nodes, :d]
+    x, given = body.nodal(now.x)[nodes, :d], body.nodal(now.given)[nodes, :d]
     local = np.concatenate([x.sum(axis=0), given.sum(axis=0), [nodes.size]])
     total = problem.comm.allreduce(local, op=MPI.SUM)
     return total[:d] / max(total[-1], 1.0), total[d:-1]

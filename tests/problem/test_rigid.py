@@ -1,5 +1,7 @@
 """Foundations and parts that move as rigid bodies, and electrodes of unknown potential."""
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 from mpi4py import MPI
@@ -12,7 +14,7 @@ from contact.methods.options import FixedPointOptions, NewtonOptions, PenaltyOpt
 from contact.output.balances import charge_balance
 from contact.problem.kkt import evaluate, residual_forces
 from contact.problem.state import State
-from contact.solving import build_problem
+from contact.solving import build_problem, solve
 from tests.problems.rigid import PIEZO, indented, solved
 
 SELF = MPI.COMM_SELF
@@ -227,7 +229,10 @@ def test_a_press_fit_presses():
         ({"rotation": 1.0, "centre": None}, "contact.rigid.centre: missing"),
         ({"rotation": [0.0, 0.0, 1.0]}, "contact.rigid.rotation: given"),
         ({"displacement": [0.0, 0.0, 0.0]}, "2 components in 2-D"),
-        ({"displacement": [0.0, "fre"]}, 'accepted: a list of 2 .* or "free"'),
+        ({"displacement": [0.0, "fre"]}, "displacement.1: .* unknown name fre"),
+        ({"displacement": [0.0, "-0.01*t"]}, r"a formula in t with \[evolution\] only"),
+        ({"displacement": [0.0, "x"]}, "displacement.1: .* depends on the place"),
+        ({"amplitude": "press"}, r"an amplitude with \[evolution\] only"),
         ({"displacement": [0.0, "free"], "force": [0.0, 0.01]}, "pull the body off"),
         ({"rotation": "free"}, r"can move as a rigid body \(rotation of what is rigid\)"),
     ],
@@ -268,3 +273,33 @@ def test_bad_electrodes_are_refused():
                 {"on": "left", "displacement": [0.0, "free"], "potential": 0.0}]),
             SELF,
         )  # fmt: skip
+
+
+def stepped(amplitudes=None, **rigid):
+    """Return the rows of an indentation with friction in four steps."""
+    data = indented(n=10).model_dump(exclude_unset=True)
+    data["contact"]["rigid"] |= rigid
+    data["evolution"] = {"times": [0.0, 1.0], "steps": [4], "amplitudes": amplitudes or {}}
+    solution = solve(parse_case(data), NewtonOptions(tolerance=1e-11), comm=SELF)
+    assert solution.converged
+    return [record.row for record in solution.steps]
+
+
+def test_an_indentation_driven_by_force_goes_the_way_of_one_driven_by_displacement():
+    driven = stepped(displacement=[0.0, "-0.02*t*(2-t)"])
+    ways, forces = ([row[name] for row in driven] for name in ("rigid_y", "rigid_force_y"))
+    press = {"time": [0.0, 0.25, 0.5, 0.75, 1.0], "value": [0.0, *forces]}
+    forced = stepped(
+        {"press": press}, displacement=[0.0, "free"], force=[0.0, 1.0], amplitude="press"
+    )
+    assert [row["rigid_y"] for row in forced] == pytest.approx(ways, rel=1e-9)
+    assert [row["rigid_force_y"] for row in forced] == pytest.approx(forces, rel=1e-9)
+    assert [row["dissipation"] for row in forced] == pytest.approx(
+        [row["dissipation"] for row in driven], rel=1e-7
+    )
+    # The work of the force is that of the motion, by the trapezoidal rule both times.
+    for before, row in pairwise([{"rigid_y": 0.0, "rigid_force_y": 0.0, "energy": 0.0}, *forced]):
+        mean = 0.5 * (row["rigid_force_y"] + before["rigid_force_y"])
+        assert row["work"] == pytest.approx(mean * (row["rigid_y"] - before["rigid_y"]), rel=1e-9)
+        lost = row["work"] - (row["energy"] - before["energy"])
+        assert abs(lost - row["dissipation"]) < 0.1 * row["work"]
