@@ -70,6 +70,7 @@ def make_contacts(
             _friction(*case.friction_of(key, contact), domain.comm, coefficient, friction),
             _conductor(case, case.electric_of(key, contact)[1], domain, contact.on),
             contact.overlap == "press",
+            contact.against,
         )
         for key, contact in case.contacts
     ]

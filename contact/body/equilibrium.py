@@ -21,17 +21,17 @@ from dolfinx.la import InsertMode
 from mpi4py import MPI
 from numpy.typing import NDArray
 from petsc4py import PETSc
-from scipy import sparse
 from ufl.core.expr import Expr
 
 from contact.body.description import Body
 from contact.body.loads import Loads
 from contact.body.masters import make_masters
 from contact.body.materials import cells_of, pieces
+from contact.body.operators import WholeOperator, make_operator
 from contact.body.supports import free_components, supports_of, without_field
-from contact.linear.bordered import BorderedBulk, BorderedOperator
+from contact.linear.change import Change
 from contact.linear.layout import Layout
-from contact.linear.operator import Counters, SparseOperator
+from contact.linear.operator import Counters
 from contact.mesh.domain import Domain
 from contact.typing import Array
 from forms.hencky import secant_form
@@ -256,11 +256,12 @@ class BodyEquilibrium:
         self,
         nodes: NDArray[np.int32],
         motion: Array | None = None,
+        change: Change | None = None,
         *,
         symmetric: bool,
         counters: Counters,
         kind: str,
-    ) -> SparseOperator | BorderedOperator:
+    ) -> WholeOperator:
         """Return the operator of the body with blocks at nodes.
 
         Parameters
@@ -270,21 +271,19 @@ class BodyEquilibrium:
         motion
             How the foundation moves at the contact nodes with the global unknowns, shape
             (n, block size, m); None where nothing moves.
+        change
+            The change of unknowns after which the blocks are those of single nodes; None where
+            they are.
         symmetric, counters, kind
             As of `SparseOperator`.
         """
-        masters = self.masters
-        if masters.size == 0:
-            return SparseOperator(self, nodes, symmetric=symmetric, counters=counters, kind=kind)
-        bordered = BorderedBulk(self, self.motions(nodes, motion), masters.free)
-        return BorderedOperator(bordered, nodes, symmetric=symmetric, counters=counters, kind=kind)
-
-    def motions(self, nodes: NDArray[np.int32], motion: Array | None) -> sparse.csr_array:
-        """Return u = R q at what follows and at contact nodes, shape (owned, m)."""
-        if motion is None:
-            return self.masters.ties
-        dofs = nodes[: motion.shape[0], None] * self.block_size + np.arange(self.block_size)
-        return self.masters.with_foundations(dofs, motion)
+        return make_operator(
+            self,
+            self.rest(),
+            self.masters,
+            (nodes, motion, change),
+            {"symmetric": symmetric, "counters": counters, "kind": kind},
+        )
 
     def norm(self, values: Array) -> float:
         """Return the Euclidean norm of owned values. Collective."""

@@ -231,6 +231,8 @@ def _check_parts(case: Case, parts: list[str]) -> None:
     used += [(f"{path}.on", contact.on) for path, contact in case.contacts]
     used += [(f"rigid.{i}.on", part.on) for i, part in enumerate(case.rigid)]
     used += [(f"electrode.{i}.on", part.on) for i, part in enumerate(case.electrode)]
+    against = [(f"{path}.against", contact.against) for path, contact in case.contacts]
+    used += [(path, name) for path, name in against if name is not None]
     for path, name in used:
         if name not in parts:
             near = difflib.get_close_matches(name, parts, n=1)

@@ -201,10 +201,14 @@ class Contact(Section):
         default="signorini",
         description="`signorini`: rigid foundation; `compliance`: with a compliant layer in front.",
     )
+    against: Name | None = Field(
+        default=None,
+        description="Part of another body of the mesh that it may touch, instead of a foundation.",
+    )
     gap: NonNegativeFormula | None = Field(
         default=None,
-        description="Gap rho to the rigid foundation along the body's normal. Default: 0 without "
-        "`foundation`.",
+        description="Gap rho to the rigid foundation along the body's normal; with `against`, what "
+        "is added to the distance between the meshes. Default: 0 without `foundation`.",
     )
     foundation: Foundation | None = Field(
         default=None, description="Rigid shape, instead of a gap: `[contact.foundation]`."
@@ -275,6 +279,10 @@ class Contact(Section):
 
     @model_validator(mode="after")
     def _check(self) -> Contact:
+        if self.against is not None and self.foundation is not None:
+            raise fault("against", Words("both against and foundation"), "one of them")
+        if self.against is not None and self.against == self.on:
+            raise fault("against", self.against, "another part than `on`")
         if self.gap is not None and self.foundation is not None:
             raise fault("gap", Words("both gap and foundation"), "one of them")
         if self.overlap == "press" and self.foundation is None:

@@ -9,13 +9,17 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from dolfinx.common import IndexMap
 from mpi4py import MPI
+from numpy.typing import NDArray
 
 from contact.errors import InputError
 from contact.interface.current import Conductor, HeldCurrent
 from contact.interface.friction import Friction, NodalFriction
 from contact.interface.history import SlipHistory
 from contact.interface.layer import Layer
+from contact.interface.links import make_links
+from contact.interface.mortar.coupling import Coupling
 from contact.interface.nodes import ContactNodes
 from contact.interface.piecewise import (
     ConductivityPieces,
@@ -55,6 +59,8 @@ class Entry:
         What acts there.
     held
         The current through nodes of the part that cannot move; None without.
+    coupling
+        What is opposite of the nodes, where that is another body; None for a rigid foundation.
     """
 
     on: str
@@ -63,16 +69,32 @@ class Entry:
     layer: Layer | None = None
     conductor: Conductor | None = None
     held: HeldCurrent | None = None
+    coupling: Coupling | None = None
 
 
-def joined_nodes(entries: Sequence[Entry]) -> ContactNodes:
+def joined_nodes(
+    entries: Sequence[Entry], index_map: IndexMap, free: NDArray[np.bool_]
+) -> ContactNodes:
     """Return the nodes of all entries, one entry after the other. Collective.
+
+    Parameters
+    ----------
+    entries
+        The entries.
+    index_map, free
+        Nodes of the mesh, and which of their unknowns are not fixed.
 
     Raises
     ------
     InputError
-        If two entries share nodes.
+        If two entries share nodes, or a node is on both sides of pairs of bodies.
     """
+    nodes = _side_by_side(entries)
+    couplings = [entry.coupling for entry in entries if entry.coupling is not None]
+    return replace(nodes, links=make_links(nodes.comm, index_map, couplings, nodes.nodes, free))
+
+
+def _side_by_side(entries: Sequence[Entry]) -> ContactNodes:
     first = entries[0].nodes
     if len(entries) == 1:
         return first

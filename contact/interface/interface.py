@@ -15,6 +15,7 @@ from contact.interface.multipliers import Multipliers
 from contact.interface.nodes import ContactNodes
 from contact.interface.response import FoundationResponse
 from contact.interface.status import CLOSED, node_status, touching
+from contact.linear.change import Change
 from contact.typing import Array
 
 
@@ -131,6 +132,11 @@ class Interface:
         jump.transpose(jump.weight[:, None] * answer, residual)
         if self.held is not None:
             self.held.add_force(residual, x)
+
+    @property
+    def change(self) -> Change | None:
+        """The change of unknowns that makes the jumps unknowns; None where they are."""
+        return None if self.jump.links is None else self.jump.links.change
 
     @property
     def coupled(self) -> NDArray[np.int32]:

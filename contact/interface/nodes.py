@@ -13,6 +13,7 @@ import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
 
+from contact.interface.links import Links
 from contact.typing import Array
 
 
@@ -47,6 +48,9 @@ class ContactNodes:
         part; the gap of these nodes is 0 (length).
     revolved
         Whether the nodes stand for the rings through them, about the axis x = 0.
+    links
+        Jumps between bodies: what is opposite of contact nodes; None where all obstacles are
+        rigid.
     """
 
     comm: MPI.Comm
@@ -60,6 +64,7 @@ class ContactNodes:
     cut: float = 0.0
     revolved: bool = False
     motion: Array | None = None
+    links: Links | None = None
 
     @property
     def dim(self) -> int:
@@ -67,22 +72,32 @@ class ContactNodes:
         return self.normal.shape[1]
 
     def apply(self, x: Array) -> Array:
-        """Return the nodal unknowns of a local dof array, shape (n, block_size).
+        """Return the jumps, shape (n, block_size), of a local dof array. Collective.
 
-        They are relative to the foundation where that moves.
+        In front of a foundation at rest these are the nodal unknowns; they are relative to one
+        that moves.
         """
-        nodal = x[self.nodes[:, None] * self.block_size + np.arange(self.block_size)]
+        moving = 0 if self.motion is None else self.motion.shape[2]
+        values = x[: x.size - moving].reshape(-1, self.block_size)
+        nodal = values[self.nodes]
+        if self.links is not None:
+            nodal[self.links.places] = self.links.apply(values)
         if self.motion is None:
             return nodal
-        return nodal - self.motion @ x[x.size - self.motion.shape[2] :]
+        return nodal - self.motion @ x[x.size - moving :]
 
     def transpose(self, nodal: Array, into: Array) -> None:
         """Add nodal vectors of shape (n, d) or (n, block_size) to a local dof array.
 
-        The opposite ones act on the foundation. Collective where that moves.
+        The opposite ones act on the foundation where that moves, or on the other body. Collective.
         """
-        size = nodal.shape[1]
-        into[self.nodes[:, None] * self.block_size + np.arange(size)] += nodal
+        size, moving = nodal.shape[1], 0 if self.motion is None else self.motion.shape[2]
+        values = into[: into.size - moving].reshape(-1, self.block_size)[:, :size]
+        own = np.ones(self.nodes.size, dtype=bool)
+        if self.links is not None:
+            own[self.links.places] = False
+            self.links.transpose(nodal[self.links.places], values)
+        values[self.nodes[own]] += nodal[own]
         if self.motion is not None:
             total = np.einsum("ni,nim->m", nodal, self.motion[:, :size])
             into[into.size - total.size :] -= self.comm.allreduce(total, op=MPI.SUM)

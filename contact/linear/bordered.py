@@ -11,7 +11,7 @@ they belong to u and q, not to u^.
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 from mpi4py import MPI
@@ -170,10 +170,17 @@ class BorderedOperator:
         return shell(self, self._bulk.layout.comm, self._owned, self._bulk.free.size)
 
 
+class Multiplies(Protocol):
+    """What is known by its products."""
+
+    def multiply(self, values: Array) -> Array:
+        """Return the matrix times owned values and q. Collective."""
+
+
 class _Products:
     """The context of a matrix that is known by its products."""
 
-    def __init__(self, operator: BorderedOperator, packing: Packing) -> None:
+    def __init__(self, operator: Multiplies, packing: Packing) -> None:
         self._operator, self._packing = operator, packing
 
     def mult(self, _: Any, vector: PETSc.Vec, image: PETSc.Vec) -> None:
@@ -213,7 +220,7 @@ class Packing:
         return np.concatenate([own, self._comm.bcast(values[own.size :])])
 
 
-def shell(operator: BorderedOperator, comm: MPI.Intracomm, owned: int, size: int) -> PETSc.Mat:
+def shell(operator: Multiplies, comm: MPI.Intracomm, owned: int, size: int) -> PETSc.Mat:
     """Return a matrix that multiplies as an operator does."""
     packing = Packing(comm, size)
     local = owned + packing.here

@@ -160,6 +160,13 @@ class SparseOperator:
         """The matrix itself."""
         return self.matrix
 
+    def multiply(self, values: Array) -> Array:
+        """Return the matrix times owned values. Collective."""
+        vector, image = self.matrix.createVecs()
+        vector.array[:] = values
+        self.matrix.mult(vector, image)
+        return np.asarray(image.array)
+
     def update(self, kind: str, x: Array, blocks: Array, *, constant: bool = False) -> bool:
         """Assemble the operator at local unknowns. Collective.
 

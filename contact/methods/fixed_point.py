@@ -118,6 +118,7 @@ class FixedPoint:
         return self.problem.equilibrium.operator(
             self.problem.interface.coupled,
             self.problem.interface.jump.motion,
+            self.problem.interface.change,
             symmetric=symmetric,
             counters=self.counters,
             kind=self.options.linear,

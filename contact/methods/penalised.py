@@ -43,6 +43,7 @@ class PenalisedProblem:
         self.operator = self._body.operator(
             self._interface.coupled,
             self._interface.jump.motion,
+            self._interface.change,
             symmetric=symmetric,
             counters=counters,
             kind=options.linear,

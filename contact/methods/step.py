@@ -125,6 +125,7 @@ class WholeStep:
             self._operator = self.problem.equilibrium.operator(
                 interface.coupled,
                 interface.jump.motion,
+                interface.change,
                 symmetric=not asymmetric,
                 counters=self.counters,
                 kind=self.options.linear,

@@ -75,7 +75,7 @@ class ForceBalance:
     supports
         Reactions of the prescribed displacements, and of rigid parts.
     contact
-        What the foundation exerts on the body.
+        What the foundations exert on the body; between bodies it cancels.
     """
 
     applied: Array
@@ -175,7 +175,10 @@ def force_balance(problem: ContactProblem, state: State) -> ForceBalance:
     supports = np.where(problem.free[:, :d], 0.0, residual).sum(axis=0)
     stress = problem.interface.stress(problem.nodal(state), state.forces)
     given = body.nodal(body.external(state.time))[:, :d].sum(axis=0)
-    local = np.stack([given, supports, -problem.nodes.weight @ stress])
+    pushes = np.zeros_like(body.external(state.time))
+    problem.nodes.transpose(-problem.nodes.weight[:, None] * stress, pushes)
+    contact = body.nodal(pushes)[:, :d].sum(axis=0)
+    local = np.stack([given, supports, contact])
     total = problem.comm.allreduce(local, op=MPI.SUM)
     applied, supports, contact = problem.domain.resultant(total)
     return ForceBalance(applied, supports, contact)

@@ -15,10 +15,12 @@ from numpy.typing import NDArray
 
 from contact.interface.interface import Interface
 from contact.interface.multipliers import Multipliers
+from contact.linear.change import Change
 from contact.linear.dense import DenseOperator
 from contact.linear.operator import Bulk, Counters, balance, check_overflow, petsc_options
 from contact.linear.schur import SchurComplement
 from contact.problem.condensed_masters import CondensedMasters
+from contact.problem.condensed_pairs import CondensedPairs
 from contact.problem.problem import ContactProblem
 from contact.problem.scales import Scales
 from contact.problem.state import State
@@ -116,6 +118,7 @@ class CondensedBody:
         self,
         nodes: NDArray[np.int32],
         motion: Array | None = None,
+        change: Change | None = None,
         *,
         symmetric: bool,
         counters: Counters,
@@ -159,8 +162,11 @@ class Condensation:
         self.counters = counters
         self.nodes = full.interface.coupled
         self.turn_to(full)
-        self._masters = CondensedMasters.of(full.equilibrium, full.interface)
-        self._bulk: Bulk = full.equilibrium if self._masters is None else self._masters.bulk
+        body, change = full.equilibrium, full.interface.change
+        self._masters = CondensedMasters.of(body, full.interface)
+        self._bulk: Bulk = body if self._masters is None else self._masters.bulk
+        pairs = None if change is None else CondensedPairs(body, full.interface, change)
+        self._pairs = pairs
         self._matrix = full.equilibrium.create_matrix()
         self._kind = ""
         self._schur: SchurComplement | None = None
@@ -202,14 +208,19 @@ class Condensation:
                 self._stiffness = self._schur.factorise(self._matrix)
             if self._masters is not None:
                 self._stiffness = self._masters.eliminate(self._schur, self._stiffness)
+            if self._pairs is not None:
+                self._stiffness = self._pairs.eliminate(self._stiffness)
             self._kind = kind
             self.counters.factorizations += 1
         residual = body.internal_forces(state.x) - body.external(state.time)
         check_overflow(body.layout, self._matrix.norm(), body.norm(residual))
         reactions = body.norm(body.reactions(residual))
         forces = -self._schur.condense(body.layout.mask(-residual[: body.owned]))
+        begin = self._schur.offset
         if self._masters is not None:
             forces = self._masters.forces(forces, residual)
+        if self._pairs is not None:
+            begin, forces = self._pairs.offset, self._pairs.forces(forces)
         if not (np.isfinite(self._stiffness).all() and np.isfinite(forces).all()):
             return None
         at = self._at(state.x)
@@ -220,7 +231,7 @@ class Condensation:
             self._stiffness,
             forces,
             at,
-            slice(self._schur.offset, self._schur.offset + at.size),
+            slice(begin, begin + at.size),
             body.load_size(state.time) + reactions,
         )
         return CondensedProblem(condensed, self._interface, self.full.scales, state.time)
@@ -232,8 +243,10 @@ class Condensation:
         return np.concatenate([jump.apply(x), others]).ravel()
 
     def _kept(self) -> NDArray[np.int32]:
-        bs = self.full.equilibrium.block_size
-        return (self.nodes[:, None] * bs + np.arange(bs, dtype=np.int32)).ravel()
+        bs, nodes = self.full.equilibrium.block_size, self.nodes
+        if self._pairs is not None:
+            nodes = np.concatenate([nodes, self._pairs.nodes])
+        return (nodes[:, None] * bs + np.arange(bs, dtype=np.int32)).ravel()
 
     def expand(self, condensed: CondensedProblem, x: Array) -> Array:
         """Return the increment of the full problem's owned unknowns. Collective.
@@ -249,6 +262,8 @@ class Condensation:
         self.counters.linear_solves += 1
         moved = x - condensed.equilibrium.at
         everywhere = np.concatenate(self.full.comm.allgather(moved))
+        if self._pairs is not None:
+            everywhere = self._pairs.expand(everywhere)
         if self._masters is None:
             return self._schur.expand(everywhere)
         return self._masters.expand(self._schur, everywhere)
@@ -261,6 +276,6 @@ def _at_kept_nodes(interface: Interface) -> Interface:
     held = interface.held
     return replace(
         interface,
-        jump=replace(interface.jump, nodes=positions[:count], motion=None),
+        jump=replace(interface.jump, nodes=positions[:count], motion=None, links=None),
         held=None if held is None else replace(held, nodes=positions[count:]),
     )

@@ -30,6 +30,7 @@ from contact.interface.layer import Layer
 from contact.interface.multipliers import Multipliers
 from contact.interface.nodes import ContactNodes
 from contact.interface.obstacle import Obstacle
+from contact.interface.pairing import find_pair
 from contact.interface.placing import candidates, find_nodes
 from contact.interface.response import FoundationResponse
 from contact.mesh.domain import Domain
@@ -55,6 +56,9 @@ class Contact:
         Friction and electric contact; None for those that the problem is given for all.
     press
         Whether the obstacle may cut the body at rest, and presses it out.
+    against
+        The part of another body that it may touch, instead of a foundation, whose gap is then
+        added to that between the bodies; None for a rigid one.
     """
 
     on: str
@@ -63,6 +67,7 @@ class Contact:
     friction: Friction | None = None
     conductor: Conductor | None = None
     press: bool = False
+    against: str | None = None
 
 
 class ContactProblem:
@@ -158,10 +163,10 @@ class ContactProblem:
             self._entry("contact" if one else f"contact.{i}", contact)
             for i, contact in enumerate(self.contacts)
         )
-        found = joined_nodes(self.entries)
+        body = self.equilibrium
+        found = joined_nodes(self.entries, body.layout.index_map, body.free)
         layer, conductor = joined_layer(self.entries), joined_conductor(self.entries)
-        scale = self.equilibrium.phi_scale
-        response = FoundationResponse(found, layer, conductor, scale, stiffness)
+        response = FoundationResponse(found, layer, conductor, body.phi_scale, stiffness)
         friction, held = joined_friction(self.entries, found), joined_held(self.entries)
         return Interface(response.constrained, response, friction, held, stiffness, size)
 
@@ -169,7 +174,13 @@ class ContactProblem:
         if contact.layer is not None:
             contact.layer.check(self.domain.size)
         assert contact.friction is not None  # filled in above
-        nodes = find_nodes(self.equilibrium, contact.on, contact.foundation, key, contact.press)
+        body = self.equilibrium
+        if contact.against is not None:
+            sides = contact.on, contact.against
+            pair = find_pair(body, *sides, contact.foundation, key, contact.press)
+            laws = contact.friction, contact.layer, contact.conductor
+            return Entry(contact.on, pair.nodes, *laws, coupling=pair.coupling)
+        nodes = find_nodes(body, contact.on, contact.foundation, key, contact.press)
         held = self._held(key, contact, nodes)
         return Entry(contact.on, nodes, contact.friction, contact.layer, contact.conductor, held)
 

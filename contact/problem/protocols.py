@@ -12,6 +12,7 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 
 from contact.interface.interface import Interface
+from contact.linear.change import Change
 from contact.linear.operator import Counters, Operator
 from contact.problem.scales import Scales
 from contact.problem.state import State
@@ -84,12 +85,16 @@ class Equilibrium(Protocol):
         self,
         nodes: NDArray[np.int32],
         motion: Array | None = None,
+        change: Change | None = None,
         *,
         symmetric: bool,
         counters: Counters,
         kind: str,
     ) -> Operator:
-        """Return an operator with blocks at nodes, in front of which a foundation may move."""
+        """Return an operator with blocks at nodes.
+
+        A foundation may move in front of them, or a change of unknowns make them jumps.
+        """
 
     def norm(self, values: Array) -> float:
         """Return the Euclidean norm of owned values. Collective."""

@@ -125,6 +125,26 @@ def test_what_is_partly_covered_still_reproduces_linear_fields(dim, degree) -> N
     np.testing.assert_allclose(found.gap, 0.05, atol=1e-9)
 
 
+@pytest.mark.parametrize(("dim", "degree"), KINDS, ids=NAMES)
+def test_nodes_without_a_multiplier_hand_their_functions_over(dim, degree) -> None:
+    """At the rim none has one: constant pressures and constant fields still pass."""
+    slave, x = flat(dim, degree, 7, 1.0, 1.0, 1)
+    master, y = flat(dim, degree, 11, 1.1, -1.0, 2, FIRST)
+    rim = np.flatnonzero(np.any((x[:, :-1] < 1e-9) | (x[:, :-1] > 1 - 1e-9), axis=1))
+    found = couple(slave, master, 1.0, without=rim)
+    assert not np.isin(found.nodes, rim).any()
+    assert found.nodes.size == len(x) - rim.size
+    lonely = np.isin(slave.nodes, rim).all(axis=1)
+    assert found.weight.sum() == pytest.approx(1 - size_of(slave.corners)[lonely].sum())
+    np.testing.assert_allclose(found.own.sum(axis=1), 1, atol=1e-12)
+    np.testing.assert_allclose(found.other.sum(axis=1), 1, atol=1e-12)
+    jump = found.own @ x[found.slaves] - found.other @ y[found.masters - FIRST]
+    np.testing.assert_allclose(jump[:, :-1], 0, atol=1e-12)
+    if not lonely.any():
+        forces = found.other.T @ found.weight
+        np.testing.assert_allclose(forces, loads(master, found.masters), rtol=0, atol=3e-15)
+
+
 def test_clipped_triangles_have_the_area_in_common() -> None:
     """Against the share of random points that lie in both triangles."""
     rng = np.random.default_rng(0)

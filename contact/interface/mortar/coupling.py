@@ -34,6 +34,9 @@ from contact.typing import Array
 #: Nodes less than this share of whose function faces the master carry no multiplier.
 LEAST_COVERED = 1e-3
 
+#: No nodes.
+NOBODY: NDArray[np.int64] = np.zeros(0, dtype=np.int64)
+
 #: Facets less than this share of which faces the master are left out: rounding.
 LEAST_PIECE = 1e-9
 
@@ -49,7 +52,7 @@ class Coupling:
     nodes
         Global numbers of the slave nodes, shape (n,).
     weight
-        int N~_j over what faces the master, shape (n,) (length^(d - 1)).
+        int Phi_j over what faces the master, int N~_j, shape (n,) (length^(d - 1)).
     normal
         Mean unit normals out of the slave, shape (n, d).
     gap
@@ -82,7 +85,7 @@ class _Parts:
     """What the facets of one rank add, by slave facet and node: before it is summed up."""
 
     nodes: NDArray[np.int64]
-    weight: Array
+    own: Array
     whole: Array
     normal: Array
     gap: Array
@@ -96,7 +99,11 @@ class _Parts:
 
 
 def couple(
-    slave: Surface, master: Surface, reach: float, comm: MPI.Intracomm = MPI.COMM_SELF
+    slave: Surface,
+    master: Surface,
+    reach: float,
+    comm: MPI.Intracomm = MPI.COMM_SELF,
+    without: NDArray[np.int64] = NOBODY,
 ) -> Coupling:
     """Integrate the dual mortar operator. Collective.
 
@@ -110,12 +117,15 @@ def couple(
         Largest distance at which facets face each other (length).
     comm
         Communicator.
+    without
+        Global numbers of slave nodes that carry no multiplier: their functions go to the other
+        nodes of their facets, so that the multipliers still contain the constants.
     """
-    own = _integrate(slave, master, reach)
-    return _assembled(own.gathered(comm), slave.corners.shape[1], slave.degree, comm)
+    own = _integrate(slave, master, reach, without).gathered(comm)
+    return _assembled(own, slave.corners.shape[1], slave.degree, without)
 
 
-def _integrate(slave: Surface, master: Surface, reach: float) -> _Parts:
+def _integrate(slave: Surface, master: Surface, reach: float, without: NDArray[np.int64]) -> _Parts:
     degree = 2 if slave.degree == master.degree == 1 else 4
     found = [
         common_points(slave, master, i, j, degree) for i, j in facing_pairs(slave, master, reach)
@@ -130,9 +140,13 @@ def _integrate(slave: Surface, master: Surface, reach: float) -> _Parts:
         _add(mass, points.slave, points.weight[:, None, None] * n[:, :, None] * n[:, None, :])
         _add(weight, points.slave, points.weight[:, None] * n)
     faces = np.flatnonzero(weight.sum(axis=1) > LEAST_PIECE * size_of(slave.corners))
-    dual = np.zeros_like(mass)
+    dual: Array = np.zeros_like(mass)
     dual[faces] = weight[faces, :, None] * np.linalg.inv(mass[faces])
     weight[np.setdiff1d(np.arange(slave.count), faces)] = 0.0
+    handed = _handed_over(np.isin(slave.nodes, without))
+    dual = handed @ dual
+    own = handed * weight[:, None, :]
+    total = own.sum(axis=2)
     gap = np.zeros((slave.count, k))
     entries = []
     for points in found:
@@ -147,17 +161,25 @@ def _integrate(slave: Surface, master: Surface, reach: float) -> _Parts:
         if entries
         else (np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.int64), np.zeros(0))
     )
-    whole = _whole(slave, change)
+    whole = np.einsum("fij,fj->fi", handed, _whole(slave, change))
     return _Parts(
         slave.nodes,
-        weight,
+        own,
         whole,
-        weight[:, :, None] * slave.normal[:, None, :],
+        total[:, :, None] * slave.normal[:, None, :],
         gap[:, :, None] * slave.normal[:, None, :],
         rows,
         masters,
         values,
     )
+
+
+def _handed_over(gone: NDArray[np.bool_]) -> Array:
+    """Return what the functions of facets become where some give theirs away, shape (f, k, k)."""
+    kept = ~gone
+    heirs = kept / np.maximum(kept.sum(axis=1, keepdims=True), 1)
+    given = heirs[:, :, None] * gone[:, None, :]
+    return np.asarray(given + kept[:, :, None] * np.eye(gone.shape[1]))
 
 
 def _add(total: Array, index: NDArray[np.intp], values: Array) -> None:
@@ -193,7 +215,7 @@ def _whole(slave: Surface, change: Array) -> Array:
     return np.asarray(size_of(slave.corners)[:, None] * share)
 
 
-def _assembled(parts: _Parts, d: int, degree: int, comm: MPI.Intracomm) -> Coupling:
+def _assembled(parts: _Parts, d: int, degree: int, without: NDArray[np.int64]) -> Coupling:
     every, place = np.unique(parts.nodes, return_inverse=True)
     place = place.reshape(parts.nodes.shape)
 
@@ -202,17 +224,21 @@ def _assembled(parts: _Parts, d: int, degree: int, comm: MPI.Intracomm) -> Coupl
         np.add.at(total, place, values)
         return total
 
-    weight, whole = summed(parts.weight), summed(parts.whole)
+    weight, whole = summed(parts.own.sum(axis=2)), summed(parts.whole)
     covered = weight / np.where(whole > 0, whole, 1.0)
-    kept = np.flatnonzero(covered > LEAST_COVERED)
+    kept = np.flatnonzero((covered > LEAST_COVERED) & ~np.isin(every, without))
     normal = summed(parts.normal)[kept]
     normal = normal / np.linalg.norm(normal, axis=1)[:, None]
     mean = summed(parts.gap)[kept] / weight[kept, None]
     masters, columns = np.unique(parts.masters, return_inverse=True)
     rows = np.searchsorted(every, parts.rows)
     other = sparse.csr_array((parts.values, (rows, columns)), shape=(every.size, masters.size))
-    other = sparse.csr_array(sparse.diags_array(1 / weight[kept]) @ other[kept])
-    own = _own(place, every.size, positive_change(d, degree))[kept]
+    divide = sparse.diags_array(1 / weight[kept])
+    rows, columns = np.broadcast_arrays(place[:, :, None], place[:, None, :])
+    places = (rows.ravel(), columns.ravel())
+    dual = sparse.csr_array((parts.own.ravel(), places), shape=(every.size, every.size))[kept]
+    own = divide @ dual @ _own(place, every.size, positive_change(d, degree))
+    own.eliminate_zeros()
     return Coupling(
         every[kept],
         weight[kept],
@@ -222,7 +248,7 @@ def _assembled(parts: _Parts, d: int, degree: int, comm: MPI.Intracomm) -> Coupl
         every,
         sparse.csr_array(own),
         masters,
-        other,
+        sparse.csr_array(divide @ other[kept]),
     )
 
 

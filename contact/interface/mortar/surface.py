@@ -114,10 +114,9 @@ def _local_nodes(space: fem.FunctionSpace, degree: int) -> NDArray[np.intp]:
 def _outward(corners: Array, inside: Array) -> Array:
     """Return unit normals that point away from a point of the body, shape (f, d)."""
     edges = corners[:, 1:] - corners[:, :1]
-    if corners.shape[2] == 2:
-        across = np.column_stack([-edges[:, 0, 1], edges[:, 0, 0]])
-    else:
-        across = np.cross(edges[:, 0], edges[:, 1])
+    flat = corners.shape[2] == 2
+    turned = edges[:, 0, ::-1] * [-1.0, 1.0] if flat else np.cross(edges[:, 0], edges[:, 1])
+    across: Array = np.asarray(turned, dtype=float)
     normal = across / np.linalg.norm(across, axis=1)[:, None]
     away = np.einsum("fd,fd->f", normal, corners[:, 0] - inside)
     return np.asarray(normal * np.sign(away)[:, None])

@@ -1,0 +1,168 @@
+"""Contact nodes in front of another body: where they are, and what is opposite of them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from mpi4py import MPI
+from numpy.typing import NDArray
+
+from contact.body.equilibrium import BodyEquilibrium
+from contact.errors import InputError
+from contact.interface.mortar.coupling import NOBODY, Coupling, couple
+from contact.interface.mortar.surface import Surface, surface_of
+from contact.interface.nodes import ContactNodes
+from contact.interface.obstacle import Obstacle
+from contact.typing import Array
+
+#: Share of the mesh's extent up to which facets are taken to face each other.
+REACH = 0.25
+
+#: Depth, in lengths of facets, that the chords of two curved sides may reach into each other.
+CHORDS = 0.25
+
+#: Share of a node's area that should face the other side, else there is a warning.
+HALF = 0.5
+
+
+@dataclass(frozen=True)
+class Pair:
+    """Contact nodes of the slave side, and the mortar operator.
+
+    Attributes
+    ----------
+    nodes
+        Those that this rank owns.
+    coupling
+        The operator, the same on all ranks.
+    partly
+        How many nodes face the other side with less than half of their area.
+    """
+
+    nodes: ContactNodes
+    coupling: Coupling
+    partly: int
+
+
+def find_pair(
+    body: BodyEquilibrium,
+    part: str,
+    against: str,
+    distance: Obstacle,
+    key: str = "contact",
+    press: bool = False,
+) -> Pair:
+    """Collect the nodes of a part that may touch another one. Collective.
+
+    A node whose normal is fixed by a Dirichlet condition is left out, and its multiplier is
+    handed over to its neighbours; a fixed tangential component is removed from its tangent
+    projector.
+
+    Parameters
+    ----------
+    body, part, against
+        Whose nodes, and the part of the other body.
+    distance
+        Gap that is added to that between the meshes.
+    key
+        What messages call the contact.
+    press
+        Whether the bodies may overlap at rest, and press each other out.
+
+    Raises
+    ------
+    InputError
+        If the parts share nodes or overlap, follow what is rigid, do not face each other, or no
+        node can move.
+    """
+    domain, space, d = body.domain, body.space, body.dim
+    comm, index_map = domain.comm, space.dofmap.index_map
+    slave = surface_of(domain, space, part)
+    master = surface_of(domain, space, against).gathered(comm)
+    names = f"{part!r} and {against!r}"
+    common = np.intersect1d(slave.nodes, master.nodes).size
+    if comm.allreduce(common, op=MPI.SUM) > 0:
+        raise InputError(
+            f"{key}.against: the parts {names} share nodes; accepted: parts of two bodies whose "
+            "meshes are apart"
+        )
+    reach = REACH * domain.size
+    coupling = couple(slave, master, reach, comm)
+    begin, end = index_map.local_range
+    free = body.free
+    _check_apart(body, coupling, f"{key}.against: {names}")
+    stuck = _stuck(coupling, free, begin, end, comm)
+    if stuck.size:
+        coupling = couple(slave, master, reach, comm, stuck)
+    if coupling.nodes.size == 0:
+        raise InputError(
+            f"{key}.against: no facets of {names} face each other within {reach:.3g}, or their "
+            "nodes are held there; accepted: sides of two bodies that look at each other"
+        )
+    here = np.flatnonzero((coupling.nodes >= begin) & (coupling.nodes < end))
+    local = (coupling.nodes[here] - begin).astype(np.int32)
+    points = space.tabulate_dof_coordinates()[local, :d]
+    gap, cut = coupling.gap[here], 0.0
+    if not press:
+        gap, cut = _apart(gap, slave, comm, f"{key}.against: {names}", domain.size)
+    _, added = distance.measure(points, coupling.normal[here])
+    moves = free[local, :d]
+    admissible = coupling.normal[here] * moves
+    length = np.linalg.norm(admissible, axis=1)
+    direction = admissible / length[:, None]
+    tangent = -direction[:, :, None] * direction[:, None, :]
+    tangent[:, np.arange(d), np.arange(d)] += moves
+    nodes = ContactNodes(
+        comm,
+        local,
+        points,
+        coupling.weight[here],
+        direction,
+        tangent,
+        (gap + added) / length,
+        space.dofmap.index_map_bs,
+        cut,
+    )
+    return Pair(nodes, coupling, int(np.count_nonzero(coupling.covered < HALF)))
+
+
+def _check_apart(body: BodyEquilibrium, coupling: Coupling, what: str) -> None:
+    """Refuse nodes that follow something rigid or an electrode. Collective."""
+    begin, end = body.layout.index_map.local_range
+    taking = np.concatenate([coupling.slaves, coupling.masters])
+    here = taking[(taking >= begin) & (taking < end)] - begin
+    if body.comm.allreduce(bool(body.masters.tied[here].any()), op=MPI.LOR):
+        raise InputError(
+            f"{what}: their nodes follow a rigid part or an electrode of unknown potential; "
+            "accepted: parts apart from these"
+        )
+
+
+def _stuck(
+    coupling: Coupling, free: NDArray[np.bool_], begin: int, end: int, comm: MPI.Intracomm
+) -> NDArray[np.int64]:
+    """Return the slave nodes of all ranks whose normal is fixed. Collective."""
+    here = np.flatnonzero((coupling.nodes >= begin) & (coupling.nodes < end))
+    moves = free[coupling.nodes[here] - begin, : coupling.normal.shape[1]]
+    held = np.linalg.norm(coupling.normal[here] * moves, axis=1) <= 0.5
+    found = np.concatenate(comm.allgather(coupling.nodes[here[held]]))
+    return np.unique(np.concatenate([NOBODY, found]))
+
+
+def _apart(
+    gap: Array, slave: Surface, comm: MPI.Intracomm, what: str, size: float
+) -> tuple[Array, float]:
+    """Refuse bodies that overlap; return gaps >= 0, and the largest depth taken for 0. Collective.
+
+    Facets are chords of what is curved: those of two sides that lie on each other cut each other
+    by h^2/8 times the difference of the curvatures.
+    """
+    longest = comm.allreduce(2 * float(slave.radii.max(initial=0.0)), op=MPI.MAX)
+    cut = comm.allreduce(float(np.max(-gap, initial=0.0)), op=MPI.MAX)
+    if cut > CHORDS * longest:
+        raise InputError(
+            f"{what}: the bodies overlap at rest, by up to {cut:.3g}; accepted: meshes that are "
+            "apart or touch, but for what straight facets take off a curve"
+        )
+    return np.maximum(gap, 0.0), cut if cut > 1e-5 * size else 0.0

@@ -1,0 +1,148 @@
+"""Two blocks, one on the other, whose meshes do not match."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import basix.ufl
+import numpy as np
+import ufl
+from dolfinx import mesh as dmesh
+from mpi4py import MPI
+
+from contact.mesh.domain import Domain, from_mesh
+
+
+@dataclass(frozen=True)
+class Blocks:
+    """An upper block on a lower one, in the plane or in space.
+
+    Attributes
+    ----------
+    dim
+        2 or 3.
+    upper, lower
+        Cells along each edge, as along x and y and z.
+    jitter
+        How far inner nodes are moved, in lengths of cells.
+    grading
+        The exponent of the spacing along x.
+    turn
+        Angle by which both are turned (degrees).
+    gap
+        Between them.
+    """
+
+    dim: int = 2
+    upper: int = 3
+    lower: int = 4
+    jitter: float = 0.15
+    grading: float = 1.0
+    turn: float = 0.0
+    gap: float = 0.0
+
+    def domain(self, comm: MPI.Intracomm) -> Domain:
+        """Return the mesh with the parts `top`, `under`, `over`, `bottom` and sides."""
+        points, cells = self._cells()
+        name = "triangle" if self.dim == 2 else "tetrahedron"
+        element = basix.ufl.element("Lagrange", name, 1, shape=(self.dim,), dtype=np.float64)
+        first = cells if comm.rank == 0 else np.zeros((0, self.dim + 1), dtype=np.int64)
+        x = points if comm.rank == 0 else np.zeros((0, self.dim))
+        mesh = dmesh.create_mesh(comm, cells=first, x=x, e=ufl.Mesh(element))
+        d = self.dim
+        mesh.topology.create_connectivity(d - 1, d)
+        facets = dmesh.exterior_facet_indices(mesh.topology)
+        middle = dmesh.compute_midpoints(mesh, d - 1, facets)[:, :d]
+        to_cell = mesh.topology.connectivity(d - 1, d)
+        inside = dmesh.compute_midpoints(mesh, d, to_cell.array[to_cell.offsets[facets]])[:, d - 1]
+        height, up = middle[:, d - 1], inside > 1 + self.gap / 2
+
+        def near(value):
+            return np.abs(height - value) < 1e-9
+
+        parts = {
+            "top": near(2 + self.gap),
+            "bottom": near(0.0),
+            "under": near(1 + self.gap) & up,
+            "over": near(1.0) & ~up,
+            "left": np.abs(middle[:, 0]) < 1e-9,
+            "right": np.abs(middle[:, 0] - 1) < 1e-9,
+            "upper_left": (np.abs(middle[:, 0]) < 1e-9) & up,
+            "lower_left": (np.abs(middle[:, 0]) < 1e-9) & ~up,
+        }
+        if d == 3:
+            parts["front"] = np.abs(middle[:, 1]) < 1e-9
+            parts["back"] = np.abs(middle[:, 1] - 1) < 1e-9
+        count = mesh.topology.index_map(d).size_local
+        centre = dmesh.compute_midpoints(mesh, d, np.arange(count, dtype=np.int32))[:, d - 1]
+        regions = {"upper": np.flatnonzero(centre > 1), "lower": np.flatnonzero(centre < 1)}
+        domain = from_mesh(mesh, {n: facets[m] for n, m in parts.items()}, 2.0, regions)
+        angle = np.deg2rad(self.turn)
+        turned = mesh.geometry.x.copy()
+        mesh.geometry.x[:, 0] = np.cos(angle) * turned[:, 0] - np.sin(angle) * turned[:, d - 1]
+        mesh.geometry.x[:, d - 1] = np.sin(angle) * turned[:, 0] + np.cos(angle) * turned[:, d - 1]
+        return domain
+
+    def joined(self, comm: MPI.Intracomm) -> Domain:
+        """Return both as one body, where their meshes match."""
+        points, cells = self._cells()
+        _, first, number = np.unique(
+            np.round(points, 9), axis=0, return_index=True, return_inverse=True
+        )
+        name = "triangle" if self.dim == 2 else "tetrahedron"
+        element = basix.ufl.element("Lagrange", name, 1, shape=(self.dim,), dtype=np.float64)
+        cells = number.reshape(-1)[cells]
+        mesh = dmesh.create_mesh(comm, cells=cells, x=points[first], e=ufl.Mesh(element))
+        d = self.dim
+        parts = {
+            "top": lambda x: np.abs(x[d - 1] - 2) < 1e-9,
+            "bottom": lambda x: np.abs(x[d - 1]) < 1e-9,
+        }
+        return from_mesh(mesh, parts, 2.0)
+
+    @property
+    def axes(self) -> np.ndarray:
+        """The turned axes, a column each, shape (d, d)."""
+        angle, axes = np.deg2rad(self.turn), np.eye(self.dim)
+        c, s = np.cos(angle), np.sin(angle)
+        axes[np.ix_([0, -1], [0, -1])] = [[c, -s], [s, c]]
+        return axes
+
+    def _cells(self):
+        parts, cells, count = [], [], 0
+        for k, (n, low) in enumerate(((self.lower, 0.0), (self.upper, 1.0 + self.gap))):
+            x, c = self._block(n, np.random.default_rng(k))
+            x[:, -1] += low
+            parts.append(x)
+            cells.append(c + count)
+            count += len(x)
+        return np.concatenate(parts), np.concatenate(cells).astype(np.int64)
+
+    def _block(self, n, rng):
+        d = self.dim
+        grid = np.linspace(0, 1, n + 1)
+        axes = [grid**self.grading, *([grid] * (d - 1))]
+        x = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, d)
+        # Along the faces too, but not off them.
+        moves = rng.uniform(-self.jitter, self.jitter, x.shape) / n
+        x = x + np.where((x > 1e-9) & (x < 1 - 1e-9), moves, 0.0)
+        i = np.arange((n + 1) ** d).reshape((n + 1,) * d)
+        if d == 2:
+            a, b, c, e = (p.ravel() for p in (i[:-1, :-1], i[1:, :-1], i[:-1, 1:], i[1:, 1:]))
+            return x, np.concatenate([np.stack([a, b, e], 1), np.stack([a, e, c], 1)])
+        corner = {
+            (p, q, r): i[p : n + p, q : n + q, r : n + r].ravel()
+            for p in (0, 1)
+            for q in (0, 1)
+            for r in (0, 1)
+        }
+        paths = [(0, 1, 2), (0, 2, 1), (1, 0, 2), (1, 2, 0), (2, 0, 1), (2, 1, 0)]
+        cells = []
+        for path in paths:
+            at = [0, 0, 0]
+            vertices = [corner[tuple(at)]]
+            for axis in path:
+                at[axis] = 1
+                vertices.append(corner[tuple(at)])
+            cells.append(np.stack(vertices, 1))
+        return x, np.concatenate(cells)

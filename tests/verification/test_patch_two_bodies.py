@@ -1,0 +1,168 @@
+"""Patch tests of two bodies in contact: constant stresses pass through any pair of meshes."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+from scipy.spatial import cKDTree
+
+from contact.body.description import Body, Fixed, Load, Material
+from contact.interface.friction import Friction
+from contact.interface.obstacle import GapFunction
+from contact.methods.newton import Newton
+from contact.methods.options import NewtonOptions
+from contact.output.balances import force_balance
+from contact.output.fields import DerivedFields
+from contact.problem.problem import Contact, ContactProblem
+from contact.typing import Array
+from forms.hencky import Linear
+from forms.laws import ConstantCoefficient
+from tests.problems.blocks import Blocks
+from tests.problems.mechanics import constant
+
+COMM = MPI.COMM_WORLD
+KINDS = [(2, 1), (2, 2), (3, 1), (3, 2)]
+NAMES = [f"{d}d-P{p}" for d, p in KINDS]
+SIDES = {2: ("left", "right"), 3: ("left", "right", "front", "back")}
+NOTHING = GapFunction(lambda points: np.zeros(len(points)))
+
+
+class Linearly:
+    """One component of A x as a given displacement."""
+
+    def __init__(self, row: Array) -> None:
+        self._row = row
+
+    def numpy(self, points: Array) -> Array:
+        return points @ self._row
+
+    def ufl(self, x):
+        return sum(float(a) * x[i] for i, a in enumerate(self._row))
+
+
+def constants(values: Array) -> list:
+    return [constant(float(value), len(values)) for value in values]
+
+
+def blocks(dim: int, **more) -> Blocks:
+    upper, lower = (5, 8) if dim == 2 else (2, 3)
+    return Blocks(dim, upper, lower, **more)
+
+
+def solve(problem: ContactProblem, tolerance: float = 1e-13, condense: bool = True):
+    newton = Newton(problem, NewtonOptions(tolerance=tolerance, condense=condense))
+    state, outcome = newton.solve()
+    assert outcome.converged, outcome
+    return state
+
+
+def contact(on: str, against: str, mu: float = 0.0) -> Contact:
+    friction = Friction(ConstantCoefficient(mu)) if mu > 0 else Friction()
+    return Contact(on, NOTHING, friction=friction, against=against)
+
+
+PAIRS = [("under", "over"), ("over", "under")]
+
+
+@pytest.mark.parallel
+@pytest.mark.parametrize("condense", [True, False], ids=["dense", "sparse"])
+@pytest.mark.parametrize("pair", PAIRS, ids=["upper", "lower"])
+@pytest.mark.parametrize(("dim", "degree"), KINDS, ids=NAMES)
+def test_constant_pressure(dim: int, degree: int, pair: Sequence[str], condense: bool) -> None:
+    """A hundred times stiffer below, either side the slave: the pressure is that on top."""
+    domain = blocks(dim, grading=1.4).domain(COMM)
+    zero = constant(0.0, dim)
+    fixed = [
+        Fixed(part, [zero if i == axis else None for i in range(dim)])
+        for part, axis in (("bottom", dim - 1), ("left", 0), ("front", 1))[:dim]
+    ]
+    laws = {"upper": Linear(1.0, 0.3), "lower": Linear(100.0, 0.2)}
+    materials = [Material(law, on=(name,)) for name, law in laws.items()]
+    load = Load("top", pressure=constant(0.01, dim))
+    body = Body.piecewise(materials, fixed, [load])
+    problem = ContactProblem(domain, body, contact(*pair), degree=degree)
+    state = solve(problem, condense=condense)
+    np.testing.assert_allclose(state.forces.pressure, 0.01, rtol=1e-12)
+    stress = DerivedFields(problem.equilibrium, state.x).cells()["stress"].x.array.reshape(-1, 9)
+    k = 4 * (dim - 1)
+    np.testing.assert_allclose(stress[:, k], -0.01, rtol=1e-10)
+    assert force_balance(problem, state).imbalance < 1e-12
+
+
+@pytest.mark.parallel
+@pytest.mark.parametrize("turn", [0.0, 30.0], ids=["straight", "turned"])
+@pytest.mark.parametrize("pair", PAIRS, ids=["upper", "lower"])
+@pytest.mark.parametrize(("dim", "degree"), KINDS, ids=NAMES)
+def test_constant_stress_with_shear(
+    dim: int, degree: int, pair: Sequence[str], turn: float
+) -> None:
+    """Under full stick two bodies carry any constant stress, as one body does."""
+    given = blocks(dim, turn=turn)
+    law, axes = Linear(1.0, 0.3), given.axes
+    strain = np.diag([0.002, 0.001, -0.01][-dim:]) + 0.002 * (1 - np.eye(dim))
+    strain = axes @ strain @ axes.T
+    across = law.bulk - 2 * law.shear / 3
+    stress = across * np.trace(strain) * np.eye(dim) + 2 * law.shear * strain
+    linear = [Linearly(row) for row in strain]
+    outward = {"left": -axes[:, 0], "right": axes[:, 0], "top": axes[:, -1]}
+    outward |= {"front": -axes[:, 1], "back": axes[:, 1]}
+    loads = [Load(part, constants(stress @ outward[part])) for part in ("top", *SIDES[dim])]
+    body = Body(law, [Fixed("bottom", linear)], loads)
+    problem = ContactProblem(given.domain(COMM), body, contact(*pair, mu=2.0), degree=degree)
+    state = solve(problem, 1e-12)
+    x = problem.equilibrium.space.tabulate_dof_coordinates()[:, :dim]
+    np.testing.assert_allclose(state.x.reshape(-1, dim), x @ strain.T, rtol=0, atol=1e-12)
+    traction = -problem.nodes.normal @ stress
+    vectors = state.forces.vectors(problem.nodes)
+    np.testing.assert_allclose(vectors, traction, rtol=0, atol=1e-11)
+
+
+# A triangle with all of its nodes on the rim has nobody to hand its functions over to.
+RIMS = [(*kind, pair) for kind in KINDS for pair in PAIRS if (*kind, pair) != (3, 1, PAIRS[0])]
+
+
+@pytest.mark.parallel
+@pytest.mark.parametrize(("dim", "degree", "pair"), RIMS)
+def test_a_rim_that_is_held_carries_no_multiplier(
+    dim: int, degree: int, pair: Sequence[str]
+) -> None:
+    """All of the outer boundary follows a linear field: the functions of the rim go inwards."""
+    given = blocks(dim)
+    law = Linear(1.0, 0.3)
+    strain = np.diag([0.002, 0.001, -0.01][-dim:]) + 0.002 * (1 - np.eye(dim))
+    linear = [Linearly(row) for row in strain]
+    fixed = [Fixed(part, linear) for part in ("top", "bottom", *SIDES[dim])]
+    body = Body(law, fixed)
+    problem = ContactProblem(given.domain(COMM), body, contact(*pair, mu=2.0), degree=degree)
+    # The rim has no jump of its own, and the gap of the others is that of the linear field.
+    state = solve(problem, 1e-12)
+    x = problem.equilibrium.space.tabulate_dof_coordinates()[:, :dim]
+    np.testing.assert_allclose(state.x.reshape(-1, dim), x @ strain.T, rtol=0, atol=1e-12)
+
+
+@pytest.mark.parametrize(("dim", "degree"), KINDS, ids=NAMES)
+def test_matching_meshes_are_one_body(dim: int, degree: int) -> None:
+    """Tied by friction along matching meshes, two blocks bend as one does."""
+    n = 5 if dim == 2 else 2
+    given = Blocks(dim, n, n, jitter=0.0)
+    zero = constant(0.0, dim)
+    load = Load("top", constants(np.array([3e-4, *[0.0] * (dim - 2), -0.01])))
+    body = Body(Linear(1.0, 0.3), [Fixed("bottom", [zero] * dim)], [load])
+    two = ContactProblem(
+        given.domain(MPI.COMM_SELF), body, contact("under", "over", 50.0), degree=degree
+    )
+    state = solve(two, 1e-12)
+    assert (state.forces.pressure > 0).all()
+    joined = given.joined(MPI.COMM_SELF)
+    far = GapFunction(lambda points: np.full(len(points), 1e3))
+    one = ContactProblem(joined, body, Contact("top", far), degree=degree)
+    alone = solve(one, 1e-12)
+    spaces = [problem.equilibrium.space for problem in (two, one)]
+    points, others = (space.tabulate_dof_coordinates()[:, :dim] for space in spaces)
+    distance, nearest = cKDTree(others).query(points)
+    assert distance.max() < 1e-12
+    values, expected = state.x.reshape(-1, dim), alone.x.reshape(-1, dim)
+    np.testing.assert_allclose(values, expected[nearest], rtol=0, atol=1e-10 * np.abs(values).max())
