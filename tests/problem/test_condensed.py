@@ -146,7 +146,7 @@ def test_where_the_body_is_condensed(monkeypatch):
     assert condenses(problem)
     assert condenses(problem, "lu")
     assert not condenses(problem, "iterative")
-    monkeypatch.setattr(condensed, "LARGEST", 10)
+    monkeypatch.setattr(condensing, "LARGEST", 10)
     assert not condenses(problem)
 
 
