@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
@@ -11,6 +12,7 @@ import numpy as np
 from contact.errors import InputError
 from contact.methods.every import METHODS
 from contact.methods.interrupt import stop_on_signal
+from contact.methods.method import Method
 from contact.methods.options import NewtonOptions, Options
 from contact.methods.report import History, Monitor, Outcome
 from contact.methods.steps import Evolution, LoadStep
@@ -19,8 +21,11 @@ from contact.output.review import announce
 from contact.output.solution import Solution
 from contact.output.steps import StepRecorder
 from contact.problem.held import check_potential
+from contact.problem.kkt import evaluate
 from contact.problem.problem import ContactProblem
 from contact.problem.state import State
+
+logger = logging.getLogger("contact.solve")
 
 
 class NotConvergedError(RuntimeError):
@@ -92,6 +97,7 @@ def solve_steps(
     monitor: Monitor | None = None,
     begin: float = 0.0,
     keep: Callable[[StepRecord], None] | None = None,
+    kept: Sequence[StepRecord] = (),
 ) -> Solution:
     """Solve a problem in steps, and keep what there is to say of each. Collective.
 
@@ -106,6 +112,8 @@ def solve_steps(
         Time at rest.
     keep
         Told of every step.
+    kept
+        The records of an earlier run's steps, to go on from.
 
     Returns
     -------
@@ -117,13 +125,14 @@ def solve_steps(
         If a linear system is singular, or the potential is not determined.
     """
     clock = time.perf_counter()
-    history, records = History(), []
-    last: LoadStep | None = None
+    history, records = History(), list(kept)
     with stop_on_signal(problem.comm, monitor) as stop:
         method = METHODS[settings.method](problem, in_steps(settings), stop)
         setup = time.perf_counter() - clock
-        recorder = StepRecorder(problem)
-        for step in Evolution(problem, method).run(times, begin):
+        recorder = StepRecorder(problem, records[-1] if records else None)
+        states = [record.state for record in records[-1:-3:-1]]
+        step: LoadStep | None = None
+        for step in Evolution(problem, method, *states).run(times, begin):
             note = f"t = {step.problem.time:g}"
             history.records += [
                 replace(record, note=f"{note} {record.note}".strip())
@@ -131,38 +140,53 @@ def solve_steps(
             ]
             if not step.outcome.converged:
                 break
-            last = step
             records.append(recorder.record(step))
             if keep is not None:
                 keep(records[-1])
-    reached = begin if last is None else last.problem.time
-    end = step if last is None else last
-    check_potential(end.problem, end.state)
+            logger.info("%s of %g", note, times[-1])
+    here, state = _end(problem, records, step)
+    check_potential(here, state)
     solution = Solution(
-        problem=end.problem,
-        state=end.state,
-        outcome=_outcome(step, reached, times[-1]),
+        problem=here,
+        state=state,
+        outcome=_outcome(here, state, step, method, times[-1]),
         history=history,
         counters=method.counters,
         method=settings.method,
-        start="rest" if last is None else "the step before",
+        start="the step before" if records else "rest",
         seconds={"setup": setup, "solve": time.perf_counter() - clock - setup, "output": 0.0},
         steps=records,
     )
-    if recorder.unloaded > 0:
+    if records and records[-1].unloaded > 0:
         solution.warnings.append(
-            f"{recorder.unloaded:.1%} of the body unload from beyond the yield strain in a step: "
-            "Hencky's law is nonlinear elasticity, and they come back the way they went; a metal "
-            "would keep a part of its strain"
+            f"{records[-1].unloaded:.1%} of the body unload from beyond the yield strain in a "
+            "step: Hencky's law is nonlinear elasticity, and they come back the way they went; a "
+            "metal would keep a part of its strain"
         )
     announce(solution)
     return solution
 
 
-def _outcome(step: LoadStep, reached: float, end: float) -> Outcome:
-    """Say how an evolution ended: with its last step, or where that has failed."""
+def _end(
+    problem: ContactProblem, records: Sequence[StepRecord], step: LoadStep | None
+) -> tuple[ContactProblem, State]:
+    """Return the last step that is complete; what the first one has come to, if none is."""
+    if not records:
+        assert step is not None  # there is one step at least
+        return step.problem, step.state
+    state = records[-1].state
+    return problem.at(state.time, state.history), state
+
+
+def _outcome(
+    problem: ContactProblem, state: State, step: LoadStep | None, method: Method, end: float
+) -> Outcome:
+    """Say how an evolution ended: with its last step, or where that has failed. Collective."""
+    if step is None:  # all were there already
+        return Outcome(evaluate(problem, state), method.options.allowed)
     if step.outcome.converged:
         return step.outcome
+    reached = problem.time if state is not step.state else 0.0
     words = f"the steps end at t = {reached:g} of {end:g}"
     ended = f"{words}: {step.outcome.ended or f'the one to {step.problem.time:g} fails'}"
     return replace(step.outcome, ended=ended)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -11,7 +10,7 @@ from mpi4py import MPI
 
 from contact.build import build_problem, named
 from contact.case.file import Case, load_case
-from contact.case.text import to_toml
+from contact.case.text import anchored, to_toml
 from contact.evolving import solve_steps
 from contact.methods.every import METHODS
 from contact.methods.interrupt import stop_on_signal
@@ -20,7 +19,7 @@ from contact.methods.options import NewtonOptions, Options
 from contact.methods.report import Monitor
 from contact.methods.steps import solve_step
 from contact.nesting import coarse_solution
-from contact.output.record import StepRecord
+from contact.output.resume import Checkpoints, read_steps
 from contact.output.review import announce
 from contact.output.solution import Solution
 from contact.problem.held import check_potential
@@ -33,7 +32,8 @@ def solve(
     settings: Options | None = None,
     monitor: Monitor | None = None,
     comm: MPI.Intracomm = MPI.COMM_WORLD,
-    keep: Callable[[StepRecord], None] | None = None,
+    folder: Path | None = None,
+    restart: Path | None = None,
     **replacements: Any,
 ) -> Solution:
     """Build and solve a case, in steps if it says so. Collective.
@@ -48,8 +48,10 @@ def solve(
         Told of every outer iteration.
     comm
         Communicator of the mesh.
-    keep
-        Told of every step of an evolution.
+    folder
+        Where checkpoints of an evolution's steps are kept until its results are written.
+    restart
+        A folder with checkpoints of the same case, to go on from.
     replacements
         Objects that take the place of parts of the case; see `build.build_problem`.
 
@@ -70,8 +72,13 @@ def solve(
         if case.evolution is None:
             solution = solve_problem(problem, settings, monitor, start)
         else:
-            times = case.evolution.ends
-            solution = solve_steps(problem, times, settings, monitor, case.evolution.times[0], keep)
+            kept = [] if restart is None else read_steps(restart, problem)
+            keep = None
+            if folder is not None:
+                here = restart is not None and restart.samefile(folder)
+                keep = Checkpoints(folder, problem, to_toml(anchored(case)), kept, here).keep
+            times, rest = case.evolution.ends, case.evolution.times[0]
+            solution = solve_steps(problem, times, settings, monitor, rest, keep, kept)
     solution.title, solution.output = case.title, case.output
     if not replacements:
         solution.case = to_toml(case)

@@ -5,11 +5,20 @@ from __future__ import annotations
 import json
 import re
 from collections.abc import Iterator, Mapping
+from pathlib import Path
 from typing import Any
 
 from contact.case.file import Case
 
 _BARE = re.compile(r"[A-Za-z0-9_-]+")
+
+
+def anchored(case: Case) -> Case:
+    """Return the same case with the whole path of its mesh file, to be read from anywhere."""
+    if case.mesh.file is None:
+        return case
+    mesh = case.mesh.model_copy(update={"file": str(Path(case.mesh.file).resolve())})
+    return case.model_copy(update={"mesh": mesh})
 
 
 def to_toml(case: Case) -> str:

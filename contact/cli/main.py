@@ -74,7 +74,8 @@ def _parser() -> _Parser:
     ):
         command = commands.add_parser(name, help=text, description=text, **common)
         command.usage = f"contact {name} CASE.toml [options] [PETSc options]"
-        command.add_argument("case", metavar="CASE.toml", help="case file")
+        optional: dict[str, Any] = {"nargs": "?"} if name == "solve" else {}
+        command.add_argument("case", metavar="CASE.toml", help="case file", **optional)
         command.add_argument(
             "--set",
             action="append",
@@ -87,7 +88,13 @@ def _parser() -> _Parser:
             command.usage = f"contact {name} CASE.toml --out DIR [options] [PETSc options]"
             command.epilog = summary_help()
             command.formatter_class = argparse.RawDescriptionHelpFormatter
-            command.add_argument("--out", required=True, metavar="DIR", help="folder for results")
+            command.add_argument("--out", metavar="DIR", help="folder for results")
+            command.add_argument(
+                "--restart",
+                metavar="DIR",
+                help="go on with an evolution that was ended, from the checkpoints in DIR: the "
+                "case is known, and the results go there too unless told otherwise",
+            )
             command.add_argument("--plot", action="store_true", help="draw the figures too")
             command.add_argument("--quiet", action="store_true", help="show no progress")
             command.add_argument("--log", metavar="FILE", help="write a log to the end of a file")
@@ -143,27 +150,55 @@ def _check_cache() -> None:
         ) from None
 
 
+def _load(options: argparse.Namespace) -> Case:
+    """Read the case, of an interrupted run too. On one rank."""
+    from contact.case.file import load_case  # after PETSc's options
+
+    if options.command != "solve" or options.restart is None:
+        if options.case is None:
+            raise InputError("CASE.toml: missing; accepted: a case file, or --restart DIR")
+        return load_case(options.case, options.set)
+    from contact.case.text import anchored, to_toml
+    from contact.output.rerun import check_restart
+    from contact.output.resume import case_of
+
+    folder = Path(options.restart)
+    stored = case_of(folder)
+    case = load_case(options.case or stored, options.set)
+    check_restart(folder, to_toml(load_case(stored)), to_toml(anchored(case)))
+    return case
+
+
 def _solve(case: Case, options: argparse.Namespace, comm: MPI.Intracomm) -> int:
-    if not options.out:  # the present folder is "."; this is rather a variable that is not set
+    out = options.restart if options.out is None else options.out
+    if out is None:
+        raise InputError("--out: missing; accepted: a folder to write to")
+    if not out:  # the present folder is "."; this is rather a variable that is not set
         raise InputError('--out "": no folder; accepted: a folder to write to')
+    restart = None if options.restart is None else Path(options.restart)
     # Not earlier: these load dolfinx, which PETSc's options have to precede.
     from contact.case.text import to_toml
     from contact.cli.progress import progress
     from contact.output.files import write_outputs
+    from contact.output.resume import discard
     from contact.solving import solve
 
-    with result_folder(options.out, comm) as folder:
+    with result_folder(out, comm) as folder:
         if not options.overwrite:
             on_root(comm, lambda: check_rerun(folder.path, to_toml(case)))
         with progress(comm, options.quiet, options.log) as monitor:
-            solution = solve(case, monitor=monitor, comm=comm)
+            solution = solve(case, monitor=monitor, comm=comm, folder=folder.path, restart=restart)
             logging.getLogger("contact").debug(solution.outcome.reason)
+        outcome = solution.outcome
+        if outcome.signal and not solution.begun:
+            raise Terminated if outcome.signal == signal.SIGTERM else KeyboardInterrupt
         # What has taken long to compute is written, signal or not.
         with signals_held(PATIENCE) as caught:
             write_outputs(solution, folder, figures=options.plot)
+            if outcome.converged:
+                on_root(comm, lambda: discard(folder.path))
             number = comm.allreduce(caught[0] if caught else 0, op=MPI.MAX)
             caught.clear()
-    outcome = solution.outcome
     if comm.rank == 0 and not (options.quiet and outcome.converged):
         state = "converged" if outcome.converged else "stopped"
         text = f"{state}: {outcome.reason}; results in {folder.path}"
@@ -218,9 +253,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
                 petsc4py.init([sys.argv[0], *_own_options(), *petsc])
                 if options.command in OTHERS:
                     return OTHERS[options.command](options, comm)
-                from contact.case.file import load_case  # after PETSc's options
-
-                case = on_root(comm, lambda: load_case(options.case, options.set))
+                case = on_root(comm, lambda: _load(options))
                 import_module("contact.solving")
                 on_root(comm, _check_cache)
             return {"solve": _solve, "check": _check}[options.command](case, options, comm)

@@ -25,9 +25,12 @@ class StepRecord:
         The contact nodes, as `table.contact_table` returns them; None on ranks other than 0.
     enthalpy
         What the energy balance of the next step begins with, see `problem.energy.Moment`.
+    unloaded
+        Largest share of the body that has unloaded from beyond yield in a step so far.
     """
 
     state: State
     row: Mapping[str, float]
     table: Mapping[str, NDArray[Any]] | None
     enthalpy: float
+    unloaded: float = 0.0

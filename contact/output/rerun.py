@@ -55,6 +55,30 @@ def check_rerun(folder: Path, case: str) -> None:
     )
 
 
+def check_restart(folder: Path, before: str, case: str) -> None:
+    """Refuse to go on with another case than the one that was interrupted.
+
+    Parameters
+    ----------
+    folder
+        The folder of the interrupted run.
+    before, case
+        Its case and the one at hand, as `contact check` prints them.
+
+    Raises
+    ------
+    InputError
+        If they differ in more than in how they are solved and shown.
+    """
+    there, here = (_without(tomllib.loads(text)) for text in (before, case))
+    place = next(_differences(there, here), None)
+    if place is not None:
+        raise InputError(
+            f"--restart {folder}: given checkpoints of another case: there {place}; accepted: the "
+            "same case, solved and shown as you like"
+        )
+
+
 def _without(case: Mapping[str, Any]) -> dict[str, Any]:
     return {key: value for key, value in case.items() if key not in MANNER}
 

@@ -87,6 +87,11 @@ class Solution:
     steps: list[StepRecord] = field(default_factory=list)
 
     @property
+    def begun(self) -> bool:
+        """Whether there is more than the start: an iteration, or a step of an earlier run."""
+        return bool(self.history.records or self.steps)
+
+    @property
     def converged(self) -> bool:
         """Whether all residuals are below the tolerance."""
         return self.outcome.converged

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -31,13 +32,18 @@ class StepRecorder:
     ----------
     problem
         The problem of the evolution.
-    before
-        Where it begins; at rest by default.
+    last
+        The record to go on from; from rest by default. Collective.
     """
 
-    def __init__(self, problem: ContactProblem, before: Moment | None = None) -> None:
-        self._before = before or Moment.rest(problem)
+    def __init__(self, problem: ContactProblem, last: StepRecord | None = None) -> None:
+        self._before = Moment.rest(problem)
+        if last is not None:
+            here = problem.at(last.state.time, last.state.history)
+            self._before = moment(here, last.state, self._before)
+            self._before = replace(self._before, enthalpy=last.enthalpy)
         self._unloading = Unloading(problem, self._before.x)
+        self._unloading.share = 0.0 if last is None else last.unloaded
         self._driven = driven_part(problem)
         self._nodes = None if self._driven is None else _nodes_of(problem, self._driven)
 
@@ -56,7 +62,7 @@ class StepRecorder:
         solution = solution_of(step)
         table = contact_table(solution)
         row = self._row(step, solution, table, energies, now)
-        return StepRecord(state, row, table, now.enthalpy)
+        return StepRecord(state, row, table, now.enthalpy, self._unloading.share)
 
     def _row(
         self,

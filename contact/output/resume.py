@@ -1,0 +1,265 @@
+"""Checkpoints of an evolution: what each step has left, for a run on any number of ranks to go on.
+
+A file a step, written under another name and renamed when it is whole: whatever ends a run, the
+steps before remain. Nodes are found again by where they are, on other ranks too.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from dolfinx import fem
+from dolfinx.la import InsertMode
+from mpi4py import MPI
+from numpy.typing import NDArray
+from scipy.spatial import cKDTree
+
+from contact import _compat
+from contact.errors import InputError
+from contact.interface.history import SlipHistory
+from contact.interface.multipliers import Multipliers
+from contact.output.folder import on_root
+from contact.output.record import StepRecord
+from contact.problem.problem import ContactProblem
+from contact.problem.state import State
+from contact.typing import Array
+
+#: Folder of the checkpoints in that of the results, that of a run which has not ended a step yet,
+#: and the case in it.
+FOLDER, FRESH, CASE = "checkpoints", "checkpoints.new", "case.toml"
+_NODES = "nodes.npz"
+#: How near a node has to be to where it was, over the size of the body.
+_NEAR = 1e-9
+
+
+class Checkpoints:
+    """The checkpoints that a run writes. Collective.
+
+    Parameters
+    ----------
+    folder
+        The folder of the results.
+    problem
+        The problem of the evolution.
+    case
+        The case, as `contact check` prints it.
+    kept
+        Records of earlier steps. Where those are already in the folder, the next one follows
+        them; else they are written there first.
+    here
+        Whether they are.
+    """
+
+    def __init__(
+        self,
+        folder: Path,
+        problem: ContactProblem,
+        case: str,
+        kept: Sequence[StepRecord] = (),
+        here: bool = False,
+    ) -> None:
+        self._folder, self._problem, self._case = folder, problem, case
+        self._count, self._fresh = 0, not here
+        if here:
+            self._count, self._where = len(kept), _where(folder, problem)
+            return
+        points = _places(problem)
+        sizes = problem.comm.allgather(len(points))
+        begin = sum(sizes[: problem.comm.rank])
+        #: Where the owned nodes stand in the files.
+        self._where = np.arange(begin, begin + len(points))
+        gathered = problem.comm.gather(points)
+        on_root(problem.comm, lambda: self._begin(np.concatenate(gathered or [points])))
+        for record in kept:
+            self._gather(record)
+
+    def _begin(self, points: Array) -> None:
+        fresh = self._folder / FRESH
+        shutil.rmtree(fresh, ignore_errors=True)
+        fresh.mkdir()
+        (fresh / CASE).write_text(self._case, encoding="utf-8")
+        _save(fresh / _NODES, {"points": points})
+
+    def keep(self, record: StepRecord) -> None:
+        """Write the checkpoint of the next step; the first replaces those of an earlier run."""
+        self._gather(record)
+        if self._fresh:
+            on_root(self._problem.comm, self._settle)
+        self._fresh = False
+
+    def _settle(self) -> None:
+        shutil.rmtree(self._folder / FOLDER, ignore_errors=True)
+        os.rename(self._folder / FRESH, self._folder / FOLDER)
+
+    def _gather(self, record: StepRecord) -> None:
+        self._count += 1
+        problem, state = self._problem, record.state
+        body, contact = problem.equilibrium, problem.nodes.nodes
+        history = state.history or SlipHistory.rest(problem.nodes)
+        nodal = [
+            state.forces.pressure[:, None],
+            state.forces.friction,
+            history.jump,
+            history.accumulated[:, None],
+        ]
+        values = {
+            "where": self._where,
+            "x": state.x[: body.owned].reshape(-1, body.block_size),
+            "contact": self._where[contact],
+            "nodal": np.concatenate(nodal, axis=1),
+        }
+        gathered = {name: problem.comm.gather(own) for name, own in values.items()}
+        on_root(problem.comm, lambda: self._write(record, gathered))
+
+    def _write(self, record: StepRecord, gathered: Mapping[str, Any]) -> None:
+        joined = {name: np.concatenate(parts) for name, parts in gathered.items()}
+        x = np.empty_like(joined["x"])
+        x[joined["where"]] = joined["x"]
+        said = {"t": record.state.time, "enthalpy": record.enthalpy, "unloaded": record.unloaded}
+        arrays = {
+            "x": x,
+            "contact": joined["contact"],
+            "nodal": joined["nodal"],
+            "said": np.array(json.dumps(said)),
+            "row": np.array(json.dumps(dict(record.row))),
+        }
+        arrays |= {f"table {name}": column for name, column in (record.table or {}).items()}
+        place = self._folder / (FRESH if self._fresh else FOLDER)
+        _save(place / _name(self._count), arrays)
+
+
+def read_steps(folder: Path, problem: ContactProblem) -> list[StepRecord]:
+    """Return the records of all steps that a run has left in a folder. Collective.
+
+    Raises
+    ------
+    InputError
+        If there are none, or they belong to another mesh.
+    """
+    where = _where(folder, problem)
+    files: list[Path] = on_root(problem.comm, lambda: _files(folder))
+    return [_read(problem, path, where) for path in files]
+
+
+def _where(folder: Path, problem: ContactProblem) -> NDArray[np.intp]:
+    """Return where the owned nodes stand in the files of a folder. Collective."""
+    comm, mine = problem.comm, _places(problem)
+    points = on_root(comm, lambda: _load(_files(folder)[0].parent / _NODES)["points"])
+    where = np.zeros(len(mine), dtype=np.intp)
+    fits = points.shape == (comm.allreduce(len(mine), op=MPI.SUM), mine.shape[1])
+    if fits and len(mine):
+        distance, where = cKDTree(points).query(mine)
+        fits = bool(distance.max() <= _NEAR * problem.domain.size)
+    if not comm.allreduce(fits, op=MPI.LAND):
+        raise InputError(
+            f"--restart {folder}: given checkpoints of another mesh; accepted: those of the same "
+            "case"
+        )
+    return where
+
+
+def _read(problem: ContactProblem, path: Path, where: NDArray[np.intp]) -> StepRecord:
+    table = None
+    arrays = on_root(problem.comm, lambda: _load(path))
+    if problem.comm.rank == 0:
+        table = {
+            name.removeprefix("table "): column
+            for name, column in arrays.items()
+            if name.startswith("table ")
+        }
+    order = np.argsort(arrays["contact"])
+    own = np.searchsorted(arrays["contact"], where[problem.nodes.nodes], sorter=order)
+    nodal, d = arrays["nodal"][order[own]], problem.dim
+    pressure, friction, jump, accumulated = np.split(nodal, [1, 1 + d, 1 + 2 * d], axis=1)
+    said = json.loads(str(arrays["said"]))
+    state = State(
+        problem.equilibrium.local(arrays["x"][where].ravel()),
+        Multipliers(pressure[:, 0].copy(), friction.copy()),
+        said["t"],
+        SlipHistory(jump.copy(), accumulated[:, 0].copy()),
+    )
+    row = json.loads(str(arrays["row"]))
+    return StepRecord(state, row, table, said["enthalpy"], said["unloaded"])
+
+
+def case_of(folder: Path) -> Path:
+    """Return where the case of an interrupted evolution stands. On one rank.
+
+    Raises
+    ------
+    InputError
+        If there is none.
+    """
+    return _files(folder)[0].parent / CASE
+
+
+def discard(folder: Path) -> None:
+    """Remove the checkpoints of a run that has come to its end. On one rank."""
+    for name in (FOLDER, FRESH):
+        shutil.rmtree(folder / name, ignore_errors=True)
+
+
+def _files(folder: Path) -> list[Path]:
+    """Return the checkpoints in a folder, one after the other."""
+    for name in (FOLDER, FRESH):  # where a run was ended between removal and renaming
+        found: list[Path] = []
+        while (path := folder / name / _name(len(found) + 1)).is_file():
+            found.append(path)
+        if found:
+            return found
+    raise InputError(
+        f"--restart {folder}: no checkpoints there; accepted: the folder of an evolution that was "
+        "ended before its last step"
+    )
+
+
+def _name(count: int) -> str:
+    return f"{count:05d}.npz"
+
+
+def _save(path: Path, arrays: dict[str, Any]) -> None:
+    draft = path.with_suffix(".draft")
+    with draft.open("wb") as file:
+        np.savez(file, **arrays)
+        file.flush()
+        os.fsync(file.fileno())
+    os.replace(draft, path)
+
+
+def _load(path: Path) -> dict[str, NDArray[Any]]:
+    try:
+        with np.load(path, allow_pickle=False) as arrays:
+            return dict(arrays)
+    except (ValueError, KeyError, EOFError) as error:
+        raise InputError(
+            f"{path}: no checkpoint ({error}); accepted: one of this program"
+        ) from None
+
+
+def _places(problem: ContactProblem) -> Array:
+    """Return what tells the owned nodes apart: their points, and the means of the cells around.
+
+    Nodes of two bodies that touch may have the same point, but not the same cells. Shape
+    (nodes, 2 d). Collective.
+    """
+    body, d = problem.equilibrium, problem.dim
+    mesh, space = body.domain.mesh, body.space
+    cells = mesh.topology.index_map(d).size_local
+    corners = mesh.geometry.x[_compat.geometry_dofmap(mesh)][:cells, : d + 1, :d]
+    sums = fem.Function(fem.functionspace(mesh, ("Lagrange", body.degree, (d + 1,))))
+    own = np.concatenate([corners.mean(axis=1), np.ones((cells, 1))], axis=1)
+    links = sums.function_space.dofmap.list
+    np.add.at(sums.x.array.reshape(-1, d + 1), links[:cells], own[:, None, :])
+    sums.x.scatter_reverse(InsertMode.add)
+    sums.x.scatter_forward()
+    at_nodes = np.empty((body.rest().size // body.block_size, d + 1))
+    at_nodes[space.dofmap.list] = sums.x.array.reshape(-1, d + 1)[links]
+    owned = body.owned // body.block_size
+    means = at_nodes[:owned, :d] / at_nodes[:owned, d:]
+    return np.concatenate([body.layout.points, means], axis=1)

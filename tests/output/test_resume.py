@@ -1,0 +1,198 @@
+"""An evolution that is ended at any step goes on from its checkpoints to the same numbers."""
+
+import json
+import signal
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+
+from contact import solve
+from contact.case.text import to_toml
+from contact.cli.main import main
+from contact.errors import InputError
+from contact.methods.newton import Newton
+from contact.methods.report import History
+from contact.output.resume import Checkpoints, case_of, discard, read_steps
+from tests.output.test_steps import case_of as steps_case
+
+SELF = MPI.COMM_SELF
+
+
+class Killed(BaseException):
+    """What ends a run here."""
+
+
+@pytest.fixture
+def ended(monkeypatch):
+    """Return a function that lets a run end after some of its steps."""
+
+    def after(count):
+        keep = Checkpoints.keep
+
+        def last(self, record):
+            keep(self, record)
+            if self._count == count:
+                raise Killed
+
+        monkeypatch.setattr(Checkpoints, "keep", last)
+        return lambda: monkeypatch.setattr(Checkpoints, "keep", keep)
+
+    return after
+
+
+def hencky(**changes):
+    law = {"material__law": "log", "material__yield_strain": 0.002}
+    return steps_case(load__0__traction=[0.0, -0.01], **law, **changes)
+
+
+@pytest.mark.parametrize("elsewhere", [False, True])
+@pytest.mark.parametrize("count", [1, 3])
+def test_going_on(tmp_path, ended, count, elsewhere):
+    case = hencky()
+    whole = solve(case, comm=SELF)
+    heal = ended(count)
+    with pytest.raises(Killed):
+        solve(case, comm=SELF, folder=tmp_path)
+    heal()
+    out = tmp_path
+    if elsewhere:
+        out = tmp_path / "elsewhere"
+        out.mkdir()
+    solution = solve(case, comm=SELF, folder=out, restart=tmp_path)
+    assert solution.converged
+    assert len(solution.steps) == len(whole.steps)
+    for one, two in zip(whole.steps, solution.steps, strict=True):
+        assert one.state.near(two.state, atol=1e-12)
+        for name, value in one.row.items():
+            if name not in ("linear_solves", "factorizations", "kkt"):
+                assert two.row[name] == pytest.approx(value, rel=1e-9, abs=1e-12)
+        assert set(one.table) == set(two.table)
+        assert np.array_equal(one.table["status"], two.table["status"])
+    assert len(list((out / "checkpoints").glob("0*.npz"))) == 5
+    assert whole.warnings == solution.warnings
+
+
+def test_a_new_run_leaves_the_earlier_checkpoints_until_its_first_step(tmp_path, monkeypatch):
+    solve(steps_case(), comm=SELF, folder=tmp_path)
+    written = [path.name for path in sorted((tmp_path / "checkpoints").iterdir())]
+
+    def fail(self, record):
+        raise Killed
+
+    with monkeypatch.context() as context:
+        context.setattr(Checkpoints, "keep", fail)
+        with pytest.raises(Killed):
+            solve(steps_case(), comm=SELF, folder=tmp_path)
+    assert [path.name for path in sorted((tmp_path / "checkpoints").iterdir())] == written
+    assert case_of(tmp_path).read_text() == to_toml(steps_case())
+    discard(tmp_path)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_all_steps_were_there(tmp_path):
+    """A run that is ended while it writes its results has nothing left to solve."""
+    whole = solve(steps_case(), comm=SELF, folder=tmp_path)
+    again = solve(steps_case(), comm=SELF, folder=tmp_path, restart=tmp_path)
+    assert again.converged
+    assert again.state.near(whole.state)
+    assert again.history.records == []
+
+
+def test_another_mesh(tmp_path):
+    solve(steps_case(), comm=SELF, folder=tmp_path)
+    for cells in ([8, 4], [16, 2]):
+        with pytest.raises(InputError, match=r"--restart .*: given checkpoints of another mesh"):
+            solve(steps_case(mesh__cells=cells), comm=SELF, restart=tmp_path)
+
+
+def test_a_damaged_checkpoint(tmp_path):
+    solve(steps_case(), comm=SELF, folder=tmp_path)
+    (tmp_path / "checkpoints" / "00002.npz").write_bytes(b"no archive")
+    with pytest.raises(InputError, match=r"00002\.npz: no checkpoint .* accepted: one of this"):
+        solve(steps_case(), comm=SELF, restart=tmp_path)
+
+
+def on_the_line(*arguments):
+    return main([str(argument) for argument in (*arguments, "--quiet")])
+
+
+def test_the_command_line(tmp_path, ended, capfd):
+    case, out = tmp_path / "case.toml", tmp_path / "out"
+    case.write_text(to_toml(steps_case()))
+    assert on_the_line("solve", "--restart", out) == 2
+    assert f"--restart {out}: no checkpoints there" in capfd.readouterr().err
+    heal = ended(2)
+    with pytest.raises(Killed):
+        on_the_line("solve", case, "--out", out)
+    heal()
+    other = ("--set", "friction.mu.rho=1.0")
+    assert on_the_line("solve", case, "--restart", out, *other) == 2
+    words = "given checkpoints of another case: there friction.mu.rho is 10000.0, here 1.0"
+    assert words in capfd.readouterr().err
+    assert on_the_line("solve", "--restart", out, "--set", "output.fields=none") == 0
+    assert not (out / "checkpoints").exists()
+    summary = json.loads((out / "summary.json").read_text())
+    assert summary["converged"]
+    assert len((out / "steps.csv").read_text().splitlines()) == 6
+
+
+def test_missing_arguments(capfd, tmp_path):
+    case = tmp_path / "case.toml"
+    case.write_text(to_toml(steps_case()))
+    assert on_the_line("solve", case) == 2
+    assert "--out: missing; accepted: a folder to write to" in capfd.readouterr().err
+    assert on_the_line("solve", "--out", tmp_path) == 2
+    assert "CASE.toml: missing; accepted: a case file, or --restart DIR" in capfd.readouterr().err
+
+
+def test_a_signal_keeps_the_complete_steps(tmp_path, monkeypatch):
+    """They are written, and checkpoints remain to go on from."""
+    keep, out, case = Checkpoints.keep, tmp_path / "out", tmp_path / "case.toml"
+    case.write_text(to_toml(hencky()))
+
+    def interrupted(self, record):
+        keep(self, record)
+        if self._count == 2:
+            signal.raise_signal(signal.SIGTERM)
+
+    with monkeypatch.context() as context:
+        context.setattr(Checkpoints, "keep", interrupted)
+        assert on_the_line("solve", case, "--out", out) == 143
+    assert len((out / "steps.csv").read_text().splitlines()) == 3
+    summary = json.loads((out / "summary.json").read_text())
+    assert not summary["converged"]
+    assert "interrupted (SIGTERM)" in summary["reason"]
+    assert len(list((out / "checkpoints").glob("0*.npz"))) == 2
+    assert on_the_line("solve", "--restart", out) == 0
+    assert len((out / "steps.csv").read_text().splitlines()) == 6
+
+
+def test_a_signal_before_the_first_iteration_leaves_what_is_there(tmp_path, monkeypatch):
+    out, case = tmp_path / "out", tmp_path / "case.toml"
+    case.write_text(to_toml(steps_case()))
+    assert on_the_line("solve", case, "--out", out) == 0
+    before = {path.name: path.read_bytes() for path in out.iterdir()}
+    turn = Newton.turn_to
+
+    def signalled(self, problem):
+        signal.raise_signal(signal.SIGINT)
+        turn(self, problem)
+
+    record = History.record
+
+    def nothing(self, *arguments, **named):
+        self.poll()
+        record(self, *arguments, **named)
+
+    monkeypatch.setattr(Newton, "turn_to", signalled)
+    monkeypatch.setattr(History, "record", nothing)
+    assert on_the_line("solve", case, "--out", out) == 130
+    after = {path.name: path.read_bytes() for path in out.iterdir() if path.is_file()}
+    assert after == before
+
+
+def test_read_steps_gives_the_states(tmp_path):
+    solution = solve(steps_case(), comm=SELF, folder=tmp_path)
+    for one, two in zip(solution.steps, read_steps(tmp_path, solution.problem), strict=True):
+        assert one.state.near(two.state)
