@@ -110,7 +110,7 @@ class Checkpoints:
         ]
         values = {
             "where": self._where,
-            "x": state.x[: body.owned].reshape(-1, body.block_size),
+            "x": body.nodal(state.x)[: self._where.size],
             "contact": self._where[contact],
             "nodal": np.concatenate(nodal, axis=1),
         }
@@ -124,6 +124,7 @@ class Checkpoints:
         said = {"t": record.state.time, "enthalpy": record.enthalpy, "unloaded": record.unloaded}
         arrays = {
             "x": x,
+            "motion": self._problem.equilibrium.motion(record.state.x),
             "contact": joined["contact"],
             "nodal": joined["nodal"],
             "said": np.array(json.dumps(said)),
@@ -179,7 +180,7 @@ def _read(problem: ContactProblem, path: Path, where: NDArray[np.intp]) -> StepR
     pressure, friction, jump, accumulated = np.split(nodal, [1, 1 + d, 1 + 2 * d], axis=1)
     said = json.loads(str(arrays["said"]))
     state = State(
-        problem.equilibrium.local(arrays["x"][where].ravel()),
+        problem.equilibrium.local(np.concatenate([arrays["x"][where].ravel(), arrays["motion"]])),
         Multipliers(pressure[:, 0].copy(), friction.copy()),
         said["t"],
         SlipHistory(jump.copy(), accumulated[:, 0].copy()),
@@ -258,7 +259,7 @@ def _places(problem: ContactProblem) -> Array:
     np.add.at(sums.x.array.reshape(-1, d + 1), links[:cells], own[:, None, :])
     sums.x.scatter_reverse(InsertMode.add)
     sums.x.scatter_forward()
-    at_nodes = np.empty((body.rest().size // body.block_size, d + 1))
+    at_nodes = np.empty((len(body.nodal(body.rest())), d + 1))
     at_nodes[space.dofmap.list] = sums.x.array.reshape(-1, d + 1)[links]
     owned = body.owned // body.block_size
     means = at_nodes[:owned, :d] / at_nodes[:owned, d:]
