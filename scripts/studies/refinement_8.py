@@ -1,0 +1,103 @@
+"""Refinement of chapter 8: what Examples 8.1 to 8.4 come to on finer and finer meshes.
+
+`python3 -m scripts.studies.refinement_8 [--out DIR] [--coarse]`, also under mpirun. Beside the
+default ramp of psi, a tenth of the body's height wide, stands a steep one of 1/1000 of its size,
+which no mesh resolves.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from contact import Solution, load_case, solve
+from contact.output.balances import charge_balance
+from scripts.cases import CASES
+from scripts.reporting import Report, options
+
+#: Example -> case file, cells along the bar over those across it, changes.
+EXAMPLES: Mapping[str, tuple[str, int, tuple[str, ...]]] = {
+    "8.1": ("piezo-8-1-conductive", 2, ()),
+    "8.2": ("piezo-8-2", 2, ()),
+    "8.3": ("compliance-8-3", 6, ()),
+    "8.4": ("compliance-8-4", 6, ()),
+    "8.4, k_e = 0.6": ("compliance-8-4", 6, ("electric.k_e=0.6",)),
+}
+
+#: Largest extent of each body with a conductive foundation.
+SIZES = {"piezo-8-1-conductive": 8.0, "piezo-8-2": 8.0, "compliance-8-4": 12.0}
+
+#: Slope of the steep ramp, over the largest extent of the body.
+STEEP = 1e3
+
+#: Finest mesh for the steep ramp: beyond, most time would go into what only the mesh makes.
+FINEST_STEEP = 192
+
+
+def measured(solution: Solution) -> dict[str, object]:
+    """Return what is looked at. Collective."""
+    problem, nodes = solution.problem, solution.problem.nodes
+    touching = nodes.gather((solution.status != "open").astype(float))
+    order = np.argsort(nodes.gather(nodes.points[:, 0]))
+    closed = touching[order] > 0
+    charges = charge_balance(problem, solution.state)
+    phi = problem.equilibrium.phi_scale * solution.nodal[:, -1]
+    conductor = problem.interface.response.conductor
+    return {
+        "1/delta": np.nan if conductor is None else 1 / conductor.psi.delta,
+        "max p": nodes.maximum(solution.pressure),
+        "p in L2": nodes.norm(solution.pressure),
+        "patches": int(closed[0]) + int(np.sum(closed[1:] & ~closed[:-1])),
+        "force": float(-solution.contact_force[1]),
+        "max phi": nodes.maximum(phi, -np.inf),
+        "charge": charges.foundation,
+        "converged": solution.converged,
+        "residual": solution.outcome.kkt.largest,
+        "several": any("several solutions" in text for text in solution.warnings),
+    }
+
+
+def refined(report: Report, example: str, levels: Sequence[int]) -> None:
+    """Tabulate one example. Collective."""
+    name, ratio, changes = EXAMPLES[example]
+    rows: list[dict[str, object]] = []
+    for steep in (False, True) if example != "8.3" else (False,):
+        before = np.nan
+        for cells in levels:
+            if steep and cells > FINEST_STEEP:
+                continue
+            grid = f"mesh.cells=[{cells}, {cells // ratio}]"
+            ramp = [f"electric.delta={STEEP / SIZES[name]}"] * steep
+            overrides = [grid, "solver.method=newton", *changes, *ramp]
+            found = measured(solve(load_case(CASES / f"{name}.toml", overrides)))
+            force = float(found["force"])  # type: ignore[arg-type]
+            row: dict[str, object] = {"cells": f"{cells} x {cells // ratio}", **found}
+            row["change of the force"] = abs(force - before)
+            before = force
+            rows.append(row)
+            print(example, *(f"{key} = {value}" for key, value in row.items()), flush=True)
+    columns = {key: [row[key] for row in rows] for key in rows[0]}
+    report.table(
+        f"refinement-{example.split(',')[0].replace('.', '-')}{'-weak' * (',' in example)}",
+        f"Example {example} on finer meshes",
+        columns,
+        "Newton's method from rest. Patches are runs of neighbouring contact nodes; the charge "
+        "goes through the foundation; several: the program warns that there may be more "
+        "solutions. With the default ramp the change of the contact force falls from level to "
+        "level once the mesh is fine enough; with the steep one nothing settles."
+        if example != "8.3"
+        else "Newton's method from rest. Nothing is conducted, and there is one solution.",
+    )
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Make the tables. Collective."""
+    chosen = options(__doc__, "refinement_8", arguments)
+    report, levels = Report(chosen.out), (12, 24) if chosen.coarse else (48, 96, 192, 384)
+    for example in EXAMPLES:
+        refined(report, example, levels)
+
+
+if __name__ == "__main__":
+    main()
