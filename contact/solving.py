@@ -79,7 +79,7 @@ def solve(
                 keep = Checkpoints(folder, problem, to_toml(anchored(case)), kept, here).keep
             times, rest = case.evolution.ends, case.evolution.times[0]
             solution = solve_steps(problem, times, settings, monitor, rest, keep, kept)
-    solution.title, solution.output = case.title, case.output
+    solution.title, solution.output, solution.units = case.title, case.output, case.case.units
     if not replacements:
         solution.case = to_toml(case)
     solution.seconds["setup"] += time.perf_counter() - begin - sum(solution.seconds.values())

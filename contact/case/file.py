@@ -31,6 +31,7 @@ from contact.case.solver import DEFAULT, Solver
 from contact.case.types import FromTable, Section, Text, as_tuple, entries, one_or_more
 from contact.errors import InputError
 from contact.output.options import OutputOptions
+from contact.output.units import Units
 from contact.settings import Accepted
 
 __all__ = [
@@ -64,10 +65,21 @@ else:
     Contacts = one_or_more(Contact, "contact")
 
 
+class About(Section):
+    """`[case]`: what the numbers stand for. Nothing is computed with it."""
+
+    units: Annotated[Units, FromTable] = Field(
+        default=Units(),
+        description='Names of units for labels: `{ length = "mm", stress = "MPa", potential = '
+        '"V", charge = "C" }`, any of them. None is assumed.',
+    )
+
+
 class Case(Section):
     """A case file."""
 
     title: Text = Field(default="", description="Title, for reports and figures.")
+    case: About = Field(default=About(), description="Names of units: `[case]`.")
     mesh: Mesh = Field(description="The body: `[mesh]`.")
     space: Space = Field(default=Space(), description="Finite elements: `[space]`.")
     material: Materials = Field(

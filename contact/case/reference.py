@@ -80,7 +80,7 @@ def _describe(section: type[Section], elsewhere: AbstractSet[type]) -> Iterator[
     yield from ("", f"## {heading}", "", text[0].upper() + text[1:], "", *_rows(section))
     for field in section.model_fields.values():
         for inner in sections_of(field.annotation).values():
-            if inner not in elsewhere:
+            if inner not in elsewhere and not is_dataclass(inner):
                 yield from _describe(inner, elsewhere)
 
 

@@ -20,6 +20,7 @@ from contact.output.fields import unknowns
 from contact.output.options import OutputOptions
 from contact.output.record import StepRecord
 from contact.output.supports import Support, moment, supports
+from contact.output.units import Units
 from contact.problem.problem import ContactProblem
 from contact.problem.state import State
 from contact.typing import Array
@@ -63,6 +64,8 @@ class Solution:
         Of the case; and the case itself as `contact check` prints it, empty where there is none.
     output
         What is written besides the summary and the tables.
+    units
+        Names of the units of the case, for labels.
     steps
         What is kept of each step of an evolution, the last of which this is.
     """
@@ -84,6 +87,7 @@ class Solution:
     title: str = ""
     case: str = ""
     output: OutputOptions = field(default_factory=OutputOptions)
+    units: Units = field(default_factory=Units)
     steps: list[StepRecord] = field(default_factory=list)
 
     @property

@@ -33,6 +33,7 @@ def summarise(solution: Solution, table: Table | None) -> dict[str, Any]:
     kkt = solution.outcome.kkt
     summary: dict[str, Any] = {
         "title": solution.title,
+        "units": solution.units.given,
         "converged": solution.converged,
         "reason": solution.outcome.reason,
         "method": solution.method,

@@ -412,7 +412,7 @@ def test_every_key_is_described():
         for key, field in keys_of(section).items():
             assert field.description, f"{section.__name__}.{key}"
             sections += sections_of(field.annotation).values()
-    assert len(set(sections)) == 23
+    assert len(set(sections)) == 25
 
 
 @pytest.mark.parametrize("method", OPTIONS)

@@ -14,16 +14,18 @@ from numpy.typing import NDArray
 
 from contact.errors import InputError
 from contact.output.field_files import body_share
-from contact.output.figures.contact import BLUE, ends
+from contact.output.figures.contact import BLUE, UNNAMED, ends
+from contact.output.figures.pixels import pixels
 from contact.output.solution import Solution
 from contact.output.table import Table, held_points
+from contact.output.units import Units
 from contact.output.vtu import VTU, Grid, gathered
 from contact.typing import Array
 
 Indices: TypeAlias = NDArray[np.integer[Any]]
 
-#: Plane meshes with more cells are drawn as pixels, this many along the body.
-MOST_CELLS, PIXELS = 150_000, 1600
+#: Plane meshes with more cells are drawn as pixels.
+MOST_CELLS = 150_000
 
 
 @dataclass(frozen=True)
@@ -121,7 +123,7 @@ def drawn(body: VTU, held: Array, field: str, label: str) -> Picture:
     box = np.array([places.min(axis=0), places.max(axis=0)])
     outline = points[_boundary(grid.corners)] if d == 2 else np.empty((0, 2, 3))
     if d == 2 and len(cells) > MOST_CELLS:
-        image = _pixels(corners + scale * moved, colours, box)
+        image = pixels(corners + scale * moved, colours, box)
         empty = np.empty((0, 3, d))
         return Picture(empty, empty, np.empty(0), outline, image, box, scale, label, held)
     return Picture(corners, moved, colours, outline, None, box, scale, label, held)
@@ -186,39 +188,13 @@ def _boundary(corners: Indices) -> Indices:
     return edges[_single(edges)]
 
 
-def _pixels(drawn: Array, colours: Array, box: Array) -> Array:
-    """Return the means over pixels, NaN outside the body."""
-    extent = box[1] - box[0]
-    shape = np.maximum(np.rint(PIXELS * extent / extent.max()).astype(int), 1)
-    corners = (drawn - box[0]) / extent * shape
-    values = np.broadcast_to(colours[:, None], (len(drawn), 3)) if colours.ndim == 1 else colours
-    longest = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max(axis=1, initial=0)
-    # Sample each triangle so densely that no pixel inside the body is missed.
-    level = np.ceil(np.log2(np.maximum(2 * longest, 1))).astype(int)
-    sums = np.zeros((2, shape.prod()))
-    for k in np.unique(level):
-        barycentric = _samples(2**k)
-        for cells in np.array_split(np.flatnonzero(level == k), 1 + len(level) * 4**k // 10**7):
-            points = np.floor(np.einsum("sc,ncd->nsd", barycentric, corners[cells])).astype(int)
-            flat = np.ravel_multi_index(tuple(np.clip(points, 0, shape - 1).T), tuple(shape))
-            weights = (barycentric @ values[cells].T).ravel()
-            sums[0] += np.bincount(flat.ravel(), weights, shape.prod())
-            sums[1] += np.bincount(flat.ravel(), minlength=shape.prod())
-    with np.errstate(invalid="ignore"):
-        return np.asarray((sums[0] / sums[1]).reshape(shape).T)
-
-
-def _samples(n: int) -> Array:
-    """Return the centres of the n^2 equal parts of a triangle, in barycentric coordinates."""
-    i, j = (index.ravel() for index in np.indices((n, n)))
-    up, down = i + j < n, i + j < n - 1
-    first = np.concatenate([i[up] + 1 / 3, i[down] + 2 / 3]) / n
-    second = np.concatenate([j[up] + 1 / 3, j[down] + 2 / 3]) / n
-    return np.column_stack([first, second, 1 - first - second])
-
-
 def draw_plane(
-    picture: Picture, table: Table, title: str = "", axes: str = "xy", mirrored: bool = False
+    picture: Picture,
+    table: Table,
+    title: str = "",
+    axes: str = "xy",
+    mirrored: bool = False,
+    units: Units = UNNAMED,
 ) -> Figure:
     """Draw a plane body over its outline at rest and the foundation.
 
@@ -232,6 +208,8 @@ def draw_plane(
         Names of the coordinates.
     mirrored
         Whether the other half of a body of revolution is drawn too.
+    units
+        Names of the units.
     """
     width, height = picture.box[1] - picture.box[0]
     if mirrored:
@@ -251,8 +229,8 @@ def draw_plane(
     ax.use_sticky_edges = False
     ax.margins(0.02)
     ax.autoscale_view()
-    ax.set_xlabel(f"${axes[0]}$ (mesh units)")
-    ax.set_ylabel(f"${axes[1]}$ (mesh units)")
+    ax.set_xlabel(units.label(f"${axes[0]}$", "length"))
+    ax.set_ylabel(units.label(f"${axes[1]}$", "length"))
     ax.set_title(with_scale(title, picture.scale), fontsize="medium")
     return figure
 

@@ -14,6 +14,7 @@ from matplotlib.patches import Patch
 
 from contact.output.surface import STATUS
 from contact.output.table import Table
+from contact.output.units import Units
 from contact.output.vtu import VTU
 from contact.typing import Array
 
@@ -21,6 +22,8 @@ from contact.typing import Array
 BLUE, ORANGE, GREY = "#0072B2", "#D55E00", "#555555"
 #: Figures narrower than this (inches) have small letters and legends of two columns.
 NARROW = 4.5
+#: Where no units are named.
+UNNAMED = Units()
 ZONES = {
     "stick": ("#CDE7F0", "sticking"),
     "slip": ("#FBE3C8", "sliding"),
@@ -73,7 +76,13 @@ def zones(status: Any, where: Array) -> Iterator[tuple[str, float, float]]:
         yield str(status[start]), float(edges[start]), float(edges[stop])
 
 
-def draw_line(table: Table, title: str = "", held: Array | None = None, axes: str = "xy") -> Figure:
+def draw_line(
+    table: Table,
+    title: str = "",
+    held: Array | None = None,
+    axes: str = "xy",
+    units: Units = UNNAMED,
+) -> Figure:
     """Draw pressure, tangential stress and friction bound along Gamma_3 in the plane.
 
     Parameters
@@ -86,6 +95,8 @@ def draw_line(table: Table, title: str = "", held: Array | None = None, axes: st
         Nodes of Gamma_3 that are no contact nodes, shape (n, 2), to begin and end at.
     axes
         Names of the coordinates.
+    units
+        Names of the units.
     """
     where, name = position(table, axes)
     bound, tau = table["bound"], table["tau"]
@@ -103,14 +114,14 @@ def draw_line(table: Table, title: str = "", held: Array | None = None, axes: st
         if np.any(table["status"] == zone)
     ]
     rows[0].plot(where, table["pressure"], color=BLUE, label=r"pressure $-\sigma_\nu$")
-    rows[0].set_ylabel(r"$-\sigma_\nu$ (units of the case)")
+    rows[0].set_ylabel(units.label(r"$-\sigma_\nu$", "stress"))
     if frictional:
         rows[1].plot(where, tau, color=ORANGE, label=r"tangential stress $-\sigma_\tau\cdot t$")
         rows[1].plot(where, bound, "--", color=GREY, lw=0.8, label=r"friction bound $\pm s$")
         rows[1].plot(where, -bound, "--", color=GREY, lw=0.8)
         rows[1].axhline(0.0, color="black", lw=0.4)
-        rows[1].set_ylabel(r"$-\sigma_\tau\cdot t$ (units of the case)")
-    rows[-1].set_xlabel(f"${name}$ along $\\Gamma_3$ (mesh units)")
+        rows[1].set_ylabel(units.label(r"$-\sigma_\tau\cdot t$", "stress"))
+    rows[-1].set_xlabel(units.label(f"${name}$ along $\\Gamma_3$", "length"))
     before, after = _margins(table, held)
     rows[0].set_xlim(where.min() - before, where.max() + after)
     _focus(rows[0], table["pressure"], 0.0)
@@ -148,7 +159,7 @@ def _focus(ax: Axes, values: Array, low: float) -> None:
         ax.annotate(text, (0.99, 0.97), xycoords="axes fraction", ha="right", va="top", fontsize=7)
 
 
-def draw_surface(surface: VTU, title: str = "") -> Figure:
+def draw_surface(surface: VTU, title: str = "", units: Units = UNNAMED) -> Figure:
     """Draw pressure, status and friction arrows on Gamma_3 in space, facet by facet."""
     view, names = _view(surface)
     flat = surface.grid.points @ view.T
@@ -168,7 +179,7 @@ def draw_surface(surface: VTU, title: str = "") -> Figure:
     )
     bar = figure.add_axes((0.1, 0.15, 0.38, 0.03))
     figure.colorbar(
-        shown, cax=bar, orientation="horizontal", label=r"$-\sigma_\nu$ (units of the case)"
+        shown, cax=bar, orientation="horizontal", label=units.label(r"$-\sigma_\nu$", "stress")
     )
     status = np.asarray(surface.at_points["status"])
     size = float(np.clip(2e3 / len(flat), 0.5, 12))
@@ -183,8 +194,8 @@ def draw_surface(surface: VTU, title: str = "") -> Figure:
         ax.margins(0.04)
         _zoom(ax, surface, flat)
         ax.set_title(name, fontsize="medium")
-        ax.set_xlabel(f"${names[0]}$ (mesh units)")
-    left.set_ylabel(f"${names[1]}$ (mesh units)")
+        ax.set_xlabel(units.label(f"${names[0]}$", "length"))
+    left.set_ylabel(units.label(f"${names[1]}$", "length"))
     if title:
         figure.suptitle(title, fontsize="large")
     return figure

@@ -11,18 +11,19 @@ import matplotlib
 from matplotlib.figure import Figure
 
 from contact.output.figures.body import Picture, draw_plane, picture
-from contact.output.figures.contact import NARROW, draw_line, draw_surface
+from contact.output.figures.contact import NARROW, UNNAMED, draw_line, draw_surface
 from contact.output.figures.space import draw_space
 from contact.output.solution import Solution
 from contact.output.surface import contact_surface
 from contact.output.table import Table, contact_table, held_points
+from contact.output.units import Quantity, Units
 from contact.output.vtu import VTU
 from contact.typing import Array
 
-#: Quantities drawn on the deformed body: name of the figure, field, label.
-DEFORMED = (
-    ("deformed", "von_mises", "von Mises stress (units of the case)"),
-    ("potential", "potential", r"potential $\varphi$ (units of the case)"),
+#: Quantities drawn on the deformed body: name of the figure, field, label, what it is measured in.
+DEFORMED: tuple[tuple[str, str, str, Quantity], ...] = (
+    ("deformed", "von_mises", "von Mises stress", "stress"),
+    ("potential", "potential", r"potential $\varphi$", "potential"),
 )
 
 #: Characters of a title that fit on a figure.
@@ -64,6 +65,8 @@ class Drawing:
         Names of the coordinates of a plane mesh.
     mirror
         Whether both halves of a body of revolution are drawn.
+    units
+        Names of the units, for labels.
     """
 
     title: str
@@ -74,6 +77,7 @@ class Drawing:
     pictures: Sequence[tuple[str, Picture]]
     axes: str = "xy"
     mirror: bool = False
+    units: Units = UNNAMED
 
     @property
     def _mirrored(self) -> bool:
@@ -107,13 +111,13 @@ class Drawing:
             figures: dict[str, Figure | None] = {}
             if contact:
                 figures["contact"] = (
-                    draw_line(self.table, self.title, self.held, self.axes)
+                    draw_line(self.table, self.title, self.held, self.axes, self.units)
                     if self.plane
-                    else draw_surface(self.surface, self.title)
+                    else draw_surface(self.surface, self.title, self.units)
                 )
             for name, made in self.pictures:
                 figures[name] = (
-                    draw_plane(made, self.table, self.title, self.axes, self._mirrored)
+                    draw_plane(made, self.table, self.title, self.axes, self._mirrored, self.units)
                     if self.plane
                     else draw_space(made, self.title)
                 )
@@ -136,16 +140,16 @@ def collect(solution: Solution) -> Drawing | None:
     table, held = contact_table(solution), held_points(solution.problem)
     surface = contact_surface(solution, table)
     pictures: list[tuple[str, Picture]] = []
-    for name, field, label in DEFORMED:
+    for name, field, words, quantity in DEFORMED:
         if field != "potential" or solution.problem.piezoelectric:
-            made = picture(solution, field, label)
+            made = picture(solution, field, solution.units.label(words, quantity))
             if made is not None:
                 pictures.append((name, made))
     if table is None or surface is None:
         return None
     title, plane = heading(solution.title), solution.problem.dim == 2
     axes, mirror = axes_of(solution.problem.domain.revolved), solution.output.mirror
-    return Drawing(title, plane, table, held, surface, pictures, axes, mirror)
+    return Drawing(title, plane, table, held, surface, pictures, axes, mirror, solution.units)
 
 
 def axes_of(revolved: bool) -> str:

@@ -18,6 +18,7 @@ from contact.output.figures.body import drawn
 from contact.output.figures.figures import DEFORMED, Drawing, axes_of, heading
 from contact.output.folder import refused, result_folder
 from contact.output.table import Table
+from contact.output.units import Units
 from contact.output.vtu import VTU, read_vtu
 
 #: Endings of files that figures may have.
@@ -48,13 +49,16 @@ def read_drawing(folder: Path, fields: Sequence[str] = (), mirror: bool = False)
     table = _read(folder, "contact.csv", lambda path: _table(path, surface))
     d = body.grid.dimension
     held = surface.grid.points[np.asarray(surface.at_points["row"]) < 0, :d]
-    known = {field: (name, label) for name, field, label in DEFORMED}
+    units = Units(**summary.get("units", {}))
+    known = {
+        field: (name, units.label(words, quantity)) for name, field, words, quantity in DEFORMED
+    }
     pictures = []
     for field in fields or [f for f in known if f in body.at_points]:
         name, label = known.get(field, (field, field.replace("_", " ") + " (units of the case)"))
         pictures.append((name, drawn(body, held, field, label)))
     title, axes = heading(summary["title"]), axes_of(summary.get("kinematics") == "axisymmetric")
-    return Drawing(title, d == 2, table, held, surface, pictures, axes, mirror)
+    return Drawing(title, d == 2, table, held, surface, pictures, axes, mirror, units)
 
 
 def plot(
