@@ -13,6 +13,7 @@ from pydantic import BaseModel
 from contact.case.evolution import check_evolution, check_time
 from contact.case.formula import Expression
 from contact.case.moving import check_moving, moving
+from contact.case.shapes import Distance
 from contact.case.showing import listed
 from contact.case.types import Words, fault
 from contact.tolerances import HUGE
@@ -174,6 +175,7 @@ def _vectors(case: Case) -> Iterator[tuple[str, tuple[Any, ...] | None]]:
         yield f"load.{i}.traction", load.traction
         yield f"load.{i}.body_force", load.body_force
     for path, contact in case.contacts:
+        yield f"{path}.axis", contact.axis
         if contact.foundation is not None:
             for key, vector in contact.foundation.vectors.items():
                 yield f"{path}.foundation.{key}", vector
@@ -195,6 +197,8 @@ def _formulas(case: Case) -> Iterator[tuple[str, Any]]:
         yield from ((f"{path}.{key}", value) for key, value in section.formulas())
     for path, contact in case.contacts:
         yield f"{path}.gap", contact.gap
+        if isinstance(contact.foundation, Distance):
+            yield f"{path}.foundation.distance", contact.foundation.distance
         key, friction = case.friction_of(path, contact)
         yield f"{key}.bound", friction.bound
         yield f"{key}.mu", friction.mu
@@ -213,6 +217,11 @@ def _check_vectors(case: Case, dimension: int) -> None:
     for path, formula in _formulas(case):
         if isinstance(formula, Expression) and dimension == 2 and "z" in formula.names:
             raise fault(path, formula.source, "formulas in x and y in the plane")
+    for path, contact in case.contacts:
+        only = None if contact.foundation is None else contact.foundation.only
+        if only is not None and only != dimension:
+            words = Words(f"in {dimension}-D")
+            raise fault(f"{path}.foundation.shape", words, f"this shape in {only}-D only")
     if dimension == 3 and case.space.kinematics == "axisymmetric":
         accepted = '"plane_strain" with a mesh in space, where it has no effect'
         raise fault("space.kinematics", case.space.kinematics, accepted)

@@ -20,12 +20,13 @@ from contact.case.body import Fixed, Load, Space
 from contact.case.checks import check_mesh, check_sections
 from contact.case.evolution import Evolution
 from contact.case.formula import Expression
-from contact.case.interface import Contact, Electric, Friction, Plane, SlipLaw, Sphere
+from contact.case.interface import Contact, Electric, Friction, SlipLaw
 from contact.case.material import Material, Piezo
 from contact.case.mesh import Mesh, Piece
 from contact.case.messages import describe, describe_fault
 from contact.case.overrides import override
 from contact.case.rigid import Electrode, RigidPart
+from contact.case.shapes import Plane, Sphere
 from contact.case.showing import clipped
 from contact.case.solver import DEFAULT, Solver
 from contact.case.types import FromTable, Section, Text, as_tuple, entries, one_or_more
@@ -205,17 +206,24 @@ def parse_case(data: Mapping[str, Any], folder: str | Path = ".", source: str = 
 
 
 def _found(data: Mapping[str, Any], folder: Path) -> dict[str, Any]:
-    """Return the materials with the places of their libraries."""
+    """Return the tables that name files, other than that of the mesh, with their places."""
 
-    def found(table: Any) -> Any:
-        if isinstance(table, Mapping) and isinstance(table.get("library"), str):
-            return {**table, "library": str(folder / table["library"])}
-        return table
+    def placed(table: Any, *keys: str) -> Any:
+        if not isinstance(table, Mapping) or keys[0] not in table:
+            return table
+        inner = table[keys[0]]
+        if len(keys) > 1:
+            return {**table, keys[0]: placed(inner, *keys[1:])}
+        return {**table, keys[0]: str(folder / inner)} if isinstance(inner, str) else table
 
-    given = data.get("material")
-    if isinstance(given, list | tuple):
-        return {"material": [found(table) for table in given]}
-    return {} if given is None else {"material": found(given)}
+    found: dict[str, Any] = {}
+    for key, path in (("material", ("library",)), ("contact", ("foundation", "file"))):
+        given = data.get(key)
+        if isinstance(given, list | tuple):
+            found[key] = [placed(table, *path) for table in given]
+        elif given is not None:
+            found[key] = placed(given, *path)
+    return found
 
 
 def load_case(path: str | Path, overrides: Mapping[str, str] | Iterable[str] = ()) -> Case:

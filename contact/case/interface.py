@@ -10,6 +10,7 @@ from pydantic import Field, model_validator
 
 from contact.case.formula import Expression
 from contact.case.rigid import Rigid
+from contact.case.shapes import Foundation
 from contact.case.types import (
     AmplitudeName,
     Name,
@@ -22,62 +23,8 @@ from contact.case.types import (
     fault,
     one_of,
 )
-from contact.interface import obstacle
-from contact.interface.obstacle import Obstacle
 from contact.settings import Accepted, Positive, Switch
 from forms.laws import Coulomb, FrictionLaw, SlipCoefficient
-
-
-class Shape(Section):
-    """A rigid shape. A new one is a section like those below, entered in `Foundation`."""
-
-    @property
-    def vectors(self) -> dict[str, tuple[float, ...]]:
-        """The keys that hold a point or a direction: each has as many numbers as space."""
-        return {key: value for key, value in self if isinstance(value, tuple)}
-
-    @abstractmethod
-    def obstacle(self, direction: str) -> Obstacle:
-        """Return the shape itself, for a contact direction."""
-
-
-class Plane(Shape):
-    """`foundation = { shape = "plane", ... }`: rigid half space."""
-
-    shape: Literal["plane"] = Field(description="A plane.")
-    point: Vector = Field(description="A point of the plane.")
-    normal: Vector = Field(description="Normal towards the body, of any length.")
-
-    @model_validator(mode="after")
-    def _check(self) -> Plane:
-        if not any(self.normal):
-            raise fault("normal", self.normal, "a vector that is not zero")
-        if len(self.normal) != len(self.point):
-            raise fault("normal", self.normal, f"{len(self.point)} numbers, as point has")
-        return self
-
-    def obstacle(self, direction: str) -> obstacle.Plane:
-        """Return the plane."""
-        return obstacle.Plane(self.point, self.normal, direction)
-
-
-class Sphere(Shape):
-    """`foundation = { shape = "sphere", ... }`: rigid sphere, in the plane a circle."""
-
-    shape: Literal["sphere"] = Field(description="A sphere or circle.")
-    centre: Vector = Field(description="Centre.")
-    radius: Positive = Field(description="Radius.")
-    inside: Switch = Field(default=False, description="`true`: the body lies inside the sphere.")
-
-    def obstacle(self, direction: str) -> obstacle.Sphere:
-        """Return the sphere."""
-        return obstacle.Sphere(self.centre, self.radius, self.inside, direction)
-
-
-if TYPE_CHECKING:
-    Foundation: TypeAlias = Shape
-else:
-    Foundation = one_of("shape", Plane, Sphere)
 
 
 class Coefficient(Section):
@@ -213,10 +160,16 @@ class Contact(Section):
     foundation: Foundation | None = Field(
         default=None, description="Rigid shape, instead of a gap: `[contact.foundation]`."
     )
-    direction: Literal["foundation", "body"] = Field(
+    direction: Literal["foundation", "body", "axis"] = Field(
         default="foundation",
-        description="Contact direction on a rigid shape: normal of the foundation or of the body. "
+        description="Contact direction on a rigid shape: normal of the foundation or of the body, "
+        "or along `axis`, as the closed forms of indentation take it; cones and edges need that. "
         "With a gap it is the body's.",
+    )
+    axis: Vector | None = Field(
+        default=None,
+        description='With `direction = "axis"`: that direction, from the body towards the '
+        "foundation, of any length.",
     )
     overlap: Literal["refuse", "press"] = Field(
         default="refuse",
@@ -285,6 +238,14 @@ class Contact(Section):
             raise fault("against", self.against, "another part than `on`")
         if self.gap is not None and self.foundation is not None:
             raise fault("gap", Words("both gap and foundation"), "one of them")
+        if (self.axis is None) != (self.direction != "axis"):
+            given = Words("missing") if self.axis is None else self.axis
+            accepted = 'a vector with direction = "axis", and with that alone'
+            raise fault("axis", given, accepted)
+        if self.axis is not None and not any(self.axis):
+            raise fault("axis", self.axis, "a vector that is not zero")
+        if self.axis is not None and self.foundation is None:
+            raise fault("direction", self.direction, "axis with a foundation that is a shape")
         if self.overlap == "press" and self.foundation is None:
             raise fault("overlap", self.overlap, "press with a foundation that is a shape")
         for key in (*LAYER, "lagged") if self.law == "signorini" else ():

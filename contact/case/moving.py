@@ -32,7 +32,7 @@ def check_moving(case: Case) -> None:
         for i, on in enumerate(parts):
             if on in parts[:i]:
                 raise fault(f"{key}.{i}.on", on, f"a part that no other [[{key}]] has")
-    if case.electrode and not any(material.piezo for _, material in case.materials):
+    if case.electrode and not any(material.piezoelectric for _, material in case.materials):
         raise fault("electrode", Words("given"), "electric quantities with [material.piezo] only")
     held = {fixed.on for fixed in case.fixed if fixed.potential is not None}
     for i, section in enumerate(case.electrode):

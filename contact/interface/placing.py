@@ -116,7 +116,7 @@ def _place(
     if np.isfinite(best) and best <= 1e-9:
         raise InputError(
             "foundation: it lies behind the contact part: the contact direction points "
-            "into the body at every node; accepted: a normal towards the body, a sphere in front "
+            "into the body at every node; accepted: a normal towards the body, a shape in front "
             "of it, or inside = true for a body within"
         )
     if press:
@@ -174,7 +174,8 @@ def find_nodes(
     direction, gap = obstacle.measure(points, found.normal)
     if domain.comm.allreduce(bool(np.isnan(direction).any()), op=MPI.LOR):
         raise InputError(
-            f"{key}.foundation: a contact node has no contact direction (it is the sphere's centre)"
+            f"{key}.foundation: a contact node has no contact direction (it is the sphere's "
+            "centre, on the axis of a cylinder, or where a formula has no value or no slope)"
         )
     cut = 0.0
     if obstacle.is_shape:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 pytest.importorskip("gmsh")
-from contact.case.interface import Sphere
+from contact.case.shapes import Sphere
 from contact.methods.options import with_method
 from scripts.thesis import hertz
 

@@ -1,0 +1,193 @@
+"""Sections of the case file about rigid shapes."""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from typing import TYPE_CHECKING, Annotated, ClassVar, Literal, TypeAlias
+
+import numpy as np
+from pydantic import Field, model_validator
+
+from contact.case.formula import Expression
+from contact.case.types import Formula, NonNegative, Section, Text, Vector, fault, one_of
+from contact.errors import InputError
+from contact.interface import obstacle
+from contact.interface.obstacle import Obstacle
+from contact.interface.obstacle.stl import read_stl
+from contact.settings import Accepted, Positive, Switch
+from contact.typing import Array
+
+#: Direction of contact, and the axis where it is given.
+Aim: TypeAlias = tuple[str, tuple[float, ...]]
+
+
+class Shape(Section):
+    """A rigid shape. A new one is a section like those below, entered in `Foundation`."""
+
+    #: Keys of vectors that may not be zero.
+    directions: ClassVar[tuple[str, ...]] = ("axis",)
+
+    #: The only dimension in which there is the shape, if it is not both.
+    only: ClassVar[int | None] = None
+
+    @property
+    def vectors(self) -> dict[str, tuple[float, ...]]:
+        """The keys that hold a point or a direction: each has as many numbers as space."""
+        return {key: value for key, value in self if isinstance(value, tuple)}
+
+    @model_validator(mode="after")
+    def _check_vectors(self) -> Shape:
+        first = next(iter(self.vectors.items()), None)
+        for key, vector in self.vectors.items():
+            if key in self.directions and not any(vector):
+                raise fault(key, vector, "a vector that is not zero")
+            if first is not None and len(vector) != len(first[1]):
+                raise fault(key, vector, f"{len(first[1])} numbers, as {first[0]} has")
+        return self
+
+    @abstractmethod
+    def obstacle(self, aim: Aim) -> Obstacle:
+        """Return the shape itself, for a contact direction."""
+
+
+class Plane(Shape):
+    """`foundation = { shape = "plane", ... }`: rigid half space."""
+
+    directions = ("normal",)
+
+    shape: Literal["plane"] = Field(description="A plane.")
+    point: Vector = Field(description="A point of the plane.")
+    normal: Vector = Field(description="Normal towards the body, of any length.")
+
+    def obstacle(self, aim: Aim) -> obstacle.Plane:
+        """Return the plane."""
+        return obstacle.Plane(self.point, self.normal, *aim)
+
+
+class Sphere(Shape):
+    """`foundation = { shape = "sphere", ... }`: rigid sphere, in the plane a circle."""
+
+    shape: Literal["sphere"] = Field(description="A sphere or circle.")
+    centre: Vector = Field(description="Centre.")
+    radius: Positive = Field(description="Radius.")
+    inside: Switch = Field(default=False, description="`true`: the body lies inside the sphere.")
+
+    def obstacle(self, aim: Aim) -> obstacle.Sphere:
+        """Return the sphere."""
+        return obstacle.Sphere(self.centre, self.radius, self.inside, *aim)
+
+
+class Cylinder(Shape):
+    """`foundation = { shape = "cylinder", ... }`: rigid cylinder without ends, or a bore."""
+
+    shape: Literal["cylinder"] = Field(description="A cylinder; in the plane a strip.")
+    point: Vector = Field(description="A point of its axis.")
+    axis: Vector = Field(description="Its axis, of any length.")
+    radius: Positive = Field(description="Radius.")
+    inside: Switch = Field(default=False, description="`true`: the body lies in the bore.")
+
+    def obstacle(self, aim: Aim) -> obstacle.Cylinder:
+        """Return the cylinder."""
+        return obstacle.Cylinder(self.point, self.axis, self.radius, self.inside, *aim)
+
+
+class Cone(Shape):
+    """`foundation = { shape = "cone", ... }`: rigid cone, in the plane a wedge."""
+
+    shape: Literal["cone"] = Field(description="A cone.")
+    apex: Vector = Field(description="Its tip.")
+    axis: Vector = Field(description="From the tip into the cone, of any length.")
+    half_angle: Annotated[
+        float, Field(gt=0, lt=90), Accepted("an angle between 0 and 90 degrees, both excluded")
+    ] = Field(description="Between axis and side (degrees).")
+
+    def obstacle(self, aim: Aim) -> obstacle.Cone:
+        """Return the cone."""
+        return obstacle.Cone(self.apex, self.axis, self.half_angle, *aim)
+
+
+class Paraboloid(Shape):
+    """`foundation = { shape = "paraboloid", ... }`: rigid paraboloid, in the plane a parabola."""
+
+    shape: Literal["paraboloid"] = Field(description="A paraboloid h = r^2/(2 R).")
+    apex: Vector = Field(description="Its tip.")
+    axis: Vector = Field(description="From the tip into the paraboloid, of any length.")
+    radius: Positive = Field(description="Radius of curvature R at the tip.")
+
+    def obstacle(self, aim: Aim) -> obstacle.Paraboloid:
+        """Return the paraboloid."""
+        return obstacle.Paraboloid(self.apex, self.axis, self.radius, *aim)
+
+
+class Punch(Shape):
+    """`foundation = { shape = "punch", ... }`: rigid flat punch, in the plane a rectangle."""
+
+    shape: Literal["punch"] = Field(description="A cylinder with a flat face.")
+    centre: Vector = Field(description="Centre of the face.")
+    axis: Vector = Field(description="From the face into the punch, of any length.")
+    radius: Positive = Field(description="Radius of the punch.")
+    edge_radius: NonNegative = Field(
+        default=0.0, description="Radius by which the edge is rounded; 0: sharp."
+    )
+
+    @model_validator(mode="after")
+    def _check(self) -> Punch:
+        if self.edge_radius > self.radius:
+            raise fault("edge_radius", self.edge_radius, f"at most the radius, {self.radius:g}")
+        return self
+
+    def obstacle(self, aim: Aim) -> obstacle.Punch:
+        """Return the punch."""
+        return obstacle.Punch(self.centre, self.axis, self.radius, self.edge_radius, *aim)
+
+
+class Distance(Shape):
+    """`foundation = { shape = "distance", ... }`: any rigid shape by a formula."""
+
+    shape: Literal["distance"] = Field(description="Where a formula is negative.")
+    distance: Formula = Field(
+        description="Signed distance, positive outside. Where its slope is not 1 it is divided by "
+        "that."
+    )
+
+    def obstacle(self, aim: Aim) -> obstacle.Level:
+        """Return the shape."""
+        return obstacle.Level(_Quiet(self.distance), *aim)
+
+
+class Surface(Shape):
+    """`foundation = { shape = "surface", ... }`: rigid surface of triangles, in space."""
+
+    only = 3
+
+    shape: Literal["surface"] = Field(description="A surface of an STL file.")
+    file: Text = Field(
+        description="STL file, binary or text, its normals towards the body. Relative to the case "
+        "file."
+    )
+
+    def obstacle(self, aim: Aim) -> obstacle.Triangles:
+        """Read the surface."""
+        return obstacle.Triangles(read_stl(self.file), *aim)
+
+
+class _Quiet:
+    """A formula that is NaN where it has no value: ranks ask it at points of their own."""
+
+    def __init__(self, expression: Expression) -> None:
+        self._expression = expression
+
+    def __call__(self, points: Array) -> Array:
+        """Return the values at points of shape (n, d)."""
+        try:
+            return self._expression.numpy(points)
+        except InputError:
+            return np.full(len(points), np.nan)
+
+
+if TYPE_CHECKING:
+    Foundation: TypeAlias = Shape
+else:
+    Foundation = one_of(
+        "shape", Plane, Sphere, Cylinder, Cone, Paraboloid, Punch, Distance, Surface
+    )

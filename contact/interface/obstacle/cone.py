@@ -1,0 +1,50 @@
+"""A rigid cone."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from contact.interface.obstacle.protocol import Shape, split
+from contact.typing import Array
+
+
+@dataclass(frozen=True)
+class Cone(Shape):
+    """A rigid cone without end; in 2-D a wedge.
+
+    Parameters
+    ----------
+    apex, axis
+        Its tip, and the axis from there into the cone, of any length.
+    half_angle
+        Between the axis and the side (degrees), above 0 and below 90.
+    direction, along
+        As for a sphere.
+    """
+
+    apex: tuple[float, ...]
+    axis: tuple[float, ...]
+    half_angle: float
+    direction: str = "foundation"
+    along: tuple[float, ...] = ()
+
+    def distance(self, points: Array) -> tuple[Array, Array]:
+        """Return distances and normals; those of the tip where it is nearest."""
+        unit, along, radius, away = split(points, self.apex, self.axis)
+        angle = np.deg2rad(self.half_angle)
+        side = radius * np.cos(angle) - along * np.sin(angle)
+        normal = np.cos(angle) * away - np.sin(angle) * unit
+        # On the axis within the cone all sides are equally near: away from the tip.
+        normal = np.where((radius > 0)[:, None], normal, -unit)
+        beyond = radius * np.sin(angle) + along * np.cos(angle) <= 0
+        length = np.hypot(radius, along)
+        tip = np.where(length > 0, length, 1.0)[:, None]
+        radial = np.where((length > 0)[:, None], (radius / tip[:, 0])[:, None] * away, 0.0)
+        radial = radial + np.where(length > 0, along / tip[:, 0], -1.0)[:, None] * unit
+        return np.where(beyond, length, side), np.where(beyond[:, None], radial, normal)
+
+    def chord_depth(self, length: float) -> float:
+        """Return how deep the tip reaches beyond a facet that it divides in two."""
+        return float(0.5 * length / np.tan(np.deg2rad(self.half_angle)))

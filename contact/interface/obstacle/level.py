@@ -1,0 +1,49 @@
+"""A rigid body by its signed distance, given as a function."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from contact.interface.obstacle.protocol import Shape
+from contact.typing import Array
+
+#: Step of the central differences, over the size of the coordinates: the third root of rounding.
+STEP = 6e-6
+
+
+@dataclass(frozen=True)
+class Level(Shape):
+    """A rigid body where a function is negative.
+
+    Parameters
+    ----------
+    function
+        Signed distance of points of shape (n, d), positive outside, shape (n,). Its slope need
+        not be 1: it is divided by it, which is exact on the surface, and nearly so close to it.
+    direction, along
+        As for a sphere.
+    """
+
+    function: Callable[[Array], Array]
+    direction: str = "foundation"
+    along: tuple[float, ...] = ()
+
+    def distance(self, points: Array) -> tuple[Array, Array]:
+        """Return distances and normals; NaN where the function has no slope."""
+        h = STEP * np.maximum(np.abs(points).max(axis=1, initial=0.0), 1e-3)[:, None]
+        slope = np.column_stack(
+            [
+                (self.function(points + h * e) - self.function(points - h * e)) / (2 * h[:, 0])
+                for e in np.eye(points.shape[1])
+            ]
+        )
+        size = np.linalg.norm(slope, axis=1)
+        known = np.where(size > 0, size, np.nan)
+        return self.function(points) / known, slope / known[:, None]
+
+    def chord_depth(self, length: float) -> float:
+        """Return 0: the curvature is not known."""
+        return 0.0

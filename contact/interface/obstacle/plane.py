@@ -1,0 +1,46 @@
+"""A rigid half space."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from contact.interface.obstacle.protocol import GRAZING, Shape
+from contact.typing import Array
+
+
+@dataclass(frozen=True)
+class Plane(Shape):
+    """A half space: the foundation lies below the plane through `point`.
+
+    Parameters
+    ----------
+    point, normal
+        A point of the plane and its normal towards the body, length d.
+    direction, along
+        "foundation": contact along the plane's normal (default); "body": along the body's;
+        "axis": along a given direction.
+    """
+
+    point: tuple[float, ...]
+    normal: tuple[float, ...]
+    direction: str = "foundation"
+    along: tuple[float, ...] = ()
+
+    def chord_depth(self, length: float) -> float:
+        """Return 0: chords of a plane lie in it."""
+        return 0.0
+
+    def distance(self, points: Array) -> tuple[Array, Array]:
+        """Return distances and normals."""
+        normal = np.asarray(self.normal) / np.linalg.norm(self.normal)
+        distance = (points - np.asarray(self.point)) @ normal
+        return distance, np.broadcast_to(normal, points.shape).copy()
+
+    def ray(self, points: Array, rays: Array) -> Array:
+        """Return the distances along rays."""
+        distance, normal = self.distance(points)
+        cosine = -np.einsum("ni,ni->n", rays, normal)
+        facing = cosine > GRAZING
+        return np.where(facing, distance / np.where(facing, cosine, 1.0), np.inf)

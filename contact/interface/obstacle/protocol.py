@@ -1,0 +1,162 @@
+"""What an obstacle is to the contact nodes, and what the shapes share."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Protocol
+
+import numpy as np
+
+from contact.typing import Array
+
+#: Cosine of the steepest angle at which a ray still leads to a surface.
+GRAZING = 1e-6
+
+
+class Obstacle(Protocol):
+    """A rigid obstacle, seen from the contact nodes.
+
+    A new shape is a class with these four.
+    """
+
+    @property
+    def direction(self) -> str:
+        """Whose normal the contact direction is: "foundation", "body", or a given "axis"."""
+
+    @property
+    def is_shape(self) -> bool:
+        """Whether the gaps are those of a body in space, which the mesh must not cut at rest.
+
+        Gaps that are given as such are what was asked for.
+        """
+
+    def chord_depth(self, length: float) -> float:
+        """Return how deep straight facets reach into the obstacle that their corners touch.
+
+        Parameters
+        ----------
+        length
+            Longest edge of the facets.
+        """
+
+    def measure(self, points: Array, body_normal: Array) -> tuple[Array, Array]:
+        """Return the contact direction, shape (n, d), and the gap along it, shape (n,).
+
+        Parameters
+        ----------
+        points
+            Node coordinates, shape (n, d).
+        body_normal
+            Outward unit normals of the body, shape (n, d).
+        """
+
+
+class Shape:
+    """What shapes share: the contact direction, and gaps along rays.
+
+    A shape is a frozen dataclass with two fields besides its own: `direction`, and `along`, the
+    direction from the body towards the foundation where that is "axis".
+    """
+
+    direction: str
+    along: tuple[float, ...]
+
+    is_shape = True
+
+    def distance(self, points: Array) -> tuple[Array, Array]:
+        """Return signed distances, positive outside, (n,), and outward unit normals, (n, d).
+
+        Normals are those of the nearest points; NaN where there is none.
+        """
+        raise NotImplementedError
+
+    def ray(self, points: Array, rays: Array) -> Array:
+        """Return how far the surface is along unit vectors, shape (n,): infinite if never met."""
+        return trace(self.distance, points, rays)
+
+    def measure(self, points: Array, body_normal: Array) -> tuple[Array, Array]:
+        """Return contact directions and gaps."""
+        if self.direction == "foundation":
+            distance, normal = self.distance(points)
+            return -normal, distance
+        rays = body_normal
+        if self.direction == "axis":
+            axis = np.asarray(self.along) / np.linalg.norm(self.along)
+            rays = np.broadcast_to(axis, points.shape).copy()
+        return rays, self.ray(points, rays)
+
+
+def trace(
+    distance: Callable[[Array], tuple[Array, Array]], points: Array, rays: Array, steps: int = 100
+) -> Array:
+    """Return where rays meet a surface, by Newton's method on the signed distance.
+
+    Along a ray the distance to a convex body is convex: Newton's method goes up to the surface
+    from outside and never beyond. At other bodies the steps are those of the distance where
+    Newton's would lead away.
+
+    Parameters
+    ----------
+    distance
+        As `Shape.distance`.
+    points, rays
+        Where the rays begin, and unit vectors along them, shape (n, d).
+    steps
+        Most steps.
+    """
+    found = np.full(len(points), np.inf)
+    left = np.arange(len(points))
+    at = np.zeros(len(points))
+    reach = np.zeros(len(points))
+    for step in range(steps):
+        value, normal = distance(points[left] + at[left, None] * rays[left])
+        slope = -np.einsum("ni,ni->n", normal, rays[left])
+        if step == 0:
+            reach = 1e4 * (np.abs(value) + np.linalg.norm(points, axis=1))
+        towards = slope > GRAZING
+        move = np.where(towards, value / np.where(towards, slope, 1.0), np.abs(value))
+        size = np.maximum(np.abs(points[left]).max(axis=1, initial=0.0), np.abs(at[left]))
+        done = towards & (np.abs(move) <= 1e-13 * np.maximum(size, np.abs(value)))
+        at[left] += move
+        found[left[done]] = at[left[done]]
+        # What is outside and moves away for good is lost.
+        gone = ~done & ~(np.abs(at[left]) <= reach[left])
+        left = left[~done & ~gone]
+        if left.size == 0:
+            break
+    return found
+
+
+def sagitta(length: float, radius: float, dim: int) -> float:
+    """Return how deep straight facets reach into a ball that their corners touch.
+
+    Parameters
+    ----------
+    length
+        Longest edge of the facets.
+    radius
+        Of the ball.
+    dim
+        Of space.
+    """
+    # A facet lies in a ball of this radius (Jung's theorem). Facets of a curve that are
+    # longer than its radius do not represent it.
+    sine = min(length / radius * np.sqrt((dim - 1) / (2 * dim)), 0.5)
+    return float(radius * sine**2 / (1 + np.sqrt(1 - sine**2)))
+
+
+def split(points: Array, origin: tuple[float, ...], axis: tuple[float, ...]) -> tuple[Array, ...]:
+    """Split points into parts along and across an axis.
+
+    Returns
+    -------
+    The unit axis, shape (d,), coordinates along it, (n,), distances from it, (n,), and unit vectors
+    away from it, (n, d); 0 on the axis itself.
+    """
+    unit = np.asarray(axis, dtype=float) / np.linalg.norm(axis)
+    offset = points - np.asarray(origin)
+    along = offset @ unit
+    across = offset - along[:, None] * unit
+    radius = np.linalg.norm(across, axis=1)
+    away = across / np.where(radius > 0, radius, 1.0)[:, None]
+    return unit, along, radius, away

@@ -1,0 +1,52 @@
+"""A rigid punch with a flat face and a rounded edge."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from contact.interface.obstacle.protocol import Shape, sagitta, split
+from contact.typing import Array
+
+
+@dataclass(frozen=True)
+class Punch(Shape):
+    """A rigid cylinder with a flat face; in 2-D a rectangle.
+
+    Parameters
+    ----------
+    centre, axis
+        Centre of the face, and the axis from there into the punch, of any length.
+    radius
+        Of the punch, > 0.
+    edge_radius
+        By which its edge is rounded, at most the radius; 0: sharp.
+    direction, along
+        As for a sphere.
+    """
+
+    centre: tuple[float, ...]
+    axis: tuple[float, ...]
+    radius: float
+    edge_radius: float = 0.0
+    direction: str = "foundation"
+    along: tuple[float, ...] = ()
+
+    def distance(self, points: Array) -> tuple[Array, Array]:
+        """Return distances and normals: those of a smaller punch, less the edge radius."""
+        unit, along, radius, away = split(points, self.centre, self.axis)
+        e = self.edge_radius
+        side, face = radius - (self.radius - e), e - along
+        outside = np.hypot(np.maximum(side, 0.0), np.maximum(face, 0.0))
+        within = np.minimum(np.maximum(side, face), 0.0)
+        # On the surface of the smaller punch, and in it, the nearer of side and face.
+        out = outside > 0
+        scale = np.where(out, outside, 1.0)
+        first = np.where(out, np.maximum(side, 0.0) / scale, side > face)
+        second = np.where(out, np.maximum(face, 0.0) / scale, side <= face)
+        return outside + within - e, first[:, None] * away - second[:, None] * unit
+
+    def chord_depth(self, length: float) -> float:
+        """Return the sagitta at the edge, across it; a sharp one fits into no facets."""
+        return 0.0 if self.edge_radius == 0 else sagitta(length, self.edge_radius, 2)
