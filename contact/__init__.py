@@ -1,10 +1,32 @@
-"""Static frictional contact of Hencky elasto-plastic and piezoelectric bodies.
+"""Frictional contact of Hencky elasto-plastic and piezoelectric bodies.
+
+A case file is solved by
 
 >>> from contact import load_case, solve
 >>> solution = solve(load_case("bar.toml"))  # doctest: +SKIP
 
-The names below are imported on first use, so that a program can import the package and still
-initialise PETSc with its own arguments.
+and a problem that is put together in Python by
+
+>>> from contact import Body, Contact, Domain, Fixed, Friction, Linear, Problem, solve
+>>> domain = Domain.from_mesh(mesh, facet_tags, {"top": 1, "bottom": 2})  # doctest: +SKIP
+>>> body = Body(Linear(210e3, 0.3), [Fixed("top", [0.0, -0.01])])  # doctest: +SKIP
+>>> problem = Problem(domain, body, Contact("bottom"), Friction(mu=0.3))  # doctest: +SKIP
+>>> solution = solve(problem)  # doctest: +SKIP
+
+Geometry: `Domain` (`Domain.from_mesh` takes dolfinx's mesh and tags).
+Body: `Body`, `Material`, `Fixed`, `Load`; `Linear`, `Log`, `UserLaw`, `Piezo`.
+Contact: `Contact` with a gap, or a `Plane`, `Sphere`, `Cylinder`, `Cone`, `Paraboloid`, `Punch`,
+`Level`, `Triangles`; `Layer`; `Friction`, `SlipCoefficient`, `Coulomb`;
+ `Conductor` with `ShiftedConductivity`, `RampConductivity`, `PerfectConductivity`.
+Solving: `Problem`, `solve`, `evolve`; `NewtonOptions`, `FixedPointOptions`, `PenaltyOptions`.
+Case files: `Case`, `load_case`, `parse_case`, `build_problem`.
+Results: `Solution`, `write_outputs`. Errors of the input: `InputError`.
+
+Wherever a field is given - a displacement, a load, a gap, a coefficient of friction - a number, a
+function of x, UFL or a dolfinx Function will do.
+
+The names are imported on first use, so that a program can import the package and still initialise
+PETSc with its own arguments.
 """
 
 from __future__ import annotations
@@ -14,31 +36,104 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from contact.body.description import Body, Fixed, Load, Material
     from contact.build import build_problem
     from contact.case.file import Case, load_case, parse_case
     from contact.errors import InputError
     from contact.evolving import evolve
+    from contact.interface.current import Conductor
+    from contact.interface.friction import Friction
+    from contact.interface.layer import Layer
+    from contact.interface.obstacle import (
+        Cone,
+        Cylinder,
+        GapFunction,
+        Level,
+        Paraboloid,
+        Plane,
+        Punch,
+        Sphere,
+        Triangles,
+    )
+    from contact.mesh.domain import Domain
+    from contact.methods.options import FixedPointOptions, NewtonOptions, PenaltyOptions
     from contact.output.files import write_outputs
     from contact.output.solution import Solution
+    from contact.problem.problem import Contact
+    from contact.problem.problem import ContactProblem as Problem
     from contact.solving import solve, solve_problem
+    from forms.hencky import Linear, Log, UserLaw
+    from forms.laws import (
+        Coulomb,
+        PerfectConductivity,
+        RampConductivity,
+        ShiftedConductivity,
+        SlipCoefficient,
+    )
+    from forms.piezo import Piezo
 
+#: Module -> the names that stand there.
 _HOMES = {
-    "Case": "case.file",
-    "InputError": "errors",
-    "Solution": "output.solution",
-    "build_problem": "build",
-    "evolve": "evolving",
-    "load_case": "case.file",
-    "parse_case": "case.file",
-    "solve": "solving",
-    "solve_problem": "solving",
-    "write_outputs": "output.files",
+    "contact.body.description": "Body Fixed Load Material",
+    "contact.build": "build_problem",
+    "contact.case.file": "Case load_case parse_case",
+    "contact.errors": "InputError",
+    "contact.evolving": "evolve",
+    "contact.interface.current": "Conductor",
+    "contact.interface.friction": "Friction",
+    "contact.interface.layer": "Layer",
+    "contact.interface.obstacle": "Cone Cylinder GapFunction Level Paraboloid Plane Punch Sphere Triangles",
+    "contact.mesh.domain": "Domain",
+    "contact.methods.options": "FixedPointOptions NewtonOptions PenaltyOptions",
+    "contact.output.files": "write_outputs",
+    "contact.output.solution": "Solution",
+    "contact.problem.problem": "Contact ContactProblem",
+    "contact.solving": "solve solve_problem",
+    "forms.hencky": "Linear Log UserLaw",
+    "forms.laws": "Coulomb PerfectConductivity RampConductivity ShiftedConductivity "
+    "SlipCoefficient",
+    "forms.piezo": "Piezo",
 }
+_HOME = {name: module for module, names in _HOMES.items() for name in names.split()}
+#: Shorter names.
+_ALIASES = {"Problem": "ContactProblem"}
 
 __all__ = [
+    "Body",
     "Case",
+    "Conductor",
+    "Cone",
+    "Contact",
+    "Coulomb",
+    "Cylinder",
+    "Domain",
+    "Fixed",
+    "FixedPointOptions",
+    "Friction",
+    "GapFunction",
     "InputError",
+    "Layer",
+    "Level",
+    "Linear",
+    "Load",
+    "Log",
+    "Material",
+    "NewtonOptions",
+    "Paraboloid",
+    "PenaltyOptions",
+    "PerfectConductivity",
+    "Piezo",
+    "Plane",
+    "Problem",
+    "Punch",
+    "RampConductivity",
+    "ShiftedConductivity",
+    "SlipCoefficient",
     "Solution",
+    "Sphere",
+    "Triangles",
+    "UserLaw",
+    "__version__",
     "build_problem",
     "evolve",
     "load_case",
@@ -48,12 +143,19 @@ __all__ = [
     "write_outputs",
 ]
 
+__version__ = "0.1.0"
+
 # Open MPI reads this as it starts, where nothing has started it before. With its default choice
 # MPI_Dist_graph_create, by which checkpoints are read, may hang (open-mpi/ompi issue 13918).
 os.environ.setdefault("OMPI_MCA_topo", "basic")
 
 
 def __getattr__(name: str) -> Any:
-    if name not in _HOMES:
+    known = _ALIASES.get(name, name)
+    if known not in _HOME:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    return getattr(import_module(f"{__name__}.{_HOMES[name]}"), name)
+    return getattr(import_module(_HOME[known]), known)
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__})

@@ -23,6 +23,13 @@ def geometry_dofmap(mesh: Mesh) -> npt.NDArray[np.int32]:
     return geometry.dofmaps[0] if hasattr(geometry, "dofmaps") else geometry.dofmap
 
 
+def interpolation_points(space: fem.FunctionSpace) -> npt.NDArray[np.float64]:
+    """Points of a reference cell at which a function is asked for to be interpolated."""
+    points = space.element.interpolation_points
+    # A method up to 0.9.
+    return np.asarray(points() if callable(points) else points)
+
+
 def original_cells(mesh: Mesh) -> npt.NDArray[np.int64]:
     """Input index of each local cell, shape (cells,)."""
     original = mesh.topology.original_cell_index

@@ -22,7 +22,7 @@ from contact.nesting import coarse_solution
 from contact.output.resume import Checkpoints, read_steps
 from contact.output.review import announce
 from contact.output.solution import Solution
-from contact.problem.held import check_potential
+from contact.problem.held import check_held, check_potential
 from contact.problem.problem import ContactProblem
 from contact.problem.state import State
 
@@ -62,6 +62,7 @@ def solve(
     """
     begin = time.perf_counter()
     if isinstance(case, ContactProblem):
+        check_held(case)
         return solve_problem(case, settings or NewtonOptions(), monitor)
     case = case if isinstance(case, Case) else load_case(case)
     settings = settings or case.solver

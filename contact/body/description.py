@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
+from dataclasses import field as default
 from typing import Protocol
 
 import numpy as np
 from ufl.core.expr import Expr
 
 from contact.body.amplitude import Amplitude, Moving, amplitude_of
+from contact.body.fields import Given, field, vector
 from contact.body.rigid import Electrode, Rigid
 from contact.errors import InputError
 from contact.typing import Array
@@ -30,15 +32,36 @@ class Field(Protocol):
 
 @dataclass(frozen=True)
 class Fixed:
-    """Prescribed values on a part; None leaves a component free.
+    """Prescribed values on a part of the boundary.
 
-    They are multiplied by the amplitude, a function of time: see `amplitude.amplitude_of`.
+    Parameters
+    ----------
+    on
+        Name of the part.
+    displacement
+        A value a component, each as `fields.field` takes it: a number, a function of x, UFL, a
+        dolfinx Function; None or "free" leaves a component free. Or one UFL expression or
+        Function of vectors.
+    potential
+        Of a piezoelectric body, likewise; None leaves it free.
+    amplitude
+        Function of time by which they are multiplied: see `amplitude.amplitude_of`.
+
+    Raises
+    ------
+    InputError
+        If a value is nothing of these.
     """
 
     on: str
-    displacement: Sequence[Field | Moving | None] | None = None
-    potential: Field | Moving | None = None
+    displacement: Given = None
+    potential: Given = None
     amplitude: Amplitude | None = None
+
+    def __post_init__(self) -> None:
+        """Make fields of what is given."""
+        object.__setattr__(self, "displacement", vector(self.displacement))
+        object.__setattr__(self, "potential", field(self.potential))
 
     @property
     def factor(self) -> Amplitude:
@@ -51,8 +74,13 @@ class Fixed:
 class Load:
     """Given forces and charges: on a part, or in the whole body where `on` is None.
 
+    Each value is a number, a function of x, UFL or a dolfinx Function, as `fields.field` takes
+    it.
+
     Attributes
     ----------
+    on
+        Name of the part; None for the whole body.
     force
         Traction (force/area) on a part, body force (force/volume) in the body.
     pressure
@@ -64,10 +92,16 @@ class Load:
     """
 
     on: str | None
-    force: Sequence[Field | Moving] | None = None
-    pressure: Field | Moving | None = None
-    charge: Field | Moving | None = None
+    force: Given = None
+    pressure: Given = None
+    charge: Given = None
     amplitude: Amplitude | None = None
+
+    def __post_init__(self) -> None:
+        """Make fields of what is given."""
+        object.__setattr__(self, "force", vector(self.force))
+        object.__setattr__(self, "pressure", field(self.pressure))
+        object.__setattr__(self, "charge", field(self.charge))
 
     @property
     def fields(self) -> list[Field | Moving]:
@@ -119,7 +153,7 @@ class Body:
 
     law: Law
     fixed: Sequence[Fixed]
-    loads: Sequence[Load] = field(default_factory=tuple)
+    loads: Sequence[Load] = default(default_factory=tuple)
     piezo: Piezo | None = None
     regions: tuple[Material, ...] = ()
     rigid: tuple[Rigid, ...] = ()

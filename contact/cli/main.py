@@ -22,6 +22,7 @@ from typing import TYPE_CHECKING, Any, NoReturn
 
 from mpi4py import MPI
 
+from contact import __version__
 from contact.cli import materials, plot
 from contact.cli.ending import (
     BAD_INPUT,
@@ -65,6 +66,9 @@ def _parser() -> _Parser:
     common: dict[str, Any] = {"add_help": False, "allow_abbrev": False}
     parser = _Parser(prog="contact", description=__doc__, **common)
     parser.add_argument("--help", action="help", help="show this help and leave")
+    parser.add_argument(
+        "--version", action="version", version=f"contact {__version__}", help="show the version"
+    )
     commands = parser.add_subparsers(
         dest="command", required=True, metavar="solve|check|plot|materials"
     )

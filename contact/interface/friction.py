@@ -6,7 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from contact.body.description import Field
+from contact.body.fields import Given, field
+from contact.errors import InputError
 from contact.interface.history import SlipHistory
 from contact.interface.nodes import ContactNodes
 from contact.interface.piecewise import SmoothingPieces
@@ -24,20 +25,31 @@ class Friction:
     coefficient
         Coulomb's mu(|u_tau|).
     tresca
-        A fixed bound S (stress), used instead of mu times the pressure.
+        A fixed bound S (stress), used instead of mu times the pressure: a number, a function of
+        x, UFL or a dolfinx Function.
     radius
         Radius of the smoothing operator R; 0 for R = identity.
     mu
-        Coulomb's mu as a function of position, instead of `coefficient`.
+        Coulomb's mu, a number or function of position likewise, instead of `coefficient`.
     law
         Any other law, for instance with a coefficient that depends on the pressure.
     """
 
     coefficient: FrictionCoefficient | None = None
-    tresca: Field | None = None
+    tresca: Given = None
     radius: float = 0.0
-    mu: Field | None = None
+    mu: Given = None
     law: FrictionLaw | None = None
+
+    def __post_init__(self) -> None:
+        """Make fields of what is given."""
+        if isinstance(self.coefficient, int | float):
+            raise InputError(
+                f"Friction({self.coefficient}): accepted: Friction(mu={self.coefficient}), a "
+                "coefficient, or Friction(tresca=...), a bound"
+            )
+        object.__setattr__(self, "tresca", field(self.tresca))
+        object.__setattr__(self, "mu", field(self.mu))
 
     def law_at(self, points: Array) -> FrictionLaw | None:
         """Return the law at nodes of coordinates (n, d); None without friction. Collective."""

@@ -4,8 +4,10 @@ Each name stands for one set of indices, so that parts, and regions, may overlap
 ``top`` and a piece ``loaded`` of it).
 """
 
+from __future__ import annotations
+
 import difflib
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any, TypeAlias
@@ -18,11 +20,11 @@ from mpi4py import MPI
 
 from contact import _compat
 from contact.errors import InputError
+from contact.mesh.entities import Indices, extent, exterior_facets
 from contact.mesh.measure import ExtendedMeasure, Measure
 from forms.kinematics import CARTESIAN, Axisymmetric, Kinematics
 
 #: Indices of facets or cells that this rank owns, ascending.
-Indices: TypeAlias = npt.NDArray[np.int32]
 Marker: TypeAlias = Callable[[npt.NDArray[np.float64]], npt.NDArray[np.bool_]]
 
 #: The region of a mesh whose cells nothing tells apart.
@@ -65,6 +67,38 @@ class Domain:
     unusable: Mapping[str, str] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
     revolved: bool = False
+
+    @staticmethod
+    def from_mesh(
+        mesh: dmesh.Mesh,
+        facet_tags: dmesh.MeshTags,
+        names: Mapping[str, int | Sequence[int]],
+        cell_tags: dmesh.MeshTags | None = None,
+        regions: Mapping[str, int | Sequence[int]] | None = None,
+    ) -> Domain:
+        """Name parts of a dolfinx mesh by its tags. Collective.
+
+        Parameters
+        ----------
+        mesh
+            Triangles or tetrahedra with straight edges.
+        facet_tags
+            Tags of facets, for instance those that dolfinx reads from Gmsh.
+        names
+            Name of a part -> its tag, or several.
+        cell_tags, regions
+            Likewise of the regions; by default there is one, ``body``.
+
+        Raises
+        ------
+        InputError
+            As `contact.mesh.domain.from_mesh`, which takes functions of position instead.
+        """
+        parts = {name: _tagged(facet_tags, tag) for name, tag in names.items()}
+        if cell_tags is None or regions is None:
+            return from_mesh(mesh, parts)
+        cells = {name: _tagged(cell_tags, tag) for name, tag in regions.items()}
+        return from_mesh(mesh, parts, regions=cells)
 
     @property
     def comm(self) -> MPI.Intracomm:
@@ -212,6 +246,11 @@ def from_mesh(
     return with_names(mesh, chosen, cells, size)
 
 
+def _tagged(tags: dmesh.MeshTags, wanted: int | Sequence[int]) -> Indices:
+    """Return the entities with one of some tags, ascending."""
+    return np.asarray(tags.indices[np.isin(tags.values, wanted)], dtype=np.int32)
+
+
 def _owned(mesh: dmesh.Mesh, dim: int, given: Marker | npt.NDArray[np.integer[Any]]) -> Indices:
     """Return the owned ones of given entities, ascending."""
     if not callable(given):
@@ -253,45 +292,4 @@ def with_names(
         empty = [name for name, count in zip(sets, counts, strict=True) if count == 0]
         if empty:
             raise InputError(f"the {what} {empty[0]!r} contains no {of_it}")
-    return Domain(mesh, parts, regions, _extent(mesh) if size is None else size)
-
-
-def combinations(
-    count: int, groups: Iterable[npt.NDArray[np.integer[Any]]]
-) -> tuple[Indices, tuple[tuple[int, ...], ...]]:
-    """Write groups of indices that may overlap as one number an index.
-
-    Returns
-    -------
-    For each of the indices 0, ..., count - 1 a number, and for each number the groups, by their
-    positions, that the index is in.
-    """
-    numbers = np.zeros(count, dtype=np.int32)
-    combined: list[tuple[int, ...]] = [()]
-    for position, group in enumerate(groups):
-        members = np.unique(group)
-        # What a number stood for so far divides into those within the group and those without.
-        met, within = np.unique(numbers[members], return_inverse=True)
-        numbers[members] = len(combined) + within
-        combined += [(*combined[old], position) for old in met]
-    return numbers, tuple(combined)
-
-
-def _extent(mesh: dmesh.Mesh) -> float:
-    """Largest extent of the bounding box over all ranks; a rank may hold no node."""
-    x = mesh.geometry.x
-    low = x.min(axis=0, initial=np.inf)
-    high = x.max(axis=0, initial=-np.inf)
-    mesh.comm.Allreduce(MPI.IN_PLACE, low, MPI.MIN)
-    mesh.comm.Allreduce(MPI.IN_PLACE, high, MPI.MAX)
-    return float((high - low).max())
-
-
-def exterior_facets(mesh: dmesh.Mesh) -> Indices:
-    """Exterior facets that this rank owns, ascending. Collective."""
-    tdim = mesh.topology.dim
-    mesh.topology.create_entities(tdim - 1)
-    mesh.topology.create_connectivity(tdim - 1, tdim)
-    mesh.topology.create_connectivity(tdim, tdim - 1)
-    mesh.topology.create_connectivity(tdim - 1, 0)
-    return np.sort(dmesh.exterior_facet_indices(mesh.topology))
+    return Domain(mesh, parts, regions, extent(mesh) if size is None else size)

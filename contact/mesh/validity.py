@@ -9,7 +9,8 @@ import numpy as np
 import numpy.typing as npt
 
 from contact.errors import InputError
-from contact.mesh.domain import BODY, combinations
+from contact.mesh.domain import BODY
+from contact.mesh.entities import combinations
 from contact.mesh.extraction import Ints, Model
 from contact.typing import Array
 

@@ -15,7 +15,8 @@ from mpi4py import MPI
 
 from contact.errors import InputError
 from contact.interface.multipliers import Multipliers
-from contact.mesh.domain import Domain, Indices, combinations, exterior_facets, from_mesh
+from contact.mesh.domain import Domain, from_mesh
+from contact.mesh.entities import Indices, combinations, exterior_facets
 from contact.mesh.revolution import revolved
 from contact.output.disk import OVERHEAD, claim_room, library_errors
 from contact.output.fields import nodal_function, unknowns

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 from dolfinx import fem
@@ -15,8 +16,9 @@ from contact.interface.multipliers import Multipliers
 from contact.interface.status import CLOSED, STICKS
 from contact.linear.operator import Counters
 from contact.methods.report import History, Outcome
+from contact.output.contact_result import ContactResult, contact_result
 from contact.output.deformation import Deformation
-from contact.output.fields import unknowns
+from contact.output.fields import DerivedFields, unknowns
 from contact.output.options import OutputOptions
 from contact.output.record import StepRecord
 from contact.output.supports import Support, moment, supports
@@ -24,6 +26,9 @@ from contact.output.units import Units
 from contact.problem.problem import ContactProblem
 from contact.problem.state import State
 from contact.typing import Array
+
+if TYPE_CHECKING:
+    from contact.output.figures.figures import Gallery
 
 
 @dataclass
@@ -99,6 +104,41 @@ class Solution:
     def converged(self) -> bool:
         """Whether all residuals are below the tolerance."""
         return self.outcome.converged
+
+    @cached_property
+    def contact(self) -> ContactResult:
+        """The contact nodes of all ranks as arrays, and as functions. Collective."""
+        return contact_result(self)
+
+    @cached_property
+    def _derived(self) -> dict[str, fem.Function]:
+        return DerivedFields(self.problem.equilibrium, self.state.x).cells()
+
+    @property
+    def stress(self) -> fem.Function:
+        """The stress, 3 x 3, cell by cell: of a degree less than the displacement. Collective."""
+        return self._derived["stress"]
+
+    @property
+    def von_mises(self) -> fem.Function:
+        """The von Mises stress, likewise. Collective."""
+        return self._derived["von_mises"]
+
+    def plot(self, *fields: str, width: float | None = None) -> Gallery | None:
+        """Return the figures on rank 0, which a notebook shows; None elsewhere. Collective.
+
+        Parameters
+        ----------
+        fields
+            Fields to colour the body by, as ``contact plot --field`` takes them. By default
+            contact part, von Mises stress and potential are drawn.
+        width
+            Of the figures (inches).
+        """
+        from contact.output.figures.figures import collect  # matplotlib takes a while to load
+
+        drawing = collect(self, fields)
+        return None if drawing is None else drawing.figures(width, contact=not fields)
 
     @cached_property
     def _unknowns(self) -> dict[str, fem.Function]:

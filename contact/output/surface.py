@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from contact.output.solution import Solution
+from contact.output.solved import Solved
 from contact.output.table import Table, tangent_of
 from contact.output.vtu import VTU, Grid, Values
 from contact.problem.problem import ContactProblem
@@ -30,7 +30,7 @@ def _facet_nodes(problem: ContactProblem, part: str) -> NDArray[np.int32]:
     return np.take_along_axis(space.dofmap.list[cells], closure[place], axis=1)
 
 
-def contact_surface(solution: Solution, table: Table | None) -> VTU | None:
+def contact_surface(solution: Solved, table: Table | None) -> VTU | None:
     """Return the contact part on rank 0, None elsewhere. Collective.
 
     Parameters
@@ -64,6 +64,17 @@ def contact_surface(solution: Solution, table: Table | None) -> VTU | None:
     return VTU(grid, {name: _completed(values, grid) for name, values in fields.items()}, {})
 
 
+def slip_and_friction(table: Table, normal: Array) -> tuple[Array, Array]:
+    """Return u_tau and lambda_f of a contact table as vectors, both of shape (n, d)."""
+    if normal.shape[1] == 2:
+        tangent = tangent_of(normal)
+        return table["u_t"][:, None] * tangent, table["tau"][:, None] * tangent
+    return (
+        np.column_stack([table[f"u_t{axis}"] for axis in "xyz"]),
+        np.column_stack([table[f"tau_{axis}"] for axis in "xyz"]),
+    )
+
+
 def _fields(
     problem: ContactProblem, table: Table, names: NDArray[np.int64], x: Array
 ) -> dict[str, Values]:
@@ -71,12 +82,7 @@ def _fields(
     d, size = problem.dim, problem.equilibrium.space.dofmap.index_map.size_global
     rows = np.searchsorted(names, table["entry"] * size + table["node"])
     normal = np.column_stack([table[f"nu_{axis}"] for axis in "xyz"[:d]])
-    if d == 2:
-        tangent = tangent_of(normal)
-        slip, friction = (table[name][:, None] * tangent for name in ("u_t", "tau"))
-    else:
-        slip = np.column_stack([table[f"u_t{axis}"] for axis in "xyz"])
-        friction = np.column_stack([table[f"tau_{axis}"] for axis in "xyz"])
+    slip, friction = slip_and_friction(table, normal)
 
     def spread(values: Values) -> Values:
         """Put the values of the contact nodes in their places, NaN in the others."""

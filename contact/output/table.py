@@ -11,7 +11,7 @@ from scipy import sparse
 from scipy.sparse import csgraph
 
 from contact.interface.placing import candidates
-from contact.output.solution import Solution
+from contact.output.solved import Solved
 from contact.problem.problem import ContactProblem
 from contact.typing import Array
 
@@ -27,7 +27,7 @@ def tangent_of(normal: Array) -> Array:
     return np.column_stack([-normal[:, 1], normal[:, 0]])
 
 
-def contact_table(solution: Solution) -> Table | None:
+def contact_table(solution: Solved) -> Table | None:
     """Return a column a quantity on rank 0 and None elsewhere. Collective.
 
     These are the columns of ``contact.csv`` (`csv_columns`), the contact direction ``nu_x``...

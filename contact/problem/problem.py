@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from contact.body.description import Body
 from contact.body.equilibrium import BodyEquilibrium
+from contact.body.fields import Given
 from contact.body.norms import volume
 from contact.errors import InputError
 from contact.interface.current import Conductor, HeldCurrent, held_current
@@ -29,7 +30,7 @@ from contact.interface.interface import Interface
 from contact.interface.layer import Layer
 from contact.interface.multipliers import Multipliers
 from contact.interface.nodes import ContactNodes
-from contact.interface.obstacle import Obstacle
+from contact.interface.obstacle import GapFunction
 from contact.interface.pairing import find_pair
 from contact.interface.placing import candidates, find_nodes
 from contact.interface.response import FoundationResponse
@@ -49,7 +50,8 @@ class Contact:
     on
         The part.
     foundation
-        The obstacle.
+        The obstacle; or a gap to a rigid foundation along the body's normal: a number, a function
+        of x, UFL or a dolfinx Function. By default the body lies on it.
     layer
         The compliant layer in front of it.
     friction, conductor
@@ -62,12 +64,17 @@ class Contact:
     """
 
     on: str
-    foundation: Obstacle
+    foundation: Given = 0.0
     layer: Layer | None = None
     friction: Friction | None = None
     conductor: Conductor | None = None
     press: bool = False
     against: str | None = None
+
+    def __post_init__(self) -> None:
+        """Make an obstacle of a gap."""
+        if not hasattr(self.foundation, "measure"):
+            object.__setattr__(self, "foundation", GapFunction.of(self.foundation))
 
 
 class ContactProblem:

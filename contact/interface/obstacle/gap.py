@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from contact.body.fields import Given, field
 from contact.typing import Array
 
 
@@ -18,9 +19,15 @@ class GapFunction:
     ----------
     gap
         Function of points of shape (n, d) that returns the gap, shape (n,) (length).
+        `GapFunction.of` takes numbers, functions of x, UFL and dolfinx Functions.
     """
 
     gap: Callable[[Array], Array]
+
+    @staticmethod
+    def of(value: Given) -> GapFunction:
+        """Return the gap that is given as `contact.body.fields.field` takes it."""
+        return GapFunction(field(value).numpy)
 
     direction = "body"
     is_shape = False

@@ -16,7 +16,7 @@ from contact.errors import InputError
 from contact.output.field_files import body_share
 from contact.output.figures.contact import BLUE, UNNAMED, ends
 from contact.output.figures.pixels import pixels
-from contact.output.solution import Solution
+from contact.output.solved import Solved
 from contact.output.table import Table, held_points
 from contact.output.units import Units
 from contact.output.vtu import VTU, Grid, gathered
@@ -77,7 +77,7 @@ def magnification(size: float, largest: float) -> float:
     return float(power * max(k for k in (1, 2, 5) if k * power <= wanted))
 
 
-def picture(solution: Solution, field: str, label: str) -> Picture | None:
+def picture(solution: Solved, field: str, label: str) -> Picture | None:
     """Collect what is drawn on rank 0; None elsewhere. Collective.
 
     Parameters
@@ -85,12 +85,13 @@ def picture(solution: Solution, field: str, label: str) -> Picture | None:
     solution
         The solution.
     field
-        "potential", or a scalar field of `DerivedFields`.
+        Name of a field, as `scalar` takes it.
     label
         Of the colours.
     """
     problem = solution.problem
-    share = body_share(problem, solution.state, ("displacement", field))
+    names = ("displacement", field, field.rpartition("_")[0])
+    share = body_share(problem, solution.state, names)
     body, held = gathered(problem.comm, share), held_points(problem)
     return None if body is None else drawn(body, held, field, label)
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import base64
+import io
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,7 +15,7 @@ from matplotlib.figure import Figure
 from contact.output.figures.body import Picture, draw_plane, picture
 from contact.output.figures.contact import NARROW, UNNAMED, draw_line, draw_surface
 from contact.output.figures.space import draw_space
-from contact.output.solution import Solution
+from contact.output.solved import Solved
 from contact.output.surface import contact_surface
 from contact.output.table import Table, contact_table, held_points
 from contact.output.units import Quantity, Units
@@ -107,7 +109,23 @@ class Drawing:
         -------
         The files, in the order in which they were drawn; one that fails is not left half done.
         """
-        with matplotlib.rc_context(STYLE | ({} if width is None else sized(width))):
+        figures = self.figures(width, contact)
+        with matplotlib.rc_context(_style(width)):
+            return [
+                _save(figure, folder / f"figure-{name}.{ending}")
+                for name, figure in figures.items()
+                for ending in formats
+            ]
+
+    def figures(self, width: float | None = None, contact: bool = True) -> Gallery:
+        """Return the figures by name. On one rank.
+
+        Parameters
+        ----------
+        width, contact
+            As `draw` takes them.
+        """
+        with matplotlib.rc_context(_style(width)):
             figures: dict[str, Figure | None] = {}
             if contact:
                 figures["contact"] = (
@@ -121,12 +139,25 @@ class Drawing:
                     if self.plane
                     else draw_space(made, self.title)
                 )
-            return [
-                _save(figure, folder / f"figure-{name}.{ending}")
-                for name, figure in figures.items()
-                if figure is not None
-                for ending in formats
-            ]
+        return Gallery({name: figure for name, figure in figures.items() if figure is not None})
+
+
+class Gallery(dict[str, Figure]):
+    """Figures by name; a notebook shows them."""
+
+    def _repr_html_(self) -> str:
+        images = []
+        for name, figure in self.items():
+            data = io.BytesIO()
+            with matplotlib.rc_context(STYLE):
+                figure.savefig(data, format="png", dpi=110)
+            text = base64.b64encode(data.getvalue()).decode()
+            images.append(f'<img alt="{name}" src="data:image/png;base64,{text}">')
+        return "".join(images)
+
+
+def _style(width: float | None) -> dict[str, Any]:
+    return STYLE | ({} if width is None else sized(width))
 
 
 def sized(width: float) -> dict[str, Any]:
@@ -135,21 +166,38 @@ def sized(width: float) -> dict[str, Any]:
     return {"figure.figsize": (width, width)} | small
 
 
-def collect(solution: Solution) -> Drawing | None:
-    """Gather on rank 0 what the figures of a solution show; None elsewhere. Collective."""
+def collect(solution: Solved, fields: Sequence[str] = ()) -> Drawing | None:
+    """Gather on rank 0 what the figures of a solution show; None elsewhere. Collective.
+
+    Parameters
+    ----------
+    solution
+        The solution.
+    fields
+        Fields to colour the body by; by default the von Mises stress and the potential.
+    """
     table, held = contact_table(solution), held_points(solution.problem)
     surface = contact_surface(solution, table)
     pictures: list[tuple[str, Picture]] = []
-    for name, field, words, quantity in DEFORMED:
-        if field != "potential" or solution.problem.piezoelectric:
-            made = picture(solution, field, solution.units.label(words, quantity))
-            if made is not None:
-                pictures.append((name, made))
+    usual = [f for _, f, *_ in DEFORMED if f != "potential" or solution.problem.piezoelectric]
+    for field in fields or usual:
+        name, label = named(field, solution.units)
+        made = picture(solution, field, label)
+        if made is not None:
+            pictures.append((name, made))
     if table is None or surface is None:
         return None
     title, plane = heading(solution.title), solution.problem.dim == 2
     axes, mirror = axes_of(solution.problem.domain.revolved), solution.output.mirror
     return Drawing(title, plane, table, held, surface, pictures, axes, mirror, solution.units)
+
+
+def named(field: str, units: Units) -> tuple[str, str]:
+    """Return the name of the figure of a field, and the label of its colours."""
+    for name, known, words, quantity in DEFORMED:
+        if known == field:
+            return name, units.label(words, quantity)
+    return field, field.replace("_", " ") + " (units of the case)"
 
 
 def axes_of(revolved: bool) -> str:
@@ -165,7 +213,7 @@ def heading(title: str) -> str:
     return line.replace("$", r"\$")
 
 
-def write_figures(solution: Solution, folder: str | Path) -> list[Path]:
+def write_figures(solution: Solved, folder: str | Path) -> list[Path]:
     """Draw the figures of a solution into a folder. Collective; rank 0 draws.
 
     In the plane the contact figure shows the stresses along Gamma_3 with the friction bound

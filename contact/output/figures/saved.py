@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from contact.errors import InputError
 from contact.output import transaction
 from contact.output.figures.body import drawn
-from contact.output.figures.figures import DEFORMED, Drawing, axes_of, heading
+from contact.output.figures.figures import DEFORMED, Drawing, axes_of, heading, named
 from contact.output.folder import refused, result_folder
 from contact.output.table import Table
 from contact.output.units import Units
@@ -50,12 +50,10 @@ def read_drawing(folder: Path, fields: Sequence[str] = (), mirror: bool = False)
     d = body.grid.dimension
     held = surface.grid.points[np.asarray(surface.at_points["row"]) < 0, :d]
     units = Units(**summary.get("units", {}))
-    known = {
-        field: (name, units.label(words, quantity)) for name, field, words, quantity in DEFORMED
-    }
+    usual = [field for _, field, *_ in DEFORMED if field in body.at_points]
     pictures = []
-    for field in fields or [f for f in known if f in body.at_points]:
-        name, label = known.get(field, (field, field.replace("_", " ") + " (units of the case)"))
+    for field in fields or usual:
+        name, label = named(field, units)
         pictures.append((name, drawn(body, held, field, label)))
     title, axes = heading(summary["title"]), axes_of(summary.get("kinematics") == "axisymmetric")
     return Drawing(title, d == 2, table, held, surface, pictures, axes, mirror, units)

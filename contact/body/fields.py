@@ -1,0 +1,184 @@
+"""Given functions of position in Python: numbers, functions of x, UFL, functions of dolfinx."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, TypeAlias
+
+import numpy as np
+import ufl
+from dolfinx import fem, geometry
+from dolfinx import mesh as dmesh
+from mpi4py import MPI
+from ufl.core.expr import Expr
+
+from contact import _compat
+from contact.body.amplitude import Moving
+from contact.errors import InputError
+from contact.typing import Array
+
+#: What `field` takes.
+Given: TypeAlias = Any
+
+ACCEPTED = (
+    "a number, a function of x as dolfinx interpolates it (x[0], x[1], ... are arrays), a scalar "
+    "UFL expression or dolfinx Function, or an object with the methods ufl(x) and numpy(points)"
+)
+
+
+def field(value: Given) -> Any:
+    """Return what is given as a function of position, as a `Field` or `Moving`; None as it is.
+
+    Raises
+    ------
+    InputError
+        If it is nothing of the kind.
+    """
+    if value is None or isinstance(value, Moving):
+        return value
+    if isinstance(value, int | float | np.number) and not isinstance(value, bool):
+        return Number(float(value))
+    if isinstance(value, Expr):
+        if value.ufl_shape != ():
+            raise InputError(f"given UFL of shape {value.ufl_shape}; accepted: {ACCEPTED}")
+        return Ufl(value)
+    if hasattr(value, "ufl") and hasattr(value, "numpy"):
+        return value
+    if callable(value):
+        return Callback(value)
+    raise InputError(f"given {value!r} for a function of position; accepted: {ACCEPTED}")
+
+
+def vector(value: Given) -> tuple[Any, ...] | None:
+    """Return the components of a vector; None or "free" for a component leaves it free.
+
+    Parameters
+    ----------
+    value
+        A list with what `field` takes, or a UFL expression or Function of vectors.
+    """
+    if value is None:
+        return None
+    if isinstance(value, Expr) and len(value.ufl_shape) == 1:
+        return tuple(Ufl(value[i]) for i in range(value.ufl_shape[0]))
+    if not isinstance(value, Sequence | np.ndarray) or isinstance(value, str):
+        raise InputError(
+            f"given {value!r} for a vector; accepted: a list with an entry a component, or UFL "
+            "or a Function of vectors"
+        )
+    return tuple(None if isinstance(v, str) and v == "free" else field(v) for v in value)
+
+
+@dataclass(frozen=True)
+class Number:
+    """The same everywhere."""
+
+    value: float
+
+    def ufl(self, x: Expr) -> float:
+        """Return the number."""
+        return self.value
+
+    def numpy(self, points: Array) -> Array:
+        """Return it for each of the points."""
+        return np.full(len(points), self.value)
+
+
+@dataclass(frozen=True)
+class Callback:
+    """A function of x, an array of shape (3, n), that returns n values.
+
+    In forms it is taken as it is where it can be called with UFL's coordinates (arithmetic and
+    `forms.ops`), else interpolated by quadratics.
+    """
+
+    function: Callable[[Any], Any]
+
+    def ufl(self, x: Expr) -> Any:
+        """Return the function as UFL of the coordinates. Collective."""
+        try:
+            found = self.function(x)
+        except Exception:  # NumPy's functions take no UFL, and say so in many ways
+            found = None
+        if isinstance(found, int | float):
+            return float(found)
+        if isinstance(found, Expr) and not isinstance(found, ufl.classes.Condition):
+            return found
+        made = fem.Function(fem.functionspace(mesh_of(x), ("Lagrange", 2)))
+        made.interpolate(self._values)
+        return made
+
+    def numpy(self, points: Array) -> Array:
+        """Return the values at points of shape (n, d)."""
+        x = np.zeros((3, len(points)))
+        x[: points.shape[1]] = points.T
+        return self._values(x)
+
+    def _values(self, x: Array) -> Array:
+        values = np.asarray(self.function(x), dtype=float)
+        return np.broadcast_to(values, x.shape[1:]).astype(float)
+
+
+@dataclass(frozen=True, eq=False)
+class Ufl:
+    """A scalar UFL expression; dolfinx's Functions are expressions too."""
+
+    expression: Expr
+
+    def ufl(self, x: Expr) -> Expr:
+        """Return the expression."""
+        return self.expression
+
+    @cached_property
+    def _function(self) -> fem.Function:
+        if isinstance(self.expression, fem.Function):
+            return self.expression
+        # Higher degrees than 2 are beyond the elements of the solution.
+        space = fem.functionspace(mesh_of(self.expression), ("Lagrange", 2))
+        made = fem.Function(space)
+        made.interpolate(fem.Expression(self.expression, _compat.interpolation_points(space)))
+        return made
+
+    def numpy(self, points: Array) -> Array:
+        """Return the values at points of shape (n, d), in the local cells. Collective.
+
+        Raises
+        ------
+        InputError
+            If a point is in no cell that this rank knows.
+        """
+        function = self._function
+        mesh = function.function_space.mesh
+        x = np.zeros((len(points), 3))
+        x[:, : points.shape[1]] = points
+        tree = geometry.bb_tree(mesh, mesh.topology.dim, padding=1e-10)
+        found = geometry.compute_collisions_points(tree, x)
+        cells = geometry.compute_colliding_cells(mesh, found, x)
+        first, count = cells.offsets[:-1], np.diff(cells.offsets)
+        if mesh.comm.allreduce(bool(np.any(count == 0)), op=MPI.LOR):
+            raise InputError("a given Function is not defined everywhere on its part")
+        if not len(x):
+            return np.zeros(0)
+        return np.asarray(function.eval(x, cells.array[first]), dtype=float).reshape(-1)
+
+
+def mesh_of(expression: Expr) -> dmesh.Mesh:
+    """Return the mesh that a UFL expression lives on.
+
+    Raises
+    ------
+    InputError
+        If it lives on none, or on several.
+    """
+    for coefficient in ufl.algorithms.extract_coefficients(expression):
+        if isinstance(coefficient, fem.Function):
+            return coefficient.function_space.mesh
+    try:
+        domain = ufl.domain.extract_unique_domain(expression)
+    except ValueError as error:
+        raise InputError(f"a UFL expression: {error}") from None
+    if domain is None:
+        raise InputError("a UFL expression without a mesh; accepted: a number instead")
+    return dmesh.Mesh(domain.ufl_cargo(), domain)

@@ -1,0 +1,122 @@
+"""Whatever a field is given as, it is the same field: numbers, functions, UFL, Functions."""
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+import ufl
+from dolfinx import fem
+from dolfinx import mesh as dmesh
+from mpi4py import MPI
+
+from contact import Body, Contact, Domain, Fixed, Friction, InputError, Linear, Load, Problem, solve
+from contact.body.fields import field, vector
+
+pytestmark = pytest.mark.parallel
+
+
+def square() -> tuple[dmesh.Mesh, dmesh.MeshTags]:
+    mesh = dmesh.create_rectangle(MPI.COMM_WORLD, [[0, 0], [2, 1]], [8, 4])
+    sides = [lambda x: np.isclose(x[1], 0), lambda x: np.isclose(x[1], 1)]
+    found = [dmesh.locate_entities_boundary(mesh, 1, side) for side in sides]
+    facets = np.concatenate(found)
+    values = np.repeat(np.array([3, 7], dtype=np.int32), [f.size for f in found])
+    order = np.argsort(facets)
+    return mesh, dmesh.meshtags(mesh, 1, facets[order], values[order])
+
+
+def forms_of_one_field(mesh: dmesh.Mesh) -> dict[str, Any]:
+    """Return 0.3 - 0.1 x in all ways that Python offers."""
+    x = ufl.SpatialCoordinate(mesh)
+    function = fem.Function(fem.functionspace(mesh, ("Lagrange", 1)))
+    function.interpolate(lambda x: 0.3 - 0.1 * x[0])
+    return {
+        "arithmetic": lambda x: 0.3 - 0.1 * x[0],
+        "NumPy": lambda x: np.add(0.3, np.multiply(-0.1, x[0])),
+        "UFL": 0.3 - 0.1 * x[0],
+        "Function": function,
+        "of Functions": 2 * function - 0.3 + 0.1 * x[0],
+    }
+
+
+WAYS = list(forms_of_one_field(square()[0]))
+
+
+@pytest.mark.parametrize("way", WAYS)
+def test_values_and_forms(way: str) -> None:
+    mesh, _ = square()
+    given = field(forms_of_one_field(mesh)[way])
+    inside = mesh.geometry.x[:, :2]
+    np.testing.assert_allclose(given.numpy(inside), 0.3 - 0.1 * inside[:, 0], atol=1e-12)
+    form = fem.form(given.ufl(ufl.SpatialCoordinate(mesh)) * ufl.ds(domain=mesh))
+    integral = mesh.comm.allreduce(fem.assemble_scalar(form), op=MPI.SUM)
+    assert integral == pytest.approx(2 * (0.3 * 2 - 0.1 * 2) + 0.3 + 0.1, rel=1e-12)
+
+
+def problem(mesh: dmesh.Mesh, tags: dmesh.MeshTags, given: Any) -> Problem:
+    """Return a block with the field everywhere: pressure, displacement, gap and friction."""
+    domain = Domain.from_mesh(mesh, tags, {"bottom": 3, "top": 7})
+    body = Body(
+        Linear(10.0, 0.3),
+        [Fixed("top", [given, "free"])],
+        [Load("top", pressure=given), Load(None, force=[given, 0.0])],
+    )
+    return Problem(domain, body, Contact("bottom", given), Friction(mu=given))
+
+
+@pytest.mark.parametrize("way", WAYS[1:])
+def test_a_problem_without_a_case_file(way: str) -> None:
+    """Numbers agree whichever way the fields are given, friction and gap included."""
+    mesh, tags = square()
+    ways = forms_of_one_field(mesh)
+    first, other = (solve(problem(mesh, tags, ways[w])) for w in (WAYS[0], way))
+    assert first.converged
+    assert other.converged
+    np.testing.assert_allclose(other.contact_force, first.contact_force, rtol=1e-8)
+    np.testing.assert_allclose(other.state.x, first.state.x, atol=1e-9)
+
+
+def test_numbers_alone() -> None:
+    mesh, tags = square()
+    solution = solve(problem(mesh, tags, 0.0))
+    assert solution.converged
+    np.testing.assert_allclose(solution.displacement.x.array, 0.0, atol=1e-12)
+    pressed = Body(Linear(10.0, 0.3), [Fixed("top", [0.0, -0.01])])
+    domain = Domain.from_mesh(mesh, tags, {"bottom": [3], "top": 7})
+    assert solve(Problem(domain, pressed, Contact("bottom"))).contact_force[1] < -0.1
+
+
+def test_vectors() -> None:
+    mesh, _ = square()
+    u = fem.Function(fem.functionspace(mesh, ("Lagrange", 1, (2,))))
+    u.interpolate(lambda x: np.array([x[0], 2 * x[1]]))
+    points = mesh.geometry.x[:, :2]
+    for given in (u, ufl.as_vector([ufl.SpatialCoordinate(mesh)[0], 2 * u[1] / 2])):
+        x, y = vector(given)
+        np.testing.assert_allclose(x.numpy(points), points[:, 0], atol=1e-12)
+        np.testing.assert_allclose(y.numpy(points), 2 * points[:, 1], atol=1e-12)
+    assert vector(["free", None]) == (None, None)
+
+
+@pytest.mark.parametrize(
+    ("make", "words"),
+    [
+        (lambda: Fixed("top", "free"), "accepted: a list with an entry a component"),
+        (lambda: Fixed("top", 0.0), "accepted: a list with an entry a component"),
+        (lambda: Fixed("top", ["x", 0.0]), "accepted: a number, a function of x"),
+        (lambda: Load("top", pressure=True), "accepted: a number, a function of x"),
+        (lambda: Friction(0.3), r"accepted: Friction\(mu=0.3\)"),
+        (lambda: field(ufl.Identity(2)), "UFL of shape"),
+    ],
+)
+def test_what_is_no_field(make: Callable[[], object], words: str) -> None:
+    with pytest.raises(InputError, match=words):
+        make()
+
+
+def test_a_function_of_another_mesh() -> None:
+    elsewhere = dmesh.create_rectangle(MPI.COMM_SELF, [[5, 5], [6, 6]], [1, 1])
+    function = fem.Function(fem.functionspace(elsewhere, ("Lagrange", 1)))
+    with pytest.raises(InputError, match="not defined everywhere"):
+        field(function).numpy(np.zeros((1, 2)))
