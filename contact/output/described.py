@@ -62,6 +62,8 @@ SUMMARY: Mapping[str, Item] = {
     "reaction_moments": Item("force · length", "Moments of these, as `contact_moment`."),
     "max_displacement": Item("length", "Largest Euclidean norm of the displacement at a node."),
     "max_dev_strain": Item("", "Largest |dev ε| over the cells (at degree 2 their nodes)."),
+    "max_strain": Item("", "Largest Frobenius norm of ε; linear kinematics is for small ones."),
+    "volume_ratio": Item("", "Least and largest volume of a cell over that at rest."),
     "max_von_mises": Item(
         "stress",
         "Largest von Mises stress over the same. At sharp corners it grows with each refinement.",
@@ -84,6 +86,13 @@ SUMMARY: Mapping[str, Item] = {
     "electrodes": Item(
         "", "`potential` and `charge` of each electrode whose potential was unknown, by part."
     ),
+    "rigid": Item(
+        "",
+        "Of foundations that move: `displacement` (length), `rotation` (degrees), `force` and "
+        "`moment` (about its centre) that act on it, of one or a list.",
+    ),
+    "rigid_parts": Item("", "The same of parts of the body that move as rigid bodies, by part."),
+    "electrodes": Item("", "`potential` and `charge` of electrodes of one unknown potential."),
     "notes": Item("", "What has been looked at and found good, in words."),
     "warnings": Item("", "What there is to beware of, in words."),
     "phi_min": Item("potential", "Least potential at a node."),
@@ -94,6 +103,9 @@ SUMMARY: Mapping[str, Item] = {
         "Free charges D·ν integrated, ν out of the body: `electrodes` and `given` part by part, "
         "`foundation` (through the contact part), `body` (in the volume), `magnitude` (of all "
         "nodal ones, without sign).",
+    ),
+    "conduction_ramp": Item(
+        "length", "1/delta: how far in front of the closed gap the foundation conducts, if it does."
     ),
     "case": Item(
         "",
@@ -144,8 +156,31 @@ _HISTORY: dict[str, Item] = {
     "contact_solves": Item("", "Dense solves at the contact nodes that it took."),
 }
 
+_STEPS: dict[str, Item] = {
+    "t": Item("time", "End of the step."),
+    "contact_force_x": Item("force", "As in `summary.json`; `_y`, in space `_z`."),
+    "max_pressure": Item("stress", "As in `summary.json`."),
+    "contact_nodes": Item("", "The same; `stick_nodes`, `slip_nodes`."),
+    "max_displacement": Item("length", "The same."),
+    "work": Item("work", "That the loads and supports have done so far."),
+    "energy": Item("work", "Stored in body and layer."),
+    "dissipation": Item("work", "By friction so far: `work` - `energy`, but for the steps' size."),
+    "linear_solves": Item("", "In this step; `factorizations` likewise."),
+    "kkt": Item("", "The largest residual."),
+    "rigid_x": Item("length", "Displacement of a foundation that moves; `rigid_rotation`..."),
+    "rigid_force_x": Item("force", "Force on it; `rigid_moment`... Several end with their part."),
+    "driven_x": Item("length", "Mean displacement of the part that is moved or loaded in time."),
+    "driven_force_x": Item("force", "What drives it: with `driven_x` it makes the loop."),
+    "potential_PART": Item("potential", "Of electrodes."),
+    "charge_PART": Item("charge", "Likewise; `charge_foundation` through the contact part."),
+}
+
 #: Tables by the name of their file.
-TABLES: Mapping[str, Mapping[str, Item]] = {"contact.csv": _NODE, "history.csv": _HISTORY}
+TABLES: Mapping[str, Mapping[str, Item]] = {
+    "contact.csv": _NODE,
+    "history.csv": _HISTORY,
+    "steps.csv": _STEPS,
+}
 
 #: Fields of fields.vtu; the derived ones have a companion NAME_cell, cell by cell.
 BODY: Mapping[str, Item] = {

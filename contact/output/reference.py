@@ -25,8 +25,11 @@ INTRODUCTION = """\
 | `summary.json` | the numbers of the run as a whole |
 | `contact.csv` | one row a contact node |
 | `history.csv` | one row an outer iteration |
+| `steps.csv` | of an evolution: one row a step |
+| `contact-steps.csv` | likewise: `contact.csv` of all steps, with a first column `t` |
 | `fields.vtu` | all fields of the body, for ParaView, pyvista and meshio |
 | `contact.vtu` | the contact part alone, a surface (in the plane a line) |
+| `fields.pvd` | of an evolution: its steps, for ParaView and pyvista |
 | `fields.bp`, `cells.bp` | instead of `fields.vtu`, with `output.fields = "vtx"`: needs ADIOS2 |
 | `fields.xdmf`, `fields.h5` | likewise with `output.fields = "xdmf"`: degree 1 at most |
 | `checkpoint.bp` | with `output.checkpoint = true` |

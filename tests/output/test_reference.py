@@ -17,6 +17,8 @@ from tests.problems.rigid import indented
 
 #: Derived fields have a companion cell by cell.
 PLAIN = ("displacement", "potential")
+#: What only rigid bodies that move and electrodes have.
+MOVING = ("rigid", "rigid_parts", "electrodes")
 
 
 def two_contacts():
@@ -51,10 +53,11 @@ def agree(found: list[list[str]], described: list[str]) -> None:
 
 
 def test_summary(written: list[Path]) -> None:
-    agree([list(json.loads((f / "summary.json").read_text())) for f in written], list(SUMMARY))
+    described = [key for key in SUMMARY if key not in MOVING]
+    agree([list(json.loads((f / "summary.json").read_text())) for f in written], described)
 
 
-@pytest.mark.parametrize("name", TABLES)
+@pytest.mark.parametrize("name", ["contact.csv", "history.csv"])
 def test_tables(name: str, written: list[Path]) -> None:
     found = [next(csv.reader((folder / name).open())) for folder in written]
     agree(found, list(TABLES[name]))
