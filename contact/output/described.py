@@ -23,6 +23,7 @@ class Item(NamedTuple):
 
 SUMMARY: Mapping[str, Item] = {
     "title": Item("", "Title of the case."),
+    "units": Item("", "Names of the units, those of `[units]`."),
     "converged": Item("", "Whether all residuals are within the tolerance."),
     "reason": Item("", "Why the run ended, in words."),
     "method": Item("", "The method, as in `[solver]`."),
@@ -86,13 +87,6 @@ SUMMARY: Mapping[str, Item] = {
     "electrodes": Item(
         "", "`potential` and `charge` of each electrode whose potential was unknown, by part."
     ),
-    "rigid": Item(
-        "",
-        "Of foundations that move: `displacement` (length), `rotation` (degrees), `force` and "
-        "`moment` (about its centre) that act on it, of one or a list.",
-    ),
-    "rigid_parts": Item("", "The same of parts of the body that move as rigid bodies, by part."),
-    "electrodes": Item("", "`potential` and `charge` of electrodes of one unknown potential."),
     "notes": Item("", "What has been looked at and found good, in words."),
     "warnings": Item("", "What there is to beware of, in words."),
     "phi_min": Item("potential", "Least potential at a node."),

@@ -7,6 +7,7 @@ from typing import Protocol
 from contact.interface.multipliers import Multipliers
 from contact.output.options import OutputOptions
 from contact.output.record import StepRecord
+from contact.output.units import Units
 from contact.problem.problem import ContactProblem
 from contact.problem.state import State
 from contact.typing import Array
@@ -18,6 +19,10 @@ class Solved(Protocol):
     @property
     def title(self) -> str:
         """Title of the case."""
+
+    @property
+    def units(self) -> Units:
+        """Names of its units."""
 
     @property
     def output(self) -> OutputOptions:
