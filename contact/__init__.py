@@ -17,7 +17,7 @@ Geometry: `Domain` (`Domain.from_mesh` takes dolfinx's mesh and tags).
 Body: `Body`, `Material`, `Fixed`, `Load`; `Linear`, `Log`, `UserLaw`, `Piezo`.
 Contact: `Contact` with a gap, or a `Plane`, `Sphere`, `Cylinder`, `Cone`, `Paraboloid`, `Punch`,
 `Level`, `Triangles`; `Layer`; `Friction`, `SlipCoefficient`, `Coulomb`;
- `Conductor` with `ShiftedConductivity`, `RampConductivity`, `PerfectConductivity`.
+`Conductor` with `ShiftedConductivity`, `RampConductivity`, `PerfectConductivity`.
 Solving: `Problem`, `solve`, `evolve`; `NewtonOptions`, `FixedPointOptions`, `PenaltyOptions`.
 Case files: `Case`, `load_case`, `parse_case`, `build_problem`.
 Results: `Solution`, `write_outputs`. Errors of the input: `InputError`.
@@ -82,7 +82,8 @@ _HOMES = {
     "contact.interface.current": "Conductor",
     "contact.interface.friction": "Friction",
     "contact.interface.layer": "Layer",
-    "contact.interface.obstacle": "Cone Cylinder GapFunction Level Paraboloid Plane Punch Sphere Triangles",
+    "contact.interface.obstacle": "Cone Cylinder GapFunction Level Paraboloid Plane Punch "
+    "Sphere Triangles",
     "contact.mesh.domain": "Domain",
     "contact.methods.options": "FixedPointOptions NewtonOptions PenaltyOptions",
     "contact.output.files": "write_outputs",
