@@ -3,9 +3,11 @@
 import contextlib
 import json
 import signal
+import subprocess
 import sys
 import tomllib
 import types
+from pathlib import Path
 
 import pytest
 
@@ -180,3 +182,19 @@ def test_check_prints_the_case_the_parts_and_the_unknowns(bar, capsys):
 def test_the_blas_is_told_from_the_loaded_libraries(paths, name):
     assert identify(paths).name == name
     assert identify(paths).is_reference == (name == "reference")
+
+
+@pytest.mark.parametrize("name", ["meshes.py", "forms/__init__.py", "forms/nothing.txt"])
+def test_files_that_hide_our_packages(name: str, tmp_path: Path) -> None:
+    """One line says which file is in the way; the working folder comes first in Python's path."""
+    path = tmp_path / name
+    path.parent.mkdir(exist_ok=True)
+    path.write_text("")
+    command = [sys.executable, "-m", "contact", "check", "case.toml"]
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=60)
+    if name.endswith("txt"):  # a folder without a package hides nothing
+        assert "case.toml: No such file" in done.stderr
+    else:
+        assert done.returncode == 2
+        assert done.stderr.count("\n") == 1
+        assert f"{path} hides the package" in done.stderr
