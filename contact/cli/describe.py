@@ -8,6 +8,7 @@ from mpi4py import MPI
 
 from contact.case.file import Case
 from contact.case.text import to_toml
+from contact.cli.expected import expectations
 from contact.mesh.domain import Indices
 from contact.output import environment
 from contact.problem.problem import ContactProblem
@@ -30,6 +31,7 @@ def describe(case: Case, problem: ContactProblem) -> str:
         *(f"# note: {note}" for note in domain.notes),
         f"# unknowns: {layout.unknowns} ({layout.block_size} a node), contact nodes: "
         f"{problem.nodes.size}",
+        *expectations(problem),
         f"# blas: {library.name} {library.path}".rstrip(),
         "# versions: " + ", ".join(f"{k} {v}" for k, v in environment.versions().items()),
     ]

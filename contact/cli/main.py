@@ -23,7 +23,7 @@ from typing import TYPE_CHECKING, Any, NoReturn
 from mpi4py import MPI
 
 from contact import __version__
-from contact.cli import materials, plot
+from contact.cli import materials, new, plot
 from contact.cli.ending import (
     BAD_INPUT,
     CONVERGED,
@@ -44,7 +44,8 @@ if TYPE_CHECKING:  # it loads dolfinx, which PETSc's options have to precede
     from contact.case.file import Case
 
 #: Commands that read no case.
-OTHERS = {"plot": plot.run, "materials": materials.run}
+POSITIONAL = ("command", "case", "folder", "name", "mesh")
+OTHERS = {"new": new.run, "plot": plot.run, "materials": materials.run}
 
 #: Seconds after a signal from which on a second one ends the writing of results too.
 PATIENCE = 2.0
@@ -70,7 +71,7 @@ def _parser() -> _Parser:
         "--version", action="version", version=f"contact {__version__}", help="show the version"
     )
     commands = parser.add_subparsers(
-        dest="command", required=True, metavar="solve|check|plot|materials"
+        dest="command", required=True, metavar="new|check|solve|plot|materials"
     )
     for name, text in (
         ("solve", "solve a case and write the results"),
@@ -107,6 +108,7 @@ def _parser() -> _Parser:
                 action="store_true",
                 help="replace results of another case, if DIR has any",
             )
+    new.add_parser(commands, common)
     plot.add_parser(commands, common)
     materials.add_parser(commands, common)
     return parser
@@ -124,7 +126,9 @@ def parse(arguments: Sequence[str]) -> tuple[argparse.Namespace, list[str]]:
         arguments = ["--help" if argument == "-h" else argument for argument in arguments]
     options, rest = _parser().parse_known_args(arguments)
     known = [
-        f"--{name}" for name in vars(options) if name not in ("command", "case", "folder", "name")
+        f"--{name}"
+        for name in vars(options)
+        if name not in ("command", "case", "folder", "name", "mesh")
     ]
     known.append("--help")
     for i, argument in enumerate(rest):

@@ -1,0 +1,79 @@
+"""What ``check`` expects of a case before it is solved: mesh quality, sizes of displacements."""
+
+from __future__ import annotations
+
+import numpy as np
+from mpi4py import MPI
+
+from contact import _compat
+from contact.problem.problem import ContactProblem
+from contact.typing import Array
+
+#: Mean ratio below which a cell is called thin.
+THIN = 0.1
+#: Displacements above this share of the body are not small.
+LARGE = 0.05
+
+
+def expectations(problem: ContactProblem) -> list[str]:
+    """Return lines on the mesh and on what the loads will do. Collective."""
+    return [*_quality(problem), *_sizes(problem)]
+
+
+def mean_ratio(corners: Array) -> Array:
+    """Return the shape of simplices, 1 for regular ones and 0 for flat ones, shape (n,).
+
+    Parameters
+    ----------
+    corners
+        Shape (n, d + 1, d).
+    """
+    d = corners.shape[2]
+    edges = corners[:, 1:] - corners[:, :1]
+    volume = np.abs(np.linalg.det(edges)) / (2 if d == 2 else 6)
+    first, second = np.triu_indices(d + 1, 1)
+    squares = ((corners[:, first] - corners[:, second]) ** 2).sum(axis=(1, 2))
+    if d == 2:
+        return np.asarray(4 * np.sqrt(3) * volume / squares)
+    return np.asarray(12 * (3 * volume) ** (2 / 3) / squares)
+
+
+def _quality(problem: ContactProblem) -> list[str]:
+    mesh, comm, d = problem.domain.mesh, problem.comm, problem.dim
+    cells = _compat.geometry_dofmap(mesh)[: mesh.topology.index_map(d).size_local, : d + 1]
+    ratio = mean_ratio(mesh.geometry.x[cells][:, :, :d])
+    least = comm.allreduce(float(ratio.min(initial=1.0)), op=MPI.MIN)
+    thin = comm.allreduce(int(np.count_nonzero(ratio < THIN)), op=MPI.SUM)
+    lines = [f"# mesh quality: the worst cell has the mean ratio {least:.2g} (1: regular)"]
+    if thin:
+        lines.append(
+            f"# warning: {thin} cells are thinner than {THIN:g}: stresses there are poor, and "
+            "iterative solvers slow"
+        )
+    return lines
+
+
+def _sizes(problem: ContactProblem) -> list[str]:
+    """Say how far loads and prescribed values move the body, about, and how far it may go."""
+    body, scales, d = problem.equilibrium, problem.scales, problem.dim
+    comm = problem.comm
+    forces = body.external(problem.time).reshape(-1, body.block_size)[:, :d]
+    given = problem.start().x.reshape(-1, body.block_size)[:, :d]
+    total = comm.allreduce(float(np.abs(forces).sum()), op=MPI.SUM)
+    moved = comm.allreduce(float(np.abs(given).max(initial=0.0)), op=MPI.MAX)
+    expected = max(total / scales.area / scales.young * scales.size, moved)
+    gap = problem.nodes.gap
+    least = comm.allreduce(float(gap.min(initial=np.inf)), op=MPI.MIN)
+    largest = comm.allreduce(float(gap.max(initial=-np.inf)), op=MPI.MAX)
+    lines = [
+        f"# expected: displacements of some {expected:.2g} (loads, over the contact part, on a "
+        f"block of the body's size; prescribed {moved:.2g}); gap {least:.3g} to {largest:.3g}"
+    ]
+    if expected > LARGE * scales.size:
+        lines.append(
+            f"# warning: that is {expected / scales.size:.0%} of the body, and strains are taken "
+            "as small; are loads and Young's modulus in the same units?"
+        )
+    if least > 10 * expected:
+        lines.append("# warning: the gap is far larger: the body may not touch at all")
+    return lines

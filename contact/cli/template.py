@@ -1,0 +1,82 @@
+"""The case file that ``contact new`` writes."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+from dolfinx import mesh as dmesh
+from mpi4py import MPI
+
+from contact.case.text import literal
+from contact.mesh.domain import Domain
+
+
+def case_text(domain: Domain, mesh: Path, path: Path) -> str:
+    """Return a case that holds the highest part and lets the lowest one touch. Collective."""
+    heights = _heights(domain)
+    order = sorted(heights, key=lambda name: (heights[name], name))
+    lowest, highest = order[0], order[-1]
+    d = domain.dim
+    held, pull = ["0.0"] * d, ["0.0"] * (d - 1) + ["-1.0"]
+    try:
+        name = str(mesh.resolve().relative_to(path.resolve().parent))
+    except ValueError:
+        name = str(mesh.resolve())
+    parts = "".join(f"#   {part}\n" for part in sorted(domain.parts))
+    regions = ", ".join(sorted(domain.regions))
+    return f"""\
+# A case to begin with; every key is described in docs/case-file.md.
+# Units are yours, but all the same: with mm and N, stresses are in MPa.
+title = {literal(mesh.stem)}
+
+[mesh]
+file = {literal(name)}
+# Parts of its boundary, to be named below:
+{parts}# Regions: {regions}.
+
+[material]
+young = 210e3                 # Young's modulus (stress)
+poisson = 0.3
+# law = "log"                 # beyond this strain the material gives way:
+# yield_strain = 0.002
+
+[[fixed]]                     # the part that lies highest; "free" for a component that is not held
+on = {literal(highest)}
+displacement = [{", ".join(held)}]
+
+# [[load]]                    # force per area, on any part but those of [contact]
+# on = {literal(highest)}
+# traction = [{", ".join(pull)}]
+
+[contact]                     # the part that lies lowest
+on = {literal(lowest)}
+gap = 0.0                     # to a rigid foundation along the part's normal; or a shape:
+# foundation = {{ shape = "plane", point = [{", ".join(held)}], normal = [{", ".join(_up(d))}] }}
+
+[friction]
+law = "coulomb"
+mu = 0.2
+
+[solver]
+method = "newton"
+tolerance = 1e-8
+"""
+
+
+def _up(dim: int) -> list[str]:
+    return ["0.0"] * (dim - 1) + ["1.0"]
+
+
+def _heights(domain: Domain) -> dict[str, float]:
+    """Return the mean last coordinate of the facets of each part. Collective."""
+    mesh, d = domain.mesh, domain.dim
+    found = {}
+    for name, facets in domain.parts.items():
+        middles = np.empty((0, 3))
+        if facets.size > 0:  # dolfinx divides by their number
+            middles = dmesh.compute_midpoints(mesh, d - 1, facets)
+        sums = np.array([middles[:, d - 1].sum(), len(middles)])
+        total = domain.comm.allreduce(sums, op=MPI.SUM)
+        found[name] = round(float(total[0] / total[1]) / domain.size, 6)
+    return found

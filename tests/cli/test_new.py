@@ -1,0 +1,90 @@
+"""A case for a mesh of one's own, and what ``check`` says of a case before it is solved."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from contact.case.file import load_case
+from contact.cli.expected import mean_ratio
+from contact.cli.main import BAD_INPUT, CONVERGED, main
+
+FIXTURES = Path(__file__).parents[2] / "meshes" / "fixtures"
+
+
+def plate(path: Path, dim: int) -> Path:
+    """Write a plate with named sides, by Gmsh."""
+    gmsh = pytest.importorskip("gmsh")
+    gmsh.initialize()
+    try:
+        gmsh.option.setNumber("General.Terminal", 0)
+        if dim == 2:
+            gmsh.model.occ.addRectangle(0, 0, 0, 2, 1)
+        else:
+            gmsh.model.occ.addBox(0, 0, 0, 2, 1, 1)
+        gmsh.model.occ.synchronize()
+        for d, tag in gmsh.model.getEntities(dim - 1):
+            middle = gmsh.model.occ.getCenterOfMass(d, tag)
+            side = {0.0: "under side", 1.0: "top"}.get(round(middle[dim - 1], 6), f"side {tag}")
+            gmsh.model.addPhysicalGroup(d, [tag], name=side)
+        gmsh.model.addPhysicalGroup(dim, [1], name="steel")
+        gmsh.option.setNumber("Mesh.MeshSizeMax", 0.5)
+        gmsh.model.mesh.generate(dim)
+        gmsh.write(str(path))
+    finally:
+        gmsh.finalize()
+    return path
+
+
+@pytest.mark.parametrize("dim", [2, 3])
+def test_a_case_to_begin_with(dim: int, tmp_path: Path, capsys: pytest.CaptureFixture) -> None:
+    """It passes check as it is, and solves."""
+    mesh = plate(tmp_path / "plate.msh", dim)
+    assert main(["new", str(mesh)]) == CONVERGED
+    path = tmp_path / "plate.toml"
+    assert "contact check" in capsys.readouterr().out
+    text = path.read_text()
+    assert "#   under side\n" in text and "# Regions: steel." in text
+    case = load_case(path)
+    assert (case.fixed[0].on, case.contact.on) == ("top", "under side")
+    assert main(["check", str(path)]) == CONVERGED
+    assert main(["solve", str(path), "--out", str(tmp_path / "out"), "--quiet"]) == CONVERGED
+    assert main(["new", str(mesh)]) == BAD_INPUT
+    assert "is there already; accepted: another name" in capsys.readouterr().err
+    assert path.read_text() == text
+
+
+@pytest.mark.parametrize("name", ["nothing.msh", "bad/no-groups.msh"])
+def test_no_mesh(name: str, tmp_path: Path, capsys: pytest.CaptureFixture) -> None:
+    case = tmp_path / "case.toml"
+    assert main(["new", str(FIXTURES / name), "--case", str(case)]) == BAD_INPUT
+    assert len(capsys.readouterr().err.splitlines()) == 1
+    assert not case.exists()
+
+
+def test_shapes_of_cells() -> None:
+    """1 for the regular ones in any size, and by hand for a right angle."""
+    triangle = 3.0 * np.array([[[0, 0], [1, 0], [0.5, np.sqrt(0.75)]]])
+    tetrahedron = 0.2 * np.array([[[1, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]]])
+    right = np.array([[[0, 0], [1, 0], [0, 1.0]]])
+    for corners, ratio in ((triangle, 1.0), (tetrahedron, 1.0), (right, np.sqrt(3) / 2)):
+        assert mean_ratio(corners) == pytest.approx([ratio], rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ([], "gap 0 to 0"),
+        (["mesh.size=[400, 1]", "mesh.parts={}", "load.0.on=right"], "thinner than 0.1"),
+        (["load.0.traction=[0, -5]"], "of the body, and strains are taken"),
+        (["contact.gap=0.9"], "the body may not touch at all"),
+    ],
+)
+def test_what_is_expected(
+    changes: list[str], words: str, bar: Path, capsys: pytest.CaptureFixture
+) -> None:
+    options = [option for change in changes for option in ("--set", change)]
+    assert main(["check", str(bar), *options]) == CONVERGED
+    printed = capsys.readouterr().out
+    assert words in printed
+    assert ("# warning" in printed) == bool(changes)
