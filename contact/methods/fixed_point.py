@@ -27,6 +27,7 @@ from contact.linear.operator import Counters, Operator
 from contact.methods.following import Following
 from contact.methods.options import FixedPointOptions
 from contact.methods.report import History, Monitor, Outcome, Record
+from contact.methods.softness import softer_r, spectrum
 from contact.methods.stagnation import Stagnation
 from contact.methods.uzawa import (
     Linearised,
@@ -45,6 +46,9 @@ from contact.typing import Array
 #: Outer iterations without progress after which the loop is given up, and how many where the
 #: block relaxation gets no further either.
 PATIENCE, PATIENCE_STALLED, PROGRESS = 25, 3, 0.9
+
+#: Earlier solves that the acceleration uses where the body is soft: its spectrum is wide.
+LONG_MEMORY = 100
 
 #: Residual below which frozen coefficients give way to their derivatives.
 NEAR = 1e-2
@@ -82,6 +86,7 @@ class FixedPoint:
         """Choose r and set up the operator."""
         options, body = self.options, self.problem.equilibrium
         self.r = automatic_r(self.problem.scales) if options.r == "auto" else options.r
+        self._softened = False
         self.operator = self._new_operator(symmetric=True)
         self.history = History(self.monitor)
         self.state = self.problem.start()
@@ -162,6 +167,11 @@ class FixedPoint:
             if friction and first == 0 and iteration == 1:
                 # The slip without friction is a bad guess, and so is the contact that goes with it.
                 z = np.zeros_like(z)
+            if self._stalled and self._residual > NEAR and self._soften():
+                # What was found with an r that does not fit is worse than nothing.
+                self.state, secant_at = problem.start(), body.rest()
+                z, bound = np.zeros_like(z), np.zeros_like(bound)
+                stagnation = Stagnation(PATIENCE, PROGRESS)
             previous = self.state
             # Newton's tangent of a zero strain is the secant, and cheaper.
             kind = "tangent" if tangent and iteration > first else "secant"
@@ -187,8 +197,22 @@ class FixedPoint:
             patience = PATIENCE_STALLED if self._stalled else PATIENCE
             given_up = stagnation(residuals.largest, patience)
             if given_up and options.stopping == "residual":
-                return self._end(residuals, f"the residual stalled at {stagnation.best:.2e}")
+                far = self._stalled and stagnation.best > NEAR
+                why = f": {spectrum(self.options.r, self.r)}" if far else ""
+                return self._end(residuals, f"the residual stalled at {stagnation.best:.2e}{why}")
         return self._end(residuals, f"not converged in {options.max_outer} outer iterations")
+
+    def _soften(self) -> bool:
+        """Take r from the body's softest mode, once; tell whether it has changed."""
+        possible = self.options.r == "auto" and self.options.stopping == "residual"
+        r = softer_r(self.problem, self.operator) if possible and not self._softened else None
+        self._softened = True
+        if r is None:
+            return False
+        self.r = r
+        depth = LONG_MEMORY if self._relaxation.depth else 0
+        self._relaxation = replace(self._relaxation, r=r, depth=depth)
+        return True
 
     def _step(
         self, bound: Array, z: Array, friction: bool, kind: str, secant_at: Array

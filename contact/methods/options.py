@@ -82,7 +82,8 @@ class FixedPointOptions(LoopOptions):
     inner_tolerance
         Tolerance of the inner loop. Default: a tenth of `tolerance`.
     r
-        Augmentation parameter of the block relaxation (force/volume).
+        Augmentation parameter of the block relaxation (force/volume). `auto` fits a block and,
+        where that stalls far from a solution, the softest mode of the body.
     acceleration
         Acceleration of the block relaxation.
     depth

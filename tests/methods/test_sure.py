@@ -4,7 +4,12 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
+from contact import build_problem
 from contact.case.file import parse_case
+from contact.methods.fixed_point import FixedPoint
+from contact.methods.options import FixedPointOptions
+from contact.methods.softness import softer_r
+from contact.methods.uzawa import automatic_r
 from contact.solving import solve
 
 SELF = MPI.COMM_SELF
@@ -111,3 +116,36 @@ def test_ranks_agree_on_the_sure_road():
     assert shared.converged and alone.converged
     assert shared.counters.contact_solves == alone.counters.contact_solves > 0
     assert np.allclose(shared.contact_force, alone.contact_force, rtol=1e-7)
+
+
+@pytest.mark.parametrize(
+    ("mu", "force"),
+    [(0.0, [0.0, -9.9734515e-05]), (0.3, [-2.9026178e-05, -9.9516588e-05])],
+)
+def test_the_block_relaxation_solves_a_cantilever_with_an_r_that_fits_it(mu, force):
+    """With r* it stalled at 1: the softest mode is 1e8 times softer than a block's."""
+    case = parse_case(beam(100.0, [200, 2], TIP, 0.5, mu))
+    solution = solve(case, FixedPointOptions(), comm=SELF)
+    assert solution.converged, solution.outcome.reason
+    assert np.allclose(solution.contact_force, force, rtol=0, atol=1e-7 * np.abs(force).max())
+    assert solution.counters.linear_solves <= 200
+    assert solution.counters.factorizations <= 3
+
+
+def test_an_r_that_does_not_fit_is_said_to_be_the_reason():
+    case = parse_case(beam(100.0, [200, 2], TIP, 0.5))
+    solution = solve(case, FixedPointOptions(r=2.0), comm=SELF)
+    assert not solution.converged
+    assert 'r = 2 was given, r = "auto" fits it to the body' in solution.outcome.reason
+
+
+def test_the_softest_mode_of_a_cantilever_is_its_first_bending_mode():
+    """With masses at the contact nodes: (1.8751/L)^4 E' h^3/12, but for its shear."""
+    case = parse_case(beam(40.0, [160, 2], TIP, 0.5, space={"degree": 2}))
+    problem = build_problem(case, comm=SELF)
+    loop = FixedPoint(problem, FixedPointOptions())
+    r = softer_r(problem, loop.operator)
+    modulus = problem.scales.plane_modulus
+    block = 1.1 * modulus / problem.scales.height
+    sigma = (r / automatic_r(problem.scales)) ** 2 * block
+    assert sigma == pytest.approx(1.8751**4 / 40.0**4 * modulus / 12, rel=5e-3)
