@@ -89,6 +89,9 @@ def _parser() -> _Parser:
             help="replace a value of the case file; may be repeated",
         )
         command.add_argument("--help", action="help", help="show this help and leave")
+        if name == "check":
+            words = "draw the set-up too: CASE-setup.png and .pdf in the present folder"
+            command.add_argument("--plot", action="store_true", help=words)
         if name == "solve":
             command.usage = f"contact {name} CASE.toml --out DIR [options] [PETSc options]"
             command.epilog = summary_help()
@@ -228,9 +231,15 @@ def _check(case: Case, options: argparse.Namespace, comm: MPI.Intracomm) -> int:
 
     if isinstance(case.solver, NewtonOptions) and case.solver.nested:
         coarser_cases(case, case.solver.nested_levels)
-    text = describe(case, build_problem(case, comm))
+    problem = build_problem(case, comm)
+    text = describe(case, problem)
     if comm.rank == 0:
         print(text)
+    if options.plot:
+        from contact.cli.setup import save_setup
+
+        for path in save_setup(case, problem, Path.cwd()):
+            print(f"# set-up: {path.name}")
     return CONVERGED
 
 
