@@ -119,7 +119,7 @@ def _arrows(ax: Axes, role: Role, middle: Array, reach: float) -> None:
     """Draw a load's arrows outside the body, the longest of a given length."""
     assert role.force is not None
     centre = role.facets.mean(axis=1)
-    order = np.lexsort(centre.T[::-1])
+    order = np.lexsort(centre.T)
     chosen = order[np.linspace(0, order.size - 1, min(ARROWS, order.size)).astype(int)]
     force = role.force[chosen]
     largest = float(np.linalg.norm(role.force, axis=1).max(initial=0.0))
