@@ -73,9 +73,10 @@ def _parser() -> _Parser:
     commands = parser.add_subparsers(
         dest="command", required=True, metavar="new|check|solve|plot|materials"
     )
-    for name, text in (
-        ("solve", "solve a case and write the results"),
-        ("check", "validate a case and print it with its mesh parts and unknowns"),
+    setup = "draw the set-up too: CASE-setup.png and .pdf in the present folder"
+    for name, text, drawn in (
+        ("solve", "solve a case and write the results", "draw the figures too"),
+        ("check", "validate a case and print it with its mesh parts and unknowns", setup),
     ):
         command = commands.add_parser(name, help=text, description=text, **common)
         command.usage = f"contact {name} CASE.toml [options] [PETSc options]"
@@ -89,9 +90,7 @@ def _parser() -> _Parser:
             help="replace a value of the case file; may be repeated",
         )
         command.add_argument("--help", action="help", help="show this help and leave")
-        if name == "check":
-            words = "draw the set-up too: CASE-setup.png and .pdf in the present folder"
-            command.add_argument("--plot", action="store_true", help=words)
+        command.add_argument("--plot", action="store_true", help=drawn)
         if name == "solve":
             command.usage = f"contact {name} CASE.toml --out DIR [options] [PETSc options]"
             command.epilog = summary_help()
@@ -103,7 +102,6 @@ def _parser() -> _Parser:
                 help="go on with an evolution that was ended, from the checkpoints in DIR: the "
                 "case is known, and the results go there too unless told otherwise",
             )
-            command.add_argument("--plot", action="store_true", help="draw the figures too")
             command.add_argument("--quiet", action="store_true", help="show no progress")
             command.add_argument("--log", metavar="FILE", help="write a log to the end of a file")
             command.add_argument(
