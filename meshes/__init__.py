@@ -20,6 +20,13 @@ from pathlib import Path
 from contact.errors import InputError
 from meshes.bars import bar, bar_on_ends, block, column, piezo_bar
 from meshes.hertz import disc, half_disc, quarter_disc, sphere
+from meshes.pairs import (
+    ball_between_plates,
+    cylinder_on_block,
+    two_blocks,
+    two_half_cylinders,
+    two_spheres,
+)
 
 __all__ = ["RECIPES", "build", "parameters", "write"]
 
@@ -35,6 +42,11 @@ RECIPES: Mapping[str, Callable[..., None]] = {
         bar_on_ends,
         block,
         column,
+        two_blocks,
+        cylinder_on_block,
+        two_half_cylinders,
+        two_spheres,
+        ball_between_plates,
     )
 }
 

@@ -87,9 +87,16 @@ def _check_count(gmsh: Any, size: float, near: float, width: float, flat: int) -
         )
 
 
-def finish(gmsh: Any, dim: int, body: Sequence[int], parts: Mapping[str, Sequence[int]]) -> None:
-    """Name the body and its parts (entities of dimension dim - 1), and make the mesh."""
-    gmsh.model.addPhysicalGroup(dim, list(body), name="body")
+def finish(
+    gmsh: Any,
+    dim: int,
+    body: Sequence[int] | Mapping[str, Sequence[int]],
+    parts: Mapping[str, Sequence[int]],
+) -> None:
+    """Name the body, or several, and the parts (entities of dimension dim - 1); make the mesh."""
+    bodies = body if isinstance(body, Mapping) else {"body": body}
+    for name, entities in bodies.items():
+        gmsh.model.addPhysicalGroup(dim, list(entities), name=name)
     for name, entities in parts.items():
         gmsh.model.addPhysicalGroup(dim - 1, list(entities), name=name)
     gmsh.option.setNumber("Mesh.ElementOrder", 1)

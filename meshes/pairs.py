@@ -1,0 +1,230 @@
+"""Two bodies, or three, that touch each other: each a region of its own, with its own nodes."""
+
+from collections.abc import Sequence
+from typing import Any
+
+Points = Sequence[tuple[float, float]]
+
+
+def two_blocks(
+    *,
+    lower_width: float = 4.0,
+    lower_height: float = 1.0,
+    upper_width: float = 2.0,
+    upper_height: float = 1.0,
+    lower_size: float = 0.2,
+    upper_size: float = 0.25,
+) -> None:
+    """Block on the middle of another one, whose top is y = 0.
+
+    Regions: ``upper``, ``lower``. Parts: ``upper_bottom`` on ``lower_top``; ``upper_top``,
+    ``upper_left``, ``upper_right``, ``lower_bottom``, ``lower_left``, ``lower_right``.
+    """
+    import gmsh
+
+    from meshes.grading import finish
+
+    bodies, parts = {}, {}
+    for name, width, low, high, size in (
+        ("lower", lower_width, -lower_height, 0.0, lower_size),
+        ("upper", upper_width, 0.0, upper_height, upper_size),
+    ):
+        half = width / 2
+        corners = [(-half, low), (half, low), (half, high), (-half, high)]
+        bodies[name], sides = _polygon(gmsh.model.geo, corners, size)
+        places = ("bottom", "right", "top", "left")
+        parts |= {f"{name}_{p}": [s] for p, s in zip(places, sides, strict=True)}
+    gmsh.model.geo.synchronize()
+    finish(gmsh, 2, bodies, parts)
+
+
+def cylinder_on_block(
+    *,
+    radius: float = 50.0,
+    width: float = 100.0,
+    height: float = 200.0,
+    size: float = 10.0,
+    contact_size: float = 0.6,
+    contact_width: float = 8.0,
+    growth: float = 0.2,
+) -> None:
+    """Right half of the lower half of a cylinder on the right half of a block, whose top is y = 0.
+
+    Regions: ``cylinder``, ``block``. Parts: ``arc`` on ``block_top``; ``symmetry`` (x = 0 of
+    both), ``top`` (the cut y = radius), ``block_bottom``, ``block_right``. Sizes as in
+    `quarter_disc`; in the plane, or about the axis x = 0 a ball on a disc.
+    """
+    import gmsh
+
+    from meshes.grading import finish, grade
+
+    geo = gmsh.model.geo
+    low, side, centre = (geo.addPoint(*p) for p in ((0, 0, 0), (radius, radius, 0), (0, radius, 0)))
+    arc = geo.addCircleArc(low, centre, side)
+    top = geo.addLine(side, centre)
+    axis = geo.addLine(centre, low)
+    cylinder = geo.addPlaneSurface([geo.addCurveLoop([arc, top, axis])])
+    corners = [(0.0, -height), (width, -height), (width, 0.0), (0.0, 0.0)]
+    block, (bottom, right, upper, left) = _polygon(geo, corners)
+    geo.synchronize()
+    grade(
+        gmsh,
+        size=size,
+        contact_size=contact_size,
+        width=contact_width,
+        growth=growth,
+        points=[low],
+    )
+    parts = {
+        "arc": [arc],
+        "block_top": [upper],
+        "symmetry": [axis, left],
+        "top": [top],
+        "block_bottom": [bottom],
+        "block_right": [right],
+    }
+    finish(gmsh, 2, {"cylinder": [cylinder], "block": block}, parts)
+
+
+def two_half_cylinders(
+    *,
+    radius: float = 10.0,
+    size: float = 1.5,
+    contact_size: float = 0.05,
+    contact_width: float = 0.8,
+    growth: float = 0.2,
+) -> None:
+    """Lower half of one cylinder on the upper half of another; they touch at the origin.
+
+    Regions: ``upper``, ``lower``. Parts: ``upper_arc`` on ``lower_arc``; the cuts ``upper_cut``
+    (y = radius) and ``lower_cut`` (y = -radius). Sizes as in `quarter_disc`.
+    """
+    import gmsh
+
+    from meshes.grading import finish, grade
+
+    geo, bodies, parts, touching = gmsh.model.geo, {}, {}, []
+    for name, sign in (("upper", 1.0), ("lower", -1.0)):
+        y = sign * radius
+        middle, right, left, centre = (
+            geo.addPoint(*p, 0) for p in ((0, 0), (radius, y), (-radius, y), (0, y))
+        )
+        arcs = [geo.addCircleArc(left, centre, middle), geo.addCircleArc(middle, centre, right)]
+        cut = [geo.addLine(right, centre), geo.addLine(centre, left)]
+        bodies[name] = [geo.addPlaneSurface([geo.addCurveLoop([*arcs, *cut])])]
+        parts |= {f"{name}_arc": arcs, f"{name}_cut": cut}
+        touching.append(middle)
+    geo.synchronize()
+    grade(
+        gmsh,
+        size=size,
+        contact_size=contact_size,
+        width=contact_width,
+        growth=growth,
+        points=touching,
+    )
+    finish(gmsh, 2, bodies, parts)
+
+
+def two_spheres(
+    *,
+    radius: float = 50.0,
+    size: float = 12.0,
+    contact_size: float = 2.0,
+    contact_width: float = 12.0,
+    growth: float = 0.4,
+) -> None:
+    """Quarter x, y >= 0 of the lower half of a ball on that of the upper half of another.
+
+    They touch at the origin. Regions: ``upper``, ``lower``. Parts: ``upper_round`` on
+    ``lower_round``; the cuts ``upper_cut`` (z = radius) and ``lower_cut`` (z = -radius);
+    ``symmetry_x`` (x = 0), ``symmetry_y`` (y = 0) of both. Sizes as in `quarter_disc`.
+    """
+    import gmsh
+
+    from meshes.grading import finish, grade
+
+    geo, bodies, touching = gmsh.model.geo, {}, []
+    parts: dict[str, list[int]] = {"symmetry_x": [], "symmetry_y": []}
+    for name, z in (("upper", radius), ("lower", -radius)):
+        low, on_x, on_y, centre = (
+            geo.addPoint(*p) for p in ((0, 0, 0), (radius, 0, z), (0, radius, z), (0, 0, z))
+        )
+        arc_x = geo.addCircleArc(low, centre, on_x)
+        rim = geo.addCircleArc(on_x, centre, on_y)
+        arc_y = geo.addCircleArc(on_y, centre, low)
+        axis = geo.addLine(centre, low)
+        out_x, out_y = geo.addLine(centre, on_x), geo.addLine(centre, on_y)
+        round_side = geo.addSurfaceFilling([geo.addCurveLoop([arc_x, rim, arc_y])])
+        on_y_zero = geo.addPlaneSurface([geo.addCurveLoop([axis, arc_x, -out_x])])
+        on_x_zero = geo.addPlaneSurface([geo.addCurveLoop([axis, -arc_y, -out_y])])
+        cut = geo.addPlaneSurface([geo.addCurveLoop([out_x, rim, -out_y])])
+        loop = geo.addSurfaceLoop([round_side, on_y_zero, on_x_zero, cut])
+        bodies[name] = [geo.addVolume([loop])]
+        parts |= {f"{name}_round": [round_side], f"{name}_cut": [cut]}
+        parts["symmetry_x"].append(on_x_zero)
+        parts["symmetry_y"].append(on_y_zero)
+        touching.append(low)
+    geo.synchronize()
+    grade(
+        gmsh,
+        size=size,
+        contact_size=contact_size,
+        width=contact_width,
+        growth=growth,
+        points=touching,
+    )
+    finish(gmsh, 3, bodies, parts)
+
+
+def ball_between_plates(
+    *,
+    radius: float = 1.0,
+    width: float = 1.5,
+    height: float = 0.5,
+    size: float = 0.15,
+    contact_size: float = 0.02,
+    contact_width: float = 0.25,
+    growth: float = 0.3,
+) -> None:
+    """Right half of a ball with the centre (0, radius) between the right halves of two plates.
+
+    Regions: ``ball``, ``upper``, ``lower``. Parts: ``ball_bottom`` on ``lower_top``, and
+    ``ball_top`` below ``upper_bottom``; ``upper_top``, ``lower_bottom``, ``symmetry`` (x = 0 of
+    all). About the axis x = 0 it is a ball, in the plane a cylinder. Sizes as in `quarter_disc`.
+    """
+    import gmsh
+
+    from meshes.grading import finish, grade
+
+    geo = gmsh.model.geo
+    low, side, high, centre = (
+        geo.addPoint(*p, 0) for p in ((0, 0), (radius, radius), (0, 2 * radius), (0, radius))
+    )
+    arcs = [geo.addCircleArc(low, centre, side), geo.addCircleArc(side, centre, high)]
+    axis = [geo.addLine(high, centre), geo.addLine(centre, low)]
+    ball = geo.addPlaneSurface([geo.addCurveLoop([*arcs, *axis])])
+    bodies, parts = {"ball": [ball]}, {"ball_bottom": arcs[:1], "ball_top": arcs[1:]}
+    for name, y in (("lower", -height), ("upper", 2 * radius)):
+        corners = [(0.0, y), (width, y), (width, y + height), (0.0, y + height)]
+        bodies[name], (bottom, _, top, left) = _polygon(geo, corners)
+        parts |= {f"{name}_bottom": [bottom], f"{name}_top": [top]}
+        axis.append(left)
+    geo.synchronize()
+    grade(
+        gmsh,
+        size=size,
+        contact_size=contact_size,
+        width=contact_width,
+        growth=growth,
+        points=[low, high],
+    )
+    finish(gmsh, 2, bodies, {**parts, "symmetry": axis})
+
+
+def _polygon(geo: Any, corners: Points, size: float = 0.0) -> tuple[list[int], list[int]]:
+    """Return the surface of a polygon, and its sides, the first from the first corner on."""
+    points = [geo.addPoint(x, y, 0, size) for x, y in corners]
+    ends = [*points[1:], points[0]]
+    sides = [geo.addLine(a, b) for a, b in zip(points, ends, strict=True)]
+    return [geo.addPlaneSurface([geo.addCurveLoop(sides)])], sides
