@@ -24,7 +24,8 @@ def two_blocks(
 
     from meshes.grading import finish
 
-    bodies, parts = {}, {}
+    bodies: dict[str, list[int]] = {}
+    parts: dict[str, list[int]] = {}
     for name, width, low, high, size in (
         ("lower", lower_width, -lower_height, 0.0, lower_size),
         ("upper", upper_width, 0.0, upper_height, upper_size),
@@ -103,7 +104,8 @@ def two_half_cylinders(
 
     from meshes.grading import finish, grade
 
-    geo, bodies, parts, touching = gmsh.model.geo, {}, {}, []
+    geo, bodies, touching = gmsh.model.geo, {}, []
+    parts: dict[str, list[int]] = {}
     for name, sign in (("upper", 1.0), ("lower", -1.0)):
         y = sign * radius
         middle, right, left, centre = (

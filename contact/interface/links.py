@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from dolfinx.common import IndexMap
@@ -45,16 +46,21 @@ class Links:
     here: NDArray[np.intp]
     local: NDArray[np.int32]
 
+    @cached_property
+    def _here(self) -> sparse.csr_array:
+        """The jumps of this rank's contact nodes."""
+        return self.jumps[self.own]
+
     def apply(self, x: Array) -> Array:
         """Return the jumps at `places` of local unknowns, (nodes, block size). Collective."""
         values = np.zeros((self.change.nodes.size, x.shape[1]))
         values[self.here] = x[self.local]
         self.comm.Allreduce(MPI.IN_PLACE, values, op=MPI.SUM)
-        return np.asarray(self.jumps[self.own] @ values)
+        return np.asarray(self._here @ values)
 
     def transpose(self, nodal: Array, into: Array) -> None:
         """Add what vectors at `places` are to owned nodes, (nodes, k). Collective."""
-        forces = np.asarray(self.jumps[self.own].T @ nodal)
+        forces = np.asarray(self._here.T @ nodal)
         self.comm.Allreduce(MPI.IN_PLACE, forces, op=MPI.SUM)
         into[self.local] += forces[self.here]
 

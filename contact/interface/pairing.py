@@ -22,9 +22,6 @@ REACH = 0.25
 #: Depth, in lengths of facets, that the chords of two curved sides may reach into each other.
 CHORDS = 0.25
 
-#: Share of a node's area that should face the other side, else there is a warning.
-HALF = 0.5
-
 
 @dataclass(frozen=True)
 class Pair:
@@ -36,13 +33,10 @@ class Pair:
         Those that this rank owns.
     coupling
         The operator, the same on all ranks.
-    partly
-        How many nodes face the other side with less than half of their area.
     """
 
     nodes: ContactNodes
     coupling: Coupling
-    partly: int
 
 
 def find_pair(
@@ -123,8 +117,9 @@ def find_pair(
         (gap + added) / length,
         space.dofmap.index_map_bs,
         cut,
+        domain.revolved,
     )
-    return Pair(nodes, coupling, int(np.count_nonzero(coupling.covered < HALF)))
+    return Pair(nodes, coupling)
 
 
 def _check_apart(body: BodyEquilibrium, coupling: Coupling, what: str) -> None:

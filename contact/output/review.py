@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import logging
 
-from contact.output import assumptions, uniqueness
+from contact.output import assumptions, bodies, uniqueness
 from contact.output.deformation import deformation
 from contact.output.fields import DerivedFields
 from contact.output.solution import Solution
@@ -43,6 +43,8 @@ def review(solution: Solution) -> None:
         uniqueness.sliding(solution),
         *uniqueness.conductivity(solution),
         uniqueness.ramp(solution),
+        *bodies.choices(solution),
+        bodies.passing(solution),
     ):
         if text:
             (solution.notes if good else solution.warnings).append(text)

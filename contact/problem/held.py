@@ -34,7 +34,8 @@ def check_held(problem: ContactProblem) -> None:
     Two things are asked for: supports and contact (in the tangential directions too if there
     is friction) leave no rigid motion at all, and the loads do not pull the body off the
     foundation where that alone holds it. Pieces that are not connected are checked one by one,
-    but for those that a rigid part or a foundation joins: they are checked with its motion.
+    but for those that touch each other, or that a rigid part or a foundation joins: they are
+    checked together, with its motion.
 
     Raises
     ------
@@ -60,7 +61,7 @@ def _free_motions(problem: ContactProblem) -> dict[int, str]:
 
 
 def _joined(problem: ContactProblem, piece: NDArray[np.int32], count: int) -> NDArray[np.bool_]:
-    """Tell which pieces touch something that moves freely, shape (count,). Collective."""
+    """Tell which pieces touch something that moves freely, or each other, (count,). Collective."""
     free, nodes, ties = [*_free_motions(problem)], problem.nodes, problem.equilibrium.masters.ties
     touched = np.zeros(count, dtype=np.intc)
     if free and nodes.motion is not None:
@@ -68,6 +69,8 @@ def _joined(problem: ContactProblem, piece: NDArray[np.int32], count: int) -> ND
         touched[piece[nodes.nodes[moves]]] = 1
         rows = np.flatnonzero(np.abs(ties[:, free]).sum(axis=1) > 0)
         touched[piece[rows // problem.equilibrium.block_size]] = 1
+    if nodes.links is not None:
+        touched[piece[nodes.links.local]] = 1
     return np.asarray(problem.comm.allreduce(touched, op=MPI.MAX)) > 0
 
 

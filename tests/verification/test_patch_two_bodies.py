@@ -12,6 +12,7 @@ from scipy.spatial import cKDTree
 from contact.body.description import Body, Fixed, Load, Material
 from contact.interface.friction import Friction
 from contact.interface.obstacle import GapFunction
+from contact.mesh.revolution import revolved
 from contact.methods.newton import Newton
 from contact.methods.options import NewtonOptions
 from contact.output.balances import force_balance
@@ -90,6 +91,26 @@ def test_constant_pressure(dim: int, degree: int, pair: Sequence[str], condense:
     k = 4 * (dim - 1)
     np.testing.assert_allclose(stress[:, k], -0.01, rtol=1e-10)
     assert force_balance(problem, state).imbalance < 1e-12
+
+
+@pytest.mark.parallel
+@pytest.mark.parametrize("pair", PAIRS, ids=["upper", "lower"])
+@pytest.mark.parametrize("degree", [1, 2])
+def test_constant_pressure_on_discs(degree: int, pair: Sequence[str]) -> None:
+    """Two discs about an axis: the pressure and sigma_zz are constant, rings and axis alike."""
+    domain = revolved(blocks(2, grading=1.4).domain(COMM))
+    zero = constant(0.0, 2)
+    laws = {"upper": Linear(1.0, 0.3), "lower": Linear(7.0, 0.2)}
+    materials = [Material(law, on=(name,)) for name, law in laws.items()]
+    fixed, load = [Fixed("bottom", [None, zero])], Load("top", pressure=constant(0.01, 2))
+    body = Body.piecewise(materials, fixed, [load])
+    problem = ContactProblem(domain, body, contact(*pair), degree=degree)
+    state = solve(problem)
+    np.testing.assert_allclose(state.forces.pressure, 0.01, rtol=1e-11)
+    assert problem.nodes.sum(np.ones(problem.nodes.nodes.size)) == pytest.approx(np.pi, rel=1e-12)
+    stress = DerivedFields(problem.equilibrium, state.x).cells()["stress"].x.array.reshape(-1, 9)
+    np.testing.assert_allclose(stress[:, 4], -0.01, rtol=1e-9)
+    np.testing.assert_allclose(np.delete(stress, 4, axis=1), 0, atol=1e-11)
 
 
 @pytest.mark.parallel

@@ -126,7 +126,7 @@ def couple(
 
 
 def _integrate(slave: Surface, master: Surface, reach: float, without: NDArray[np.int64]) -> _Parts:
-    degree = 2 if slave.degree == master.degree == 1 else 4
+    degree = 2 if slave.degree == master.degree == 1 and not slave.revolved else 4
     found = [
         common_points(slave, master, i, j, degree) for i, j in facing_pairs(slave, master, reach)
     ]
@@ -139,7 +139,7 @@ def _integrate(slave: Surface, master: Surface, reach: float, without: NDArray[n
         n = basis(points.on_slave, slave.degree) @ change.T
         _add(mass, points.slave, points.weight[:, None, None] * n[:, :, None] * n[:, None, :])
         _add(weight, points.slave, points.weight[:, None] * n)
-    faces = np.flatnonzero(weight.sum(axis=1) > LEAST_PIECE * size_of(slave.corners))
+    faces = np.flatnonzero(weight.sum(axis=1) > LEAST_PIECE * _whole(slave, change).sum(axis=1))
     dual: Array = np.zeros_like(mass)
     dual[faces] = weight[faces, :, None] * np.linalg.inv(mass[faces])
     weight[np.setdiff1d(np.arange(slave.count), faces)] = 0.0
@@ -210,8 +210,11 @@ def _master_entries(
 
 def _whole(slave: Surface, change: Array) -> Array:
     """Return int N~ over whole facets, shape (f, k)."""
-    places, weights = rule(slave.corners.shape[1], 2)
-    share = weights @ (basis(places, slave.degree) @ change.T)
+    places, weights = rule(slave.corners.shape[1], 4)
+    functions = basis(places, slave.degree) @ change.T
+    facets = np.repeat(np.arange(slave.count), weights.size)
+    turns = slave.turn(facets, np.tile(places, (slave.count, 1))).reshape(-1, weights.size)
+    share = (turns * weights) @ functions
     return np.asarray(size_of(slave.corners)[:, None] * share)
 
 

@@ -32,7 +32,7 @@ class Points:
     on_slave, on_master
         Barycentric coordinates there, shape (p, d).
     weight
-        Quadrature weights, lengths or areas on the slave facet, shape (p,).
+        Quadrature weights, lengths or areas on the slave facet, or of its rings, shape (p,).
     gap
         Distance from the slave to the master facet along the slave's normal, shape (p,).
     """
@@ -74,12 +74,13 @@ def common_points(
     gap = np.einsum("pqc,pc->pq", on_master, height[pair])
     size = (size_of(corners)[pair] * share[pair, part])[:, None] * weights
     points = np.repeat(pair, weights.size)
+    places = on_slave.reshape(-1, d)
     return Points(
         i[points],
         j[points],
-        on_slave.reshape(-1, d),
+        places,
         on_master.reshape(-1, d),
-        size.ravel(),
+        size.ravel() * slave.turn(i[points], places),
         gap.ravel(),
     )
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 
 import basix
 import numpy as np
@@ -30,12 +30,15 @@ class Surface:
         Unit normals out of the body, shape (f, d).
     degree
         Of the space.
+    revolved
+        Whether the facets stand for the rings through them, about the axis x = 0.
     """
 
     nodes: NDArray[np.int64]
     corners: Array
     normal: Array
     degree: int
+    revolved: bool = False
 
     @property
     def count(self) -> int:
@@ -58,9 +61,22 @@ class Surface:
         arrays = {
             f.name: np.concatenate(comm.allgather(getattr(self, f.name)))
             for f in fields(self)
-            if f.name != "degree"
+            if f.name not in ("degree", "revolved")
         }
-        return Surface(**arrays, degree=self.degree)
+        return replace(self, **arrays)
+
+    def turn(self, facets: NDArray[np.intp], barycentric: Array) -> Array:
+        """Return the circumferences through points of facets; 1 unless revolved, shape (p,).
+
+        Parameters
+        ----------
+        facets, barycentric
+            The points, shapes (p,) and (p, d).
+        """
+        if not self.revolved:
+            return np.ones(facets.size)
+        radius = np.einsum("pc,pc->p", barycentric, self.corners[facets][:, :, 0])
+        return np.asarray(2 * np.pi * radius)
 
 
 def surface_of(domain: Domain, space: fem.FunctionSpace, part: str) -> Surface:
@@ -92,6 +108,7 @@ def surface_of(domain: Domain, space: fem.FunctionSpace, part: str) -> Surface:
         corners,
         _outward(corners, inside),
         degree,
+        domain.revolved,
     )
 
 

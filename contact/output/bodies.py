@@ -1,0 +1,103 @@
+"""What there is to say about bodies that touch each other, or that should."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+from mpi4py import MPI
+from numpy.typing import NDArray
+
+from contact.mesh.pieces import connected_pieces
+from contact.output.solution import Solution
+from contact.problem.problem import ContactProblem
+
+#: How many times finer or softer the other side may be before there is a warning.
+FINER, SOFTER = 2.0, 5.0
+
+#: Share of a node's area that should face the other side.
+HALF = 0.5
+
+
+def choices(solution: Solution) -> Iterator[tuple[str, bool]]:
+    """Say where the sides of two bodies had better change places, or face each other in part.
+
+    Multipliers live on the side `on`: it should be the finer and the softer one, else it
+    penetrates what is finer, or carries pressures that what is softer cannot follow.
+    """
+    problem = solution.problem
+    for contact, entry in zip(problem.contacts, problem.entries, strict=True):
+        if contact.against is None or entry.coupling is None:
+            continue
+        sides = f"contact on {contact.on!r} against {contact.against!r}"
+        (size, young), (other_size, other_young) = (
+            _side(problem, part) for part in (contact.on, contact.against)
+        )
+        better = "accuracy is better with on and against exchanged"
+        if size > FINER * other_size:
+            sizes = f"facets of {other_size:.3g} against {size:.3g}"
+            ratio = size / other_size
+            yield f"{sides}: the other side is {ratio:.3g} times finer ({sizes}): {better}", False
+        elif young > SOFTER * other_young and size >= other_size:
+            ratio = young / other_young
+            yield f"{sides}: the other side is {ratio:.3g} times softer: {better}", False
+        # The rim of what faces the other side is where pressures end, far from where they act.
+        partly = entry.coupling.covered < HALF
+        if partly.any():
+            yield _partly(solution, entry.coupling.nodes[partly], sides)
+
+
+def _partly(solution: Solution, nodes: NDArray[np.int64], sides: str) -> tuple[str, bool]:
+    """Warn of nodes that carry pressure though less than half of their area faces anything."""
+    problem = solution.problem
+    begin, end = problem.equilibrium.layout.index_map.local_range
+    here = nodes[(nodes >= begin) & (nodes < end)] - begin
+    pressed = np.isin(problem.nodes.nodes, here) & (solution.pressure > 0)
+    count = problem.comm.allreduce(int(pressed.sum()), op=MPI.SUM)
+    if count == 0:
+        return "", True
+    return (
+        f"{sides}: {count} nodes in contact face the other side with less than half of their "
+        "area: the pressure there is a mean over the rest; facets that end where the other side "
+        "does avoid that"
+    ), False
+
+
+def _side(problem: ContactProblem, part: str) -> tuple[float, float]:
+    """Return the mean size of a part's facets, and the least of Young's moduli behind them."""
+    domain, body = problem.domain, problem.equilibrium
+    d, facets = domain.dim, domain.facets(part)
+    sizes = domain.mesh.h(d - 1, facets) if facets.size else np.zeros(0)
+    total = problem.comm.allreduce(np.array([sizes.sum(), sizes.size]), op=MPI.SUM)
+    to_cell = domain.mesh.topology.connectivity(d - 1, d)
+    cells = to_cell.array[to_cell.offsets[facets]]
+    youngs = [
+        float(material.law.young)
+        for material, own in zip(body.body.materials, body.cells, strict=True)
+        if np.isin(cells, own).any()
+    ]
+    least = problem.comm.allreduce(min(youngs, default=np.inf), op=MPI.MIN)
+    return float(total[0] / total[1]), float(least)
+
+
+def passing(solution: Solution) -> tuple[str, bool]:
+    """Warn where pieces of the mesh are in no contact with another: nothing keeps them apart."""
+    problem = solution.problem
+    piece, count = connected_pieces(problem.equilibrium.space)
+    if count == 1:
+        return "", True
+    begin, end = problem.equilibrium.layout.index_map.local_range
+    met = np.zeros(count, dtype=np.intc)
+    for entry in problem.entries:
+        if entry.coupling is not None:
+            both = np.concatenate([entry.coupling.slaves, entry.coupling.masters])
+            met[piece[both[(both >= begin) & (both < end)] - begin]] = 1
+    problem.comm.Allreduce(MPI.IN_PLACE, met, op=MPI.MAX)
+    alone = count - int(np.count_nonzero(met))
+    if alone == 0:
+        return "", True
+    return (
+        f"the mesh has {count} pieces that share no nodes, and {alone} of them can pass through "
+        "the others: contact between two pieces is asked for by [[contact]] with `on` one and "
+        "`against` the other"
+    ), False

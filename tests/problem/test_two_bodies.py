@@ -1,0 +1,246 @@
+"""Two bodies: how they are held, methods and ranks that agree, and what is refused."""
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+
+from contact import parse_case, solve
+from contact.body.description import Body, Fixed, Load, Material
+from contact.build import build_problem
+from contact.errors import InputError
+from contact.interface.friction import Friction
+from contact.interface.obstacle import GapFunction
+from contact.interface.pairing import find_pair
+from contact.methods.options import OPTIONS
+from contact.output.table import contact_table
+from contact.problem.held import check_held
+from contact.problem.problem import Contact, ContactProblem
+from contact.solving import METHODS
+from forms.hencky import Linear
+from forms.laws import ConstantCoefficient
+from tests.problems.blocks import Blocks
+from tests.problems.mechanics import constant
+
+COMM = MPI.COMM_WORLD
+NOTHING = GapFunction(lambda points: np.zeros(len(points)))
+ZERO = constant(0.0, 2)
+
+
+def pushed(comm, degree=1, dim=2, mu=0.3, supports=(), **given):
+    """Return a block that is pressed on another one and pushed along; friction may hold it."""
+    zero = constant(0.0, dim)
+    force = [constant(c, dim) for c in (0.001, *[0.0] * (dim - 2), -0.01)]
+    moduli = {"upper": 1.0, "lower": 3.0}
+    body = Body.piecewise(
+        [Material(Linear(young, 0.3), on=(name,)) for name, young in moduli.items()],
+        [Fixed("bottom", [zero] * dim), *supports],
+        [Load("top", force)],
+    )
+    pair = Contact("under", NOTHING, friction=Friction(ConstantCoefficient(mu)), against="over")
+    cells = (6, 9) if dim == 2 else (2, 3)
+    return ContactProblem(Blocks(dim, *cells, **given).domain(comm), body, pair, degree=degree)
+
+
+@pytest.mark.parametrize("degree", [1, 2])
+def test_methods_agree(degree):
+    problem = pushed(MPI.COMM_SELF, degree)
+    found = {}
+    for name in ("newton", "uzawa"):
+        state, outcome = METHODS[name](problem, OPTIONS[name](tolerance=1e-11), None).solve()
+        assert outcome.converged, (name, outcome)
+        found[name] = state.x
+    size = np.abs(found["newton"]).max()
+    np.testing.assert_allclose(found["uzawa"], found["newton"], rtol=0, atol=1e-8 * size)
+    sparse = OPTIONS["newton"](tolerance=1e-11, condense=False)
+    state, outcome = METHODS["newton"](problem, sparse, None).solve()
+    assert outcome.converged
+    np.testing.assert_allclose(state.x, found["newton"], rtol=0, atol=1e-9 * size)
+
+
+def test_penalty_comes_near():
+    problem = pushed(MPI.COMM_SELF, supports=[Fixed("upper_left", [ZERO, None])])
+    exact, outcome = METHODS["newton"](problem, OPTIONS["newton"](tolerance=1e-11), None).solve()
+    assert outcome.converged
+    errors = []
+    for eps in (2e-2, 1e-2):
+        options = OPTIONS["penalty"](tolerance=1e-9, eps_contact=eps, eps_slip=eps * 1e-2)
+        state, outcome = METHODS["penalty"](problem, options, None).solve()
+        assert outcome.converged
+        errors.append(np.abs(state.x - exact.x).max() / np.abs(exact.x).max())
+    assert errors[0] < 0.1 and errors[1] == pytest.approx(errors[0] / 2, rel=0.2)
+
+
+@pytest.mark.parallel
+@pytest.mark.parametrize("condense", [True, False])
+@pytest.mark.parametrize("dim", [2, 3])
+def test_ranks_agree(comm, dim, condense):
+    found = []
+    for ranks in (comm, MPI.COMM_SELF):
+        problem = pushed(ranks, 1, dim)
+        options = OPTIONS["newton"](tolerance=1e-12, condense=condense)
+        state, outcome = METHODS["newton"](problem, options, None).solve()
+        assert outcome.converged
+        nodes = problem.nodes
+        both = [nodes.gather(a) for a in (nodes.points, state.forces.vectors(nodes))]
+        order = np.lexsort(np.round(both[0], 9).T)
+        found.append([values[order] for values in both])
+    np.testing.assert_allclose(found[0][0], found[1][0], atol=1e-12)
+    np.testing.assert_allclose(found[0][1], found[1][1], rtol=0, atol=1e-11)
+
+
+def held(fixed, load, mu=0.0, pair=("under", "over")):
+    body = Body(Linear(1.0, 0.3), fixed, [load])
+    friction = Friction(ConstantCoefficient(mu)) if mu > 0 else Friction()
+    domain = Blocks(2, 3, 4).domain(MPI.COMM_SELF)
+    contact = Contact(pair[0], NOTHING, friction=friction, against=pair[1])
+    return ContactProblem(domain, body, contact)
+
+
+PRESS, PULL = (Load("top", [ZERO, constant(force, 2)]) for force in (-0.01, 0.01))
+
+
+@pytest.mark.parametrize("pair", [("under", "over"), ("over", "under")])
+def test_a_body_may_be_held_by_contact_alone(pair):
+    """It is where loads press it on; supports, or friction, have to do the rest."""
+    clamped, guided = Fixed("bottom", [ZERO, ZERO]), Fixed("upper_left", [ZERO, None])
+    check_held(held([clamped, guided], PRESS, pair=pair))
+    check_held(held([clamped], PRESS, mu=0.2, pair=pair))
+    with pytest.raises(InputError, match=r"not held: it can move as a rigid body"):
+        check_held(held([clamped], PRESS, pair=pair))
+    with pytest.raises(InputError, match="the loads pull the body off"):
+        check_held(held([clamped, guided], PULL, pair=pair))
+    with pytest.raises(InputError, match=r"not held: it can move as a rigid body"):
+        check_held(held([guided], PRESS, mu=0.0, pair=pair))
+
+
+def case(**more):
+    return {
+        "mesh": {"generator": "two_blocks", "lower_size": 0.3, "upper_size": 0.3},
+        "material": {"young": 100.0, "poisson": 0.3},
+        "fixed": [{"on": "lower_bottom", "displacement": [0.0, 0.0]}],
+        "load": [{"on": "upper_top", "traction": [0.0, -1.0]}],
+        "contact": {"on": "upper_bottom", "against": "lower_top"},
+        "friction": {"law": "coulomb", "mu": 0.3},
+        **more,
+    }
+
+
+@pytest.mark.parametrize(
+    ("more", "message"),
+    [
+        (
+            {"contact": {"on": "upper_bottom", "against": "upper_bottom"}},
+            r'contact\.against: given "upper_bottom"; accepted: another part than `on`',
+        ),
+        (
+            {"contact": {"on": "upper_bottom", "against": "upper_left"}},
+            r"contact\.against: the parts 'upper_bottom' and 'upper_left' share nodes",
+        ),
+        (
+            {"contact": {"on": "upper_bottom", "against": "lower_tip"}},
+            r'contact\.against: given "lower_tip"; accepted: a part of the mesh',
+        ),
+        (
+            {
+                "contact": {
+                    "on": "upper_bottom",
+                    "against": "lower_top",
+                    "foundation": {"shape": "plane", "point": [0, 0], "normal": [0, 1]},
+                }
+            },
+            r"contact\.against: both against and foundation; accepted: one of them",
+        ),
+        (
+            {"contact": {"on": "upper_top", "against": "lower_top"}, "load": []},
+            r"contact\.against: no facets of 'upper_top' and 'lower_top' face each other",
+        ),
+        (
+            {
+                "contact": [
+                    {"on": "upper_bottom", "against": "lower_top"},
+                    {"on": "lower_top", "against": "upper_bottom"},
+                ]
+            },
+            "a node is on the slave side of one contact and on the other side",
+        ),
+        (
+            {
+                "fixed": [
+                    {"on": "lower_bottom", "displacement": [0.0, 0.0]},
+                    {"on": "upper_bottom", "displacement": ["free", 0.0]},
+                ]
+            },
+            r"contact\.against: no facets .* face each other within .*, or their nodes are held",
+        ),
+    ],
+)
+def test_what_is_refused(more, message):
+    with pytest.raises(InputError, match=message):
+        build_problem(parse_case(case(**more)))
+
+
+def test_overlapping_bodies_are_refused():
+    domain = Blocks(2, 5, 8).domain(MPI.COMM_SELF)
+    nodes = np.unique(domain.mesh.geometry.dofmap[domain.cells("upper")])
+    domain.mesh.geometry.x[nodes, 1] -= 0.2
+    body = Body(Linear(1.0, 0.3), [Fixed("bottom", [ZERO, ZERO])])
+    problem = ContactProblem(
+        domain, body, Contact("left", GapFunction(lambda p: np.full(len(p), 9.0)))
+    )
+    with pytest.raises(InputError, match=r"the bodies overlap at rest, by up to 0\.2"):
+        find_pair(problem.equilibrium, "under", "over", NOTHING)
+    pair = find_pair(problem.equilibrium, "under", "over", NOTHING, press=True)
+    np.testing.assert_allclose(pair.nodes.gap, -0.2, atol=1e-12)
+
+
+def test_what_is_said_of_the_choice_of_sides():
+    """The coarser, or the stiffer side should not be the one with the multipliers."""
+    fine = {"generator": "two_blocks", "lower_size": 0.1, "upper_size": 0.3}
+    warned = solve(parse_case(case(mesh=fine))).warnings
+    assert any("times finer" in warning and "exchanged" in warning for warning in warned)
+    moduli = {"upper": 1e4, "lower": 1e2}
+    stiff = [{"on": name, "young": young, "poisson": 0.3} for name, young in moduli.items()]
+    warned = solve(parse_case(case(material=stiff))).warnings
+    assert any("100 times softer" in warning for warning in warned)
+    swapped = {"on": "lower_top", "against": "upper_bottom"}
+    said = solve(parse_case(case(mesh=fine, contact=swapped))).warnings
+    assert not any("exchanged" in warning for warning in said)
+
+
+def test_bodies_that_may_pass_through_each_other_are_named():
+    """Only the upper block can touch a foundation: nothing keeps it off the lower one."""
+    foundation = {"shape": "plane", "point": [0.0, -0.05], "normal": [0.0, 1.0]}
+    contact = {"on": "upper_bottom", "foundation": foundation}
+    solution = solve(parse_case(case(contact=contact)))
+    assert solution.converged
+    assert any("2 of them can pass through the others" in w for w in solution.warnings)
+    assert not any("pass through" in w for w in solve(parse_case(case())).warnings)
+
+
+def test_two_pairs_have_two_laws():
+    """A ball between plates: friction below, none above, and the column `on` says which."""
+    given = {
+        "mesh": {"generator": "ball_between_plates", "contact_size": 0.05, "size": 0.3},
+        "material": {"young": 1000.0, "poisson": 0.3},
+        "fixed": [
+            {"on": "symmetry", "displacement": [0.0, "free"]},
+            {"on": "lower_bottom", "displacement": ["free", 0.0]},
+            {"on": "upper_top", "displacement": ["free", -0.02]},
+        ],
+        "contact": [
+            {
+                "on": "ball_bottom",
+                "against": "lower_top",
+                "friction": {"law": "coulomb", "mu": 0.2},
+            },
+            {"on": "ball_top", "against": "upper_bottom"},
+        ],
+    }
+    solution = solve(parse_case(given))
+    assert solution.converged
+    table = contact_table(solution)
+    below, above = table["on"] == "ball_bottom", table["on"] == "ball_top"
+    upwards = table["weight"] * table["pressure"] * table["nu_y"]
+    force = [upwards[below].sum(), upwards[above].sum()]
+    assert force[1] > 0 and force[0] == pytest.approx(-force[1], rel=0.02)
+    assert np.abs(table["tau"][above]).max() < 1e-10 < 0.1 < np.abs(table["tau"][below]).max()
