@@ -68,6 +68,48 @@ RECIPES = {
         4.0,
         {"left": 4.0, "right": 4.0, "front": 4.0, "back": 4.0, "bottom": 1.0, "top": 1.0},
     ),
+    "two_blocks": (
+        6.0,
+        {
+            f"{block}_{side}": length
+            for block, width in (("lower", 4.0), ("upper", 2.0))
+            for side, length in (("bottom", width), ("top", width), ("left", 1.0), ("right", 1.0))
+        },
+    ),
+    "cylinder_on_block": (
+        np.pi * 625 + 2e4,
+        {
+            "arc": np.pi * 25,
+            "block_top": 100.0,
+            "symmetry": 250.0,
+            "top": 50.0,
+            "block_bottom": 100.0,
+            "block_right": 200.0,
+        },
+    ),
+    "two_half_cylinders": (
+        np.pi * 100,
+        {"upper_arc": np.pi * 10, "lower_arc": np.pi * 10, "upper_cut": 20.0, "lower_cut": 20.0},
+    ),
+    "two_spheres": (
+        np.pi * 125e3 / 3,
+        {
+            **dict.fromkeys(("symmetry_x", "symmetry_y"), np.pi * 1250),
+            **dict.fromkeys(("upper_round", "lower_round"), np.pi * 1250),
+            **dict.fromkeys(("upper_cut", "lower_cut"), np.pi * 625),
+        },
+    ),
+    "ball_between_plates": (
+        np.pi / 2 + 1.5,
+        {
+            "ball_bottom": np.pi / 2,
+            "ball_top": np.pi / 2,
+            **{
+                f"{plate}_{side}": 1.5 for plate in ("lower", "upper") for side in ("bottom", "top")
+            },
+            "symmetry": 3.0,
+        },
+    ),
 }
 
 
@@ -132,9 +174,7 @@ def test_quarter_disc_resolves_the_hertz_contact(half_width, contact_size):
 
 @pytest.mark.parametrize("name", meshes.RECIPES)
 def test_smaller_sizes_give_more_nodes(name):
-    sizes = {
-        k: 0.7 * v for k, v in meshes.parameters(name).items() if k in ("size", "contact_size")
-    }
+    sizes = {k: 0.7 * v for k, v in meshes.parameters(name).items() if k.endswith("size")}
     assert nodes(from_recipe(COMM, name, **sizes)) > nodes(from_recipe(COMM, name))
 
 
