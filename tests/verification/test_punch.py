@@ -1,0 +1,92 @@
+"""Flat punches under force and moment on half spaces, against the closed forms."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+
+from contact.body.description import Body, Fixed
+from contact.body.rigid import Motion, Rigid
+from contact.interface.obstacle import Plane
+from contact.mesh.domain import Domain, from_mesh
+from contact.mesh.grid import rectangle
+from contact.methods.newton import Newton
+from contact.methods.options import NewtonOptions
+from contact.output.motions import movements
+from contact.problem.problem import Contact, ContactProblem
+from forms.hencky import Linear
+from tests.problems.mechanics import constant
+
+SELF = MPI.COMM_SELF
+NU, FORCE, MOMENT = 0.3, 0.01, 0.002
+
+
+def growing(first, far):
+    """Return distances from 0 to `far` whose steps grow by a fourth."""
+    count = int(np.ceil(np.log(1 + 0.25 * far / first) / np.log(1.25)))
+    distances = np.cumsum(np.concatenate([[0.0], first * 1.25 ** np.arange(count)]))
+    return distances * far / distances[-1]
+
+
+def half_space(n: int, far: float, revolved: bool) -> Domain:
+    """Return a piece of the half space y < 0, refined towards the ends of |x| <= 1."""
+    under = 1 - (1 - np.linspace(0, 1, n + 1)) ** 3
+    first = under[-1] - under[-2]
+    x = np.concatenate([under, 1 + growing(first, far - 1)[1:]])
+    x = x if revolved else np.concatenate([-x[:0:-1], x])
+    y = -growing(first, far)[::-1]
+    cells = x.size - 1, y.size - 1
+    mesh = rectangle(SELF, (0.0, 0.0), (float(cells[0]), float(cells[1])), cells).mesh
+    for k, values in enumerate((x, y)):
+        mesh.geometry.x[:, k] = np.interp(mesh.geometry.x[:, k], np.arange(values.size), values)
+
+    def distant(p):
+        left = np.zeros_like(p[0], dtype=bool) if revolved else p[0] < -far + 1e-9
+        return (p[1] < -far + 1e-9) | (p[0] > far - 1e-9) | left
+
+    def punched(p):
+        return (p[1] > -1e-9) & (np.abs(p[0]) < 1 + 1e-9)
+
+    domain = from_mesh(mesh, {"punch": punched, "far": distant})
+    return replace(domain, revolved=revolved)
+
+
+def pressed(n: int, far: float, revolved: bool, motion: Motion):
+    """Return how a punch moves, and its problem."""
+    fixed = [Fixed("far", [constant(0.0, 2), constant(0.0, 2)])]
+    body = Body(Linear(1.0, NU), fixed, (), rigid=(Rigid("punch", motion, foundation=True),))
+    contact = Contact("punch", Plane((0.0, 0.0), (0.0, -1.0)))
+    problem = ContactProblem(half_space(n, far, revolved), body, contact, degree=2)
+    method = Newton(problem, NewtonOptions(tolerance=1e-9))
+    state, outcome = method.solve()
+    assert outcome.converged
+    assert method.counters.linear_solves == 1
+    # Nothing lifts off.
+    assert np.all(state.forces.pressure > 0)
+    return problem, state, movements(problem, state)["rigid"]
+
+
+def test_a_moment_tilts_a_flat_punch():
+    """M = pi a^2 E theta/(4 (1 - nu^2)) a unit length; the force does not tilt it."""
+    motion = Motion([0.0, None], [None], [0.0, -FORCE], [MOMENT], [0.0, 0.0])
+    problem, state, moved = pressed(7, 20.0, False, motion)
+    theta = 4 * (1 - NU**2) * MOMENT / np.pi
+    assert np.deg2rad(moved["rotation"]) == pytest.approx(theta, rel=5e-3)
+    nodes, pressure = problem.nodes, state.forces.pressure
+    assert nodes.weight @ pressure == pytest.approx(FORCE, rel=1e-12)
+    # The moment of the pressure upwards on the punch balances that which is given.
+    assert nodes.weight @ (nodes.points[:, 0] * pressure) == pytest.approx(-MOMENT, rel=1e-12)
+    # p = (P - 2 M x/a^2)/(pi sqrt(a^2 - x^2)), a little inside of the edges.
+    x = nodes.points[:, 0]
+    inside = np.abs(x) < 0.8
+    closed = (FORCE - 2 * MOMENT * x) / (np.pi * np.sqrt(1 - np.minimum(x**2, 0.99)))
+    assert np.abs(pressure - closed)[inside].max() < 0.05 * closed[inside].max()
+
+
+def test_a_circular_punch_sinks_by_its_force():
+    """P = 2 E* a delta; what the far supports take off falls like the inverse of their distance."""
+    motion = Motion([0.0, None], [0.0], [0.0, -FORCE], [0.0], [0.0, 0.0])
+    depths = [-pressed(6, far, True, motion)[2]["displacement"][1] for far in (10.0, 20.0)]
+    stiffness = [FORCE / (2 * depth) * (1 - NU**2) for depth in depths]
+    assert 2 * stiffness[1] - stiffness[0] == pytest.approx(1.0, rel=5e-3)
