@@ -96,7 +96,7 @@ def _check_group(
     """
     body, nodes, d = problem.equilibrium, problem.nodes, problem.dim
     points, masters = body.layout.points, body.masters
-    columns, names, centre = [], [], _centre(problem)
+    columns, names, centres, centre = [], [], [], _centre(problem)
     own_names = NAMES[d][1:2] if problem.domain.revolved else NAMES[d]
     for k in group:
         inside, size = piece == k, problem.domain.size
@@ -105,6 +105,7 @@ def _check_group(
         rigid = rigid_motions((points[inside] - centre) / size, problem.domain.revolved)
         motions = np.zeros((*body.free.shape, rigid.shape[2]))
         motions[inside, :d] = rigid
+        centres.append(centre)
         still = np.zeros(masters.size)
         columns += [np.append(motion.ravel(), still) for motion in np.moveaxis(motions, 2, 0)]
         names += own_names
@@ -128,10 +129,15 @@ def _check_group(
         touching = touching + _gram(problem, tangential)
     loose = _null_space(supports + touching)
     if loose.shape[1] > 0:
-        whole = "the body" if len(names) == len(own_names) else "the body, or what is rigid,"
+        whole = "the body, or what is rigid," if moving else "the body"
         if count > 1:
-            where = ", ".join(f"{x:.4g}" for x in centre)
-            whole = f"the mesh has {count} pieces that share no nodes, and the one about ({where})"
+            own = np.linalg.norm(loose[: len(group) * len(own_names)], axis=1)
+            moves = own.reshape(len(group), -1).max(axis=1) > 1e-6
+            where = " and ".join(
+                f"({', '.join(f'{x:.4g}' for x in c)})" for c in np.array(centres)[moves]
+            )
+            which = "the one" if np.count_nonzero(moves) == 1 else "what is"
+            whole = f"the mesh has {count} pieces that share no nodes, and {which} about {where}"
         raise InputError(
             f"{whole} is not held: it can move as a rigid body ({_describe(loose, names)}); "
             "accepted: displacement components fixed so that it cannot"
@@ -205,6 +211,13 @@ def _describe(motions: Array, names: list[str]) -> str:
     """Name the axis motions that a space of rigid motions contains, or count it."""
     contained = np.linalg.norm(motions, axis=1) > 1 - 1e-6
     found = [name for name, inside in zip(names, contained, strict=True) if inside]
+    for axis in "xyz":
+        # Of several together.
+        all_along = np.array([f"translation along {axis}" in name for name in names], dtype=float)
+        along = all_along * (np.linalg.norm(motions, axis=1) > 1e-6)
+        size = float(np.linalg.norm(along))
+        if size > 1 and np.linalg.norm(motions.T @ along) > (1 - 1e-6) * size:
+            found.append(f"translation along {axis}, together")
     return ", ".join(found) or "translation and rotation combined"
 
 

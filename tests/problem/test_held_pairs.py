@@ -1,0 +1,55 @@
+"""Bodies that nothing but each other holds."""
+
+import pytest
+from mpi4py import MPI
+
+from contact.body.description import Body, Fixed, Load
+from contact.errors import InputError
+from contact.interface.friction import Friction
+from contact.methods.newton import Newton
+from contact.methods.options import NewtonOptions
+from contact.output.balances import force_balance
+from contact.problem.held import check_held
+from contact.problem.problem import Contact, ContactProblem
+from forms.hencky import Linear
+from forms.laws import ConstantCoefficient
+from tests.problems.blocks import Blocks
+from tests.problems.mechanics import constant, flat
+
+SELF = MPI.COMM_SELF
+
+
+def blocks(held, traction, mu=0.0):
+    """Return two blocks, the lower one held as said, the upper one loaded and on it alone."""
+    fixed = [Fixed("bottom", [None if c is None else constant(c, 2) for c in held])]
+    load = Load("top", [constant(f, 2) for f in traction])
+    body = Body(Linear(1.0, 0.3), fixed, (load,))
+    friction = Friction(ConstantCoefficient(mu)) if mu else None
+    contact = Contact("under", flat(), friction=friction, against="over")
+    return ContactProblem(Blocks().domain(SELF), body, contact)
+
+
+@pytest.mark.parametrize("condense", [True, False])
+def test_a_body_that_lies_on_another_is_held_by_friction(condense):
+    problem = blocks((0.0, 0.0), (0.001, -0.01), mu=0.5)
+    check_held(problem)
+    method = Newton(problem, NewtonOptions(tolerance=1e-9, condense=condense))
+    state, outcome = method.solve()
+    assert outcome.converged
+    balance = force_balance(problem, state)
+    assert balance.applied == pytest.approx([0.001, -0.01], rel=1e-10)
+    assert balance.supports == pytest.approx([-0.001, 0.01], rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("held", "traction", "mu", "words"),
+    [
+        ((0.0, 0.0), (0.0, -0.01), 0.0, r"the one about \(0.5, 1.5\) is not held.*along x\)"),
+        ((None, 0.0), (0.0, -0.01), 0.5, r"what is about \(.*\) and \(.*\) .*along x, together"),
+        ((0.0, 0.0), (0.0, 0.01), 0.5, "pull the body off"),
+        ((0.0, 0.0), (0.01, -0.01), 0.5, "pull the body off"),
+    ],
+)
+def test_pairs_that_fly_away_are_refused(held, traction, mu, words):
+    with pytest.raises(InputError, match=words):
+        check_held(blocks(held, traction, mu))
