@@ -18,6 +18,7 @@ Appl. Mech. Engrg. 200 (2011) 1317 (partly covered facets).
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -33,6 +34,9 @@ from contact.typing import Array
 
 #: Nodes less than this share of whose function faces the master carry no multiplier.
 LEAST_COVERED = 1e-3
+
+#: Directions that differ less than this from the normals are these.
+FLAT = 1e-12
 
 #: No nodes.
 NOBODY: NDArray[np.int64] = np.zeros(0, dtype=np.int64)
@@ -54,7 +58,7 @@ class Coupling:
     weight
         int Phi_j over what faces the master, int N~_j, shape (n,) (length^(d - 1)).
     normal
-        Mean unit normals out of the slave, shape (n, d).
+        Unit vectors from the slave to the master, between their normals, shape (n, d).
     gap
         Mean distance along them, shape (n,) (length).
     covered
@@ -127,9 +131,13 @@ def couple(
 
 def _integrate(slave: Surface, master: Surface, reach: float, without: NDArray[np.int64]) -> _Parts:
     degree = 2 if slave.degree == master.degree == 1 and not slave.revolved else 4
-    found = [
-        common_points(slave, master, i, j, degree) for i, j in facing_pairs(slave, master, reach)
-    ]
+    pairs = list(facing_pairs(slave, master, reach))
+    direction = slave.normal
+    found = [common_points(slave, master, pair, direction, degree) for pair in pairs]
+    middle = _middle(slave, master, found)
+    if np.abs(middle - direction).max(initial=0.0) > FLAT:
+        direction = middle
+        found = [common_points(slave, master, pair, direction, degree) for pair in pairs]
     d = slave.corners.shape[1]
     change = positive_change(d, slave.degree)
     k = change.shape[0]
@@ -166,12 +174,27 @@ def _integrate(slave: Surface, master: Surface, reach: float, without: NDArray[n
         slave.nodes,
         own,
         whole,
-        total[:, :, None] * slave.normal[:, None, :],
-        gap[:, :, None] * slave.normal[:, None, :],
+        total[:, :, None] * direction[:, None, :],
+        gap[:, :, None] * direction[:, None, :],
         rows,
         masters,
         values,
     )
+
+
+def _middle(slave: Surface, master: Surface, found: Sequence[Points]) -> Array:
+    """Return directions between the normals of slave facets and of what they face, shape (f, d).
+
+    Along them two curved sides see each other alike, whichever of them is the slave: the normals
+    of one alone would turn some of the closing of the gap into slip.
+    """
+    total = np.zeros_like(slave.normal)
+    for points in found:
+        _add(total, points.slave, points.weight[:, None] * master.normal[points.master])
+    length = np.linalg.norm(total, axis=1)
+    mean = total / np.where(length > 0, length, 1.0)[:, None]
+    direction = slave.normal - mean
+    return np.asarray(direction / np.linalg.norm(direction, axis=1)[:, None])
 
 
 def _handed_over(gone: NDArray[np.bool_]) -> Array:

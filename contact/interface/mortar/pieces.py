@@ -1,8 +1,8 @@
 """Where two facets face each other: quadrature points on the pieces that they have in common.
 
-A master facet is projected along the normal of a slave facet onto that one's line or plane. What
-both have in common is a segment or a convex polygon, on which all integrands are polynomials: the
-rules are exact there.
+A master facet is projected onto the line or plane of a slave facet, along a direction that each
+slave facet has. What both have in common is a segment or a convex polygon, on which all integrands
+are polynomials: the rules are exact there.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ class Points:
     weight
         Quadrature weights, lengths or areas on the slave facet, or of its rings, shape (p,).
     gap
-        Distance from the slave to the master facet along the slave's normal, shape (p,).
+        Distance from the slave to the master facet along the slave's direction, shape (p,).
     """
 
     slave: NDArray[np.intp]
@@ -46,7 +46,11 @@ class Points:
 
 
 def common_points(
-    slave: Surface, master: Surface, i: NDArray[np.intp], j: NDArray[np.intp], degree: int
+    slave: Surface,
+    master: Surface,
+    pairs: tuple[NDArray[np.intp], NDArray[np.intp]],
+    direction: Array,
+    degree: int,
 ) -> Points:
     """Return quadrature points on what pairs of facets have in common.
 
@@ -54,14 +58,17 @@ def common_points(
     ----------
     slave, master
         The two sides.
-    i, j
-        The facets of each pair, shape (n,).
+    pairs
+        The facets of each pair, shapes (n,).
+    direction
+        Along which a slave facet looks, unit vectors, shape (f, d).
     degree
         Of the polynomials that are integrated exactly, 2 or 4.
     """
-    corners, normal = slave.corners[i], slave.normal[i]
+    i, j = pairs
+    corners = slave.corners[i]
     # Barycentric coordinates of the master's corners, projected, on the slave: (n, d, d).
-    projected, height = _on_plane(corners, normal, master.corners[j])
+    projected, height = _on_plane(corners, slave.normal[i], direction[i], master.corners[j])
     d = corners.shape[1]
     parts, share = (_segments if d == 2 else _triangles)(projected)
     # Parts of the slave facet by barycentric coordinates of their corners: (n, parts, d, d).
@@ -85,13 +92,15 @@ def common_points(
     )
 
 
-def _on_plane(corners: Array, normal: Array, x: Array) -> tuple[Array, Array]:
-    """Return barycentric coordinates of projected points on facets, and their heights.
+def _on_plane(corners: Array, normal: Array, direction: Array, x: Array) -> tuple[Array, Array]:
+    """Return barycentric coordinates of projected points on facets, and their distances.
 
     Parameters
     ----------
     corners, normal
         Of the facets, shapes (n, d, d) and (n, d).
+    direction
+        Of the projection, and of the distances, shape (n, d).
     x
         Points, shape (n, m, d).
 
@@ -100,11 +109,13 @@ def _on_plane(corners: Array, normal: Array, x: Array) -> tuple[Array, Array]:
     Shapes (n, m, d) and (n, m).
     """
     offset = x - corners[:, :1]
-    height = np.einsum("nmd,nd->nm", offset, normal)
+    cosine = np.einsum("nd,nd->n", normal, direction)
+    height = np.einsum("nmd,nd->nm", offset, normal) / cosine[:, None]
     edges = corners[:, 1:] - corners[:, :1]
     gram = np.einsum("nid,njd->nij", edges, edges)
-    # The projection takes nothing off the products with the edges, which lie in the plane.
     products = np.einsum("nid,nmd->nim", edges, offset)
+    aside = np.einsum("nid,nd->ni", edges, direction)
+    products -= aside[:, :, None] * height[:, None, :]
     others = np.linalg.solve(gram, products).transpose(0, 2, 1)
     first = 1 - others.sum(axis=2, keepdims=True)
     return np.concatenate([first, others], axis=2), height
