@@ -100,7 +100,7 @@ def _solve_linearised(
 ) -> Found | None:
     """Solve with layer and current linearised at a state; rank 0 does it for all."""
     body, interface, comm = problem.equilibrium, problem.interface, problem.equilibrium.comm
-    gathered = _Gathered.of(problem, state)
+    gathered = Gathered.of(problem, state)
     layer = interface.response.layer_pressure(interface.jump.apply(state.x))
 
     def own_bound(pressure: Array, slip: Array) -> Array:
@@ -138,7 +138,7 @@ def _solve_linearised(
 
 
 @dataclass(frozen=True)
-class _Gathered:
+class Gathered:
     """The linearised problem of all ranks: kept nodes in rank order, counted from `origin`."""
 
     stiffness: Array
@@ -151,7 +151,8 @@ class _Gathered:
     weight: Array
 
     @staticmethod
-    def of(problem: CondensedProblem, state: State) -> _Gathered:
+    def of(problem: CondensedProblem, state: State) -> Gathered:
+        """Gather a problem with layer and current linearised at a state. Collective."""
         body, interface = problem.equilibrium, problem.interface
         response, jump = interface.response, interface.jump
         nodal = jump.apply(state.x)
@@ -173,7 +174,7 @@ class _Gathered:
         masked = weighted * free[:, :, None] * free[:, None, :]
         total[rows[:, :, None], rows[:, None, :]] += masked
         load = np.where(free.ravel(), total @ moved - base, 0.0)
-        return _Gathered(total, load, origin, free, normal, tangent, gap, weight)
+        return Gathered(total, load, origin, free, normal, tangent, gap, weight)
 
     def solve(self, bound: Bound, frictional: bool) -> tuple[Array, Array, Array, int, str]:
         """Return unknowns, pressure, friction, steps and words."""

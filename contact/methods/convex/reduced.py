@@ -90,7 +90,7 @@ class Reduced:
         free: Mask,
     ) -> None:
         n, d = normal.shape
-        self._basis, role = _bases(normal, tangent, closing, free)
+        self._basis, role = bases(normal, tangent, closing, free)
         acting = (role == 2) & closing[:, None] | (role == 1) & rubbing[:, None]
         left = (role >= 0) & ~acting
         self._turned = _turned(stiffness, self._basis)
@@ -185,7 +185,7 @@ class Reduced:
         raise NotConvexError("the stiffness has negative eigenvalues")
 
 
-def _bases(normal: Array, tangent: Array, closing: Mask, free: Mask) -> tuple[Array, NDArray]:
+def bases(normal: Array, tangent: Array, closing: Mask, free: Mask) -> tuple[Array, NDArray]:
     """Return nodal bases: normal, tangents, and what is left or fixed (roles 2, 1, 0, -1)."""
     admissible = normal * free
     lost = np.abs(np.linalg.norm(admissible, axis=1) - 1) > 1e-6
