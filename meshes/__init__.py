@@ -23,6 +23,7 @@ from meshes.hertz import disc, half_disc, quarter_disc, sphere
 from meshes.pairs import (
     ball_between_plates,
     cylinder_on_block,
+    two_balls,
     two_blocks,
     two_half_cylinders,
     two_spheres,
@@ -45,6 +46,7 @@ RECIPES: Mapping[str, Callable[..., None]] = {
         two_blocks,
         cylinder_on_block,
         two_half_cylinders,
+        two_balls,
         two_spheres,
         ball_between_plates,
     )

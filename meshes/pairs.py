@@ -128,6 +128,47 @@ def two_half_cylinders(
     finish(gmsh, 2, bodies, parts)
 
 
+def two_balls(
+    *,
+    radius: float = 50.0,
+    size: float = 6.0,
+    contact_size: float = 1.0,
+    contact_width: float = 13.0,
+    growth: float = 0.2,
+) -> None:
+    """Right half of the lower half of a ball on that of the upper half of another one.
+
+    They touch at the origin. Regions: ``upper``, ``lower``. Parts: ``upper_arc`` on
+    ``lower_arc``; the cuts ``upper_cut`` (y = radius) and ``lower_cut`` (y = -radius);
+    ``symmetry`` (x = 0 of both). About the axis x = 0 these are balls, in the plane cylinders.
+    Sizes as in `quarter_disc`.
+    """
+    import gmsh
+
+    from meshes.grading import finish, grade
+
+    geo, bodies, touching = gmsh.model.geo, {}, []
+    parts: dict[str, list[int]] = {"symmetry": []}
+    for name, y in (("upper", radius), ("lower", -radius)):
+        low, side, centre = (geo.addPoint(*p, 0) for p in ((0, 0), (radius, y), (0, y)))
+        arc, cut = geo.addCircleArc(low, centre, side), geo.addLine(side, centre)
+        axis = geo.addLine(centre, low)
+        bodies[name] = [geo.addPlaneSurface([geo.addCurveLoop([arc, cut, axis])])]
+        parts |= {f"{name}_arc": [arc], f"{name}_cut": [cut]}
+        parts["symmetry"].append(axis)
+        touching.append(low)
+    geo.synchronize()
+    grade(
+        gmsh,
+        size=size,
+        contact_size=contact_size,
+        width=contact_width,
+        growth=growth,
+        points=touching,
+    )
+    finish(gmsh, 2, bodies, parts)
+
+
 def two_spheres(
     *,
     radius: float = 50.0,

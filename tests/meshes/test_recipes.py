@@ -91,6 +91,14 @@ RECIPES = {
         np.pi * 100,
         {"upper_arc": np.pi * 10, "lower_arc": np.pi * 10, "upper_cut": 20.0, "lower_cut": 20.0},
     ),
+    "two_balls": (
+        np.pi * 1250,
+        {
+            "symmetry": 100.0,
+            **dict.fromkeys(("upper_arc", "lower_arc"), np.pi * 25),
+            **dict.fromkeys(("upper_cut", "lower_cut"), 50.0),
+        },
+    ),
     "two_spheres": (
         np.pi * 125e3 / 3,
         {

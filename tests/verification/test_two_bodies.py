@@ -1,0 +1,131 @@
+"""Two elastic bodies against Hertz, Cattaneo and Mindlin."""
+
+import numpy as np
+import pytest
+
+from contact import parse_case, solve
+from contact.output.table import contact_table
+from scripts.studies.pairs import converges, random_case
+
+
+def hertz_line(table, modulus, radius):
+    """Return half width and largest pressure of Hertz's line contact, found over exact.
+
+    The half width is found by the second moment of the pressure, a^2/4.
+    """
+    x, p = table["x"], table["pressure"]
+    share = table["weight"] * p
+    force = share.sum() * (2 if x.min() >= 0 else 1)
+    a = np.sqrt(4 * force * radius / (np.pi * modulus))
+    found = 2 * np.sqrt((share * x**2).sum() / share.sum())
+    return found / a, p.max() / (2 * force / (np.pi * a)), a
+
+
+def effective(first, second, poisson=0.3):
+    """Return E* of two materials."""
+    return 1 / ((1 - poisson**2) * (1 / first + 1 / second))
+
+
+@pytest.mark.parametrize("mu", [0.0, 0.1])
+def test_steel_cylinder_on_an_aluminium_block(mu):
+    """NAFEMS R0094-1 (SSNP154): a 6.21 and p_0 3585.37 of Hertz at 35 kN a millimetre."""
+    given = {
+        "mesh": {"generator": "cylinder_on_block"},
+        "material": [
+            {"on": "cylinder", "young": 210e3, "poisson": 0.3},
+            {"on": "block", "young": 70e3, "poisson": 0.3},
+        ],
+        "fixed": [
+            {"on": "symmetry", "displacement": [0.0, "free"]},
+            {"on": "block_bottom", "displacement": [0.0, 0.0]},
+        ],
+        "load": [{"on": "top", "traction": [0.0, -350.0]}],
+        "contact": {"on": "arc", "against": "block_top"},
+        "friction": {"law": "coulomb", "mu": mu} if mu else {"law": "none"},
+    }
+    solution = solve(parse_case(given))
+    assert solution.converged
+    table = contact_table(solution)
+    width, pressure, a = hertz_line(table, effective(210e3, 70e3), 50.0)
+    assert a == pytest.approx(6.2146, rel=2e-3)
+    # Friction narrows the contact of unlike materials a little.
+    assert width == pytest.approx(1, abs=5e-3 if mu == 0 else 15e-3)
+    assert pressure == pytest.approx(1, abs=5e-3 if mu == 0 else 15e-3)
+    up = -solution.contact_force[1]
+    assert up == pytest.approx(17500.0, rel=1e-9)
+
+
+def test_two_balls():
+    """SSNV104's balls, axisymmetric: Hertz's a and p_0 at the force that acts."""
+    errors = []
+    for size in (2.0, 1.0, 0.5):
+        given = {
+            "mesh": {"generator": "two_balls", "contact_size": size},
+            "space": {"kinematics": "axisymmetric"},
+            "material": {"young": 20e3, "poisson": 0.3},
+            "fixed": [
+                {"on": "upper_cut", "displacement": ["free", -2.0]},
+                {"on": "lower_cut", "displacement": ["free", 2.0]},
+            ],
+            "contact": {"on": "upper_arc", "against": "lower_arc"},
+        }
+        solution = solve(parse_case(given))
+        assert solution.converged
+        table = contact_table(solution)
+        share = table["weight"] * table["pressure"]
+        force, modulus = share.sum(), effective(20e3, 20e3)
+        a = (3 * force * 25.0 / (4 * modulus)) ** (1 / 3)
+        found = np.sqrt(5 / 2 * (share * table["x"] ** 2).sum() / force)
+        highest = 1.5 * force / (np.pi * a**2)
+        errors.append([abs(found / a - 1), table["pressure"].max() / highest - 1])
+    assert errors[1][0] < 0.01 and abs(errors[1][1]) < 0.012
+    assert errors[2][0] < 0.004 and abs(errors[2][1]) < 0.004
+
+
+def half_cylinders(size, steps):
+    """Press two half cylinders on each other, then push the upper one along."""
+    return {
+        "mesh": {
+            "generator": "two_half_cylinders",
+            "contact_size": size,
+            "contact_width": 0.7,
+        },
+        "material": {"young": 1000.0, "poisson": 0.3},
+        "fixed": [
+            {"on": "upper_cut", "displacement": ["0.02*max(t-1,0)", "-0.1*min(t,1)"]},
+            {"on": "lower_cut", "displacement": [0.0, 0.0]},
+        ],
+        "contact": {"on": "upper_arc", "against": "lower_arc"},
+        "friction": {"law": "coulomb", "mu": 0.3},
+        "evolution": {"times": [0.0, 1.0, 2.0], "steps": [1, steps]},
+    }
+
+
+def test_partial_slip_of_two_half_cylinders():
+    """Cattaneo and Mindlin: c/a = sqrt(1 - Q/(mu P)), whatever the number of steps."""
+    modulus, mu = effective(1000.0, 1000.0), 0.3
+    away = []
+    for size, steps in ((0.04, 1), (0.02, 2)):
+        solution = solve(parse_case(half_cylinders(size, steps)))
+        assert solution.converged
+        table = contact_table(solution)
+        x, tau, weight = table["x"], np.abs(table["tau"]), table["weight"]
+        width, pressure, a = hertz_line(table, modulus, 5.0)
+        assert width == pytest.approx(1, abs=6e-3) and pressure == pytest.approx(1, abs=6e-3)
+        share = (weight * tau).sum() / (mu * (weight * table["pressure"]).sum())
+        assert 0.35 < share < 0.45
+        c = a * np.sqrt(1 - share)
+        sticks = np.abs(x[table["status"] == "stick"])
+        spacing = np.diff(x[np.abs(x) < a]).mean()
+        assert (sticks.max() + spacing / 2) / a == pytest.approx(c / a, abs=size)
+        p_0 = 2 * (weight * table["pressure"]).sum() / (np.pi * a)
+        full, inner = (np.sqrt(np.maximum(1 - (x / r) ** 2, 0)) for r in (a, c))
+        exact = mu * p_0 * (full - c / a * inner)
+        away.append(np.sqrt((weight * (tau - exact) ** 2).sum() / (weight * exact**2).sum()))
+    assert away[1] < 0.05 and away[1] < 0.8 * away[0]
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_random_pairs(seed):
+    good, words = converges(random_case(seed), compared=seed < 2)
+    assert good, words
