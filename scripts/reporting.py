@@ -1,7 +1,8 @@
 """How the scripts of this folder write their tables and figures.
 
-Each table or figure is a CSV file with the numbers, a PNG file for a figure, and a Markdown
-fragment of the same name with caption and remarks. `results_page.py` puts the fragments together.
+Each table or figure is a CSV file with the numbers, for a figure a PNG and a PDF file, and a
+Markdown fragment of the same name with caption and remarks. `results_page.py` puts the fragments
+together.
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ from typing import Any
 
 import numpy as np
 import ufl
+from cycler import cycler
 from dolfinx import fem
 from matplotlib import rcParams
 from matplotlib.figure import Figure
@@ -33,8 +35,20 @@ from contact.solving import METHODS
 from forms.hencky import Log
 from forms.kinematics import deviator_squared, strain
 
+#: Widths of figures of one column, 85 mm, and of two (inches).
+ONE_COLUMN, TWO_COLUMNS = 85 / 25.4, 175 / 25.4
+
+#: Dots per inch of pictures, and of what is an image in a PDF.
+DPI = 300
+
 rcParams.update(STYLE)
-rcParams["axes.titlesize"] = 9
+rcParams.update(
+    {"font.size": 8, "axes.titlesize": 8, "legend.fontsize": 7, "figure.figsize": (TWO_COLUMNS, 4)}
+)
+rcParams["axes.prop_cycle"] = cycler(
+    # Okabe and Ito's palette, which readers who do not see all colours tell apart.
+    color=["#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000"]
+)
 
 
 @dataclass(frozen=True)
@@ -80,7 +94,8 @@ class Report:
         if MPI.COMM_WORLD.rank > 0:
             return
         self.out.mkdir(parents=True, exist_ok=True)
-        figure.savefig(self.out / f"{name}.png", dpi=130, bbox_inches="tight")
+        for ending in ("png", "pdf"):
+            figure.savefig(self.out / f"{name}.{ending}", dpi=DPI)
         length = max(len(column) for column in data.values())
         padded = {key: [*column, *[""] * (length - len(column))] for key, column in data.items()}
         self._csv(name, padded)
@@ -122,7 +137,10 @@ def text(value: Any) -> str:
 
 
 def subplots(
-    rows: int = 1, columns: int = 1, size: tuple[float, float] = (6.6, 3.0), **shared: Any
+    rows: int = 1,
+    columns: int = 1,
+    size: tuple[float, float] = (TWO_COLUMNS, 2.8),
+    **shared: Any,
 ) -> tuple[Figure, Any]:
     """Return a figure and its axes, in the style of `contact.output.figures`."""
     figure = Figure(figsize=size)
@@ -153,6 +171,7 @@ def solved(case: Case, problem: ContactProblem | None = None) -> Solution:
         If it does not converge: no table or figure shows such numbers.
     """
     solution = solve(case) if problem is None else solve_problem(problem, case.solver)
+    solution.units = case.case.units
     if not solution.converged:
         raise InputError(f"{case.title}: {solution.outcome.reason}")
     return solution

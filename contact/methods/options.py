@@ -53,8 +53,9 @@ class LoopOptions(Options):
     ----------
     stopping
         `residual`: the KKT residuals end the loops; `thesis`: the rules (3.45) and (3.46), with
-        a potential (6.40), by `penalty` (4.38), on the change between iterations do. The
-        residuals decide `converged` in any case.
+        a potential (5.38) and (6.40), by `penalty` (4.38), on the change between iterations do;
+        phi counts in its own unit sqrt(mu_1/beta), where the thesis adds u and phi as they are.
+        The residuals decide `converged` in any case.
     eps_fp
         Tolerance of (3.46), outer loop.
     max_inner

@@ -23,7 +23,15 @@ from contact.methods.report import Outcome
 from contact.output.fields import DerivedFields
 from contact.typing import Array
 from scripts.cases import bar
-from scripts.reporting import Report, iterates, observed_orders, options, solved, subplots
+from scripts.reporting import (
+    TWO_COLUMNS,
+    Report,
+    iterates,
+    observed_orders,
+    options,
+    solved,
+    subplots,
+)
 from scripts.studies.exact_solutions import Singular, exact, manufactured
 
 RHO = 1e4
@@ -114,7 +122,7 @@ def mesh_series(
 
 def draw_series(columns: Mapping[str, Sequence[Any]]) -> Figure:
     """Draw the errors of a table of `mesh_series` over h."""
-    figure, axes = subplots(1, 3, size=(7.2, 3.2))
+    figure, axes = subplots(1, 3, size=(TWO_COLUMNS, 3.2))
     problems, cells = np.array(columns["problem"]), np.array(columns["1/h"], dtype=int)
     for label, marker in zip(dict.fromkeys(columns["problem"]), "os^v", strict=False):
         own = problems == label
@@ -305,7 +313,7 @@ def _settings(iteration: Iteration) -> Options:
 def fixed_points(report: Report, coarse: bool) -> dict[str, float]:
     """Show the errors of the fixed points per iteration; return observed rates. Collective."""
     n = 8 if coarse else 16
-    figure, axes = subplots(1, 2, size=(7.2, 3.4), sharey=True)
+    figure, axes = subplots(1, 2, size=(TWO_COLUMNS, 3.4), sharey=True)
     columns: dict[str, list[object]] = {
         name: []
         for name in (

@@ -18,7 +18,7 @@ from contact.methods.fixed_point import FixedPoint
 from contact.methods.options import FixedPointOptions
 from contact.typing import Array
 from scripts.cases import CASES
-from scripts.reporting import Report, iterates, options, subplots
+from scripts.reporting import TWO_COLUMNS, Report, iterates, options, subplots
 from scripts.studies.product_norm import ProductNorm
 
 #: k_e of the figure.
@@ -94,7 +94,7 @@ def theorem_5_2(report: Report, coarse: bool) -> dict[str, float]:
     """Show the errors of Algorithm 4 per iteration, lagged and implicit. Collective."""
     cells = (16, 8) if coarse else (64, 32)
     name, shown = "piezo-8-1-conductive", SHOWN[1::2] if coarse else SHOWN
-    figure, axes = subplots(1, 2, size=(7.2, 3.2), sharey=True)
+    figure, axes = subplots(1, 2, size=(TWO_COLUMNS, 3.2), sharey=True)
     data: dict[str, Sequence[float]] = {}
     columns: dict[str, list[object]] = {
         key: [] for key in ("k_e", "charge", "iterations", "converged", "observed rate")

@@ -23,7 +23,15 @@ from contact.problem.problem import Contact, ContactProblem
 from contact.typing import Array
 from forms.laws import Compliance, PotentialFactor
 from scripts.cases import CASES, TABLE_8_4
-from scripts.reporting import Report, iterates, observed_orders, options, solved, subplots
+from scripts.reporting import (
+    TWO_COLUMNS,
+    Report,
+    iterates,
+    observed_orders,
+    options,
+    solved,
+    subplots,
+)
 from scripts.studies.product_norm import ProductNorm
 
 #: mu = k_e of the limit: those of the table and some between them.
@@ -194,7 +202,7 @@ def table(report: Report, name: str, caption: str, errors: Errors, note: str = "
 
 def draw_errors(curves: Mapping[str, Errors]) -> tuple[Figure, dict[str, Array]]:
     """Draw distances in V and W over the parameter, with a line of slope 1."""
-    figure, axes = subplots(size=(5.5, 3.8))
+    figure, axes = subplots(size=(TWO_COLUMNS, 3.8))
     data: dict[str, Array] = {}
     for (label, errors), fill in zip(curves.items(), ("none", "full"), strict=False):
         data[f"{errors.name}, {label}"] = errors.parameter
@@ -214,7 +222,7 @@ def draw_errors(curves: Mapping[str, Errors]) -> tuple[Figure, dict[str, Array]]
 
 def draw_iterations(curves: Mapping[str, Array]) -> Figure:
     """Draw errors over the iterations of the fixed point."""
-    figure, axes = subplots(size=(5.5, 3.8))
+    figure, axes = subplots(size=(TWO_COLUMNS, 3.8))
     for label, errors in curves.items():
         axes.semilogy(
             np.arange(1, errors.size + 1),

@@ -14,7 +14,7 @@ from contact import Solution
 from contact.body.norms import errors
 from contact.output.table import Table, contact_table
 from scripts.cases import bar
-from scripts.reporting import Report, options, solved, subplots
+from scripts.reporting import TWO_COLUMNS, Report, options, solved, subplots
 
 RHO = 1e4
 LOADS = (-0.005, -0.05)
@@ -101,7 +101,7 @@ def study(report: Report, n: int, load: float) -> dict[str, Solution]:
 
 
 def _draw(report: Report, name: str, where: str, tables: dict[str, Table | None]) -> None:
-    figure, axes = subplots(3, 2, size=(7.2, 6.6), sharex="col")
+    figure, axes = subplots(3, 2, size=(TWO_COLUMNS, 6.6), sharex="col")
     data: dict[str, Sequence[float]] = {}
     for label, table in tables.items():
         assert table is not None

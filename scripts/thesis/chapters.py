@@ -41,6 +41,7 @@ class Part:
 
 
 PARTS = (
+    Part("setups", "Set-ups and constants: Figures 1.1, 1.2, 7.1, 7.3, 8.1, 8.8, Table 8.1"),
     Part("hertz", "Example 7.1: Hertz's cylinder, and a sphere"),
     Part("table_7_1", "Example 7.2: Table 7.1, Algorithms 1 and 2", figures=False),
     Part("figures_mechanics", "Example 7.2: Figures 7.4, 7.5, 7.7 and 7.8", tables=False),
@@ -50,12 +51,15 @@ PARTS = (
     Part("tables_piezo", "Examples 8.1 and 8.2: Tables 8.2 and 8.3", figures=False),
     Part("figures_piezo", "Examples 8.1 and 8.2: Figures 8.2 to 8.7", tables=False),
     Part("tables_compliance", "Examples 8.3 and 8.4: Table 8.4", figures=False),
+    Part("stopping_8_3", "Example 8.3: the thesis's two iterations", figures=False),
     Part("figures_compliance", "Examples 8.3 and 8.4: figures", tables=False),
     Part(
         "limit_theorem",
         "Theorems 6.3 to 6.5: limits of the compliant foundation",
         package="studies",
     ),
+    Part("refinement_8", "Chapter 8 on finer meshes", figures=False, package="studies"),
+    Part("sensitivity", "Parameters that the thesis does not print", package="studies"),
     Part("agreement", "Do the methods agree? All examples", figures=False, package="studies"),
 )
 

@@ -21,11 +21,19 @@ from contact.typing import Array
 from forms.foundation import contact_multiplier
 from forms.laws import Compliance, PotentialFactor, RampConductivity, ShiftedConductivity
 from scripts.cases import CASES
-from scripts.reporting import Report, options, solved, subplots, yielded_share
+from scripts.reporting import (
+    ONE_COLUMN,
+    TWO_COLUMNS,
+    Report,
+    options,
+    solved,
+    subplots,
+    yielded_share,
+)
 
 #: Labels of axes and colours.
-POTENTIAL = r"potential $\varphi$ (units of the case)"
-ALONG = r"$x$ along $\Gamma_3$ (mesh units)"
+POTENTIAL = r"potential $\varphi$ (GV)"
+ALONG = r"$x$ along $\Gamma_3$ (m)"
 
 #: mu = k_e of Figures 8.11 and 8.12, and how it is written.
 VALUES = {
@@ -74,7 +82,7 @@ def laws(report: Report) -> None:
         "1-7": ("Coulomb's law, bound 1", coulomb_graph(1.0)),
     }
     for number, (what, (u, force)) in graphs.items():
-        figure, axes = subplots(size=(3.6, 2.6))
+        figure, axes = subplots(size=(ONE_COLUMN, 2.4))
         axes.axhline(0.0, color="0.7", lw=0.6)
         axes.axvline(0.0, color="0.7", lw=0.6)
         axes.plot(u, force, "k", lw=1.6)
@@ -84,7 +92,7 @@ def laws(report: Report) -> None:
         note = "Drawn from the projection that the block relaxation applies at a contact node."
         report.figure(f"figure-{number}", caption, figure, {"u": u, "-sigma": force}, note)
 
-    figure, (left, middle, right) = subplots(1, 3, size=(7.2, 2.4))
+    figure, (left, middle, right) = subplots(1, 3, size=(TWO_COLUMNS, 2.4))
     s = np.linspace(-1.5, 1.5, 301)
     data = {"u_nu - rho": s}
     for name, psi in (
@@ -149,7 +157,7 @@ def example(
     report.figure(
         f"figure-{number}a{ending}",
         f"Figure {dotted} (a){of}: {stress} on Gamma_3, {what}",
-        draw_line(table, held=deformed.held),
+        draw_line(table, held=deformed.held, units=solution.units),
         csv_columns(table),
         f"{remark(solution, table)}{yielding(solution.max_dev_strain, share)} {note}".rstrip(),
     )
@@ -157,7 +165,7 @@ def example(
         f"figure-{number}b{ending}",
         f"Figure {dotted} (b){of}: deformed bar, potential and contact forces on it (arrows), "
         f"{what}",
-        with_forces(draw_plane(deformed, table), deformed, table),
+        with_forces(draw_plane(deformed, table, units=solution.units), deformed, table),
         {"smallest potential": [float(values.min())], "largest potential": [float(values.max())]},
     )
 
@@ -217,17 +225,17 @@ def series(report: Report, cells: tuple[int, int]) -> None:
     if MPI.COMM_WORLD.rank > 0:
         return
     for number, key, what, ylabel in (
-        ("8-11a", "pressure", "normal stress", r"$-\sigma_\nu$ (units of the case)"),
-        ("8-11b", "tau", "tangential stress", r"$-\sigma_\tau\cdot t$ (units of the case)"),
+        ("8-11a", "pressure", "normal stress", r"$-\sigma_\nu$ (GPa)"),
+        ("8-11b", "tau", "tangential stress", r"$-\sigma_\tau\cdot t$ (GPa)"),
         ("8-12", "phi", "potential", POTENTIAL),
     ):
-        figure, axes = subplots(size=(6.0, 3.2))
+        figure, axes = subplots(size=(TWO_COLUMNS, 3.2))
         data: dict[str, Sequence[float]] = {}
         for (label, table), name in zip(tables.items(), names, strict=True):
             assert table is not None
             data.setdefault("x", table["x"])
             data[label] = table[key]
-            style = "k--" if label.startswith("P") else "-"
+            style = "k--" if label.startswith("P") else "-"  # dashes: what the others tend to
             axes.plot(table["x"], table[key], style, lw=1.0, label=name)
         axes.set(xlabel=ALONG, ylabel=ylabel)
         axes.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
@@ -245,14 +253,23 @@ def main(arguments: Sequence[str] | None = None) -> None:
         laws(report)
     example(report, "8-9", "compliance-8-3", "Example 8.3", cells)
     data = "Example 8.4, mu = 0.6, k_e = 1"
-    leaning = (
-        "With so much friction and current several solutions coexist, and the mesh decides which "
-        "is found. All triangles lean to one side here, and so does this solution; the mirrored "
-        "mesh gives its mirror image, a symmetric mesh a symmetric one (variant below)."
-    )
-    example(report, "8-10", "compliance-8-4", data, cells, note=leaning)
     crossed, what = ["mesh.diagonal=crossed"], f"{data}, crossed diagonals"
-    example(report, "8-10", "compliance-8-4", what, cells, "crossed", crossed)
+    symmetric = (
+        "The mesh is symmetric, and so are bar, loads and this solution. The bump in the middle is "
+        "where slips to either side meet: friction changes its sign there within a few nodes."
+    )
+    example(report, "8-10", "compliance-8-4", what, cells, "", crossed, note=symmetric)
+    leaning = (
+        "All triangles lean to one side here; with the default ramp of psi the solution differs "
+        "little from that of the symmetric mesh, and less on finer ones."
+    )
+    example(report, "8-10", "compliance-8-4", data, cells, "leaning", note=leaning)
+    steep = (
+        "The ramp of psi of earlier versions, 1000 over the largest extent: far below the spacing "
+        "of the nodes, so that the mesh decides where the bar touches. Shown to warn."
+    )
+    ramp, what = [*crossed, "electric.delta=83.3333"], f"{data}, delta = 83.3"
+    example(report, "8-10", "compliance-8-4", what, cells, "steep", ramp, note=steep)
     layer = "layer of thickness 0.1"
     example(report, "8-9", "compliance-8-3-layer", f"Example 8.3, {layer}", cells, "layer")
     example(report, "8-10", "compliance-8-4-layer", f"Example 8.4, {layer}", cells, "layer")

@@ -12,6 +12,7 @@ import numpy as np
 import ufl
 from dolfinx import fem
 from matplotlib.figure import Figure
+from matplotlib.ticker import FormatStrFormatter, LogLocator, NullFormatter, NullLocator
 from mpi4py import MPI
 
 from contact.body.equilibrium import BodyEquilibrium
@@ -20,7 +21,7 @@ from contact.output.figures.body import draw_plane, picture
 from contact.output.table import contact_table
 from contact.typing import Array
 from forms.kinematics import strain
-from scripts.reporting import Report, observed_orders, options, subplots
+from scripts.reporting import TWO_COLUMNS, Report, observed_orders, options, subplots
 from scripts.studies.lagged_current import theorem_5_2
 from scripts.thesis.figures_compliance import (
     ALONG,
@@ -58,7 +59,7 @@ def figure_8_2a(report: Report, cells: tuple[int, int]) -> None:
     report.figure(
         "figure-8-2a",
         "Figure 8.2 (a): deformed bar, potential, contact forces on it (arrows), k_e = 0, mu = 0.2",
-        with_forces(draw_plane(deformed, table), deformed, table),
+        with_forces(draw_plane(deformed, table, units=solution.units), deformed, table),
         {"smallest potential": [float(values.min())], "largest potential": [float(values.max())]},
         remark(solution, table),
     )
@@ -71,7 +72,7 @@ def potentials(
     """Draw the potential on Gamma_3 for several data. Collective."""
     domain = None
     data: dict[str, Array] = {}
-    figure, axes = subplots(size=(6.0, 3.2))
+    figure, axes = subplots(size=(TWO_COLUMNS, 3.2))
     residual = 0.0
     for k, curve in enumerate(curves):
         solution = solution_of(name, cells, *curve.changes, domain=domain)
@@ -81,8 +82,9 @@ def potentials(
         if table is not None:
             data.setdefault("x", table["x"])
             data[curve.label] = table["phi"]
-            # Dashes let curves be seen that coincide.
-            axes.plot(table["x"], table["phi"], "--" if k % 2 else "-", lw=1.0, label=curve.label)
+            # Thinner from curve to curve: those that coincide are all seen.
+            width = 0.8 + 2.0 * (1 - k / max(len(curves) - 1, 1))
+            axes.plot(table["x"], table["phi"], lw=width, label=curve.label)
     if MPI.COMM_WORLD.rank > 0:
         return
     axes.set(xlabel=ALONG, ylabel=POTENTIAL)
@@ -169,7 +171,7 @@ def error_figure(h: Array, found: Mapping[str, Array]) -> Figure:
     found
         Problem -> its errors in `NORMS`, shape (n, 4).
     """
-    figure, axes = subplots(1, 2, size=(7.2, 3.4))
+    figure, axes = subplots(1, 2, size=(TWO_COLUMNS, 3.4))
     for line, (label, errors) in zip(("o-", "x--"), found.items(), strict=True):
         for k, symbol in enumerate(("$u$", r"$\varphi$") * 2):
             axes[k // 2].loglog(h, errors[:, k], line, ms=4, label=f"{symbol}, {label}")
@@ -177,9 +179,12 @@ def error_figure(h: Array, found: Mapping[str, Array]) -> Figure:
         low = 0.7 * ax.dataLim.y0
         ends = np.array([h.min(), h.max()])
         ax.loglog(ends, low * (ends / ends[0]) ** power, "k:", label=f"slope {power}")
-        ax.set(title=f"relative error in {title}", xlabel="$h$ (mesh units)")
+        ax.set(title=f"relative error in {title}", xlabel="$h$ (m)")
         ax.set_xticks(h, [f"1/{1 / size:g}" for size in h])
-        ax.minorticks_off()
+        ax.xaxis.set_minor_locator(NullLocator())
+        ax.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+        ax.yaxis.set_major_formatter(FormatStrFormatter("%g"))
+        ax.yaxis.set_minor_formatter(NullFormatter())
         ax.legend(fontsize=6)
     return figure
 

@@ -16,7 +16,7 @@ from contact.body.norms import volume
 from contact.meshing import make_domain
 from contact.output.figures.body import draw_plane, picture
 from contact.output.table import contact_table
-from scripts.reporting import Report, options, solved, subplots
+from scripts.reporting import TWO_COLUMNS, Report, options, solved, subplots
 from scripts.thesis.hertz_problems import Cylinder, Sphere, cylinder, sphere
 
 
@@ -182,7 +182,7 @@ def figure_7_2(report: Report, solutions: Mapping[tuple[object, ...], Solution])
         return
     x = np.linspace(0, 1.25 * hertz.half_width, 400)
     data: dict[str, Sequence[float]] = {"x": x, "Hertz": hertz.pressure(x)}
-    figure, axes = subplots(2, 1, size=(6.3, 5.2), sharex=True)
+    figure, axes = subplots(2, 1, size=(TWO_COLUMNS, 5.2), sharex=True)
     axes[0].plot(x, hertz.pressure(x), "k--", lw=1.0, label="Hertz")
     for label, table in tables.items():
         assert table is not None

@@ -24,6 +24,9 @@ from contact.typing import Array
 
 Indices: TypeAlias = NDArray[np.integer[Any]]
 
+#: Quantiles of the values at which colours end where some values lie far beyond.
+OUTLIERS = (0.005, 0.995)
+
 #: Plane meshes with more cells are drawn as pixels.
 MOST_CELLS = 150_000
 
@@ -223,9 +226,10 @@ def draw_plane(
     for side in (-1, 1) if mirrored else (1,):
         shown = _body(ax, picture, side)
         shown.set_cmap("viridis")
+        label = _ranged(shown, picture)
         ax.add_collection(LineCollection(list(picture.outline * [side, 1]), **rest))
         _foundation(ax, table, picture.scale, ends(table, picture.held), side)
-    figure.colorbar(shown, ax=ax, location="bottom", label=picture.label, aspect=40, shrink=0.8)
+    figure.colorbar(shown, ax=ax, location="bottom", label=label, aspect=40, shrink=0.8)
     ax.set_aspect("equal")
     ax.use_sticky_edges = False
     ax.margins(0.02)
@@ -236,6 +240,22 @@ def draw_plane(
     return figure
 
 
+def _ranged(shown: Any, picture: Picture) -> str:
+    """Keep singular corners from spending all the colours; return the label, which says so."""
+    values = picture.values if picture.image is None else picture.image[np.isfinite(picture.image)]
+    low, high = (float(end) for end in np.quantile(values, OUTLIERS))
+    ends = float(values.min()), float(values.max())
+    range_, peaks = list(ends), []
+    if ends[1] - high > 0.2 * (high - low) > 0:
+        range_[1] = high
+        peaks.append(f"peak {ends[1]:.3g}")
+    if low - ends[0] > 0.2 * (high - low) > 0:
+        range_[0] = low
+        peaks.insert(0, f"least {ends[0]:.3g}")
+    shown.set_clim(*range_)
+    return ", ".join([picture.label, *peaks])
+
+
 def _body(ax: Axes, picture: Picture, side: int) -> Any:
     """Draw the coloured body, or its mirror image where the side is -1."""
     if picture.image is not None:
@@ -244,13 +264,17 @@ def _body(ax: Axes, picture: Picture, side: int) -> Any:
         return ax.imshow(picture.image, extent=extent, origin="lower")
     drawn = (picture.corners + picture.scale * picture.displacement) * [side, 1]
     if picture.values.ndim == 1:
-        shown = ax.add_collection(PolyCollection(list(drawn), array=picture.values, lw=0))
+        shown = ax.add_collection(
+            PolyCollection(list(drawn), array=picture.values, lw=0, rasterized=True)
+        )
         # Smoothed edges of neighbours would let the background shine through.
         shown.set_antialiased(False)
         return shown
     points = drawn.reshape(-1, 2)
     triangles = np.arange(len(points)).reshape(-1, 3)
-    return ax.tripcolor(*points.T, triangles, picture.values.ravel(), shading="gouraud")
+    return ax.tripcolor(
+        *points.T, triangles, picture.values.ravel(), shading="gouraud", rasterized=True
+    )
 
 
 def _foundation(ax: Axes, table: Table, scale: float, edges: Array, side: int) -> None:
@@ -262,7 +286,7 @@ def _foundation(ax: Axes, table: Table, scale: float, edges: Array, side: int) -
     gap = np.concatenate([gap[:1], gap, gap[-1:]])
     points, normal = points * [side, 1], normal * [side, 1]
     surface = points + scale * gap[:, None] * normal
-    ax.plot(*surface.T, color="black", lw=1.0)
+    ax.plot(*surface.T, color="black", lw=0.5)
     thick = 0.03 * np.ptp(points, axis=0).max()
     band = np.concatenate([surface, (surface + thick * normal)[::-1]])
     ax.fill(*band.T, facecolor="none", edgecolor=BLUE, hatch="////", lw=0)

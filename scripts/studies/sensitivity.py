@@ -1,0 +1,139 @@
+"""How much the parameters that the thesis does not print decide: rho, delta, the layer, R.
+
+`python3 -m scripts.studies.sensitivity [--out DIR] [--coarse]`, also under mpirun.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from mpi4py import MPI
+
+from contact import Solution, build_problem, load_case, solve_problem
+from scripts.cases import CASES
+from scripts.reporting import ONE_COLUMN, Report, options, subplots
+
+
+@dataclass(frozen=True)
+class Sweep:
+    """One parameter of one case.
+
+    Attributes
+    ----------
+    words
+        What it is, for captions and the axis.
+    case, key
+        Case file, and the key that is changed.
+    values
+        Of the parameter.
+    cells, changes
+        The mesh, along and across, and further changes of the case.
+    log
+        Whether the axis is logarithmic.
+    note
+        What is to be seen.
+    """
+
+    words: str
+    case: str
+    key: str
+    values: Sequence[float]
+    cells: tuple[int, int]
+    changes: tuple[str, ...] = ()
+    log: bool = True
+    note: str = ""
+
+
+LAYER = "compliance-8-4-layer"
+
+SWEEPS: Mapping[str, Sweep] = {
+    "rho": Sweep(
+        r"$\rho$ of (7.16)", "piezo-8-2", "friction.mu.rho",
+        (1e-3, 1e-2, 1e-1, 1.0, 1e1, 1e2, 1e3, 1e4, 1e5), (64, 32),
+        note="Example 8.2, where the thesis prints no rho; the case takes 1.",
+    ),
+    "delta": Sweep(
+        r"$\delta$ of $\psi$", "compliance-8-4", "electric.delta",
+        (0.5, 1.0, 2.0, 10 / 3, 5.0, 8.0, 12.0), (192, 32),
+        note="Example 8.4; by default delta = 10/3. The thesis says that delta is small. From "
+        "about 10 on patches come and go with the mesh, and the parameter has no meaning.",
+    ),
+    "c_nu": Sweep(
+        r"$c_\nu$", LAYER, "contact.stiffness", (0.1, 1.0, 3.0, 10.0, 30.0, 100.0, 1000.0),
+        (96, 16), note="Example 8.4 with a layer of thickness 0.1; the case takes 10.",
+    ),
+    "alpha_nu": Sweep(
+        r"$\alpha_\nu$", LAYER, "contact.potential_factor", (1.0, 1.5, 2.0, 3.0, 5.0, 10.0),
+        (96, 16), log=False, note="The same; the case takes 2.",
+    ),
+    "n_nu": Sweep(
+        r"$n_\nu$", LAYER, "contact.limit", (0.01, 0.02, 0.05, 0.1, 0.2, 0.5), (96, 16),
+        note="The same; the case takes 0.1, the thickness of the layer, beyond which the limit "
+        "has no effect, for the rigid part is reached.",
+    ),
+    "radius": Sweep(
+        r"radius of $R$", "compliance-8-4", "friction.radius", (0.0, 0.1, 0.2, 0.4, 0.8, 1.6),
+        (96, 16), log=False, note="Example 8.4; the case takes 0, R = identity, as the thesis "
+        "computes.",
+    ),
+}  # fmt: skip
+
+
+def run(sweep: Sweep, value: float, cells: tuple[int, int], domain: object) -> Solution:
+    """Solve with one value. Collective."""
+    changes = (f"mesh.cells=[{cells[0]}, {cells[1]}]", f"{sweep.key}={value}", *sweep.changes)
+    case = load_case(CASES / f"{sweep.case}.toml", ["solver.method=newton", *changes])
+    return solve_problem(build_problem(case, domain=domain), case.solver)  # type: ignore[arg-type]
+
+
+def study(report: Report, name: str, coarse: bool) -> None:
+    """Draw contact force and largest pressure over one parameter. Collective."""
+    sweep = SWEEPS[name]
+    cells = (24, 24 // (sweep.cells[0] // sweep.cells[1])) if coarse else sweep.cells
+    names = (name, "contact force", "max p", "p in L2", "in contact", "converged", "residual")
+    columns: dict[str, list[object]] = {key: [] for key in names}
+    domain = None
+    for value in sweep.values:
+        solution = run(sweep, value, cells, domain)
+        domain, nodes = solution.problem.domain, solution.problem.nodes
+        row = (
+            value,
+            float(-solution.contact_force[1]),
+            nodes.maximum(solution.pressure),
+            nodes.norm(solution.pressure),
+            int(nodes.sum(np.where(solution.status == "open", 0.0, 1.0 / nodes.weight))),
+            solution.converged,
+            solution.outcome.kkt.largest,
+        )
+        for key, entry in zip(names, row, strict=True):
+            columns[key].append(entry)
+    caption = f"Sensitivity: {name}, {cells[0]} x {cells[1]} cells"
+    report.table(f"sensitivity-{name}-table", caption, columns, sweep.note)
+    if MPI.COMM_WORLD.rank > 0:
+        return
+    figure, (above, below) = subplots(2, 1, size=(ONE_COLUMN, 3.6), sharex=True)
+    good = np.array(columns["converged"], dtype=bool)
+    x = np.array(sweep.values)
+    for ax, key, label in (
+        (above, "contact force", "contact force (GPa m)"),
+        (below, "max p", "largest pressure (GPa)"),
+    ):
+        ax.plot(x[good], np.array(columns[key], dtype=float)[good], "o-", ms=3)
+        ax.set_ylabel(label)
+        if sweep.log:
+            ax.set_xscale("log")
+    below.set_xlabel(sweep.words)
+    report.figure(f"sensitivity-{name}", caption, figure, columns)
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Make tables and figures. Collective."""
+    chosen = options(__doc__, "sensitivity", arguments)
+    for name in SWEEPS:
+        study(Report(chosen.out), name, chosen.coarse)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,63 @@
+"""Scripts beside the thesis on coarse meshes: set-ups, stopping by (6.40), refinement, norms."""
+
+import csv
+
+import numpy as np
+import pytest
+
+from contact import build_problem, solve_problem
+from contact.case.file import Friction
+from scripts.cases import bar
+from scripts.reporting import Report
+from scripts.studies import refinement_8, sensitivity
+from scripts.studies.dual_norm import DualNorm
+from scripts.thesis import setups, stopping_8_3
+
+
+def rows(path):
+    with path.open() as stream:
+        return list(csv.DictReader(stream))
+
+
+def test_constants_are_those_of_the_thesis(tmp_path):
+    setups.constants(Report(tmp_path))
+    for row in rows(tmp_path / "table-8-1.csv"):
+        assert float(row["case file by the thesis"]) == pytest.approx(1.0, abs=1e-5)
+
+
+def test_example_8_3_stops_after_two_iterations(tmp_path):
+    stopping_8_3.main(["--coarse", "--out", str(tmp_path)])
+    found = rows(tmp_path / "stopping-8-3.csv")
+    (honest,) = [r for r in found if r["case"] == "as printed" and "solved" in r["inner loop"]]
+    assert [int(honest[key]) for key in list(honest)[2:5]] == [2, 2, 2]
+    (early,) = [r for r in found if r["case"] == "as printed" and "0.25 E" in r["inner loop"]]
+    assert int(early["(6.40), phi scaled"]) > 2
+
+
+def test_pressure_inside():
+    """A pressure 1 + x over [0, 4] without half a unit at either end: 3 + 6."""
+    x = np.array([0.0, 1.0, 2.5, 4.0])
+    assert refinement_8.inside(x, 1 + x, 0.5) == pytest.approx(9.0)
+
+
+def test_the_dual_norm_of_a_pressure_is_the_energy_that_it_makes():
+    """Theorem 4.4 is an equality without friction for a linear body: u - u_eps is made by p."""
+    case = bar(4, -0.005, 1e4, "material={law='linear', young=1.0, poisson=0.3}")
+    case = case.model_copy(update={"friction": Friction()})
+    problem = build_problem(case)
+    exact = solve_problem(problem, case.solver)
+    measure, distances = DualNorm(problem), []
+    for eps in (1e-2, 1e-3):
+        options = bar(4, -0.005, 1e4, "solver.method=penalty", f"solver.eps_contact={eps}").solver
+        penalised = solve_problem(problem, options)
+        distances.append(measure.pressure(exact.pressure - penalised.pressure))
+        moved = measure.displacement(exact.state.x, penalised.state.x)
+        assert distances[-1] == pytest.approx(moved, rel=1e-6)
+    assert distances[0] / distances[1] == pytest.approx(10, rel=0.1)
+
+
+def test_sensitivity(tmp_path):
+    sensitivity.study(Report(tmp_path), "radius", coarse=True)
+    found = rows(tmp_path / "sensitivity-radius-table.csv")
+    assert {row["converged"] for row in found} == {"True"}
+    assert (tmp_path / "sensitivity-radius.pdf").is_file()
