@@ -6,7 +6,7 @@ NAMES := $(notdir $(basename $(SCRIPTS)))
 MPI_TESTS = timeout --foreground 1200 $(FX) mpirun -n $(1) \
 	python3 -m mpi4py -m pytest tests -m parallel -q --color=no -p no:cacheprovider
 
-.PHONY: help demo test test-serial lint format clean $(NAMES)
+.PHONY: help demo test test-serial lint format docs clean $(NAMES)
 .DEFAULT_GOAL := help
 
 help:
@@ -15,6 +15,7 @@ help:
 	@echo "make lint     ruff and mypy"
 	@echo "make format   let ruff format the sources"
 	@echo "make NAME     run a script: $(sort $(NAMES))"
+	@echo "make docs     the documentation, into build/docs (notebooks are executed)"
 	@echo "make clean    remove results and caches in this folder"
 	@echo "FENICSX_SUITE=sid make test   the same on dolfinx 0.11"
 
@@ -43,6 +44,11 @@ lint:
 
 format:
 	scripts/ruff format .
+
+docs:
+	$(FX) python3 docs/render.py
+	$(FX) python3 -m sphinx -q -W --keep-going -b html docs build/docs
+	@echo "build/docs/index.html"
 
 clean:
 	rm -rf results build .pytest_cache .mypy_cache .ruff_cache .hypothesis

@@ -1,0 +1,56 @@
+"""Sphinx: `make docs`, or ``python3 -m sphinx -W docs build/docs``."""
+
+import re
+import sys
+from pathlib import Path
+from typing import Any
+
+sys.path.insert(0, str(Path(__file__).parents[1]))
+
+from pygments.lexers.special import TextLexer
+
+import contact
+
+project = "contact-fenicsx"
+version = release = contact.__version__
+extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.napoleon", "sphinx.ext.mathjax"]
+myst_enable_extensions = ["dollarmath"]
+myst_heading_anchors = 3
+exclude_patterns = ["results/**"]
+html_theme = "alabaster"
+html_theme_options = {
+    "description": "Frictional contact in FEniCSx",
+    "page_width": "1100px",
+    "fixed_sidebar": True,
+}
+html_static_path = []
+autodoc_typehints = "none"
+autodoc_member_order = "bysource"
+napoleon_numpy_docstring = True
+napoleon_use_ivar = True
+# Links to sources lead to files of the repository, and single quotes of docstrings to nothing.
+suppress_warnings = ["myst.xref_missing"]
+default_role = "code"
+
+
+def _bars(_: Any, __: str, ___: str, ____: Any, _____: Any, lines: list[str]) -> None:
+    """Let |x| be what it says in docstrings, and no substitution."""
+    for i, line in enumerate(lines):
+        pieces = re.split(r"(``?[^`]*``?)", line)
+        lines[i] = "".join(p if p.startswith("`") else p.replace("|", r"\|") for p in pieces)
+
+
+def _present(app: Any, name: str, source: list[str]) -> None:
+    """Leave out of the index what is not there: notebooks that have not been run."""
+    if name == "index":
+        lines = source[0].splitlines()
+        pages = re.compile(r"[a-z_/0-9-]+")
+        kept = (x for x in lines if not pages.fullmatch(x) or x in app.env.found_docs)
+        source[0] = "\n".join(kept)
+
+
+def setup(app: Any) -> None:
+    """Connect what docstrings need, before napoleon reads them, and the index."""
+    app.connect("autodoc-process-docstring", _bars, priority=400)
+    app.connect("source-read", _present)
+    app.add_lexer("mermaid", TextLexer)  # the forge draws it

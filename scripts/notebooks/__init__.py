@@ -1,0 +1,1 @@
+"""Notebooks (jupytext): open them in Jupyter, run them as scripts, or read them in the docs."""

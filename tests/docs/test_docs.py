@@ -1,0 +1,49 @@
+"""Every code block of the documentation runs, links lead somewhere, the index has all pages."""
+
+import re
+from pathlib import Path
+
+import pytest
+
+from tests.docs.pages import ROOT, blocks, run
+
+DOCS = ROOT / "docs"
+PAGES = sorted(
+    path for path in DOCS.glob("*.md") if path.name not in ("architecture.md", "results.md")
+)
+#: What makes the problems of a page small.
+SMALL = {'bar.toml")': 'bar.toml", ["mesh.cells=[16, 4]"])'}
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
+def test_code_runs(page: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """In a folder of its own, as a reader would type it."""
+    if not any(block.language in ("python", "sh", "toml") for block in blocks(page)):
+        pytest.skip("it shows no code")
+    for module in ("gmsh", "pyvista", "meshio"):
+        if re.search(rf"^import {module}|^from {module}", page.read_text(), re.M):
+            pytest.importorskip(module)
+    monkeypatch.chdir(tmp_path)
+    if page.stem == "output":  # it opens what a run has left
+        assert run_bar(tmp_path) == 0
+    run(page, SMALL)
+
+
+def run_bar(folder: Path) -> int:
+    from contact.cli.main import main
+
+    case = str(ROOT / "scripts" / "cases" / "bar.toml")
+    coarse = ["--set", "mesh.cells=[16, 4]", "--quiet"]
+    return main(["solve", case, "--out", str(folder / "results"), *coarse])
+
+
+@pytest.mark.parametrize("page", sorted(DOCS.glob("*.md")), ids=lambda page: page.stem)
+def test_links_lead_somewhere(page: Path) -> None:
+    for target in re.findall(r"\]\(([^)#:\s]+)(?:#[^)]*)?\)", page.read_text()):
+        assert (page.parent / target).exists(), target
+
+
+def test_the_index_has_all_pages() -> None:
+    index = (DOCS / "index.md").read_text()
+    listed = set(re.findall(r"^([a-z-]+)$", index, re.M))
+    assert {page.stem for page in DOCS.glob("*.md")} - {"index"} <= listed
