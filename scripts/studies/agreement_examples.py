@@ -58,7 +58,7 @@ COARSE: Mapping[str, tuple[str, ...]] = {
 
 
 def examples() -> list[Example]:
-    """Return all case files, those of tables with the rows of these."""
+    """Return all case files of one static step, those of tables with the rows of these."""
     found = []
     for name, load in (("bar", -0.005), ("bar-large", -0.05)):
         for rho in RHO:
@@ -87,7 +87,14 @@ def examples() -> list[Example]:
         for value in TABLE_8_4:
             changes = (f"friction.mu={value}", f"electric.k_e={value}")
             found.append(Example(f"8.4{words}, mu = k_e = {value:g}", name, changes))
-    return found
+    known = {example.name for example in found}
+    return found + [Example(name, name) for name in static_cases() if name not in known]
+
+
+def static_cases() -> list[str]:
+    """Return the names of the case files that do not go on in time."""
+    files = sorted(CASES.glob("*.toml"))
+    return [file.stem for file in files if load_case(file).evolution is None]
 
 
 def short(number: float) -> str:

@@ -55,7 +55,7 @@ def test_normals_are_the_body_s_own_for_a_given_gap():
             with_plane.domain,
             with_plane.body,
             Contact("bottom", flat()),
-            with_plane.friction,
+            with_plane.contacts[0].friction,
             degree=2,
         )
         assert np.abs(with_plane.nodes.normal - with_gap.nodes.normal).max() < 1e-12
