@@ -205,16 +205,25 @@ class SchurComplement:
         self._part.mult(vector, image)
         return image.array
 
-    def condense(self, rhs: Array) -> Array:
+    def condense(self, rhs: Array, rounding: float = 0.0) -> Array:
         """Return what an owned right-hand side becomes on the kept unknowns, on all ranks.
 
         It is remembered for `expand`. Collective.
+
+        Parameters
+        ----------
+        rhs
+            The right-hand side.
+        rounding
+            What counts as nothing at the eliminated unknowns: no solve is needed to see what is
+            left of it elsewhere.
         """
         self._rhs = rhs
         total = np.zeros(self.dense_size)
         total[self._rows] = rhs[np.concatenate([self._kept, self._shared])]
-        inside = self._solve_inside(rhs[self._inside])
-        total -= self._times(inside, np.zeros(self.dense_size))[self._eliminated :]
+        if np.abs(rhs[self._inside]).max(initial=0.0) > rounding:
+            inside = self._solve_inside(rhs[self._inside])
+            total -= self._times(inside, np.zeros(self.dense_size))[self._eliminated :]
         self.comm.Allreduce(MPI.IN_PLACE, total, op=MPI.SUM)
         if self._between == 0:
             return total
