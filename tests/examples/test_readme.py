@@ -5,31 +5,34 @@ import tomllib
 from pathlib import Path
 
 from scripts.cases import CASES
+from tests.docs.pages import ROOT, blocks, run
 
-README = Path(__file__).parents[2] / "README.md"
+README = ROOT / "README.md"
 
 
-def blocks(language: str) -> list[str]:
-    """Return the README's code in a language."""
-    return re.findall(rf"```{language}\n(.*?)```", README.read_text(), re.DOTALL)
+def test_it_is_short():
+    assert len(README.read_text().splitlines()) < 200
 
 
 def test_the_case_is_that_of_the_file():
-    (shown,) = blocks("toml")
+    (shown,) = (block.text for block in blocks(README) if block.language == "toml")
     assert tomllib.loads(shown) == tomllib.loads((CASES / "bar.toml").read_text())
 
 
 def test_links_lead_somewhere():
-    for target in re.findall(r"\]\(([^)#:]+)\)", README.read_text()):
-        assert (README.parent / target).exists(), target
+    text = README.read_text()
+    targets = re.findall(r"\]\(([^)#:]+)\)", text) + re.findall(r'src="([^"]+)"', text)
+    for target in targets:
+        assert (ROOT / target).exists(), target
 
 
-def test_python_runs(monkeypatch):
-    """On a coarse mesh, and together: the second block says only what it adds."""
-    code = "\n".join(blocks("python"))
-    assert "solve(load_case(" in code
-    coarse = code.replace('bar.toml")', 'bar.toml", ["mesh.cells=[16, 4]"])')
-    monkeypatch.chdir(README.parent)
-    names: dict[str, object] = {}
-    exec(compile(coarse, str(README), "exec"), names)
-    assert names["solution"].converged
+def test_it_runs(tmp_path: Path, monkeypatch):
+    """On coarse meshes, commands and Python."""
+    monkeypatch.chdir(tmp_path)
+    coarse = "cases/bar.toml --set mesh.cells='[16, 4]' --quiet"
+    small = {
+        'bar.toml")': 'bar.toml", ["mesh.cells=[16, 4]"])',
+        "solve scripts/cases/bar.toml": f"solve scripts/{coarse}",
+    }
+    assert run(README, small)["solution"].converged
+    assert (tmp_path / "results" / "bar" / "figure-stress_xy.pdf").exists()
