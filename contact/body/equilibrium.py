@@ -17,14 +17,14 @@ import numpy as np
 import ufl
 from dolfinx import fem
 from dolfinx.fem.petsc import assemble_matrix, create_matrix
-from dolfinx.la import InsertMode
 from mpi4py import MPI
 from numpy.typing import NDArray
 from petsc4py import PETSc
 from ufl.core.expr import Expr
 
 from contact.body.description import Body
-from contact.body.loads import Loads
+from contact.body.known import LastAnswer
+from contact.body.loads import Loads, assembled
 from contact.body.masters import make_masters
 from contact.body.materials import cells_of, pieces
 from contact.body.operators import WholeOperator, make_operator
@@ -88,9 +88,7 @@ class BodyEquilibrium:
         # Where the forms are evaluated; written anew by each query.
         self._at = fem.Function(self.space)
         self._secant_at = fem.Function(self.space)
-        #: Unknowns at which the forces were asked for last, and the answer.
-        self._asked: tuple[Array, Array] = (np.empty(0), np.empty(0))
-        self._answer: Array = np.empty(0)
+        self._last_forces = LastAnswer(domain.comm)
         self._compile()
 
     @property
@@ -175,13 +173,7 @@ class BodyEquilibrium:
         if not self.linear:
             derivative = ufl.derivative(internal(self._at, self._at), self._at, trial)
             self._forms["tangent"] = fem.form(derivative)
-        self._loads = Loads(self.domain, body, v, xi, self._assembled, self.owned)
-
-    def _assembled(self, form: fem.Form) -> Array:
-        """Return the owned part of an assembled vector."""
-        vector = fem.assemble_vector(form)
-        vector.scatter_reverse(InsertMode.add)
-        return np.asarray(vector.array[: self.owned].copy())
+        self._loads = Loads(self.domain, body, v, xi, self.owned)
 
     def rest(self) -> Array:
         """Return the unknowns of the body at rest, without prescribed values."""
@@ -222,16 +214,11 @@ class BodyEquilibrium:
         """
         at = self.nodal(x).ravel()
         about = at if secant_at is None or self.linear else self.nodal(secant_at).ravel()
-        # The end of a step is asked about by several, who do not know of each other.
-        known = all(
-            np.array_equal(old, new) for old, new in zip(self._asked, (at, about), strict=True)
-        )
-        if not self.comm.allreduce(known, op=MPI.LAND):
-            self._at.x.array[:], self._secant_at.x.array[:] = at, about
-            forces = [self._assembled(self._internal), np.zeros(self.masters.size)]
-            self._answer = np.concatenate(forces)
-            self._asked = at.copy(), about.copy()
-        return self._answer.copy()
+        return self._last_forces((at, about), lambda: self._forces(at, about))
+
+    def _forces(self, at: Array, about: Array) -> Array:
+        self._at.x.array[:], self._secant_at.x.array[:] = at, about
+        return np.concatenate([assembled(self._internal, self.owned), np.zeros(self.masters.size)])
 
     def external(self, time: float = 1.0) -> Array:
         """Return the owned nodal loads at a time. Collective."""

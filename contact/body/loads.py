@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 import ufl
 from dolfinx import fem
+from dolfinx.la import InsertMode
 from ufl.core.expr import Expr
 
 from contact.body.amplitude import Amplitude, Moving, at_time
@@ -41,8 +41,6 @@ class Loads:
         Mesh, and what acts on the body.
     v, xi
         Test functions of the displacement and the potential; None for a body without.
-    assemble
-        Returns the owned part of an assembled form. Collective.
     owned
         Number of owned unknowns.
 
@@ -59,10 +57,9 @@ class Loads:
         body: Body,
         v: Expr,
         xi: Expr | None,
-        assemble: Callable[[fem.Form], Array],
         owned: int,
     ) -> None:
-        self._assemble, self._owned = assemble, owned
+        self._owned = owned
         self._time = constant(domain.mesh, 0.0)
         self._shares: list[_Share] = []
         for load in body.loads:
@@ -83,9 +80,16 @@ class Loads:
             if share.form is None or (share.moving and share.time != time):
                 self._time.value = time
                 share.form = share.form or fem.form(share.work)
-                share.vector, share.time = self._assemble(share.form), time
+                share.vector, share.time = assembled(share.form, self._owned), time
             total += share.amplitude(time) * share.vector
         return total
+
+
+def assembled(form: fem.Form, owned: int) -> Array:
+    """Return the owned part of an assembled vector. Collective."""
+    vector = fem.assemble_vector(form)
+    vector.scatter_reverse(InsertMode.add)
+    return np.asarray(vector.array[:owned].copy())
 
 
 def _works(
