@@ -1,6 +1,8 @@
 """Every code block of the documentation runs, links lead somewhere, the index has all pages."""
 
 import re
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -47,3 +49,14 @@ def test_the_index_has_all_pages() -> None:
     index = (DOCS / "index.md").read_text()
     listed = set(re.findall(r"^([a-z-]+)$", index, re.M))
     assert {page.stem for page in DOCS.glob("*.md")} - {"index"} <= listed
+
+
+def test_pages_build_without_warnings(tmp_path: Path) -> None:
+    """All but the notebooks, which `make docs` executes first."""
+    pytest.importorskip("sphinx")
+    pytest.importorskip("myst_parser")
+    command = [sys.executable, "-m", "sphinx", "-q", "-W", "--keep-going", "-D"]
+    command += ["exclude_patterns=results/**,notebooks/**", str(DOCS), str(tmp_path)]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=300)
+    assert done.returncode == 0, done.stderr
+    assert "Domain.from_mesh" in (tmp_path / "api.html").read_text()
