@@ -76,6 +76,7 @@ def contact_table(solution: Solved) -> Table | None:
     columns |= {
         "node": problem.equilibrium.layout.index_map.local_to_global(nodes.nodes),
         "entry": entry,
+        "rigid": np.array([e.coupling is None for e in problem.entries])[entry],
     }
     order = _order(problem)
     gathered = {name: problem.comm.gather(values) for name, values in columns.items()}
@@ -88,8 +89,14 @@ def contact_table(solution: Solved) -> Table | None:
 
 def csv_columns(table: Table) -> Table:
     """Return the columns of ``contact.csv``: all but contact direction and numbers."""
-    inner = ("nu_x", "nu_y", "nu_z", "node", "entry")
+    inner = ("nu_x", "nu_y", "nu_z", "node", "entry", "rigid")
     return {name: values for name, values in table.items() if name not in inner}
+
+
+def by_contact(table: Table) -> list[Table]:
+    """Return the rows of each contact, in their order."""
+    entries = np.unique(table["entry"])
+    return [{name: v[table["entry"] == i] for name, v in table.items()} for i in entries]
 
 
 def held_points(problem: ContactProblem) -> Array:

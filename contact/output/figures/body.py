@@ -17,7 +17,7 @@ from contact.output.field_files import body_share
 from contact.output.figures.contact import BLUE, UNNAMED, ends
 from contact.output.figures.pixels import pixels
 from contact.output.solved import Solved
-from contact.output.table import Table, held_points
+from contact.output.table import Table, by_contact, held_points
 from contact.output.units import Units
 from contact.output.vtu import VTU, Grid, gathered
 from contact.typing import Array
@@ -228,7 +228,9 @@ def draw_plane(
         shown.set_cmap("viridis")
         label = _ranged(shown, picture)
         ax.add_collection(LineCollection(list(picture.outline * [side, 1]), **rest))
-        _foundation(ax, table, picture.scale, ends(table, picture.held), side)
+        for part in by_contact(table):
+            if part["rigid"].all():
+                _foundation(ax, part, picture.scale, ends(part, picture.held), side)
     figure.colorbar(shown, ax=ax, location="bottom", label=label, aspect=40, shrink=0.8)
     ax.set_aspect("equal")
     ax.use_sticky_edges = False

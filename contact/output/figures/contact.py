@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from typing import Any
 
 import matplotlib
@@ -10,10 +10,10 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure
-from matplotlib.patches import Patch
+from matplotlib.lines import Line2D
 
 from contact.output.surface import STATUS
-from contact.output.table import Table
+from contact.output.table import Table, by_contact
 from contact.output.units import Units
 from contact.output.vtu import VTU
 from contact.typing import Array
@@ -98,21 +98,53 @@ def draw_line(
     units
         Names of the units.
     """
-    where, name = position(table, axes)
-    bound, tau = table["bound"], table["tau"]
-    frictional = bool(np.any(bound > 0))
+    parts = by_contact(table)
+    frictional = bool(np.any(table["bound"] > 0))
     width = float(matplotlib.rcParams["figure.figsize"][0])
     tall = 0.8 if frictional else 0.48
     figure = Figure(figsize=(width, (tall if width > NARROW else 1.5 * tall) * width))
-    rows = figure.subplots(2 if frictional else 1, sharex=True, squeeze=False)[:, 0]
+    size = (2 if frictional else 1, len(parts))
+    grid = figure.subplots(*size, sharex="col", sharey="row", squeeze=False)
+    for rows, part in zip(grid.T, parts, strict=True):
+        _draw_rows(rows, part, held, axes, units)
+    for ax in grid[:, 1:].ravel():
+        ax.set_ylabel("")
+    if len(parts) == 1:
+        for ax in grid[:, 0]:
+            handles = _handles([ax])
+            columns = len(handles) if width > NARROW else 2
+            ax.legend(handles=handles, ncols=columns, loc="lower left", bbox_to_anchor=(0, 1))
+    else:
+        for ax, part in zip(grid[0], parts, strict=True):
+            ax.set_title(str(part["on"][0]), fontsize="medium")
+        figure.legend(handles=_handles(grid.ravel()), ncols=3, loc="outside lower center")
+    if title:
+        figure.suptitle(title, fontsize="large")
+    return figure
+
+
+def _handles(axes: Iterable[Axes]) -> list[Any]:
+    """Return what a legend shows: each label once, lines first."""
+    found: dict[str, Any] = {}
+    for ax in axes:
+        handles, labels = ax.get_legend_handles_labels()
+        for label, handle in zip(labels, handles, strict=True):
+            found.setdefault(label, handle)
+    return sorted(found.values(), key=lambda handle: not isinstance(handle, Line2D))
+
+
+def _draw_rows(rows: Any, table: Table, held: Array | None, axes: str, units: Units) -> None:
+    """Draw one contact: pressure, and below it friction, if there is a second row."""
+    where, name = position(table, axes)
+    bound, tau = table["bound"], table["tau"]
+    frictional = len(rows) > 1
     for ax in rows:
         for zone, start, stop in zones(table["status"], where):
             ax.axvspan(start, stop, color=ZONES[zone][0], lw=0, zorder=0)
-    shown = [
-        Patch(color=colour, label=label if frictional or zone == "open" else "in contact")
-        for zone, (colour, label) in ZONES.items()
-        if np.any(table["status"] == zone)
-    ]
+    for zone, (colour, label) in ZONES.items():
+        if np.any(table["status"] == zone):
+            words = label if frictional or zone == "open" else "in contact"
+            rows[0].fill_between([], [], color=colour, lw=0, label=words)
     rows[0].plot(where, table["pressure"], color=BLUE, label=r"pressure $-\sigma_\nu$")
     rows[0].set_ylabel(units.label(r"$-\sigma_\nu$", "stress"))
     if frictional:
@@ -127,13 +159,6 @@ def draw_line(
     _focus(rows[0], table["pressure"], 0.0)
     if frictional:
         _focus(rows[1], bound, -1.0)
-    for k, ax in enumerate(rows):
-        handles = ax.get_legend_handles_labels()[0] + (shown if k == 0 else [])
-        columns = len(handles) if width > NARROW else 2
-        ax.legend(handles=handles, ncols=columns, loc="lower left", bbox_to_anchor=(0, 1))
-    if title:
-        figure.suptitle(title, fontsize="large")
-    return figure
 
 
 def _margins(table: Table, held: Array | None) -> tuple[float, float]:
