@@ -8,7 +8,6 @@ by SIGTERM (what a solve had reached is written).
 from __future__ import annotations
 
 import argparse
-import difflib
 import io
 import logging
 import os
@@ -18,12 +17,12 @@ import tempfile
 from collections.abc import Sequence
 from importlib import import_module
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NoReturn
+from typing import TYPE_CHECKING, NoReturn
 
 from mpi4py import MPI
 
-from contact import __version__
 from contact.cli import materials, new, plot
+from contact.cli.arguments import parse
 from contact.cli.ending import (
     BAD_INPUT,
     CONVERGED,
@@ -37,110 +36,16 @@ from contact.cli.ending import (
 from contact.errors import InputError
 from contact.methods.interrupt import Terminated, ending_on_signal, signals_held
 from contact.output.folder import on_root, refused, result_folder
-from contact.output.reference import summary_help
 from contact.output.rerun import check_rerun
 
 if TYPE_CHECKING:  # it loads dolfinx, which PETSc's options have to precede
     from contact.case.file import Case
 
 #: Commands that read no case.
-POSITIONAL = ("command", "case", "folder", "name", "mesh")
 OTHERS = {"new": new.run, "plot": plot.run, "materials": materials.run}
 
 #: Seconds after a signal from which on a second one ends the writing of results too.
 PATIENCE = 2.0
-
-
-class _Parser(argparse.ArgumentParser):
-    """A parser that raises InputError, and prints its help on one rank alone."""
-
-    def error(self, message: str) -> NoReturn:
-        raise InputError(f"{message}; accepted: {' '.join(self.format_usage().split())}")
-
-    def _print_message(self, message: str, file: Any = None) -> None:
-        if MPI.COMM_WORLD.rank == 0:
-            super()._print_message(message, file)
-
-
-def _parser() -> _Parser:
-    # PETSc's options begin with one dash and any letter, -h among them.
-    common: dict[str, Any] = {"add_help": False, "allow_abbrev": False}
-    parser = _Parser(prog="contact", description=__doc__, **common)
-    parser.add_argument("--help", action="help", help="show this help and leave")
-    parser.add_argument(
-        "--version", action="version", version=f"contact {__version__}", help="show the version"
-    )
-    commands = parser.add_subparsers(
-        dest="command", required=True, metavar="new|check|solve|plot|materials"
-    )
-    setup = "draw the set-up too: CASE-setup.png and .pdf in the present folder"
-    for name, text, drawn in (
-        ("solve", "solve a case and write the results", "draw the figures too"),
-        ("check", "validate a case and print it with its mesh parts and unknowns", setup),
-    ):
-        command = commands.add_parser(name, help=text, description=text, **common)
-        command.usage = f"contact {name} CASE.toml [options] [PETSc options]"
-        optional: dict[str, Any] = {"nargs": "?"} if name == "solve" else {}
-        command.add_argument("case", metavar="CASE.toml", help="case file", **optional)
-        command.add_argument(
-            "--set",
-            action="append",
-            default=[],
-            metavar="KEY=VALUE",
-            help="replace a value of the case file; may be repeated",
-        )
-        command.add_argument("--help", action="help", help="show this help and leave")
-        command.add_argument("--plot", action="store_true", help=drawn)
-        if name == "solve":
-            command.usage = f"contact {name} CASE.toml --out DIR [options] [PETSc options]"
-            command.epilog = summary_help()
-            command.formatter_class = argparse.RawDescriptionHelpFormatter
-            command.add_argument("--out", metavar="DIR", help="folder for results")
-            command.add_argument(
-                "--restart",
-                metavar="DIR",
-                help="go on with an evolution that was ended, from the checkpoints in DIR: the "
-                "case is known, and the results go there too unless told otherwise",
-            )
-            command.add_argument("--quiet", action="store_true", help="show no progress")
-            command.add_argument("--log", metavar="FILE", help="write a log to the end of a file")
-            command.add_argument(
-                "--overwrite",
-                action="store_true",
-                help="replace results of another case, if DIR has any",
-            )
-    new.add_parser(commands, common)
-    plot.add_parser(commands, common)
-    materials.add_parser(commands, common)
-    return parser
-
-
-def parse(arguments: Sequence[str]) -> tuple[argparse.Namespace, list[str]]:
-    """Split a command line into ours and PETSc's.
-
-    Raises
-    ------
-    InputError
-        If it is not understood.
-    """
-    if "-h" in arguments:
-        arguments = ["--help" if argument == "-h" else argument for argument in arguments]
-    options, rest = _parser().parse_known_args(arguments)
-    known = [
-        f"--{name}"
-        for name in vars(options)
-        if name not in ("command", "case", "folder", "name", "mesh")
-    ]
-    known.append("--help")
-    for i, argument in enumerate(rest):
-        follows = i > 0 and rest[i - 1].startswith("-")
-        if argument.startswith("--"):
-            near = difflib.get_close_matches(argument.partition("=")[0], known, n=1)
-            hint = f", did you mean {near[0]}?" if near else ""
-            raise InputError(f"{argument}: unknown option{hint}; accepted: {', '.join(known)}")
-        if not argument.startswith("-") and not follows:
-            raise InputError(f"{argument}: one argument too many; accepted: one case file")
-    return options, rest
 
 
 def _check_cache() -> None:
@@ -266,12 +171,17 @@ def main(arguments: Sequence[str] | None = None) -> int:
                 import petsc4py
 
                 petsc4py.init([sys.argv[0], *_own_options(), *petsc])
+                # PETSc would call it a crash that a reader, such as head, has seen enough.
+                signal.signal(signal.SIGPIPE, signal.SIG_IGN)
                 if options.command in OTHERS:
-                    return OTHERS[options.command](options, comm)
+                    return _told(OTHERS[options.command](options, comm))
                 case = on_root(comm, lambda: _load(options))
                 import_module("contact.solving")
                 on_root(comm, _check_cache)
-            return {"solve": _solve, "check": _check}[options.command](case, options, comm)
+            return _told({"solve": _solve, "check": _check}[options.command](case, options, comm))
+    except BrokenPipeError:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return SIGNALLED + signal.SIGPIPE
     except InputError as error:
         if comm.rank == 0:
             print(f"contact: {error}", file=sys.stderr)
@@ -286,6 +196,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return end(comm, f"interrupted ({number.name})", SIGNALLED + number)
     except Exception:
         return end_by_crash(comm)
+
+
+def _told(status: int) -> int:
+    """Return a status once all that was printed has been read."""
+    sys.stdout.flush()
+    return status
 
 
 def run() -> NoReturn:

@@ -198,3 +198,12 @@ def test_files_that_hide_our_packages(name: str, tmp_path: Path) -> None:
         assert done.returncode == 2
         assert done.stderr.count("\n") == 1
         assert f"{path} hides the package" in done.stderr
+
+
+def test_a_reader_that_has_seen_enough() -> None:
+    """`contact materials | head -1` ends in silence."""
+    line = f"set -o pipefail; {sys.executable} -m contact materials | head -1"
+    done = subprocess.run(["bash", "-c", line], capture_output=True, text=True, timeout=60)
+    assert done.returncode in (0, 141)
+    assert done.stdout.count("\n") == 1
+    assert done.stderr == ""
