@@ -527,3 +527,26 @@ def test_a_block_that_tips_over_its_edge_runs_away_however_far_the_foundation_is
         # a couple that lifts one node by more than the other presses down
         setting.load[d + d - 1] = 1.5
         assert setting.solve().status == "unbounded"
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_all_nodes_pressed_onto_no_gap_take_no_more_steps(seed):
+    """Their displacements are rounding: a penetration relative to these alone never vanished."""
+    setting = random_setting(20, 2, 1e3, 0.0, seed, flat=True)
+    load = np.zeros((20, 2))
+    load[:, 1] = -1.1
+    pressed = replace(setting, gap=np.zeros(20), load=load.ravel())
+    result = pressed.solve()
+    assert result.certified and np.all(result.pressure > 0)
+    assert result.iterations <= 12
+
+
+@pytest.mark.parametrize("gap", [0.6, 1e6])
+def test_little_friction_on_what_bends_away_takes_no_more_steps(gap):
+    """The slips of a body that touches nothing were reached in steps cut to nothing."""
+    setting = beam(50, 10.0, bound=1e-4, gap=gap)
+    bent = replace(setting, load=0.8 / 50 * setting.load)
+    result = bent.solve()
+    check(bent, result)
+    assert not np.any(result.pressure > 0)
+    assert result.iterations <= 8

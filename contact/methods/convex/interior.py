@@ -32,7 +32,8 @@ class Certificate:
     gap
         Duality gap, that of the forces out of balance included, over the energy.
     penetration
-        Largest penetration, over the largest displacement or gap of a node that touches.
+        Largest penetration, over the largest displacement or gap of a node that touches, or how
+        far its contact force alone moves a node between others that are held.
     balance
         Largest force out of balance, beyond rounding, over the largest force.
     """
@@ -103,7 +104,8 @@ class Program:
         energy = 0.5 * abs(x @ internal) + abs(self.load @ x) + float(np.sum(slipping))
         energy += float(np.abs(point.force @ self.gap))
         touching = point.force > 0
-        lengths = np.abs(np.append(x, self.gap[touching]))
+        pressed = point.force / np.diag(self.body.matrix)[self.body.normals]
+        lengths = np.abs(np.concatenate([x, self.gap[touching], pressed]))
         closed = float(lengths.max(initial=0.0))
         noise = 4 * EPS * self.stiffest * float(np.abs(x).max(initial=0.0))
         unbalanced = float(np.abs(self.residual(point, internal)).max(initial=0.0))
@@ -164,9 +166,12 @@ class Interior:
         # Where the body would lift off, the slack is that from the beginning: grown from a small
         # one it would take the force beyond zero at once, and the step would be cut to nothing.
         slack = np.maximum(np.maximum(gap, gap - free[body.normals]), np.sqrt(work * give))
+        # Likewise where friction hardly holds what slips.
+        slips = np.linalg.norm(np.append(free, 0.0)[self.tangents], axis=1)
+        length = np.maximum(work / bound, slips)
         zeros = np.zeros(self.tangents.shape)
         self.x = np.zeros_like(program.load)
-        self.cones = Cones(slack, work / slack, work / bound, zeros, bound, zeros)
+        self.cones = Cones(slack, work / slack, length, zeros, bound, zeros)
 
     @property
     def point(self) -> Point:
