@@ -53,7 +53,7 @@ def softer_r(problem: Problem, operator: Operator) -> float | None:
     blocks = interface.weighted(current + augmentation(jump, shift, False), state.x)
 
     def solve(traction: Array) -> Array:
-        rhs = np.zeros(body.owned)
+        rhs = np.zeros_like(body.owned_part(state.x))
         jump.transpose((jump.weight * traction)[:, None] * jump.normal, rhs)
         return jump.normal_component(jump.apply(operator.solve(rhs)))
 
