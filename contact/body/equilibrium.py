@@ -141,12 +141,15 @@ class BodyEquilibrium:
     @property
     def mechanical(self) -> NDArray[np.bool_]:
         """Which of owned values, global ones behind them, are displacements or forces."""
-        nodal = np.broadcast_to(np.arange(self.block_size) < self.dim, self.free.shape)
-        return np.concatenate([nodal.ravel(), self.masters.mechanical])
+        nodal = np.tile(np.arange(self.block_size) < self.dim, self.free.shape[0])
+        return np.concatenate([nodal, self.masters.mechanical])
 
     def owned_part(self, x: Array) -> Array:
         """Return the owned ones of local unknowns, and the global ones behind them."""
         return np.concatenate([x[: self.owned], self.motion(x)])
+
+    def take_apart(self, matrix: PETSc.Mat) -> None:
+        """Do nothing: what touches each other is no matter of the bodies."""
 
     def _compile(self) -> None:
         body = self.body
@@ -275,13 +278,9 @@ class BodyEquilibrium:
         symmetric, counters, kind
             As of `SparseOperator`.
         """
-        return make_operator(
-            self,
-            self.rest(),
-            self.masters,
-            (nodes, motion, change),
-            {"symmetric": symmetric, "counters": counters, "kind": kind},
-        )
+        options = {"symmetric": symmetric, "counters": counters, "kind": kind}
+        blocks = nodes, motion, change
+        return make_operator(self, self.rest(), self.masters, blocks, options)
 
     def norm(self, values: Array) -> float:
         """Return the Euclidean norm of owned values. Collective."""

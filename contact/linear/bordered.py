@@ -77,6 +77,16 @@ class BorderedBulk:
         vector.array[:] = own
         matrix.diagonalScale(vector, vector)
 
+    def take_apart(self, matrix: PETSc.Mat) -> PETSc.Mat | None:
+        """Fill a matrix with bodies that do not touch; see `operator.Bulk`. Collective."""
+        change = self._bulk.take_apart(matrix)
+        if change is None:
+            return None
+        own = matrix.createVecLeft()
+        own.array[:] = self.layout.free.ravel()
+        matrix.diagonalScale(own, own)
+        return change
+
     def gathered(self, forces: Array) -> Array:
         """Return R^T f of owned forces, shape (owned,) or (owned, k). Collective."""
         return np.asarray(self.layout.comm.allreduce(self.motions.T @ forces, op=MPI.SUM))

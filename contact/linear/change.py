@@ -32,11 +32,15 @@ class Change:
         the identity.
     inverse
         Its inverse.
+    unrestrained
+        The inverse if nothing were fixed: what it is made of is the same for all unknowns of a
+        node.
     """
 
     nodes: NDArray[np.int64]
     matrix: sparse.csr_array
     inverse: sparse.csr_array
+    unrestrained: sparse.csr_array
 
     @staticmethod
     def of(
@@ -62,25 +66,14 @@ class Change:
         free
             Which unknowns are not fixed, shape (c, block size).
         """
-        count = free.shape[0]
-        own = np.asarray(jumps[np.arange(rows.size), rows]).ravel()
-        changes, inverses = [], []
-        for component in free.T:
-            replaced = np.flatnonzero(component[rows])
-            scale = np.ones(count)
-            scale[rows[replaced]] = own[replaced]
-            place = sparse.csr_array(
-                (np.ones(replaced.size), (rows[replaced], replaced)), shape=(count, rows.size)
-            )
-            others = place @ jumps @ sparse.diags_array(component.astype(float))
-            others = others - sparse.diags_array(others.diagonal())
-            identity = sparse.eye_array(count)
-            follows = -(sparse.diags_array(1 / scale) @ others)
-            # What follows replaced nodes follows them no further.
-            whole = (identity + follows + follows @ follows) @ sparse.diags_array(1 / scale)
-            changes.append(sparse.csr_array(whole))
-            inverses.append(sparse.csr_array(sparse.diags_array(scale) @ (identity - follows)))
-        return Change(nodes, _interleaved(changes), _interleaved(inverses))
+        made = [_of_component(rows, jumps, component) for component in free.T]
+        _, unrestrained = _of_component(rows, jumps, np.ones(free.shape[0], dtype=bool))
+        return Change(
+            nodes,
+            _interleaved([matrix for matrix, _ in made]),
+            _interleaved([inverse for _, inverse in made]),
+            _interleaved([unrestrained] * free.shape[1]),
+        )
 
     def petsc(self, matrix: sparse.csr_array, layout: Layout) -> PETSc.Mat:
         """Return Q, or its inverse, as a parallel matrix. Collective."""
@@ -103,6 +96,28 @@ class Change:
         made = PETSc.Mat().createAIJ(sizes, bsize=size, csr=parts, comm=layout.comm)
         made.assemble()
         return made
+
+
+def _of_component(
+    rows: NDArray[np.intp], jumps: sparse.csr_array, free: NDArray[np.bool_]
+) -> tuple[sparse.csr_array, sparse.csr_array]:
+    """Return the change and its inverse for one unknown of each node, given which are free."""
+    count = free.size
+    own = np.asarray(jumps[np.arange(rows.size), rows]).ravel()
+    replaced = np.flatnonzero(free[rows])
+    scale = np.ones(count)
+    scale[rows[replaced]] = own[replaced]
+    place = sparse.csr_array(
+        (np.ones(replaced.size), (rows[replaced], replaced)), shape=(count, rows.size)
+    )
+    others = place @ jumps @ sparse.diags_array(free.astype(float))
+    others = others - sparse.diags_array(others.diagonal())
+    identity = sparse.eye_array(count)
+    follows = -(sparse.diags_array(1 / scale) @ others)
+    # What follows replaced nodes follows them no further.
+    whole = (identity + follows + follows @ follows) @ sparse.diags_array(1 / scale)
+    inverse = sparse.diags_array(scale) @ (identity - follows)
+    return sparse.csr_array(whole), sparse.csr_array(inverse)
 
 
 def _interleaved(components: list[sparse.csr_array]) -> sparse.csr_array:
@@ -129,7 +144,7 @@ class ChangedBulk:
     """
 
     def __init__(self, bulk: Bulk, change: Change, rest: Array) -> None:
-        self._bulk, self._rest = bulk, rest
+        self._bulk, self._change, self._rest = bulk, change, rest
         self.matrix = change.petsc(change.matrix, bulk.layout)
         self.inverse = change.petsc(change.inverse, bulk.layout)
         self._plain = bulk.create_matrix()
@@ -158,6 +173,12 @@ class ChangedBulk:
         """Return columns of owned values in these unknowns, shape (owned, m). Collective."""
         columns = [self.times(self.inverse, column) for column in motions.T.toarray()]
         return sparse.csr_array(np.reshape(columns, (motions.shape[1], -1)).T)
+
+    def take_apart(self, matrix: PETSc.Mat) -> PETSc.Mat:
+        """Fill a matrix with K as it was assembled last; see `operator.Bulk`. Collective."""
+        matrix.zeroEntries()
+        matrix.axpy(1.0, self._plain, PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN)
+        return self._change.petsc(self._change.unrestrained, self.layout)
 
     def assemble(self, matrix: PETSc.Mat, kind: str, x: Array) -> None:
         """Assemble Q^T K Q at local unknowns x. Collective."""

@@ -12,12 +12,13 @@ from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
-from mpi4py import MPI
 from numpy.typing import NDArray
 from petsc4py import PETSc
 
 from contact.errors import InputError
 from contact.linear import multigrid
+from contact.linear.apart import set_up_apart
+from contact.linear.balance import balance
 from contact.linear.block import BlockPreconditioner
 from contact.linear.faults import no_solution
 from contact.linear.layout import Layout
@@ -69,6 +70,15 @@ class Bulk(Protocol):
 
     def assemble(self, matrix: PETSc.Mat, kind: str, x: Array) -> None:
         """Assemble the body's "secant" or "tangent" at local unknowns. Collective."""
+
+    def take_apart(self, matrix: PETSc.Mat) -> PETSc.Mat | None:
+        """Fill a matrix with bodies that do not touch each other. Collective.
+
+        Returns
+        -------
+        The unknowns by those of the bodies apart; None, and nothing is done, where these are the
+        same.
+        """
 
 
 @dataclass
@@ -199,15 +209,16 @@ class SparseOperator:
                 self._bulk = self.matrix.copy()
         rest = self._masked(nodes, blocks)
         if self._multigrid and self._stiff is None:
-            touch = TOUCH * rest
-            self._add(nodes, touch)
-            self._set_up(symmetric=True)
+            if not set_up_apart(self, self._bulk):
+                touch = TOUCH * rest
+                self._add(nodes, touch)
+                self.set_up(symmetric=True)
+                rest = rest - touch
             self._stiff = StiffNodes(self.ksp.getPC(), nodes)
-            rest = rest - touch
         self._add(nodes, rest)
         if self._stiff is not None:
             self._stiff.follow(self.matrix, self._masked(nodes, blocks))
-        self._set_up(self.symmetric)
+        self.set_up(self.symmetric)
         self._kind, self._blocks = kind, blocks.copy()
         self.counters.factorizations += 1
         return True
@@ -220,7 +231,7 @@ class SparseOperator:
     def _all(self, flag: bool) -> bool:
         return bool(self.layout.comm.allreduce(int(flag)) == self.layout.comm.size)
 
-    def _set_up(self, symmetric: bool) -> None:
+    def set_up(self, symmetric: bool) -> None:
         """Set up the solver for the matrix as it is."""
         self.matrix.setOption(PETSc.Mat.Option.SYMMETRIC, symmetric)
         split = self._split
@@ -284,17 +295,3 @@ class SparseOperator:
             raise no_solution(self.ksp.getPC(), self._prefix)
         # An iterative solver leaves fixed unknowns to its tolerance.
         return self.layout.mask(self._solution.array)
-
-
-def balance(matrix: PETSc.Mat, layout: Layout) -> None:
-    """Put the size of the matrix's own diagonal at fixed unknowns, in place of ones. Collective.
-
-    Against a modulus of 1e12 ones are nothing, and multigrid takes them for a body that is not
-    held; against 1e-12 they are all that it sees.
-    """
-    diagonal, free = matrix.getDiagonal(), layout.free.ravel()
-    sizes = np.array([np.abs(diagonal.array[free]).sum(), np.count_nonzero(free)])
-    layout.comm.Allreduce(MPI.IN_PLACE, sizes, op=MPI.SUM)
-    if sizes[0] > 0 and np.isfinite(sizes[0]):
-        diagonal.array[~free] = sizes[0] / sizes[1]
-        matrix.setDiagonal(diagonal)

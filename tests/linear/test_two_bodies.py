@@ -1,0 +1,59 @@
+"""Multigrid for two bodies that touch each other."""
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+
+from contact.body.description import Body, Fixed, Load
+from contact.interface.friction import Friction
+from contact.linear import multigrid
+from contact.linear.operator import Counters
+from contact.methods.newton import Newton
+from contact.methods.options import NewtonOptions
+from contact.problem.problem import Contact, ContactProblem
+from forms.hencky import Linear
+from forms.laws import ConstantCoefficient
+from tests.problems.blocks import Blocks
+from tests.problems.mechanics import constant, flat
+
+SELF = MPI.COMM_SELF
+
+
+def blocks(held: bool, n: int = 6) -> ContactProblem:
+    """Return two blocks in space; a side of both is a plane of symmetry.
+
+    The upper one is moved at its top, or loaded there and held by friction alone.
+    """
+    bottom = Fixed("bottom", [constant(0.0, 3)] * 3)
+    sides = Fixed("left", [constant(0.0, 3), None, None])
+    top = [constant(value, 3) for value in (0.0, 0.01, -0.01)]
+    fixed, loads = [bottom, sides], []
+    if held:
+        fixed.append(Fixed("top", top))
+    else:
+        loads.append(Load("top", [constant(value, 3) for value in (0.0, 0.001, -0.01)]))
+    friction = Friction(ConstantCoefficient(0.2))
+    contact = Contact("under", flat(), friction=friction, against="over")
+    domain = Blocks(3, n, n + 1, jitter=0.1).domain(SELF)
+    return ContactProblem(domain, Body(Linear(1.0, 0.3), fixed, tuple(loads)), contact)
+
+
+@pytest.mark.parametrize("held", [True, False])
+def test_it_converges_as_fast_as_for_one_body(held, monkeypatch):
+    # Small systems have no coarse levels otherwise.
+    options = {**multigrid.DEFAULTS, "pc_gamg_coarse_eq_limit": "200"}
+    monkeypatch.setattr(multigrid, "DEFAULTS", options)
+    problem, counters = blocks(held), Counters()
+    method = Newton(
+        problem,
+        NewtonOptions(tolerance=1e-8, condense=False, linear="iterative"),
+        counters=counters,
+    )
+    state, outcome = method.solve()
+    assert outcome.converged
+    assert method.whole.operator._inner.ksp.getPC().getMGLevels() > 1
+    assert counters.linear_iterations <= 6.5 * counters.linear_solves
+    direct, exact = Newton(problem, NewtonOptions(tolerance=1e-8)).solve()
+    assert exact.converged
+    scale = np.abs(direct.x).max()
+    assert np.allclose(state.x, direct.x, rtol=0, atol=1e-6 * scale)
