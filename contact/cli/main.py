@@ -71,6 +71,8 @@ def _load(options: argparse.Namespace) -> Case:
     if options.command != "solve" or options.restart is None:
         if options.case is None:
             raise InputError("CASE.toml: missing; accepted: a case file, or --restart DIR")
+        if options.command == "solve" and options.out is None:
+            raise InputError("--out: missing; accepted: a folder to write to")
         return load_case(options.case, options.set)
     from contact.case.text import anchored, to_toml
     from contact.output.rerun import check_restart
@@ -85,8 +87,7 @@ def _load(options: argparse.Namespace) -> Case:
 
 def _solve(case: Case, options: argparse.Namespace, comm: MPI.Intracomm) -> int:
     out = options.restart if options.out is None else options.out
-    if out is None:
-        raise InputError("--out: missing; accepted: a folder to write to")
+    assert out is not None  # asked for as the case was read
     if not out:  # the present folder is "."; this is rather a variable that is not set
         raise InputError('--out "": no folder; accepted: a folder to write to')
     restart = None if options.restart is None else Path(options.restart)
@@ -104,7 +105,8 @@ def _solve(case: Case, options: argparse.Namespace, comm: MPI.Intracomm) -> int:
             solution = solve(case, monitor=monitor, comm=comm, folder=folder.path, restart=restart)
             logging.getLogger("contact").debug(solution.outcome.reason)
         outcome = solution.outcome
-        if outcome.signal and not solution.begun:
+        earlier = on_root(comm, (folder.path / "summary.json").exists)
+        if outcome.signal and not solution.begun and earlier:  # which are worth more
             raise Terminated if outcome.signal == signal.SIGTERM else KeyboardInterrupt
         # What has taken long to compute is written, signal or not.
         with signals_held(PATIENCE) as caught:
