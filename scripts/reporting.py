@@ -95,7 +95,9 @@ class Report:
             return
         self.out.mkdir(parents=True, exist_ok=True)
         for ending in ("png", "pdf"):
-            figure.savefig(self.out / f"{name}.{ending}", dpi=DPI)
+            figure.savefig(
+                self.out / f"{name}.{ending}", dpi=DPI, bbox_inches="tight", pad_inches=0.02
+            )
         length = max(len(column) for column in data.values())
         padded = {key: [*column, *[""] * (length - len(column))] for key, column in data.items()}
         self._csv(name, padded)

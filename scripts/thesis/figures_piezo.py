@@ -172,9 +172,10 @@ def error_figure(h: Array, found: Mapping[str, Array]) -> Figure:
         Problem -> its errors in `NORMS`, shape (n, 4).
     """
     figure, axes = subplots(1, 2, size=(TWO_COLUMNS, 3.4))
-    for line, (label, errors) in zip(("o-", "x--"), found.items(), strict=True):
+    for line, (label, errors) in zip(("o-", "x-"), found.items(), strict=True):
         for k, symbol in enumerate(("$u$", r"$\varphi$") * 2):
-            axes[k // 2].loglog(h, errors[:, k], line, ms=4, label=f"{symbol}, {label}")
+            colour, name = f"C{k % 2}", f"{symbol}, {label}"
+            axes[k // 2].loglog(h, errors[:, k], line, ms=4, lw=0.8, color=colour, label=name)
     for ax, power, title in zip(axes, (1, 2), ("$H^1$", "$L^2$"), strict=True):
         low = 0.7 * ax.dataLim.y0
         ends = np.array([h.min(), h.max()])

@@ -31,7 +31,7 @@ reports its residuals, computed from scratch after the solve: *residual* is the 
 equilibrium, contact and friction. A penalty solution is judged by the residual of the penalised
 problem (PV_eps) instead. A script stops if a run does not converge, so that no table holds
 numbers of one that has not, unless it says so. A dash, —, stands for what is not defined or was
-not reached; dashed lines are bounds, limits and references, and outlines at rest.
+not reached; dashed and dotted lines are bounds, limits and references.
 
 **What was re-read.** The printed numbers of chapter 8 in SI units (E = 58.7 GPa, loads of 10 to
 120 N/m^2, a gap of 0.5 m, phi_F = 32 V) cannot touch the foundation, nor yield. They are consistent

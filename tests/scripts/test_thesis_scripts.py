@@ -9,7 +9,7 @@ from contact import build_problem, solve_problem
 from contact.case.file import Friction
 from scripts.cases import bar
 from scripts.reporting import Report
-from scripts.studies import refinement_8, sensitivity
+from scripts.studies import pressure_convergence, refinement_8, sensitivity
 from scripts.studies.dual_norm import DualNorm
 from scripts.thesis import setups, stopping_8_3
 
@@ -61,3 +61,10 @@ def test_sensitivity(tmp_path):
     found = rows(tmp_path / "sensitivity-radius-table.csv")
     assert {row["converged"] for row in found} == {"True"}
     assert (tmp_path / "sensitivity-radius.pdf").is_file()
+
+
+def test_the_pressure_converges_in_the_dual_norm(tmp_path):
+    found = pressure_convergence.main(["--coarse", "--out", str(tmp_path)])
+    assert found[1][-1] < 0.5 * found[1][0]
+    assert found[2][-1] < 0.2 * found[2][0]
+    assert found[2][-1] < found[1][-1]
