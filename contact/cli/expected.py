@@ -6,6 +6,7 @@ import numpy as np
 from mpi4py import MPI
 
 from contact import _compat
+from contact.output.assumptions import fitting
 from contact.problem.problem import ContactProblem
 from contact.typing import Array
 
@@ -17,7 +18,8 @@ LARGE = 0.05
 
 def expectations(problem: ContactProblem) -> list[str]:
     """Return lines on the mesh and on what the loads will do. Collective."""
-    return [*_quality(problem), *_sizes(problem)]
+    text, _ = fitting(problem)
+    return [*_quality(problem), *_sizes(problem), *([f"# warning: {text}"] if text else [])]
 
 
 def mean_ratio(corners: Array) -> Array:

@@ -6,8 +6,10 @@ from collections.abc import Iterator, Sequence
 from typing import TypeAlias
 
 import numpy as np
+from mpi4py import MPI
 
 from contact.output.solution import Solution
+from contact.problem.problem import ContactProblem
 from forms.elasticity import Anisotropic
 from forms.hencky import Hencky, check_monotonicity
 
@@ -82,6 +84,28 @@ def chords(solution: Solution) -> Remark:
     return (
         f"straight facets of the curved contact part reach {cut:.3g} into the foundation at rest: "
         "the gap there is taken as 0; a mesh that is finer from the beginning has less of it",
+        False,
+    )
+
+
+def fitting(problem: ContactProblem) -> Remark:
+    """Say where a curved part has no gap anywhere: its foundation has then its very shape."""
+    comm, size = problem.comm, problem.domain.size
+    found = []
+    for contact, entry in zip(problem.contacts, problem.entries, strict=True):
+        nodes = entry.nodes
+        sums = np.append(nodes.weight @ nodes.normal, nodes.weight.sum())
+        total = comm.allreduce(sums, op=MPI.SUM)
+        flat = np.linalg.norm(total[:-1]) > 0.995 * total[-1]
+        gap = comm.allreduce(float(np.abs(nodes.gap).max(initial=0.0)), op=MPI.MAX)
+        if contact.against is None and not contact.foundation.is_shape:
+            found += [contact.on] * (not flat and gap <= 1e-9 * size)
+    if not found:
+        return "", True
+    return (
+        f"the part {', '.join(found)} is curved and its gap is 0 everywhere: the foundation has "
+        "the body's own shape; for a plane, sphere... in front of it give contact.foundation, and "
+        "a gap otherwise",
         False,
     )
 

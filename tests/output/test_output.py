@@ -440,3 +440,20 @@ def test_ranks_without_cells_write_and_draw_too(method: str, shared_tmp_path: Pa
     write_figures(solution, shared_tmp_path)
     if MPI.COMM_WORLD.rank == 0:
         assert len(list(shared_tmp_path.glob("figure-*.png"))) == 2
+
+
+@pytest.mark.parallel
+def test_a_gap_that_was_forgotten() -> None:
+    """A curved part without a gap fits its foundation; a plane one lies on it."""
+    disc = {
+        "mesh": {"generator": "half_disc", "size": 2.0, "contact_size": 0.5},
+        "fixed": [{"on": "top", "displacement": [0.0, -0.01]}],
+        "friction": {},
+    }
+    (warning,) = (
+        w for w in solve(block(2, contact={"on": "contact"}, **disc)).warnings if "curved" in w
+    )
+    assert warning.startswith("the part contact is curved and its gap is 0 everywhere")
+    plane = {"shape": "plane", "point": [0.0, 0.0], "normal": [0.0, 1.0]}
+    for other in (block(2), block(2, contact={"on": "contact", "foundation": plane}, **disc)):
+        assert not any("curved and its gap" in text for text in solve(other).warnings)

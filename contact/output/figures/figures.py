@@ -28,6 +28,9 @@ DEFORMED: tuple[tuple[str, str, str, Quantity], ...] = (
     ("potential", "potential", r"potential $\varphi$", "potential"),
 )
 
+#: Fields, with their components, whose unit has a name.
+KINDS: dict[str, Quantity] = {"displacement": "length", "stress": "stress"}
+
 #: Characters of a title that fit on a figure.
 WIDTH = 70
 
@@ -197,7 +200,10 @@ def named(field: str, units: Units) -> tuple[str, str]:
     for name, known, words, quantity in DEFORMED:
         if known == field:
             return name, units.label(words, quantity)
-    return field, field.replace("_", " ") + " (units of the case)"
+    words, base = field.replace("_", " "), field.partition("_")[0]
+    if base in KINDS:
+        return field, units.label(words, KINDS[base])
+    return field, words if field == "dev_strain" else f"{words} (units of the case)"
 
 
 def axes_of(revolved: bool) -> str:
