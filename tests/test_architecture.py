@@ -30,6 +30,7 @@ LAYERS = (
         "moving",
         "nesting",
         "solving",
+        "sweeping",
     },
     {"cli"},
 )

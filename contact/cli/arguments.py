@@ -10,7 +10,7 @@ from typing import Any, NoReturn
 from mpi4py import MPI
 
 from contact import __version__
-from contact.cli import materials, new, plot
+from contact.cli import materials, new, plot, sweep
 from contact.errors import InputError
 from contact.output.reference import summary_help
 
@@ -55,7 +55,7 @@ def _parser() -> _Parser:
         "--version", action="version", version=f"contact {__version__}", help="show the version"
     )
     commands = parser.add_subparsers(
-        dest="command", required=True, metavar="new|check|solve|plot|materials"
+        dest="command", required=True, metavar="new|check|solve|sweep|plot|materials"
     )
     setup = "draw the set-up too: CASE-setup.png and .pdf in the present folder"
     for name, text, drawn in (
@@ -94,6 +94,7 @@ def _parser() -> _Parser:
                 help="replace results of another case, if DIR has any",
             )
     new.add_parser(commands, common)
+    sweep.add_parser(commands, common)
     plot.add_parser(commands, common)
     materials.add_parser(commands, common)
     return parser

@@ -1,4 +1,4 @@
-"""The command line: ``contact solve CASE.toml --out DIR``, ``check``, ``plot``, ``materials``.
+"""The command line: ``contact solve CASE.toml --out DIR``, ``check``, ``sweep``, ``plot``, ...
 
 Exit status: 0 converged, 1 not converged (outputs are written), 2 bad input, or no place for the
 results (one message, nothing is written), 70 a fault of the program, 130 stopped by Ctrl-C, 143
@@ -21,7 +21,7 @@ from typing import TYPE_CHECKING, NoReturn
 
 from mpi4py import MPI
 
-from contact.cli import materials, new, plot
+from contact.cli import materials, new, plot, sweep
 from contact.cli.arguments import parse
 from contact.cli.ending import (
     BAD_INPUT,
@@ -33,8 +33,9 @@ from contact.cli.ending import (
     end_in_words,
     end_with_launcher,
 )
+from contact.cli.loading import load
 from contact.errors import InputError
-from contact.methods.interrupt import Terminated, ending_on_signal, signals_held
+from contact.methods.interrupt import Interrupted, Terminated, ending_on_signal, signals_held
 from contact.output.folder import on_root, refused, result_folder
 from contact.output.rerun import check_rerun
 
@@ -42,7 +43,7 @@ if TYPE_CHECKING:  # it loads dolfinx, which PETSc's options have to precede
     from contact.case.file import Case
 
 #: Commands that read no case.
-OTHERS = {"new": new.run, "plot": plot.run, "materials": materials.run}
+OTHERS = {"new": new.run, "plot": plot.run, "materials": materials.run, "sweep": sweep.run}
 
 #: Seconds after a signal from which on a second one ends the writing of results too.
 PATIENCE = 2.0
@@ -62,27 +63,6 @@ def _check_cache() -> None:
             f"{cache}: {error.strerror or error}; accepted: a folder to keep compiled forms in, "
             "by HOME or XDG_CACHE_HOME"
         ) from None
-
-
-def _load(options: argparse.Namespace) -> Case:
-    """Read the case, of an interrupted run too. On one rank."""
-    from contact.case.file import load_case  # after PETSc's options
-
-    if options.command != "solve" or options.restart is None:
-        if options.case is None:
-            raise InputError("CASE.toml: missing; accepted: a case file, or --restart DIR")
-        if options.command == "solve" and options.out is None:
-            raise InputError("--out: missing; accepted: a folder to write to")
-        return load_case(options.case, options.set)
-    from contact.case.text import anchored, to_toml
-    from contact.output.rerun import check_restart
-    from contact.output.resume import case_of
-
-    folder = Path(options.restart)
-    stored = case_of(folder)
-    case = load_case(options.case or stored, options.set)
-    check_restart(folder, to_toml(load_case(stored)), to_toml(anchored(case)))
-    return case
 
 
 def _solve(case: Case, options: argparse.Namespace, comm: MPI.Intracomm) -> int:
@@ -177,7 +157,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
                 signal.signal(signal.SIGPIPE, signal.SIG_IGN)
                 if options.command in OTHERS:
                     return _told(OTHERS[options.command](options, comm))
-                case = on_root(comm, lambda: _load(options))
+                case = on_root(comm, lambda: load(options))
                 import_module("contact.solving")
                 on_root(comm, _check_cache)
             return _told({"solve": _solve, "check": _check}[options.command](case, options, comm))
@@ -188,6 +168,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         if comm.rank == 0:
             print(f"contact: {error}", file=sys.stderr)
         return BAD_INPUT
+    except Interrupted as interrupt:
+        return end(comm, str(interrupt), SIGNALLED + interrupt.number)
     except MemoryError:
         text = "not enough memory; accepted: fewer cells, or more ranks on more machines"
         return end(comm, text, BAD_INPUT)

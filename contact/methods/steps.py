@@ -122,7 +122,7 @@ class Evolution:
         counted = replace(method.counters)
         start = None if last is None else self._predicted(problem, last)
         state, outcome = solve_step(problem, method, start)
-        return LoadStep(problem, state, outcome, method.history, _since(method.counters, counted))
+        return LoadStep(problem, state, outcome, method.history, since(method.counters, counted))
 
     def _predicted(self, problem: ContactProblem, last: State) -> State:
         """Return where a step starts from: the last one's end, moved on as its loads have."""
@@ -185,6 +185,6 @@ def _given(problem: ContactProblem, time: float) -> tuple[Array, Array]:
     return body.external(time), body.owned_part(body.prescribe(body.rest(), time))
 
 
-def _since(now: Counters, before: Counters) -> Counters:
+def since(now: Counters, before: Counters) -> Counters:
     """Return what has been counted since."""
     return Counters(**{name: count - vars(before)[name] for name, count in vars(now).items()})

@@ -70,13 +70,17 @@ def check_restart(folder: Path, before: str, case: str) -> None:
     InputError
         If they differ in more than in how they are solved and shown.
     """
-    there, here = (_without(tomllib.loads(text)) for text in (before, case))
-    place = next(_differences(there, here), None)
+    place = difference(*(_without(tomllib.loads(text)) for text in (before, case)))
     if place is not None:
         raise InputError(
             f"--restart {folder}: given checkpoints of another case: there {place}; accepted: the "
             "same case, solved and shown as you like"
         )
+
+
+def difference(before: Mapping[str, Any], now: Mapping[str, Any]) -> str | None:
+    """Say in words what differs first between the tables of two cases; None for nothing."""
+    return next(_differences(before, now), None)
 
 
 def _without(case: Mapping[str, Any]) -> dict[str, Any]:

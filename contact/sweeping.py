@@ -1,0 +1,276 @@
+"""Sweeps: a case for each of several values of some of its keys, one row a value.
+
+Each solve starts from the solution before it, and where loads and friction alone change what has
+been factorised is kept. Rows that are there already are not computed again.
+"""
+
+from __future__ import annotations
+
+import csv
+import itertools
+import os
+import time
+import tomllib
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from mpi4py import MPI
+
+from contact.build import build_problem, named
+from contact.case.file import Case, load_case
+from contact.case.text import to_toml
+from contact.errors import InputError
+from contact.evolving import solve_steps
+from contact.mesh.domain import Domain
+from contact.methods.every import METHODS
+from contact.methods.interrupt import Interrupted, stop_on_signal
+from contact.methods.method import Method
+from contact.methods.report import Monitor
+from contact.methods.steps import since, solve_step
+from contact.output.folder import on_root
+from contact.output.rerun import difference
+from contact.output.solution import Solution
+from contact.output.summary import count, largest_displacement
+from contact.output.table import contact_table
+from contact.output.tables import write_csv
+from contact.problem.held import check_potential
+from contact.problem.problem import ContactProblem
+from contact.problem.state import State
+
+#: Names of the table and of the case that was swept.
+TABLE, CASE = "sweep.csv", "sweep.toml"
+
+#: Sections that may change without another matrix or other contact nodes.
+LIGHT = ("title", "load", "output", "friction", "fixed")
+
+
+@dataclass(frozen=True)
+class Axis:
+    """A key of the case file and the values that it takes, as texts."""
+
+    key: str
+    values: tuple[str, ...]
+
+    @staticmethod
+    def of(text: str) -> Axis:
+        """Read ``key=v1,v2,...``; commas in lists and texts separate nothing.
+
+        Raises
+        ------
+        InputError
+            If it is not that.
+        """
+        key, equals, given = text.partition("=")
+        values = tuple(value.strip() for value in _split(given))
+        if not equals or not key.strip() or not all(values):
+            raise InputError(f"--over {text}: accepted: path.to.key=value,value,...")
+        if len(set(values)) < len(values):
+            raise InputError(f"--over {text}: a value stands there twice; accepted: each once")
+        return Axis(key.strip(), values)
+
+
+def _split(text: str) -> Iterator[str]:
+    """Split at the commas outside of brackets and quotes."""
+    depth, quote, begin = 0, "", 0
+    for i, letter in enumerate(text):
+        if quote:
+            quote = "" if letter == quote else quote
+        elif letter in "\"'":
+            quote = letter
+        elif letter == "," and depth == 0:
+            yield text[begin:i]
+            begin = i + 1
+        depth += (letter in "[{") - (letter in "]}") if not quote else 0
+    yield text[begin:]
+
+
+def sweep(
+    path: str | Path,
+    axes: Sequence[Axis],
+    folder: Path,
+    overrides: Sequence[str] = (),
+    monitor: Monitor | None = None,
+    comm: MPI.Intracomm = MPI.COMM_WORLD,
+    warm: bool = True,
+) -> list[dict[str, Any]]:
+    """Solve a case for all combinations of values; write a row of ``sweep.csv`` after each.
+
+    Parameters
+    ----------
+    path, overrides
+        The case file, and values that replace some of its own.
+    axes
+        What is varied; the last one fastest.
+    folder
+        Where the table is, or goes to.
+    monitor
+        Told of all outer iterations.
+    comm
+        Communicator of the mesh.
+    warm
+        Whether each solve starts from the one before.
+
+    Returns
+    -------
+    The rows. Collective.
+
+    Raises
+    ------
+    Interrupted
+        After a signal; the rows before it are in the table.
+    InputError
+        If a value is not accepted, or the folder has the sweep of another case.
+    """
+    names = [axis.key for axis in axes]
+    points = [
+        dict(zip(names, values, strict=True))
+        for values in itertools.product(*(axis.values for axis in axes))
+    ]
+    # All of them before the first is solved.
+    cases = on_root(comm, lambda: [load_case(path, [*overrides, *_set(p)]) for p in points])
+    text = to_toml(load_case(path, [*overrides, *_set(points[0])]))
+    done = on_root(comm, lambda: _begin(folder, names, text))
+    rows: list[dict[str, Any]] = []
+    with stop_on_signal(comm, monitor) as stop:
+        runner = _Runner(comm, stop, warm)
+        for point, case in zip(points, cases, strict=True):
+            row = done.get(tuple(point.values()))
+            if row is None:
+                begin = time.perf_counter()
+                solution = runner.solve(case)
+                if solution.outcome.signal:
+                    raise Interrupted(solution.outcome.signal)
+                seconds = comm.bcast(time.perf_counter() - begin)
+                row = {**point, **_row(solution), "seconds": seconds}
+            rows.append(row)
+            on_root(comm, lambda: _write(folder, rows))
+    return rows
+
+
+def _set(point: Mapping[str, str]) -> list[str]:
+    return [f"{key}={value}" for key, value in point.items()]
+
+
+def _begin(folder: Path, names: list[str], text: str) -> dict[tuple[str, ...], dict[str, Any]]:
+    """Return the rows that are there already. On one rank."""
+    before = folder / CASE
+    if before.is_file():
+        place = difference(*(_without(t, names) for t in (before.read_text("utf-8"), text)))
+        if place is not None:
+            raise InputError(
+                f"--out {folder}: given a sweep of another case: there {place}; accepted: the same "
+                "case, or another folder"
+            )
+    else:
+        before.write_text(text, encoding="utf-8")
+    if not (folder / TABLE).is_file():
+        return {}
+    with (folder / TABLE).open(newline="", encoding="utf-8") as file:
+        rows = list(csv.DictReader(file))
+    if rows and list(rows[0])[: len(names)] != names:
+        raise InputError(
+            f"--out {folder}: given a sweep over other keys; accepted: one over "
+            f"{', '.join(names)}, or another folder"
+        )
+    kept = (row for row in rows if row["converged"] == "True")
+    return {tuple(row[name] for name in names): dict(row) for row in kept}
+
+
+def _without(text: str, names: list[str]) -> dict[str, Any]:
+    """Return a case without the keys that are swept."""
+    data = tomllib.loads(text)
+    for name in names:
+        *parents, last = name.split(".")
+        place: Any = data
+        for key in parents:
+            place = place[int(key)] if isinstance(place, list) else place.get(key, {})
+        if isinstance(place, list):
+            place[int(last)] = 0
+        else:
+            place.pop(last, None)
+    return data
+
+
+def _write(folder: Path, rows: Sequence[Mapping[str, Any]]) -> None:
+    draft = folder / f"{TABLE}.draft"
+    write_csv(draft, rows[0], (row.values() for row in rows))
+    os.replace(draft, folder / TABLE)
+
+
+def _row(solution: Solution) -> dict[str, Any]:
+    """Return what the table says of a solution. Collective."""
+    problem = solution.problem
+    counts = count(problem.comm, contact_table(solution))
+    force = zip("xyz", solution.contact_force, strict=False)
+    return {
+        "converged": solution.converged,
+        "max_pressure": problem.nodes.maximum(solution.pressure),
+        **{f"contact_force_{axis}": float(component) for axis, component in force},
+        "contact_nodes": counts["stick"] + counts["slip"],
+        "stick_nodes": counts["stick"],
+        "slip_nodes": counts["slip"],
+        "max_displacement": largest_displacement(solution),
+        "outer_iterations": len(solution.history.records),
+        "linear_solves": solution.counters.linear_solves,
+        "factorizations": solution.counters.factorizations,
+        "kkt": solution.outcome.kkt.largest,
+    }
+
+
+class _Runner:
+    """Solves one case after the other, with what is left of the one before."""
+
+    def __init__(self, comm: MPI.Intracomm, monitor: Monitor, warm: bool) -> None:
+        self._comm, self._monitor, self._warm = comm, monitor, warm
+        self._case: Case | None = None
+        self._domain: Domain | None = None
+        self._method: Method | None = None
+        self._state: State | None = None
+
+    def solve(self, case: Case) -> Solution:
+        """Solve a case. Collective."""
+        before, self._case = (self._case if self._warm else None), case
+        if before is None or before.mesh != case.mesh:
+            self._domain = None
+        problem = build_problem(case, self._comm, domain=self._domain)
+        self._domain = problem.domain
+        with named(case.source):
+            if case.evolution is not None:
+                ends, rest = case.evolution.ends, case.evolution.times[0]
+                return solve_steps(problem, ends, case.solver, self._monitor, rest)
+            if self._method is None or before is None or not _alike(before, case):
+                self._method = METHODS[case.solver.method](problem, case.solver, self._monitor)
+                self._state = None
+            else:
+                self._method.turn_to(problem)
+            return self._static(problem, case.solver.method, self._method)
+
+    def _static(self, problem: ContactProblem, name: str, method: Method) -> Solution:
+        counted, start = replace(method.counters), self._state
+        if start is not None:
+            start = replace(start, x=problem.equilibrium.prescribe(start.x, problem.time))
+        state, outcome = solve_step(problem, method, start)
+        if start is not None and not outcome.converged and not outcome.signal:
+            state, outcome = solve_step(problem, method, None)
+        self._state = state if outcome.converged else None
+        check_potential(problem, state)
+        counters = since(method.counters, counted)
+        return Solution(problem, state, outcome, method.history, counters, name, seconds={})
+
+
+def _alike(before: Case, case: Case) -> bool:
+    """Tell whether two cases differ in loads, prescribed values and coefficients alone."""
+    one, two = (
+        given.model_dump(exclude=set(LIGHT))
+        | {
+            "friction": None if given.friction is None else given.friction.law,
+            "fixed": [
+                (f.on, [c == "free" for c in f.displacement or ()], f.potential is None)
+                for f in given.fixed
+            ],
+        }
+        for given in (before, case)
+    )
+    return bool(one == two)
