@@ -107,6 +107,11 @@ def _check_contacts(case: Case) -> None:
             if fixed.on == contact.on and fixed.is_clamped:
                 accepted = f"a part that fixed.{i} does not fix wholly"
                 raise fault(f"{path}.on", contact.on, accepted)
+        key, electric = case.electric_of(path, contact)
+        if contact.against is not None and electric is not None:
+            if electric.phi_f != Expression(0.0):
+                accepted = "0, or none, with against: the other body has a potential of its own"
+                raise fault(f"{key}.phi_f", electric.phi_f.source, accepted)
         if seen.setdefault(contact.on, path) != path:
             raise fault(f"{path}.on", contact.on, f"a part that {seen[contact.on]} does not have")
     for key in ("friction", "electric"):

@@ -158,10 +158,14 @@ def charge_balance(problem: ContactProblem, state: State) -> ChargeBalance:
 
 
 def _foundation_charges(problem: ContactProblem, state: State) -> Array:
-    """Return the charges that pass through the owned nodes of the contact part."""
-    interface, nodal = problem.interface, problem.nodal(state)
+    """Return the charges that leave the owned nodes through contact; between bodies they cancel."""
+    interface, nodal, body = problem.interface, problem.nodal(state), problem.equilibrium
     pressure = interface.pressure(nodal, state.forces)
-    charges = problem.nodes.weight * interface.response.charge(nodal, pressure)
+    density = np.zeros((nodal.shape[0], body.block_size))
+    density[:, -1] = problem.nodes.weight * interface.response.charge(nodal, pressure)
+    leaving = np.zeros_like(body.external(state.time))
+    problem.nodes.transpose(density, leaving)
+    charges = body.nodal(leaving)[:, -1]
     if interface.held is None:
         return charges
     held = interface.held.weight * interface.held.charge(state.x)

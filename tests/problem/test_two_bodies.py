@@ -12,6 +12,7 @@ from contact.interface.friction import Friction
 from contact.interface.obstacle import GapFunction
 from contact.interface.pairing import find_pair
 from contact.methods.options import OPTIONS
+from contact.output.balances import charge_balance
 from contact.output.table import contact_table
 from contact.problem.held import check_held
 from contact.problem.problem import Contact, ContactProblem
@@ -244,3 +245,58 @@ def test_two_pairs_have_two_laws():
     force = [upwards[below].sum(), upwards[above].sum()]
     assert force[1] > 0 and force[0] == pytest.approx(-force[1], rel=0.02)
     assert np.abs(table["tau"][above]).max() < 1e-10 < 0.1 < np.abs(table["tau"][below]).max()
+
+
+#: Two columns on each other: heights 1, permittivities, conductance of the contact, voltage.
+PERMITTIVITIES, CONDUCTANCE, VOLTAGE = (2.0, 5.0), 0.7, 3.0
+
+
+def columns(on, against, degree, **electric):
+    materials = []
+    for name, beta in zip(("upper", "lower"), PERMITTIVITIES, strict=True):
+        piezo = {"e31": 0.0, "e33": 0.0, "e15": 0.0, "beta11": beta, "beta33": beta}
+        materials.append({"on": name, "young": 100.0, "poisson": 0.3, "piezo": piezo})
+    roller = [0.0, "free"]
+    return {
+        "mesh": {
+            "generator": "two_blocks",
+            "upper_width": 1.0,
+            "lower_width": 1.0,
+            "upper_size": 0.35,
+            "lower_size": 0.22,
+        },
+        "space": {"degree": degree},
+        "material": materials,
+        "fixed": [
+            {"on": "lower_bottom", "displacement": ["free", 0.0], "potential": 0.0},
+            {"on": "upper_top", "displacement": ["free", -0.01], "potential": VOLTAGE},
+            {"on": "lower_left", "displacement": roller},
+            {"on": "upper_left", "displacement": roller},
+        ],
+        "contact": {
+            "on": on,
+            "against": against,
+            "electric": {"law": "perfect", "k_e": CONDUCTANCE, **electric},
+        },
+        "solver": {"tolerance": 1e-11},
+    }
+
+
+@pytest.mark.parametrize("degree", [1, 2])
+@pytest.mark.parametrize("pair", [("upper_bottom", "lower_top"), ("lower_top", "upper_bottom")])
+def test_columns_in_series(pair, degree):
+    """I = V/(H1/b1 + 1/k + H2/b2): what leaves the one body enters the other."""
+    solution = solve(parse_case(columns(*pair, degree)))
+    assert solution.converged
+    current = VOLTAGE / (1 / PERMITTIVITIES[0] + 1 / CONDUCTANCE + 1 / PERMITTIVITIES[1])
+    found = charge_balance(solution.problem, solution.state)
+    assert found.electrodes["lower_bottom"] == pytest.approx(current, rel=1e-10)
+    assert found.electrodes["upper_top"] == pytest.approx(-current, rel=1e-10)
+    assert abs(found.foundation) < 1e-12 * current and found.imbalance < 1e-12
+
+
+def test_a_foundation_of_its_own_potential_is_no_body():
+    with pytest.raises(
+        InputError, match=r"contact\.electric\.phi_f: .*; accepted: 0, or none, with"
+    ):
+        parse_case(columns("upper_bottom", "lower_top", 1, phi_f=2.0))
