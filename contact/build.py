@@ -13,6 +13,7 @@ from mpi4py import MPI
 from contact.blame import to_blame
 from contact.body.description import Body, Fixed, Load
 from contact.case import file as sections
+from contact.case.replaced import check_replaced
 from contact.contacts import make_contacts
 from contact.errors import InputError
 from contact.given import amplitude, check_range, loading_field
@@ -60,6 +61,8 @@ def build_problem(
         or the body is not held.
     """
     with named(case.source):
+        given = {"domain": domain, "law": law, "coefficient": coefficient, "friction": friction}
+        check_replaced(case.filled, given)
         domain = make_domain(case.mesh, comm) if domain is None else domain
         if case.space.kinematics == "axisymmetric":
             domain = revolved(domain)

@@ -10,6 +10,7 @@ from mpi4py import MPI
 
 from contact.build import build_problem, named
 from contact.case.file import Case, load_case
+from contact.case.replaced import replaced_by
 from contact.case.text import anchored, to_toml
 from contact.evolving import solve_steps
 from contact.methods.every import METHODS
@@ -64,7 +65,7 @@ def solve(
     if isinstance(case, ContactProblem):
         check_held(case)
         return solve_problem(case, settings or NewtonOptions(), monitor)
-    case = case if isinstance(case, Case) else load_case(case)
+    case = case if isinstance(case, Case) else load_case(case, without=replaced_by(replacements))
     settings = settings or case.solver
     problem = build_problem(case, comm, **replacements)
     with named(case.source):

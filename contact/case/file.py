@@ -9,7 +9,7 @@ from __future__ import annotations
 import re
 import sys
 import tomllib
-from collections.abc import Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, TypeAlias
 
@@ -25,6 +25,7 @@ from contact.case.material import Material, Piezo
 from contact.case.mesh import Mesh, Piece
 from contact.case.messages import describe, describe_fault
 from contact.case.overrides import override
+from contact.case.replaced import stand_ins
 from contact.case.rigid import Electrode, RigidPart
 from contact.case.shapes import Plane, Sphere
 from contact.case.showing import clipped
@@ -119,6 +120,7 @@ class Case(Section):
     )
 
     _source: str = PrivateAttr("case")
+    _filled: tuple[str, ...] = PrivateAttr(())
 
     @property
     def source(self) -> str:
@@ -147,6 +149,11 @@ class Case(Section):
             return f"{key}.electric", contact.electric
         return "electric", self.electric
 
+    @property
+    def filled(self) -> tuple[str, ...]:
+        """Keys that were missing, for objects are to take their places."""
+        return self._filled
+
     @model_validator(mode="after")
     def _check(self) -> Case:
         check_sections(self)
@@ -173,7 +180,12 @@ class Case(Section):
             raise InputError(f"{self._source}: {describe_fault(error)}") from None
 
 
-def parse_case(data: Mapping[str, Any], folder: str | Path = ".", source: str = "case") -> Case:
+def parse_case(
+    data: Mapping[str, Any],
+    folder: str | Path = ".",
+    source: str = "case",
+    without: Collection[str] = (),
+) -> Case:
     """Make a case of a dictionary with the keys of the case file.
 
     Parameters
@@ -184,13 +196,16 @@ def parse_case(data: Mapping[str, Any], folder: str | Path = ".", source: str = 
         Folder that a relative name of a mesh file belongs to.
     source
         What messages call the case.
+    without
+        Keys that may be missing, for objects will take their places: "mesh", "material",
+        "friction.mu".
 
     Raises
     ------
     InputError
         On the first mistake; the message is one line.
     """
-    data = {**data, **_found(data, Path(folder))}
+    data, filled = stand_ins({**data, **_found(data, Path(folder))}, without)
     try:
         case = Case.model_validate(data)
     except ValidationError as error:
@@ -201,7 +216,7 @@ def parse_case(data: Mapping[str, Any], folder: str | Path = ".", source: str = 
             raise InputError(f"{source}: mesh.file: no file {path}; accepted: a Gmsh file (.msh)")
         mesh = case.mesh.model_copy(update={"file": str(path)})
         case = case.model_copy(update={"mesh": mesh})
-    case._source = source
+    case._source, case._filled = source, tuple(filled)
     return case
 
 
@@ -226,7 +241,11 @@ def _found(data: Mapping[str, Any], folder: Path) -> dict[str, Any]:
     return found
 
 
-def load_case(path: str | Path, overrides: Mapping[str, str] | Iterable[str] = ()) -> Case:
+def load_case(
+    path: str | Path,
+    overrides: Mapping[str, str] | Iterable[str] = (),
+    without: Collection[str] = (),
+) -> Case:
     """Read a case file.
 
     Parameters
@@ -237,6 +256,8 @@ def load_case(path: str | Path, overrides: Mapping[str, str] | Iterable[str] = (
         Values that replace those of the file: ``"material.young=2.0"``, or a mapping of keys
         to texts. Keys are dotted paths, with numbers for list entries (``load.0.traction``);
         values are TOML, bare words are texts.
+    without
+        As `parse_case` takes it.
 
     Raises
     ------
@@ -265,4 +286,4 @@ def load_case(path: str | Path, overrides: Mapping[str, str] | Iterable[str] = (
             f"{path}{place}: a number of more than {digits} digits; accepted: shorter ones"
         ) from None
     override(data, overrides, str(path))
-    return parse_case(data, path.parent, str(path))
+    return parse_case(data, path.parent, str(path), without)

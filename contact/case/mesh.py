@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from typing import Annotated, Any, Literal, TypeAlias
 
 import numpy as np
-from pydantic import Discriminator, Field, Tag, model_validator
+from pydantic import Discriminator, Field, PrivateAttr, Tag, model_validator
 
 import meshes
 from contact.case.types import (
@@ -132,6 +132,15 @@ class Mesh(Section):
         default={}, description="Parameters of a recipe. They may stand in `[mesh]` itself."
     )
 
+    _absent: bool = PrivateAttr(False)
+
+    @staticmethod
+    def absent() -> Mesh:
+        """Return what stands where a domain made in Python is to take the place of `[mesh]`."""
+        made = Mesh.model_construct()
+        made._absent = True
+        return made
+
     @property
     def dimension(self) -> int | None:
         """Space dimension; None if only the mesh itself can tell."""
@@ -177,6 +186,8 @@ class Mesh(Section):
 
     @model_validator(mode="after")
     def _check(self) -> Mesh:
+        if self._absent:
+            return self
         if (self.generator is None) == (self.file is None):
             given = "neither generator nor file" if self.file is None else "generator and file"
             raise fault("generator", Words(given), "one of generator and file")

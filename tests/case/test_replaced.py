@@ -1,0 +1,57 @@
+"""What objects in Python replace need not stand in the case."""
+
+import pytest
+from mpi4py import MPI
+
+from contact import InputError, Linear, parse_case, solve
+from contact.mesh.grid import rectangle
+from forms.laws import ConstantCoefficient
+
+BARE = {
+    "fixed": [{"on": "top", "displacement": [0.02, -0.02]}],
+    "contact": {"on": "bottom"},
+    "friction": {"law": "coulomb"},
+}
+WITHOUT = ("mesh", "material", "friction.mu")
+
+
+def objects() -> dict[str, object]:
+    domain = rectangle(MPI.COMM_WORLD, (0.0, 0.0), (2.0, 1.0), (4, 2))
+    return {"domain": domain, "law": Linear(10.0, 0.3), "coefficient": ConstantCoefficient(0.3)}
+
+
+@pytest.mark.parallel
+def test_the_same_as_in_the_case() -> None:
+    mesh = {"generator": "rectangle", "size": [2.0, 1.0], "cells": [4, 2]}
+    material = {"young": 10.0, "poisson": 0.3}
+    friction = {"law": "coulomb", "mu": 0.3}
+    whole = solve(parse_case({**BARE, "mesh": mesh, "material": material, "friction": friction}))
+    bare = solve(parse_case(BARE, without=WITHOUT), **objects())
+    assert bare.converged
+    assert bare.contact_force == pytest.approx(whole.contact_force, rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("key", "name"), [("mesh", "domain"), ("material", "law"), ("friction.mu", "coefficient")]
+)
+def test_an_object_that_is_not_there(key: str, name: str) -> None:
+    """Nothing that only stands in for something is ever solved."""
+    others = {k: v for k, v in objects().items() if k != name}
+    with pytest.raises(InputError, match=rf"{key}: missing; accepted: it in the case, or {name}"):
+        solve(parse_case(BARE, without=WITHOUT), **others)
+
+
+def test_what_cannot_be_left_out() -> None:
+    with pytest.raises(InputError, match=r"accepted: mesh, material, friction\.mu"):
+        parse_case(BARE, without=["contact"])
+    with pytest.raises(InputError, match="mesh: missing"):
+        parse_case(BARE, without=["material", "friction.mu"])
+
+
+def test_a_file_and_its_objects(tmp_path) -> None:
+    """`solve` with a file name knows what its objects replace."""
+    path = tmp_path / "bare.toml"
+    fixed = '[[fixed]]\non = "top"\ndisplacement = [0.02, -0.02]\n'
+    path.write_text(fixed + '[contact]\non = "bottom"\n')
+    given = {k: v for k, v in objects().items() if k != "coefficient"}
+    assert solve(path, **given).converged
