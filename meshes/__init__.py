@@ -20,6 +20,7 @@ from pathlib import Path
 from contact.errors import InputError
 from meshes.bars import bar, bar_on_ends, block, column, piezo_bar
 from meshes.hertz import disc, half_disc, quarter_disc, sphere
+from meshes.indentation import half_space
 from meshes.pairs import (
     ball_between_plates,
     cylinder_on_block,
@@ -43,6 +44,7 @@ RECIPES: Mapping[str, Callable[..., None]] = {
         bar_on_ends,
         block,
         column,
+        half_space,
         two_blocks,
         cylinder_on_block,
         two_half_cylinders,

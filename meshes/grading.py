@@ -27,11 +27,13 @@ def grade(
     points: Sequence[int] = (),
     curves: Sequence[int] = (),
     surfaces: Sequence[int] = (),
+    edges: Sequence[int] = (),
+    edge_size: float = 0.0,
 ) -> None:
     """Set the element size by the distance to some entities.
 
     It is ``contact_size`` up to the distance ``width`` and then grows by ``growth`` a unit
-    length, up to ``size``.
+    length, up to ``size``. At the points ``edges`` it is ``edge_size``, and grows from there.
 
     Raises
     ------
@@ -41,11 +43,31 @@ def grade(
     near = min(contact_size, size)
     # The first elements of the ramp count too.
     _check_count(gmsh, size, near, width + near / growth, 2 if surfaces else 1 if curves else 0)
+    zone = {"PointsList": points, "CurvesList": curves, "SurfacesList": surfaces}
+    fields = [_ramp(gmsh, zone, near, size, width, growth)]
+    if edges:
+        fields.append(_ramp(gmsh, {"PointsList": edges}, min(edge_size, near), size, 0.0, growth))
+    field = gmsh.model.mesh.field
+    least = field.add("Min")
+    field.setNumbers(least, "FieldsList", fields)
+    field.setAsBackgroundMesh(least if edges else fields[0])
+    for key in ("MeshSizeExtendFromBoundary", "MeshSizeFromPoints", "MeshSizeFromCurvature"):
+        gmsh.option.setNumber(f"Mesh.{key}", 0)
+
+
+def _ramp(
+    gmsh: Any,
+    entities: Mapping[str, Sequence[int]],
+    near: float,
+    size: float,
+    width: float,
+    growth: float,
+) -> int:
+    """Return a field of sizes that grow with the distance from entities beyond a width."""
     field = gmsh.model.mesh.field
     distance = field.add("Distance")
-    field.setNumbers(distance, "PointsList", list(points))
-    field.setNumbers(distance, "CurvesList", list(curves))
-    field.setNumbers(distance, "SurfacesList", list(surfaces))
+    for kind, chosen in entities.items():
+        field.setNumbers(distance, kind, list(chosen))
     field.setNumber(distance, "Sampling", 200)
     ramp = field.add("Threshold")
     field.setNumber(ramp, "InField", distance)
@@ -54,9 +76,7 @@ def grade(
     field.setNumber(ramp, "DistMin", width)
     # A ramp of no length would divide by zero.
     field.setNumber(ramp, "DistMax", width + max(size - near, 1e-6 * size) / growth)
-    field.setAsBackgroundMesh(ramp)
-    for key in ("MeshSizeExtendFromBoundary", "MeshSizeFromPoints", "MeshSizeFromCurvature"):
-        gmsh.option.setNumber(f"Mesh.{key}", 0)
+    return int(ramp)
 
 
 def _check_count(gmsh: Any, size: float, near: float, width: float, flat: int) -> None:

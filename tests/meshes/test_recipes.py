@@ -68,6 +68,10 @@ RECIPES = {
         4.0,
         {"left": 4.0, "right": 4.0, "front": 4.0, "back": 4.0, "bottom": 1.0, "top": 1.0},
     ),
+    "half_space": (
+        900.0,
+        {"axis": 30.0, "contact": 1.0, "free": 29.0, "side": 30.0, "bottom": 30.0},
+    ),
     "two_blocks": (
         6.0,
         {

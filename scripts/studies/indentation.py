@@ -1,0 +1,303 @@
+"""Indentation of half spaces beside closed forms: punch, cone and ball, insulating and conducting.
+
+`python3 -m scripts.studies.indentation [--out DIR] [--coarse]`, also under mpirun. Each problem is
+solved in two boxes; what is off by the box is of first order in the contact radius over its size,
+and is extrapolated to none.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from mpi4py import MPI
+
+from contact import Case, Solution, load_case
+from contact.library.reading import find
+from contact.output.balances import charge_balance
+from contact.output.table import contact_table
+from contact.typing import Array
+from forms.elasticity import isotropic
+from forms.piezo import hexagonal_voigt
+from scripts.cases import CASES
+from scripts.reporting import Report, options, solved, subplots
+from scripts.studies import half_space
+from scripts.studies.half_space import HalfSpace, Indentation
+
+#: Contact radius that is aimed at, radius of curvature of the ball, half angle of the cone.
+RADIUS, CURVATURE, HALF_ANGLE = 0.1, 1.0, 70.3
+
+#: Shape -> second moment of its pressure, a^2/<r^2>, known from the closed form.
+MOMENTS = {"punch": None, "cone": 3.0, "ball": 2.5}
+
+#: Constants of the thesis's material: isotropic elasticity, the coupling of PZT-5A.
+THESIS = {"young": 58.7102, "poisson": 0.3912}
+COUPLING = {"e31": -5.4, "e33": 15.8, "e15": 12.3, "beta11": 8.13866, "beta33": 7.37455}
+
+MATERIALS = ("PZT-4", "PZT-5A", "thesis")
+
+
+@dataclass(frozen=True)
+class Setting:
+    """An indentation.
+
+    Attributes
+    ----------
+    material
+        Name in the library, or "thesis"; "elastic" without coupling.
+    shape
+        "punch", "cone" or "ball".
+    potential
+        Of a conducting indenter (GV); None for an insulating one.
+    fineness
+        Elements on the contact radius.
+    poling
+        -90: into the half space; 90: out of it.
+    units
+        "GPa", or "SI".
+    """
+
+    material: str
+    shape: str
+    potential: float | None = None
+    fineness: float = 12.0
+    poling: float = -90.0
+    units: str = "GPa"
+
+    @property
+    def depth(self) -> float:
+        """The depth that is prescribed: that of the aimed radius for an insulating indenter."""
+        slope = 1 / np.tan(np.deg2rad(HALF_ANGLE))
+        return {
+            "punch": 0.01,
+            "cone": np.pi / 2 * RADIUS * slope,
+            "ball": RADIUS**2 / CURVATURE,
+        }[self.shape]
+
+    @property
+    def radius(self) -> float:
+        """The contact radius of the closed form at the prescribed depth."""
+        raised = 0.0
+        if self.potential is not None:
+            raised = float(self.body.inverse[0, 1] / self.body.inverse[0, 0]) * self.potential
+        if self.shape == "cone":
+            return float(2 / np.pi * np.tan(np.deg2rad(HALF_ANGLE)) * (self.depth + raised))
+        return float(np.sqrt(CURVATURE * (self.depth + raised))) if self.shape == "ball" else RADIUS
+
+    @property
+    def body(self) -> HalfSpace:
+        """The half space, in GPa, GV and C/m2."""
+        if self.material == "thesis":
+            return HalfSpace(isotropic(*THESIS.values()), *hexagonal_voigt(**COUPLING))
+        entry = find(self.material)
+        assert entry.coupling is not None
+        assert entry.permittivity is not None
+        sign = -np.sign(self.poling)
+        return HalfSpace(entry.stiffness / 1e9, sign * entry.coupling, 1e9 * entry.permittivity)
+
+    def case(self, extent: float) -> Case:
+        """Return the case in a box of an extent, in contact radii."""
+        unit = 1e9 if self.units == "SI" else 1.0
+        insulating = self.potential is None
+        name = "indent-pzt4-insulating.toml" if insulating else "indent-pzt4-conducting.toml"
+        changes = [
+            # Fine at the edge of the contact: that of a smooth one is close to that of the part.
+            f"mesh.radius={self.radius * (1.0 if self.shape == 'punch' else 1.03)}",
+            f"mesh.contact_size={RADIUS / self.fineness}",
+            f"mesh.edge_size={RADIUS / self.fineness / 50}",
+            f"mesh.extent={extent * RADIUS}",
+            f"mesh.size={extent * RADIUS / 8}",
+            f"contact.rigid.displacement=[0.0, {-self.depth}]",
+            f"contact.foundation={_foundation(self.shape)}",
+            f"material={self._material()}",
+        ]
+        if not insulating:
+            changes.append(f"electric.phi_f={(self.potential or 0.0) * unit}")
+            changes.append(f"electric.k_e={1e6 / unit}")
+        return load_case(CASES / name, changes)
+
+    def _material(self) -> str:
+        if self.material == "thesis":
+            given = [f"{key} = {value}" for key, value in THESIS.items()]
+            piezo = ", ".join(f"{key} = {value}" for key, value in COUPLING.items())
+            return f"{{ {', '.join(given)}, poling = {self.poling}, piezo = {{ {piezo} }} }}"
+        return f'{{ name = "{self.material}", units = "{self.units}", poling = {self.poling} }}'
+
+    def surface(self, r: Array) -> Array:
+        """Return the depth of the surface beneath the indenter, at distances from the axis."""
+        slope = 1 / np.tan(np.deg2rad(HALF_ANGLE))
+        profile = {"punch": 0 * r, "cone": slope * r, "ball": r**2 / (2 * CURVATURE)}
+        return np.asarray(self.depth - profile[self.shape])
+
+    def closed(self, radius: float) -> Indentation:
+        """Return the closed form, at a contact radius."""
+        body, phi = self.body, self.potential
+        if self.shape == "punch":
+            return half_space.punch(body, RADIUS, self.depth, phi)
+        if self.shape == "cone":
+            return half_space.cone(body, HALF_ANGLE, radius, phi)
+        return half_space.ball(body, CURVATURE, radius, phi)
+
+
+def _foundation(shape: str) -> str:
+    if shape == "punch":
+        return '{ shape = "plane", point = [0.0, 0.0], normal = [0.0, -1.0] }'
+    own = f"radius = {CURVATURE}" if shape == "ball" else f"half_angle = {HALF_ANGLE}"
+    name = "paraboloid" if shape == "ball" else "cone"
+    return f'{{ shape = "{name}", apex = [0.0, 0.0], axis = [0.0, 1.0], {own} }}'
+
+
+@dataclass(frozen=True)
+class Found:
+    """What a solution says, in GPa, m, GV and C: ratios to the closed form at its own radius.
+
+    Attributes
+    ----------
+    force, depth, charge, potential
+        P, delta, Q, and phi(0) of an insulating indenter; NaN for what there is not.
+    radius
+        a, of the second moment of the pressure.
+    unknowns
+        Number of unknowns.
+    """
+
+    force: float
+    depth: float
+    charge: float
+    potential: float
+    radius: float
+    unknowns: int
+
+
+def measure(setting: Setting, solution: Solution) -> Found:
+    """Compare a solution with the closed form. Collective."""
+    unit = 1e9 if setting.units == "SI" else 1.0
+    nodes, problem = solution.problem.nodes, solution.problem
+    r, pressure = nodes.points[:, 0], solution.pressure
+    factor, radius = MOMENTS[setting.shape], RADIUS
+    if factor is not None:
+        radius = float(np.sqrt(factor * nodes.sum(pressure * r**2) / nodes.sum(pressure)))
+    exact = setting.closed(radius)
+    charge = potential = np.nan
+    if setting.potential is not None:
+        # Of the free charges D.nu of the body, nu outwards: D_z with z into it is minus that.
+        charge = -charge_balance(problem, solution.state).foundation / exact.charge
+    else:
+        inner = r < 0.3 * radius
+        phi = problem.equilibrium.phi_scale * solution.nodal[:, -1]
+        # phi is (M_21/M_11) u_z everywhere beneath the indenter.
+        expected = half_space.potential_beneath(setting.body, 1.0) * setting.surface(r)
+        ratio = np.where(inner, phi / unit / expected, 0.0)
+        potential = nodes.sum(ratio) / nodes.sum(inner.astype(float))
+    return Found(
+        float(solution.contact_force[1]) / unit / exact.force,
+        setting.depth / exact.depth,
+        float(charge),
+        float(potential),
+        radius,
+        problem.equilibrium.layout.unknowns,
+    )
+
+
+def extrapolated(setting: Setting, extent: float = 30.0) -> tuple[Found, list[Found]]:
+    """Return what is left without a box, and what the two boxes gave. Collective."""
+    boxes = [extent, 2 * extent]
+    found = [measure(setting, solved(setting.case(box))) for box in boxes]
+
+    def limit(name: str) -> float:
+        x = [f.radius / RADIUS / box for f, box in zip(found, boxes, strict=True)]
+        first, second = (getattr(f, name) for f in found)
+        return float(second - (first - second) * x[1] / (x[0] - x[1]))
+
+    names = ("force", "depth", "charge", "potential")
+    return replace(found[-1], **{name: limit(name) for name in names}), found
+
+
+def table(report: Report, fineness: float, materials: Sequence[str] = MATERIALS) -> None:
+    """Tabulate ratios to the closed forms. Collective."""
+    names = ("material", "shape", "indenter", "P", "delta", "Q", "phi", "P in the box", "unknowns")
+    columns: dict[str, list[object]] = {name: [] for name in names}
+    for material in materials:
+        for shape in MOMENTS:
+            for potential in (None, 0.0, 0.002):
+                setting = Setting(material, shape, potential, fineness)
+                found, boxes = extrapolated(setting)
+                kind = "insulating" if potential is None else f"at {potential:g} GV"
+                row = (
+                    material,
+                    shape,
+                    kind,
+                    found.force,
+                    found.depth,
+                    found.charge,
+                    found.potential,
+                    boxes[-1].force,
+                    found.unknowns,
+                )
+                for name, value in zip(names, row, strict=True):
+                    columns[name].append(value)
+    note = (
+        "Ratios of the computed to the closed form at the computed contact radius (that of the "
+        "punch is given), extrapolated from boxes of 30 and 60 contact radii; phi is the potential "
+        "over (M_21/M_11) u_z beneath an insulating indenter. At a potential the foundation "
+        "conducts across gaps up to 1e-6 m: with conduction in contact alone, contact could end "
+        "at any smaller radius, with a singular pressure."
+    )
+    report.table("closed-forms", "Indentation, computed over closed form", columns, note)
+
+
+def figure(report: Report, fineness: float) -> None:
+    """Draw pressure and charge beneath indenters of PZT-4 beside the closed forms. Collective."""
+    drawn, axes = subplots(1, 3, size=(7.6, 2.6))
+    data: dict[str, Sequence[float]] = {}
+    for ax, shape in zip(axes, MOMENTS, strict=True):
+        for potential, colour in ((None, "#0072B2"), (0.0, "#D55E00")):
+            setting = Setting("PZT-4", shape, potential, fineness)
+            solution = solved(setting.case(40.0))
+            radius, made = measure(setting, solution).radius, contact_table(solution)
+            if made is None:
+                continue
+            body, kind = setting.body, "insulating" if potential is None else "grounded"
+            stiff = body.insulating if potential is None else body.conducting
+            x = np.linspace(0.002, 0.9995, 400)
+            exact = _pressure(shape, x, stiff, setting.depth, radius)
+            chosen = made["x"] < (0.985 if shape == "punch" else 1.3) * RADIUS
+            ax.plot(made["x"][chosen], made["pressure"][chosen], ".", ms=2, color=colour)
+            ax.plot(x * radius, exact, lw=0.8, color=colour, label=kind)
+            data |= {
+                f"r, {shape}, {kind}": made["x"][chosen],
+                f"p, {shape}, {kind}": made["pressure"][chosen],
+                f"r, {shape}, {kind}, closed form": x * radius,
+                f"p, {shape}, {kind}, closed form": exact,
+            }
+        ax.set_title(shape)
+        ax.set_xlabel("$r$ (m)")
+        ax.set_ylim(0, {"punch": 20.0, "cone": 80.0, "ball": 9.0}[shape])
+    axes[0].set_ylabel("pressure (GPa)")
+    axes[0].legend(loc="upper left")
+    if MPI.COMM_WORLD.rank == 0:
+        drawn.tight_layout()
+        caption = "Pressure beneath indenters of PZT-4: nodes, and closed forms (lines)"
+        report.figure("pressure", caption, drawn, data)
+
+
+def _pressure(shape: str, x: np.ndarray, stiff: float, depth: float, radius: float) -> np.ndarray:
+    """Return the pressure of isotropic elasticity with an E*, over r/a."""
+    if shape == "punch":
+        return np.asarray(stiff * depth / (np.pi * RADIUS) / np.sqrt(1 - x**2))
+    if shape == "cone":
+        return np.asarray(stiff / 2 / np.tan(np.deg2rad(HALF_ANGLE)) * np.arccosh(1 / x))
+    return np.asarray(2 * stiff * radius / (np.pi * CURVATURE) * np.sqrt(1 - x**2))
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Make the table and the figure."""
+    chosen = options(__doc__, "indentation", arguments)
+    report, fineness = Report(chosen.out), 6.0 if chosen.coarse else 12.0
+    table(report, fineness, MATERIALS[:1] if chosen.coarse else MATERIALS)
+    figure(report, fineness)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,117 @@
+"""Indentation beside closed forms: Hertz's ball, and piezoelectric half spaces of class 6mm."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+pytest.importorskip("gmsh")
+from contact import load_case, solve
+from contact.library.reading import find
+from forms.elasticity import hexagonal
+from scripts.cases import CASES
+from scripts.studies import half_space
+from scripts.studies.indentation import Setting, extrapolated
+
+#: Material -> E* insulating and conducting (GPa), |Q/P| of a grounded indenter (pC/N): published
+#: constants, computed independently of this code.
+KNOWN = {
+    "PZT-4": (114.321, 86.565, 253.3),
+    "PZT-5A": (95.756, 73.125, 303.5),
+    "thesis": (98.603, 76.412, 288.1),
+}
+
+
+@pytest.mark.parametrize("name", KNOWN)
+def test_constants_of_the_half_space(name):
+    body = Setting(name, "ball").body
+    insulating, conducting, ratio = KNOWN[name]
+    assert body.insulating == pytest.approx(insulating, abs=6e-4)
+    assert body.conducting == pytest.approx(conducting, abs=6e-4)
+    assert abs(body.charge_ratio) * 1e3 == pytest.approx(ratio, abs=0.06)
+    n = body.inverse
+    assert n[1, 0] == pytest.approx(-n[0, 1], rel=1e-10)
+
+
+def test_the_ball_on_the_material_of_the_thesis():
+    body = Setting("thesis", "ball").body
+    assert half_space.ball(body, 1.0, 0.1, None).force == pytest.approx(0.131471, abs=1e-6)
+    assert half_space.ball(body, 1.0, 0.1, 0.0).force == pytest.approx(0.101882, abs=1e-6)
+    assert half_space.potential_beneath(body, 0.01) == pytest.approx(0.010080, abs=1e-6)
+
+
+def test_without_coupling_it_is_transversely_isotropic():
+    """The indentation modulus of Delafargue and Ulm, Int. J. Solids Struct. 41 (2004) 7351."""
+    c11, c12, c13, c33, c44 = 139.0, 77.8, 74.3, 113.0, 25.6
+    stiffness = hexagonal(c11, c12, c13, c33, c44)
+    body = half_space.HalfSpace(stiffness, np.zeros((3, 6)), np.diag([6.0, 6.0, 5.5]))
+    compliance = 1 / c44 + 2 / (np.sqrt(c11 * c33) + c13)
+    known = 2 * np.sqrt((c11 * c33 - c13**2) / c11 / compliance)
+    assert body.insulating == pytest.approx(known, rel=1e-10)
+    assert body.conducting == pytest.approx(known, rel=1e-10)
+
+
+@pytest.mark.parametrize("shape", ["punch", "cone", "ball"])
+@pytest.mark.parametrize("potential", [None, 0.002])
+def test_pzt4(shape, potential):
+    found, boxes = extrapolated(Setting("PZT-4", shape, potential, 6.0))
+    for name in ("force", "depth", "charge", "potential"):
+        value = getattr(found, name)
+        assert np.isnan(value) or value == pytest.approx(1, abs=5e-3), name
+    assert found.unknowns < 20_000
+    if shape == "punch":
+        # A smaller box is stiffer.
+        assert boxes[0].force > boxes[1].force > 1.005
+
+
+def test_poling_reversed_and_si_units():
+    given = Setting("PZT-4", "ball", 0.0, 4.0)
+    (one, two, si) = (
+        solve(setting.case(20.0))
+        for setting in (
+            given,
+            Setting("PZT-4", "ball", 0.0, 4.0, poling=90.0),
+            Setting("PZT-4", "ball", 0.0, 4.0, units="SI"),
+        )
+    )
+    assert np.allclose(two.pressure, one.pressure, rtol=0, atol=1e-6 * one.pressure.max())
+    phi, other = (s.potential.x.array for s in (one, two))
+    assert np.abs(phi + other).max() < 1e-6 * np.abs(phi).max()
+    assert np.allclose(si.pressure, 1e9 * one.pressure, rtol=0, atol=1e3 * one.pressure.max())
+    assert si.converged and one.converged and two.converged
+
+
+def test_hertz_ball_with_few_unknowns():
+    """P, a, p_0 within 0.2 %, and delta once the box is extrapolated."""
+    depths, boxes = [], (30.0, 60.0)
+    for extent in boxes:
+        changes = [f"mesh.extent={extent}", f"mesh.size={extent / 8}"]
+        solution = solve(load_case(CASES / "indent-ball.toml", changes))
+        problem, nodes, pressure = solution.problem, solution.problem.nodes, solution.pressure
+        assert problem.equilibrium.layout.unknowns <= 20_000
+        r = nodes.points[:, 0]
+        a = np.sqrt(2.5 * nodes.sum(pressure * r**2) / nodes.sum(pressure))
+        closed = np.max(r[solution.status != "open"])
+        stiff = 1000.0 / (1 - 0.3**2)
+        assert closed <= a < closed + 0.021  # the spacing of the nodes
+        assert solution.contact_force[1] == pytest.approx(4 / 3 * stiff * a**3 / 4, rel=2e-3)
+        inner = r < a / 2
+        centre = np.sqrt(np.polyfit(r[inner] ** 2, pressure[inner] ** 2, 1)[1])
+        assert centre == pytest.approx(2 * stiff * a / (4 * np.pi), rel=2e-3)
+        depths.append((a / extent, 0.25 / (a**2 / 4)))
+    (x, first), (y, second) = depths
+    assert second - (first - second) * y / (x - y) == pytest.approx(1, abs=2e-3)
+    assert abs(second - 1) > 5e-3
+
+
+def test_the_cone_of_sneddon():
+    solution = solve(load_case(CASES / "indent-cone.toml"))
+    nodes, pressure, r = solution.problem.nodes, solution.pressure, solution.problem.nodes.points
+    a = np.sqrt(3 * nodes.sum(pressure * r[:, 0] ** 2) / nodes.sum(pressure))
+    cot, stiff = 1 / np.tan(np.deg2rad(70.3)), 1000.0 / (1 - 0.3**2)
+    assert solution.contact_force[1] == pytest.approx(np.pi / 2 * stiff * a**2 * cot, rel=1e-3)
+
+
+def test_the_library_and_the_study_have_the_same_pzt4():
+    entry = find("PZT-4")
+    assert np.array_equal(entry.stiffness / 1e9, hexagonal(139.0, 77.8, 74.3, 113.0, 25.6))
