@@ -138,6 +138,10 @@ class Masters:
         found = (m for m in self.members if m.foundation and m.what.on == part)
         return next(found, None)
 
+    def still(self, nodes: int, block_size: int) -> Array | None:
+        """Return the motion of an obstacle at rest, (nodes, block size, m); None without any q."""
+        return np.zeros((nodes, block_size, self.size)) if self.size > 0 else None
+
     def prescribe(self, q: Array, time: float) -> Array:
         """Return q with the given values at a time."""
         given = [member.given(time) for member in self.members]

@@ -59,10 +59,13 @@ def _sizes(problem: ContactProblem) -> list[str]:
     """Say how far loads and prescribed values move the body, about, and how far it may go."""
     body, scales, d = problem.equilibrium, problem.scales, problem.dim
     comm = problem.comm
-    forces = body.external(problem.time).reshape(-1, body.block_size)[:, :d]
-    given = problem.start().x.reshape(-1, body.block_size)[:, :d]
-    total = comm.allreduce(float(np.abs(forces).sum()), op=MPI.SUM)
+    loads, start = body.external(problem.time), problem.start().x
+    forces, given = (body.nodal(values)[:, :d] for values in (loads, start))
+    total = (
+        comm.allreduce(float(np.abs(forces).sum()), op=MPI.SUM) + np.abs(body.motion(loads)).sum()
+    )
     moved = comm.allreduce(float(np.abs(given).max(initial=0.0)), op=MPI.MAX)
+    moved = max(moved, float(np.abs(body.motion(start)).max(initial=0.0)))
     expected = max(total / scales.area / scales.young * scales.size, moved)
     gap = problem.nodes.gap
     least = comm.allreduce(float(gap.min(initial=np.inf)), op=MPI.MIN)

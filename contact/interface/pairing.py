@@ -118,6 +118,7 @@ def find_pair(
         space.dofmap.index_map_bs,
         cut,
         domain.revolved,
+        body.masters.still(local.size, space.dofmap.index_map_bs),
     )
     return Pair(nodes, coupling)
 

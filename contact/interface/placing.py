@@ -238,11 +238,8 @@ def _motion(
         Components that no support holds, and what they have taken from the direction, (n, d).
     """
     masters, (free, held) = body.masters, supports
-    if masters.size == 0:
-        return None
-    motion = np.zeros((points.shape[0], body.block_size, masters.size))
-    member = masters.member(part)
-    if member is not None:
+    motion, member = masters.still(len(points), body.block_size), masters.member(part)
+    if motion is not None and member is not None:
         own, d = member.motion(points, body.block_size), body.dim
         # Along the supports nothing is seen of it but what closes the gap.
         towards = np.einsum("ni,nik->nk", held, own[:, :d])

@@ -218,9 +218,7 @@ class ChangedOperator:
         bulk = self._bulk
         start = None if guess is None else bulk.times(bulk.inverse, guess)
         solved = self._inner.solve(bulk.times(bulk.matrix, rhs, transposed=True), rtol, start)
-        found = bulk.times(bulk.matrix, solved)
-        owned = bulk.layout.free.size
-        return np.concatenate([bulk.layout.mask(found[:owned]), found[owned:]])
+        return bulk.times(bulk.matrix, solved)
 
     def multiply(self, values: Array) -> Array:
         """Return the matrix times owned values and global ones, as forces. Collective."""

@@ -167,10 +167,11 @@ class Condensation:
         self.nodes = full.interface.coupled
         self.turn_to(full)
         body, change = full.equilibrium, full.interface.change
-        self._masters = CondensedMasters.of(body, full.interface)
-        self._bulk: Bulk = body if self._masters is None else self._masters.bulk
         pairs = None if change is None else CondensedPairs(body, full.interface, change)
         self._pairs = pairs
+        kept = self._kept().size
+        self._masters = CondensedMasters.of(body, full.interface, kept)
+        self._bulk: Bulk = body if self._masters is None else self._masters.bulk
         self._matrix = full.equilibrium.create_matrix()
         self._kind = ""
         self._schur: SchurComplement | None = None

@@ -39,11 +39,19 @@ class CondensedMasters:
         self._responses = np.zeros((body.owned, self._free.size))
 
     @staticmethod
-    def of(body: BodyEquilibrium, interface: Interface) -> CondensedMasters | None:
-        """Return those of a body and its interface; None where there are none. Collective."""
+    def of(body: BodyEquilibrium, interface: Interface, size: int) -> CondensedMasters | None:
+        """Return those of a body and its interface; None where there are none. Collective.
+
+        Parameters
+        ----------
+        body, interface
+            The body and its interface.
+        size
+            Number of kept unknowns of this rank, those of the contact nodes first.
+        """
         if body.masters.size == 0:
             return None
-        kept = np.zeros((interface.coupled.size * body.block_size, body.masters.size))
+        kept = np.zeros((size, body.masters.size))
         motion = interface.jump.motion
         if motion is not None:
             kept[: motion.shape[0] * motion.shape[1]] = motion.reshape(-1, motion.shape[2])

@@ -1,0 +1,91 @@
+"""Current between two piezoelectric bodies, against columns in series."""
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+
+from contact.body.description import Body, Fixed, Material
+from contact.body.rigid import Electrode
+from contact.interface.current import Conductor
+from contact.methods.fixed_point import FixedPoint
+from contact.methods.newton import Newton
+from contact.methods.options import FixedPointOptions, NewtonOptions
+from contact.output.balances import charge_balance
+from contact.output.motions import movements
+from contact.problem.problem import Contact, ContactProblem
+from forms.hencky import Linear
+from forms.laws import PerfectConductivity, ShiftedConductivity, Truncation
+from forms.piezo import from_voigt
+from tests.problems.blocks import Blocks
+from tests.problems.mechanics import constant, flat
+
+SELF = MPI.COMM_SELF
+VOLTS, CONDUCTANCE, UPPER, LOWER = 3.0, 2.0, 0.5, 4.0
+
+
+def columns(electrode: float | None = None) -> ContactProblem:
+    """Return two blocks of height and width 1 without coupling, pressed onto each other.
+
+    Parameters
+    ----------
+    electrode
+        Charge of the upper electrode; None where that is held at `VOLTS`.
+    """
+    still = [constant(0.0, 2), constant(0.0, 2)]
+    down = [constant(0.0, 2), constant(-0.01, 2)]
+    volts = None if electrode is not None else constant(VOLTS, 2)
+    fixed = [Fixed("bottom", still, constant(0.0, 2)), Fixed("top", down, volts)]
+    materials = [
+        Material(Linear(1.0, 0.3), from_voigt(np.zeros((3, 6)), beta * np.eye(3)), (name,))
+        for name, beta in (("upper", UPPER), ("lower", LOWER))
+    ]
+    body = Body.piecewise(materials, fixed)
+    if electrode is not None:
+        body = Body(
+            body.law, fixed, (), body.piezo, body.regions, (), (Electrode("top", electrode),)
+        )
+    # Without a fixed potential what touches has to conduct before it is pressed.
+    law = PerfectConductivity(CONDUCTANCE)
+    conducts = law if electrode is None else ShiftedConductivity(CONDUCTANCE, 1e3)
+    conductor = Conductor(conducts, 0.0, Truncation(np.inf))
+    contact = Contact("under", flat(), conductor=conductor, against="over")
+    return ContactProblem(Blocks(jitter=0.1).domain(SELF), body, contact)
+
+
+def solved(problem, method):
+    state, outcome = method.solve()
+    assert outcome.converged, outcome.reason
+    return state, charge_balance(problem, state)
+
+
+@pytest.mark.parametrize("how", ["condensed", "whole", "uzawa"])
+def test_columns_in_series(how):
+    """I = V/(H_1/beta_1 + 1/k + H_2/beta_2), and what leaves one body enters the other."""
+    problem = columns()
+    if how == "uzawa":
+        method = FixedPoint(problem, FixedPointOptions(tolerance=1e-11))
+    else:
+        options = NewtonOptions(tolerance=1e-11, condense=how == "condensed")
+        method = Newton(problem, options)
+    state, charges = solved(problem, method)
+    current = VOLTS / (1 / UPPER + 1 / CONDUCTANCE + 1 / LOWER)
+    assert abs(charges.electrodes["top"]) == pytest.approx(current, rel=1e-10)
+    lost = charges.electrodes["top"] + charges.electrodes["bottom"]
+    assert abs(lost) < 1e-12 * current
+    points, phi = problem.equilibrium.layout.points, problem.equilibrium.nodal(state.x)[:, 2]
+    volts = problem.equilibrium.phi_scale * phi
+    upper = points[:, 1] > 1.5
+    slope = np.polyfit(points[upper, 1], volts[upper], 1)[0]
+    assert slope == pytest.approx(current / UPPER, rel=1e-9)
+
+
+@pytest.mark.parametrize("condense", [True, False])
+def test_an_electrode_of_given_charge_on_a_column_in_series(condense):
+    problem = columns(0.25)
+    method = Newton(problem, NewtonOptions(tolerance=1e-11, condense=condense))
+    state, charges = solved(problem, method)
+    potential = movements(problem, state)["electrodes"]["top"]["potential"]
+    resistance = 1 / UPPER + 1 / CONDUCTANCE + 1 / LOWER
+    assert abs(potential) == pytest.approx(0.25 * resistance, rel=1e-10)
+    assert charges.electrodes["top"] == pytest.approx(0.25, rel=1e-10)
+    assert charges.electrodes["bottom"] == pytest.approx(-0.25, rel=1e-10)
