@@ -151,17 +151,18 @@ def figure_7_6(report: Report, coarse: bool) -> dict[str, Array]:
         ]
     else:
         variants = [
-            Variant("P1, f2 = -0.005", small, 1, (8, 16, 32, 64, 128), 512),
-            Variant("P1, f2 = -0.05", large, 1, (8, 16, 32, 64, 128), 512),
-            Variant("P2, f2 = -0.005", small, 2, (8, 16, 32, 64), 256),
-            Variant("P2, f2 = -0.05", large, 2, (8, 16, 32, 64), 256),
+            Variant("P1, f2 = -0.005", small, 1, (8, 16, 32, 64), 512),
+            Variant("P1, f2 = -0.05", large, 1, (8, 16, 32, 64), 512),
+            Variant("P2, f2 = -0.005", small, 2, (8, 16, 32), 256),
+            Variant("P2, f2 = -0.05", large, 2, (8, 16, 32), 256),
         ]
     return mesh_series(
         report,
         "figure-7-6",
         "Figure 7.6: error against a reference solution, Example 7.2, rho = 1e4",
         "The thesis's reference is its finest tested mesh, so that its last point means nothing; "
-        "here it is two levels finer than the finest mesh. The solution is singular at the "
+        "here it is three levels finer than the finest mesh, for with two the last order comes out "
+        "about 0.05 too large. The solution is singular at the "
         "corners of the bar, above all at (4, 0), which the load presses down and where the "
         "pressure peaks, and at the clamped ones: P1 falls short of order 1 in H1, and P2 gains "
         "accuracy but no order.",

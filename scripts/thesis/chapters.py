@@ -47,6 +47,7 @@ PARTS = (
     Part("figures_mechanics", "Example 7.2: Figures 7.4, 7.5, 7.7 and 7.8", tables=False),
     Part("table_7_2", "Example 7.2: Table 7.2, the penalty method, Theorem 4.2"),
     Part("convergence_mechanics", "Figure 7.6 and Theorems 3.2, 4.3 and 4.5", package="studies"),
+    Part("corner", "The singular corner of Example 7.2", figures=False, package="studies"),
     Part("pressure_convergence", "Convergence of the contact pressure", package="studies"),
     Part("nonlocal_friction", "Non-local friction at work", package="studies"),
     Part("tables_piezo", "Examples 8.1 and 8.2: Tables 8.2 and 8.3", figures=False),

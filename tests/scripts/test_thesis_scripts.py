@@ -9,7 +9,7 @@ from contact import build_problem, solve_problem
 from contact.case.file import Friction
 from scripts.cases import bar
 from scripts.reporting import Report
-from scripts.studies import pressure_convergence, refinement_8, sensitivity
+from scripts.studies import corner, pressure_convergence, refinement_8, sensitivity
 from scripts.studies.dual_norm import DualNorm
 from scripts.thesis import setups, stopping_8_3
 
@@ -68,3 +68,13 @@ def test_the_pressure_converges_in_the_dual_norm(tmp_path):
     assert found[1][-1] < 0.5 * found[1][0]
     assert found[2][-1] < 0.2 * found[2][0]
     assert found[2][-1] < found[1][-1]
+
+
+def test_corner_exponents(tmp_path):
+    """90 degrees: sin(pi lambda/2)^2 = 1 - lambda^2 for nu = 1/2, and 0.711 for nu = 0.3."""
+    power = corner.exponent(0.5)
+    assert np.sin(np.pi / 2 * power) ** 2 == pytest.approx(1 - power**2, abs=1e-12)
+    assert power == pytest.approx(0.5946, abs=1e-4)
+    assert corner.exponent(0.3) == pytest.approx(0.7112, abs=1e-4)
+    fitted = corner.main(["--coarse", "--out", str(tmp_path)])
+    assert fitted[-1] == pytest.approx(corner.exponent(0.3), abs=0.03)

@@ -1,0 +1,71 @@
+"""The corner on which the bar stands: its singular exponent, by theory and from pressures.
+
+`python3 -m scripts.studies.corner [--out DIR] [--coarse]`, also under mpirun.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from scipy.optimize import brentq
+
+from scripts.cases import bar
+from scripts.reporting import Report, observed_orders, options, solved
+
+#: Poisson's ratio and decay of (7.16) of Example 7.2.
+POISSON, RHO = 0.3, 1e4
+
+
+def exponent(poisson: float, angle: float = np.pi / 2) -> float:
+    """Return lambda of u ~ r^lambda in a corner with one side held and one free, plane strain.
+
+    The least root of sin(lambda omega)^2 = ((kappa + 1)^2 - 4 lambda^2 sin(omega)^2) / (4 kappa),
+    kappa = 3 - 4 nu (Williams, J. Appl. Mech. 19 (1952) 526).
+    """
+    kappa = 3 - 4 * poisson
+
+    def defect(power: float) -> float:
+        given = ((kappa + 1) ** 2 - 4 * power**2 * np.sin(angle) ** 2) / (4 * kappa)
+        return float(np.sin(power * angle) ** 2 - given)
+
+    return float(brentq(defect, 0.3, 0.99))
+
+
+def main(arguments: Sequence[str] | None = None) -> list[float]:
+    """Make the table; return the fitted exponents. Collective."""
+    chosen = options(__doc__, "corner", arguments)
+    names = ("1/h", "status", "pressure at (4, 0)", "lambda, fitted", "lambda, theory", "residual")
+    columns: dict[str, list[object]] = {name: [] for name in names}
+    cells, pressures = (8, 16, 32) if chosen.coarse else (16, 32, 64, 128), []
+    for n in cells:
+        solution = solved(bar(n, -0.005, RHO))
+        nodes = solution.problem.nodes
+        last = nodes.gather(nodes.points[:, 0]).argmax()
+        pressures.append(float(nodes.gather(solution.pressure)[last]))
+        sticks = nodes.gather((solution.status == "stick").astype(float))[last] > 0
+        columns["status"].append("sticks" if sticks else "slides")
+        columns["residual"].append(solution.outcome.kkt.largest)
+    # p ~ h^(lambda - 1)
+    fitted = [order + 1 for order in observed_orders(1 / np.array(cells), pressures)]
+    theory = exponent(POISSON)
+    columns["1/h"] = list(cells)
+    columns["pressure at (4, 0)"] = list(pressures)
+    columns["lambda, fitted"] = list(fitted)
+    columns["lambda, theory"] = [theory] * len(cells)
+    Report(chosen.out).table(
+        "corner",
+        "Exponent of the singular corner (4, 0) of Example 7.2, f2 = -0.005, rho = 1e4",
+        columns,
+        "The last node sticks: the corner is one of 90 degrees with a side that is held and one "
+        "that is free, as those at the clamped end are too, and u ~ r^lambda there. The largest "
+        f"pressure thus grows like h^(lambda - 1) for ever, and P1 and P2 have order {theory:.3f} "
+        "in H1 on uniform meshes in the end, which Figure 7.6 approaches from above. A mesh graded "
+        f"like r^(1 - 1/q) with q > 1/lambda = {1 / theory:.2f} would give P1 its order 1 back, "
+        f"with q > 2/lambda = {2 / theory:.2f} P2 its order 2 as far as these corners go.",
+    )
+    return fitted[1:]
+
+
+if __name__ == "__main__":
+    main()
