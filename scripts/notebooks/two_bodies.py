@@ -7,8 +7,8 @@
 # %% [markdown]
 # # Two bodies: a steel cylinder on a block of aluminium
 #
-# Parts of one mesh may touch each other: `[contact] against = ...`, with a mortar method in between,
-# so that their meshes need not match. The example is NAFEMS's R0094-1, half of it by symmetry.
+# Parts of one mesh may touch each other: `[contact] against = ...`. A mortar method in between lets
+# their meshes be as they are. The example is NAFEMS's R0094-1, half of it by symmetry.
 
 # %%
 import matplotlib.pyplot as plt
