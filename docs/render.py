@@ -4,6 +4,7 @@ The pages go to ``docs/notebooks``, for Sphinx; they are not kept in the reposit
 """
 
 import base64
+import os
 import sys
 from pathlib import Path
 
@@ -56,6 +57,7 @@ def _output(output: dict, stem: str) -> list[str]:
 
 
 if __name__ == "__main__":
+    os.environ.pop("MPLBACKEND", None)  # the kernel shows figures in the notebook
     for old in PAGES.glob("*"):
         old.unlink()
     for chosen in NOTEBOOKS:

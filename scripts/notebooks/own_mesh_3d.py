@@ -85,7 +85,7 @@ print(f"{solution.contact_area:.0f} of {contact.weight.sum():.0f} mm2 touch")
 solution.plot()
 
 # %% [markdown]
-# The foot lifts off at its far end, away from the load. Is the balance right? The table bears the
+# Heel and washer bear; in between the foot lifts off. Is the balance right? The table bears the
 # screw's force, but for the polygons that stand for its circles:
 
 # %%
