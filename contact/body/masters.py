@@ -197,6 +197,8 @@ def make_masters(
     members: list[Member] = []
     described: list[Rigid | Electrode] = [*body.rigid, *body.electrodes]
     for what in described:
+        if domain.revolved and isinstance(what, Rigid):
+            _check_revolved(what)
         begin = members[-1].columns.stop if members else 0
         scale = body.phi_scale if isinstance(what, Electrode) else domain.size
         members.append(Member(what, begin, scale))
@@ -208,6 +210,16 @@ def make_masters(
         if not member.foundation:
             ties = ties + _tie(domain, space, member, free, tied, size)
     return Masters(domain.comm, tuple(members), unknown, ties, tied)
+
+
+def _check_revolved(what: Rigid) -> None:
+    """Refuse motions that a body of revolution has not."""
+    radial, _, turn = what.values
+    if any(value is None or callable(value) or value != 0 for value in (radial, turn)):
+        raise InputError(
+            f"{what.name} on {what.on!r}: what is rigid moves along the axis alone where space is "
+            "axisymmetric; accepted: 0 for the first component of the displacement, no rotation"
+        )
 
 
 def _tie(

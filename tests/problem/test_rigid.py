@@ -246,6 +246,16 @@ def test_bad_motions_are_refused(changes, words):
         build_problem(parse_case(data), SELF)
 
 
+@pytest.mark.parametrize("changes", [{"displacement": ["free", 0.0]}, {"rotation": 1.0}])
+def test_nothing_leaves_the_axis_of_revolution(changes):
+    data = indented().model_dump(exclude_unset=True)
+    data["space"] = {"kinematics": "axisymmetric"}
+    data["contact"]["foundation"]["centre"] = [0.0, 2.0]
+    data["contact"]["rigid"] |= changes
+    with pytest.raises(InputError, match="along the axis alone"):
+        build_problem(parse_case(data), SELF)
+
+
 @pytest.mark.parametrize(
     ("rigid", "words"),
     [
