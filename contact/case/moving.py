@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Any, TypeAlias
 
-from contact.case.rigid import Moving
+from contact.case.rigid import NOTHING, Moving
 from contact.case.types import Words, fault
 
 #: `contact.case.file.Case`.
@@ -27,6 +27,9 @@ def check_moving(case: Case) -> None:
     for i, part in enumerate(case.rigid):
         if part.on in touched:
             raise fault(f"rigid.{i}.on", part.on, "a part beside the contact part")
+    if case.space.kinematics == "axisymmetric":
+        for path, motion in moving(case):
+            _check_along_axis(path, motion)
     for key in ("rigid", "electrode"):
         parts = [section.on for section in getattr(case, key)]
         for i, on in enumerate(parts):
@@ -38,3 +41,14 @@ def check_moving(case: Case) -> None:
     for i, section in enumerate(case.electrode):
         if section.on in held:
             raise fault(f"electrode.{i}.on", section.on, "a part whose potential is not fixed")
+
+
+def _check_along_axis(path: str, section: Moving) -> None:
+    """Raise a fault if something moves otherwise than along the axis of a body of revolution."""
+    across = (section.displacement or (NOTHING,))[0]
+    if across != NOTHING:
+        given = across if isinstance(across, str) else across.source
+        accepted = "0 across the axis of a body of revolution"
+        raise fault(f"{path}.displacement.0", given, accepted)
+    if any(turn != NOTHING for turn in section.turns):
+        raise fault(f"{path}.rotation", Words("given"), "no rotation of a body of revolution")

@@ -16,6 +16,9 @@ from forms.hencky import Hencky, check_monotonicity
 #: What there is to say, if anything, and whether it is good news.
 Remark: TypeAlias = tuple[str, bool]
 
+#: Nodes across a contact zone from which on it is one.
+ACROSS = 5
+
 #: Largest |eps| of which eps is a good measure: the square of the strain is then 1 % of it.
 SMALL = 0.1
 
@@ -132,3 +135,35 @@ def falling(solution: Solution) -> Remark:
         return "", True
     text = "p_nu falls with the penetration: several solutions may exist, and this is one of them"
     return text, False
+
+
+def resolution(solution: Solution) -> Remark:
+    """Say where so few nodes are in contact that pressures and zones mean nothing.
+
+    A zone that ends within the contact part is looked at; one that covers it has the size that it
+    was given.
+    """
+    problem, nodes = solution.problem, solution.problem.nodes
+    closed = solution.status != "open"
+    count = int(nodes.comm.allreduce(int(np.count_nonzero(closed)), op=MPI.SUM))
+    if count == 0 or count == nodes.size:
+        return "", True
+    points = nodes.gather(nodes.points[closed])
+    if problem.dim == 3:
+        # Of a round zone with that many nodes.
+        across = float(np.sqrt(4 * count / np.pi))
+        width = float(np.sqrt(4 * solution.contact_area / np.pi))
+    elif problem.domain.revolved:
+        # Both halves; the zone of one is known by its area, but for a ring.
+        on_axis = float(points[:, 0].min()) < 1e-9 * problem.domain.size
+        across = 2 * count - 1 if on_axis else 2 * count
+        width = float(2 * np.sqrt(solution.contact_area / np.pi))
+    else:
+        across, width = count, solution.contact_area
+    if across >= ACROSS:
+        return "", True
+    return (
+        f"the contact zone is too coarse to mean anything: {across:.3g} nodes across it; accepted: "
+        f"{ACROSS} at least, for instance elements of at most {width / ACROSS:.2g} there",
+        False,
+    )

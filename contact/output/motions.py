@@ -75,8 +75,11 @@ def _members(problem: ContactProblem, state: State) -> Iterator[tuple[Member, Ar
     forces = body.motion(residual) + masters.gathered(residual[: body.owned])
     forces += masters.forces(state.time)
     for member in masters.members:
-        units = member.units
-        yield member, q[member.columns] * units, forces[member.columns] / units
+        units, own = member.units, forces[member.columns]
+        if problem.domain.revolved and not isinstance(member.what, Electrode):
+            # Over the full turn what acts across the axis, and about it, cancels.
+            own = np.where(np.arange(own.size) == 1, own, 0.0)
+        yield member, q[member.columns] * units, own / units
 
 
 def _one_or_more(values: Array) -> Any:

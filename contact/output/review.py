@@ -40,6 +40,7 @@ def review(solution: Solution) -> None:
         assumptions.fitting(solution.problem),
         assumptions.preload(solution),
         assumptions.falling(solution),
+        assumptions.resolution(solution),
         uniqueness.theorem(solution),
         uniqueness.sliding(solution),
         *uniqueness.conductivity(solution),

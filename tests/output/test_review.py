@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from contact import Solution, load_case, solve
+from contact.case.file import parse_case
 from scripts.cases import CASES
 
 
@@ -64,6 +65,27 @@ def test_a_layer_adds_its_constants():
 def test_what_a_conductivity_gives_up_is_said(law, good, words):
     solution = reviewed("piezo-8-1-conductive", "mesh.cells=[16, 8]", f"electric.law={law}")
     assert said(solution.notes if good else solution.warnings, words)
+
+
+@pytest.mark.parametrize("kinematics", ["axisymmetric", "plane_strain"])
+def test_contact_that_is_too_coarse_is_warned_of(kinematics):
+    """A ball, or half a cylinder, that touches with a node or two; the named size is enough."""
+    words, plate = "too coarse to mean anything", {"point": [0.0, 0.0], "normal": [0.0, 1.0]}
+    mesh = {"generator": "quarter_disc", "radius": 10.0, "contact_width": 2.0, "size": 2.0}
+    data = {
+        "space": {"kinematics": kinematics},
+        "material": {"young": 1000.0, "poisson": 0.3},
+        "fixed": [
+            {"on": "top", "displacement": ["free", -0.02]},
+            {"on": "symmetry", "displacement": [0.0, "free"]},
+        ],
+        "contact": {"on": "contact", "foundation": {"shape": "plane", **plate}},
+    }
+    coarse = solve(parse_case({**data, "mesh": {**mesh, "contact_size": 0.4}}))
+    size = float(said(coarse.warnings, words).rpartition("at most ")[2].split()[0])
+    # What few nodes say of the width is only about right.
+    fine = solve(parse_case({**data, "mesh": {**mesh, "contact_size": size / 2}}))
+    assert not [text for text in fine.warnings if words in text]
 
 
 def test_large_strains_are_warned_of():
