@@ -94,9 +94,12 @@ def csv_columns(table: Table) -> Table:
 
 
 def by_contact(table: Table) -> list[Table]:
-    """Return the rows of each contact, in their order."""
-    entries = np.unique(table["entry"])
-    return [{name: v[table["entry"] == i] for name, v in table.items()} for i in entries]
+    """Return the rows of each contact, in their order; of a table that was read too."""
+    owner = table.get("entry", table.get("on"))
+    if owner is None:
+        return [table]
+    _, firsts = np.unique(owner, return_index=True)
+    return [{name: v[owner == owner[i]] for name, v in table.items()} for i in np.sort(firsts)]
 
 
 def held_points(problem: ContactProblem) -> Array:

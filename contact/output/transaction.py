@@ -55,6 +55,9 @@ MEMBERS = (
     "fields.h5",
     "checkpoint.bp",
     "figure-contact.png",
+    "figure-loop.png",
+    "figure-zones.png",
+    "figure-energy.png",
     "figure-deformed.png",
     "figure-potential.png",
 )

@@ -10,6 +10,8 @@ from mpi4py import MPI
 from contact import parse_case, solve, write_outputs
 from contact.build import build_problem
 from contact.evolving import evolve
+from contact.output.figures.saved import plot
+from contact.output.figures.steps import Course
 from tests.problems.bar import changed
 from tests.problems.piezo import COUPLING, PERMITTIVITY
 
@@ -136,3 +138,23 @@ def test_unloading_is_warned_of():
     loaded = {**STEPS, "steps": [2, 1], "amplitudes": {"press": {**PRESS, "value": [0, 1, 2]}}}
     case = case.model_copy(update={"evolution": parse_case(changed(evolution=loaded)).evolution})
     assert not any("nonlinear" in text for text in solve(case, comm=SELF).warnings)
+
+
+def test_figures(tmp_path):
+    """Of a run, and once more from its files: the same figures, all of them drawn."""
+    moved = {"on": "left", "displacement": ["0.001*sin(4*t)", 0.0]}
+    case = case_of(load__0__amplitude=None, fixed=[moved])
+    solution = solve(case, comm=SELF)
+    write_outputs(solution, tmp_path, figures=True)
+    drawn = {path.name for path in tmp_path.glob("figure-*.png")}
+    assert {"figure-loop.png", "figure-zones.png", "figure-energy.png"} <= drawn
+    again = {path.name for path in plot(tmp_path, formats=["svg"])}
+    assert {name.removesuffix(".svg") for name in again} == {
+        name.removesuffix(".png") for name in drawn
+    }
+    figure = Course([r.row for r in solution.steps], [r.table for r in solution.steps]).draw(
+        True, "steps"
+    )["loop"]
+    (line,) = figure.axes[0].lines
+    way = [0.0, *(record.row["driven_x"] for record in solution.steps)]
+    np.testing.assert_allclose(line.get_xdata(), way)

@@ -15,6 +15,7 @@ from matplotlib.figure import Figure
 from contact.output.figures.body import Picture, draw_plane, picture
 from contact.output.figures.contact import NARROW, UNNAMED, draw_line, draw_surface
 from contact.output.figures.space import draw_space
+from contact.output.figures.steps import Course
 from contact.output.solved import Solved
 from contact.output.surface import contact_surface
 from contact.output.table import Table, contact_table, held_points
@@ -72,6 +73,8 @@ class Drawing:
         Whether both halves of a body of revolution are drawn.
     units
         Names of the units, for labels.
+    course
+        The steps of an evolution.
     """
 
     title: str
@@ -83,6 +86,7 @@ class Drawing:
     axes: str = "xy"
     mirror: bool = False
     units: Units = UNNAMED
+    course: Course | None = None
 
     @property
     def _mirrored(self) -> bool:
@@ -136,6 +140,8 @@ class Drawing:
                     if self.plane
                     else draw_surface(self.surface, self.title, self.units)
                 )
+            if contact and self.course is not None:
+                figures |= self.course.draw(self.plane, self.title, self.axes, self.units)
             for name, made in self.pictures:
                 figures[name] = (
                     draw_plane(made, self.table, self.title, self.axes, self._mirrored, self.units)
@@ -192,7 +198,13 @@ def collect(solution: Solved, fields: Sequence[str] = ()) -> Drawing | None:
         return None
     title, plane = heading(solution.title), solution.problem.dim == 2
     axes, mirror = axes_of(solution.problem.domain.revolved), solution.output.mirror
-    return Drawing(title, plane, table, held, surface, pictures, axes, mirror, solution.units)
+    course = None
+    if solution.steps:
+        tables = [record.table for record in solution.steps if record.table is not None]
+        course = Course([record.row for record in solution.steps], tables)
+    return Drawing(
+        title, plane, table, held, surface, pictures, axes, mirror, solution.units, course
+    )
 
 
 def named(field: str, units: Units) -> tuple[str, str]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import json
 from collections.abc import Sequence
+from itertools import groupby
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +17,7 @@ from contact.errors import InputError
 from contact.output import transaction
 from contact.output.figures.body import drawn
 from contact.output.figures.figures import DEFORMED, Drawing, axes_of, heading, named
+from contact.output.figures.steps import Course
 from contact.output.folder import refused, result_folder
 from contact.output.table import Table
 from contact.output.units import Units
@@ -56,7 +58,12 @@ def read_drawing(folder: Path, fields: Sequence[str] = (), mirror: bool = False)
         name, label = named(field, units)
         pictures.append((name, drawn(body, held, field, label)))
     title, axes = heading(summary["title"]), axes_of(summary.get("kinematics") == "axisymmetric")
-    return Drawing(title, d == 2, table, held, surface, pictures, axes, mirror, units)
+    course = None
+    if "steps.csv" in summary.get("files", ()):
+        course = Course(
+            _read(folder, "steps.csv", _rows), _read(folder, "contact-steps.csv", _tables)
+        )
+    return Drawing(title, d == 2, table, held, surface, pictures, axes, mirror, units, course)
 
 
 def plot(
@@ -110,6 +117,24 @@ def _read(folder: Path, name: str, reader: Any) -> Any:
         raise refused(error) from None
     except (ValueError, KeyError, IndexError) as error:
         raise InputError(f"{path}: not as a run has left it ({error})") from None
+
+
+def _rows(path: Path) -> list[dict[str, float]]:
+    """Read ``steps.csv``."""
+    with path.open(newline="", encoding="utf-8") as file:
+        return [{k: float(v) for k, v in row.items()} for row in csv.DictReader(file)]
+
+
+def _tables(path: Path) -> list[Table]:
+    """Read ``contact-steps.csv``: a table a step."""
+    with path.open(newline="", encoding="utf-8") as file:
+        header, *rows = csv.reader(file)
+    found: list[Table] = []
+    for _, group in groupby(rows, key=lambda row: row[0]):
+        columns = zip(*group, strict=True)
+        texts = {name: np.array(values) for name, values in zip(header, columns, strict=True)}
+        found.append({k: v if k in ("status", "on") else v.astype(float) for k, v in texts.items()})
+    return found
 
 
 def _table(path: Path, surface: VTU) -> Table:
