@@ -229,7 +229,7 @@ def draw_plane(
         label = _ranged(shown, picture)
         ax.add_collection(LineCollection(list(picture.outline * [side, 1]), **rest))
         for part in by_contact(table):
-            if part["rigid"].all():
+            if np.all(part.get("rigid", True)):
                 _foundation(ax, part, picture.scale, ends(part, picture.held), side)
     figure.colorbar(shown, ax=ax, location="bottom", label=label, aspect=40, shrink=0.8)
     ax.set_aspect("equal")
