@@ -278,6 +278,13 @@ def test_the_default_ramp_has_a_mesh_limit():
     assert steep[1] > 2 * steep[0]
 
 
+def test_newton_ends_in_contact_with_a_steep_ramp_too():
+    """It once went on from a body that had flown away, and gave that as its best."""
+    solution = solved("8-4", 96, "solver.method=newton", "electric.k_e=0.6", STEEP)
+    assert solution.converged
+    assert 35.0 < -solution.contact_force[1] < 55.0
+
+
 def test_mean_pressure_of_the_review_does_not_count_rounding():
     slip = "friction.mu={law='slip', a=0.05, b=0.02, rho=10.0}"
     notes = []
