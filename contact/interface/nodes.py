@@ -77,22 +77,26 @@ class ContactNodes:
         In front of a foundation at rest these are the nodal unknowns; they are relative to one
         that moves.
         """
-        moving = 0 if self.motion is None else self.motion.shape[2]
-        values = x[: x.size - moving].reshape(-1, self.block_size)
+        values = self._nodal(x)
         nodal = values[self.nodes]
         if self.links is not None:
             nodal[self.links.places] = self.links.apply(values)
         if self.motion is None:
             return nodal
-        return nodal - self.motion @ x[x.size - moving :]
+        return nodal - self.motion @ x[x.size - self.motion.shape[2] :]
+
+    def _nodal(self, values: Array) -> Array:
+        """Return a view of what belongs to nodes; the global unknowns are behind that."""
+        count = values.size // self.block_size
+        return values[: count * self.block_size].reshape(count, self.block_size)
 
     def transpose(self, nodal: Array, into: Array) -> None:
         """Add nodal vectors of shape (n, d) or (n, block_size) to a local dof array.
 
         The opposite ones act on the foundation where that moves, or on the other body. Collective.
         """
-        size, moving = nodal.shape[1], 0 if self.motion is None else self.motion.shape[2]
-        values = into[: into.size - moving].reshape(-1, self.block_size)[:, :size]
+        size = nodal.shape[1]
+        values = self._nodal(into)[:, :size]
         own = np.ones(self.nodes.size, dtype=bool)
         if self.links is not None:
             own[self.links.places] = False

@@ -80,6 +80,15 @@ def _side(problem: ContactProblem, part: str) -> tuple[float, float]:
     return float(total[0] / total[1]), float(least)
 
 
+def regions(solution: Solution) -> tuple[str, bool]:
+    """Say where regions of the mesh, which somebody has named, have one material."""
+    names, materials = solution.problem.domain.regions, solution.problem.body.materials
+    if len(names) == 1 or len(materials) > 1:
+        return "", True
+    which = ", ".join(names)
+    return f"the regions {which} have one material; [[material]] with `on` gives each its own", True
+
+
 def passing(solution: Solution) -> tuple[str, bool]:
     """Warn where pieces of the mesh are in no contact with another: nothing keeps them apart."""
     problem = solution.problem

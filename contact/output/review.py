@@ -47,6 +47,7 @@ def review(solution: Solution) -> None:
         uniqueness.ramp(solution),
         *bodies.choices(solution),
         bodies.passing(solution),
+        bodies.regions(solution),
     ):
         if text:
             (solution.notes if good else solution.warnings).append(text)

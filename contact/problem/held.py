@@ -71,7 +71,8 @@ def _joined(problem: ContactProblem, piece: NDArray[np.int32], count: int) -> ND
         touched[piece[rows // problem.equilibrium.block_size]] = 1
     if nodes.links is not None:
         touched[piece[nodes.links.local]] = 1
-    return np.asarray(problem.comm.allreduce(touched, op=MPI.MAX)) > 0
+    problem.comm.Allreduce(MPI.IN_PLACE, touched, op=MPI.MAX)
+    return touched > 0
 
 
 def _check_group(

@@ -300,3 +300,33 @@ def test_a_foundation_of_its_own_potential_is_no_body():
         InputError, match=r"contact\.electric\.phi_f: .*; accepted: 0, or none, with"
     ):
         parse_case(columns("upper_bottom", "lower_top", 1, phi_f=2.0))
+
+
+@pytest.mark.parallel
+def test_a_rigid_plate_presses_a_block_on_another(comm):
+    """A plate under a force sinks in as far as it takes that force to push it, on any ranks."""
+    roller = {"on": "lower_bottom", "displacement": [0.0, 0.0]}
+    contact = {"on": "upper_bottom", "against": "lower_top"}
+    common = {"contact": contact, "solver": {"tolerance": 1e-12}}
+    plate = {"on": "upper_top", "displacement": [0.0, "free"], "force": [0.0, -1.5]}
+    free = case(fixed=[roller], rigid=[plate], **common)
+    del free["load"]
+    pressed = solve(parse_case(free), comm=comm)
+    assert pressed.converged
+    depth = float(pressed.problem.equilibrium.motion(pressed.state.x)[1])
+    assert depth < 0
+    top = {"on": "upper_top", "displacement": [0.0, depth]}
+    given = case(fixed=[roller, top], **common)
+    del given["load"]
+    pushed_in = solve(parse_case(given), comm=comm)
+    assert pushed_in.converged
+    assert -pushed_in.contact_force[1] == pytest.approx(1.5, rel=1e-9)
+    np.testing.assert_allclose(
+        pushed_in.forces.pressure, pressed.forces.pressure, rtol=0, atol=1e-8
+    )
+    assert pressed.contact_force == pytest.approx(pushed_in.contact_force, rel=1e-9)
+
+
+def test_regions_of_one_material_are_named():
+    notes = solve(parse_case(case())).notes
+    assert any("the regions lower, upper have one material" in note for note in notes)
