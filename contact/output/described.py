@@ -204,5 +204,6 @@ SURFACE: Mapping[str, Item] = {
         "", "0 open, 1 stick, 2 slip; -1 for a node that is held, or a corner of a P2 facet."
     ),
     "row": Item("", "Row of the node in `contact.csv`, from 0; -1 for none."),
-    "entry": Item("", "Number of its `[[contact]]`, from 0; where there are several."),
+    "entry": Item("", "Number of its `[[contact]]`, from 0."),
+    "rigid": Item("", "1 in front of a rigid foundation, 0 in front of another body."),
 }

@@ -148,4 +148,6 @@ def _table(path: Path, surface: VTU) -> Table:
     row = np.asarray(surface.at_points["row"])
     nodes = np.argsort(row)[np.count_nonzero(row < 0) :]
     normal = np.asarray(surface.at_points["normal"])[nodes]
+    columns["entry"] = np.asarray(surface.at_points["entry"])[nodes]
+    columns["rigid"] = np.asarray(surface.at_points["rigid"])[nodes] > 0
     return columns | {f"nu_{axis}": normal[:, i] for i, axis in enumerate("xyz")}
