@@ -252,7 +252,7 @@ def test_nothing_leaves_the_axis_of_revolution(changes):
     data["space"] = {"kinematics": "axisymmetric"}
     data["contact"]["foundation"]["centre"] = [0.0, 2.0]
     data["contact"]["rigid"] |= changes
-    with pytest.raises(InputError, match="along the axis alone"):
+    with pytest.raises(InputError, match="of a body of revolution"):
         build_problem(parse_case(data), SELF)
 
 

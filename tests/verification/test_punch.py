@@ -8,6 +8,7 @@ from mpi4py import MPI
 
 from contact.body.description import Body, Fixed
 from contact.body.rigid import Motion, Rigid
+from contact.errors import InputError
 from contact.interface.obstacle import Plane
 from contact.mesh.domain import Domain, from_mesh
 from contact.mesh.grid import rectangle
@@ -82,6 +83,16 @@ def test_a_moment_tilts_a_flat_punch():
     inside = np.abs(x) < 0.8
     closed = (FORCE - 2 * MOMENT * x) / (np.pi * np.sqrt(1 - np.minimum(x**2, 0.99)))
     assert np.abs(pressure - closed)[inside].max() < 0.05 * closed[inside].max()
+
+
+def test_a_circular_punch_has_no_way_but_along_its_axis():
+    still = [0.0, 0.0]
+    for motion in (
+        Motion([None, 0.0], [0.0], still, [0.0], still),
+        Motion(still, [0.1], still, [0.0], still),
+    ):
+        with pytest.raises(InputError, match="along the axis alone"):
+            pressed(2, 4.0, True, motion)
 
 
 def test_a_circular_punch_sinks_by_its_force():
