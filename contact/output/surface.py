@@ -59,9 +59,9 @@ def contact_surface(solution: Solved, table: Table | None) -> VTU | None:
     names, first = np.unique(names, return_index=True)
     grid = Grid(points[first], np.searchsorted(names, cells), d - 1)
     fields = _fields(problem, table, names, x[first])
-    entry = (names // index_map.size_global).astype(np.int32)
+    owner = (names // index_map.size_global).astype(np.int32)
     rigid = [contact.against is None for contact in problem.contacts]
-    fields |= {"entry": entry, "rigid": np.array(rigid, dtype=np.int32)[entry]}
+    fields |= {"entry": owner, "rigid": np.array(rigid, dtype=np.int32)[owner]}
     return VTU(grid, {name: _completed(values, grid) for name, values in fields.items()}, {})
 
 
