@@ -4,7 +4,15 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from scripts.examples import bar_pressure, electrode_charge, own_contact, own_material, refinement
+from scripts.examples import (
+    bar_pressure,
+    cyclic_sensor,
+    electrode_charge,
+    fretting,
+    own_contact,
+    own_material,
+    refinement,
+)
 
 pytestmark = pytest.mark.parallel
 
@@ -51,3 +59,21 @@ def test_refinement(shared_tmp_path):
     assert np.all(np.log2(coarse / fine) > 0.6)
     MPI.COMM_WORLD.barrier()
     assert (shared_tmp_path / "errors.png").is_file()
+
+
+def test_fretting():
+    """Around the loop the force changes its sign and comes back to the same size."""
+    rows = fretting.main((24, 12), 4)
+    force = dict(zip(rows[:, 0], rows[:, 1], strict=True))
+    assert force[4.0] == pytest.approx(-force[2.0], rel=0.02)
+    assert force[6.0] == pytest.approx(force[2.0], rel=1e-6)
+    assert abs(force[3.0]) > 0.1 * force[2.0]  # friction remembers
+
+
+def test_cyclic_sensor(shared_tmp_path):
+    load, charge = cyclic_sensor.main(shared_tmp_path, (16, 8))
+    # The way back is another one, and from then on nearly the same again.
+    ends = np.flatnonzero(np.isclose(load, 1.0))
+    assert charge[ends[1]] == pytest.approx(charge[ends[2]], rel=1e-3)
+    first, back = (k for k in np.flatnonzero(np.isclose(load, 0.5))[:2])
+    assert abs(charge[back] - charge[first]) > 1e-2 * np.ptp(charge)
