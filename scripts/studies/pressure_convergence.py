@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+from matplotlib.ticker import NullLocator
 
 from contact import InputError, solve_problem
 from contact.methods.options import NewtonOptions
@@ -88,6 +89,8 @@ def main(arguments: Sequence[str] | None = None) -> dict[int, list[float]]:
         axes.loglog(h, 0.3 * h**power, "k:", lw=0.8)
         axes.annotate(f"slope {power:g}", (h[-1], 0.3 * h[-1] ** power), fontsize=6, va="top")
     axes.set(xlabel="$h$", ylabel="relative error of $p$")
+    axes.set_xticks(h, [f"1/{n}" for n in cells])
+    axes.xaxis.set_minor_locator(NullLocator())
     axes.legend(fontsize=6)
     caption = "Convergence of the contact pressure, closed form 4"
     report.table("pressure-convergence-table", caption, columns, NOTE)
