@@ -78,6 +78,9 @@ def contact_table(solution: Solved) -> Table | None:
         "entry": entry,
         "rigid": np.array([e.coupling is None for e in problem.entries])[entry],
     }
+    # How far the foundation has moved along the contact direction.
+    own = problem.equilibrium.nodal(solution.state.x)[nodes.nodes]
+    columns["moved"] = nodes.normal_component(own) - solution.normal_displacement
     order = _order(problem)
     gathered = {name: problem.comm.gather(values) for name, values in columns.items()}
     if order is None:
@@ -89,7 +92,7 @@ def contact_table(solution: Solved) -> Table | None:
 
 def csv_columns(table: Table) -> Table:
     """Return the columns of ``contact.csv``: all but contact direction and numbers."""
-    inner = ("nu_x", "nu_y", "nu_z", "node", "entry", "rigid")
+    inner = ("nu_x", "nu_y", "nu_z", "node", "entry", "rigid", "moved")
     return {name: values for name, values in table.items() if name not in inner}
 
 

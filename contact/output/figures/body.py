@@ -282,7 +282,7 @@ def _body(ax: Axes, picture: Picture, side: int) -> Any:
 def _foundation(ax: Axes, table: Table, scale: float, edges: Array, side: int) -> None:
     """Draw the foundation as far as it faces Gamma_3, moved as the displacements are scaled."""
     points = np.column_stack([table["x"], table["y"]])
-    normal, gap = np.column_stack([table["nu_x"], table["nu_y"]]), table["gap"]
+    normal, gap = np.column_stack([table["nu_x"], table["nu_y"]]), table["gap"] + table["moved"]
     points = np.concatenate([edges[:1], points, edges[1:]])
     normal = np.concatenate([normal[:1], normal, normal[-1:]])
     gap = np.concatenate([gap[:1], gap, gap[-1:]])

@@ -150,4 +150,6 @@ def _table(path: Path, surface: VTU) -> Table:
     normal = np.asarray(surface.at_points["normal"])[nodes]
     columns["entry"] = np.asarray(surface.at_points["entry"])[nodes]
     columns["rigid"] = np.asarray(surface.at_points["rigid"])[nodes] > 0
+    moved = np.asarray(surface.at_points["displacement"])[nodes, : normal.shape[1]]
+    columns["moved"] = np.einsum("ni,ni->n", moved, normal) - columns["u_n"]
     return columns | {f"nu_{axis}": normal[:, i] for i, axis in enumerate("xyz")}
