@@ -1,8 +1,8 @@
-"""GetFEM and this code side by side: a block that is pressed and pushed on another one, both ways.
+"""GetFEM and this code side by side: a block that is pressed and pushed on another one.
 
-``python3 -m scripts.benchmarks.peer_pair [MU]``: the meshes of the recipe `two_blocks` for both, P1.
-GetFEM integrates its augmented Lagrangian at Gauss points of the upper block's facets, with
-continuous multipliers; pressures and displacements agree to the order of the mesh, not to rounding.
+``python3 -m scripts.benchmarks.peer_pair [MU]``: the meshes of the recipe `two_blocks` for both,
+P1. GetFEM integrates its augmented Lagrangian at Gauss points of the upper block's facets, with
+continuous multipliers: displacements agree to the order of the mesh, not to rounding.
 """
 
 from __future__ import annotations
