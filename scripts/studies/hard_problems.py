@@ -204,6 +204,36 @@ def yielding(rng: Rng) -> Case:
     return case
 
 
+def corners(rng: Rng) -> Case:
+    """Draw a block or a beam over a foundation with a step, an edge or a groove."""
+    case = _one(rng, _block(rng, [64, 8], [4.0, 1.0]), _block(rng, [160, 4], [40.0, 1.0]))
+    long = case["mesh"]["size"][0]
+    depth = _one(rng, 1e-3, 1e-2) * long
+    case["contact"]["gap"] = _one(
+        rng,
+        f"where(x > {0.6 * long}, {depth}, 0)",
+        f"{depth / long}*abs(x-{0.6 * long})",
+        f"where(x > {0.3 * long}, where(x < {0.7 * long}, {depth}, 0), 0)",
+    )
+    if long > 10:
+        case["load"][0]["traction"] = [0.0, -_one(rng, 1e-5, 1e-4)]
+    return case
+
+
+def loose(rng: Rng) -> Case:
+    """Draw a block that contact alone holds up; its top, or a side, is guided."""
+    case = _block(rng, [_one(rng, 32, 64), 8], [4.0, 1.0])
+    side = _one(rng, "top", "left")
+    case["fixed"] = [{"on": side, "displacement": [0.0, "free"]}]
+    push = _one(rng, 0.0, 1e-3, -1e-3)
+    case["load"] = [
+        {"on": "top", "traction": [0.0, f"-0.01*(1+x/{_one(rng, 4.0, 40.0)})"]},
+        {"on": "right", "traction": [push, 0.0]},
+    ]
+    case["contact"]["gap"] = _one(rng, 0.0, 1e-2)
+    return case
+
+
 def _pzt() -> dict[str, float]:
     return {"e31": -5.4, "e33": 15.8, "e15": 12.3, "beta11": 8.13866, "beta33": 7.37455}
 
@@ -224,14 +254,16 @@ FAMILIES = {
         units,
         layers,
         yielding,
+        corners,
+        loose,
     )
 }
 
 #: How many problems of each family.
 COUNTS = {
-    "cantilever": 70,
-    "clamped": 30,
-    "lifted": 30,
+    "cantilever": 50,
+    "clamped": 20,
+    "lifted": 20,
     "bimorph": 20,
     "plate": 20,
     "stretched": 40,
@@ -241,4 +273,6 @@ COUNTS = {
     "units": 20,
     "layers": 20,
     "yielding": 10,
+    "corners": 20,
+    "loose": 20,
 }

@@ -2,7 +2,8 @@
 
 `python3 -m scripts.studies.sweep [--out DIR] [--coarse] [--methods newton uzawa] [--only NAME]
 [--hard]`, also under mpirun. The problems are drawn once, with a fixed seed, from the ranges
-below; with --hard from those of `hard_problems`.
+below; with --hard from those of `hard_problems`. With several methods the table says how far
+their displacements are from those of the first, relative to the largest.
 """
 
 from __future__ import annotations
@@ -14,7 +15,7 @@ from typing import Any
 import numpy as np
 from mpi4py import MPI
 
-from contact import build_problem, solve_problem
+from contact import Solution, build_problem, solve_problem
 from contact.case.file import Case, parse_case
 from contact.methods.options import with_method
 from scripts.reporting import Report, parser
@@ -24,6 +25,8 @@ METHODS = ("newton", "uzawa")
 #: How many problems of each family; --coarse takes a tenth.
 COUNTS = {"bar": 120, "piezo": 60, "layer": 40, "hertz": 30, "block": 50}
 SEED = 20240229
+#: Difference from which on two methods are said not to agree.
+AGREE = 1e-7
 
 
 def _rectangle(rng: np.random.Generator, size: list[float], n: int) -> dict[str, Any]:
@@ -217,11 +220,10 @@ def main(arguments: Sequence[str] | None = None) -> None:
     command.add_argument("--only", help="a family, or one problem such as bar-7")
     command.add_argument("--hard", action="store_true", help="those that bend, stick and stretch")
     given = command.parse_args(arguments)
-    rows: dict[str, list[Any]] = {
-        key: [] for key in ("problem", "method", "converged", "solves", "seconds", "why")
-    }
+    keys = ("problem", "method", "converged", "solves", "seconds", "why", "difference")
+    rows: dict[str, list[Any]] = {key: [] for key in keys}
     for _, case in problems(given.coarse, given.only, given.hard):
-        problem = build_problem(case)
+        problem, first = build_problem(case), None
         for method in given.methods:
             begin = time.perf_counter()
             settings = with_method(case.solver, method)
@@ -237,15 +239,27 @@ def main(arguments: Sequence[str] | None = None) -> None:
                 solution.counters.linear_solves,
                 round(time.perf_counter() - begin, 2),
                 fallback if solution.converged else solution.outcome.reason,
+                _difference(solution, first or solution),
             )
+            first = first or solution
             for key, value in zip(rows, row, strict=True):
                 rows[key].append(value)
-            if MPI.COMM_WORLD.rank == 0 and (not solution.converged or fallback):
+            if MPI.COMM_WORLD.rank == 0 and (
+                not solution.converged or fallback or not row[-1] <= AGREE
+            ):
                 print(*row, flush=True)
     report = Report(given.out)
     name = "sweep-hard" if given.hard else "sweep"
     report.numbers(name, rows)
     report.table(f"{name}-summary", "Robustness sweep", summary(rows, given.methods))
+
+
+def _difference(solution: Solution, other: Solution) -> float:
+    """Return the largest difference of displacements over the largest one. Collective."""
+    u, v = solution.displacement.x.array, other.displacement.x.array
+    sizes = np.array([np.abs(u - v).max(initial=0.0), np.abs(v).max(initial=0.0)])
+    MPI.COMM_WORLD.Allreduce(MPI.IN_PLACE, sizes, op=MPI.MAX)
+    return float(sizes[0] / (sizes[1] or 1.0))
 
 
 def summary(rows: dict[str, list[Any]], methods: Sequence[str]) -> dict[str, list[Any]]:
@@ -258,6 +272,7 @@ def summary(rows: dict[str, list[Any]], methods: Sequence[str]) -> dict[str, lis
         "without fall-back": [],
         "median solves": [],
         "most solves": [],
+        "largest difference": [],
     }
     family = np.array([name.rsplit("-", 1)[0] for name in rows["problem"]])
     for name in dict.fromkeys(family):
@@ -267,7 +282,8 @@ def summary(rows: dict[str, list[Any]], methods: Sequence[str]) -> dict[str, lis
             plain = np.array([why == "" for why in rows["why"]])[chosen]
             solves = np.array(rows["solves"])[chosen]
             values = (name, method, chosen.sum(), converged.sum(), (converged & plain).sum())
-            values += (int(np.median(solves)), solves.max())
+            both = np.array(rows["difference"])[chosen & np.array(rows["converged"])]
+            values += (int(np.median(solves)), solves.max(), both.max(initial=0.0))
             for key, value in zip(table, values, strict=True):
                 table[key].append(value)
     return table

@@ -17,6 +17,9 @@ SHORTEST, LONGEST = 0.9, 0.999
 #: holds comes from further away.
 SHARE, LOOSE = 1e-2, 100.0
 
+#: The same for such a body over gaps, over that of the load along these.
+SINKING = 0.1
+
 #: Stiffness against free motions, beside 1 of the nodes: what contact does not hold drifts.
 DRIFT = 1e-8
 
@@ -162,6 +165,10 @@ class Interior:
             float(np.max(depth**2 / give, initial=0.0)),
             float(np.max(bound**2 * aside, initial=0.0)),
         )
+        if body.motions.size and gap.size:
+            # It sinks until the other gaps are small beside what they were.
+            load = float(np.abs(program.load).sum())
+            work = max(work, SINKING * load * float(gap.mean()) / gap.size)
         work = max(work, EPS * program.local)
         # Where the body would lift off, the slack is that from the beginning: grown from a small
         # one it would take the force beyond zero at once, and the step would be cut to nothing.
