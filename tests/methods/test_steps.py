@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from contact import evolve
+from contact import build_problem, evolve, load_case
 from contact.body.amplitude import Tabulated
 from contact.body.description import Body, Fixed
 from contact.errors import InputError
@@ -24,6 +24,7 @@ from contact.problem.problem import Contact, ContactProblem
 from contact.solving import solve
 from forms.hencky import Linear, Log
 from forms.laws import ConstantCoefficient, SlipCoefficient
+from scripts.cases import CASES
 from tests.problems import mechanics
 from tests.problems.mechanics import SlidingBlock, constant
 from tests.problems.stepped import SteppedBlock, to_and_fro
@@ -156,6 +157,21 @@ def test_methods_agree_at_every_step(law):
         bound = interface.bound(nodal, one.state.forces)
         kinds |= set(interface.status(nodal, one.state.forces, bound, rounding=1e-9).tolist())
     assert len(kinds) == 3  # open, sticking and sliding nodes have been met
+
+
+def test_methods_agree_on_a_yielding_piezoelectric_body():
+    """Hencky's law, friction and piezoelectricity together, loaded and unloaded twice."""
+    changes = ["mesh.cells=[8, 4]", "material.law=log", "material.yield_strain=0.005"]
+    changes += ["evolution.steps=[3, 2, 2, 1, 1]", 'load.0.traction=[0.0, "-1*x"]']
+    case = load_case(CASES / "piezo-sensor-cyclic.toml", changes)
+    newton, uzawa = (
+        steps_of(build_problem(case, SELF), case.evolution.ends, replace(told, tolerance=1e-11))
+        for told in TIGHT.values()
+    )
+    for one, two in zip(newton, uzawa, strict=True):
+        assert np.abs(one.state.x - two.state.x).max() < 1e-7 * np.abs(one.state.x).max()
+        difference = np.abs(one.state.forces.friction - two.state.forces.friction).max()
+        assert difference < 1e-7 * one.state.forces.pressure.max()
 
 
 def test_penalty_comes_near():
