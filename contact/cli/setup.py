@@ -37,6 +37,8 @@ def draw_setup(case: Case, problem: ContactProblem) -> Figure | None:
         The case, and the problem that was built of it.
     """
     domain = problem.domain
+    for other in (0, domain.dim):
+        domain.mesh.topology.create_connectivity(domain.dim - 1, other)
     roles = list(_roles(case, problem))
     cells = _corners(domain, domain.dim, _owned(domain))
     nodes = problem.nodes
@@ -146,11 +148,11 @@ def _owned(domain: Domain) -> Indices:
 def _local(domain: Domain, dim: int, entities: Indices) -> Array:
     """Return the corners of entities of this rank, shape (n, corners, d)."""
     mesh = domain.mesh
+    if not entities.size:  # which `entities_to_geometry` divides by
+        return np.empty((0, dim + 1, domain.dim))
     if dim == domain.dim:
         places = _compat.geometry_dofmap(mesh)[entities][:, : dim + 1]
     else:
-        for other in (0, domain.dim):
-            mesh.topology.create_connectivity(dim, other)
         places = dmesh.entities_to_geometry(mesh, dim, entities)
     return np.asarray(mesh.geometry.x[places][..., : domain.dim])
 
