@@ -253,8 +253,8 @@ class RampConductivity:
 
     @property
     def follows_gap(self) -> bool:
-        """True, unless nothing is conducted."""
-        return self.k_e > 0
+        """True, unless nothing is conducted, or the same at any gap."""
+        return self.k_e > 0 and self.delta > 0
 
     def __call__(self, s: Value) -> Value:
         """Return the conductivity at s = u_nu - rho."""

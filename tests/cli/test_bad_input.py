@@ -73,7 +73,7 @@ FILES = {
         ("[mesh.parts.loaded]", '[mesh.parts."a\\nb"]\nside = "base"\n[mesh.parts.loaded]'),
         r"mesh.parts.a\nb.side: given",
     ),
-    "a long key": (("young", f"{LONG} = 1\nyoung"), "kkk...: unknown key; accepted: on, law"),
+    "a long key": (("young", f"{LONG} = 1\nyoung"), "kkk...: unknown key; accepted: on, name"),
     "a long part": (
         ("[mesh.parts.loaded]", f'[mesh.parts.{LONG}]\nside = "base"\n[mesh.parts.loaded]'),
         'side: given "base"',
@@ -106,12 +106,12 @@ FILES = {
         'contact.foundation.raduis: unknown key with shape = "sphere", did you mean radius?',
     ),
     "an unknown shape": (
-        ('on = "bottom"', 'on = "bottom"\nfoundation = {shape = "cone", centre = [0, 0]}'),
-        'contact.foundation.shape: given "cone"; accepted: "plane" or "sphere"',
+        ('on = "bottom"', 'on = "bottom"\nfoundation = {shape = "cube", centre = [0, 0]}'),
+        'contact.foundation.shape: given "cube"; accepted: "plane", "sphere", "cylinder", "cone"',
     ),
     "no shape": (
         ('on = "bottom"', 'on = "bottom"\nfoundation = {centre = [0, 0]}'),
-        'contact.foundation.shape: missing; accepted: "plane" or "sphere"',
+        'contact.foundation.shape: missing; accepted: "plane", "sphere", "cylinder"',
     ),
     "a force": (
         ("traction", "force"),

@@ -14,7 +14,7 @@ from contact.mesh.refinement import refined
 from contact.mesh.transfer import carry
 from forms.hencky import energy_density
 from forms.kinematics import strain
-from scripts.reporting import Report, subplots
+from scripts.reporting import Report
 from scripts.studies import convergence_mechanics as study
 from scripts.studies import nonlocal_friction
 from scripts.thesis import figures_mechanics, table_7_2
@@ -149,10 +149,3 @@ def test_figures_mechanics(tmp_path):
         assert (tmp_path / f"figure-{name}.png").stat().st_size > 10_000
         assert (tmp_path / f"figure-{name}.csv").is_file()
     assert (tmp_path / "multipliers-and-penalty.png").is_file()
-
-
-def test_units_of_example_7_2():
-    figure, axes = subplots()
-    axes.set(xlabel="$x$ (mesh units)", ylabel="$p$ (units of the case)")
-    figures_mechanics.in_units(figure)
-    assert (axes.get_xlabel(), axes.get_ylabel()) == ("$x$ (mm)", "$p$ (daN/mm²)")
