@@ -261,9 +261,9 @@ FAMILIES = {
 
 #: How many problems of each family.
 COUNTS = {
-    "cantilever": 50,
-    "clamped": 20,
-    "lifted": 20,
+    "cantilever": 70,
+    "clamped": 30,
+    "lifted": 30,
     "bimorph": 20,
     "plate": 20,
     "stretched": 40,
