@@ -16,6 +16,7 @@ from contact.mesh.grid import Piece, rectangle
 from contact.problem.problem import Contact, ContactProblem
 from forms.hencky import Log
 from forms.laws import SlipCoefficient
+from tests.problems.everywhere import displacements
 from tests.problems.mechanics import (
     bar,
     constant,
@@ -30,15 +31,6 @@ from tests.problems.revolution import pressed_cylinder
 pytestmark = pytest.mark.parallel
 
 TOLERANCE = 1e-8
-
-
-def displacements(loop):
-    """Return the displacements of all nodes, sorted by position, on every rank."""
-    body = loop.problem.equilibrium
-    x = body.layout.points
-    u = loop.state.x[: body.owned].reshape(-1, body.block_size)[:, : body.dim]
-    x, u = (np.concatenate(body.comm.allgather(part)) for part in (x, u))
-    return u[np.lexsort(np.round(x, 9).T)]
 
 
 def agree(comm, make):
