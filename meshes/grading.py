@@ -91,7 +91,22 @@ def _check_count(gmsh: Any, size: float, near: float, width: float, flat: int) -
     far = sum(math.log10(extent / size) for extent in extents)
     zone = (dim - flat) * math.log10(min(width, *extents) / near)
     zone += sum(math.log10(extent / near) for extent in extents[:flat])
-    count = max(far, zone)
+    check_cells(max(far, zone))
+
+
+def check_cells(count: float) -> None:
+    """Refuse more cells than the memory holds, and say what many take.
+
+    Parameters
+    ----------
+    count
+        Decimal logarithm of their number, rather too small.
+
+    Raises
+    ------
+    InputError
+        If Gmsh has not the memory for them.
+    """
     machine = os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
     if count > math.log10(machine / CELL_MEMORY):
         raise InputError(

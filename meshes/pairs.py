@@ -1,5 +1,6 @@
 """Two bodies, or three, that touch each other: each a region of its own, with its own nodes."""
 
+import math
 from collections.abc import Sequence
 from typing import Any
 
@@ -22,7 +23,7 @@ def two_blocks(
     """
     import gmsh
 
-    from meshes.grading import finish
+    from meshes.grading import check_cells, finish
 
     bodies: dict[str, list[int]] = {}
     parts: dict[str, list[int]] = {}
@@ -30,6 +31,7 @@ def two_blocks(
         ("lower", lower_width, -lower_height, 0.0, lower_size),
         ("upper", upper_width, 0.0, upper_height, upper_size),
     ):
+        check_cells(math.log10(width / size) + math.log10((high - low) / size))
         half = width / 2
         corners = [(-half, low), (half, low), (half, high), (-half, high)]
         bodies[name], sides = _polygon(gmsh.model.geo, corners, size)

@@ -112,6 +112,10 @@ def _side_by_side(entries: Sequence[Entry]) -> ContactNodes:
     }
     if first.motion is not None:
         together["motion"] = np.concatenate([entry.nodes.motion for entry in entries])
+    held = [
+        np.zeros_like(e.nodes.normal) if e.nodes.held is None else e.nodes.held for e in entries
+    ]
+    together["held"] = np.concatenate(held)
     return replace(first, **together, cut=max(entry.nodes.cut for entry in entries))
 
 

@@ -51,6 +51,9 @@ class ContactNodes:
     links
         Jumps between bodies: what is opposite of contact nodes; None where all obstacles are
         rigid.
+    held
+        What supports have taken from the contact direction, shape (n, d): times what they
+        prescribe at time 1 it is off the gap. None for nothing.
     """
 
     comm: MPI.Comm
@@ -65,6 +68,7 @@ class ContactNodes:
     revolved: bool = False
     motion: Array | None = None
     links: Links | None = None
+    held: Array | None = None
 
     @property
     def dim(self) -> int:

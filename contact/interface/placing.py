@@ -211,6 +211,7 @@ def find_nodes(
         cut if cut > 1e-5 * domain.size else 0.0,
         domain.revolved,
         _motion(body, part, points, direction, (free, held)),
+        held=held,
     )
     if jump.size == 0:
         raise InputError(

@@ -12,7 +12,9 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from mpi4py import MPI
 
+from contact.errors import InputError
 from contact.interface.history import SlipHistory
 from contact.linear.operator import Counters
 from contact.methods.interrupt import Interrupted
@@ -30,6 +32,9 @@ HALVINGS = 4
 
 #: Largest part of the last step's way that the prediction adds to it.
 FARTHEST = 2.0
+
+#: Part of the body's size that is no motion.
+ROUNDING = 1e-12
 
 #: Stands for residuals until they are measured.
 NOTHING = KKT(np.inf, np.inf, np.inf)
@@ -92,7 +97,13 @@ class Evolution:
             Ends of the steps, increasing. Those that the start has passed are left out.
         begin
             Time at rest.
+
+        Raises
+        ------
+        InputError
+            If supports that move take contact nodes towards the foundation.
         """
+        check_gaps(self.problem, times)
         for k, end in enumerate(times):
             whole = end - (times[k - 1] if k > 0 else begin)
             while (now := begin if self._last is None else self._last.time) < end:
@@ -130,6 +141,38 @@ class Evolution:
         x = last.x if self._before is None else last.x + share * (last.x - self._before.x)
         x = problem.equilibrium.prescribe(x, problem.time)
         return State(x, last.forces, problem.time)
+
+
+def check_gaps(problem: ContactProblem, times: Sequence[float]) -> None:
+    """Refuse supports that close gaps in the course of time. Collective.
+
+    A component that is fixed aslant to the contact direction is off the gap, with its value at
+    time 1.
+
+    Raises
+    ------
+    InputError
+        If that value is another one at the end of a step.
+    """
+    nodes, body = problem.nodes, problem.equilibrium
+    slant = nodes.held is not None and bool(np.abs(nodes.held).max(initial=0.0) > 0)
+    if not problem.comm.allreduce(slant, op=MPI.LOR):
+        return
+
+    def closed(time: float) -> Array:
+        given = body.nodal(body.prescribe(body.rest(), time))[nodes.nodes, : nodes.dim]
+        held = np.zeros_like(given) if nodes.held is None else nodes.held
+        return np.asarray(np.einsum("ni,ni->n", held, given))
+
+    counted = closed(1.0)
+    for time in times:
+        change = nodes.maximum(np.abs(closed(time) - counted))
+        if change > ROUNDING * problem.domain.size:
+            raise InputError(
+                f"fixed: by time {time:g} a support moves contact nodes by {change:.3g} along "
+                "their contact direction, which it meets aslant; accepted: supports that move "
+                "contact nodes along the foundation, or hold them where they are"
+            )
 
 
 def solve_step(

@@ -202,6 +202,7 @@ def test_smaller_sizes_give_more_nodes(name):
         ("bar", {"contact_size": 1e-8}, r"cells, which .* accepted: sizes that give at most"),
         ("block", {"size": 1e-4}, r"at least 1e\d{2} cells, which take more memory than the"),
         ("quarter_disc", {"contact_size": 1e-7}, r"at least 1e\d{2} cells"),
+        ("two_blocks", {"lower_size": 8e-8}, r"at least 1e\d{2} cells"),
         ("sphere", {"contact_size": 1e-200}, r"at least 1e\d{3} cells"),
         ("bar", {"loaded_from": 4.0}, "loaded_from must be less than the length"),
         ("bar_on_ends", {"end": 6.0}, "end must be less than half the length"),
