@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable
 from typing import Protocol
 
@@ -51,7 +52,7 @@ class Obstacle(Protocol):
         """
 
 
-class Shape:
+class Shape(ABC):
     """What shapes share: the contact direction, and gaps along rays.
 
     A shape is a frozen dataclass with two fields besides its own: `direction`, and `along`, the
@@ -63,12 +64,12 @@ class Shape:
 
     is_shape = True
 
+    @abstractmethod
     def distance(self, points: Array) -> tuple[Array, Array]:
         """Return signed distances, positive outside, (n,), and outward unit normals, (n, d).
 
         Normals are those of the nearest points; NaN where there is none.
         """
-        raise NotImplementedError
 
     def ray(self, points: Array, rays: Array) -> Array:
         """Return how far the surface is along unit vectors, shape (n,): infinite if never met."""
