@@ -1,9 +1,10 @@
-"""A cylinder pressed on a rigid plane: how much of the contact sticks, in one step and in many.
+"""How much of a growing contact sticks: a cylinder on a rigid plane, a rigid ball on a half space.
 
 The contact grows as the load does, and friction fixes each part of it where it first touches.
-Spence showed that the stick zone then has a fixed share k = c/a of the contact, whatever the load:
-K'(k)/K(k) = (1 - 2 nu)/(2 mu (1 - nu)) where the shear's effect on the pressure is left out. A
-static law knows one step only, and finds far less.
+Spence (J. Elasticity 5 (1975) 297) showed that the stick zone then has a fixed share k = c/a of the
+contact, whatever the load. Where the shear's effect on the pressure is left out, with
+gamma = (1 - 2 nu)/(2 (1 - nu)), K'(k)/K(k) = gamma/mu of the cylinder, and of the ball
+ln((1 + k)/(1 - k))/(2 k) = (mu/gamma) K'(k). A static law knows one step only, and finds far less.
 
     python3 -m scripts.studies.stick_ratio [STEPS...]
 """
@@ -11,7 +12,8 @@ static law knows one step only, and finds far less.
 from __future__ import annotations
 
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from scipy.optimize import brentq
@@ -25,17 +27,11 @@ from scripts.cases import CASES
 
 POISSON, HALF_WIDTH = 0.3, 0.02
 
-#: Friction coefficient -> stick ratio with the shear's effect on the pressure, +-0.005.
-COUPLED = {0.1: 0.035, 0.2: 0.362, 0.3: 0.689, 0.5: 0.941}
+#: (1 - 2 nu)/(2 (1 - nu)).
+GAMMA = (1 - 2 * POISSON) / (2 * (1 - POISSON))
 
 
-def uncoupled(mu: float, poisson: float = POISSON) -> float:
-    """Return Spence's stick ratio without the shear's effect on the pressure."""
-    ratio = (1 - 2 * poisson) / (2 * (1 - poisson)) / mu
-    return float(brentq(lambda k: ellipk(1 - k * k) / ellipk(k * k) - ratio, 1e-12, 1 - 1e-12))
-
-
-def cylinder(mu: float, cells: int) -> ContactProblem:
+def cylinder(mu: float, cells: int = 160) -> ContactProblem:
     """Return half a cylinder whose contact has a half width of `cells` elements at time 1."""
     size = HALF_WIDTH / cells
     modulus = 2000.0 / (1 - POISSON**2)
@@ -49,6 +45,67 @@ def cylinder(mu: float, cells: int) -> ContactProblem:
         "friction.mu": f"{mu}",
     }
     return build_problem(load_case(CASES / "hertz.toml", changes))
+
+
+def ball(mu: float, cells: int = 160) -> ContactProblem:
+    """Return a half space under a ball whose contact has a radius of `cells` elements at time 1."""
+    changes = {
+        "space.degree": "1",
+        "mesh.radius": "1.1",
+        "mesh.contact_size": f"{1 / cells}",
+        "mesh.edge_size": f"{1 / cells}",
+        "mesh.growth": "0.25",
+        "friction": f"{{ law = 'coulomb', mu = {mu} }}",
+    }
+    return build_problem(load_case(CASES / "indent-ball.toml", changes))
+
+
+def cylinder_alone(k: float, mu: float) -> float:
+    """Return what is 0 at the cylinder's ratio without the shear's effect on the pressure."""
+    return float(ellipk(1 - k * k) / ellipk(k * k) - GAMMA / mu)
+
+
+def ball_alone(k: float, mu: float) -> float:
+    """Return what is 0 at the ball's."""
+    return float(np.arctanh(k) / k - mu / GAMMA * ellipk(1 - k * k))
+
+
+@dataclass(frozen=True)
+class Pressed:
+    """What is pressed.
+
+    Attributes
+    ----------
+    make
+        The problem of a friction coefficient, whose load grows with the time up to 1.
+    coupled
+        Friction coefficient -> stick ratio with the shear's effect on the pressure, +-0.005.
+    alone
+        Zero at the stick ratio without it, a function of k and mu.
+    """
+
+    make: Callable[[float, int], ContactProblem]
+    coupled: Mapping[float, float]
+    alone: Callable[[float, float], float]
+
+    def uncoupled(self, mu: float) -> float:
+        """Return Spence's stick ratio without the shear's effect on the pressure."""
+        return float(brentq(self.alone, 1e-9, 1 - 1e-12, args=(mu,)))
+
+    def ratios(self, mu: float, steps: Sequence[int], cells: int = 160) -> list[float]:
+        """Return the stick ratio of a contact that has grown in each of some numbers of steps."""
+        problem, found = self.make(mu, cells), []
+        for count in steps:
+            *_, last = evolve(problem, np.arange(1, count + 1) / count, NewtonOptions())
+            found.append(stick_ratio(problem, last))
+        return found
+
+
+#: Of the cylinder the force grows, of the ball the depth: the contact with the root of either.
+PRESSED = {
+    "cylinder": Pressed(cylinder, {0.1: 0.035, 0.2: 0.362, 0.3: 0.689, 0.5: 0.941}, cylinder_alone),
+    "ball": Pressed(ball, {0.1: 0.202, 0.2: 0.697, 0.3: 0.896, 0.5: 0.984}, ball_alone),
+}
 
 
 def stick_ratio(problem: ContactProblem, state: State) -> float:
@@ -72,25 +129,18 @@ def _between(x: np.ndarray, beyond: np.ndarray) -> float:
     return float(x[first] + x[max(first - 1, 0)]) / 2 if first > 0 else 0.0
 
 
-def stick_ratios(mu: float, steps: Sequence[int], cells: int = 160) -> list[float]:
-    """Return the stick ratio of a contact that has grown in each of some numbers of steps."""
-    problem, found = cylinder(mu, cells), []
-    for count in steps:
-        # The load grows with the time, and the half width with its root.
-        times = np.arange(1, count + 1) / count
-        *_, last = evolve(problem, times, NewtonOptions())
-        found.append(stick_ratio(problem, last))
-    return found
-
-
 def main(steps: Sequence[int]) -> None:
-    """Print the table."""
-    print("| mu | " + " | ".join(f"{n} step{'s' * (n > 1)}" for n in steps), end=" | ")
-    print("coupled, limit | Spence, uncoupled |")
-    print("|---" * (len(steps) + 3) + "|")
-    for mu, limit in COUPLED.items():
-        row = [f"{value:.3f}" for value in stick_ratios(mu, steps)]
-        print("| " + " | ".join([f"{mu}", *row, f"{limit:.3f}", f"{uncoupled(mu):.3f}"]) + " |")
+    """Print the tables."""
+    for name, pressed in PRESSED.items():
+        print(
+            f"\n| {name}, mu | " + " | ".join(f"{n} step{'s' * (n > 1)}" for n in steps), end=" | "
+        )
+        print("coupled, limit | Spence, uncoupled |")
+        print("|---" * (len(steps) + 3) + "|")
+        for mu, limit in pressed.coupled.items():
+            row = [f"{value:.3f}" for value in pressed.ratios(mu, steps)]
+            row += [f"{limit:.3f}", f"{pressed.uncoupled(mu):.3f}"]
+            print("| " + " | ".join([f"{mu}", *row]) + " |", flush=True)
 
 
 if __name__ == "__main__":
