@@ -251,7 +251,10 @@ def _assembled(parts: _Parts, d: int, degree: int, without: NDArray[np.int64]) -
         return total
 
     weight, whole = summed(parts.own.sum(axis=2)), summed(parts.whole)
-    covered = weight / np.where(whole > 0, whole, 1.0)
+    # The integral of a quadratic function on the axis of revolution is rounding.
+    around = summed(np.broadcast_to(parts.whole.sum(axis=1, keepdims=True), place.shape))
+    some = whole > LEAST_PIECE * around
+    covered = np.where(some, weight / np.where(some, whole, 1.0), 0.0)
     kept = np.flatnonzero((covered > LEAST_COVERED) & ~np.isin(every, without))
     normal = summed(parts.normal)[kept]
     normal = normal / np.linalg.norm(normal, axis=1)[:, None]
