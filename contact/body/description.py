@@ -14,6 +14,7 @@ from contact.body.amplitude import Amplitude, Moving, amplitude_of
 from contact.body.fields import Given, field, vector
 from contact.body.rigid import Electrode, Rigid
 from contact.errors import InputError
+from contact.mesh.together import part
 from contact.typing import Array
 from forms.elasticity import Anisotropic
 from forms.hencky import Law, Linear
@@ -37,7 +38,7 @@ class Fixed:
     Parameters
     ----------
     on
-        Name of the part.
+        Name of the part, or a list of names.
     displacement
         A value a component, each as `fields.field` takes it: a number, a function of x, UFL, a
         dolfinx Function; None or "free" leaves a component free. Or one UFL expression or
@@ -53,13 +54,14 @@ class Fixed:
         If a value is nothing of these.
     """
 
-    on: str
+    on: Given
     displacement: Given = None
     potential: Given = None
     amplitude: Amplitude | None = None
 
     def __post_init__(self) -> None:
         """Make fields of what is given."""
+        object.__setattr__(self, "on", part(self.on))
         object.__setattr__(self, "displacement", vector(self.displacement))
         object.__setattr__(self, "potential", field(self.potential))
 
@@ -80,7 +82,7 @@ class Load:
     Attributes
     ----------
     on
-        Name of the part; None for the whole body.
+        Name of the part, or a list of names; None for the whole body.
     force
         Traction (force/area) on a part, body force (force/volume) in the body.
     pressure
@@ -91,7 +93,7 @@ class Load:
         Function of time that multiplies all of them: see `amplitude.amplitude_of`.
     """
 
-    on: str | None
+    on: Given
     force: Given = None
     pressure: Given = None
     charge: Given = None
@@ -99,6 +101,7 @@ class Load:
 
     def __post_init__(self) -> None:
         """Make fields of what is given."""
+        object.__setattr__(self, "on", None if self.on is None else part(self.on))
         object.__setattr__(self, "force", vector(self.force))
         object.__setattr__(self, "pressure", field(self.pressure))
         object.__setattr__(self, "charge", field(self.charge))

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TypeAlias
+from typing import Any, TypeAlias
 
 import numpy as np
 
 from contact.body.amplitude import Amplitude, ramp, steady
+from contact.mesh.together import part
 from contact.typing import Array
 
 #: A number, which grows with an amplitude, or a function of time.
@@ -51,11 +52,15 @@ class Motion:
 
 @dataclass(frozen=True)
 class Rigid:
-    """A part that moves as a rigid body, or a foundation in front of it that does."""
+    """A part that moves as a rigid body, or a list of parts, or a foundation in front of it."""
 
-    on: str
+    on: Any
     motion: Motion
     foundation: bool = False
+
+    def __post_init__(self) -> None:
+        """Make one name of several."""
+        object.__setattr__(self, "on", part(self.on))
 
     name = "rigid"
 
@@ -76,11 +81,15 @@ class Rigid:
 
 @dataclass(frozen=True)
 class Electrode:
-    """A part with one unknown potential, and its charge."""
+    """A part, or a list of parts, with one unknown potential, and its charge."""
 
-    on: str
+    on: Any
     charge: Timed = 0.0
     amplitude: Amplitude | None = None
+
+    def __post_init__(self) -> None:
+        """Make one name of several."""
+        object.__setattr__(self, "on", part(self.on))
 
     name = "electrode"
     values = (None,)

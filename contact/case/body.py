@@ -6,11 +6,11 @@ from typing import Annotated, Any, Literal, TypeAlias
 
 from pydantic import Discriminator, Field, Tag, model_validator
 
+from contact.case.parts import Part
 from contact.case.types import (
     AmplitudeName,
     Formula,
     FormulaVector,
-    Name,
     Section,
     Words,
     as_tuple,
@@ -48,7 +48,7 @@ Component: TypeAlias = Annotated[
 class Fixed(Section):
     """`[[fixed]]`: prescribed displacement or potential on a part."""
 
-    on: Name = Field(description="Part of the boundary.")
+    on: Part = Field(description="Part of the boundary, or a list of parts.")
     displacement: (
         Annotated[
             tuple[Component, ...],
@@ -91,9 +91,10 @@ class Fixed(Section):
 class Load(Section):
     """`[[load]]`: forces and charges on a part, or in the whole body."""
 
-    on: Name | None = Field(
+    on: Part | None = Field(
         default=None,
-        description="Part of the boundary, beside the contact part. This or `everywhere`.",
+        description="Part of the boundary, or a list of parts, beside the contact part. This or "
+        "`everywhere`.",
     )
     everywhere: Switch = Field(default=False, description="`true`: in the whole body.")
     traction: FormulaVector | None = Field(default=None, description="Force per area of the part.")

@@ -16,6 +16,7 @@ from contact.case.moving import check_moving, moving
 from contact.case.shapes import Distance
 from contact.case.showing import listed
 from contact.case.types import Words, fault
+from contact.mesh.together import members
 from contact.tolerances import HUGE
 
 #: `contact.case.file.Case`, which calls these checks.
@@ -104,7 +105,7 @@ def _check_contacts(case: Case) -> None:
     seen: dict[str, str] = {}
     for path, contact in case.contacts:
         for i, fixed in enumerate(case.fixed):
-            if fixed.on == contact.on and fixed.is_clamped:
+            if fixed.is_clamped and {*members(contact.on)} <= {*members(fixed.on)}:
                 accepted = f"a part that fixed.{i} does not fix wholly"
                 raise fault(f"{path}.on", contact.on, accepted)
         key, electric = case.electric_of(path, contact)
@@ -112,8 +113,9 @@ def _check_contacts(case: Case) -> None:
             if electric.phi_f != Expression(0.0):
                 accepted = "0, or none, with against: the other body has a potential of its own"
                 raise fault(f"{key}.phi_f", electric.phi_f.source, accepted)
-        if seen.setdefault(contact.on, path) != path:
-            raise fault(f"{path}.on", contact.on, f"a part that {seen[contact.on]} does not have")
+        for part in members(contact.on):
+            if seen.setdefault(part, path) != path:
+                raise fault(f"{path}.on", part, f"a part that {seen[part]} does not have")
     for key in ("friction", "electric"):
         own = [getattr(contact, key) is not None for _, contact in case.contacts]
         if all(own) and getattr(case, key) is not None:
@@ -164,13 +166,14 @@ def _check_contradictions(case: Case) -> None:
         for quantity, path, value in given:
             if value is None or value == "free":
                 continue
-            first, other = seen.setdefault((fixed.on, quantity), (i, value))
-            if other != value:
-                raise fault(
-                    f"fixed.{i}.{path}",
-                    value.source,
-                    f"{other}, as fixed.{first} has on the same part {fixed.on}",
-                )
+            for part in members(fixed.on):
+                first, other = seen.setdefault((part, quantity), (i, value))
+                if other != value:
+                    raise fault(
+                        f"fixed.{i}.{path}",
+                        value.source,
+                        f"{other}, as fixed.{first} has on the same part {part}",
+                    )
 
 
 def _vectors(case: Case) -> Iterator[tuple[str, tuple[Any, ...] | None]]:
@@ -247,7 +250,7 @@ def _check_parts(case: Case, parts: list[str]) -> None:
     used += [(f"electrode.{i}.on", part.on) for i, part in enumerate(case.electrode)]
     against = [(f"{path}.against", contact.against) for path, contact in case.contacts]
     used += [(path, name) for path, name in against if name is not None]
-    for path, name in used:
+    for path, name in ((path, name) for path, on in used for name in members(on)):
         if name not in parts:
             near = difflib.get_close_matches(name, parts, n=1)
             hint = f" (did you mean {near[0]}?)" if near else ""

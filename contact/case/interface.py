@@ -9,11 +9,11 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeAlias
 from pydantic import Field, model_validator
 
 from contact.case.formula import Expression
+from contact.case.parts import Part
 from contact.case.rigid import Rigid
 from contact.case.shapes import Foundation
 from contact.case.types import (
     AmplitudeName,
-    Name,
     NonNegative,
     NonNegativeFormula,
     Section,
@@ -23,6 +23,7 @@ from contact.case.types import (
     fault,
     one_of,
 )
+from contact.mesh.together import meet
 from contact.settings import Accepted, Positive, Switch
 from forms.laws import Coulomb, FrictionLaw, SlipCoefficient
 
@@ -143,14 +144,17 @@ class Contact(Section):
     share no nodes.
     """
 
-    on: Name = Field(description="Part of the boundary that may touch the foundation.")
+    on: Part = Field(
+        description="Part of the boundary, or a list of parts, that may touch the foundation."
+    )
     law: Literal["signorini", "compliance"] = Field(
         default="signorini",
         description="`signorini`: rigid foundation; `compliance`: with a compliant layer in front.",
     )
-    against: Name | None = Field(
+    against: Part | None = Field(
         default=None,
-        description="Part of another body of the mesh that it may touch, instead of a foundation.",
+        description="Part of another body of the mesh, or a list of parts, that it may touch, "
+        "instead of a foundation.",
     )
     gap: NonNegativeFormula | None = Field(
         default=None,
@@ -234,7 +238,7 @@ class Contact(Section):
     def _check(self) -> Contact:
         if self.against is not None and self.foundation is not None:
             raise fault("against", Words("both against and foundation"), "one of them")
-        if self.against is not None and self.against == self.on:
+        if self.against is not None and meet(self.against, self.on):
             raise fault("against", self.against, "another part than `on`")
         if self.gap is not None and self.foundation is not None:
             raise fault("gap", Words("both gap and foundation"), "one of them")

@@ -7,6 +7,7 @@ from typing import Any, TypeAlias
 
 from contact.case.rigid import NOTHING, Moving
 from contact.case.types import Words, fault
+from contact.mesh.together import meet
 
 #: `contact.case.file.Case`.
 Case: TypeAlias = Any
@@ -25,7 +26,7 @@ def check_moving(case: Case) -> None:
     """Raise a fault if a part is rigid or an electrode twice, or an electrode has no field."""
     touched = [contact.on for _, contact in case.contacts]
     for i, part in enumerate(case.rigid):
-        if part.on in touched:
+        if any(meet(part.on, other) for other in touched):
             raise fault(f"rigid.{i}.on", part.on, "a part beside the contact part")
     if case.space.kinematics == "axisymmetric":
         for path, motion in moving(case):
@@ -33,13 +34,13 @@ def check_moving(case: Case) -> None:
     for key in ("rigid", "electrode"):
         parts = [section.on for section in getattr(case, key)]
         for i, on in enumerate(parts):
-            if on in parts[:i]:
+            if any(meet(on, other) for other in parts[:i]):
                 raise fault(f"{key}.{i}.on", on, f"a part that no other [[{key}]] has")
     if case.electrode and not any(material.piezoelectric for _, material in case.materials):
         raise fault("electrode", Words("given"), "electric quantities with [material.piezo] only")
-    held = {fixed.on for fixed in case.fixed if fixed.potential is not None}
+    held = [fixed.on for fixed in case.fixed if fixed.potential is not None]
     for i, section in enumerate(case.electrode):
-        if section.on in held:
+        if any(meet(section.on, other) for other in held):
             raise fault(f"electrode.{i}.on", section.on, "a part whose potential is not fixed")
 
 

@@ -8,9 +8,9 @@ from typing import Annotated, Any, Literal, TypeAlias
 from pydantic import Discriminator, Field, Tag, model_validator
 
 from contact.case.formula import Expression
+from contact.case.parts import Part
 from contact.case.types import (
     AmplitudeName,
-    Name,
     Section,
     TimeFormula,
     Vector,
@@ -141,13 +141,13 @@ class Rigid(Moving):
 class RigidPart(Moving):
     """`[[rigid]]`: a part that moves as a rigid body, such as a plate that loads the body."""
 
-    on: Name = Field(description="Part of the boundary.")
+    on: Part = Field(description="Part of the boundary, or a list of parts.")
 
 
 class Electrode(Section):
     """`[[electrode]]`: a part with one unknown potential, whose charge is given."""
 
-    on: Name = Field(description="Part of the boundary.")
+    on: Part = Field(description="Part of the boundary, or a list of parts.")
     charge: TimeFormula = Field(default=NOTHING, description="Its charge; 0: open circuit.")
     amplitude: AmplitudeName | None = Field(
         default=None, description="Factor of the charge as a function of time, see `[evolution]`."

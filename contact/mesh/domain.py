@@ -6,7 +6,6 @@ Each name stands for one set of indices, so that parts, and regions, may overlap
 
 from __future__ import annotations
 
-import difflib
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -22,6 +21,7 @@ from contact import _compat
 from contact.errors import InputError
 from contact.mesh.entities import Indices, extent, exterior_facets
 from contact.mesh.measure import ExtendedMeasure, Measure
+from contact.mesh.together import known, members, pieces
 from forms.kinematics import CARTESIAN, Axisymmetric, Kinematics
 
 #: Indices of facets or cells that this rank owns, ascending.
@@ -116,16 +116,20 @@ class Domain:
         return (*self.parts, *self.unusable)
 
     def facets(self, name: str) -> Indices:
-        """Local indices of the facets of part ``name`` that this rank owns, ascending.
+        """Local indices of the facets of a part that this rank owns, ascending.
+
+        Several parts may stand `together.Together`.
 
         Raises
         ------
         InputError
             If there is no such part; the message names the nearest one and lists all.
         """
-        if name in self.unusable:
-            raise InputError(self.unusable[name])
-        return self.parts[_known("part", name, self.parts)]
+        for one in members(name):
+            if one in self.unusable:
+                raise InputError(self.unusable[one])
+        found = [self.parts[known("part", one, self.parts)] for one in members(name)]
+        return found[0] if len(found) == 1 else np.unique(np.concatenate(found))
 
     def cells(self, name: str) -> Indices:
         """Local indices of the cells of region ``name`` that this rank owns, ascending.
@@ -135,7 +139,7 @@ class Domain:
         InputError
             If there is no such region, likewise.
         """
-        return self.regions[_known("region", name, self.regions)]
+        return self.regions[known("region", name, self.regions)]
 
     @property
     def kinematics(self) -> Kinematics:
@@ -143,16 +147,13 @@ class Domain:
         return Axisymmetric() if self.revolved else CARTESIAN
 
     def ds(self, name: str) -> Measure:
-        """Measure over the facets of part ``name``; raises as `facets`."""
+        """Measure over the facets of part ``name``; raises as `facets`. Collective."""
         self.facets(name)
-        return self._extended(
-            ufl.Measure(
-                "ds",
-                domain=self.mesh,
-                subdomain_data=self._facet_data,
-                subdomain_id=list(self.parts).index(name),
-            )
-        )
+        every = list(self.parts)
+        wanted = {every.index(one) for one in members(name)}
+        found = tuple(i for i, (within, _) in enumerate(self._pieces) if wanted & {*within})
+        ds = ufl.Measure("ds", domain=self.mesh, subdomain_data=self._facet_data)
+        return self._extended(ds(found))
 
     @property
     def dx(self) -> Measure:
@@ -183,24 +184,21 @@ class Domain:
 
     # The integrals of a form must share one object of subdomain data for each kind of integral.
 
+    # Parts may overlap: a measure is over pieces that do not.
+
+    @cached_property
+    def _pieces(self) -> list[tuple[tuple[int, ...], Indices]]:
+        count = self.mesh.topology.index_map(self.dim - 1).size_local
+        return pieces(self.comm, count, self.parts.values())
+
     @cached_property
     def _facet_data(self) -> list[tuple[int, Indices]]:
-        facets = self.parts.values()
-        return [(i, _compat.facet_entities(self.mesh, part)) for i, part in enumerate(facets)]
+        facets = (facets for _, facets in self._pieces)
+        return [(i, _compat.facet_entities(self.mesh, piece)) for i, piece in enumerate(facets)]
 
     @cached_property
     def _cell_data(self) -> list[tuple[int, Indices]]:
         return list(enumerate(self.regions.values()))
-
-
-def _known(what: str, name: str, names: Mapping[str, Indices]) -> str:
-    if name in names:
-        return name
-    near = difflib.get_close_matches(str(name), names, n=1)
-    hint = f"; did you mean {near[0]!r}?" if near else ""
-    raise InputError(
-        f"the mesh has no {what} {name!r}{hint} (its {what}s: {', '.join(sorted(names))})"
-    )
 
 
 def from_mesh(

@@ -20,6 +20,7 @@ from mpi4py import MPI
 from contact.body.constants import constant
 from contact.body.loads import expression
 from contact.errors import InputError
+from contact.mesh.together import members
 from contact.problem.kkt import residual_forces
 from contact.problem.problem import ContactProblem
 from contact.problem.state import State
@@ -125,12 +126,12 @@ def charge_balance(problem: ContactProblem, state: State) -> ChargeBalance:
     for fixed in problem.body.fixed:
         if fixed.potential is None:
             continue
-        dofs = _electric_dofs(problem, fixed.on)
-        new = dofs[~taken[dofs]]
-        taken[new] = True
-        charge = electrodes.get(fixed.on, 0.0) + _sum(problem, residual[new])
-        electrodes[fixed.on] = charge
-        magnitude += _sum(problem, np.abs(residual[new]))
+        for part in members(fixed.on):
+            dofs = _electric_dofs(problem, part)
+            new = dofs[~taken[dofs]]
+            taken[new] = True
+            electrodes[part] = electrodes.get(part, 0.0) + _sum(problem, residual[new])
+            magnitude += _sum(problem, np.abs(residual[new]))
     for electrode in problem.body.electrodes:
         dofs = _electric_dofs(problem, electrode.on)
         electrodes[electrode.on] = _sum(problem, residual[dofs])

@@ -9,6 +9,7 @@ import numpy as np
 from dolfinx import fem
 from mpi4py import MPI
 
+from contact.mesh.together import members
 from contact.problem.kkt import residual_forces
 from contact.problem.problem import ContactProblem
 from contact.problem.state import State
@@ -59,13 +60,14 @@ def supports(problem: ContactProblem, state: State) -> Mapping[str, Support]:
     for fixed in problem.body.fixed:
         if fixed.displacement is None:
             continue
-        facets = problem.domain.facets(fixed.on)
-        nodes = fem.locate_dofs_topological(body.space, d - 1, facets)
-        nodes = nodes[nodes < len(residual)]
         held = np.array([component is not None for component in fixed.displacement])
-        forces = np.where(left[nodes] & held, residual[nodes], 0.0)
-        left[nodes] &= ~held
-        whole = problem.domain.resultant(forces.sum(axis=0))
-        local = np.concatenate([whole, moment(points[nodes], forces, problem.domain.revolved)])
-        totals[fixed.on] = totals.get(fixed.on, 0.0) + comm.allreduce(local, op=MPI.SUM)
+        for part in members(fixed.on):
+            facets = problem.domain.facets(part)
+            nodes = fem.locate_dofs_topological(body.space, d - 1, facets)
+            nodes = nodes[nodes < len(residual)]
+            forces = np.where(left[nodes] & held, residual[nodes], 0.0)
+            left[nodes] &= ~held
+            whole = problem.domain.resultant(forces.sum(axis=0))
+            local = np.concatenate([whole, moment(points[nodes], forces, problem.domain.revolved)])
+            totals[part] = totals.get(part, 0.0) + comm.allreduce(local, op=MPI.SUM)
     return {part: Support(total[:d], total[d:]) for part, total in totals.items()}

@@ -35,6 +35,7 @@ from contact.interface.pairing import find_pair
 from contact.interface.placing import candidates, find_nodes
 from contact.interface.response import FoundationResponse
 from contact.mesh.domain import Domain
+from contact.mesh.together import part
 from contact.problem.approach import approached
 from contact.problem.scales import Scales
 from contact.problem.state import State
@@ -48,7 +49,7 @@ class Contact:
     Attributes
     ----------
     on
-        The part.
+        The part, or a list of parts.
     foundation
         The obstacle; or a gap to a rigid foundation along the body's normal: a number, a function
         of x, UFL or a dolfinx Function. By default the body lies on it.
@@ -63,16 +64,19 @@ class Contact:
         added to that between the bodies; None for a rigid one.
     """
 
-    on: str
+    on: Given
     foundation: Given = 0.0
     layer: Layer | None = None
     friction: Friction | None = None
     conductor: Conductor | None = None
     press: bool = False
-    against: str | None = None
+    against: Given = None
 
     def __post_init__(self) -> None:
         """Make an obstacle of a gap."""
+        object.__setattr__(self, "on", part(self.on))
+        if self.against is not None:
+            object.__setattr__(self, "against", part(self.against))
         if not hasattr(self.foundation, "measure"):
             object.__setattr__(self, "foundation", GapFunction.of(self.foundation))
 

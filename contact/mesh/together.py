@@ -1,0 +1,105 @@
+"""Several parts of a boundary under one name, and facets by the parts that they are in."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterable, Mapping, Sequence
+
+import numpy as np
+from mpi4py import MPI
+
+from contact.errors import InputError
+from contact.mesh.entities import Indices, combinations
+
+ACCEPTED = "the name of a part, or a list of names"
+
+
+class Together(str):
+    """The name of several parts together: their names, with commas between.
+
+    Attributes
+    ----------
+    members
+        The parts.
+    """
+
+    __slots__ = ("members",)
+
+    members: tuple[str, ...]
+
+    def __new__(cls, members: Iterable[str]) -> Together:
+        """Join names."""
+        names = tuple(members)
+        made = super().__new__(cls, ", ".join(names))
+        made.members = names
+        return made
+
+    def __getnewargs__(self) -> tuple[tuple[str, ...]]:  # type: ignore[override]
+        """Return what a copy is made of: a text alone does not say where a name ends."""
+        return (self.members,)
+
+
+def part(given: str | Sequence[str]) -> str:
+    """Return the name of a part, or of several together, of a name or a list of names.
+
+    Raises
+    ------
+    InputError
+        If it is neither.
+    """
+    names = [given] if isinstance(given, str) else given
+    named = isinstance(names, list | tuple) and all(isinstance(n, str) and n for n in names)
+    if not named or not names:
+        raise InputError(f"given {given!r}; accepted: {ACCEPTED}")
+    different = list(dict.fromkeys(names))
+    return different[0] if len(different) == 1 else Together(different)
+
+
+def members(name: str) -> tuple[str, ...]:
+    """Return the parts that a name stands for."""
+    return name.members if isinstance(name, Together) else (name,)
+
+
+def meet(one: str, other: str) -> bool:
+    """Tell whether two names have a part in common."""
+    return not set(members(one)).isdisjoint(members(other))
+
+
+def pieces(
+    comm: MPI.Intracomm, count: int, parts: Iterable[Indices]
+) -> list[tuple[tuple[int, ...], Indices]]:
+    """Divide facets into pieces that are in the same parts. Collective.
+
+    Parameters
+    ----------
+    count
+        Number of facets of this rank.
+    parts
+        Those of each part; they may overlap.
+
+    Returns
+    -------
+    The parts, by their positions, with the facets in these and no other: the same ones in the
+    same order on all ranks, be it with no facet here.
+    """
+    numbers, combined = combinations(count, parts)
+    own = {combined[k]: np.flatnonzero(numbers == k).astype(np.int32) for k in np.unique(numbers)}
+    there = sorted(set().union(*comm.allgather(tuple(own))) - {()})
+    return [(found, own.get(found, np.empty(0, dtype=np.int32))) for found in there]
+
+
+def known(what: str, name: str, names: Mapping[str, Indices]) -> str:
+    """Return a name that is one of some names.
+
+    Raises
+    ------
+    InputError
+        If it is not; the message names the nearest one and lists all.
+    """
+    if name in names:
+        return name
+    near = difflib.get_close_matches(str(name), names, n=1)
+    hint = f"; did you mean {near[0]!r}?" if near else ""
+    raise InputError(
+        f"the mesh has no {what} {name!r}{hint} (its {what}s: {', '.join(sorted(names))})"
+    )
