@@ -52,6 +52,7 @@ def description(entry: Entry) -> str:
     lines = [
         f"{entry.name}, {entry.symmetry}",
         f"source: {entry.source}",
+        f"checked against: {entry.checked or 'nothing'}",
         f"temperature: {entry.temperature}; {entry.condition}",
         "order of indices: 11, 22, 33, 23, 13, 12",
         "",

@@ -38,6 +38,8 @@ class Entry:
         Indices (i, J) of d_iJ -> published value (C/N).
     within
         By which share d = s e may differ from these.
+    checked
+        Where else the constants were found, and how they differ there; empty where nobody looked.
     """
 
     name: str
@@ -51,6 +53,7 @@ class Entry:
     permittivity: Array | None = None
     published: tuple[tuple[tuple[int, int], float], ...] = ()
     within: float = 0.05
+    checked: str = ""
 
     @property
     def piezo(self) -> Piezo | None:

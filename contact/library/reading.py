@@ -23,6 +23,9 @@ PACKAGED = Path(__file__).with_name("materials.toml")
 #: What every entry says in words.
 WORDS = ("class", "source", "temperature", "condition")
 
+#: What it may say besides: where else its numbers were found.
+CHECKED = "checked"
+
 #: Keys of which an entry has one set or another.
 ISOTROPIC, HEXAGONAL, FULL = ("young", "poisson"), ("c",), ("stiffness",)
 NUMBERS = ("c", "stiffness", "young", "poisson", "e", "coupling", "permittivity", "d", "within")
@@ -81,7 +84,7 @@ def _entry(path: Path, name: str, table: Any) -> Entry:
 
 
 def _read(name: str, table: Mapping[str, Any]) -> Entry:
-    unknown = [key for key in table if key not in (*WORDS, *NUMBERS)]
+    unknown = [key for key in table if key not in (*WORDS, *NUMBERS, CHECKED)]
     if unknown:
         raise ValueError(f"{unknown[0]}: unknown key")
     kinds = [keys for keys in (ISOTROPIC, HEXAGONAL, FULL) if any(key in table for key in keys)]
@@ -113,6 +116,7 @@ def _read(name: str, table: Mapping[str, Any]) -> Entry:
         permittivity,
         published,
         float(table.get("within", 0.05)),
+        str(table.get(CHECKED, "")),
     )
 
 

@@ -32,6 +32,20 @@ source = "measured"
 """
 
 
+#: The same ceramics and crystals in COMSOL's material library: c11, c12, c13, c33, c44 (GPa), e31,
+#: e33, e15 (C/m2), permittivities 11 and 33 over that of empty space; how far they may differ.
+ELSEWHERE = """
+PZT-4 Clevite | 138.999 77.8366 74.2836 115.412 25.641 -5.20279 15.0804 12.7179 762.5 663.2 0.004
+PZT-5A | 120.346 75.1791 75.0901 110.867 21.0526 -5.35116 15.7835 12.2947 919.1 826.6 0.01
+PZT-5H | 127.205 80.2122 84.6702 117.436 22.9885 -6.62281 23.2403 17.0345 1704.4 1433.6 0.03
+BaTiO3 | 150.377 65.6308 65.9391 145.521 43.8596 -4.32015 17.3624 11.4035 1115.1 1251.3 0.01
+ZnO | 209.714 121.14 105.359 211.194 42.3729 -0.567005 1.32044 -0.480508 8.5446 10.204 0.012
+AlN | 410 149 99 389 125 -0.58 1.55 -0.48 9 9 0.001
+quartz | 86.7362 6.98527 11.9104 107.194 57.9428 0 0 0 4.428 4.634 0.004
+LiNbO3 | 202.897 52.9177 74.9098 243.075 59.9034 0.193644 1.30863 3.69548 43.6 29.16 0.04
+"""
+
+
 def case(**material):
     return parse_case({**CASE, "material": material})
 
@@ -41,7 +55,7 @@ def test_the_packaged_library():
     wanted = "PZT-4 PZT-5A PZT-5H PZT-6B BaTiO3 PVDF ZnO AlN quartz LiNbO3 steel aluminium tungsten"
     assert {*wanted.split(), "sapphire"} <= set(known)
     for entry in known.values():
-        assert entry.source and entry.temperature and entry.condition
+        assert entry.source and entry.temperature and entry.condition and entry.checked
         entry.check()
         if entry.coupling is not None:
             # d = e s and e = d c, eps^T = eps^S + d e^T is symmetric and larger.
@@ -71,6 +85,17 @@ def test_classes_32_and_3m_have_their_threefold_axis_and_their_diad_or_mirror():
     e = find("LiNbO3").piezo.e
     mirror = np.diag([-1.0, 1.0, 1.0])
     assert np.allclose(np.einsum("ia,jb,kc,abc", mirror, mirror, mirror, e), e)
+
+
+@pytest.mark.parametrize("row", ELSEWHERE.split("\n")[1:-1])
+def test_the_numbers_are_those_of_another_library(row):
+    name, given = row.split(" | ")
+    *numbers, within = map(float, given.split())
+    entry = find(name)
+    c, e, eps = entry.stiffness / 1e9, entry.coupling, entry.permittivity / 8.8541878e-12
+    own = [c[0, 0], c[0, 1], c[0, 2], c[2, 2], c[3, 3], e[2, 0], e[2, 2], e[0, 4]]
+    own += [eps[0, 0], eps[2, 2]]
+    assert own == pytest.approx(numbers, rel=within, abs=1e-9)
 
 
 def test_published_charge_constants_of_quartz_and_lithium_niobate():
