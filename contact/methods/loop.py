@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 
 from contact.interface.residuals import interface_residuals
-from contact.methods.options import NewtonOptions
-from contact.methods.report import History, Outcome
+from contact.methods.report import Outcome
+from contact.methods.search import Search
 from contact.methods.stagnation import Stagnation
 from contact.methods.step import Iterate, Step
 from contact.problem.kkt import KKT, evaluate
-from contact.problem.protocols import Problem
 from contact.typing import Array
 
 #: What counts as progress of a step.
@@ -33,30 +31,21 @@ class NewtonLoop:
 
     Attributes
     ----------
-    problem, options
-        What is solved, and the tolerances.
+    search
+        What is solved, with the tolerances; told of every iterate.
     step
         Takes the steps.
-    history
-        Gets a record a step.
-    seen
-        Told of every iterate and its residuals, before they are recorded.
     secant_until
         Equilibrium residual below which the material's tangent replaces its secant: far from the
         solution the tangent is too soft, and overshoots.
+    patience
+        Steps without progress after which it is given up; that of the options by default.
     """
 
-    problem: Problem
-    options: NewtonOptions
+    search: Search
     step: Step
-    history: History
-    seen: Callable[[Iterate, KKT], None]
     secant_until: float
-
-    @property
-    def left(self) -> int:
-        """Number of steps that are left of the limit."""
-        return self.options.max_outer - len(self.history.records)
+    patience: int | None = None
 
     def run(
         self, iterate: Iterate, note: str = "", bound: Array | None = None, goal: float = 0.0
@@ -74,14 +63,15 @@ class NewtonLoop:
         goal
             With a frozen bound, what the residual of that bound has to fall below.
         """
-        problem, options, linear = self.problem, self.options, self.problem.equilibrium.linear
+        search, problem, options = self.search, self.search.problem, self.search.options
+        linear, patience = problem.equilibrium.linear, self.patience or options.patience
         goal = max(goal, options.tolerance)
         residuals = evaluate(problem, iterate.state)
-        stagnation = Stagnation(options.patience, PROGRESS)
+        stagnation = Stagnation(patience, PROGRESS)
         self.step.begin()
         # A start from elsewhere is near the solution; zero displacement has no better tangent.
         tangent = iterate.status is not None and not linear
-        for _ in range(min(options.max_iterations, self.left)):
+        for _ in range(min(options.max_iterations, search.left)):
             before, kept = residuals, iterate
             taken = self.step(iterate, tangent, residuals.largest, bound)
             if taken is None:
@@ -89,14 +79,14 @@ class NewtonLoop:
             iterate = taken.iterate
             residuals = evaluate(problem, iterate.state)
             worse = self.step.following.worsened(residuals.largest)
-            self.seen(iterate, residuals)
+            search.see(iterate, residuals)
             words = (note, taken.note, "tangent" * tangent, "taken back" * worse)
             said = " ".join(word for word in words if word)
-            self.history.record(residuals, said, contact=taken.solves)
+            search.history.record(residuals, said, contact=taken.solves)
             if worse:
                 iterate = kept
                 residuals = evaluate(problem, iterate.state)
-                self.seen(iterate, residuals)
+                search.see(iterate, residuals)
             measured = self._measure(iterate, residuals, bound)
             if residuals.largest <= options.tolerance:
                 return iterate, self._end(residuals)
@@ -109,21 +99,21 @@ class NewtonLoop:
                 near = residuals.equilibrium < self.secant_until
                 tangent = near and (falls or not tangent)
             more = FROZEN_RAMP if self.step.following.frozen else 1
-            if stagnation(measured, options.patience * more):
+            if stagnation(measured, patience * more):
                 words_of_end = f"Newton's method stalled at {stagnation.best:.1e}"
                 return iterate, self._end(residuals, words_of_end)
-        steps = len(self.history.records)
+        steps = len(search.history.records)
         return iterate, self._end(residuals, f"not converged in {steps} steps")
 
     def _measure(self, iterate: Iterate, residuals: KKT, bound: Array | None) -> float:
         """Return the largest residual, with the frozen friction bound if there is one."""
         if bound is None:
             return residuals.largest
-        interface, state = self.problem.interface, iterate.state
+        interface, state = self.search.problem.interface, iterate.state
         nodal = interface.jump.apply(state.x)
         return max(
             residuals.equilibrium, *interface_residuals(interface, nodal, state.forces, bound)
         )
 
     def _end(self, residuals: KKT, ended: str = "") -> Outcome:
-        return Outcome(residuals, self.options.allowed, ended)
+        return Outcome(residuals, self.search.options.allowed, ended)

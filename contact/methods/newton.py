@@ -23,17 +23,20 @@ from contact.interface.linearised import Moduli
 from contact.interface.multipliers import Multipliers
 from contact.interface.status import touching
 from contact.linear.operator import Counters
-from contact.methods.fixed_point import FixedPoint
-from contact.methods.loop import UPDATE, NewtonLoop
+from contact.methods.frozen_friction import FROZEN_FRICTION, frozen_friction
+from contact.methods.load_steps import load_steps
+from contact.methods.loop import NewtonLoop
 from contact.methods.material import SECANT_UNTIL, MaterialStep
-from contact.methods.options import FixedPointOptions, NewtonOptions
-from contact.methods.report import History, Monitor, Outcome, Record
+from contact.methods.options import NewtonOptions
+from contact.methods.relaxed import BLOCK_RELAXATION, block_relaxation
+from contact.methods.report import History, Monitor, Outcome
+from contact.methods.search import Search
 from contact.methods.step import Iterate, WholeStep
 from contact.methods.sure import INTERIOR_POINT, solve_convex
 from contact.methods.uzawa import automatic_r
 from contact.problem.condensed import CondensedProblem
 from contact.problem.condensing import condensation, pays
-from contact.problem.kkt import KKT, evaluate
+from contact.problem.kkt import evaluate
 from contact.problem.problem import ContactProblem
 from contact.problem.protocols import Problem
 from contact.problem.scales import Scales
@@ -42,17 +45,10 @@ from contact.problem.state import State
 logger = logging.getLogger("contact.solver")
 
 #: What the history says of the slower methods.
-FROZEN_FRICTION, BLOCK_RELAXATION = "frozen friction", "block relaxation"
 SLOWER = INTERIOR_POINT, FROZEN_FRICTION, BLOCK_RELAXATION
 
 #: Patience with the whole body where a surer road is left.
 SHORT = 4
-
-#: Updates of a frozen friction bound, and what the first of its problems is solved to.
-MOST_UPDATES, FIRST_GOAL = 40, 1e-2
-
-#: Part of the load in the first of the load steps, and the least one that is tried.
-FIRST_STEP, LEAST_STEP = 0.25, 1e-2
 
 
 def moduli_of(scales: Scales, gamma: float) -> Moduli:
@@ -94,7 +90,7 @@ class Newton:
         problem, options = self.problem, self.options
         self.history = History(self.monitor)
         self._moduli = self.moduli or moduli_of(problem.scales, options.gamma)
-        self._forget()
+        self._begin()
         self.whole = WholeStep(problem, options, self._moduli, self.counters)
         self._condensed: MaterialStep | None = None
         self._pays = False
@@ -114,17 +110,16 @@ class Newton:
         if self._condensed is not None:
             assert isinstance(problem, ContactProblem)
             self._condensed.turn_to(problem, self.history)
-        self._forget()
+        self._begin()
 
-    def _forget(self) -> None:
-        self._at = Iterate(self.problem.start())
-        self._best: Iterate | None = None
-        self._least = np.inf
+    def _begin(self, iterate: Iterate | None = None) -> None:
+        at = Iterate(self.problem.start()) if iterate is None else iterate
+        self.search = Search(self.problem, self.options, self.history, at)
 
     @property
     def state(self) -> State:
         """What the last step has left."""
-        return self._at.state
+        return self.search.at.state
 
     def solve(self, start: State | None = None) -> tuple[State, Outcome]:
         """Iterate until convergence or the limit. Collective.
@@ -134,8 +129,8 @@ class Newton:
         start
             Where from; from rest by default.
         """
-        self._forget()
-        iterate = self._at if start is None else self._started(start)
+        self._begin()
+        iterate = self.search.at if start is None else self._started(start)
         iterate, outcome = self.run(iterate)
         return iterate.state, outcome
 
@@ -154,34 +149,25 @@ class Newton:
 
     def run(self, iterate: Iterate) -> tuple[Iterate, Outcome]:
         """Take one road after the other from an iterate; the best iterate if all fail."""
-        self._at, self._best, self._least = iterate, None, np.inf
+        self._begin(iterate)
+        search = self.search
         self.history.restart()
         iterate, outcome = self._roads(iterate)
-        if not outcome.converged and self._best is not None:
-            iterate = self._best
+        if not outcome.converged and search.best is not None:
+            iterate = search.best
             outcome = replace(outcome, kkt=evaluate(self.problem, iterate.state))
-        self._at = iterate
+        search.at = iterate
         return iterate, outcome
 
-    def _see(self, iterate: Iterate, residuals: KKT) -> None:
-        """Remember where the method is, and which iterate meets the whole load best."""
-        self._at = iterate
-        if iterate.state.time == self.problem.time and residuals.largest < self._least:
-            self._best, self._least = iterate, residuals.largest
-
-    @property
-    def _left(self) -> int:
-        """Number of steps that are left of the limit."""
-        return self.options.max_outer - len(self.history.records)
-
     def _roads(self, iterate: Iterate) -> tuple[Iterate, Outcome]:
+        search = self.search
         if self._condensed is not None and self._pays:
             iterate, outcome = self._at_contact(self._condensed, iterate)
-            if outcome.converged or self._left <= 0:
+            if outcome.converged or search.left <= 0:
                 return iterate, outcome
             logger.info("%s; going on with the whole body", outcome.ended)
         surer = None if self._pays else self._condensed
-        loop = self._whole_loop(SHORT if surer is not None else None)
+        loop = self.whole_loop(SHORT if surer is not None else None)
         iterate, outcome = loop.run(iterate)
         if not outcome.converged and surer is not None:
             logger.info("%s; going on at the contact nodes", outcome.ended)
@@ -190,18 +176,17 @@ class Newton:
             iterate, outcome = self._at_contact(surer, start)
         if not outcome.converged and isinstance(self.problem, CondensedProblem):
             iterate, outcome = self._convex(self.problem, iterate, outcome)
-        if not outcome.converged and self.problem.interface.friction.acts and self._left > 0:
-            iterate, outcome = self._frozen_friction(loop, iterate)
-        if not outcome.converged and self._left > 0:
-            iterate, outcome = self._block_relaxation()
-        if not outcome.converged and self._left > 0 and self.options.load_steps:
-            iterate, outcome = self._load_steps(loop)
+        if not outcome.converged and self.problem.interface.friction.acts and search.left > 0:
+            iterate, outcome = frozen_friction(loop, iterate)
+        if not outcome.converged and search.left > 0:
+            iterate, outcome = block_relaxation(search, self.counters)
+        if not outcome.converged and search.left > 0 and self.options.load_steps:
+            iterate, outcome = load_steps(loop)
         return iterate, outcome
 
     def _at_contact(self, step: MaterialStep, iterate: Iterate) -> tuple[Iterate, Outcome]:
         """Iterate with the body condensed onto the contact nodes."""
-        loop = NewtonLoop(self.problem, self.options, step, self.history, self._see, SECANT_UNTIL)
-        return loop.run(iterate)
+        return NewtonLoop(self.search, step, SECANT_UNTIL).run(iterate)
 
     def _convex(
         self, problem: CondensedProblem, iterate: Iterate, outcome: Outcome
@@ -211,83 +196,26 @@ class Newton:
         Without friction first: where the body touches, Newton's method mostly finds the rest.
         """
         for friction in (False, True) if problem.interface.friction.acts else (False,):
-            start = problem.start() if self._best is None else self._best.state
+            start = problem.start() if self.search.best is None else self.search.best.state
             found = solve_convex(problem, start, self.history.poll, friction)
             if found is None:
                 break
             residuals = evaluate(problem, found.state)
             iterate = self._started(found.state)
-            self._see(iterate, residuals)
+            self.search.see(iterate, residuals)
             self.history.record(residuals, INTERIOR_POINT, found.steps)
             outcome = Outcome(residuals, self.options.allowed, found.words)
-            if outcome.converged or self._left <= 0:
+            if outcome.converged or self.search.left <= 0:
                 break
-            loop = self._whole_loop(None if friction else SHORT)
+            loop = self.whole_loop(None if friction else SHORT)
             iterate, outcome = loop.run(iterate, INTERIOR_POINT)
             if outcome.converged:
                 break
         return iterate, outcome
 
-    def _whole_loop(self, patience: int | None = None) -> NewtonLoop:
-        options = replace(self.options, patience=patience or self.options.patience)
-        return NewtonLoop(
-            self.problem, options, self.whole, self.history, self._see, options.secant_until
-        )
-
-    def _frozen_friction(self, loop: NewtonLoop, iterate: Iterate) -> tuple[Iterate, Outcome]:
-        """Update the friction bound outside of Newton's loop: each problem is then convex."""
-        goal, interface = FIRST_GOAL, self.problem.interface
-        for _ in range(MOST_UPDATES):
-            state = iterate.state
-            bound = interface.bound(interface.jump.apply(state.x), state.forces)
-            iterate, outcome = loop.run(iterate, FROZEN_FRICTION, bound, goal)
-            if outcome.converged or outcome.ended != UPDATE:
-                break
-            goal = 0.1 * outcome.kkt.largest
-        return iterate, outcome
-
-    def _block_relaxation(self) -> tuple[Iterate, Outcome]:
-        """Solve by the fixed point over block relaxation, which damps what Newton lets cycle."""
-
-        def note(record: Record) -> None:
-            self._see(Iterate(relaxed.state), record.kkt)
-            self.history.record(record.kkt, BLOCK_RELAXATION, record.inner)
-
-        options = FixedPointOptions(
-            tolerance=self.options.tolerance,
-            max_outer=min(FixedPointOptions.max_outer, self._left),
-            linear=self.options.linear,
-        )
-        relaxed = FixedPoint(self.problem, options, note, self.counters, self.history.poll)
-        state, outcome = relaxed.solve()
-        return Iterate(state), outcome
-
-    def _load_steps(self, loop: NewtonLoop) -> tuple[Iterate, Outcome]:
-        """Apply loads and prescribed displacements in steps, halved where they are too large.
-
-        For a static problem, whose loads grow with time from 0 to 1.
-        """
-        body, step, reached = self.problem.equilibrium, FIRST_STEP, 0.0
-        iterate = Iterate(self.problem.start(0.0))
-        while reached < 1.0 and step > LEAST_STEP and self._left > 0:
-            load = min(1.0, reached + step)
-            state = iterate.state
-            loaded = replace(state, x=body.prescribe(state.x, load), time=load)
-            tried, outcome = loop.run(replace(iterate, state=loaded), f"load {load:.3g}")
-            if not outcome.converged and self.problem.interface.friction.acts:
-                tried, outcome = self._frozen_friction(loop, tried)
-            if outcome.converged:
-                iterate, reached = tried, load
-            else:
-                step /= 2
-        state = iterate.state
-        time = self.problem.time
-        whole = replace(state, x=body.prescribe(state.x, time), time=time)
-        iterate = replace(iterate, state=whole)
-        residuals = evaluate(self.problem, iterate.state)
-        self._see(iterate, residuals)
-        ended = "" if reached == 1.0 else f"load steps ended at {reached:.3g} of the load"
-        return iterate, Outcome(residuals, self.options.allowed, ended)
+    def whole_loop(self, patience: int | None = None) -> NewtonLoop:
+        """Return Newton's loop on the problem's own body."""
+        return NewtonLoop(self.search, self.whole, self.options.secant_until, patience)
 
 
 def _solve_condensed(

@@ -24,6 +24,7 @@ from contact.methods.loop import NewtonLoop
 from contact.methods.newton import moduli_of
 from contact.methods.options import NewtonOptions
 from contact.methods.report import History
+from contact.methods.search import Search
 from contact.methods.step import Iterate, WholeStep
 from contact.methods.sure import Gathered
 from contact.problem.condensed import Condensation, CondensedProblem
@@ -137,8 +138,9 @@ def newton(problem: CondensedProblem, start: State | None) -> tuple[State, bool,
     options = NewtonOptions(tolerance=1e-11, condense=False)
     step = WholeStep(problem, options, moduli_of(problem.scales, options.gamma), Counters())
     history = History()
-    loop = NewtonLoop(problem, options, step, history, lambda *_: None, 0.0)
-    iterate, outcome = loop.run(Iterate(problem.start() if start is None else start))
+    iterate = Iterate(problem.start() if start is None else start)
+    search = Search(problem, options, history, iterate)
+    iterate, outcome = NewtonLoop(search, step, 0.0).run(iterate)
     return iterate.state, outcome.kkt.largest <= 1e-9, len(history.records)
 
 

@@ -15,6 +15,7 @@ from contact.interface.linearised import Moduli, linearise
 from contact.interface.multipliers import Multipliers
 from contact.interface.status import CLOSED, FREE, SLIDES, STICKS
 from contact.methods.fixed_point import FixedPoint
+from contact.methods.load_steps import load_steps
 from contact.methods.newton import Newton
 from contact.methods.options import FixedPointOptions, NewtonOptions
 from contact.methods.report import Outcome
@@ -275,13 +276,15 @@ def test_load_steps_that_end_early_have_not_converged():
     class FailsLate:
         """Two steps of load, the second of which fails."""
 
+        search = method.search
+
         def run(self, iterate, note="", bound=None, goal=0.0):
             loads.append(iterate.state.time)
             residual = 0.0 if iterate.state.time <= 0.25 else 1.0
             kkt = KKT(residual, residual, residual)
             return iterate, Outcome(kkt, method.options.allowed, "" if residual == 0 else "no")
 
-    iterate, outcome = method._load_steps(FailsLate())
+    iterate, outcome = load_steps(FailsLate())
     assert max(loads) > 0.25
     assert not outcome.converged
     assert "load steps ended at 0.25 of the load" in outcome.reason

@@ -15,6 +15,7 @@ from mpi4py import MPI
 from contact.build import build_problem
 from contact.case.file import Case, parse_case
 from contact.linear.operator import SparseOperator
+from contact.methods.load_steps import load_steps
 from contact.methods.newton import Newton
 from contact.methods.options import NewtonOptions, with_method
 from contact.methods.report import Record
@@ -410,14 +411,14 @@ def test_an_interrupted_load_step_is_judged_by_the_full_load(
     problem = build_problem(block(2))
     notes = []
 
-    def load_steps(method: Newton, _: object) -> Any:
-        return method._load_steps(method._whole_loop())
+    def stepped(method: Newton, _: object) -> Any:
+        return load_steps(method.whole_loop())
 
     def press(record: Record) -> None:
         notes.append(record.note)
         signal.raise_signal(signal.SIGINT)
 
-    monkeypatch.setattr(Newton, "_roads", load_steps)
+    monkeypatch.setattr(Newton, "_roads", stepped)
     solution = solve_problem(problem, NewtonOptions(condense=False), press)
     assert solution.outcome.signal == signal.SIGINT
     assert [note.split()[:2] for note in notes] == [["load", "0.25"]]
