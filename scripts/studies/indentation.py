@@ -2,7 +2,8 @@
 
 `python3 -m scripts.studies.indentation [--out DIR] [--coarse]`, also under mpirun. Each problem is
 solved in two boxes; what is off by the box is of first order in the contact radius over its size,
-and is extrapolated to none.
+and is extrapolated to none. `indentation_figures.py` draws pressure, and the current of an
+experiment.
 """
 
 from __future__ import annotations
@@ -11,17 +12,15 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from mpi4py import MPI
 
 from contact import Case, Solution, load_case
 from contact.library.reading import find
 from contact.output.balances import charge_balance
-from contact.output.table import contact_table
 from contact.typing import Array
 from forms.elasticity import isotropic
 from forms.piezo import hexagonal_voigt
 from scripts.cases import CASES
-from scripts.reporting import Report, options, solved, subplots
+from scripts.reporting import Report, options, solved
 from scripts.studies import half_space
 from scripts.studies.half_space import HalfSpace, Indentation
 
@@ -96,8 +95,8 @@ class Setting:
         sign = -np.sign(self.poling)
         return HalfSpace(entry.stiffness / 1e9, sign * entry.coupling, 1e9 * entry.permittivity)
 
-    def case(self, extent: float) -> Case:
-        """Return the case in a box of an extent, in contact radii."""
+    def case(self, extent: float, *more: str) -> Case:
+        """Return the case in a box of an extent, in contact radii; `more` are overrides."""
         unit = 1e9 if self.units == "SI" else 1.0
         insulating = self.potential is None
         name = "indent-pzt4-insulating.toml" if insulating else "indent-pzt4-conducting.toml"
@@ -115,7 +114,7 @@ class Setting:
         if not insulating:
             changes.append(f"electric.phi_f={(self.potential or 0.0) * unit}")
             changes.append(f"electric.k_e={1e6 / unit}")
-        return load_case(CASES / name, changes)
+        return load_case(CASES / name, [*changes, *more])
 
     def _material(self) -> str:
         if self.material == "thesis":
@@ -247,56 +246,11 @@ def table(report: Report, fineness: float, materials: Sequence[str] = MATERIALS)
     report.table("closed-forms", "Indentation, computed over closed form", columns, note)
 
 
-def figure(report: Report, fineness: float) -> None:
-    """Draw pressure and charge beneath indenters of PZT-4 beside the closed forms. Collective."""
-    drawn, axes = subplots(1, 3, size=(7.6, 2.6))
-    data: dict[str, Sequence[float]] = {}
-    for ax, shape in zip(axes, MOMENTS, strict=True):
-        for potential, colour in ((None, "#0072B2"), (0.0, "#D55E00")):
-            setting = Setting("PZT-4", shape, potential, fineness)
-            solution = solved(setting.case(40.0))
-            radius, made = measure(setting, solution).radius, contact_table(solution)
-            if made is None:
-                continue
-            body, kind = setting.body, "insulating" if potential is None else "grounded"
-            stiff = body.insulating if potential is None else body.conducting
-            x = np.linspace(0.002, 0.9995, 400)
-            exact = _pressure(shape, x, stiff, setting.depth, radius)
-            chosen = made["x"] < (0.985 if shape == "punch" else 1.3) * RADIUS
-            ax.plot(made["x"][chosen], made["pressure"][chosen], ".", ms=2, color=colour)
-            ax.plot(x * radius, exact, lw=0.8, color=colour, label=kind)
-            data |= {
-                f"r, {shape}, {kind}": made["x"][chosen],
-                f"p, {shape}, {kind}": made["pressure"][chosen],
-                f"r, {shape}, {kind}, closed form": x * radius,
-                f"p, {shape}, {kind}, closed form": exact,
-            }
-        ax.set_title(shape)
-        ax.set_xlabel("$r$ (m)")
-        ax.set_ylim(0, {"punch": 20.0, "cone": 80.0, "ball": 9.0}[shape])
-    axes[0].set_ylabel("pressure (GPa)")
-    axes[0].legend(loc="upper left")
-    if MPI.COMM_WORLD.rank == 0:
-        drawn.tight_layout()
-        caption = "Pressure beneath indenters of PZT-4: nodes, and closed forms (lines)"
-        report.figure("pressure", caption, drawn, data)
-
-
-def _pressure(shape: str, x: np.ndarray, stiff: float, depth: float, radius: float) -> np.ndarray:
-    """Return the pressure of isotropic elasticity with an E*, over r/a."""
-    if shape == "punch":
-        return np.asarray(stiff * depth / (np.pi * RADIUS) / np.sqrt(1 - x**2))
-    if shape == "cone":
-        return np.asarray(stiff / 2 / np.tan(np.deg2rad(HALF_ANGLE)) * np.arccosh(1 / x))
-    return np.asarray(2 * stiff * radius / (np.pi * CURVATURE) * np.sqrt(1 - x**2))
-
-
 def main(arguments: Sequence[str] | None = None) -> None:
-    """Make the table and the figure."""
+    """Make the table."""
     chosen = options(__doc__, "indentation", arguments)
-    report, fineness = Report(chosen.out), 6.0 if chosen.coarse else 12.0
-    table(report, fineness, MATERIALS[:1] if chosen.coarse else MATERIALS)
-    figure(report, fineness)
+    fineness = 6.0 if chosen.coarse else 12.0
+    table(Report(chosen.out), fineness, MATERIALS[:1] if chosen.coarse else MATERIALS)
 
 
 if __name__ == "__main__":

@@ -13,6 +13,7 @@ from forms.elasticity import hexagonal
 from scripts.cases import CASES
 from scripts.studies import half_space
 from scripts.studies.indentation import Setting, extrapolated
+from scripts.studies.indentation_figures import BALL, TIME, charges
 
 #: Material -> E* insulating and conducting (GPa), |Q/P| of a grounded indenter (pC/N): published
 #: constants, computed independently of this code.
@@ -129,3 +130,16 @@ def test_the_cone_of_sneddon():
 def test_the_library_and_the_study_have_the_same_pzt4():
     entry = find("PZT-4")
     assert np.array_equal(entry.stiffness / 1e9, hexagonal(139.0, 77.8, 74.3, 113.0, 25.6))
+
+
+def test_the_charge_of_a_ball_that_is_driven_at_constant_velocity():
+    """Q = (8/3) |N_21| sqrt(R) (v t)^1.5: the exponents of the published experiment's current."""
+    times = TIME * np.array([0.25, 0.5, 1.0])
+    found = {}
+    for velocity in (1e-6, 2e-6):
+        small, large = (charges(velocity, times, 12.0, box) for box in (30.0, 60.0))
+        found[velocity] = np.abs(2 * large - small)
+        n21 = Setting("PZT-4", "ball").body.inverse[1, 0]
+        theory = 8 / 3 * abs(n21) * np.sqrt(BALL) * (velocity * times) ** 1.5
+        assert found[velocity] == pytest.approx(theory, rel=5e-3)
+    assert found[2e-6] / found[1e-6] == pytest.approx(2**1.5, rel=5e-3)
