@@ -216,9 +216,9 @@ class Contact(Section):
         description="`true`: the layer's force is taken from the previous outer iteration, as in "
         "Algorithms 6 and 8; not with method `newton`.",
     )
-    friction: Friction | None = Field(
-        default=None, description="Friction on this part. Default: that of `[friction]`."
-    )
+    friction: Annotated[
+        Friction | None, Accepted("a table; [friction] at the top level is for all contacts")
+    ] = Field(default=None, description="Friction on this part. Default: that of `[friction]`.")
     electric: Electric | None = Field(
         default=None, description="Electric contact of this part. Default: that of `[electric]`."
     )

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import difflib
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from typing import Any, Literal, get_args, get_origin
 
 from pydantic import ValidationError
@@ -16,7 +16,7 @@ from contact.case.types import UNKNOWN, Section, Words, accepted_by, keys_of, se
 #: What a user may look for in a load, and where it is.
 FORCES = {
     key: "a load is given per area, traction = resultant / area of the part, or per volume, "
-    "body_force"
+    "body_force; a resultant goes to a part that is rigid, force of [[rigid]]"
     for key in ("force", "resultant", "forces")
 }
 
@@ -95,19 +95,34 @@ def _hint(key: str, sections: list[type], others: list[type], root: type[Section
     """
     field = keys_of(root).get(key)
     if field is not None and sections_of(field.annotation):
-        table = f"[[{key}]]" if get_origin(field.annotation) is tuple else f"[{key}]"
+        table = _table(key, field.annotation)
         return f" here: {table} is a table of its own, at the top level"
     if Load in sections and key in FORCES:
         return f": {FORCES[key]}"
-    for section in sections:
-        kind = _kind(section)
+    kinds = {_kind(section): section for section in sections if _kind(section)}
+    for kind, section in kinds.items():
         for other in others:
-            if kind and other is not section and key in keys_of(other):
+            if other is not section and key in keys_of(other):
                 return f" with {kind}: it belongs to {_kind(other)}"
-        if kind:
-            near = difflib.get_close_matches(key, keys_of(section), n=1)
-            return f" with {kind}" + (f", did you mean {near[0]}?" if near else "")
-    return ""
+    homes = dict.fromkeys(table for table, section in _tables(root) if key in keys_of(section))
+    if homes:
+        return f" here: it belongs to {' or '.join(homes)}"
+    if not kinds:
+        return ""
+    kind, section = next(iter(kinds.items()))
+    near = difflib.get_close_matches(key, keys_of(section), n=1)
+    return f" with {kind}" + (f", did you mean {near[0]}?" if near else "")
+
+
+def _tables(root: type[Section]) -> Iterator[tuple[str, type]]:
+    """Give the tables of a case at its top level with the sections that read them."""
+    for key, field in keys_of(root).items():
+        for section in sections_of(field.annotation).values():
+            yield _table(key, field.annotation), section
+
+
+def _table(key: str, annotation: Any) -> str:
+    return f"[[{key}]]" if get_origin(annotation) is tuple else f"[{key}]"
 
 
 def _kind(section: type) -> str:

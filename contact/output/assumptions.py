@@ -11,7 +11,7 @@ from mpi4py import MPI
 from contact.output.solution import Solution
 from contact.problem.problem import ContactProblem
 from forms.elasticity import Anisotropic
-from forms.hencky import Hencky, check_monotonicity
+from forms.hencky import Hencky, MonotonicityReport, check_monotonicity
 
 #: What there is to say, if anything, and whether it is good news.
 Remark: TypeAlias = tuple[str, bool]
@@ -36,28 +36,39 @@ def monotonicity(solution: Solution, strains: Sequence[float]) -> Iterator[Remar
 def _monotonicity(law: Hencky, on: Sequence[str], strain: float, dim: int) -> Remark:
     report = check_monotonicity(law, strain, dim=dim)
     place = f" in {', '.join(on)}" if on else ""
-    text = (
-        f"assumption (h1) {'holds' if report.holds else 'does not hold'}{place} on the strains of "
-        f"this solution, |dev eps| <= {strain:.4g}: g_0 = {report.g_0:.4g} <= g <= "
+    constants = (
+        f"assumption (h1) {'holds' if report.holds else 'does not hold'} on the strains of this "
+        f"solution, |dev eps| <= {strain:.4g}: g_0 = {report.g_0:.4g} <= g <= "
         f"{report.largest:.4g}, (d/2) k_0 = {report.ceiling:.4g}, alpha = {report.alpha:.4g}, "
         f"beta = {report.beta:.4g}"
     )
+    said = []
     if not report.hardens:
-        text += "; alpha <= 0, the material softens: there may be several solutions or none"
-    if report.g_0 <= 0:
-        text += "; g_0 <= 0: the material has no stiffness in shear"
-    if report.largest > report.ceiling:
-        text += (
-            "; g exceeds (d/2) k_0, as for any linear material with a Poisson's ratio below "
-            f"{_least_poisson(dim):.3g}"
+        said.append(
+            f"the material softens{place}, alpha <= 0: there may be several solutions or none"
         )
-        if report.hardens:
-            text += (
-                ": the proof of Theorem 3.1 does not cover it as printed, though with the deviator "
-                "in three dimensions the operator is strongly monotone, with the constant "
-                f"min(3 k_0, 2 alpha) = {min(6 * report.ceiling / dim, 2 * report.alpha):.4g}"
-            )
-    return text, report.holds
+    if report.g_0 <= 0:
+        said.append(f"the material has no stiffness in shear{place}, g_0 <= 0")
+    if report.largest > report.ceiling:
+        said.append(_above_ceiling(report, place, dim))
+    if not said:
+        said.append(f"the material is stable{place}")
+    return f"{'; '.join(said)}; {constants}", report.holds
+
+
+def _above_ceiling(report: MonotonicityReport, place: str, dim: int) -> str:
+    """Say what it means that g exceeds (d/2) k_0."""
+    text = (
+        f"the theory does not cover the material{place}: g exceeds (d/2) k_0, as for any linear "
+        f"material with a Poisson's ratio below {_least_poisson(dim):.3g}"
+    )
+    if not report.hardens:
+        return text
+    return (
+        f"{text}, and the proof of Theorem 3.1 is not for it as printed, though with the deviator "
+        "in three dimensions the operator is strongly monotone, with the constant "
+        f"min(3 k_0, 2 alpha) = {min(6 * report.ceiling / dim, 2 * report.alpha):.4g}"
+    )
 
 
 def _least_poisson(dim: int) -> float:
@@ -133,7 +144,10 @@ def falling(solution: Solution) -> Remark:
     layers, size = [c.layer for c in solution.problem.contacts], solution.problem.domain.size
     if not any(layer is not None and layer.falls(size) for layer in layers):
         return "", True
-    text = "p_nu falls with the penetration: several solutions may exist, and this is one of them"
+    text = (
+        "the layer presses less the deeper it is pressed, p_nu falls with the penetration: several "
+        "solutions may exist, and this is one of them"
+    )
     return text, False
 
 

@@ -39,7 +39,17 @@ def theorem(solution: Solution) -> Remark:
     elif problem.piezoelectric:
         name = "5.1"
     total, values = " + ".join(t[0] for t in terms), ", ".join(" = ".join(t) for t in terms)
-    text = f"Theorem {name}: one solution where {total} is small enough; here {values}"
+    given = {
+        "friction": friction is not None,
+        "the layer": layered,
+        "the current": conductor is not None,
+    }
+    weak = [name for name, there in given.items() if there]
+    text = (
+        f"one solution is sure where {' and '.join(weak)} {'is' if len(weak) == 1 else 'are'} weak "
+        f"enough: Theorem {name} asks that {total} be "
+        f"small; here {values}"
+    )
     if layered and friction is not None and friction[1] > 0:
         text += f"; it has no mu that depends on the slip, and here L_mu = {friction[1]:.4g}/length"
     if conductor is not None and not np.isfinite(_limit(conductor)):
@@ -143,7 +153,7 @@ def sliding(solution: Solution) -> Remark:
     if friction[1] < bound:
         return text, True
     return (
-        f"{text}: several solutions may exist, and this is one reached from {solution.start}; a "
+        f"several solutions may exist, and this is one reached from {solution.start}: {text}; a "
         "mu that falls more slowly (a smaller rho) has fewer of them",
         False,
     )
@@ -158,20 +168,22 @@ def conductivity(solution: Solution) -> Iterator[Remark]:
     }
     if ShiftedConductivity in laws:
         yield (
-            'electric.law = "shifted" gives up (h~5)(d), psi = 0 for u_nu <= rho: with it, as '
-            '"ramp" has it, the foundation never conducts, for u_nu <= rho everywhere',
+            'the foundation conducts from just before it is touched, electric.law = "shifted": it '
+            'gives up (h~5)(d), psi = 0 for u_nu <= rho, with which, as "ramp" has it, it never '
+            "conducts, for u_nu <= rho everywhere",
             True,
         )
     if RampConductivity in laws:
         yield (
-            'electric.law = "ramp" conducts only where u_nu > rho, and u_nu <= rho: k_e has no '
-            'effect; "shifted" moves the ramp in front of the closing gap',
+            'the foundation never conducts, k_e has no effect: electric.law = "ramp" conducts only '
+            'where u_nu > rho, and u_nu <= rho; "shifted" moves the ramp in front of the closing '
+            "gap",
             False,
         )
     if PerfectConductivity in laws:
         yield (
-            'electric.law = "perfect" jumps as the gap closes, (h~5)(e) fails, and no theorem says '
-            'that there is a solution or only one; "shifted" is continuous',
+            'the current jumps as the gap closes, electric.law = "perfect": (h~5)(e) fails, and no '
+            'theorem says that there is a solution or only one; "shifted" is continuous',
             False,
         )
 
@@ -192,9 +204,10 @@ def ramp(solution: Solution) -> Remark:
     width, text = 1 / psi.delta, ""
     if width < 2 * scales.spacing:
         text = (
-            f"psi rises within 1/delta = {width:.3g} of the gap, less than two spacings "
-            f"(2 h = {2 * scales.spacing:.3g}) of the contact nodes: the mesh decides which of "
-            f"them conduct; take a finer mesh, or electric.delta below {0.5 / scales.spacing:.3g}"
+            f"the mesh decides which contact nodes conduct: psi rises within 1/delta = "
+            f"{width:.3g} of the gap, less than two of their spacings "
+            f"(2 h = {2 * scales.spacing:.3g}); take a finer mesh, or electric.delta below "
+            f"{0.5 / scales.spacing:.3g}"
         )
     potential = problem.equilibrium.phi_scale * solution.nodal[:, -1]
     largest = problem.nodes.maximum(np.abs(conductor.phi_l(potential - conductor.phi_f)))
@@ -204,9 +217,9 @@ def ramp(solution: Solution) -> Remark:
     number = psi.delta * largest * coupling * biot / (1 + biot)
     if number >= 1:
         text += (text and "; ") + (
-            f"the current changes within 1/delta = {width:.3g} of the gap by so much that it opens "
-            f"or closes gaps by itself (a column asks for a number below 1, and it is "
-            f"{number:.3g}): several solutions may exist, and this is one reached from "
-            f"{solution.start}; a smaller delta has fewer of them"
+            f"several solutions may exist, and this is one reached from {solution.start}: the "
+            f"current changes within 1/delta = {width:.3g} of the gap by so much that it opens or "
+            f"closes gaps by itself (a column asks for a number below 1, and it is {number:.3g}); "
+            "a smaller delta has fewer of them"
         )
     return text, False

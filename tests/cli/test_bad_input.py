@@ -117,6 +117,14 @@ FILES = {
         ("traction", "force"),
         "load.0.force: unknown key: a load is given per area, traction = resultant / area of the",
     ),
+    "a coefficient of the contact": (
+        ('on = "bottom"', 'on = "bottom"\nmu = 0.3'),
+        "contact.mu: unknown key here: it belongs to [friction]; accepted: on,",
+    ),
+    "friction of the contact as a number": (
+        ('on = "bottom"', 'on = "bottom"\nfriction = 0.3'),
+        "contact.friction: given 0.3; accepted: a table; [friction] at the top level is for all",
+    ),
     "material of the contact": (
         ('on = "bottom"', 'on = "bottom"\nmaterial = {young = 0.3}'),
         "contact.material: unknown key here: [material] is a table of its own, at the top level",
