@@ -59,61 +59,66 @@ class HeldCurrent:
 
     Attributes
     ----------
-    nodes, weight
-        Local node numbers and lumped areas, shape (n,).
-    direction, gap
-        Contact direction, shape (n, d), and gap, shape (n,).
+    jump
+        The nodes: what is seen of them is seen as at contact nodes. No tangential directions.
     conductor
         The conductive foundation.
     phi_scale
-        Unit of the potential in the unknowns.
-    block_size
-        Unknowns a node, the last of which is the potential.
+        Unit of the potential in the unknowns, the last of a node.
     """
 
-    nodes: NDArray[np.int32]
-    weight: Array
-    direction: Array
-    gap: Array
+    jump: ContactNodes
     conductor: Conductor
     phi_scale: float
-    block_size: int
 
     def at(self, time: float) -> HeldCurrent:
         """Return the same nodes in front of the foundation at a time."""
         return replace(self, conductor=self.conductor.at(time))
 
     def _at_nodes(self, x: Array) -> tuple[Array, Array]:
-        """Return psi and phi - phi_F for a local dof array."""
-        nodal = x[self.nodes[:, None] * self.block_size + np.arange(self.block_size)]
-        opening = np.einsum("ni,ni->n", nodal[:, :-1], self.direction) - self.gap
+        """Return psi and phi - phi_F for a local dof array. Collective."""
+        jump = self.jump
+        nodal = jump.apply(x)
+        opening = jump.normal_component(nodal) - jump.gap
         # Closed up to the rounding of the prescribed displacement.
-        reach = np.abs(self.gap) + np.linalg.norm(nodal[:, :-1], axis=1)
+        reach = np.abs(jump.gap) + np.linalg.norm(nodal[:, :-1], axis=1)
         closed = opening >= -1e-12 * reach
         # Its displacement is prescribed, not found up to a tolerance: nothing is taken for closed.
         conductivity = self.conductor.psi.at(opening, np.zeros_like(closed), closed)
         return conductivity, self.phi_scale * nodal[:, -1] - self.conductor.phi_f
 
-    def charge(self, x: Array) -> Array:
-        """Return D.nu = psi phi_L(phi - phi_F) at the nodes, shape (n,)."""
+    def add_charge(self, into: Array, x: Array, factor: float = 1.0) -> None:
+        """Add the charges psi phi_L(phi - phi_F) of nodes, times a factor. Collective.
+
+        Parameters
+        ----------
+        into
+            A local dof array.
+        x
+            Local unknowns.
+        factor
+            The factor.
+        """
         psi, difference = self._at_nodes(x)
-        return np.asarray(psi * self.conductor.phi_l(difference))
+        nodal = np.zeros((difference.size, self.jump.block_size))
+        nodal[:, -1] = factor * self.jump.weight * psi * self.conductor.phi_l(difference)
+        self.jump.transpose(nodal, into)
 
     def add_force(self, residual: Array, x: Array) -> None:
-        """Add the nodal residuals of the current to a dof array."""
-        rows = self.nodes * self.block_size + self.block_size - 1
-        residual[rows] -= self.phi_scale * self.weight * self.charge(x)
+        """Add the nodal residuals of the current to a dof array. Collective."""
+        self.add_charge(residual, x, -self.phi_scale)
 
     def slope(self, x: Array) -> Array:
-        """Return the derivative of D.nu by the potential at the nodes, psi frozen, shape (n,)."""
+        """Return the derivative of D.nu by the potential at the nodes, psi frozen. Collective."""
         psi, difference = self._at_nodes(x)
         return np.asarray(psi * self.conductor.phi_l.derivative(difference))
 
     def block(self, x: Array) -> Array:
         """Return the weighted linearisation, (n, block size, block size); 0 if lagged."""
-        total = np.zeros((self.nodes.size, self.block_size, self.block_size))
+        size = self.jump.block_size
+        total = np.zeros((self.jump.nodes.size, size, size))
         if not self.conductor.lagged:
-            total[:, -1, -1] = -(self.phi_scale**2) * self.weight * self.slope(x)
+            total[:, -1, -1] = -(self.phi_scale**2) * self.jump.weight * self.slope(x)
         return total
 
 
@@ -138,14 +143,18 @@ def held_current(
     jump, conductor, phi_scale
         The contact nodes, the conductive foundation and the unit of the potential.
     """
-    direction, gap = obstacle.measure(candidates.points, candidates.normal)
+    direction, gap = candidates.measure(obstacle)
+    gap = candidates.gaps(direction, gap)
     keep = ~np.isin(candidates.nodes, jump.nodes) & free[candidates.nodes, -1] & np.isfinite(gap)
-    return HeldCurrent(
-        candidates.nodes[keep],
-        candidates.weight[keep],
-        direction[keep],
-        gap[keep],
-        conductor,
-        phi_scale,
-        jump.block_size,
+    held = replace(
+        jump,
+        nodes=candidates.nodes[keep],
+        points=candidates.points[keep],
+        weight=candidates.weight[keep],
+        normal=direction[keep],
+        tangent=np.zeros((np.count_nonzero(keep), jump.dim, jump.dim)),
+        gap=gap[keep],
+        motion=None,
+        held=None,
     )
+    return HeldCurrent(held, conductor, phi_scale)

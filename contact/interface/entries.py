@@ -18,8 +18,9 @@ from contact.interface.current import Conductor, HeldCurrent
 from contact.interface.friction import Friction, NodalFriction
 from contact.interface.history import SlipHistory
 from contact.interface.layer import Layer
-from contact.interface.links import make_links
+from contact.interface.links import Links, make_links
 from contact.interface.mortar.coupling import Coupling
+from contact.interface.mortar.lumping import Mixing
 from contact.interface.nodes import ContactNodes
 from contact.interface.piecewise import (
     ConductivityPieces,
@@ -61,6 +62,8 @@ class Entry:
         The current through nodes of the part that cannot move; None without.
     coupling
         What is opposite of the nodes, where that is another body; None for a rigid foundation.
+    mixing
+        The jumps in front of a rigid foundation, where these are no nodal values; else None.
     """
 
     on: str
@@ -70,6 +73,7 @@ class Entry:
     conductor: Conductor | None = None
     held: HeldCurrent | None = None
     coupling: Coupling | None = None
+    mixing: Mixing | None = None
 
 
 def joined_nodes(
@@ -89,15 +93,15 @@ def joined_nodes(
     InputError
         If two entries share nodes, or a node is on both sides of pairs of bodies.
     """
-    nodes = _side_by_side(entries)
-    couplings = [entry.coupling for entry in entries if entry.coupling is not None]
-    return replace(nodes, links=make_links(nodes.comm, index_map, couplings, nodes.nodes, free))
+    _check_apart(entries)
+    nodes = _side_by_side([entry.nodes for entry in entries])
+    given = [entry.coupling or entry.mixing for entry in entries]
+    rows = [jumps for jumps in given if jumps is not None]
+    return replace(nodes, links=make_links(nodes.comm, index_map, rows, nodes.nodes, free))
 
 
-def _side_by_side(entries: Sequence[Entry]) -> ContactNodes:
+def _check_apart(entries: Sequence[Entry]) -> None:
     first = entries[0].nodes
-    if len(entries) == 1:
-        return first
     every = np.concatenate([entry.nodes.nodes for entry in entries])
     shared = every.size - np.unique(every).size
     if first.comm.allreduce(shared, op=MPI.SUM) > 0:
@@ -106,17 +110,21 @@ def _side_by_side(entries: Sequence[Entry]) -> ContactNodes:
             f"contact: the parts {names} share nodes, which one obstacle alone can hold; "
             "accepted: parts without common nodes, such as pieces of a side with a gap between"
         )
+
+
+def _side_by_side(pieces: Sequence[ContactNodes]) -> ContactNodes:
+    first = pieces[0]
+    if len(pieces) == 1:
+        return first
     together = {
-        name: np.concatenate([getattr(entry.nodes, name) for entry in entries])
+        name: np.concatenate([getattr(nodes, name) for nodes in pieces])
         for name in ("nodes", "points", "weight", "normal", "tangent", "gap")
     }
     if first.motion is not None:
-        together["motion"] = np.concatenate([entry.nodes.motion for entry in entries])
-    held = [
-        np.zeros_like(e.nodes.normal) if e.nodes.held is None else e.nodes.held for e in entries
-    ]
+        together["motion"] = np.concatenate([nodes.motion for nodes in pieces])
+    held = [np.zeros_like(n.normal) if n.held is None else n.held for n in pieces]
     together["held"] = np.concatenate(held)
-    return replace(first, **together, cut=max(entry.nodes.cut for entry in entries))
+    return replace(first, **together, cut=max(nodes.cut for nodes in pieces))
 
 
 def joined_friction(entries: Sequence[Entry], nodes: ContactNodes) -> NodalFriction:
@@ -180,19 +188,28 @@ def _joined_conductors(
     )
 
 
-def joined_held(entries: Sequence[Entry]) -> HeldCurrent | None:
-    """Return the current through the held nodes of all entries."""
+def joined_held(entries: Sequence[Entry], begin: int, links: Links | None) -> HeldCurrent | None:
+    """Return the current through the held nodes of all entries.
+
+    Parameters
+    ----------
+    entries
+        The entries.
+    begin
+        Global number of the first node of this rank.
+    links
+        Jumps that are no nodal values.
+    """
     given = [entry.held for entry in entries if entry.held is not None]
-    if len(given) <= 1:
-        return given[0] if given else None
-    together = {
-        name: np.concatenate([getattr(held, name) for held in given])
-        for name in ("nodes", "weight", "direction", "gap")
-    }
-    bounds = Pieces.bounds_of(held.nodes.size for held in given)
+    if not given:
+        return None
+    nodes = _side_by_side([held.jump for held in given])
+    if links is not None:
+        nodes = replace(nodes, links=links.at(nodes.nodes.astype(np.int64) + begin))
+    bounds = Pieces.bounds_of(held.jump.nodes.size for held in given)
     conductor = _joined_conductors([held.conductor for held in given], bounds)
     assert conductor is not None
-    return replace(given[0], **together, conductor=conductor)
+    return replace(given[0], jump=nodes, conductor=conductor)
 
 
 def _bounds(entries: Sequence[Entry]) -> tuple[int, ...]:

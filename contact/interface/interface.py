@@ -143,7 +143,7 @@ class Interface:
         """Nodes at which the operator has blocks: contact nodes, then held ones."""
         if self.held is None:
             return self.jump.nodes
-        return np.concatenate([self.jump.nodes, self.held.nodes])
+        return np.concatenate([self.jump.nodes, self.held.jump.nodes])
 
     def weighted(self, blocks: Array, x: Array) -> Array:
         """Return the operator's blocks at `coupled`: those of the contact nodes, times weight.

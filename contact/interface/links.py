@@ -1,10 +1,11 @@
-"""Jumps between bodies: contact nodes that look at nodes of another body, on whatever rank."""
+"""Jumps that are sums over nodes: of another body, or of the same facet; on whatever rank."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Protocol
 
 import numpy as np
 from dolfinx.common import IndexMap
@@ -13,14 +14,41 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from contact.errors import InputError
-from contact.interface.mortar.coupling import Coupling
 from contact.linear.change import Change
 from contact.typing import Array
 
 
+class Rows(Protocol):
+    """Jumps (S u)_j - sum_l P_jl u_l at some nodes; the same on all ranks.
+
+    `contact.interface.mortar.coupling.Coupling` between bodies, and
+    `contact.interface.mortar.lumping.Mixing` in front of a rigid foundation.
+    """
+
+    @property
+    def nodes(self) -> NDArray[np.int64]:
+        """Global numbers of these nodes, shape (n,)."""
+
+    @property
+    def slaves(self) -> NDArray[np.int64]:
+        """Global numbers of the nodes of their facets, shape (s,)."""
+
+    @property
+    def own(self) -> sparse.csr_array:
+        """S, shape (n, s)."""
+
+    @property
+    def masters(self) -> NDArray[np.int64]:
+        """Global numbers of nodes of the other body, shape (m,)."""
+
+    @property
+    def other(self) -> sparse.csr_array:
+        """P, shape (n, m)."""
+
+
 @dataclass(frozen=True)
 class Links:
-    """The jumps at the contact nodes between bodies, as sums over nodes of both.
+    """The jumps at contact nodes that are no nodal values.
 
     Attributes
     ----------
@@ -30,8 +58,12 @@ class Links:
         The jumps of all ranks by the values of the nodes that take part, shape (r, c).
     change
         The change of unknowns that makes them unknowns.
+    numbers
+        The global numbers of their nodes, shape (r,).
+    between
+        Whether other bodies take part.
     places
-        Where such nodes are among the contact nodes of this rank, shape (k,).
+        Where such nodes are among some nodes of this rank, shape (k,).
     own
         Their rows, shape (k,).
     here, local
@@ -41,10 +73,20 @@ class Links:
     comm: MPI.Intracomm
     jumps: sparse.csr_array
     change: Change
+    numbers: NDArray[np.int64]
+    between: bool
     places: NDArray[np.intp]
     own: NDArray[np.intp]
     here: NDArray[np.intp]
     local: NDArray[np.int32]
+
+    def at(self, numbers: NDArray[np.int64]) -> Links:
+        """Return the links at other nodes of this rank, given their global numbers."""
+        order = np.argsort(self.numbers)
+        found = np.searchsorted(self.numbers, numbers, sorter=order)
+        rows = order[np.minimum(found, self.numbers.size - 1)]
+        places = np.flatnonzero(self.numbers[rows] == numbers)
+        return replace(self, places=places, own=rows[places])
 
     @cached_property
     def _here(self) -> sparse.csr_array:
@@ -68,18 +110,18 @@ class Links:
 def make_links(
     comm: MPI.Intracomm,
     index_map: IndexMap,
-    couplings: Sequence[Coupling],
+    given: Sequence[Rows],
     nodes: NDArray[np.int32],
     free: NDArray[np.bool_],
 ) -> Links | None:
-    """Return the links of all pairs of bodies; None where there are none. Collective.
+    """Return the links of all contacts; None where there are none. Collective.
 
     Parameters
     ----------
     comm, index_map
         Communicator, and the nodes of the mesh.
-    couplings
-        The mortar operators of the pairs.
+    given
+        The jumps that are no nodal values.
     nodes
         Local numbers of the contact nodes of this rank.
     free
@@ -90,17 +132,17 @@ def make_links(
     InputError
         If a node is a slave and a master.
     """
-    if not couplings:
+    if not given:
         return None
-    slaves = np.concatenate([coupling.nodes for coupling in couplings])
-    masters = np.concatenate([coupling.masters for coupling in couplings])
+    slaves = np.concatenate([rows.nodes for rows in given])
+    masters = np.concatenate([rows.masters for rows in given])
     if np.intersect1d(slaves, masters).size:
         raise InputError(
             "contact.against: a node is on the slave side of one contact and on the other side of "
             "one; accepted: parts `on` that share no nodes with parts `against`"
         )
-    every = np.unique(np.concatenate([masters, *(coupling.slaves for coupling in couplings)]))
-    jumps = sparse.vstack([_over(coupling, every) for coupling in couplings], format="csr")
+    every = np.unique(np.concatenate([masters, *(rows.slaves for rows in given)]))
+    jumps = sparse.vstack([_over(rows, every) for rows in given], format="csr")
     begin, end = index_map.local_range
     here = np.flatnonzero((every >= begin) & (every < end))
     local = (every[here] - begin).astype(np.int32)
@@ -108,21 +150,18 @@ def make_links(
     flags[here] = free[local]
     comm.Allreduce(MPI.IN_PLACE, flags, op=MPI.SUM)
     change = Change.of(every, np.searchsorted(every, slaves), jumps, flags > 0)
-    order = np.argsort(slaves)
-    numbers = nodes.astype(np.int64) + begin
-    found = np.searchsorted(slaves, numbers, sorter=order)
-    rows = order[np.minimum(found, slaves.size - 1)]
-    places = np.flatnonzero(slaves[rows] == numbers)
-    return Links(comm, jumps, change, places, rows[places], here, local)
+    none = np.zeros(0, dtype=np.intp)
+    links = Links(comm, jumps, change, slaves, masters.size > 0, none, none, here, local)
+    return links.at(nodes.astype(np.int64) + begin)
 
 
-def _over(coupling: Coupling, every: NDArray[np.int64]) -> sparse.csr_array:
-    """Return a pair's jumps by the values of the nodes of all pairs."""
-    count = coupling.nodes.size
+def _over(rows: Rows, every: NDArray[np.int64]) -> sparse.csr_array:
+    """Return a contact's jumps by the values of the nodes of all contacts."""
+    count = rows.nodes.size
     total = sparse.csr_array((count, every.size))
     for sign, numbers, part in (
-        (1.0, coupling.slaves, coupling.own),
-        (-1.0, coupling.masters, coupling.other),
+        (1.0, rows.slaves, rows.own),
+        (-1.0, rows.masters, rows.other),
     ):
         entries = part.tocoo()
         columns = np.searchsorted(every, numbers)[entries.col]

@@ -31,7 +31,8 @@ class ContactNodes:
         Coordinates, shape (n, d) (length).
     weight
         Integrals of the nodal basis functions over Gamma_3, shape (n,): they reproduce the
-        nodal forces of a constant pressure (vertex rule for P1, Simpson's for P2 edges).
+        nodal forces of a constant pressure (vertex rule for P1, Simpson's for P2 edges; on P2
+        triangles of the functions of `contact.interface.mortar.lumping`).
     normal
         Contact direction, a unit vector out of the body, shape (n, d).
     tangent
@@ -49,8 +50,7 @@ class ContactNodes:
     revolved
         Whether the nodes stand for the rings through them, about the axis x = 0.
     links
-        Jumps between bodies: what is opposite of contact nodes; None where all obstacles are
-        rigid.
+        Jumps that are no nodal values, between bodies and on quadratic triangles; None for none.
     held
         What supports have taken from the contact direction, shape (n, d): times what they
         prescribe at time 1 it is off the gap. None for nothing.

@@ -7,26 +7,18 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 
 import numpy as np
-import ufl
 from dolfinx import fem
-from dolfinx.la import InsertMode
 from mpi4py import MPI
 from numpy.typing import NDArray
 
 from contact.body.equilibrium import BodyEquilibrium
 from contact.errors import InputError
+from contact.interface.mortar.lumping import Lumping, Mixing
+from contact.interface.mortar.surface import surface_of
 from contact.interface.nodes import ContactNodes
 from contact.interface.obstacle import Obstacle
 from contact.mesh.domain import Domain
 from contact.typing import Array
-
-
-def _assembled(space: fem.FunctionSpace, form: ufl.Form) -> Array:
-    """Return the owned part of an assembled vector, one row a node."""
-    vector = fem.assemble_vector(fem.form(form))
-    vector.scatter_reverse(InsertMode.add)
-    size = space.dofmap.index_map.size_local * space.dofmap.index_map_bs
-    return vector.array[:size].reshape(-1, space.dofmap.index_map_bs)
 
 
 @dataclass(frozen=True)
@@ -35,33 +27,57 @@ class Candidates:
 
     Attributes
     ----------
+    comm
+        Communicator.
     nodes, points, weight, normal
         As in `ContactNodes`, whatever is fixed there.
+    numbers
+        Global numbers of the nodes, shape (n,).
+    mixing
+        The jumps, where these are no nodal values.
     """
 
+    comm: MPI.Intracomm
     nodes: NDArray[np.int32]
     points: Array
     weight: Array
     normal: Array
+    numbers: NDArray[np.int64]
+    mixing: Mixing | None
+
+    def jumps(self, values: Array) -> Array:
+        """Return the jumps of values at these nodes, shape (n, m). Collective."""
+        if self.mixing is None:
+            return values
+        return self.mixing.apply(self.comm, self.numbers, values)
+
+    def measure(self, obstacle: Obstacle) -> tuple[Array, Array]:
+        """Return the contact directions and the gaps of nodes, before anything is mixed."""
+        return obstacle.measure(self.points, self.normal)
+
+    def gaps(self, direction: Array, gap: Array) -> Array:
+        """Return the gaps of the jumps, (n,); next to infinite ones no numbers. Collective."""
+        if self.mixing is None:
+            return gap
+        with np.errstate(invalid="ignore"):
+            mixed = self.jumps(gap[:, None] * direction)
+            return np.asarray(np.einsum("nd,nd->n", direction, mixed))
 
 
 def candidates(domain: Domain, space: fem.FunctionSpace, part: str) -> Candidates:
     """Collect the nodes of a boundary part whose area is not zero. Collective."""
-    d = domain.dim
-    v = ufl.TestFunction(space)
-    nu = ufl.FacetNormal(domain.mesh)
-    ds = domain.ds(part)
-    weight = _assembled(space, v[0] * ds)[:, 0]
-    normal = _assembled(space, sum(nu[i] * v[i] for i in range(d)) * ds)[:, :d]
-
-    measure = domain.comm.allreduce(weight.sum(), op=MPI.SUM)
-    count = domain.comm.allreduce(int(np.count_nonzero(weight)), op=MPI.SUM)
-    # Nodes whose basis function has no mean on Gamma_3 carry none: P2 vertices of triangles, and
-    # of edges where they meet the axis of a body of revolution.
-    nodes = np.flatnonzero(weight > 1e-9 * measure / max(count, 1)).astype(np.int32)
-    points = space.tabulate_dof_coordinates()[nodes, :d]
-    normal = normal[nodes] / np.linalg.norm(normal[nodes], axis=1)[:, None]
-    return Candidates(nodes, points, weight[nodes], normal)
+    lumped = Lumping.of(surface_of(domain, space, part).gathered(domain.comm))
+    # Nodes whose function has no mean on Gamma_3 carry none: P2 vertices of edges where they meet
+    # the axis of a body of revolution.
+    heavy = lumped.weight > 1e-9 * lumped.weight.sum() / max(lumped.weight.size, 1)
+    begin, end = space.dofmap.index_map.local_range
+    here = np.flatnonzero(heavy & (lumped.nodes >= begin) & (lumped.nodes < end))
+    numbers, normal = lumped.nodes[here], lumped.normal[here]
+    nodes = (numbers - begin).astype(np.int32)
+    points = space.tabulate_dof_coordinates()[nodes, : domain.dim]
+    normal = normal / np.linalg.norm(normal, axis=1)[:, None]
+    weight = lumped.weight[here]
+    return Candidates(domain.comm, nodes, points, weight, normal, numbers, lumped.mixing)
 
 
 def _corners(space: fem.FunctionSpace) -> NDArray[np.int32]:
@@ -145,8 +161,8 @@ def find_nodes(
     obstacle: Obstacle,
     key: str = "contact",
     press: bool = False,
-) -> ContactNodes:
-    """Collect the contact nodes of a boundary part. Collective.
+) -> tuple[ContactNodes, Mixing | None]:
+    """Collect the contact nodes of a boundary part, and the jumps there. Collective.
 
     A node whose contact direction is fixed by a Dirichlet condition is left out; a fixed
     tangential component is removed from its tangent projector. On a symmetry line the
@@ -171,7 +187,7 @@ def find_nodes(
     domain, space, d = body.domain, body.space, body.dim
     found = candidates(domain, space, part)
     nodes, points, weight = found.nodes, found.points, found.weight
-    direction, gap = obstacle.measure(points, found.normal)
+    direction, gap = found.measure(obstacle)
     if domain.comm.allreduce(bool(np.isnan(direction).any()), op=MPI.LOR):
         raise InputError(
             f"{key}.foundation: a contact node has no contact direction (it is the sphere's "
@@ -186,8 +202,8 @@ def find_nodes(
             f"{key}.on: part {part!r} shares nodes with a rigid part; accepted: parts apart"
         )
     free = body.free[nodes, :d]
-    fixed = body.nodal(body.prescribe(body.rest()))[nodes, :d]
-    gap = gap - np.einsum("ni,ni->n", direction, fixed)
+    fixed = found.jumps(body.nodal(body.prescribe(body.rest()))[nodes, :d])
+    gap = found.gaps(direction, gap) - np.einsum("ni,ni->n", direction, ~free * fixed)
     admissible = direction * free
     length = np.linalg.norm(admissible, axis=1)
     # A gap is infinite where the body's normal does not lead to the foundation.
@@ -217,7 +233,7 @@ def find_nodes(
         raise InputError(
             f"{key}.on: part {part!r} has no node that is free to move towards the foundation"
         )
-    return jump
+    return jump, found.mixing
 
 
 def _motion(

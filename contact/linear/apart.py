@@ -64,10 +64,15 @@ def set_up_apart(solver: Solver, kept: PETSc.Mat | None) -> bool:
     pc = solver.ksp.getPC()
     if pc.getMGLevels() > 1:
         finest = pc.getMGLevels() - 1
-        made = jumps.matMult(pc.getMGInterpolation(finest))
+        plain = pc.getMGInterpolation(finest).copy()
+        made = jumps.matMult(plain)
         own = made.createVecLeft()
         own.array[:] = layout.free.ravel()
         made.diagonalScale(L=own)
+        # Where an unknown is fixed all is as it was: coarse functions of these alone remain some.
+        own.array[:] = ~layout.free.ravel()
+        plain.diagonalScale(L=own)
+        made.axpy(1.0, plain)
         pc.setMGInterpolation(finest, made)
         pc.setMGRestriction(finest, made)
     coupled.copy(matrix, PETSc.Mat.Structure.SAME_NONZERO_PATTERN)

@@ -166,11 +166,9 @@ def _foundation_charges(problem: ContactProblem, state: State) -> Array:
     density[:, -1] = problem.nodes.weight * interface.response.charge(nodal, pressure)
     leaving = np.zeros_like(body.external(state.time))
     problem.nodes.transpose(density, leaving)
-    charges = body.nodal(leaving)[:, -1]
-    if interface.held is None:
-        return charges
-    held = interface.held.weight * interface.held.charge(state.x)
-    return np.concatenate([charges, held])
+    if interface.held is not None:
+        interface.held.add_charge(leaving, state.x)
+    return np.asarray(body.nodal(leaving)[:, -1])
 
 
 def force_balance(problem: ContactProblem, state: State) -> ForceBalance:

@@ -121,7 +121,9 @@ _NODE: dict[str, Item] = {
     "u_n": Item(
         "length",
         "Displacement along ν, out of the body; gap - u_n is what stays open. Where "
-        "the foundation moves, relative to that; so are the tangential ones.",
+        "the foundation moves, relative to that; so are the tangential ones. At degree 2 in space "
+        "mid-edges have (u - (u₁ + u₂)/5)/(3/5), u₁ and u₂ being at the ends of the edge, and so "
+        "has the gap: that, not u, is what the pressure there acts against.",
     ),
     "u_t": Item("length", "Tangential displacement u_τ; in the plane."),
     "u_tx": Item("length", "Its components; in space."),
@@ -200,9 +202,7 @@ SURFACE: Mapping[str, Item] = {
     "weight": Item("area", "As in `contact.csv`."),
     "potential": Item("potential", "Potential; of piezoelectric bodies."),
     "charge": Item("charge/area", "`d_n` of `contact.csv`; likewise."),
-    "status": Item(
-        "", "0 open, 1 stick, 2 slip; -1 for a node that is held, or a corner of a P2 facet."
-    ),
+    "status": Item("", "0 open, 1 stick, 2 slip; -1 for a node that is held."),
     "row": Item("", "Row of the node in `contact.csv`, from 0; -1 for none."),
     "entry": Item("", "Number of its `[[contact]]`, from 0."),
     "rigid": Item("", "1 in front of a rigid foundation, 0 in front of another body."),

@@ -282,8 +282,10 @@ def _at_kept_nodes(interface: Interface) -> Interface:
     count = interface.jump.nodes.size
     positions = np.arange(interface.coupled.size, dtype=np.int32)
     held = interface.held
+    if held is not None:
+        held = replace(held, jump=replace(held.jump, nodes=positions[count:], links=None))
     return replace(
         interface,
         jump=replace(interface.jump, nodes=positions[:count], motion=None, links=None),
-        held=None if held is None else replace(held, nodes=positions[count:]),
+        held=held,
     )

@@ -69,7 +69,7 @@ def _joined(problem: ContactProblem, piece: NDArray[np.int32], count: int) -> ND
         touched[piece[nodes.nodes[moves]]] = 1
         rows = np.flatnonzero(np.abs(ties[:, free]).sum(axis=1) > 0)
         touched[piece[rows // problem.equilibrium.block_size]] = 1
-    if nodes.links is not None:
+    if nodes.links is not None and nodes.links.between:
         touched[piece[nodes.links.local]] = 1
     problem.comm.Allreduce(MPI.IN_PLACE, touched, op=MPI.MAX)
     return touched > 0
@@ -171,7 +171,8 @@ def check_potential(problem: ContactProblem, state: State) -> None:
     slopes = interface.response.jacobian(nodal, pressure)[:, -1, -1]
     known = bool(np.any(slopes != 0)) or not np.all(problem.equilibrium.unsupported[:, -1])
     if interface.held is not None:
-        known = known or bool(np.any(interface.held.slope(state.x) != 0))
+        through_held = interface.held.slope(state.x)
+        known = known or bool(np.any(through_held != 0))
     if not comm.allreduce(known, op=MPI.LOR):
         raise InputError(
             "the potential is not determined: it is prescribed nowhere, and the foundation "

@@ -178,7 +178,8 @@ class ContactProblem:
         found = joined_nodes(self.entries, body.layout.index_map, body.free)
         layer, conductor = joined_layer(self.entries), joined_conductor(self.entries)
         response = FoundationResponse(found, layer, conductor, body.phi_scale, stiffness)
-        friction, held = joined_friction(self.entries, found), joined_held(self.entries)
+        friction = joined_friction(self.entries, found)
+        held = joined_held(self.entries, body.layout.index_map.local_range[0], found.links)
         return Interface(response.constrained, response, friction, held, stiffness, size)
 
     def _entry(self, key: str, contact: Contact) -> Entry:
@@ -191,9 +192,9 @@ class ContactProblem:
             pair = find_pair(body, *sides, contact.foundation, key, contact.press)
             laws = contact.friction, contact.layer, contact.conductor
             return Entry(contact.on, pair.nodes, *laws, coupling=pair.coupling)
-        nodes = find_nodes(body, contact.on, contact.foundation, key, contact.press)
-        held = self._held(key, contact, nodes)
-        return Entry(contact.on, nodes, contact.friction, contact.layer, contact.conductor, held)
+        nodes, mixing = find_nodes(body, contact.on, contact.foundation, key, contact.press)
+        laws = contact.friction, contact.layer, contact.conductor
+        return Entry(contact.on, nodes, *laws, self._held(key, contact, nodes), mixing=mixing)
 
     def _held(self, key: str, contact: Contact, nodes: ContactNodes) -> HeldCurrent | None:
         if contact.conductor is None or not self.piezoelectric:
@@ -210,7 +211,7 @@ class ContactProblem:
                 "electrode of unknown potential; accepted: parts apart, or an insulated foundation"
             )
         moves = masters.member(contact.on) is not None
-        if self.comm.allreduce(held.nodes.size, op=MPI.SUM) > 0 and moves:
+        if self.comm.allreduce(held.jump.nodes.size, op=MPI.SUM) > 0 and moves:
             raise InputError(
                 f"{key}.rigid: supports hold nodes of part {contact.on!r}, through which current "
                 "flows as the foundation comes near; accepted: a part that can move everywhere"

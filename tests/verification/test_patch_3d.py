@@ -37,13 +37,18 @@ def test_weights_carry_a_constant_pressure():
         assert nodes.weight.min() > 1e-3
 
 
-def test_p2_contact_nodes_of_triangles_are_the_midpoints_of_their_edges():
+def test_p2_contact_nodes_of_triangles_are_all_nodes_with_positive_areas():
     problem = pressed_block(MPI.COMM_SELF, 3, 2)
     corners = problem.domain.mesh.geometry.x
     distance = np.linalg.norm(problem.nodes.points[:, None] - corners[None], axis=2)
-    assert distance.min() > 0.1
+    at_corners = distance.min(axis=1) < 1e-9
     # A grid of 2 x 3 squares, each cut in two: edges along x, along y, and diagonals.
-    assert problem.nodes.size == 2 * 4 + 3 * 3 + 6
+    assert np.count_nonzero(at_corners) == 3 * 4
+    assert np.count_nonzero(~at_corners) == 2 * 4 + 3 * 3 + 6
+    # A triangle gives 2/15 of its area to each corner, 1/5 to the middle of each edge.
+    weight = problem.nodes.weight
+    assert weight[at_corners].sum() == pytest.approx(3 * 2 / 15, rel=1e-12)
+    assert weight[~at_corners].max() == pytest.approx(2 / 5 / 12, rel=1e-12)
 
 
 def test_normals_are_the_body_s_own_for_a_given_gap():

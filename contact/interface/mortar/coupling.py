@@ -26,8 +26,9 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 from scipy import sparse
 
-from contact.interface.mortar.basis import basis, positive_change, rule, size_of
+from contact.interface.mortar.basis import basis, positive_change
 from contact.interface.mortar.candidates import facing_pairs
+from contact.interface.mortar.lumping import coefficients, integrals
 from contact.interface.mortar.pieces import Points, common_points
 from contact.interface.mortar.surface import Surface
 from contact.typing import Array
@@ -147,7 +148,7 @@ def _integrate(slave: Surface, master: Surface, reach: float, without: NDArray[n
         n = basis(points.on_slave, slave.degree) @ change.T
         _add(mass, points.slave, points.weight[:, None, None] * n[:, :, None] * n[:, None, :])
         _add(weight, points.slave, points.weight[:, None] * n)
-    faces = np.flatnonzero(weight.sum(axis=1) > LEAST_PIECE * _whole(slave, change).sum(axis=1))
+    faces = np.flatnonzero(weight.sum(axis=1) > LEAST_PIECE * integrals(slave).sum(axis=1))
     dual: Array = np.zeros_like(mass)
     dual[faces] = weight[faces, :, None] * np.linalg.inv(mass[faces])
     weight[np.setdiff1d(np.arange(slave.count), faces)] = 0.0
@@ -169,7 +170,7 @@ def _integrate(slave: Surface, master: Surface, reach: float, without: NDArray[n
         if entries
         else (np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.int64), np.zeros(0))
     )
-    whole = np.einsum("fij,fj->fi", handed, _whole(slave, change))
+    whole = np.einsum("fij,fj->fi", handed, integrals(slave))
     return _Parts(
         slave.nodes,
         own,
@@ -231,16 +232,6 @@ def _master_entries(
     return rows.ravel(), columns.ravel(), values.ravel()
 
 
-def _whole(slave: Surface, change: Array) -> Array:
-    """Return int N~ over whole facets, shape (f, k)."""
-    places, weights = rule(slave.corners.shape[1], 4)
-    functions = basis(places, slave.degree) @ change.T
-    facets = np.repeat(np.arange(slave.count), weights.size)
-    turns = slave.turn(facets, np.tile(places, (slave.count, 1))).reshape(-1, weights.size)
-    share = (turns * weights) @ functions
-    return np.asarray(size_of(slave.corners)[:, None] * share)
-
-
 def _assembled(parts: _Parts, d: int, degree: int, without: NDArray[np.int64]) -> Coupling:
     every, place = np.unique(parts.nodes, return_inverse=True)
     place = place.reshape(parts.nodes.shape)
@@ -266,7 +257,7 @@ def _assembled(parts: _Parts, d: int, degree: int, without: NDArray[np.int64]) -
     rows, columns = np.broadcast_arrays(place[:, :, None], place[:, None, :])
     places = (rows.ravel(), columns.ravel())
     dual = sparse.csr_array((parts.own.ravel(), places), shape=(every.size, every.size))[kept]
-    own = divide @ dual @ _own(place, every.size, positive_change(d, degree))
+    own = divide @ dual @ coefficients(place, every.size, positive_change(d, degree))
     own.eliminate_zeros()
     return Coupling(
         every[kept],
@@ -278,17 +269,4 @@ def _assembled(parts: _Parts, d: int, degree: int, without: NDArray[np.int64]) -
         sparse.csr_array(own),
         masters,
         sparse.csr_array(divide @ other[kept]),
-    )
-
-
-def _own(place: NDArray[np.intp], count: int, change: Array) -> sparse.csr_array:
-    """Return S: the coefficients of a function in N~ as those in N, shape (count, count)."""
-    coefficients = np.linalg.inv(change.T)
-    rows = np.broadcast_to(place[:, :, None], (*place.shape, place.shape[1]))
-    columns = np.broadcast_to(place[:, None, :], rows.shape)
-    values = np.broadcast_to(coefficients, rows.shape)
-    # Facets that share nodes say the same of them: any of them may be heard.
-    pairs, first = np.unique(rows.ravel() * count + columns.ravel(), return_index=True)
-    return sparse.csr_array(
-        (values.ravel()[first], (pairs // count, pairs % count)), shape=(count, count)
     )

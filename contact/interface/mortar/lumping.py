@@ -1,0 +1,142 @@
+"""Nodal areas of a surface: integrals of functions that all have some, and their coefficients.
+
+At the vertices of quadratic triangles the basis functions have no mean: a constraint there would
+weigh nothing. The functions N~ = A N of `basis.positive_change` take their place, and with them
+the coefficients S u, S = A^-T, that of the nodal values u: in front of a rigid foundation as in
+front of another body. For all other facets A is the identity.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from mpi4py import MPI
+from numpy.typing import NDArray
+from scipy import sparse
+
+from contact.interface.mortar.basis import basis, positive_change, rule, size_of
+from contact.interface.mortar.surface import Surface
+from contact.typing import Array
+
+
+def integrals(surface: Surface) -> Array:
+    """Return int N~ over whole facets, shape (f, k)."""
+    corners = surface.corners.shape[1]
+    places, weights = rule(corners, 4)
+    functions = basis(places, surface.degree) @ positive_change(corners, surface.degree).T
+    facets = np.repeat(np.arange(surface.count), weights.size)
+    turns = surface.turn(facets, np.tile(places, (surface.count, 1))).reshape(-1, weights.size)
+    return np.asarray(size_of(surface.corners)[:, None] * ((turns * weights) @ functions))
+
+
+def coefficients(place: NDArray[np.intp], count: int, change: Array) -> sparse.csr_array:
+    """Return S: the coefficients of a function in N~ as those in N, shape (count, count).
+
+    Parameters
+    ----------
+    place
+        Numbers of the nodes of each facet, shape (f, k).
+    count
+        Number of nodes.
+    change
+        A of a facet, shape (k, k).
+    """
+    own = np.linalg.inv(change.T)
+    rows = np.broadcast_to(place[:, :, None], (*place.shape, place.shape[1]))
+    columns = np.broadcast_to(place[:, None, :], rows.shape)
+    values = np.broadcast_to(own, rows.shape)
+    # Facets that share nodes say the same of them: any of them may be heard.
+    pairs, first = np.unique(rows.ravel() * count + columns.ravel(), return_index=True)
+    made = sparse.csr_array(
+        (values.ravel()[first], (pairs // count, pairs % count)), shape=(count, count)
+    )
+    made.eliminate_zeros()
+    return made
+
+
+@dataclass(frozen=True)
+class Mixing:
+    """The jump at the nodes of a part in front of a rigid foundation, S u.
+
+    Rows are nodes in ascending order of their global numbers; the same on all ranks.
+
+    Attributes
+    ----------
+    nodes
+        Global numbers of the nodes, shape (n,).
+    own
+        S, shape (n, n).
+    """
+
+    nodes: NDArray[np.int64]
+    own: sparse.csr_array
+
+    @property
+    def slaves(self) -> NDArray[np.int64]:
+        """Global numbers of the nodes that jumps are made of: the same."""
+        return self.nodes
+
+    @property
+    def masters(self) -> NDArray[np.int64]:
+        """Global numbers of nodes of another body: none."""
+        return np.zeros(0, dtype=np.int64)
+
+    @property
+    def other(self) -> sparse.csr_array:
+        """What these do to the jumps, shape (n, 0)."""
+        return sparse.csr_array((self.nodes.size, 0))
+
+    def apply(self, comm: MPI.Intracomm, numbers: NDArray[np.int64], values: Array) -> Array:
+        """Return S times nodal values of owned nodes, shape (k, m). Collective.
+
+        What is made of infinite values is no number.
+
+        Parameters
+        ----------
+        comm, numbers, values
+            Communicator, the global numbers of the nodes that this rank owns, and their values.
+        """
+        place = np.searchsorted(self.nodes, numbers)
+        total = np.zeros((self.nodes.size, values.shape[1]))
+        total[place] = values
+        comm.Allreduce(MPI.IN_PLACE, total, op=MPI.SUM)
+        with np.errstate(invalid="ignore"):
+            return np.asarray((self.own @ total)[place])
+
+
+@dataclass(frozen=True)
+class Lumping:
+    """The nodes of a surface with their areas; the same on all ranks.
+
+    Attributes
+    ----------
+    nodes
+        Global numbers in ascending order, shape (n,).
+    weight
+        int N~_j, shape (n,) (length^(d - 1)).
+    normal
+        int N~_j nu, shape (n, d).
+    mixing
+        The jumps that belong to the weights; None where they are the nodal values.
+    """
+
+    nodes: NDArray[np.int64]
+    weight: Array
+    normal: Array
+    mixing: Mixing | None
+
+    @staticmethod
+    def of(surface: Surface) -> Lumping:
+        """Return the areas, given the facets of all ranks."""
+        nodes, place = np.unique(surface.nodes, return_inverse=True)
+        place = place.reshape(surface.nodes.shape)
+        area = integrals(surface)
+        weight, normal = np.zeros(nodes.size), np.zeros((nodes.size, surface.normal.shape[1]))
+        np.add.at(weight, place, area)
+        np.add.at(normal, place, area[:, :, None] * surface.normal[:, None, :])
+        change = positive_change(surface.corners.shape[1], surface.degree)
+        if np.array_equal(change, np.eye(len(change))):
+            return Lumping(nodes, weight, normal, None)
+        mixing = Mixing(nodes, coefficients(place, nodes.size, change))
+        return Lumping(nodes, weight, normal, mixing)

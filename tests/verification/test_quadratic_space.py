@@ -1,0 +1,96 @@
+"""Degree 2 in space: all nodes of Gamma_3 carry positive areas and forces, vertices too."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+
+from contact.body.description import Body, Fixed
+from contact.interface.obstacle import Sphere
+from contact.mesh.grid import box
+from contact.methods.options import FixedPointOptions, NewtonOptions, PenaltyOptions
+from contact.output.table import contact_table
+from contact.problem.problem import Contact, ContactProblem
+from contact.solving import solve_problem
+from forms.hencky import Linear
+from tests.problems.mechanics import constant, leaning_block
+from tests.problems.piezo import Column, potential
+from tests.problems.rigid import indented, solved
+
+SELF = MPI.COMM_SELF
+
+
+def quadratic(n, **rigid):
+    case = indented(3, n, **rigid)
+    return case.model_copy(update={"space": case.space.model_copy(update={"degree": 2})})
+
+
+METHODS = {
+    "sparse": (NewtonOptions(tolerance=1e-9, condense=False), 1e-7),
+    "multigrid": (NewtonOptions(tolerance=1e-9, linear="iterative"), 1e-7),
+    "fixed point": (FixedPointOptions(tolerance=1e-9), 1e-6),
+    "penalty": (PenaltyOptions(eps_contact=1e-6, eps_slip=1e-7), 2e-3),
+}
+
+
+@pytest.mark.parametrize("name", METHODS)
+def test_all_methods_find_the_same_pressures(name):
+    """Friction, yield, and a clamped side: nodes without forces whose neighbours have some."""
+    found = solve_problem(leaning_block(SELF, 2, 2), NewtonOptions(tolerance=1e-10))
+    options, tolerance = METHODS[name]
+    other = solve_problem(leaning_block(SELF, 2, 2), options)
+    assert found.converged and other.converged
+    for one, two in ((found.pressure, other.pressure), (found.friction, other.friction)):
+        assert np.abs(one - two).max() < tolerance * np.abs(found.pressure).max()
+
+
+def test_no_node_is_in_the_ball():
+    """The means of the constraint hold: with them, so do nodal values, which are their mixtures."""
+    radius, rise = 3.0, 0.03
+    domain = box(SELF, [-0.5, -0.5, -0.5], [1.0, 1.0, 0.5], [4, 4, 2])
+    lifted = Fixed("bottom", [constant(0.0, 3)] * 2 + [constant(rise, 3)])
+    ball = Sphere((0.0, 0.0, radius), radius)
+    problem = ContactProblem(
+        domain, Body(Linear(1.0, 0.3), [lifted]), Contact("top", ball), degree=2
+    )
+    solution = solve_problem(problem, NewtonOptions(tolerance=1e-10))
+    points = problem.equilibrium.space.tabulate_dof_coordinates()
+    top = np.abs(points[:, 2]) < 1e-9
+    u = solution.state.x.reshape(-1, 3)[top]
+    direction, gap = ball.measure(points[top], np.tile([0.0, 0.0, 1.0], (len(u), 1)))
+    depth = np.einsum("ni,ni->n", direction, u) - gap
+    # Directions differ from node to node, by h/R over an edge.
+    assert depth.max() < 0.02 * rise
+    pressed = problem.nodes.points[solution.pressure > 1e-6]
+    vertices = np.abs(pressed[:, :2] * 4 - np.round(pressed[:, :2] * 4)).max(axis=1) < 1e-9
+    assert 5 <= np.count_nonzero(vertices) < len(pressed)
+    table = contact_table(solution)
+    assert table is not None
+    assert table["x"].size == np.count_nonzero(top)
+
+
+def test_a_ball_that_is_pressed_and_one_that_is_moved():
+    still = [0.0, 0.0]
+    forced, moved = solved(quadratic(2, displacement=[*still, "free"], force=[*still, -0.02]), SELF)
+    depth = moved["rigid"]["displacement"][-1]
+    driven, held = solved(quadratic(2, displacement=[*still, depth]), SELF)
+    assert held["rigid"]["force"][-1] == pytest.approx(-0.02, rel=1e-9)
+    scale = np.abs(driven.pressure).max()
+    assert np.allclose(forced.pressure, driven.pressure, rtol=0, atol=1e-8 * scale)
+
+
+@pytest.mark.parallel
+@pytest.mark.parametrize("method", [NewtonOptions(tolerance=1e-11), FixedPointOptions()])
+def test_current_through_nodes_that_are_held(comm, method):
+    """Closed form 3 with all sides held: the rim of Gamma_3 cannot move, but conducts."""
+    column = Column(k_e=2.0, phi_f=32.0)
+    problem = column.problem(comm, 3, degree=2, degrees=30.0)
+    held = problem.interface.held
+    assert held is not None
+    assert comm.allreduce(held.jump.nodes.size) > 0
+    solution = solve_problem(problem, replace(method, tolerance=1e-10))
+    assert solution.converged
+    _, bottom = column.solution()
+    found = potential(problem, solution.state)
+    assert np.abs(found - bottom).max(initial=0.0) < 1e-8 * abs(bottom)
