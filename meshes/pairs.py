@@ -4,6 +4,8 @@ import math
 from collections.abc import Sequence
 from typing import Any
 
+from contact.errors import InputError
+
 Points = Sequence[tuple[float, float]]
 
 
@@ -178,39 +180,33 @@ def two_spheres(
     contact_size: float = 2.0,
     contact_width: float = 12.0,
     growth: float = 0.4,
+    quarters: float = 1,
 ) -> None:
-    """Quarter x, y >= 0 of the lower half of a ball on that of the upper half of another.
+    """One quarter, x, y >= 0, of the lower half of a ball on that of the upper half of another.
 
     They touch at the origin. Regions: ``upper``, ``lower``. Parts: ``upper_round`` on
     ``lower_round``; the cuts ``upper_cut`` (z = radius) and ``lower_cut`` (z = -radius);
-    ``symmetry_x`` (x = 0), ``symmetry_y`` (y = 0) of both. Sizes as in `quarter_disc`.
+    ``symmetry_x`` (x = 0), ``symmetry_y`` (y = 0) of both. Sizes as in `quarter_disc`. Of two
+    quarters, the half y >= 0, there is no ``symmetry_x``.
     """
     import gmsh
 
     from meshes.grading import finish, grade
 
-    geo, bodies, touching = gmsh.model.geo, {}, []
-    parts: dict[str, list[int]] = {"symmetry_x": [], "symmetry_y": []}
+    if quarters not in (1, 2):
+        raise InputError(f"quarters of the mesh recipe must be 1 or 2; given: {quarters:g}")
+    bodies: dict[str, list[int]] = {}
+    parts: dict[str, list[int]] = {}
+    touching = []
     for name, z in (("upper", radius), ("lower", -radius)):
-        low, on_x, on_y, centre = (
-            geo.addPoint(*p) for p in ((0, 0, 0), (radius, 0, z), (0, radius, z), (0, 0, z))
-        )
-        arc_x = geo.addCircleArc(low, centre, on_x)
-        rim = geo.addCircleArc(on_x, centre, on_y)
-        arc_y = geo.addCircleArc(on_y, centre, low)
-        axis = geo.addLine(centre, low)
-        out_x, out_y = geo.addLine(centre, on_x), geo.addLine(centre, on_y)
-        round_side = geo.addSurfaceFilling([geo.addCurveLoop([arc_x, rim, arc_y])])
-        on_y_zero = geo.addPlaneSurface([geo.addCurveLoop([axis, arc_x, -out_x])])
-        on_x_zero = geo.addPlaneSurface([geo.addCurveLoop([axis, -arc_y, -out_y])])
-        cut = geo.addPlaneSurface([geo.addCurveLoop([out_x, rim, -out_y])])
-        loop = geo.addSurfaceLoop([round_side, on_y_zero, on_x_zero, cut])
-        bodies[name] = [geo.addVolume([loop])]
-        parts |= {f"{name}_round": [round_side], f"{name}_cut": [cut]}
-        parts["symmetry_x"].append(on_x_zero)
-        parts["symmetry_y"].append(on_y_zero)
+        body, low = _half_ball(gmsh.model.geo, radius, z, int(quarters))
+        bodies[name] = body["volumes"]
+        parts |= {f"{name}_round": body["round"], f"{name}_cut": body["cut"]}
+        first, *_, last = body["sides"]
+        parts.setdefault("symmetry_y", []).append(first)
+        parts.setdefault("symmetry_x" if quarters == 1 else "symmetry_y", []).append(last)
         touching.append(low)
-    geo.synchronize()
+    gmsh.model.geo.synchronize()
     grade(
         gmsh,
         size=size,
@@ -220,6 +216,33 @@ def two_spheres(
         points=touching,
     )
     finish(gmsh, 3, bodies, parts)
+
+
+def _half_ball(
+    geo: Any, radius: float, z: float, quarters: int
+) -> tuple[dict[str, list[int]], int]:
+    """Return quarters of a half ball that touches the origin, about its axis, and that point.
+
+    They are given as volumes, the surfaces ``round`` and ``cut``, and ``sides`` from y = 0 on.
+    """
+    low, centre = geo.addPoint(0, 0, 0), geo.addPoint(0, 0, z)
+    axis = geo.addLine(centre, low)
+    places = [(radius, 0), (0, radius), (-radius, 0)][: quarters + 1]
+    rims = [geo.addPoint(x, y, z) for x, y in places]
+    arcs = [geo.addCircleArc(low, centre, rim) for rim in rims]
+    spokes = [geo.addLine(centre, rim) for rim in rims]
+    made: dict[str, list[int]] = {"volumes": [], "round": [], "cut": [], "sides": []}
+    for arc, spoke in zip(arcs, spokes, strict=True):
+        made["sides"].append(geo.addPlaneSurface([geo.addCurveLoop([axis, arc, -spoke])]))
+    for k in range(quarters):
+        rim = geo.addCircleArc(rims[k], centre, rims[k + 1])
+        loop = geo.addCurveLoop([arcs[k], rim, -arcs[k + 1]])
+        made["round"].append(geo.addSurfaceFilling([loop]))
+        cut = geo.addCurveLoop([spokes[k], rim, -spokes[k + 1]])
+        made["cut"].append(geo.addPlaneSurface([cut]))
+        around = [made["round"][k], made["cut"][k], *made["sides"][k : k + 2]]
+        made["volumes"].append(geo.addVolume([geo.addSurfaceLoop(around)]))
+    return made, low
 
 
 def ball_between_plates(

@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 
 from contact.body.equilibrium import BodyEquilibrium
 from contact.errors import InputError
-from contact.interface.mortar.coupling import NOBODY, Coupling, couple
+from contact.interface.mortar.coupling import Coupling, couple
+from contact.interface.mortar.integration import NOTHING
 from contact.interface.mortar.surface import Surface, surface_of
 from contact.interface.nodes import ContactNodes
 from contact.interface.obstacle import Obstacle
@@ -143,7 +144,7 @@ def _stuck(
     moves = free[coupling.nodes[here] - begin, : coupling.normal.shape[1]]
     held = np.linalg.norm(coupling.normal[here] * moves, axis=1) <= 0.5
     found = np.concatenate(comm.allgather(coupling.nodes[here[held]]))
-    return np.unique(np.concatenate([NOBODY, found]))
+    return np.unique(np.concatenate([NOTHING, found]))
 
 
 def _apart(

@@ -233,3 +233,13 @@ def test_command_line_writes_a_mesh(tmp_path, version):
 def test_command_line_refuses_wrong_sizes(tmp_path, capsys):
     assert main(["bar", "--size", "-1", "--out", str(tmp_path / "bar.msh")]) == 2
     assert "positive number" in capsys.readouterr().err
+
+
+def test_spheres_of_two_quarters():
+    """Twice as much of all, and one plane of symmetry."""
+    domain = from_recipe(COMM, "two_spheres", quarters=2)
+    _, expected = RECIPES["two_spheres"]
+    twice = {name: 2 * area for name, area in expected.items() if name != "symmetry_x"}
+    assert measures(domain) == pytest.approx(twice, rel=1e-2)
+    with pytest.raises(InputError, match="quarters of the mesh recipe must be 1 or 2; given: 3"):
+        from_recipe(COMM, "two_spheres", quarters=3)

@@ -5,6 +5,7 @@ import pytest
 
 from contact import parse_case, solve
 from contact.output.table import contact_table
+from scripts.studies.mindlin import turn
 from scripts.studies.pairs import converges, random_case
 from scripts.studies.two_bodies import approach, middle, pressed
 
@@ -69,6 +70,14 @@ def test_round_bodies(kinematics, degree, push):
         found = [small.a, large.a, small.p_0, large.p_0, approach(small, large, kinematics)]
         errors.append(np.abs(np.array(found) - 1).max())
     assert errors[0] < 0.02 and errors[1] < 0.01 and errors[2] < 0.005
+
+
+def test_loop_of_two_balls():
+    """Mindlin and Deresiewicz: what friction takes of a turn is the area of the loop, in space."""
+    loop = turn(poisson=0.0, elements=4, steps=2)
+    assert 0.6 < loop.share < 0.8
+    assert loop.area / loop.exact == pytest.approx(1, abs=0.07)
+    assert loop.dissipation / loop.exact == pytest.approx(1, abs=0.07)
 
 
 def test_no_pressure_stands_on_an_axis():
