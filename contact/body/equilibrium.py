@@ -56,8 +56,6 @@ class BodyEquilibrium:
         If a part is missing, a vector has the wrong length, or the material is none.
     """
 
-    cancelling = 100.0
-
     def __init__(self, domain: Domain, body: Body, degree: int = 1) -> None:
         body.check(domain.dim)
         self.domain, self.body, self.degree = domain, body, degree

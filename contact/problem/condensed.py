@@ -68,8 +68,6 @@ class CondensedBody:
     size: float
 
     linear = True
-    #: The reactions of the supports are out of sight here.
-    cancelling = 1e4
 
     @property
     def block_size(self) -> int:

@@ -14,6 +14,10 @@ from contact.problem.protocols import Problem
 from contact.problem.state import State
 from contact.typing import Array
 
+#: Forces at a node that count as rounding, over those that hold it alone where it is; and over
+#: loads, contact forces and reactions of the body.
+ROUNDING, MOST_ROUNDING = 1e-14, 0.1
+
 
 @dataclass(frozen=True)
 class KKT:
@@ -22,9 +26,9 @@ class KKT:
     Attributes
     ----------
     equilibrium
-        |F(u) + contact forces| on free unknowns, over the sum of the norms of loads, contact
-        forces and reactions, or over what rounding makes of the stresses around the nodes
-        (`_least_force`); mechanical and (scaled) electric unknowns together.
+        |F(u) + contact forces| on free unknowns, less what rounding makes of the stresses around
+        the nodes (`_rounding`), over the sum of the norms of loads, contact forces and reactions;
+        mechanical and (scaled) electric unknowns together.
     contact
         |p - max(0, p + c (u_nu - rho))| / |p| in L2(Gamma_3), c = E/length.
     friction
@@ -74,15 +78,14 @@ def residual_forces(problem: Problem, state: State, secant_at: Array | None = No
     return residual
 
 
-def _least_force(problem: Problem, state: State) -> float:
-    """Return 1e-6 of the forces that would hold each node alone at its displacement.
+def _rounding(problem: Problem, state: State) -> float:
+    """Return what rounding may leave of the forces that hold each node alone where it is.
 
     The stresses around a node of a slender body, or of one that is moved without being touched,
-    cancel but for far smaller forces, and their rounding, some 1e-16 of each, remains: that
-    passes for nothing at any sensible tolerance.
+    cancel but for far smaller forces, and the rounding of each remains.
     """
     body = problem.equilibrium
-    return 1e-6 * problem.scales.stiffness * body.norm(body.owned_part(state.x))
+    return ROUNDING * problem.scales.stiffness * body.norm(body.owned_part(state.x))
 
 
 def evaluate(problem: Problem, state: State) -> KKT:
@@ -95,11 +98,11 @@ def evaluate(problem: Problem, state: State) -> KKT:
     jump.transpose(jump.weight[:, None] * stress, contact_forces)
     loads, pushes = body.load_size(state.time), body.norm(contact_forces)
     scale = loads + pushes + body.norm(body.reactions(residual))
-    least = _least_force(problem, state)
-    if loads > 0 or pushes > 1e-6 * least:
+    rounding = _rounding(problem, state)
+    if loads > 0 or pushes > rounding:
         # Not more than that: of a body that flies away all forces are rounding.
-        least = min(least, body.cancelling * scale)
-    scale = max(scale, least)
-    equilibrium = body.norm(body.unbalanced(residual)) / (scale or 1.0)
+        rounding = min(rounding, MOST_ROUNDING * scale)
+    unbalanced = body.norm(body.unbalanced(residual))
+    equilibrium = max(0.0, unbalanced - rounding) / (scale or 1.0)
     bound = interface.bound(nodal, state.forces)
     return KKT(equilibrium, *interface_residuals(interface, nodal, state.forces, bound))

@@ -47,10 +47,6 @@ class Equilibrium(Protocol):
         """Number of unknowns that this rank owns."""
 
     @property
-    def cancelling(self) -> float:
-        """How much larger than loads, contact forces and reactions those may be that cancel."""
-
-    @property
     def linear(self) -> bool:
         """Whether the operator is the same at all unknowns."""
 

@@ -78,6 +78,16 @@ def test_a_beam_clamped_at_both_ends_is_pressed_to_the_ground():
     assert np.allclose(solution.contact_force[1], other.contact_force[1], rtol=2e-2)
 
 
+def test_rounding_does_not_keep_a_long_beam_from_its_solution():
+    """It cancels to 1e-5 of the loads: the condensed beam went on to the block relaxation."""
+    load = {"on": "top", "traction": [0.0, -1e-13]}
+    case = beam(1000.0, [100, 1], load, 0.1, 0.8, space={"degree": 2})
+    solution = solve(parse_case({**case, "solver": {"tolerance": 1e-10}}), comm=SELF)
+    assert solution.converged, solution.outcome.reason
+    assert [record.note for record in solution.history.records] == ["interior point"]
+    assert solution.counters.contact_solves < 100
+
+
 @pytest.mark.parametrize("mu", [0.0, 0.3])
 @pytest.mark.parametrize("degree", [1, 2])
 def test_a_beam_whose_tip_is_lifted_off(degree, mu):
