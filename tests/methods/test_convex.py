@@ -10,7 +10,7 @@ import pytest
 from scipy.linalg import block_diag
 
 from contact.methods.convex.haslinger import coulomb
-from contact.methods.convex.reduced import NotConvexError, without_potential
+from contact.methods.convex.reduced import NotConvexError, Reduced, without_potential
 from contact.methods.convex.tresca import Result, TrescaSolver, tresca
 
 
@@ -170,6 +170,18 @@ def block(n: int, d: int, force: np.ndarray, bound: float, seed: int = 0) -> Set
     return Setting(
         (stiffness + stiffness.T) / 2, load, normal, gap, weight, np.full(n, bound / n), free
     )
+
+
+@pytest.mark.parametrize("noise", [0.0, 3e-14, -3e-14])
+def test_free_motions_are_told_from_rounding(noise):
+    """Of a body with a fine mesh behind its contact rounding left one eigenvalue at 3e-14."""
+    setting = block(40, 2, np.array([0.0, -1.0]), 0.1)
+    turn = np.linalg.eigh(setting.stiffness)[1][:, 0]
+    stiffness = setting.stiffness + noise * np.outer(turn, turn) * np.diag(setting.stiffness).max()
+    everywhere = np.ones(40, dtype=bool)
+    tangent = np.tile(np.diag([1.0, 0.0]), (40, 1, 1))
+    body = Reduced(stiffness, setting.normal, tangent, everywhere, everywhere, setting.free)
+    assert body.motions.shape[1] == 3
 
 
 def enumerated(setting: Setting, mu: float | None = None) -> list[np.ndarray]:

@@ -23,8 +23,11 @@ from scipy.linalg import cho_solve
 from contact.errors import InputError
 from contact.methods.convex.cones import Array
 from contact.methods.convex.haslinger import coulomb
-from contact.methods.convex.reduced import NULL, cholesky
+from contact.methods.convex.reduced import cholesky
 from contact.methods.convex.tresca import TrescaSolver
+
+#: Least pivot of a flexibility with ones on its diagonal that leaves its inverse some digits.
+SINGULAR = 1e-14
 
 
 @dataclass(frozen=True)
@@ -77,7 +80,7 @@ class LocalProblem:
         diagonal = np.diag(self.flexibility)
         size = np.sqrt(np.where(diagonal > 0, diagonal, 1.0))
         factor = cholesky(np.asfortranarray(self.flexibility / size[:, None] / size))
-        if factor is None or np.diag(factor).min() ** 2 < NULL:
+        if factor is None or np.diag(factor).min() ** 2 < SINGULAR:
             raise InputError(
                 "the flexibility W of the contacts is singular; accepted: a definite one, as of "
                 "contacts that deform, each with all its directions free"

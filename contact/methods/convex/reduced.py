@@ -18,9 +18,12 @@ from scipy.linalg.lapack import dpotrf, dtrtri
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
-#: Eigenvalues below this are those of free motions, with ones on the diagonal of the matrix.
-#: A beam 1000 times as long as thick has some 1e-13; rounding leaves some 1e-16.
-NULL = 1e-14
+#: Eigenvalues below this, with ones on the diagonal of the matrix, are those of free motions where
+#: the next one is that many times larger. A beam 1000 times as long as thick has some 1e-13, and
+#: the next is 39 times that; rounding leaves up to 1e-13 of a body with many nodes behind it.
+NULL, JUMP = 1e-12, 1e3
+
+EPS = float(np.finfo(float).eps)
 
 #: Free motions that can be found: 6 a body, and some to spare.
 MOTIONS = 16
@@ -102,7 +105,7 @@ class Reduced:
         size = np.sqrt(size)
         factor = cholesky(self._ordered(order, size))
         self._split = np.count_nonzero(left)
-        definite = factor is not None and _lowest(factor)[0][0] >= NULL
+        definite = factor is not None and _count_free(_lowest(factor)[0]) == 0
         if definite:
             assert factor is not None
             k = self._split
@@ -181,7 +184,7 @@ class Reduced:
             factor = cholesky(matrix)
             if factor is not None:
                 values, vectors = _lowest(factor, 12)
-                return vectors[:, values - shift < NULL]
+                return vectors[:, : _count_free(values - shift)]
         raise NotConvexError("the stiffness has negative eigenvalues")
 
 
@@ -216,6 +219,13 @@ def _turned(stiffness: Array, basis: Array) -> Array:
                 turned[:, a] += basis[:, i, a, None] * blocks[:, i]
         result = turned.reshape(m, m).T
     return result
+
+
+def _count_free(values: Array) -> int:
+    """Return how many of the lowest eigenvalues, in rising order, are those of free motions."""
+    following = np.append(values[1:], 1.0)
+    free = np.flatnonzero((values < NULL) & (following > JUMP * np.maximum(values, EPS)))
+    return int(free[-1]) + 1 if free.size else 0
 
 
 def _lowest(factor: Array, sweeps: int = 4) -> tuple[Array, Array]:
