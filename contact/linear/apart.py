@@ -36,7 +36,7 @@ class Solver(Protocol):
         """Set up the solver for the matrix as it is."""
 
 
-def set_up_apart(solver: Solver, kept: PETSc.Mat | None) -> bool:
+def set_up_apart(solver: Solver) -> bool:
     """Set multigrid up for bodies that do not touch; False where none touch each other. Collective.
 
     Motions of each body are then what is interpolated, and the jumps follow from them. Made for
@@ -47,11 +47,9 @@ def set_up_apart(solver: Solver, kept: PETSc.Mat | None) -> bool:
     ----------
     solver
         Has the matrix of bodies that touch, and has it again afterwards.
-    kept
-        A copy of that, if there is one.
     """
     matrix, layout = solver.matrix, solver.bulk.layout
-    coupled = kept or matrix.copy()
+    coupled = matrix.copy()
     jumps = solver.bulk.take_apart(matrix)
     if jumps is None:
         return False

@@ -21,9 +21,11 @@ from contact.linear.apart import set_up_apart
 from contact.linear.balance import balance
 from contact.linear.block import BlockPreconditioner
 from contact.linear.faults import no_solution
+from contact.linear.hierarchy import Hierarchy
 from contact.linear.layout import Layout
+from contact.linear.nodal import insert_blocks, nodal_blocks
 from contact.linear.rigid import held_motions
-from contact.linear.stiff_nodes import TOUCH, StiffNodes
+from contact.linear.stiff_nodes import TOUCH
 from contact.tolerances import HUGE
 from contact.typing import Array
 
@@ -144,13 +146,12 @@ class SparseOperator:
         self.matrix = bulk.create_matrix()
         self._kind = ""
         self._blocks: Array | None = None
-        self._bulk: PETSc.Mat | None = None
         self._rhs, self._solution = self.matrix.createVecs()
         self.ksp = PETSc.KSP().create(self.layout.comm)
         self.ksp.setOptionsPrefix(prefix)
         self.iterative = kind == "iterative" or (kind == "auto" and multigrid.is_large(self.layout))
         self._split: BlockPreconditioner | None = None
-        self._stiff: StiffNodes | None = None
+        self._hierarchy: Hierarchy | None = None
         self._prefix = prefix
         if self.iterative and self.layout.coupled:
             self._split = BlockPreconditioner(self.ksp, self.layout, symmetric)
@@ -196,31 +197,30 @@ class SparseOperator:
         -------
         Whether anything was done.
         """
-        nodes = self._nodes
-        last, same = self._blocks, constant and kind == self._kind
+        nodes, last, same = self._nodes, self._blocks, constant and kind == self._kind
         if same and last is not None and self._all(np.array_equal(blocks, last)):
             return False
-        if same and self._bulk is not None:
-            self._bulk.copy(self.matrix, PETSc.Mat.Structure.SAME_NONZERO_PATTERN)
-        else:
+        self._kind, self._blocks = kind, blocks.copy()
+        if not same:
             self.bulk.assemble(self.matrix, kind, x)
             balance(self.matrix, self.layout)
-            if constant:
-                self._bulk = self.matrix.copy()
-        rest = self._masked(nodes, blocks)
-        if self._multigrid and self._stiff is None:
-            if not set_up_apart(self, self._bulk):
-                touch = TOUCH * rest
-                self._add(nodes, touch)
+            self._own = nodal_blocks(self.matrix, nodes)
+        rest, own = self._masked(nodes, blocks), self._own
+        # To insert nothing would be a reason to set the solver up again.
+        inserts = same or not self._all(not rest.any())
+        if self._multigrid and self._hierarchy is None:
+            if not set_up_apart(self):
+                if inserts:
+                    insert_blocks(self.matrix, nodes, own + TOUCH * rest)
                 self.set_up(symmetric=True)
-                rest = rest - touch
-            self._stiff = StiffNodes(self.ksp.getPC(), nodes)
-        self._add(nodes, rest)
-        if self._stiff is not None:
-            self._stiff.follow(self.matrix, self._masked(nodes, blocks))
-        self.set_up(self.symmetric)
-        self._kind, self._blocks = kind, blocks.copy()
-        self.counters.factorizations += 1
+            self._hierarchy = Hierarchy(self.ksp, nodes, lambda: self.set_up(self.symmetric))
+        if inserts:
+            insert_blocks(self.matrix, nodes, own + rest)
+        if self._hierarchy is None:
+            self.set_up(self.symmetric)
+            self.counters.factorizations += 1
+        else:
+            self.counters.factorizations += self._hierarchy.follow(own, rest)
         return True
 
     @property
@@ -243,17 +243,6 @@ class SparseOperator:
         """Return blocks at nodes, zero where an unknown is fixed."""
         free = self.layout.free[at].astype(float)
         return blocks * free[:, :, None] * free[:, None, :]
-
-    def _add(self, at: NDArray[np.int32], blocks: Array) -> None:
-        """Add blocks at nodes; none at all would be a reason to set the solver up again."""
-        if self._all(not blocks.any()):
-            return
-        rows = np.arange(at.size + 1, dtype=PETSc.IntType)
-        nodes = at.astype(PETSc.IntType)
-        self.matrix.setValuesBlockedLocalIJV(
-            rows, nodes, blocks, addv=PETSc.InsertMode.ADD_VALUES, rowmap=nodes
-        )
-        self.matrix.assemble()
 
     def solve(self, rhs: Array, rtol: float | None = None, guess: Array | None = None) -> Array:
         """Solve with the owned part of a right-hand side; fixed unknowns stay 0. Collective.
@@ -279,15 +268,14 @@ class SparseOperator:
             self.ksp.setInitialGuessNonzero(guess is not None)
             if guess is not None:
                 self._solution.array[:] = guess
-        jump = self._stiff.jump(self._rhs) if self._stiff else None
-        if jump is not None:
-            self._rhs.axpy(-1.0, self.matrix * jump)
-            self._solution.axpy(-1.0, jump)
-        self.ksp.solve(self._rhs, self._solution)
-        if jump is not None:
-            self._solution.axpy(1.0, jump)
+        if self._hierarchy is None:
+            self.ksp.solve(self._rhs, self._solution)
+            iterations = self.ksp.getIterationNumber()
+        else:
+            iterations, renewed = self._hierarchy.solve(self._rhs, self._solution)
+            self.counters.factorizations += renewed
         self.counters.linear_solves += 1
-        self.counters.linear_iterations += self.ksp.getIterationNumber()
+        self.counters.linear_iterations += iterations
         reason = self.ksp.getConvergedReason()
         finite = bool(np.isfinite(self._solution.norm()))
         if reason == PETSc.KSP.ConvergedReason.DIVERGED_PCSETUP_FAILED or not finite:

@@ -46,20 +46,17 @@ class StiffNodes:
         of_body = finest.createSubMatrix(chosen, None)
         self._starts, self._columns, self._values = of_body.getValuesCSR()
 
-    def follow(self, operator: PETSc.Mat, blocks: Array) -> None:
-        """Adapt the interpolation to weighted blocks that are part of the operator. Collective.
+    def follow(self, own: Array, blocks: Array) -> None:
+        """Adapt the interpolation to contact blocks. Collective.
 
         Parameters
         ----------
-        operator
-            The operator with the blocks.
-        blocks
-            Blocks at the nodes, zero where an unknown is fixed, shape (n, block size, block size).
+        own, blocks
+            What the body and contact have at the nodes, zero where an unknown is fixed, shape
+            (n, block size, block size).
         """
-        bs = blocks.shape[1]
         # Of K its diagonal will do.
-        total = operator.getDiagonal().array.reshape(-1, bs)[self._nodes]
-        root = np.sqrt(np.abs(total - np.einsum("nii->ni", blocks)))
+        root = np.sqrt(np.abs(np.einsum("nii->ni", own)))
         scaled = blocks / root[:, :, None] / root[:, None, :]
         # Where numbers overflow the solver itself will say so.
         left, size, right = np.linalg.svd(np.where(np.isfinite(scaled), scaled, 0.0))

@@ -73,7 +73,7 @@ class NewtonLoop:
         tangent = iterate.status is not None and not linear
         for _ in range(min(options.max_iterations, search.left)):
             before, kept = residuals, iterate
-            taken = self.step(iterate, tangent, residuals.largest, bound)
+            taken = self.step(iterate, tangent, residuals, bound)
             if taken is None:
                 return kept, self._end(residuals, "the condensed contact problem is not solved")
             iterate = taken.iterate

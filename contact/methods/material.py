@@ -18,6 +18,7 @@ from contact.methods.options import NewtonOptions
 from contact.methods.report import History, Outcome
 from contact.methods.step import NEAR, Iterate, Taken
 from contact.problem.condensed import Condensation, CondensedProblem
+from contact.problem.kkt import KKT
 from contact.problem.problem import ContactProblem
 from contact.typing import Array
 
@@ -79,7 +80,7 @@ class MaterialStep:
         """Do nothing: each step begins anew."""
 
     def __call__(
-        self, iterate: Iterate, tangent: bool, reached: float, bound: Array | None
+        self, iterate: Iterate, tangent: bool, reached: KKT, bound: Array | None
     ) -> Taken | None:
         """Take a step; None where the body cannot be condensed or contact is not solved."""
         state, body = iterate.state, self.condensation.full.equilibrium
@@ -89,7 +90,7 @@ class MaterialStep:
         # No more accurate than the material is linearised, nor than the end asks for.
         enough = 0.1 * self.options.tolerance
         if not body.linear:
-            enough = max(enough, CONTACT_PART * min(reached, 1.0))
+            enough = max(enough, CONTACT_PART * min(reached.largest, 1.0))
         options = replace(
             self.options,
             tolerance=enough,
@@ -102,7 +103,7 @@ class MaterialStep:
         end, outcome = self._solve(condensed, options, self.moduli, history, begin)
         solves = sum(record.inner for record in history.records)
         self.counters.contact_solves += solves
-        if outcome.kkt.largest > max(enough, NEAR * reached):
+        if outcome.kkt.largest > max(enough, NEAR * reached.largest):
             return None
         increment = self.condensation.expand(condensed, end.state.x)
         new = replace(state, x=body.moved(state.x, increment), forces=end.state.forces)

@@ -18,7 +18,7 @@ from contact.interface.multipliers import Multipliers
 from contact.linear.operator import Counters, Operator
 from contact.methods.following import Following
 from contact.methods.options import NewtonOptions
-from contact.problem.kkt import residual_forces
+from contact.problem.kkt import KKT, residual_forces
 from contact.problem.protocols import Problem
 from contact.problem.state import State
 from contact.typing import Array
@@ -26,6 +26,15 @@ from contact.typing import Array
 #: Residual from which on the foundation's conductivity is followed although nodes still change
 #: their status: far away, its derivative belongs to nodes that will not be where they are.
 NEAR = 0.05
+
+#: What an iterative solver leaves of a step's residual: more digits last longer than the steps that
+#: they save. A goal that depended on the residuals would ask for more digits on finer meshes, whose
+#: residuals pass through more values between the first and the last.
+FORCING = 1e-2
+
+#: Equilibrium residual over the largest one below which the material is left as it was linearised
+#: last: contact and friction are what is wrong.
+SMALL = 0.1
 
 
 @dataclass(frozen=True)
@@ -75,7 +84,7 @@ class Step(Protocol):
         """Forget the steps before: a new loop begins."""
 
     def __call__(
-        self, iterate: Iterate, tangent: bool, reached: float, bound: Array | None
+        self, iterate: Iterate, tangent: bool, reached: KKT, bound: Array | None
     ) -> Taken | None:
         """Take a step; None if it cannot be taken. Collective.
 
@@ -86,7 +95,7 @@ class Step(Protocol):
         tangent
             Whether the material's tangent is taken, or its secant.
         reached
-            The largest residual there.
+            The residuals there.
         bound
             A friction bound that is frozen, shape (n,); None for the law's own.
         """
@@ -115,6 +124,7 @@ class WholeStep:
         """Forget the steps before."""
         self.following = Following()
         self._calm = 0  # steps in which no node has changed its status
+        self._kind = ""
 
     @property
     def operator(self) -> Operator:
@@ -133,7 +143,7 @@ class WholeStep:
         return self._operator
 
     def __call__(
-        self, iterate: Iterate, tangent: bool, reached: float, bound: Array | None
+        self, iterate: Iterate, tangent: bool, reached: KKT, bound: Array | None
     ) -> Taken | None:
         """Take a step; see `Step`."""
         state, interface = iterate.state, self.problem.interface
@@ -145,17 +155,16 @@ class WholeStep:
         )
         self._calm = self._calm + 1 if contact.settled else 0
         layer, shift = linearised_layer(interface, nodal, iterate, self.moduli, contact.settled)
-        blocks = contact.blocks + layer + self._current(nodal, contact, reached)
-        kind = "tangent" if tangent else "secant"
+        blocks = contact.blocks + layer + self._current(nodal, contact, reached.largest)
+        kind, last = "tangent" if tangent else "secant", self._kind
+        remains = kind == last and reached.equilibrium < SMALL * reached.largest
         blocks = interface.weighted(blocks, state.x)
-        self.operator.update(kind, state.x, blocks, constant=body.linear)
+        self.operator.update(kind, state.x, blocks, constant=body.linear or remains)
+        self._kind = kind
         here = replace(state, forces=contact.forces)
         residual = residual_forces(self.problem, here)
         jump.transpose((jump.weight * shift)[:, None] * jump.normal, residual)
-        # Gamma leaves this part of an interface residual in any case. A goal that depended on the
-        # residuals would ask for more digits on finer meshes, whose residuals pass through more
-        # values between the first and the last.
-        increment = self.operator.solve(-residual, 1 / self.options.gamma)
+        increment = self.operator.solve(-residual, FORCING)
         moved = jump.apply(increment)
         change = np.einsum("nij,nj->ni", contact.blocks, moved)
         vectors = contact.forces.vectors(jump) + change[:, : interface.dim]

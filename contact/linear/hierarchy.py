@@ -1,0 +1,103 @@
+"""Multigrid for an operator that changes from solve to solve, renewed when iterations say so."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from math import ceil, log10
+
+import numpy as np
+from numpy.typing import NDArray
+from petsc4py import PETSc
+
+from contact.linear.stiff_nodes import StiffNodes
+from contact.typing import Array
+
+#: What it costs to renew the coarse levels, in iterations (seen in `scripts.benchmarks.phases`).
+PRICE = 8
+
+
+class Hierarchy:
+    """The levels of GAMG, which follow an operator at little cost.
+
+    To multiply out all coarse operators takes as long as `PRICE` iterations, and from one step of
+    Newton's method to the next little changes. So the smoother of the finest level and the
+    interpolation at the contact nodes follow the operator in each of them, the coarse levels only
+    once the iterations that have been lost without them would have paid for that. No sequence of
+    operators then costs more than twice what the best choice would have cost. A solve that
+    loses as many by itself is begun again.
+
+    Parameters
+    ----------
+    ksp
+        A solver with GAMG, set up with the body's operator.
+    nodes
+        Owned nodes that may have contact blocks, local numbers, shape (n,).
+    set_up
+        Sets the solver up for the operator as it is.
+    """
+
+    def __init__(
+        self, ksp: PETSc.KSP, nodes: NDArray[np.int32], set_up: Callable[[], None]
+    ) -> None:
+        self._ksp, self._set_up = ksp, set_up
+        self._stiff = StiffNodes(ksp.getPC(), nodes)
+        self._most = ksp.getTolerances()[3]
+        self._lost = np.inf
+        self._rate: float | None = None
+
+    def follow(self, own: Array, blocks: Array) -> bool:
+        """Follow the operator, and tell whether its coarse levels are renewed. Collective.
+
+        Parameters
+        ----------
+        own, blocks
+            What the body and contact have at the nodes, zero where an unknown is fixed, shape
+            (n, block size, block size).
+        """
+        self._stiff.follow(own, blocks)
+        if self._lost >= PRICE:
+            self._renew()
+            return True
+        pc = self._ksp.getPC()
+        pc.setReusePreconditioner(True)
+        self._set_up()
+        pc.getMGSmoother(pc.getMGLevels() - 1).getPC().setUp()
+        return False
+
+    def _renew(self) -> None:
+        self._ksp.getPC().setReusePreconditioner(False)
+        self._set_up()
+        self._lost, self._rate = 0.0, None
+
+    def solve(self, rhs: PETSc.Vec, solution: PETSc.Vec) -> tuple[int, bool]:
+        """Solve. Collective.
+
+        Returns
+        -------
+        The number of iterations, and whether the coarse levels have been renewed on the way.
+        """
+        jump = self._stiff.jump(rhs)
+        rhs.axpy(-1.0, self._ksp.getOperators()[0] * jump)
+        solution.axpy(-1.0, jump)
+        taken, renewed = self._iterate(rhs, solution)
+        solution.axpy(1.0, jump)
+        return taken, renewed
+
+    def _iterate(self, rhs: PETSc.Vec, solution: PETSc.Vec) -> tuple[int, bool]:
+        ksp, digits = self._ksp, -log10(self._ksp.getTolerances()[0])
+        if self._rate is None:
+            ksp.setTolerances(max_it=self._most)
+            ksp.solve(rhs, solution)
+            self._rate = ksp.getIterationNumber() / digits
+            return ksp.getIterationNumber(), False
+        fresh = self._rate * digits
+        ksp.setTolerances(max_it=ceil(fresh) + PRICE)
+        ksp.solve(rhs, solution)
+        taken = ksp.getIterationNumber()
+        if ksp.getConvergedReason() > 0:
+            self._lost += max(taken - fresh, 0.0)
+            return taken, False
+        self._renew()
+        ksp.setInitialGuessNonzero(False)
+        again, _ = self._iterate(rhs, solution)
+        return taken + again, True
