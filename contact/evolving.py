@@ -14,7 +14,7 @@ from contact.methods.every import METHODS
 from contact.methods.interrupt import stop_on_signal
 from contact.methods.method import Method
 from contact.methods.options import NewtonOptions, Options
-from contact.methods.report import History, Monitor, Outcome
+from contact.methods.report import History, Monitor, Outcome, tell
 from contact.methods.steps import Evolution, LoadStep
 from contact.output.record import StepRecord
 from contact.output.review import announce
@@ -25,7 +25,7 @@ from contact.problem.kkt import evaluate
 from contact.problem.problem import ContactProblem
 from contact.problem.state import State
 
-logger = logging.getLogger("contact.solve")
+logger = logging.getLogger("contact.steps")
 
 
 class NotConvergedError(RuntimeError):
@@ -132,6 +132,7 @@ def solve_steps(
         recorder = StepRecorder(problem, records[-1] if records else None)
         states = [record.state for record in records[-1:-3:-1]]
         step: LoadStep | None = None
+        tell(logger, 0.0, "steps to t = %g", times[-1])
         for step in Evolution(problem, method, *states).run(times, begin):
             note = f"t = {step.problem.time:g}"
             history.records += [
@@ -143,7 +144,12 @@ def solve_steps(
             records.append(recorder.record(step))
             if keep is not None:
                 keep(records[-1])
-            logger.info("%s of %g", note, times[-1])
+            tell(
+                logger,
+                (step.problem.time - begin) / (times[-1] - begin),
+                "%s of %g: iterations %d, residual %.1e",
+                *(note, times[-1], len(step.history.records), step.outcome.kkt.largest),
+            )
     here, state = _end(problem, records, step)
     check_potential(here, state)
     solution = Solution(

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import csv
 import itertools
+import logging
 import os
 import time
 import tomllib
@@ -27,7 +28,7 @@ from contact.mesh.domain import Domain
 from contact.methods.every import METHODS
 from contact.methods.interrupt import Interrupted, stop_on_signal
 from contact.methods.method import Method
-from contact.methods.report import Monitor
+from contact.methods.report import Monitor, tell
 from contact.methods.steps import since, solve_step
 from contact.output.folder import on_root
 from contact.output.rerun import difference
@@ -38,6 +39,8 @@ from contact.output.tables import write_csv
 from contact.problem.held import check_potential
 from contact.problem.problem import ContactProblem
 from contact.problem.state import State
+
+logger = logging.getLogger("contact.sweep")
 
 #: Names of the table and of the case that was swept.
 TABLE, CASE = "sweep.csv", "sweep.toml"
@@ -133,6 +136,7 @@ def sweep(
     text = to_toml(load_case(path, [*overrides, *_set(points[0])]))
     done = on_root(comm, lambda: _begin(folder, names, text))
     rows: list[dict[str, Any]] = []
+    tell(logger, 0.0, "%d cases", len(cases))
     with stop_on_signal(comm, monitor) as stop:
         runner = _Runner(comm, stop, warm)
         for point, case in zip(points, cases, strict=True):
@@ -144,6 +148,8 @@ def sweep(
                     raise Interrupted(solution.outcome.signal)
                 seconds = comm.bcast(time.perf_counter() - begin)
                 row = {**point, **_row(solution), "seconds": seconds}
+                said = f"{', '.join(_set(point))}: {solution.outcome.reason}"
+                tell(logger, (len(rows) + 1) / len(cases), said)
             rows.append(row)
             on_root(comm, lambda: _write(folder, rows))
     return rows

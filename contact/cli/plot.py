@@ -38,12 +38,18 @@ def add_parser(commands: Any, common: dict[str, Any]) -> None:
     command.add_argument(
         "--mirror", action="store_true", help="show both halves of a body of revolution"
     )
+    command.add_argument(
+        "--animate",
+        action="store_true",
+        help="draw animation-FIELD.gif instead, the deformed body over the steps of an evolution",
+    )
     command.add_argument("--help", action="help", help="show this help and leave")
 
 
 def run(options: argparse.Namespace, comm: MPI.Intracomm) -> int:
     """Draw the figures on rank 0 and name their files."""
-    from contact.output.figures.saved import FORMATS, plot  # it takes a while to load
+    from contact.output.figures.animation import animate  # they take a while to load
+    from contact.output.figures.saved import FORMATS, plot
 
     formats = [text.strip() for text in options.format.split(",")]
     for text in formats:
@@ -53,8 +59,14 @@ def run(options: argparse.Namespace, comm: MPI.Intracomm) -> int:
                 f"{', '.join(FORMATS)}, or several with commas"
             )
     width = None if options.width is None else inches(options.width)
-    folder = Path(options.folder)
-    files = on_root(comm, lambda: plot(folder, options.field, formats, width, options.mirror))
+    folder, fields, mirror = Path(options.folder), options.field, options.mirror
+
+    def draw() -> list[Path]:
+        if options.animate:
+            return animate(folder, fields, width, mirror)
+        return plot(folder, fields, formats, width, mirror)
+
+    files = on_root(comm, draw)
     if comm.rank == 0:
         print(*files, sep="\n")
     return CONVERGED

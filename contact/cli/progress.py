@@ -19,7 +19,11 @@ from contact.output.folder import on_root
 
 #: Seconds between two words on inner iterations: on a terminal, and in plain lines.
 OFTEN, SELDOM = 0.2, 10.0
-OUTER, INNER = "contact.solver", "contact.inner"
+#: Loggers of what is within another: the iterations of a solve, its steps, the cases of a sweep.
+RANKS = ("contact.inner", "contact.solver", "contact.steps", "contact.sweep")
+OUTER = "contact.solver"
+#: The bar of many solves.
+SHARES = "{percentage:3.0f}%|{bar}| {elapsed}<{remaining}{postfix}"
 
 
 @contextmanager
@@ -67,30 +71,50 @@ def progress(
             handler.close()
 
 
-class _Lines(logging.StreamHandler[Any]):
-    """Plain lines; of inner iterations one now and then, where nothing else is said."""
+class _Ranked(logging.Handler):
+    """Follows what leads, the highest of the loggers in `RANKS` that has spoken so far."""
+
+    def __init__(self, level: int) -> None:
+        super().__init__(level)
+        self._lead = RANKS.index(OUTER)
+        self._last = time.monotonic()
+
+    def _leads(self, name: str) -> bool:
+        """Note who speaks; tell whether it is what leads, or none of the ranks."""
+        if name not in RANKS:
+            return True
+        self._lead = max(self._lead, RANKS.index(name))
+        return name == RANKS[self._lead]
+
+    def _silent_for(self, seconds: float) -> bool:
+        """Tell whether nothing has been said for so long; if so, something is now."""
+        now = time.monotonic()
+        silent = now - self._last >= seconds
+        if silent:
+            self._last = now
+        return silent
+
+
+class _Lines(_Ranked):
+    """Plain lines; of iterations within what leads one now and then, where nothing else is said."""
 
     def __init__(self, quiet: bool) -> None:
-        super().__init__(sys.stderr)
-        self.setLevel(logging.WARNING if quiet else logging.DEBUG)
-        self._last = time.monotonic()
+        super().__init__(logging.WARNING if quiet else logging.DEBUG)
+        self._stream = logging.StreamHandler(sys.stderr)
 
     def emit(self, record: logging.LogRecord) -> None:
         """Write a line."""
-        now = time.monotonic()
-        if record.levelno < logging.INFO and (record.name != INNER or now - self._last < SELDOM):
-            return
-        self._last = now
-        super().emit(record)
+        leads = self._leads(record.name) and record.levelno >= logging.INFO
+        if self._silent_for(0.0 if leads else SELDOM) and (leads or record.name in RANKS):
+            self._stream.emit(record)
 
 
-class _Bar(logging.Handler):
-    """A bar that counts the outer iterations and says where the inner ones are."""
+class _Bar(_Ranked):
+    """A bar over outer iterations, or over the share of many solves that is done."""
 
     def __init__(self, bar: Any) -> None:
         super().__init__(logging.DEBUG)
         self._bar = bar
-        self._last = 0.0
 
     def __call__(self, record: Record) -> None:
         """Show an outer iteration."""
@@ -100,17 +124,20 @@ class _Bar(logging.Handler):
             f"{kkt.friction:.1e} {record.note}",
             refresh=False,
         )
-        self._bar.update()
+        self._bar.update(1 if RANKS[self._lead] == OUTER else 0)
 
     def emit(self, record: logging.LogRecord) -> None:
-        """Show inner iterations in the bar, and write other lines above it."""
-        if record.name == INNER:
-            now = time.monotonic()
-            if now - self._last > OFTEN:
-                self._last = now
-                self._bar.set_postfix_str(record.getMessage())
-        elif record.levelno >= logging.INFO and record.name != OUTER:
-            self._bar.write(self.format(record), file=sys.stderr)
+        """Show in the bar what leads and what is within it, and other lines above it."""
+        leads = self._leads(record.name)
+        if record.name not in RANKS:
+            if record.levelno >= logging.INFO:
+                self._bar.write(self.format(record), file=sys.stderr)
+        elif leads and hasattr(record, "share"):
+            self._bar.total, self._bar.bar_format = 1.0, SHARES
+            self._bar.n = record.share
+            self._bar.set_postfix_str(record.getMessage())
+        elif record.name != OUTER and self._silent_for(OFTEN):
+            self._bar.set_postfix_str(record.getMessage())
 
     def close(self) -> None:
         """Leave the bar as it is."""

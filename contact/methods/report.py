@@ -15,6 +15,11 @@ from contact.problem.kkt import KKT
 logger = logging.getLogger("contact.solver")
 
 
+def tell(logger: logging.Logger, share: float, text: str, *values: object) -> None:
+    """Log how far a run of many solves has come: the share of it that is done, 0 to 1."""
+    logger.info(text, *values, extra={"share": share})
+
+
 @dataclass(frozen=True)
 class Record:
     """One outer iteration.

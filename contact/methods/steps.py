@@ -25,7 +25,7 @@ from contact.problem.problem import ContactProblem
 from contact.problem.state import State
 from contact.typing import Array
 
-logger = logging.getLogger("contact.solver")
+logger = logging.getLogger("contact.solve")
 
 #: How often a step that fails is halved.
 HALVINGS = 4

@@ -34,6 +34,7 @@ INTRODUCTION = """\
 | `fields.xdmf`, `fields.h5` | likewise with `output.fields = "xdmf"`: degree 1 at most |
 | `checkpoint.bp` | with `output.checkpoint = true` |
 | `figure-*.png` | with `--plot`, and by `contact plot DIR` |
+| `animation-*.gif` | of an evolution, by `contact plot DIR --animate` |
 
 They replace those of an earlier run all together, once they are complete; other files in DIR are
 left alone. Results of another problem are replaced with `--overwrite` only: the same one may be

@@ -14,7 +14,8 @@ from mpi4py import MPI
 from contact import Case, Solution, build_problem
 from contact.body.norms import volume
 from contact.meshing import make_domain
-from contact.output.figures.body import draw_plane, picture
+from contact.output.figures.body import draw_plane
+from contact.output.figures.picture import picture
 from contact.output.table import contact_table
 from scripts.reporting import TWO_COLUMNS, Report, options, solved, subplots
 from scripts.thesis.hertz_problems import Cylinder, Sphere, cylinder, sphere

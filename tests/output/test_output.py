@@ -332,8 +332,9 @@ def test_figures(dim: int, shared_tmp_path: Path) -> None:
 
 def test_figures_begin_at_the_edge_of_the_body() -> None:
     """The clamped corner is no contact node, but the axis and the foundation reach it."""
-    from contact.output.figures.body import draw_plane, picture
+    from contact.output.figures.body import draw_plane
     from contact.output.figures.contact import draw_line
+    from contact.output.figures.picture import picture
 
     case = block(
         2,

@@ -12,8 +12,9 @@ from typing import Any
 import matplotlib
 from matplotlib.figure import Figure
 
-from contact.output.figures.body import Picture, draw_plane, picture
+from contact.output.figures.body import draw_plane
 from contact.output.figures.contact import NARROW, UNNAMED, draw_line, draw_surface
+from contact.output.figures.picture import Picture, picture
 from contact.output.figures.space import draw_space
 from contact.output.figures.steps import Course
 from contact.output.solved import Solved
@@ -89,7 +90,8 @@ class Drawing:
     course: Course | None = None
 
     @property
-    def _mirrored(self) -> bool:
+    def mirrored(self) -> bool:
+        """Whether there are two halves to draw."""
         return self.mirror and self.axes == "rz"
 
     def draw(
@@ -117,7 +119,7 @@ class Drawing:
         The files, in the order in which they were drawn; one that fails is not left half done.
         """
         figures = self.figures(width, contact)
-        with matplotlib.rc_context(_style(width)):
+        with matplotlib.rc_context(style(width)):
             return [
                 _save(figure, folder / f"figure-{name}.{ending}")
                 for name, figure in figures.items()
@@ -132,7 +134,7 @@ class Drawing:
         width, contact
             As `draw` takes them.
         """
-        with matplotlib.rc_context(_style(width)):
+        with matplotlib.rc_context(style(width)):
             figures: dict[str, Figure | None] = {}
             if contact:
                 figures["contact"] = (
@@ -144,7 +146,7 @@ class Drawing:
                 figures |= self.course.draw(self.plane, self.title, self.axes, self.units)
             for name, made in self.pictures:
                 figures[name] = (
-                    draw_plane(made, self.table, self.title, self.axes, self._mirrored, self.units)
+                    draw_plane(made, self.table, self.title, self.axes, self.mirrored, self.units)
                     if self.plane
                     else draw_space(made, self.title)
                 )
@@ -165,7 +167,8 @@ class Gallery(dict[str, Figure]):
         return "".join(images)
 
 
-def _style(width: float | None) -> dict[str, Any]:
+def style(width: float | None) -> dict[str, Any]:
+    """Return the settings of figures of a width (inches); None for that of a page."""
     return STYLE | ({} if width is None else sized(width))
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import csv
 import json
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from itertools import groupby
 from pathlib import Path
 from typing import Any
@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 
 from contact.errors import InputError
 from contact.output import transaction
-from contact.output.figures.body import drawn
 from contact.output.figures.figures import DEFORMED, Drawing, axes_of, heading, named
+from contact.output.figures.picture import drawn
 from contact.output.figures.steps import Course
 from contact.output.folder import refused, result_folder
 from contact.output.table import Table
@@ -35,7 +35,7 @@ def read_drawing(folder: Path, fields: Sequence[str] = (), mirror: bool = False)
     folder
         The results of the run.
     fields
-        Fields to colour the body by, as `figures.body.scalar` takes them; by default those of
+        Fields to colour the body by, as `figures.picture.scalar` takes them; by default those of
         ``contact solve --plot``.
     mirror
         Whether to show both halves of a body of revolution.
@@ -45,10 +45,10 @@ def read_drawing(folder: Path, fields: Sequence[str] = (), mirror: bool = False)
     InputError
         If the folder has not all that is needed, or no such field.
     """
-    summary = _read(folder, "summary.json", lambda path: json.loads(path.read_bytes()))
-    surface = _read(folder, "contact.vtu", read_vtu)
-    body = _read(folder, "fields.vtu", read_vtu)
-    table = _read(folder, "contact.csv", lambda path: _table(path, surface))
+    summary = read(folder, "summary.json", lambda path: json.loads(path.read_bytes()))
+    surface = read(folder, "contact.vtu", read_vtu)
+    body = read(folder, "fields.vtu", read_vtu)
+    table = read(folder, "contact.csv", lambda path: _table(path, surface))
     d = body.grid.dimension
     held = surface.grid.points[np.asarray(surface.at_points["row"]) < 0, :d]
     units = Units(**summary.get("units", {}))
@@ -61,7 +61,7 @@ def read_drawing(folder: Path, fields: Sequence[str] = (), mirror: bool = False)
     course = None
     if "steps.csv" in summary.get("files", ()):
         course = Course(
-            _read(folder, "steps.csv", _rows), _read(folder, "contact-steps.csv", _tables)
+            read(folder, "steps.csv", _rows), read(folder, "contact-steps.csv", _tables)
         )
     return Drawing(title, d == 2, table, held, surface, pictures, axes, mirror, units, course)
 
@@ -91,13 +91,34 @@ def plot(
     InputError
         As `read_drawing`, and if the folder cannot be written to or another run works in it.
     """
+
+    def draw(new: Path) -> list[Path]:
+        drawing = read_drawing(folder, fields, mirror)
+        return drawing.draw(new, formats, width, contact=not fields)
+
+    return added(folder, draw)
+
+
+def added(folder: Path, draw: Callable[[Path], list[Path]]) -> list[Path]:
+    """Let files be drawn, and add them to the results in a folder. On one rank.
+
+    Parameters
+    ----------
+    folder
+        The results of a run.
+    draw
+        Draws files into the folder that it is given, and returns them.
+
+    Raises
+    ------
+    InputError
+        If there are no results, the folder cannot be written to, or another run works in it.
+    """
     if not (folder / "summary.json").is_file():
         raise InputError(f"{folder}: no results there; accepted: a folder that a run has left")
     with result_folder(folder, MPI.COMM_SELF):
-        drawing = read_drawing(folder, fields, mirror)
         try:
-            new = transaction.begin(folder)
-            files = drawing.draw(new, formats, width, contact=not fields)
+            files = draw(transaction.begin(folder))
             transaction.add(folder, files)
         except OSError as error:
             raise refused(error) from None
@@ -106,7 +127,14 @@ def plot(
     return [folder / path.name for path in files]
 
 
-def _read(folder: Path, name: str, reader: Any) -> Any:
+def read(folder: Path, name: str, reader: Any) -> Any:
+    """Read a file of the results.
+
+    Raises
+    ------
+    InputError
+        If it is missing or damaged.
+    """
     path = folder / name
     try:
         return reader(path)

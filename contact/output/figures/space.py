@@ -12,7 +12,8 @@ from matplotlib.cm import ScalarMappable
 from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 
-from contact.output.figures.body import Picture, with_scale
+from contact.output.figures.body import with_scale
+from contact.output.figures.picture import Picture
 
 logger = logging.getLogger("contact.plots")
 
@@ -35,7 +36,7 @@ def draw_space(picture: Picture, title: str = "") -> Figure | None:
     place["values"] = picture.values.ravel()
     width = float(matplotlib.rcParams["figure.figsize"][0])
     figure = Figure(figsize=(width, 0.52 * width))
-    norm = Normalize(picture.values.min(), picture.values.max())
+    norm = Normalize(*(picture.limits or (picture.values.min(), picture.values.max())))
     axes = figure.subplots(1, 2)
     for ax, name, height in zip(axes, ("from above", "from below"), (0.8, -0.8), strict=True):
         plotter = pyvista.Plotter(off_screen=True, window_size=(1000, 900))
@@ -53,6 +54,7 @@ def draw_space(picture: Picture, title: str = "") -> Figure | None:
         )
         plotter.add_axes()
         plotter.view_vector((1.0, -1.6, height))
+        plotter.reset_camera(bounds=picture.box.T.ravel())
         ax.imshow(plotter.screenshot(return_img=True))
         plotter.close()
         ax.set_title(name, fontsize="medium")

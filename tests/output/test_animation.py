@@ -1,0 +1,59 @@
+"""Animations of evolutions: one frame a step, with the same axes and colours."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from contact.cli.main import main
+from contact.output.figures.animation import read_frames
+from scripts.cases import CASES
+
+SMALL = ["--set", "mesh.cells=[8,4]", "--set", "evolution.steps=[1,2,1,1]", "--quiet"]
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("fretting")
+    assert main(["solve", str(CASES / "fretting.toml"), "--out", str(folder), *SMALL]) == 0
+    return folder
+
+
+def test_one_frame_a_step(run: Path) -> None:
+    assert main(["plot", str(run), "--animate", "--width", "80mm"]) == 0
+    image = Image.open(run / "animation-deformed.gif")
+    assert image.n_frames == 5
+    frames = []
+    for k in range(image.n_frames):
+        image.seek(k)
+        frames.append(np.asarray(image.convert("RGB"), dtype=int))
+    # All have one size and one bar of colours, at the bottom; the body in the middle changes.
+    height = frames[0].shape[0]
+    assert len({frame.shape for frame in frames}) == 1
+    assert abs(frames[0][-height // 5 :] - frames[-1][-height // 5 :]).max() < 8
+    assert abs(frames[0] - frames[-1]).max() > 100
+
+
+def test_a_later_run_takes_it_away(run: Path) -> None:
+    assert main(["plot", str(run), "--animate", "--field", "displacement_x"]) == 0
+    assert (run / "animation-displacement_x.gif").is_file()
+    arguments = ["solve", str(CASES / "fretting.toml"), "--out", str(run), *SMALL]
+    assert main(arguments) == 0
+    assert not (run / "animation-displacement_x.gif").exists()
+
+
+def test_frames_are_the_steps(run: Path) -> None:
+    frames = read_frames(run)
+    assert [frame.time for frame in frames] == pytest.approx([1.0, 1.5, 2.0, 4.0, 6.0])
+    # The foundation is at rest: what is opposite of the nodes has not moved.
+    for frame in frames:
+        assert abs(frame.table["moved"]).max() < 1e-12
+
+
+def test_static_results_have_no_steps(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    case = str(CASES / "bar.toml")
+    arguments = ["solve", case, "--out", str(tmp_path), "--set", "mesh.cells=[8,2]", "--quiet"]
+    assert main(arguments) == 0
+    assert main(["plot", str(tmp_path), "--animate"]) == 2
+    assert "no steps there; accepted: the results of an evolution" in capsys.readouterr().err
