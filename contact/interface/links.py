@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from contact.errors import InputError
-from contact.linear.change import Change
+from contact.linear.change import Change, in_circles
 from contact.typing import Array
 
 
@@ -130,26 +130,29 @@ def make_links(
     Raises
     ------
     InputError
-        If a node is a slave and a master.
+        If nodes of several contacts follow each other in a circle.
     """
     if not given:
         return None
     slaves = np.concatenate([rows.nodes for rows in given])
     masters = np.concatenate([rows.masters for rows in given])
-    if np.intersect1d(slaves, masters).size:
-        raise InputError(
-            "contact.against: a node is on the slave side of one contact and on the other side of "
-            "one; accepted: parts `on` that share no nodes with parts `against`"
-        )
     every = np.unique(np.concatenate([masters, *(rows.slaves for rows in given)]))
     jumps = sparse.vstack([_over(rows, every) for rows in given], format="csr")
+    replaced = np.searchsorted(every, slaves)
+    circle = in_circles(replaced, jumps)
+    if circle.size:
+        raise InputError(
+            f"contact.against: {circle.size} contact nodes follow, by way of what is opposite, "
+            "themselves; accepted: contacts that form no circle, such as one of two that are each "
+            "other's opposite"
+        )
     begin, end = index_map.local_range
     here = np.flatnonzero((every >= begin) & (every < end))
     local = (every[here] - begin).astype(np.int32)
     flags = np.zeros((every.size, free.shape[1]), dtype=np.intc)
     flags[here] = free[local]
     comm.Allreduce(MPI.IN_PLACE, flags, op=MPI.SUM)
-    change = Change.of(every, np.searchsorted(every, slaves), jumps, flags > 0)
+    change = Change.of(every, replaced, jumps, flags > 0)
     none = np.zeros(0, dtype=np.intp)
     links = Links(comm, jumps, change, slaves, masters.size > 0, none, none, here, local)
     return links.at(nodes.astype(np.int64) + begin)

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 from petsc4py import PETSc
 from scipy import sparse
+from scipy.sparse import csgraph
 
 from contact.linear.bordered import BorderedOperator, shell
 from contact.linear.layout import Layout
@@ -62,7 +63,7 @@ class Change:
             Which of them are replaced, shape (r,).
         jumps
             The jumps by the unknowns, shape (r, c). One is made of the node itself, of nodes that
-            are not replaced, and of replaced ones whose own jumps are made of none but these.
+            are not replaced, and of replaced ones, but in no circle: see `in_circles`.
         free
             Which unknowns are not fixed, shape (c, block size).
         """
@@ -98,6 +99,24 @@ class Change:
         return made
 
 
+def in_circles(rows: NDArray[np.intp], jumps: sparse.csr_array) -> NDArray[np.intp]:
+    """Return the replaced nodes that follow each other in circles; none, or there is no change.
+
+    Parameters
+    ----------
+    rows, jumps
+        As in `Change.of`.
+
+    Returns
+    -------
+    Places among the nodes that take part.
+    """
+    among = sparse.coo_array(jumps[:, rows])
+    edges = sparse.csr_array((among.data != 0, among.coords), shape=among.shape)
+    count, member = csgraph.connected_components(edges, connection="strong")
+    return rows[np.bincount(member, minlength=count)[member] > 1]
+
+
 def _of_component(
     rows: NDArray[np.intp], jumps: sparse.csr_array, free: NDArray[np.bool_]
 ) -> tuple[sparse.csr_array, sparse.csr_array]:
@@ -114,8 +133,12 @@ def _of_component(
     others = others - sparse.diags_array(others.diagonal())
     identity = sparse.eye_array(count)
     follows = -(sparse.diags_array(1 / scale) @ others)
-    # What follows replaced nodes follows them no further.
-    whole = (identity + follows + follows @ follows) @ sparse.diags_array(1 / scale)
+    # What follows replaced nodes follows what these follow; without circles there is an end.
+    whole, further = identity, follows
+    while further.count_nonzero():
+        whole = whole + further
+        further = further @ follows
+    whole = whole @ sparse.diags_array(1 / scale)
     inverse = sparse.diags_array(scale) @ (identity - follows)
     return sparse.csr_array(whole), sparse.csr_array(inverse)
 

@@ -163,7 +163,7 @@ def case(**more):
                     {"on": "lower_top", "against": "upper_bottom"},
                 ]
             },
-            "a node is on the slave side of one contact and on the other side",
+            "contact nodes follow, by way of what is opposite, themselves",
         ),
         (
             {

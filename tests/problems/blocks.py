@@ -146,3 +146,43 @@ class Blocks:
                 vertices.append(corner[tuple(at)])
             cells.append(np.stack(vertices, 1))
         return x, np.concatenate(cells)
+
+
+def squares(comm: MPI.Intracomm, corners, cells) -> Domain:
+    """Return unit squares, each a region with its own mesh, in the plane.
+
+    Parameters
+    ----------
+    corners
+        The lower left corner of each.
+    cells
+        Cells along its edges. Regions are ``body0``, ..., parts ``left0``, ``top1``, ...
+    """
+    parts, blocks, count = [], [], 0
+    for k, (corner, n) in enumerate(zip(corners, cells, strict=True)):
+        x, own = Blocks(2)._block(n, np.random.default_rng(k))
+        parts.append(x + np.array(corner))
+        blocks.append(own + count)
+        count += len(x)
+    element = basix.ufl.element("Lagrange", "triangle", 1, shape=(2,), dtype=np.float64)
+    first = comm.rank == 0
+    cells_here = np.concatenate(blocks).astype(np.int64) if first else np.zeros((0, 3), np.int64)
+    points = np.concatenate(parts) if first else np.zeros((0, 2))
+    mesh = dmesh.create_mesh(comm, cells=cells_here, x=points, e=ufl.Mesh(element))
+    mesh.topology.create_connectivity(1, 2)
+    facets = dmesh.exterior_facet_indices(mesh.topology)
+    to_cell = mesh.topology.connectivity(1, 2)
+    inside = dmesh.compute_midpoints(mesh, 2, to_cell.array[to_cell.offsets[facets]])
+    middle = dmesh.compute_midpoints(mesh, 1, facets)
+    every = np.arange(mesh.topology.index_map(2).size_local, dtype=np.int32)
+    centre = dmesh.compute_midpoints(mesh, 2, every)
+    named, regions = {}, {}
+    for k, corner in enumerate(np.array(corners, dtype=float)):
+        own = (np.abs(inside[:, :2] - corner - 0.5) < 0.5).all(axis=1)
+        regions[f"body{k}"] = np.flatnonzero(
+            (np.abs(centre[:, :2] - corner - 0.5) < 0.5).all(axis=1)
+        )
+        for side, axis, value in (("left", 0, 0), ("right", 0, 1), ("bottom", 1, 0), ("top", 1, 1)):
+            there = np.abs(middle[:, axis] - corner[axis] - value) < 1e-9
+            named[f"{side}{k}"] = facets[own & there]
+    return from_mesh(mesh, named, 2.0, regions)

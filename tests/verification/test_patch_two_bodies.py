@@ -21,7 +21,7 @@ from contact.problem.problem import Contact, ContactProblem
 from contact.typing import Array
 from forms.hencky import Linear
 from forms.laws import ConstantCoefficient
-from tests.problems.blocks import Blocks
+from tests.problems.blocks import Blocks, squares
 from tests.problems.mechanics import constant
 
 COMM = MPI.COMM_WORLD
@@ -184,3 +184,37 @@ def test_matching_meshes_are_one_body(dim: int, degree: int) -> None:
     assert distance.max() < 1e-12
     values, expected = state.x.reshape(-1, dim), alone.x.reshape(-1, dim)
     np.testing.assert_allclose(values, expected[nearest], rtol=0, atol=1e-10 * np.abs(values).max())
+
+
+@pytest.mark.parallel
+@pytest.mark.parametrize("condense", [True, False], ids=["dense", "sparse"])
+@pytest.mark.parametrize("degree", [1, 2])
+def test_a_chain_of_bodies(degree: int, condense: bool) -> None:
+    """Three blocks on each other: the middle one has a part `on`, and one `against` it."""
+    domain = squares(COMM, [(0, 0), (0, 1), (0, 2)], (4, 5, 3))
+    zero = constant(0.0, 2)
+    laws = [Linear(young, 0.3) for young in (2.0, 1.0, 5.0)]
+    materials = [Material(law, on=(f"body{k}",)) for k, law in enumerate(laws)]
+    fixed = [Fixed("bottom0", [None, zero]), *(Fixed(f"left{k}", [zero, None]) for k in range(3))]
+    body = Body.piecewise(materials, fixed, [Load("top2", pressure=constant(0.01, 2))])
+    pairs = [contact("bottom1", "top0"), contact("bottom2", "top1")]
+    state = solve(ContactProblem(domain, body, pairs, degree=degree), condense=condense)
+    np.testing.assert_allclose(state.forces.pressure, 0.01, rtol=1e-12)
+
+
+@pytest.mark.parallel
+@pytest.mark.parametrize("condense", [True, False], ids=["dense", "sparse"])
+@pytest.mark.parametrize("degree", [1, 2])
+def test_a_corner_that_is_on_one_body_and_against_another(degree: int, condense: bool) -> None:
+    """The corner of a block presses on the one below, and the one beside presses on it."""
+    domain = squares(COMM, [(0, 0), (0, 1), (1, 1)], (4, 5, 3))
+    zero = constant(0.0, 2)
+    rollers = [("bottom0", 1), ("left0", 0), ("left1", 0), ("bottom2", 1)]
+    fixed = [Fixed(part, [None if i != axis else zero for i in range(2)]) for part, axis in rollers]
+    loads = [Load("top1", pressure=constant(0.01, 2)), Load("right2", pressure=constant(0.02, 2))]
+    body = Body(Linear(1.0, 0.3), fixed, loads)
+    pairs = [contact("bottom1", "top0"), contact("left2", "right1")]
+    problem = ContactProblem(domain, body, pairs, degree=degree)
+    state = solve(problem, condense=condense)
+    expected = np.where(np.abs(problem.nodes.normal[:, 0]) > 0.5, 0.02, 0.01)
+    np.testing.assert_allclose(state.forces.pressure, expected, rtol=1e-12)
