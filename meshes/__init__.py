@@ -20,7 +20,7 @@ from pathlib import Path
 from contact.errors import InputError
 from meshes.bars import bar, bar_on_ends, block, column, piezo_bar
 from meshes.hertz import disc, half_disc, quarter_disc, sphere
-from meshes.indentation import half_space
+from meshes.indentation import half_cylinder, half_space
 from meshes.pairs import (
     ball_between_plates,
     cylinder_on_block,
@@ -45,6 +45,7 @@ RECIPES: Mapping[str, Callable[..., None]] = {
         block,
         column,
         half_space,
+        half_cylinder,
         two_blocks,
         cylinder_on_block,
         two_half_cylinders,

@@ -33,7 +33,8 @@ def grade(
     """Set the element size by the distance to some entities.
 
     It is ``contact_size`` up to the distance ``width`` and then grows by ``growth`` a unit
-    length, up to ``size``. At the points ``edges`` it is ``edge_size``, and grows from there.
+    length, up to ``size``. At ``edges``, points in the plane and curves in space, it is
+    ``edge_size``, and grows from there.
 
     Raises
     ------
@@ -46,7 +47,8 @@ def grade(
     zone = {"PointsList": points, "CurvesList": curves, "SurfacesList": surfaces}
     fields = [_ramp(gmsh, zone, near, size, width, growth)]
     if edges:
-        fields.append(_ramp(gmsh, {"PointsList": edges}, min(edge_size, near), size, 0.0, growth))
+        kind = "PointsList" if gmsh.model.getDimension() == 2 else "CurvesList"
+        fields.append(_ramp(gmsh, {kind: edges}, min(edge_size, near), size, 0.0, growth))
     field = gmsh.model.mesh.field
     least = field.add("Min")
     field.setNumbers(least, "FieldsList", fields)

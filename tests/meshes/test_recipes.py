@@ -72,6 +72,16 @@ RECIPES = {
         900.0,
         {"axis": 30.0, "contact": 1.0, "free": 29.0, "side": 30.0, "bottom": 30.0},
     ),
+    "half_cylinder": (
+        np.pi * 108,
+        {
+            "contact": np.pi / 2,
+            "free": np.pi * 17.5,
+            "symmetry": 72.0,
+            "side": np.pi * 36,
+            "bottom": np.pi * 18,
+        },
+    ),
     "two_blocks": (
         6.0,
         {
