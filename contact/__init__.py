@@ -13,8 +13,9 @@ and a problem that is put together in Python by
 >>> problem = Problem(domain, body, Contact("bottom"), Friction(mu=0.3))  # doctest: +SKIP
 >>> solution = solve(problem)  # doctest: +SKIP
 
-Geometry: `Domain` (`Domain.from_mesh` takes dolfinx's mesh and tags).
-Body: `Body`, `Material`, `Fixed`, `Load`; `Linear`, `Log`, `UserLaw`, `Piezo`.
+Geometry: `from_msh` reads a Gmsh file, `Domain.from_mesh` takes dolfinx's mesh and tags.
+Body: `Body`, `Material`, `Fixed`, `Load`; `Linear`, `Log`, `UserLaw`, `Piezo`; `Rigid` with its
+`Motion`, and `Electrode`.
 Contact: `Contact` with a gap, or a `Plane`, `Sphere`, `Cylinder`, `Cone`, `Paraboloid`, `Punch`,
 `Level`, `Triangles`; `Layer`; `Friction`, `SlipCoefficient`, `Coulomb`;
 `Conductor` with `ShiftedConductivity`, `RampConductivity`, `PerfectConductivity`.
@@ -37,6 +38,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from contact.body.description import Body, Fixed, Load, Material
+    from contact.body.rigid import Electrode, Motion, Rigid
     from contact.build import build_problem
     from contact.case.file import Case, load_case, parse_case
     from contact.errors import InputError
@@ -56,6 +58,7 @@ if TYPE_CHECKING:
         Triangles,
     )
     from contact.mesh.domain import Domain
+    from contact.mesh.reader import from_msh
     from contact.methods.options import FixedPointOptions, NewtonOptions, PenaltyOptions
     from contact.output.files import write_outputs
     from contact.output.solution import Solution
@@ -75,6 +78,7 @@ if TYPE_CHECKING:
 #: Module -> the names that stand there.
 _HOMES = {
     "contact.body.description": "Body Fixed Load Material",
+    "contact.body.rigid": "Electrode Motion Rigid",
     "contact.build": "build_problem",
     "contact.case.file": "Case load_case parse_case",
     "contact.errors": "InputError",
@@ -85,6 +89,7 @@ _HOMES = {
     "contact.interface.obstacle": "Cone Cylinder GapFunction Level Paraboloid Plane Punch "
     "Sphere Triangles",
     "contact.mesh.domain": "Domain",
+    "contact.mesh.reader": "from_msh",
     "contact.methods.options": "FixedPointOptions NewtonOptions PenaltyOptions",
     "contact.output.files": "write_outputs",
     "contact.output.solution": "Solution",
@@ -108,6 +113,7 @@ __all__ = [
     "Coulomb",
     "Cylinder",
     "Domain",
+    "Electrode",
     "Fixed",
     "FixedPointOptions",
     "Friction",
@@ -119,6 +125,7 @@ __all__ = [
     "Load",
     "Log",
     "Material",
+    "Motion",
     "NewtonOptions",
     "Paraboloid",
     "PenaltyOptions",
@@ -128,6 +135,7 @@ __all__ = [
     "Problem",
     "Punch",
     "RampConductivity",
+    "Rigid",
     "ShiftedConductivity",
     "SlipCoefficient",
     "Solution",
@@ -137,6 +145,7 @@ __all__ = [
     "__version__",
     "build_problem",
     "evolve",
+    "from_msh",
     "load_case",
     "parse_case",
     "solve",

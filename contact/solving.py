@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +13,7 @@ from contact.build import build_problem, named
 from contact.case.file import Case, load_case
 from contact.case.replaced import replaced_by
 from contact.case.text import anchored, to_toml
+from contact.errors import InputError
 from contact.evolving import solve_steps
 from contact.methods.every import METHODS
 from contact.methods.interrupt import stop_on_signal
@@ -27,6 +29,9 @@ from contact.problem.held import check_held, check_potential
 from contact.problem.problem import ContactProblem
 from contact.problem.state import State
 
+#: What a start is called that is given as such.
+GIVEN = "the state that was given"
+
 
 def solve(
     case: Case | ContactProblem | str | Path,
@@ -35,6 +40,7 @@ def solve(
     comm: MPI.Intracomm = MPI.COMM_WORLD,
     folder: Path | None = None,
     restart: Path | None = None,
+    start: State | None = None,
     **replacements: Any,
 ) -> Solution:
     """Build and solve a case, in steps if it says so. Collective.
@@ -53,27 +59,41 @@ def solve(
         Where checkpoints of an evolution's steps are kept until its results are written.
     restart
         A folder with checkpoints of the same case, to go on from.
+    start
+        A state of the same mesh to start from, of an earlier solution; from rest by default.
     replacements
         Objects that take the place of parts of the case; see `build.build_problem`.
 
     Raises
     ------
     InputError
-        If the case does not fit its mesh, or the body is not held.
+        If the case does not fit its mesh, the body is not held, or something is given that would
+        be ignored.
     """
     begin = time.perf_counter()
     if isinstance(case, ContactProblem):
+        given = {"folder": folder, "restart": restart, **replacements}
+        _refuse(given, "a problem that is built already")
+        nested = isinstance(settings, NewtonOptions) and settings.nested
+        _refuse({"nested": nested or None}, "a problem that is built already")
         check_held(case)
-        return solve_problem(case, settings or NewtonOptions(), monitor)
+        return solve_problem(case, settings or NewtonOptions(), monitor, start)
     case = case if isinstance(case, Case) else load_case(case, without=replaced_by(replacements))
     settings = settings or case.solver
     problem = build_problem(case, comm, **replacements)
     with named(case.source):
         nested = isinstance(settings, NewtonOptions) and settings.nested
-        start = coarse_solution(case, comm, **replacements) if nested else None
         if case.evolution is None:
-            solution = solve_problem(problem, settings, monitor, start)
+            _refuse({"restart": restart}, "a case without [evolution]")
+            words = GIVEN
+            if nested:
+                _refuse({"start": start}, "nested = true, which has a start of its own")
+                start = prolong(*coarse_solution(case, comm, **replacements), problem)
+                words = "the solution on a coarser mesh"
+            solution = solve_problem(problem, settings, monitor, start, words)
         else:
+            _refuse({"start": start}, "[evolution]; evolve(problem, times, start=state) goes on")
+            _refuse({"nested": nested or None}, "[evolution]")
             kept = [] if restart is None else read_steps(restart, problem)
             keep = None
             if folder is not None:
@@ -88,11 +108,19 @@ def solve(
     return solution
 
 
+def _refuse(given: Mapping[str, Any], beside: str) -> None:
+    """Refuse arguments that would be ignored."""
+    for name, value in given.items():
+        if value is not None:
+            raise InputError(f"{name}: given together with {beside}; accepted: one without it")
+
+
 def solve_problem(
     problem: ContactProblem,
     settings: Options,
     monitor: Monitor | None = None,
-    start: tuple[ContactProblem, State] | None = None,
+    start: State | None = None,
+    words: str = GIVEN,
 ) -> Solution:
     """Solve a problem. Collective.
 
@@ -101,7 +129,9 @@ def solve_problem(
     problem, settings, monitor
         The problem, the method with its tolerances, and who is told of the outer iterations.
     start
-        A problem on a coarser mesh and its solution, to start from.
+        A state of the problem, or of one with the same mesh and contact nodes, to start from.
+    words
+        What start that is, for what is said of the solution.
 
     An interrupt (Ctrl-C, or SIGTERM from a batch system) ends the solve after the running
     iteration and keeps what the last outer one left; a second one ends the program.
@@ -109,14 +139,16 @@ def solve_problem(
     Raises
     ------
     InputError
-        If the linear system is singular, or the potential is not determined.
+        If the linear system is singular, the potential is not determined, or the start is that of
+        another problem.
     """
     begin = time.perf_counter()
+    if start is not None:
+        start = _begun(problem, start)
     with stop_on_signal(problem.comm, monitor) as stop:
         method = METHODS[settings.method](problem, settings, stop)
         setup = time.perf_counter() - begin
-        begun = None if start is None else prolong(*start, problem)
-        state, outcome = solve_step(problem, method, begun)
+        state, outcome = solve_step(problem, method, start)
     check_potential(problem, state)
     solution = Solution(
         problem=problem,
@@ -125,7 +157,7 @@ def solve_problem(
         history=method.history,
         counters=method.counters,
         method=settings.method,
-        start="zero slip" if start is None else "the solution on a coarser mesh",
+        start="zero slip" if start is None else words,
         seconds={
             "setup": setup,
             "solve": time.perf_counter() - begin - setup,
@@ -134,3 +166,15 @@ def solve_problem(
     )
     announce(solution)
     return solution
+
+
+def _begun(problem: ContactProblem, start: State) -> State:
+    """Return a given start with the values that the problem prescribes. Collective."""
+    rest, nodes = problem.start(), problem.nodes.nodes.size
+    fits = start.x.shape == rest.x.shape and start.forces.pressure.shape == (nodes,)
+    if not problem.comm.allreduce(fits, op=MPI.LAND):
+        raise InputError(
+            "start: given a state of another problem; accepted: one with the same mesh, elements "
+            "and contact nodes, on the same ranks"
+        )
+    return State(problem.equilibrium.prescribe(start.x, problem.time), start.forces, problem.time)

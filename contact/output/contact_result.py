@@ -20,7 +20,7 @@ from contact.problem.problem import ContactProblem
 from contact.typing import Array
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class ContactResult:
     """The contact nodes of all ranks, on each of them, in the order of ``contact.csv``.
 
@@ -62,6 +62,15 @@ class ContactResult:
     potential: Array | None
     charge: Array | None
     _problem: ContactProblem
+
+    def __repr__(self) -> str:
+        """Return how many nodes there are, and how many of them touch."""
+        closed = np.count_nonzero(self.status != "open")
+        largest = self.pressure.max(initial=0.0)
+        return (
+            f"<ContactResult: {self.status.size} nodes, {closed} in contact, pressure up to "
+            f"{largest:.4g}>"
+        )
 
     def function(self, name: str) -> fem.Function:
         """Return one of the arrays as a function on a mesh of the contact surface. Collective.

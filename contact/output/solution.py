@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from contact.output.figures.figures import Gallery
 
 
-@dataclass
+@dataclass(repr=False)
 class Solution:
     """A solved problem, or what was reached.
 
@@ -94,6 +94,15 @@ class Solution:
     output: OutputOptions = field(default_factory=OutputOptions)
     units: Units = field(default_factory=Units)
     steps: list[StepRecord] = field(default_factory=list)
+
+    def __repr__(self) -> str:
+        """Return what a look at it should show; `summary.json` has all."""
+        name = f" {self.title!r}" if self.title else ""
+        state = "converged" if self.converged else "not converged"
+        return (
+            f"<Solution{name}: {state}, {self.outcome.reason}; method {self.method}, "
+            f"von Mises stress up to {self.max_von_mises:.4g}; {len(self.warnings)} warning(s)>"
+        )
 
     @property
     def begun(self) -> bool:

@@ -27,6 +27,7 @@ from contact import Case, build_problem, load_case, solve_problem
 from contact.case.file import parse_case
 from contact.case.mesh import Mesh
 from contact.linear.operator import SparseOperator
+from contact.methods.nested import prolong
 from contact.nesting import coarse_solution
 from contact.output.solution import Solution
 from contact.problem.problem import ContactProblem
@@ -91,8 +92,10 @@ def from_file(name: str, *changes: str) -> dict[str, Any]:
     """Measure a case file."""
     case = load_case(CASES / name, changes)
     warm(case, lambda: case)
-    start = coarse_solution(case, COMM) if getattr(case.solver, "nested", False) else None
-    return described(solve_problem(build_problem(case), case.solver, start=start))
+    problem = build_problem(case)
+    nested = getattr(case.solver, "nested", False)
+    start = prolong(*coarse_solution(case, COMM), problem) if nested else None
+    return described(solve_problem(problem, case.solver, start=start))
 
 
 def bar_with_constant_friction(n: str, mu: str) -> dict[str, Any]:
@@ -129,9 +132,9 @@ def ratio(dimension: str, n: str, start: str) -> dict[str, Any]:
     problem = build_problem(case)
     linear, iterations = one_linear_solve(problem)
     begin = time.perf_counter()
-    levels = coarse_solution(case, COMM) if start == "nested" else None
+    begun = prolong(*coarse_solution(case, COMM), problem) if start == "nested" else None
     coarse = time.perf_counter() - begin
-    result = described(solve_problem(problem, case.solver, start=levels))
+    result = described(solve_problem(problem, case.solver, start=begun))
     total = result["solve"] + coarse
     return {
         "dofs": result["dofs"],

@@ -1,0 +1,72 @@
+"""Starts: used, and said to be what they are; refused where they would be ignored."""
+
+from dataclasses import replace
+
+import pytest
+
+from contact import (
+    FixedPointOptions,
+    InputError,
+    NewtonOptions,
+    PenaltyOptions,
+    build_problem,
+    load_case,
+    solve,
+)
+from scripts.cases import CASES
+
+SMALL = ["mesh.cells=[16, 4]", "solver.method=newton"]
+
+
+def bar(*changes: str):
+    return load_case(CASES / "bar.toml", [*SMALL, *changes])
+
+
+@pytest.mark.parametrize("options", [NewtonOptions(), FixedPointOptions(), PenaltyOptions()])
+def test_a_solution_is_found_again_at_once(options):
+    problem = build_problem(bar())
+    cold = solve(problem, options)
+    warm = solve(problem, options, start=cold.state)
+    assert cold.converged and warm.converged
+    assert sum(r.inner for r in warm.history.records) < sum(r.inner for r in cold.history.records)
+    assert warm.contact_force == pytest.approx(cold.contact_force, rel=1e-6)
+    assert (cold.start, warm.start) == ("zero slip", "the state that was given")
+
+
+def test_the_solution_of_a_case_starts_another():
+    """With other loads: prescribed values are those of the new problem."""
+    first = solve(bar("load.0.traction=[0, -0.004]"))
+    warm, cold = (solve(bar(), start=start) for start in (first.state, None))
+    assert warm.contact_force == pytest.approx(cold.contact_force, rel=1e-7)
+
+
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        ({"law": 1}, "law: given together with a problem that is built already"),
+        ({"restart": "here"}, "restart: given together with a problem that is built already"),
+        ({"settings": NewtonOptions(nested=True)}, "nested: given together with a problem"),
+    ],
+)
+def test_what_a_problem_would_ignore_is_refused(given, message):
+    with pytest.raises(InputError, match=message):
+        solve(build_problem(bar()), **given)
+
+
+def test_what_a_case_would_ignore_is_refused():
+    state = solve(bar()).state
+    with pytest.raises(InputError, match="start: given together with nested = true"):
+        solve(bar("solver.nested=true"), start=state)
+    with pytest.raises(InputError, match="restart: given together with a case without"):
+        solve(bar(), restart="here")
+    with pytest.raises(InputError, match=r"start: given together with \[evolution\]"):
+        solve(load_case(CASES / "fretting.toml"), start=state)
+
+
+def test_a_state_of_another_problem_is_refused():
+    state = solve(bar()).state
+    with pytest.raises(InputError, match="given a state of another problem"):
+        solve(bar("mesh.cells=[32, 8]"), start=state)
+    shorter = replace(state, x=state.x[:-2].copy())
+    with pytest.raises(InputError, match="given a state of another problem"):
+        solve(build_problem(bar()), start=shorter)
