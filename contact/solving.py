@@ -17,11 +17,10 @@ from contact.errors import InputError
 from contact.evolving import solve_steps
 from contact.methods.every import METHODS
 from contact.methods.interrupt import stop_on_signal
-from contact.methods.nested import prolong
 from contact.methods.options import NewtonOptions, Options
 from contact.methods.report import Monitor
 from contact.methods.steps import solve_step
-from contact.nesting import coarse_solution
+from contact.nesting import nested_start, pays
 from contact.output.resume import Checkpoints, read_steps
 from contact.output.review import announce
 from contact.output.solution import Solution
@@ -83,12 +82,14 @@ def solve(
     problem = build_problem(case, comm, **replacements)
     with named(case.source):
         nested = isinstance(settings, NewtonOptions) and settings.nested
+        if isinstance(settings, NewtonOptions) and nested is None and start is None:
+            nested = not replacements and pays(case, problem)
         if case.evolution is None:
             _refuse({"restart": restart}, "a case without [evolution]")
             words = GIVEN
             if nested:
                 _refuse({"start": start}, "nested = true, which has a start of its own")
-                start = prolong(*coarse_solution(case, comm, **replacements), problem)
+                start = nested_start(case, problem, **replacements)
                 words = "the solution on a coarser mesh"
             solution = solve_problem(problem, settings, monitor, start, words)
         else:

@@ -18,8 +18,8 @@ SMALL = 1000
 def coarser_cases(case: Case, levels: int | None = None) -> list[Case]:
     """Return the case on coarser and coarser meshes, the coarsest first, without itself.
 
-    A generated mesh has its cells halved as often as all numbers of cells are even, a mesh
-    that is refined has one refinement less.
+    A generated mesh has its cells halved as often as they are enough, a mesh that is refined has
+    one refinement less.
 
     Parameters
     ----------
@@ -34,25 +34,33 @@ def coarser_cases(case: Case, levels: int | None = None) -> list[Case]:
         If there is no coarser mesh, or there are not as many as asked for.
     """
     found: list[Case] = []
-    mesh = case.mesh
-    while levels is None or len(found) < levels - 1:
-        cells = mesh.cells
-        if mesh.refine > 0:
-            update: dict[str, object] = {"refine": mesh.refine - 1}
-        elif cells is not None and all(n % 2 == 0 for n in cells) and min(cells) >= 2 * COARSEST:
-            update = {"cells": tuple(n // 2 for n in cells)}
-        else:
-            break
-        mesh = mesh.model_copy(update=update)
+    mesh = _coarser(case.mesh)
+    while mesh is not None and (levels is None or len(found) < levels - 1):
         if levels is None and found and _nodes(mesh) < SMALL:
             break
         found.insert(0, case.model_copy(update={"mesh": mesh}))
+        mesh = _coarser(mesh)
     if not found or (levels is not None and len(found) < levels - 1):
         raise InputError(
             f"{case.source}: solver.nested: there are {len(found) + 1} nested meshes only; "
-            "accepted: numbers of cells that can be halved, or mesh.refine > 0"
+            f"accepted: at least {2 * COARSEST} cells along each edge, or mesh.refine > 0"
         )
     return found
+
+
+def has_coarser(case: Case) -> bool:
+    """Tell whether there is a coarser mesh."""
+    return _coarser(case.mesh) is not None
+
+
+def _coarser(mesh: Mesh) -> Mesh | None:
+    """Return the next coarser mesh, if there is one."""
+    cells = mesh.cells
+    if mesh.refine > 0:
+        return mesh.model_copy(update={"refine": mesh.refine - 1})
+    if cells is not None and min(cells) >= 2 * COARSEST:
+        return mesh.model_copy(update={"cells": tuple((n + 1) // 2 for n in cells)})
+    return None
 
 
 def _nodes(mesh: Mesh) -> float:

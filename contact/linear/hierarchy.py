@@ -24,7 +24,7 @@ class Hierarchy:
     interpolation at the contact nodes follow the operator in each of them, the coarse levels only
     once the iterations that have been lost without them would have paid for that. No sequence of
     operators then costs more than twice what the best choice would have cost. A solve that
-    loses as many by itself is begun again.
+    loses as many by itself goes on with new ones.
 
     Parameters
     ----------
@@ -97,7 +97,8 @@ class Hierarchy:
         if ksp.getConvergedReason() > 0:
             self._lost += max(taken - fresh, 0.0)
             return taken, False
+        begun = ksp.getConvergedReason() == PETSc.KSP.ConvergedReason.DIVERGED_MAX_IT
         self._renew()
-        ksp.setInitialGuessNonzero(False)
+        ksp.setInitialGuessNonzero(begun)
         again, _ = self._iterate(rhs, solution)
         return taken + again, True

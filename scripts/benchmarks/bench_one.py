@@ -27,8 +27,7 @@ from contact import Case, build_problem, load_case, solve_problem
 from contact.case.file import parse_case
 from contact.case.mesh import Mesh
 from contact.linear.operator import SparseOperator
-from contact.methods.nested import prolong
-from contact.nesting import coarse_solution
+from contact.nesting import nested_start
 from contact.output.solution import Solution
 from contact.problem.problem import ContactProblem
 from scripts.cases import CASES, bar
@@ -93,8 +92,7 @@ def from_file(name: str, *changes: str) -> dict[str, Any]:
     case = load_case(CASES / name, changes)
     warm(case, lambda: case)
     problem = build_problem(case)
-    nested = getattr(case.solver, "nested", False)
-    start = prolong(*coarse_solution(case, COMM), problem) if nested else None
+    start = nested_start(case, problem) if getattr(case.solver, "nested", False) else None
     return described(solve_problem(problem, case.solver, start=start))
 
 
@@ -132,9 +130,9 @@ def ratio(dimension: str, n: str, start: str) -> dict[str, Any]:
     problem = build_problem(case)
     linear, iterations = one_linear_solve(problem)
     begin = time.perf_counter()
-    begun = prolong(*coarse_solution(case, COMM), problem) if start == "nested" else None
+    nested = nested_start(case, problem) if start == "nested" else None
     coarse = time.perf_counter() - begin
-    result = described(solve_problem(problem, case.solver, start=begun))
+    result = described(solve_problem(problem, case.solver, start=nested))
     total = result["solve"] + coarse
     return {
         "dofs": result["dofs"],

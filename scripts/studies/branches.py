@@ -7,14 +7,13 @@ from dataclasses import dataclass
 import numpy as np
 from mpi4py import MPI
 
-from contact import Case, InputError, Solution
-from contact.case.nesting import coarser_cases
+from contact import Case, Solution
+from contact.case.nesting import has_coarser
 from contact.interface.multipliers import Multipliers
 from contact.methods.method import Method
-from contact.methods.nested import prolong
 from contact.methods.newton import Newton
 from contact.methods.options import NewtonOptions, Options
-from contact.nesting import coarse_solution
+from contact.nesting import nested_start
 from contact.output.review import review
 from contact.problem.kkt import KKT, evaluate
 from contact.problem.problem import ContactProblem
@@ -147,11 +146,7 @@ class Branches:
 
     def nested_start(self, case: Case) -> State | None:
         """Return what nested meshes start from; None where there are none. Collective."""
-        try:
-            coarser_cases(case)
-        except InputError:
-            return None
-        return prolong(*coarse_solution(case, self.problem.comm), self.problem)
+        return nested_start(case, self.problem) if has_coarser(case) else None
 
     def disturbed(self, found: Solution) -> State:
         """Return a start beside a solution, off by up to `DISTURBANCE` at each node."""

@@ -178,7 +178,7 @@ WRONG = {
     "nested meshes of too few cells": (
         "[friction]",
         "[solver]\nnested = true\n[friction]",
-        ["solver.nested", "cells that can be halved"],
+        ["solver.nested", "at least 8 cells along each edge"],
     ),
     "friction negative somewhere": ("mu = 0.3", 'mu = "0.3-x"', ["friction.mu", "0.3-x"]),
     "Coulomb without mu": ("mu = 0.3", "", ["friction.mu", "missing"]),

@@ -57,7 +57,7 @@ def test_counts_do_not_grow_with_the_number_of_sliding_nodes(mu: float) -> None:
 
 @pytest.mark.parallel
 def test_coarse_levels_are_renewed_when_iterations_say_so() -> None:
-    """Where little changes they stay; where much does the solve is begun again with new ones."""
+    """Where little changes they stay; where much does the solve goes on with new ones."""
     problem = mechanics.leaning_block(WORLD, 12)
     body, weight = problem.equilibrium, problem.nodes.weight[:, None, None]
     x, load, sticks = problem.start().x, body.external(), weight * sticking(problem)

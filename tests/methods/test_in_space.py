@@ -1,0 +1,51 @@
+"""Newton's method with multigrid: what it costs in set-ups and iterations, not in seconds."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+
+from contact import nesting
+from contact.linear import multigrid
+from contact.output.solution import Solution
+from contact.solving import solve
+from scripts.benchmarks.bench_one import block
+
+#: Largest displacement of the block, found by a direct solver.
+LARGEST = 0.0366836772
+
+
+@pytest.fixture
+def small_is_large(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Let a mesh of some thousand unknowns be solved like one of a million."""
+    monkeypatch.setattr(nesting, "MANY", 1000)
+    monkeypatch.setitem(multigrid.LARGE, (3, False), 1000)
+    monkeypatch.setitem(multigrid.DEFAULTS, "pc_gamg_coarse_eq_limit", "200")
+
+
+def largest(solution: Solution) -> float:
+    """Return the largest displacement component."""
+    here = np.abs(solution.state.x).max(initial=0.0)
+    return float(solution.problem.comm.allreduce(here, op=MPI.MAX))
+
+
+@pytest.mark.parallel
+@pytest.mark.usefixtures("small_is_large")
+@pytest.mark.parametrize(
+    ("solver", "start", "iterations"),
+    [({}, "the solution on a coarser mesh", 5), ({"nested": False}, "zero slip", 6)],
+    ids=["nested", "cold"],
+)
+def test_a_block_costs_few_set_ups_and_iterations(
+    solver: dict[str, bool], start: str, iterations: int
+) -> None:
+    """A nested start is the program's own choice; coarse levels are not made in every step."""
+    solution = solve(block(8, **solver))
+    counters = solution.counters
+    assert solution.converged
+    assert solution.start == start
+    assert largest(solution) == pytest.approx(LARGEST, rel=1e-7)
+    assert counters.linear_solves <= 9
+    assert counters.factorizations <= 2
+    assert counters.linear_iterations <= iterations * counters.linear_solves
