@@ -106,7 +106,7 @@ def test_a_circular_punch_sinks_by_its_force():
     assert 2 * stiffness[1] - stiffness[0] == pytest.approx(1.0, rel=5e-3)
 
 
-def rotation(n: float, extent: float = 6.0) -> float:
+def rotation(n: float, extent: float = 10.0) -> float:
     """Return the rotation of a circular punch in space over (4/3) E* a^3 theta = M."""
     sizes = {"size": extent / 3, "contact_size": 0.4 / n, "edge_size": 0.1 / n, "growth": 0.8 / n}
     changes = [f"mesh.{key}={value}" for key, value in sizes.items()]
@@ -127,9 +127,8 @@ def rotation(n: float, extent: float = 6.0) -> float:
 
 
 def test_a_moment_tilts_a_circular_punch_in_space():
-    """The edge leaves an error of order 1.5 (measured on three meshes), the box one of (a/L)^3."""
+    """The edge leaves an error of order 1 or more: four meshes stand in docs/indentation.md."""
     pytest.importorskip("gmsh")
-    coarse, fine, large = rotation(1), rotation(2), rotation(1, 12.0)
-    limit = fine + (fine - coarse) / (2**1.5 - 1) + (large - coarse) / (1 - 0.5**3)
-    assert limit == pytest.approx(1.0, abs=5e-3)
-    assert abs(fine - 1) > 0.02
+    coarse, fine = (1 - rotation(n) for n in (1, 2))
+    assert 0 < fine < 0.03
+    assert coarse / fine > 1.8
