@@ -112,7 +112,7 @@ def rotation(n: float, extent: float = 10.0) -> float:
     changes = [f"mesh.{key}={value}" for key, value in sizes.items()]
     changes.append(f"mesh.extent={extent}")
     problem = build_problem(load_case(CASES / "indent-punch-tilted.toml", changes))
-    method = Newton(problem, NewtonOptions(tolerance=1e-9))
+    method = Newton(problem, NewtonOptions(tolerance=1e-11, linear="lu"))
     state, outcome = method.solve()
     assert outcome.converged
     weight, x = problem.nodes.weight, problem.nodes.points[:, 0]
