@@ -171,9 +171,25 @@ _STEPS: dict[str, Item] = {
     "charge_PART": Item("charge", "Likewise; `charge_foundation` through the contact part."),
 }
 
+_AGAINST: dict[str, Item] = {
+    "on": Item("", "Part of the node: one that is `against` in a contact."),
+    "x": _NODE["x"],
+    "y": _NODE["y"],
+    "z": _NODE["z"],
+    "weight": _NODE["weight"],
+    "pressure": Item("stress", "Forces of the contact on the node, over its area: the pressure."),
+    "traction_x": Item("stress", "Of all of the force: what the body with `on` exerts here."),
+    "traction_y": Item("stress", "The same."),
+    "traction_z": Item("stress", "The same; in space."),
+    "u_x": Item("length", "Displacement of the node."),
+    "u_y": Item("length", "The same."),
+    "u_z": Item("length", "The same; in space."),
+}
+
 #: Tables by the name of their file.
 TABLES: Mapping[str, Mapping[str, Item]] = {
     "contact.csv": _NODE,
+    "contact-against.csv": _AGAINST,
     "history.csv": _HISTORY,
     "steps.csv": _STEPS,
 }
@@ -206,4 +222,14 @@ SURFACE: Mapping[str, Item] = {
     "row": Item("", "Row of the node in `contact.csv`, from 0; -1 for none."),
     "entry": Item("", "Number of its `[[contact]]`, from 0."),
     "rigid": Item("", "1 in front of a rigid foundation, 0 in front of another body."),
+}
+
+#: Fields of contact-against.vtu.
+OPPOSITE: Mapping[str, Item] = {
+    "displacement": SURFACE["displacement"],
+    "pressure": Item("stress", "As in `contact-against.csv`."),
+    "traction": Item("stress", "The same, a vector."),
+    "normal": Item("", "Out of the body."),
+    "weight": Item("area", "As in `contact-against.csv`."),
+    "entry": SURFACE["entry"],
 }

@@ -11,12 +11,13 @@ from mpi4py import MPI
 
 from contact.output.field_files import write_fields, write_share
 from contact.output.folder import ResultFolder, on_root, result_folder
+from contact.output.opposite import AGAINST, opposite_surface, opposite_table
 from contact.output.solution import Solution
 from contact.output.steps import write_steps
 from contact.output.summary import summarise
 from contact.output.surface import contact_surface
 from contact.output.table import contact_table
-from contact.output.tables import write_tables
+from contact.output.tables import write_table, write_tables
 
 
 def write_outputs(
@@ -59,6 +60,7 @@ def _replace(solution: Solution, folder: ResultFolder, figures: bool) -> None:
     def write(new: Path) -> Mapping[str, Any]:
         table = contact_table(solution)
         surface = contact_surface(solution, table)
+        opposite = opposite_surface(solution)
 
         def write_contact() -> None:
             assert table is not None
@@ -67,6 +69,9 @@ def _replace(solution: Solution, folder: ResultFolder, figures: bool) -> None:
             if solution.steps:
                 write_steps(solution.steps, new)
             write_share(MPI.COMM_SELF, surface, new / "contact.vtu")
+            if opposite is not None:
+                write_table(opposite_table(solution.problem, opposite), new / f"{AGAINST}.csv")
+                write_share(MPI.COMM_SELF, opposite, new / f"{AGAINST}.vtu")
 
         on_root(comm, write_contact)
         if solution.output.fields != "none":

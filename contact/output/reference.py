@@ -9,7 +9,7 @@ import textwrap
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 
-from contact.output.described import BODY, SUMMARY, SURFACE, TABLES, Item
+from contact.output.described import BODY, OPPOSITE, SUMMARY, SURFACE, TABLES, Item
 
 PAGE = Path(__file__).parents[2] / "docs" / "output.md"
 
@@ -29,6 +29,7 @@ INTRODUCTION = """\
 | `contact-steps.csv` | likewise: `contact.csv` of all steps, with a first column `t` |
 | `fields.vtu` | all fields of the body, for ParaView, pyvista and meshio |
 | `contact.vtu` | the contact part alone, a surface (in the plane a line) |
+| `contact-against.csv`, `.vtu` | between bodies: the other side, with what acts there |
 | `fields.pvd` | of an evolution: its steps, for ParaView and pyvista |
 | `fields.bp`, `cells.bp` | instead of `fields.vtu`, with `output.fields = "vtx"`: needs ADIOS2 |
 | `fields.xdmf`, `fields.h5` | likewise with `output.fields = "xdmf"`: degree 1 at most |
@@ -102,6 +103,10 @@ def page() -> str:
         "At the nodes; `nan` where a node is held and hence no contact node.",
         "",
         *_rows(SURFACE, "field"),
+        "",
+        "## contact-against.vtu",
+        "",
+        *_rows(OPPOSITE, "field"),
     ]
     return "\n".join(lines) + "\n"
 

@@ -33,10 +33,14 @@ def write_tables(solution: Solution, table: Table, folder: Path) -> None:
     folder
         Where to.
     """
-    columns = csv_columns(table)
-    rows = zip(*(column.tolist() for column in columns.values()), strict=True)
-    write_csv(folder / "contact.csv", columns, rows)
+    write_table(csv_columns(table), folder / "contact.csv")
     write_csv(folder / "history.csv", HISTORY, _history(solution))
+
+
+def write_table(columns: Table, path: Path) -> None:
+    """Write columns. On one rank."""
+    rows = zip(*(column.tolist() for column in columns.values()), strict=True)
+    write_csv(path, columns, rows)
 
 
 def _history(solution: Solution) -> Iterable[tuple[Any, ...]]:

@@ -8,11 +8,10 @@ from typing import Any
 import matplotlib
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
+from scipy.spatial import cKDTree
 
-from contact.output.surface import STATUS
 from contact.output.table import Table, by_contact
 from contact.output.units import Units
 from contact.output.vtu import VTU
@@ -82,6 +81,7 @@ def draw_line(
     held: Array | None = None,
     axes: str = "xy",
     units: Units = UNNAMED,
+    opposite: VTU | None = None,
 ) -> Figure:
     """Draw pressure, tangential stress and friction bound along Gamma_3 in the plane.
 
@@ -97,6 +97,8 @@ def draw_line(
         Names of the coordinates.
     units
         Names of the units.
+    opposite
+        The other sides of contacts between bodies.
     """
     parts = by_contact(table)
     frictional = bool(np.any(table["bound"] > 0))
@@ -107,6 +109,8 @@ def draw_line(
     grid = figure.subplots(*size, sharex="col", sharey="row", squeeze=False)
     for rows, part in zip(grid.T, parts, strict=True):
         _draw_rows(rows, part, held, axes, units)
+        if opposite is not None:
+            _draw_opposite(rows[0], part, opposite)
     for ax in grid[:, 1:].ravel():
         ax.set_ylabel("")
     if len(parts) == 1:
@@ -161,6 +165,23 @@ def _draw_rows(rows: Any, table: Table, held: Array | None, axes: str, units: Un
         _focus(rows[1], bound, -1.0)
 
 
+def _draw_opposite(ax: Axes, table: Table, opposite: VTU) -> None:
+    """Draw the pressure on the other side where its nodes are opposite of those of a contact."""
+    own = np.asarray(opposite.at_points["entry"]) == table["entry"][0]
+    if not own.any():
+        return
+    points = np.column_stack([table["x"], table["y"]])
+    where, _ = position(table)
+    places = opposite.grid.points[own][:, :2]
+    near = cKDTree(points).query(places)[1]
+    # Along the side of the contact nodes, from the nearest of them.
+    along = np.gradient(points, axis=0) / np.gradient(where)[:, None]
+    there = where[near] + np.einsum("ni,ni->n", places - points[near], along[near])
+    order = np.argsort(there)
+    pressure = np.asarray(opposite.at_points["pressure"])[own][order]
+    ax.plot(there[order], pressure, ":", color=GREY, lw=1.0, label="pressure on the other side")
+
+
 def _margins(table: Table, held: Array | None) -> tuple[float, float]:
     """Return how far Gamma_3 goes on beyond its contact nodes, at either end of the axis."""
     if held is None:
@@ -182,107 +203,3 @@ def _focus(ax: Axes, values: Array, low: float) -> None:
     if top < largest:
         text = f"peak {largest:.3g}, cut off"
         ax.annotate(text, (0.99, 0.97), xycoords="axes fraction", ha="right", va="top", fontsize=7)
-
-
-def draw_surface(surface: VTU, title: str = "", units: Units = UNNAMED) -> Figure:
-    """Draw pressure, status and friction arrows on Gamma_3 in space, facet by facet."""
-    view, names = _view(surface)
-    flat = surface.grid.points @ view.T
-    triangles = _triangles(surface)
-    pressure = np.asarray(surface.at_points["pressure"])
-    width = float(matplotlib.rcParams["figure.figsize"][0])
-    figure = Figure(figsize=(width, 0.6 * width))
-    # Placed by hand: the automatic layouts leave no room below axes of equal scale.
-    figure.set_layout_engine("none")
-    left, right = (figure.add_axes((x, 0.34, 0.38, 0.5)) for x in (0.1, 0.6))
-    for ax in (left, right):
-        ax.add_collection(PolyCollection(list(flat[triangles]), facecolor="#F2F2F2", lw=0))
-    known = np.isfinite(pressure[triangles]).all(axis=1)
-    drawn = triangles[known] if known.any() else triangles
-    shown = left.tripcolor(
-        *flat.T, drawn, np.nan_to_num(pressure), shading="gouraud", cmap="viridis"
-    )
-    bar = figure.add_axes((0.1, 0.15, 0.38, 0.03))
-    figure.colorbar(
-        shown, cax=bar, orientation="horizontal", label=units.label(r"$-\sigma_\nu$", "stress")
-    )
-    status = np.asarray(surface.at_points["status"])
-    size = float(np.clip(2e3 / len(flat), 0.5, 12))
-    for zone, colour in (("open", "#DDDDDD"), ("stick", BLUE), ("slip", ORANGE)):
-        chosen = status == STATUS[zone]
-        if np.any(chosen):
-            right.scatter(*flat[chosen].T, color=colour, s=size, lw=0, label=ZONES[zone][1])
-    _arrows(right, surface, flat, view)
-    figure.legend(ncols=3, handletextpad=0.2, loc="center", bbox_to_anchor=(0.79, 0.165))
-    for ax, name in ((left, "contact pressure"), (right, "status, friction (arrows)")):
-        ax.set_aspect("equal")
-        ax.margins(0.04)
-        _zoom(ax, surface, flat)
-        ax.set_title(name, fontsize="medium")
-        ax.set_xlabel(units.label(f"${names[0]}$", "length"))
-    left.set_ylabel(units.label(f"${names[1]}$", "length"))
-    if title:
-        figure.suptitle(title, fontsize="large")
-    return figure
-
-
-def _triangles(surface: VTU) -> Any:
-    """Return the facets as triangles of nodes, those of degree 2 as four each."""
-    cells = surface.grid.cells
-    if cells.shape[1] == 3:
-        return cells
-    quarters = [[0, 5, 4], [5, 1, 3], [4, 3, 2], [3, 4, 5]]
-    return np.concatenate([cells[:, corners] for corners in quarters])
-
-
-def _arrows(ax: Axes, surface: VTU, flat: Array, view: Array) -> None:
-    """Draw the friction stress, its largest arrow a tenth of the contact part, within the axes."""
-    traction, normal = (np.asarray(surface.at_points[name]) for name in ("traction", "normal"))
-    along = traction - np.einsum("ni,ni->n", traction, normal)[:, None] * normal
-    friction = np.nan_to_num(along @ view.T)
-    size = np.linalg.norm(friction, axis=1)
-    acting = np.flatnonzero(size > 1e-6 * size.max(initial=0.0))
-    if not acting.size:
-        return
-    chosen = acting[_thinned(flat[acting], 16)]
-    scale = size[chosen].max() / (0.1 * np.ptp(flat, axis=0).max())
-    ends = flat[chosen] + friction[chosen] / scale
-    exact = {"angles": "xy", "scale_units": "xy", "scale": scale}
-    ax.quiver(*flat[chosen].T, *friction[chosen].T, color="black", width=0.004, **exact)
-    ax.update_datalim(ends)
-
-
-def _view(surface: VTU) -> tuple[Array, tuple[str, str]]:
-    """Return two directions across the mean contact direction, shape (2, 3), and their names.
-
-    These are axes where it lies along the third, else directions x_1, x_2.
-    """
-    normal = np.asarray(surface.at_points["normal"])
-    touching = np.asarray(surface.at_points["status"]) > STATUS["open"]
-    mean = np.nanmean(normal[touching if touching.any() else slice(None)], axis=0)
-    mean = mean / np.linalg.norm(mean)
-    thin = int(np.argmax(np.abs(mean)))
-    kept = [k for k in range(3) if k != thin]
-    if abs(mean[thin]) > 0.98:
-        return np.eye(3)[kept], ("xyz"[kept[0]], "xyz"[kept[1]])
-    first = np.cross(np.eye(3)[kept[0]], mean)
-    first /= np.linalg.norm(first)
-    return np.array([first, np.cross(mean, first)]), ("x_1", "x_2")
-
-
-def _zoom(ax: Axes, surface: VTU, flat: Array) -> None:
-    """Show what touches and as much around it, where that is a small piece of the whole."""
-    touching = flat[np.asarray(surface.at_points["status"]) > STATUS["open"]]
-    whole = np.ptp(flat, axis=0).max()
-    if len(touching) and (size := np.ptp(touching, axis=0).max()) < 0.3 * whole:
-        low, high = touching.min(axis=0), touching.max(axis=0)
-        margin = max(0.4 * size, 0.02 * whole)
-        ax.set_xlim(low[0] - margin, high[0] + margin)
-        ax.set_ylim(low[1] - margin, high[1] + margin)
-
-
-def _thinned(flat: Array, count: int) -> Array:
-    """Return the first point of each cell of a grid of count x count cells."""
-    span = np.ptp(flat, axis=0).max() or 1.0
-    cells = np.floor((flat - flat.min(axis=0)) / span * count)
-    return np.unique(cells, axis=0, return_index=True)[1]

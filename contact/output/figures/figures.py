@@ -13,10 +13,12 @@ import matplotlib
 from matplotlib.figure import Figure
 
 from contact.output.figures.body import draw_plane
-from contact.output.figures.contact import NARROW, UNNAMED, draw_line, draw_surface
+from contact.output.figures.contact import NARROW, UNNAMED, draw_line
+from contact.output.figures.facets import draw_surface
 from contact.output.figures.picture import Picture, picture
 from contact.output.figures.space import draw_space
 from contact.output.figures.steps import Course
+from contact.output.opposite import opposite_surface
 from contact.output.solved import Solved
 from contact.output.surface import contact_surface
 from contact.output.table import Table, contact_table, held_points
@@ -64,8 +66,8 @@ class Drawing:
         Whether the body is plane.
     table, held
         The contact nodes, and the other nodes of Gamma_3.
-    surface
-        Gamma_3 with its fields; drawn in space.
+    surface, opposite
+        Gamma_3 with its fields, drawn in space, and the other sides of contacts between bodies.
     pictures
         Names of the figures of the deformed body, and what they show.
     axes
@@ -88,6 +90,7 @@ class Drawing:
     mirror: bool = False
     units: Units = UNNAMED
     course: Course | None = None
+    opposite: VTU | None = None
 
     @property
     def mirrored(self) -> bool:
@@ -138,9 +141,11 @@ class Drawing:
             figures: dict[str, Figure | None] = {}
             if contact:
                 figures["contact"] = (
-                    draw_line(self.table, self.title, self.held, self.axes, self.units)
+                    draw_line(
+                        self.table, self.title, self.held, self.axes, self.units, self.opposite
+                    )
                     if self.plane
-                    else draw_surface(self.surface, self.title, self.units)
+                    else draw_surface(self.surface, self.title, self.units, self.opposite)
                 )
             if contact and self.course is not None:
                 figures |= self.course.draw(self.plane, self.title, self.axes, self.units)
@@ -189,7 +194,7 @@ def collect(solution: Solved, fields: Sequence[str] = ()) -> Drawing | None:
         Fields to colour the body by; by default the von Mises stress and the potential.
     """
     table, held = contact_table(solution), held_points(solution.problem)
-    surface = contact_surface(solution, table)
+    surface, opposite = contact_surface(solution, table), opposite_surface(solution)
     pictures: list[tuple[str, Picture]] = []
     usual = [f for _, f, *_ in DEFORMED if f != "potential" or solution.problem.piezoelectric]
     for field in fields or usual:
@@ -206,7 +211,7 @@ def collect(solution: Solved, fields: Sequence[str] = ()) -> Drawing | None:
         tables = [record.table for record in solution.steps if record.table is not None]
         course = Course([record.row for record in solution.steps], tables)
     return Drawing(
-        title, plane, table, held, surface, pictures, axes, mirror, solution.units, course
+        title, plane, table, held, surface, pictures, axes, mirror, solution.units, course, opposite
     )
 
 

@@ -19,6 +19,7 @@ from contact.output.figures.figures import DEFORMED, Drawing, axes_of, heading, 
 from contact.output.figures.picture import drawn
 from contact.output.figures.steps import Course
 from contact.output.folder import refused, result_folder
+from contact.output.opposite import AGAINST
 from contact.output.table import Table
 from contact.output.units import Units
 from contact.output.vtu import VTU, read_vtu
@@ -57,13 +58,18 @@ def read_drawing(folder: Path, fields: Sequence[str] = (), mirror: bool = False)
     for field in fields or usual:
         name, label = named(field, units)
         pictures.append((name, drawn(body, held, field, label)))
+    opposite = None
+    if f"{AGAINST}.vtu" in summary.get("files", ()):
+        opposite = read(folder, f"{AGAINST}.vtu", read_vtu)
     title, axes = heading(summary["title"]), axes_of(summary.get("kinematics") == "axisymmetric")
     course = None
     if "steps.csv" in summary.get("files", ()):
         course = Course(
             read(folder, "steps.csv", _rows), read(folder, "contact-steps.csv", _tables)
         )
-    return Drawing(title, d == 2, table, held, surface, pictures, axes, mirror, units, course)
+    return Drawing(
+        title, d == 2, table, held, surface, pictures, axes, mirror, units, course, opposite
+    )
 
 
 def plot(
