@@ -26,6 +26,7 @@ from meshes.pairs import (
     cylinder_on_block,
     two_balls,
     two_blocks,
+    two_boxes,
     two_half_cylinders,
     two_spheres,
 )
@@ -47,6 +48,7 @@ RECIPES: Mapping[str, Callable[..., None]] = {
         half_space,
         half_cylinder,
         two_blocks,
+        two_boxes,
         cylinder_on_block,
         two_half_cylinders,
         two_balls,

@@ -43,6 +43,42 @@ def two_blocks(
     finish(gmsh, 2, bodies, parts)
 
 
+def two_boxes(
+    *,
+    lower_width: float = 2.0,
+    lower_height: float = 1.0,
+    upper_width: float = 1.0,
+    upper_height: float = 1.0,
+    lower_size: float = 0.35,
+    upper_size: float = 0.25,
+) -> None:
+    """Box on the middle of another one, in space, both with square bases; z = 0 is between them.
+
+    Regions: ``upper``, ``lower``. Parts: ``upper_bottom`` on ``lower_top``; of both, as
+    ``upper_top``, ``lower_bottom``, the other sides: ``left``, ``right`` (x), ``front``, ``back``
+    (y), ``bottom``, ``top``.
+    """
+    import gmsh
+
+    from meshes.grading import check_cells, finish
+
+    model, bodies = gmsh.model, {}
+    parts: dict[str, list[int]] = {}
+    for name, width, low, height, size in (
+        ("lower", lower_width, -lower_height, lower_height, lower_size),
+        ("upper", upper_width, 0.0, upper_height, upper_size),
+    ):
+        check_cells(2 * math.log10(width / size) + math.log10(height / size))
+        body = model.occ.addBox(-width / 2, -width / 2, low, width, width, height)
+        model.occ.synchronize()
+        model.mesh.setSize(model.getBoundary([(3, body)], recursive=True), size)
+        bodies[name] = [body]
+        sides = ("left", "right", "front", "back", "bottom", "top")
+        faces = model.getBoundary([(3, body)], oriented=False)
+        parts |= {f"{name}_{side}": [face] for side, (_, face) in zip(sides, faces, strict=True)}
+    finish(gmsh, 3, bodies, parts)
+
+
 def cylinder_on_block(
     *,
     radius: float = 50.0,

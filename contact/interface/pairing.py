@@ -15,6 +15,7 @@ from contact.interface.mortar.integration import NOTHING
 from contact.interface.mortar.surface import Surface, surface_of
 from contact.interface.nodes import ContactNodes
 from contact.interface.obstacle import Obstacle
+from contact.mesh.pieces import connected_pieces
 from contact.typing import Array
 
 #: Share of the mesh's extent up to which facets are taken to face each other.
@@ -100,7 +101,7 @@ def find_pair(
     points = space.tabulate_dof_coordinates()[local, :d]
     gap, cut = coupling.gap[here], 0.0
     if not press:
-        gap, cut = _apart(gap, slave, comm, f"{key}.against: {names}", domain.size)
+        gap, cut = _apart(gap, slave, body, coupling, f"{key}.against: {names}")
     _, added = distance.measure(points, coupling.normal[here])
     moves = free[local, :d]
     admissible = coupling.normal[here] * moves
@@ -148,18 +149,35 @@ def _stuck(
 
 
 def _apart(
-    gap: Array, slave: Surface, comm: MPI.Intracomm, what: str, size: float
+    gap: Array, slave: Surface, body: BodyEquilibrium, coupling: Coupling, what: str
 ) -> tuple[Array, float]:
     """Refuse bodies that overlap; return gaps >= 0, and the largest depth taken for 0. Collective.
 
     Facets are chords of what is curved: those of two sides that lie on each other cut each other
     by h^2/8 times the difference of the curvatures.
     """
+    comm = body.comm
     longest = comm.allreduce(2 * float(slave.radii.max(initial=0.0)), op=MPI.MAX)
     cut = comm.allreduce(float(np.max(-gap, initial=0.0)), op=MPI.MAX)
-    if cut > CHORDS * longest:
+    if cut <= CHORDS * longest:
+        return np.maximum(gap, 0.0), cut if cut > 1e-5 * body.domain.size else 0.0
+    if _connected(body, coupling):
         raise InputError(
-            f"{what}: the bodies overlap at rest, by up to {cut:.3g}; accepted: meshes that are "
-            "apart or touch, but for what straight facets take off a curve"
+            f"{what} are sides of one body that look away from each other; accepted: parts of two "
+            "bodies whose meshes are apart"
         )
-    return np.maximum(gap, 0.0), cut if cut > 1e-5 * size else 0.0
+    raise InputError(
+        f"{what}: the bodies overlap at rest, by up to {cut:.3g}; accepted: meshes that are "
+        "apart or touch, but for what straight facets take off a curve"
+    )
+
+
+def _connected(body: BodyEquilibrium, coupling: Coupling) -> bool:
+    """Tell whether both sides are on the same piece of the mesh. Collective."""
+    piece, count = connected_pieces(body.space)
+    begin, end = body.layout.index_map.local_range
+    found = np.zeros((2, count), dtype=np.intc)
+    for k, nodes in enumerate((coupling.slaves, coupling.masters)):
+        found[k, piece[nodes[(nodes >= begin) & (nodes < end)] - begin]] = 1
+    body.comm.Allreduce(MPI.IN_PLACE, found, op=MPI.MAX)
+    return bool(found.all(axis=0).any())

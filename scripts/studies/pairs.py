@@ -8,6 +8,7 @@ a seed that is the number of the pair: any line can be had again.
 
 from __future__ import annotations
 
+import logging
 import sys
 from collections.abc import Mapping
 from typing import Any
@@ -78,6 +79,8 @@ def main(arguments: list[str]) -> None:
     """Solve pairs, and say which fail."""
     count = int(arguments[0]) if arguments else 100
     compared = int(arguments[1]) if len(arguments) > 1 else 30
+    # What each is worth is told by `contact solve`.
+    logging.getLogger("contact").setLevel(logging.ERROR)
     failed = 0
     for seed in range(count):
         good, words = converges(random_case(seed), seed < compared)

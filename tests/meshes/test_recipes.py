@@ -101,6 +101,14 @@ RECIPES = {
             "block_right": 200.0,
         },
     ),
+    "two_boxes": (
+        5.0,
+        {
+            **{f"lower_{side}": 4.0 for side in ("bottom", "top")},
+            **{f"lower_{side}": 2.0 for side in ("left", "right", "front", "back")},
+            **{f"upper_{s}": 1.0 for s in ("bottom", "top", "left", "right", "front", "back")},
+        },
+    ),
     "two_half_cylinders": (
         np.pi * 100,
         {"upper_arc": np.pi * 10, "lower_arc": np.pi * 10, "upper_cut": 20.0, "lower_cut": 20.0},

@@ -139,6 +139,10 @@ def case(**more):
             r"contact\.against: the parts 'upper_bottom' and 'upper_left' share nodes",
         ),
         (
+            {"contact": {"on": "upper_bottom", "against": "upper_top"}},
+            "'upper_bottom' and 'upper_top' are sides of one body that look away from each other",
+        ),
+        (
             {"contact": {"on": "upper_bottom", "against": "lower_tip"}},
             r'contact\.against: given "lower_tip"; accepted: a part of the mesh',
         ),

@@ -1,0 +1,75 @@
+"""Two boxes on each other in space beside one box of the same size: iterations and time.
+
+``python3 -m scripts.benchmarks.pair_space [SIZE]``: SIZE is that of the elements, 0.06 for some
+50 000 unknowns, 0.028 for 500 000. Both are pressed and pushed, with friction below, and solved by
+Newton's method with multigrid, one after the other; seconds are those of the processor.
+"""
+
+from __future__ import annotations
+
+import sys
+import time
+from typing import Any
+
+import petsc4py
+
+petsc4py.init(sys.argv)
+
+from contact import build_problem, parse_case, solve_problem  # noqa: E402
+
+FRICTION = {"law": "coulomb", "mu": 0.3}
+TRACTION = [0.001, 0.0, -0.01]
+
+
+def one(size: float) -> dict[str, Any]:
+    """Return a box of 1 x 1 x 2 on a rigid foundation."""
+    mesh = {"generator": "block", "height": 2.0, "size": size, "contact_size": size}
+    foundation = {"shape": "plane", "point": [0, 0, 0], "normal": [0, 0, 1]}
+    return {
+        "mesh": mesh,
+        "material": {"young": 1.0, "poisson": 0.3},
+        "fixed": [{"on": "top", "displacement": ["free", 0.0, "free"]}],
+        "load": [{"on": "top", "traction": TRACTION}],
+        "contact": {"on": "bottom", "foundation": foundation},
+        "friction": FRICTION,
+    }
+
+
+def two(size: float) -> dict[str, Any]:
+    """Return two boxes of 1 x 1 x 1 whose meshes do not match, the lower one stiffer."""
+    sizes = {"lower_width": 1.0, "lower_size": 1.03 * size, "upper_size": 0.97 * size}
+    return {
+        "mesh": {"generator": "two_boxes", **sizes},
+        "material": [
+            {"on": name, "young": young, "poisson": 0.3}
+            for name, young in (("upper", 1.0), ("lower", 3.0))
+        ],
+        "fixed": [
+            {"on": "upper_top", "displacement": ["free", 0.0, "free"]},
+            {"on": "lower_bottom", "displacement": [0.0, 0.0, 0.0]},
+        ],
+        "load": [{"on": "upper_top", "traction": TRACTION}],
+        "contact": {"on": "upper_bottom", "against": "lower_top"},
+        "friction": FRICTION,
+    }
+
+
+def main(arguments: list[str]) -> None:
+    """Solve both, and print what they took."""
+    size = float(arguments[0]) if arguments else 0.06
+    for name, given in (("one", one(size)), ("two", two(size))):
+        case = parse_case(given)
+        problem = build_problem(case)
+        begin = time.process_time()
+        solution = solve_problem(problem, case.solver)
+        seconds, counters = time.process_time() - begin, solution.counters
+        print(
+            f"{name}: {problem.equilibrium.layout.free.size} unknowns, converged "
+            f"{solution.converged}, {counters.linear_solves} solves, "
+            f"{counters.linear_iterations} iterations, {seconds:.3g} s",
+            flush=True,
+        )
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:])
