@@ -26,16 +26,15 @@ from contact.body.description import Body
 from contact.body.known import LastAnswer
 from contact.body.loads import Loads, assembled
 from contact.body.masters import make_masters
-from contact.body.materials import cells_of, pieces
+from contact.body.materials import cells_of
 from contact.body.operators import WholeOperator, make_operator
 from contact.body.supports import free_components, supports_of, without_field
+from contact.body.weak_forms import WeakForms
 from contact.linear.change import Change
 from contact.linear.layout import Layout
 from contact.linear.operator import Counters
 from contact.mesh.domain import Domain
 from contact.typing import Array
-from forms.hencky import secant_form
-from forms.piezo import symmetrised_form
 
 
 class BodyEquilibrium:
@@ -83,11 +82,12 @@ class BodyEquilibrium:
             float(body.law.young),
             domain.revolved,
         )
-        # Where the forms are evaluated; written anew by each query.
-        self._at = fem.Function(self.space)
-        self._secant_at = fem.Function(self.space)
+        # Where the forms are evaluated is written anew by each query.
+        self._forms = WeakForms(domain, body, self.space, self.cells, degree)
+        self._at = self._forms.at
         self._last_forces = LastAnswer(domain.comm)
-        self._compile()
+        test = self._forms.split(ufl.TestFunction(self.space))
+        self._loads = Loads(domain, body, *test, self.owned)
 
     @property
     def comm(self) -> MPI.Intracomm:
@@ -119,8 +119,7 @@ class BodyEquilibrium:
 
     def split(self, x: Any) -> tuple[Expr, Expr | None]:
         """Split a function or argument into displacement and scaled-back potential."""
-        u = ufl.as_vector([x[i] for i in range(self.dim)])
-        return u, (self.phi_scale * x[self.dim] if self.piezoelectric else None)
+        return self._forms.split(x)
 
     def function(self, x: Array, name: str = "x") -> fem.Function:
         """Return local unknowns as a function in `space`."""
@@ -148,33 +147,6 @@ class BodyEquilibrium:
 
     def take_apart(self, matrix: PETSc.Mat) -> None:
         """Do nothing: what touches each other is no matter of the bodies."""
-
-    def _compile(self) -> None:
-        body = self.body
-        trial, test = ufl.TrialFunction(self.space), ufl.TestFunction(self.space)
-        kinematics = self.domain.kinematics
-        degree = 1 if self.degree == 1 else (2 if self.linear else 4)
-        degree += kinematics.added_degree
-        materials = list(pieces(self.domain, body.materials, self.cells, degree))
-        v, xi = self.split(test)
-
-        def internal(secant_at: Any, x: Any) -> ufl.Form:
-            u, phi = self.split(x)
-            u_0, _ = self.split(secant_at)
-            return sum(
-                secant_form(law, u_0, u, v, kinematics) * dx
-                if piezo is None
-                else symmetrised_form(law, piezo, u_0, u, phi, v, xi, kinematics) * dx
-                for law, piezo, dx in materials
-            )
-
-        self._internal = fem.form(internal(self._secant_at, self._at))
-        self._forms = {"secant": fem.form(internal(self._secant_at, trial))}
-        self._forms["tangent"] = self._forms["secant"]
-        if not self.linear:
-            derivative = ufl.derivative(internal(self._at, self._at), self._at, trial)
-            self._forms["tangent"] = fem.form(derivative)
-        self._loads = Loads(self.domain, body, v, xi, self.owned)
 
     def rest(self) -> Array:
         """Return the unknowns of the body at rest, without prescribed values."""
@@ -213,13 +185,16 @@ class BodyEquilibrium:
         secant_at
             Where the secant modulus is taken; at `x` by default: the material law itself.
         """
-        at = self.nodal(x).ravel()
-        about = at if secant_at is None or self.linear else self.nodal(secant_at).ravel()
-        return self._last_forces((at, about), lambda: self._forces(at, about))
+        given = [x] if secant_at is None or self.linear else [x, secant_at]
+        asked = tuple(self.nodal(values).ravel() for values in given)
+        return self._last_forces(asked, lambda: self._forces(*asked))
 
-    def _forces(self, at: Array, about: Array) -> Array:
-        self._at.x.array[:], self._secant_at.x.array[:] = at, about
-        return np.concatenate([assembled(self._internal, self.owned), np.zeros(self.masters.size)])
+    def _forces(self, at: Array, about: Array | None = None) -> Array:
+        self._at.x.array[:] = at
+        if about is not None:
+            self._forms.secant_at.x.array[:] = about
+        form = self._forms.law_forces if about is None else self._forms.secant_forces
+        return np.concatenate([assembled(form, self.owned), np.zeros(self.masters.size)])
 
     def external(self, time: float = 1.0) -> Array:
         """Return the owned nodal loads at a time. Collective."""
@@ -242,13 +217,15 @@ class BodyEquilibrium:
 
     def create_matrix(self) -> PETSc.Mat:
         """Return an empty matrix with the pattern of the body. Collective."""
-        return create_matrix(self._forms["secant"])
+        return create_matrix(self._forms.secant)
 
     def assemble(self, matrix: PETSc.Mat, kind: str, x: Array) -> None:
         """Assemble Kacanov's "secant" or Newton's "tangent" at local unknowns. Collective."""
-        self._at.x.array[:] = self._secant_at.x.array[:] = self.nodal(x).ravel()
+        forms = self._forms
+        forms.at.x.array[:] = forms.secant_at.x.array[:] = self.nodal(x).ravel()
+        form = forms.tangent if kind == "tangent" else forms.secant
         matrix.zeroEntries()
-        assemble_matrix(matrix, self._forms[kind], bcs=[s.condition for s in self.supports])
+        assemble_matrix(matrix, form, bcs=[s.condition for s in self.supports])
         matrix.assemble()
 
     def operator(
