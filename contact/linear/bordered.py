@@ -2,8 +2,9 @@
 
 With u = u^ + R q the unknowns u^ at contact nodes are distances to what moves, the same nodal
 blocks act on them as if nothing moved, and the matrix is [[K, K R], [R^T K, R^T K R]] with blocks
-in its first corner alone. It is solved by one solve a column of R beside that of the right-hand
-side, all with one factorisation or one multigrid hierarchy.
+in its first corner alone. Either way it takes one solve: a factorisation solves for the columns of
+K R together with the right-hand side; for an iterative solver q is eliminated, which takes a matrix
+of rank m from K and leaves its preconditioner as it is.
 
 Right-hand sides and solutions have the values of q, the same on all ranks, behind the owned ones;
 they belong to u and q, not to u^.
@@ -23,12 +24,9 @@ from contact.linear.layout import Layout
 from contact.linear.operator import Bulk, Counters, SparseOperator
 from contact.typing import Array
 
-#: Share of the stiffness against q that is taken for none: rounding, and what iterative solvers
-#: leave. Where nothing holds it, q is left where it is.
-NOTHING = {False: 1e-13, True: 1e-9}
-
-#: Relative tolerance of the columns' solves.
-TOLERANCE = 1e-12
+#: Share of the stiffness against q that is taken for none: rounding. Where nothing holds it, q is
+#: left where it is.
+NOTHING = 1e-13
 
 
 class BorderedBulk:
@@ -114,8 +112,10 @@ class BorderedOperator:
     ) -> None:
         self._bulk = bulk
         self._inner = SparseOperator(bulk, nodes, symmetric=symmetric, counters=counters, kind=kind)
+        self._nodes, self._behind = nodes, False
         self._owned, self._free = bulk.layout.free.size, np.flatnonzero(bulk.free)
         self._responses = np.zeros((self._owned, self._free.size))
+        self._inverse = np.zeros((self._free.size, self._free.size))
 
     @property
     def symmetric(self) -> bool:
@@ -126,36 +126,77 @@ class BorderedOperator:
         """Assemble and factorise; see `SparseOperator.update`. Collective."""
         if not self._inner.update(kind, x, blocks, constant=constant):
             return False
-        free, bulk = self._free, self._bulk
-        # Copies: an iterative solver takes the last ones for where it begins.
-        for k in range(free.size):
-            column = bulk.columns[:, free[k]]
-            guess = self._responses[:, k].copy()
-            self._responses[:, k] = self._inner.solve(column, TOLERANCE, guess)
-        coupling = bulk.columns[:, free].T @ self._responses
-        corner = bulk.corner[np.ix_(free, free)]
-        stiffness = corner - bulk.layout.comm.allreduce(coupling, op=MPI.SUM)
-        left, size, right = np.linalg.svd(stiffness)
-        resists = size > NOTHING[self._inner.iterative] * np.abs(corner).max(initial=0.0)
-        self._inverse = (right[resists].T / size[resists]) @ left[:, resists].T
+        self._behind = self._free.size > 0
+        if self._inner.iterative and self._behind:
+            self._eliminate(blocks)
         return True
+
+    def _eliminate(self, blocks: Array) -> None:
+        """Eliminate those of q that anything resists, for an iterative solver. Collective."""
+        bulk, inner, free = self._bulk, self._inner, self._free
+        held = self._held(blocks)
+        stiffness, turned = np.linalg.eigh(held.T @ bulk.corner[np.ix_(free, free)] @ held)
+        basis = held @ turned
+        self._inverse = basis / stiffness @ basis.T
+        size = (self._owned, None), (None, basis.shape[1])
+        columns = PETSc.Mat().createDense(size, comm=bulk.layout.comm)
+        columns.setUp()
+        factors = PETSc.Vec().createSeq(basis.shape[1])
+        columns.getDenseArray()[:] = bulk.columns[:, free] @ basis
+        columns.assemble()
+        factors.array[:] = -1 / stiffness
+        inner.system = PETSc.Mat().createLRC(inner.matrix, columns, factors, columns)
+        inner.ksp.setOperators(inner.system, inner.ksp.getOperators()[1])
+
+    def _held(self, blocks: Array) -> Array:
+        """Return a basis of the free motions that parts or blocks resist, (free, k). Collective."""
+        bulk, free = self._bulk, self._free
+        size = bulk.layout.block_size
+        dofs = (self._nodes[:, None] * size + np.arange(size)).ravel()
+        motion = bulk.motions[dofs][:, free].toarray().reshape(self._nodes.size, size, free.size)
+        pushed = np.einsum("nij,njk->nik", blocks, motion).reshape(-1, free.size)
+        gram = bulk.layout.comm.allreduce(pushed.T @ pushed, op=MPI.SUM)
+        other = np.ones(self._owned)
+        other[dofs] = 0.0
+        tied = bulk.motions[:, free].multiply(other[:, None]).toarray()
+        parts = bulk.layout.comm.allreduce(tied.T @ tied, op=MPI.SUM)
+        gram = sum(part / max(np.abs(part).max(initial=0.0), 1e-300) for part in (gram, parts))
+        resistance, directions = np.linalg.eigh(gram)
+        return np.asarray(directions[:, resistance > NOTHING * resistance.max(initial=0.0)])
 
     def solve(self, rhs: Array, rtol: float | None = None, guess: Array | None = None) -> Array:
         """Solve for the owned unknowns and q; see `SparseOperator.solve`. Collective."""
-        bulk, own = self._bulk, rhs[: self._owned]
-        if guess is not None:
-            guess = self._relative(guess)[: self._owned] + self._responses @ self._moved(guess)
-        first = self._inner.solve(own, rtol, guess)
-        forces = rhs[self._owned :] + bulk.gathered(own)
-        coupling = bulk.layout.comm.allreduce(bulk.columns.T @ first, op=MPI.SUM)
-        q = np.zeros(forces.size)
-        q[self._free] = self._inverse @ (forces - coupling)[self._free]
-        own = first - self._responses @ q[self._free] + bulk.motions @ q
-        return np.concatenate([own, q])
+        bulk, own, free = self._bulk, rhs[: self._owned], self._free
+        columns = bulk.columns[:, free]
+        forces = (rhs[self._owned :] + bulk.gathered(own))[free]
+        if self._inner.iterative:
+            if guess is not None:
+                guess = self._relative(guess)[: self._owned]
+            relative = self._inner.solve(own - columns @ (self._inverse @ forces), rtol, guess)
+            moved = self._inverse @ (forces - self._on_q(columns, relative))
+        else:
+            if self._behind:
+                first, *responses = self._inner.solve_all(np.column_stack([own, columns])).T
+                self._responses, self._behind = np.column_stack(responses), False
+                self._condense(columns)
+            else:
+                first = self._inner.solve(own)
+            moved = self._inverse @ (forces - self._on_q(columns, first))
+            relative = first - self._responses @ moved
+        q = np.zeros(bulk.free.size)
+        q[free] = moved
+        return np.concatenate([relative + bulk.motions @ q, q])
 
-    def _moved(self, values: Array) -> Array:
-        """Return the free ones of q."""
-        return np.asarray(values[self._owned :][self._free])
+    def _condense(self, columns: Array) -> None:
+        """Find the inverse of the stiffness against q, given the columns' responses. Collective."""
+        corner = self._bulk.corner[np.ix_(self._free, self._free)]
+        left, size, right = np.linalg.svd(corner - self._on_q(columns, self._responses))
+        resists = size > NOTHING * np.abs(corner).max(initial=0.0)
+        self._inverse = (right[resists].T / size[resists]) @ left[:, resists].T
+
+    def _on_q(self, columns: Array, values: Array) -> Array:
+        """Return what relative unknowns do to free ones of q. Collective."""
+        return np.asarray(self._bulk.layout.comm.allreduce(columns.T @ values, op=MPI.SUM))
 
     def _relative(self, values: Array) -> Array:
         """Return u^ and q of u and q."""

@@ -2,12 +2,47 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
+
 from petsc4py import PETSc
 
 from contact.errors import InputError
+from contact.linear.layout import Layout
+from contact.tolerances import HUGE
 
 #: MUMPS's INFOG(1) where its workspace, its memory or what ICNTL(23) allows was too small.
 OUT_OF_MEMORY = (-8, -9, -11, -12, -13, -17, -19, -20)
+
+
+@contextmanager
+def petsc_options(prefix: str) -> Iterator[None]:
+    """Turn what PETSc says of its options while a solver is set up into an InputError."""
+    try:
+        yield
+    except PETSc.Error as error:
+        words = str(error).strip().splitlines()[-1].removeprefix("[0] ")
+        raise InputError(
+            f"PETSc cannot set up its solver: {words}; accepted: options of PETSc with the prefix "
+            f"-{prefix} that it knows, or none"
+        ) from error
+
+
+def check_overflow(layout: Layout, operator: float, rhs: float) -> None:
+    """Refuse a linear system whose numbers overflow, given its norms.
+
+    Raises
+    ------
+    InputError
+        If they do.
+    """
+    young = layout.stiffness
+    if not (operator < HUGE and rhs < HUGE and rhs < HUGE * young):
+        raise InputError(
+            f"numbers overflow: Young's modulus is {young:.3g}, the linear operator of the "
+            f"size {operator:.3g}, its right-hand side {rhs:.3g}; accepted: constants, loads "
+            "and prescribed values in units that bring them nearer to 1"
+        )
 
 
 def no_solution(pc: PETSc.PC, prefix: str) -> InputError:

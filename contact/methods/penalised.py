@@ -11,7 +11,8 @@ from petsc4py import PETSc
 from contact.errors import InputError
 from contact.interface.penalised import NodalLaw, Regularisation, outer
 from contact.linear.bordered import Packing
-from contact.linear.operator import Counters, petsc_options
+from contact.linear.faults import petsc_options
+from contact.linear.operator import Counters
 from contact.methods.options import PenaltyOptions
 from contact.problem.kkt import residual_forces
 from contact.problem.problem import ContactProblem

@@ -18,7 +18,8 @@ from contact.interface.multipliers import Multipliers
 from contact.linear.balance import balance
 from contact.linear.change import Change
 from contact.linear.dense import DenseOperator
-from contact.linear.operator import Bulk, Counters, check_overflow, petsc_options
+from contact.linear.faults import check_overflow, petsc_options
+from contact.linear.operator import Bulk, Counters
 from contact.linear.schur import SchurComplement
 from contact.problem.condensed_masters import CondensedMasters
 from contact.problem.condensed_pairs import CondensedPairs

@@ -6,12 +6,14 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
+from contact import write_outputs
 from contact.case.file import parse_case
 from contact.errors import InputError
 from contact.interface.multipliers import Multipliers
 from contact.methods.newton import Newton
 from contact.methods.options import FixedPointOptions, NewtonOptions, PenaltyOptions
 from contact.output.balances import charge_balance
+from contact.output.figures.saved import plot
 from contact.problem.kkt import evaluate, residual_forces
 from contact.problem.state import State
 from contact.solving import build_problem, solve
@@ -35,6 +37,21 @@ def test_force_and_displacement_control_agree(dim):
     assert np.allclose(forced.state.x, driven.state.x, rtol=0, atol=1e-10 * scale)
     # A linear body is solved for once, however the indenter is driven.
     assert forced.counters.linear_solves == driven.counters.linear_solves == 1
+
+
+@pytest.mark.parametrize("linear", ["lu", "iterative"])
+def test_unknown_motions_cost_no_solves(linear):
+    """Not condensed, and the same number of solves as with the motion given."""
+    options = NewtonOptions(tolerance=1e-10, condense=False, linear=linear)
+    free = {"displacement": [0.05, "free"], "force": [0.0, -0.01], "rotation": "free"}
+    forced, moved = solved(indented(n=8, **free), SELF, options)
+    found = moved["rigid"]
+    driven, _ = solved(
+        indented(n=8, displacement=found["displacement"], rotation=found["rotation"]), SELF, options
+    )
+    assert np.allclose(forced.state.x, driven.state.x, rtol=0, atol=1e-8)
+    assert forced.counters.linear_solves <= driven.counters.linear_solves + 2
+    assert forced.counters.linear_iterations <= 3 * driven.counters.linear_iterations
 
 
 def test_a_ball_rolls_to_where_no_moment_is_left():
@@ -187,6 +204,7 @@ def column(**more):
     [
         NewtonOptions(tolerance=1e-10),
         NewtonOptions(tolerance=1e-10, condense=False),
+        NewtonOptions(tolerance=1e-10, condense=False, linear="iterative"),
         FixedPointOptions(tolerance=1e-10),
         PenaltyOptions(eps_contact=1e-8),
     ],
@@ -293,6 +311,18 @@ def stepped(amplitudes=None, **rigid):
     solution = solve(parse_case(data), NewtonOptions(tolerance=1e-11), comm=SELF)
     assert solution.converged
     return [record.row for record in solution.steps]
+
+
+def test_what_an_indentation_in_steps_writes(tmp_path):
+    """Global unknowns are no part of the fields; the foundation's force over its way is drawn."""
+    data = indented(n=6).model_dump(exclude_unset=True)
+    data["contact"]["rigid"]["displacement"] = [0.0, "-0.02*t"]
+    data["evolution"] = {"times": [0.0, 1.0], "steps": [2]}
+    solution = solve(parse_case(data), comm=SELF)
+    write_outputs(solution, tmp_path)
+    plot(tmp_path)
+    assert (tmp_path / "fields-0001.vtu").is_file()
+    assert (tmp_path / "figure-loop.png").is_file()
 
 
 def test_an_indentation_driven_by_force_goes_the_way_of_one_driven_by_displacement():

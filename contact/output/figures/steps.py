@@ -19,6 +19,9 @@ from contact.typing import Array
 #: Names of the figures; the first has no place where nothing is driven, the second in space.
 LOOP, MAP, ENERGY = "loop", "zones", "energy"
 
+#: What moves, as the columns of ``steps.csv`` begin, and what axes call its way and itself.
+DRIVEN = {"driven": ("mean displacement", "part"), "rigid": ("displacement", "foundation")}
+
 
 @dataclass(frozen=True)
 class Course:
@@ -56,19 +59,20 @@ class Course:
             Names of the units, for labels.
         """
         found = {ENERGY: self._energies()}
-        if "driven_x" in self.rows[0]:
-            found[LOOP] = self._loop(plane, units)
+        for moves, words in DRIVEN.items():
+            if f"{moves}_x" in self.rows[0] and LOOP not in found:
+                found[LOOP] = self._loop(moves, words, plane, units)
         if plane and len(self.rows) > 1 and "on" not in self.tables[0]:
             found[MAP] = self._zones(axes, units)
         for figure in found.values():
             figure.suptitle(title, fontsize="large")
         return found
 
-    def _loop(self, plane: bool, units: Units) -> Figure:
-        """Draw the force on the driven part over its way, from the rest at the origin."""
+    def _loop(self, moves: str, words: tuple[str, str], plane: bool, units: Units) -> Figure:
+        """Draw the force on what moves over its way, from the rest at the origin."""
         names = "xy" if plane else "xyz"
-        ways = [np.concatenate([[0.0], self.column(f"driven_{axis}")]) for axis in names]
-        forces = [np.concatenate([[0.0], self.column(f"driven_force_{axis}")]) for axis in names]
+        ways = [np.concatenate([[0.0], self.column(f"{moves}_{axis}")]) for axis in names]
+        forces = [np.concatenate([[0.0], self.column(f"{moves}_force_{axis}")]) for axis in names]
         figure, turns = _figure(0.66), []
         for way in ways:
             direction = np.sign(np.diff(way))
@@ -77,8 +81,8 @@ class Course:
         k = int(np.lexsort(([np.ptp(way) for way in ways], turns))[-1])
         ax = figure.subplots()
         ax.plot(ways[k], forces[k], "-o", color="#1F4E79", markersize=2.5)
-        ax.set_xlabel(units.label(f"mean displacement $u_{names[k]}$", "length"))
-        ax.set_ylabel(f"force on the part along ${names[k]}$")
+        ax.set_xlabel(units.label(f"{words[0]} $u_{names[k]}$", "length"))
+        ax.set_ylabel(f"force on the {words[1]} along ${names[k]}$")
         ax.grid(alpha=0.25)
         return figure
 
