@@ -15,7 +15,7 @@ from contact.problem.kkt import KKT, evaluate
 from contact.typing import Array
 
 #: What counts as progress of a step.
-PROGRESS = 0.9
+PROGRESS = 0.5
 
 #: Why a loop with a frozen friction bound ends.
 UPDATE = "friction bound to be updated"

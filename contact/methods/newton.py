@@ -197,7 +197,8 @@ class Newton:
         """
         for friction in (False, True) if problem.interface.friction.acts else (False,):
             start = problem.start() if self.search.best is None else self.search.best.state
-            found = solve_convex(problem, start, self.history.poll, friction)
+            poll, goal = self.history.poll, self.options.tolerance
+            found = solve_convex(problem, start, poll, friction, goal)
             if found is None:
                 break
             residuals = evaluate(problem, found.state)

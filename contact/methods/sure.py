@@ -30,6 +30,9 @@ INTERIOR_POINT = "interior point"
 #: Times that a layer and a current are linearised anew, and the change that ends it.
 MOST_ANSWERS, SETTLED = 60, 1e-10
 
+#: Tolerance of a Tresca problem within Haslinger's loop.
+INNER = 1e-10
+
 #: Least share of a step that is taken between two of these times.
 LEAST_SHARE = 1 / 16
 
@@ -56,7 +59,11 @@ class Found:
 
 
 def solve_convex(
-    problem: CondensedProblem, state: State, poll: Callable[[], None], friction: bool = True
+    problem: CondensedProblem,
+    state: State,
+    poll: Callable[[], None],
+    friction: bool = True,
+    tolerance: float = 1e-8,
 ) -> Found | None:
     """Solve a condensed problem; None where it is not convex. Collective.
 
@@ -69,11 +76,13 @@ def solve_convex(
         Called between the convex problems, on all ranks.
     friction
         Whether friction acts. Without it there is one small problem, of the normals alone.
+    tolerance
+        Relative change of the friction bound that is left.
     """
     steps, found, last, share = 0, None, np.inf, 1.0
     for _ in range(MOST_ANSWERS if problem.interface.response.active else 1):
         found = _solve_linearised(
-            problem, state, poll, friction and problem.interface.friction.acts
+            problem, state, poll, friction and problem.interface.friction.acts, tolerance
         )
         if found is None:
             return None
@@ -96,7 +105,11 @@ def _largest(problem: CondensedProblem, values: Array) -> float:
 
 
 def _solve_linearised(
-    problem: CondensedProblem, state: State, poll: Callable[[], None], friction: bool
+    problem: CondensedProblem,
+    state: State,
+    poll: Callable[[], None],
+    friction: bool,
+    tolerance: float,
 ) -> Found | None:
     """Solve with layer and current linearised at a state; rank 0 does it for all."""
     body, interface, comm = problem.equilibrium, problem.interface, problem.equilibrium.comm
@@ -120,7 +133,7 @@ def _solve_linearised(
     answer = None
     if comm.rank == 0:
         try:
-            answer = gathered.solve(bound, friction)
+            answer = gathered.solve(bound, friction, tolerance)
         except NotConvexError:
             answer = None
         comm.bcast(None)
@@ -176,7 +189,9 @@ class Gathered:
         load = np.where(free.ravel(), total @ moved - base, 0.0)
         return Gathered(total, load, origin, free, normal, tangent, gap, weight)
 
-    def solve(self, bound: Bound, frictional: bool) -> tuple[Array, Array, Array, int, str]:
+    def solve(
+        self, bound: Bound, frictional: bool, tolerance: float
+    ) -> tuple[Array, Array, Array, int, str]:
         """Return unknowns, pressure, friction, steps and words."""
         n, d = self.normal.shape
         stiffness, load, complete = self.stiffness, self.load, None
@@ -188,7 +203,8 @@ class Gathered:
             stiffness, self.normal, self.tangent, self.gap, self.weight, free, rubbing
         )
         if frictional:
-            loop = coulomb(solver, load, bound)
+            inner = min(INNER, 0.01 * tolerance)
+            loop = coulomb(solver, load, bound, tolerance=tolerance, inner=inner)
             result, steps, words = loop.result, loop.iterations, loop.message
         else:
             result = solver.solve(load, np.zeros(n))

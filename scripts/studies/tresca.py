@@ -135,10 +135,16 @@ def interior_point(problem: CondensedProblem) -> tuple[Result, Gathered]:
 
 def newton(problem: CondensedProblem, start: State | None) -> tuple[State, bool, int]:
     """Solve by Newton's loop alone; return the state, whether it converged, and its steps."""
-    options = NewtonOptions(tolerance=1e-11, condense=False)
-    step = WholeStep(problem, options, moduli_of(problem.scales, options.gamma), Counters())
+    options, interface = NewtonOptions(tolerance=1e-11, condense=False), problem.interface
+    moduli = moduli_of(problem.scales, options.gamma)
+    step = WholeStep(problem, options, moduli, Counters())
     history = History()
-    iterate = Iterate(problem.start() if start is None else start)
+    iterate = Iterate(problem.start())
+    if start is not None:
+        # Without the status it would begin with all nodes sticking that touch.
+        nodal = interface.jump.apply(start.x)
+        bound = interface.bound(nodal, start.forces)
+        iterate = Iterate(start, interface.status(nodal, start.forces, bound, moduli.status))
     search = Search(problem, options, history, iterate)
     iterate, outcome = NewtonLoop(search, step, 0.0).run(iterate)
     return iterate.state, outcome.kkt.largest <= 1e-9, len(history.records)
