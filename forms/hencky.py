@@ -15,7 +15,6 @@ from typing import Protocol, TypeAlias
 
 import numpy as np
 import ufl
-from scipy.optimize import brentq
 from ufl.core.expr import Expr
 
 from forms.elasticity import Anisotropic
@@ -153,6 +152,8 @@ class Log(Isotropic):
         """The q from which the floor g_min acts (infinity without a floor)."""
         if self.g_min <= 0:
             return np.inf
+        from scipy.optimize import brentq  # takes a while to load, and few need it
+
         upper = 4 * self._limit
         while self._bare_modulus(upper) > self.g_min:
             upper *= 4

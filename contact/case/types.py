@@ -40,6 +40,7 @@ class Section(BaseModel):
         allow_inf_nan=False,
         populate_by_name=True,
         validate_default=False,
+        defer_build=True,  # the case's own is all that reads; each would take milliseconds
     )
 
 

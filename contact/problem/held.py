@@ -8,7 +8,6 @@ from types import MappingProxyType
 import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
-from scipy.optimize import linprog
 
 from contact.body.motions import rigid_motions
 from contact.body.rigid import Rigid
@@ -260,6 +259,8 @@ def _check_loads(
     cone = np.concatenate([problem.nodes.gather(row) for row in rows])
     pulled = False
     if comm.rank == 0 and np.abs(work).max() > ROUNDING * scale:
+        from scipy.optimize import linprog  # takes a while to load
+
         motion = linprog(-work, cone, np.zeros(len(cone)), bounds=[(-1, 1)] * free.shape[1])
         pulled = motion.status == 0 and -motion.fun > 1e-6 * scale
     if comm.bcast(pulled):

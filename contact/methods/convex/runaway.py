@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.optimize import linprog
 
 from contact.methods.convex.cones import Array
 from contact.methods.convex.interior import Program
@@ -56,6 +55,8 @@ def runaway(program: Program) -> bool:
     table = np.vstack(rows)
     limits = [(-1.0, 1.0)] * count + [(0.0, None)] * rubbing.size
     gain = np.append(program.load @ motions, -bound)
+    from scipy.optimize import linprog  # takes a while to load
+
     found = linprog(-gain, A_ub=table, b_ub=np.zeros(table.shape[0]), bounds=limits)
     if found.status != 0:
         return False
