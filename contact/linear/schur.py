@@ -62,6 +62,19 @@ def _dense(matrix: PETSc.Mat) -> Array:
     return np.array(dense.getDenseArray(), order="C")
 
 
+def _ordered(matrix: PETSc.Mat, inside: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Return owned unknowns in the order of Cuthill and McKee.
+
+    Where a Schur complement is asked for, MUMPS orders by minimum degree alone. That breaks its
+    many ties by the order given, and this one leaves it a quarter less work than most.
+    """
+    rows = PETSc.IS().createGeneral(
+        (inside + matrix.getOwnershipRange()[0]).astype(PETSc.IntType), PETSc.COMM_SELF
+    )
+    (part,) = matrix.createSubMatrices([rows], [rows])
+    return inside[part.getOrdering("rcm")[0].getIndices()] if inside.size else inside
+
+
 class SchurComplement:
     """A symmetric matrix reduced to kept unknowns.
 
@@ -84,8 +97,9 @@ class SchurComplement:
         rows = np.repeat(np.arange(end - begin), np.diff(starts))
         shared[rows[columns < begin]] = True
         shared[kept] = False
-        self._inside = np.ones(end - begin, dtype=bool)
-        self._inside[kept] = self._inside[shared] = False
+        inside = np.ones(end - begin, dtype=bool)
+        inside[kept] = inside[shared] = False
+        self._inside = _ordered(matrix, np.flatnonzero(inside))
         # The kept ones first, then those between the ranks, each in rank order.
         self._kept, self._shared = kept, np.flatnonzero(shared)
         mine = [(part + begin).astype(PETSc.IntType) for part in (kept, self._shared)]
@@ -101,7 +115,7 @@ class SchurComplement:
             ]
         )
         left = np.concatenate([part for parts in gathered for part in parts])
-        eliminated = (np.flatnonzero(self._inside) + begin).astype(PETSc.IntType)
+        eliminated = (self._inside + begin).astype(PETSc.IntType)
         self._left = PETSc.IS().createGeneral(left, PETSc.COMM_SELF)
         self._local = PETSc.IS().createGeneral(np.concatenate([eliminated, left]), PETSc.COMM_SELF)
         self._eliminated, self._prefix = eliminated.size, prefix
@@ -237,7 +251,7 @@ class SchurComplement:
             between = self._solve_between(self._rhs_between - self._coupling.T @ kept)
             left = np.concatenate([kept, between])
         coupled = self._times(np.zeros(self._eliminated), left)[: self._eliminated]
-        solution = np.zeros(self._inside.size)
+        solution = np.zeros(self._rhs.size)
         solution[self._inside] = self._solve_inside(self._rhs[self._inside] - coupled)
         solution[np.concatenate([self._kept, self._shared])] = left[self._rows]
         return solution
