@@ -28,6 +28,8 @@ from contact.mesh.domain import Domain
 from contact.methods.every import METHODS
 from contact.methods.interrupt import Interrupted, stop_on_signal
 from contact.methods.method import Method
+from contact.methods.options import NewtonOptions, Options
+from contact.methods.predictor import Reached, predicted
 from contact.methods.report import Monitor, tell
 from contact.methods.steps import since, solve_step
 from contact.output.folder import on_root
@@ -38,7 +40,6 @@ from contact.output.table import contact_table
 from contact.output.tables import write_csv
 from contact.problem.held import check_potential
 from contact.problem.problem import ContactProblem
-from contact.problem.state import State
 
 logger = logging.getLogger("contact.sweep")
 
@@ -233,7 +234,7 @@ class _Runner:
         self._case: Case | None = None
         self._domain: Domain | None = None
         self._method: Method | None = None
-        self._state: State | None = None
+        self._reached: list[Reached] = []
 
     def solve(self, case: Case) -> Solution:
         """Solve a case. Collective."""
@@ -247,20 +248,28 @@ class _Runner:
                 ends, rest = case.evolution.ends, case.evolution.times[0]
                 return solve_steps(problem, ends, case.solver, self._monitor, rest)
             if self._method is None or before is None or not _alike(before, case):
-                self._method = METHODS[case.solver.method](problem, case.solver, self._monitor)
-                self._state = None
+                self._method = METHODS[case.solver.method](
+                    problem, self._settings(case), self._monitor
+                )
+                self._reached = []
             else:
                 self._method.turn_to(problem)
             return self._static(problem, case.solver.method, self._method)
 
+    def _settings(self, case: Case) -> Options:
+        """Return the method's options: what is factorised for one case may do for the next."""
+        if self._warm and isinstance(case.solver, NewtonOptions):
+            return replace(case.solver, keep="across")
+        return case.solver
+
     def _static(self, problem: ContactProblem, name: str, method: Method) -> Solution:
-        counted, start = replace(method.counters), self._state
-        if start is not None:
-            start = replace(start, x=problem.equilibrium.prescribe(start.x, problem.time))
+        counted, ends = replace(method.counters), self._reached
+        start = predicted(problem, ends[-1], ends[0] if len(ends) > 1 else None) if ends else None
         state, outcome = solve_step(problem, method, start)
         if start is not None and not outcome.converged and not outcome.signal:
             state, outcome = solve_step(problem, method, None)
-        self._state = state if outcome.converged else None
+        end = Reached.of(problem, state)
+        self._reached = [*ends[-1:], end] if outcome.converged else []
         check_potential(problem, state)
         counters = since(method.counters, counted)
         return Solution(problem, state, outcome, method.history, counters, name, seconds={})

@@ -266,6 +266,12 @@ class BodyEquilibrium:
         own, n = np.dot(one[: self.owned], other[: self.owned]), self.owned
         return float(self.comm.allreduce(own, op=MPI.SUM) + np.dot(one[n:], other[n:]))
 
+    def products(self, ones: Array, others: Array) -> Array:
+        """Return the inner products of columns of local values, as a matrix. Collective."""
+        n, behind = self.owned, ones.shape[0] - self.masters.size
+        own = self.comm.allreduce(ones[:n].T @ others[:n], op=MPI.SUM)
+        return np.asarray(own + ones[behind:].T @ others[behind:])
+
     def load_size(self, time: float = 1.0) -> float:
         """Return the Euclidean norm of the nodal loads at a time. Collective."""
         return self.norm(self.external(time))

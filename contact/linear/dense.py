@@ -1,7 +1,12 @@
-"""A dense operator at kept nodes, the same on all ranks, plus a small block at each node."""
+"""A dense operator at kept nodes, the same on all ranks, plus a small block at each node.
+
+From one step of a contact problem to the next few nodes change what they do. The factors are kept
+until many have, and corrected for those few: Sherman, Morrison and Woodbury.
+"""
 
 from __future__ import annotations
 
+from dataclasses import dataclass, field
 from typing import Protocol
 
 import numpy as np
@@ -11,6 +16,39 @@ from scipy.linalg.lapack import dgetrf, dgetrs
 
 from contact.linear.operator import Counters
 from contact.typing import Array
+
+#: Part of the unknowns whose blocks may differ from those that were factorised: corrections then
+#: take half the operations of new factors.
+FEW = 1 / 8
+
+
+@dataclass
+class Factors:
+    """The factors of a dense matrix with those nodal blocks that it had at the time.
+
+    Attributes
+    ----------
+    lower_upper, pivots
+        As LAPACK leaves them; None before the first factorisation.
+    blocks
+        The nodal blocks that are in them, shape (nodes, block size, block size).
+    """
+
+    lower_upper: Array | None = None
+    pivots: NDArray[np.int32] = field(default_factory=lambda: np.zeros(0, dtype=np.int32))
+    blocks: Array = field(default_factory=lambda: np.zeros((0, 0, 0)))
+
+    def make(self, matrix: Array, blocks: Array) -> None:
+        """Factorise a matrix plus blocks."""
+        total = matrix.copy(order="F")
+        rows = np.arange(matrix.shape[0]).reshape(blocks.shape[:2])
+        total[rows[:, :, None], rows[:, None, :]] += blocks
+        self.lower_upper, self.pivots, _ = dgetrf(total, overwrite_a=True)
+        self.blocks = blocks
+
+    def solve(self, rhs: Array) -> Array:
+        """Solve for one or several columns."""
+        return np.asarray(dgetrs(self.lower_upper, self.pivots, rhs)[0])
 
 
 class DenseBulk(Protocol):
@@ -27,6 +65,10 @@ class DenseBulk(Protocol):
     @property
     def stiffness(self) -> Array:
         """The dense matrix, on all ranks in rank order."""
+
+    @property
+    def factors(self) -> Factors:
+        """Its factors, where some have been made."""
 
     @property
     def own(self) -> slice:
@@ -48,28 +90,57 @@ class DenseOperator:
 
     def __init__(self, bulk: DenseBulk, counters: Counters) -> None:
         self.bulk, self.counters = bulk, counters
-        self._factors: tuple[Array, Array] | None = None
+        self._changed: NDArray[np.int64] = np.zeros(0, dtype=np.int64)
 
     def update(self, kind: str, x: Array, blocks: Array, *, constant: bool = False) -> bool:
         """Add up and factorise. Collective; see `operator.SparseOperator.update`."""
         bulk, free = self.bulk, self.bulk.free.astype(float)
-        masked = _gather(bulk, blocks * free[:, :, None] * free[:, None, :])
-        total = bulk.stiffness.copy(order="F")
-        n, size = masked.shape[:2]
-        rows = np.arange(n * size).reshape(n, size)
-        total[rows[:, :, None], rows[:, None, :]] += masked
-        factors, pivots, _ = dgetrf(total, overwrite_a=True)
-        self._factors = factors, pivots
+        factors = bulk.factors
+        self._blocks = _gather(bulk, blocks * free[:, :, None] * free[:, None, :])
+        if factors.lower_upper is not None:
+            change = self._blocks - factors.blocks
+            differs = change != 0
+            self._changed = np.flatnonzero((differs.any(axis=2) | differs.any(axis=1)).ravel())
+        if factors.lower_upper is None or self._changed.size > FEW * bulk.stiffness.shape[0]:
+            factors.make(bulk.stiffness, self._blocks)
+            self._changed = np.zeros(0, dtype=np.int64)
+        elif self._changed.size > 0:
+            self._correct(change)
         self.counters.factorizations += 1
         return True
 
+    def _correct(self, change: Array) -> None:
+        """Correct the factors for blocks that differ by a change, at the unknowns that it meets."""
+        changed, size = self._changed, change.shape[1]
+        unit = np.zeros((self.bulk.stiffness.shape[0], changed.size), order="F")
+        unit[changed, np.arange(changed.size)] = 1.0
+        self._columns = self.bulk.factors.solve(unit)
+        node, component = np.divmod(changed, size)
+        among = change[node[:, None], component[:, None], component]
+        self._change = np.where(node[:, None] == node, among, 0.0)
+        self._inner = np.eye(changed.size) + self._change @ self._columns[changed]
+
     def solve(self, rhs: Array, rtol: float | None = None, guess: Array | None = None) -> Array:
         """Solve for the owned unknowns. Collective; see `operator.SparseOperator.solve`."""
-        assert self._factors is not None
         total = _gather(self.bulk, np.where(self.bulk.free.ravel(), rhs, 0.0))
         self.counters.linear_solves += 1
-        solution, _ = dgetrs(*self._factors, total, overwrite_b=True)
-        return np.asarray(solution[self.bulk.own])
+        solution = self._solve(total)
+        if self._changed.size > 0:  # stiff blocks that were taken away have left their rounding
+            solution += self._solve(total - self._times(solution))
+        return solution[self.bulk.own]
+
+    def _solve(self, rhs: Array) -> Array:
+        solution = self.bulk.factors.solve(rhs)
+        if self._changed.size > 0:
+            known = self._change @ solution[self._changed]
+            solution -= self._columns @ np.linalg.solve(self._inner, known)
+        return solution
+
+    def _times(self, values: Array) -> Array:
+        """Return the matrix, blocks included, times values of all ranks."""
+        nodal = values.reshape(self._blocks.shape[:2])
+        added = np.einsum("nij,nj->ni", self._blocks, nodal).ravel()
+        return np.asarray(self.bulk.stiffness @ values + added)
 
 
 def _gather(bulk: DenseBulk, values: Array) -> Array:

@@ -125,7 +125,7 @@ class ResidualMinimiser:
         for _ in range(self._sweeps):
             slopes = basis[0] - self._derivative(point[1], basis[1])
             load = self._inner(slopes, self._defect(point)[:, None])[:, 0]
-            step = -basis @ _least_squares(self._inner(slopes, slopes), load)
+            step = -basis @ least_squares(self._inner(slopes, slopes), load)
             trials = [point + t * step for t in DAMPED]
             sizes = self._sizes(trials)
             k = int(np.argmin(sizes))
@@ -153,7 +153,7 @@ class ResidualMinimiser:
         return trials[int(np.flatnonzero(sizes <= level)[-1])]
 
 
-def _least_squares(gram: Array, load: Array) -> Array:
+def least_squares(gram: Array, load: Array) -> Array:
     """Solve the normal equations of directions of length 1.
 
     Combinations that change the residual less than a millionth of their length are left out:

@@ -14,6 +14,7 @@ from dataclasses import replace
 from contact.interface.linearised import Moduli
 from contact.linear.operator import Counters
 from contact.methods.following import Following
+from contact.methods.kept import WORTH, Kept
 from contact.methods.options import NewtonOptions
 from contact.methods.report import History, Outcome
 from contact.methods.step import NEAR, Iterate, Taken
@@ -70,26 +71,36 @@ class MaterialStep:
         self.condensation, self.options, self.moduli = condensation, options, moduli
         self.counters, self.following = counters, Following()
         self._solve, self._history, self._slower = solve, history, slower
+        inner = condensation.full.equilibrium.products
+        self._kept = Kept(options.tolerance, inner, WORTH if options.keep != "never" else 0.0)
 
     def turn_to(self, problem: ContactProblem, history: History) -> None:
         """Go on with another step of the same problem."""
         self.condensation.turn_to(problem)
         self._history = history
 
+    def forget(self) -> None:
+        """Begin another solve: what is factorised remains where it may be kept across solves."""
+        if self.options.keep != "across":
+            self._kept.forget()
+
     def begin(self) -> None:
-        """Do nothing: each step begins anew."""
+        """Begin another loop; what is factorised remains."""
+        self._kept.begin()
 
     def __call__(
         self, iterate: Iterate, tangent: bool, reached: KKT, bound: Array | None
     ) -> Taken | None:
         """Take a step; None where the body cannot be condensed or contact is not solved."""
-        state, body = iterate.state, self.condensation.full.equilibrium
-        condensed = self.condensation.linearise("tangent" if tangent else "secant", state)
+        body = self.condensation.full.equilibrium
+        iterate, keep = self._kept.turn(iterate, reached.largest)
+        state = iterate.state
+        condensed = self.condensation.linearise("tangent" if tangent else "secant", state, keep)
         if condensed is None:
             return None
         # No more accurate than the material is linearised, nor than the end asks for.
         enough = 0.1 * self.options.tolerance
-        if not body.linear:
+        if not body.linear and not keep:
             enough = max(enough, CONTACT_PART * min(reached.largest, 1.0))
         options = replace(
             self.options,
@@ -107,6 +118,9 @@ class MaterialStep:
             return None
         increment = self.condensation.expand(condensed, end.state.x)
         new = replace(state, x=body.moved(state.x, increment), forces=end.state.forces)
+        if not body.linear:
+            new = self._kept.mixed(state, new)
         notes = [record.note for record in history.records]
         slower = [word for word in self._slower if any(word in note for note in notes)]
-        return Taken(replace(end, state=new), ", ".join(slower), solves)
+        note = ", ".join([*["kept"] * int(keep), *slower])
+        return Taken(replace(end, state=new), note, solves)

@@ -130,6 +130,8 @@ class Newton:
             Where from; from rest by default.
         """
         self._begin()
+        if self._condensed is not None:
+            self._condensed.forget()
         iterate = self.search.at if start is None else self._started(start)
         iterate, outcome = self.run(iterate)
         return iterate.state, outcome

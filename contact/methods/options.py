@@ -168,6 +168,9 @@ class NewtonOptions(Options):
     condense
         Whether to condense the linearised body onto the contact nodes where that pays: one
         step then solves the whole contact problem for a linear body.
+    keep
+        Whether to keep the factorisation of a condensed body while that costs less than new ones:
+        within a solve, which then does not depend on those before, or across solves too.
     load_steps
         Whether to apply the load in steps where all else has failed.
     """
@@ -184,6 +187,7 @@ class NewtonOptions(Options):
     patience: Annotated[int, Internal()] = 12
     softening: Annotated[float, Internal()] = 0.25
     condense: Annotated[bool, Internal()] = True
+    keep: Annotated[Literal["never", "within", "across"], Internal()] = "within"
     load_steps: Annotated[bool, Internal()] = True
 
 

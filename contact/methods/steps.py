@@ -19,6 +19,7 @@ from contact.interface.history import SlipHistory
 from contact.linear.operator import Counters
 from contact.methods.interrupt import Interrupted
 from contact.methods.method import Method
+from contact.methods.predictor import Reached, predicted
 from contact.methods.report import History, Outcome
 from contact.problem.kkt import KKT, evaluate
 from contact.problem.problem import ContactProblem
@@ -29,9 +30,6 @@ logger = logging.getLogger("contact.solve")
 
 #: How often a step that fails is halved.
 HALVINGS = 4
-
-#: Largest part of the last step's way that the prediction adds to it.
-FARTHEST = 2.0
 
 #: Part of the body's size that is no motion.
 ROUNDING = 1e-12
@@ -131,16 +129,12 @@ class Evolution:
         problem = self.problem.at(time) if last is None else after(self.problem, last, time)
         method.turn_to(problem)
         counted = replace(method.counters)
-        start = None if last is None else self._predicted(problem, last)
+        start = None
+        if last is not None:
+            before = None if self._before is None else Reached.of(problem, self._before)
+            start = predicted(problem, Reached.of(problem, last), before)
         state, outcome = solve_step(problem, method, start)
         return LoadStep(problem, state, outcome, method.history, since(method.counters, counted))
-
-    def _predicted(self, problem: ContactProblem, last: State) -> State:
-        """Return where a step starts from: the last one's end, moved on as its loads have."""
-        share = 0.0 if self._before is None else _share(problem, self._before, last)
-        x = last.x if self._before is None else last.x + share * (last.x - self._before.x)
-        x = problem.equilibrium.prescribe(x, problem.time)
-        return State(x, last.forces, problem.time)
 
 
 def check_gaps(problem: ContactProblem, times: Sequence[float]) -> None:
@@ -208,24 +202,6 @@ def after(problem: ContactProblem, state: State, time: float) -> ContactProblem:
     here = problem.at(state.time, state.history or SlipHistory.rest(problem.nodes))
     history = here.interface.remembered(here.nodal(state))
     return problem.at(time, history, since=state.time)
-
-
-def _share(problem: ContactProblem, before: State, last: State) -> float:
-    """Return how far the loads go on the way they have come, over that way. Collective."""
-    given = [_given(problem, time) for time in (before.time, last.time, problem.time)]
-    product, shares = problem.equilibrium.product, []
-    for first, second, third in zip(*given, strict=True):
-        come, going = second - first, third - second
-        square = product(come, come)
-        if square > 0:
-            shares.append(product(come, going) / square)
-    return float(np.clip(min(shares, default=0.0), 0.0, FARTHEST))
-
-
-def _given(problem: ContactProblem, time: float) -> tuple[Array, Array]:
-    """Return the owned loads and prescribed values at a time. Collective."""
-    body = problem.equilibrium
-    return body.external(time), body.owned_part(body.prescribe(body.rest(), time))
 
 
 def since(now: Counters, before: Counters) -> Counters:

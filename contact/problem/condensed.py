@@ -17,7 +17,7 @@ from contact.interface.interface import Interface
 from contact.interface.multipliers import Multipliers
 from contact.linear.balance import balance
 from contact.linear.change import Change
-from contact.linear.dense import DenseOperator
+from contact.linear.dense import DenseOperator, Factors
 from contact.linear.faults import check_overflow, petsc_options
 from contact.linear.operator import Bulk, Counters
 from contact.linear.schur import SchurComplement
@@ -49,6 +49,8 @@ class CondensedBody:
         Which unknowns of the owned kept nodes are not fixed, shape (nodes, block size).
     stiffness
         The Schur complement, on all ranks.
+    factors
+        Its factors, where some have been made.
     residual
         Condensed internal forces minus loads where the body was linearised, all ranks.
     at
@@ -63,6 +65,7 @@ class CondensedBody:
     dim: int
     free: NDArray[np.bool_]
     stiffness: Array
+    factors: Factors
     residual: Array
     at: Array
     own: slice
@@ -180,7 +183,7 @@ class Condensation:
         self.full = full
         self._interface = _at_kept_nodes(full.interface)
 
-    def linearise(self, kind: str, state: State) -> CondensedProblem | None:
+    def linearise(self, kind: str, state: State, keep: bool = False) -> CondensedProblem | None:
         """Condense the body, linearised at a state of the full problem. Collective.
 
         Parameters
@@ -189,6 +192,8 @@ class Condensation:
             "secant" or "tangent".
         state
             Where.
+        keep
+            Whether to take what was factorised last, wherever that was.
 
         Returns
         -------
@@ -201,7 +206,8 @@ class Condensation:
             If numbers overflow.
         """
         body = self.full.equilibrium
-        if self._schur is None or kind != self._kind or not body.linear:
+        same = keep or (body.linear and kind == self._kind)
+        if self._schur is None or not same:
             self._bulk.assemble(self._matrix, kind, state.x)
             balance(self._matrix, body.layout)
             if self._schur is None:
@@ -214,7 +220,7 @@ class Condensation:
                 self._stiffness = self._masters.eliminate(self._schur, self._stiffness)
             if self._pairs is not None:
                 self._stiffness = self._pairs.eliminate(self._stiffness)
-            self._kind = kind
+            self._kind, self._factors = kind, Factors()
             self.counters.factorizations += 1
         residual = body.internal_forces(state.x) - body.external(state.time)
         check_overflow(body.layout, self._matrix.norm(), body.norm(residual))
@@ -236,6 +242,7 @@ class Condensation:
             body.dim,
             body.free[self.nodes],
             self._stiffness,
+            self._factors,
             forces,
             at,
             slice(begin, begin + at.size),

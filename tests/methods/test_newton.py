@@ -102,7 +102,7 @@ def test_newton_stays_at_a_solution_that_rounding_has_touched(rho, radius):
 def test_the_last_steps_square_the_residual():
     law = Log(1.0, 0.3, yield_strain=0.01)
     problem = mechanics.bar(SELF, 16, -0.02, law=law, friction=Friction(ConstantCoefficient(0.4)))
-    records = newton(problem, tolerance=1e-12).history.records
+    records = newton(problem, tolerance=1e-12, keep="never").history.records
     assert len(records) <= 12
     before, after = records[-2].kkt.largest, records[-1].kkt.largest
     # gamma leaves 1e-4 of the interface residual, the material's part is squared
@@ -215,7 +215,8 @@ def test_nested_meshes_save_steps_and_change_nothing():
     plain = solve(bar_case(32), comm=SELF)
     nested = solve(bar_case(32, "solver.nested=true"), comm=SELF)
     assert plain.outcome.converged and nested.outcome.converged
-    assert nested.counters.linear_solves < plain.counters.linear_solves <= 5
+    assert nested.counters.factorizations < plain.counters.factorizations <= 2
+    assert max(nested.counters.linear_solves, plain.counters.linear_solves) <= 8
     assert np.allclose(plain.forces.pressure, nested.forces.pressure, rtol=0, atol=1e-8)
 
 

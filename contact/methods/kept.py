@@ -1,0 +1,139 @@
+"""Steps with a factorisation that was made elsewhere, and when they pay.
+
+A step of Newton's method costs a factorisation, a step with one of an earlier state a few
+substitutions. That one converges linearly, but where little of the body has yielded fast:
+Anderson's acceleration makes it GMRES for the tangent, with the kept factorisation as the
+preconditioner, once contact is settled. Contact itself is solved exactly in each step.
+
+References
+----------
+Walker and Ni, Anderson acceleration for fixed-point iterations, SIAM J. Numer. Anal. 49 (2011).
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable
+from dataclasses import replace
+from typing import TypeAlias
+
+import numpy as np
+
+from contact.interface.multipliers import Multipliers
+from contact.methods.acceleration import least_squares
+from contact.methods.step import Iterate
+from contact.problem.state import State
+from contact.typing import Array
+
+#: Steps that a new factorisation is worth: as many are taken with the old one at most.
+WORTH = 10.0
+
+#: Rate of convergence that a new factorisation would at least have.
+FAST = 0.1
+
+#: Number of earlier steps that the acceleration uses.
+DEPTH = 8
+
+#: Global inner products: maps two matrices (m, k) and (m, l) of local values to the (k, l)
+#: matrix of sums over all ranks.
+Inner: TypeAlias = Callable[[Array, Array], Array]
+
+
+class Kept:
+    """Decides from the residuals whether a factorisation is kept, and accelerates its steps.
+
+    All ranks decide alike.
+
+    Parameters
+    ----------
+    goal
+        The residual that is to be reached.
+    inner
+        Inner products of the owned parts of local unknowns.
+    worth
+        Steps that a new factorisation is worth; 0: it is never kept.
+    """
+
+    def __init__(self, goal: float, inner: Inner, worth: float) -> None:
+        self._goal, self._inner, self._worth = goal, inner, worth
+        self._changes: deque[tuple[Array, Array]] = deque(maxlen=DEPTH)
+        self.forget()
+        self.begin()
+
+    def forget(self) -> None:
+        """Let the next step make a new factorisation."""
+        self._made = self._keeps = False
+        self._slow = 0
+
+    def begin(self) -> None:
+        """Begin another loop: it has other loads, or begins elsewhere."""
+        self._before: Iterate | None = None
+        self._first = False
+        self._reached = np.inf
+        self._last: tuple[Array, Array] | None = None
+        self._changes.clear()
+
+    def turn(self, iterate: Iterate, reached: float) -> tuple[Iterate, bool]:
+        """Return where to go on from, and whether with the kept factorisation.
+
+        Parameters
+        ----------
+        iterate
+            Where the method is.
+        reached
+            The largest residual there.
+        """
+        before, last = self._before, self._reached
+        if not self._made or self._worth <= 0:
+            keep = False
+        elif before is None:
+            keep = iterate.status is not None
+        elif reached >= last and self._keeps:
+            iterate, reached, keep = before, last, False
+        else:
+            rate = reached / last
+            left = np.log(self._goal / reached) / np.log(rate) if rate < 1 else np.inf
+            self._slow += self._keeps and rate > FAST
+            # What other loads have taken tells what the next ones will.
+            tired = self._first and self._slow > self._worth / 2
+            keep = bool(left <= self._worth) and not tired
+        self._first = before is None
+        if not keep:
+            self._changes.clear()
+            self._last, self._slow = None, 0
+        self._before, self._reached, self._keeps = iterate, reached, keep
+        return iterate, keep
+
+    def mixed(self, state: State, new: State) -> State:
+        """Return where a step leads that follows others with the same factorisation. Collective.
+
+        Parameters
+        ----------
+        state, new
+            Where it began and where it ended.
+        """
+        end, move = _values(new), new.x - state.x
+        if self._last is not None:
+            self._changes.append((end - self._last[0], move - self._last[1]))
+        self._last, self._made = (end, move), True
+        if not self._changes:
+            return new
+        towards, changes = (np.stack(part, axis=1) for part in zip(*self._changes, strict=True))
+        gram = self._inner(changes, np.column_stack([changes, move]))
+        lengths = np.sqrt(np.diag(gram))
+        lengths = np.where(lengths > 0, lengths, 1.0)
+        gram, load = gram[:, :-1] / np.outer(lengths, lengths), gram[:, -1] / lengths
+        return _with(new, end - towards @ (least_squares(gram, load) / lengths))
+
+
+def _values(state: State) -> Array:
+    """Return unknowns and contact forces as one vector."""
+    return np.concatenate([state.x, state.forces.pressure, state.forces.friction.ravel()])
+
+
+def _with(state: State, values: Array) -> State:
+    """Return a state with other unknowns and contact forces."""
+    n, count = state.x.size, state.forces.pressure.size
+    x, pressure, friction = np.split(values, [n, n + count])
+    friction = friction.reshape(state.forces.friction.shape)
+    return replace(state, x=x, forces=Multipliers(pressure, friction))

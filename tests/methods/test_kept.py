@@ -1,0 +1,107 @@
+"""A factorisation that is kept while the material moves on."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+
+from contact.interface.friction import Friction
+from contact.methods.kept import Kept
+from contact.methods.newton import Newton
+from contact.methods.options import NewtonOptions
+from contact.methods.step import Iterate
+from contact.problem.problem import ContactProblem
+from forms.hencky import Log
+from forms.laws import ConstantCoefficient
+from tests.problems import mechanics
+
+SELF = MPI.COMM_SELF
+
+
+def yielding(load: float = -0.03, yield_strain: float = 0.02) -> ContactProblem:
+    law = Log(1.0, 0.3, yield_strain=yield_strain)
+    return mechanics.bar(SELF, 16, load, law=law, friction=Friction(ConstantCoefficient(0.4)))
+
+
+@pytest.mark.parametrize("yield_strain", [0.02, 0.004])
+def test_it_saves_factorisations_and_changes_nothing(yield_strain):
+    problem = yielding(yield_strain=yield_strain)
+    always, kept = (
+        Newton(problem, NewtonOptions(keep=k, tolerance=1e-10)) for k in ("never", "within")
+    )
+    (one, first), (other, second) = always.solve(), kept.solve()
+    assert first.converged and second.converged
+    assert np.allclose(one.x, other.x, rtol=0, atol=1e-8 * np.abs(one.x).max())
+    assert np.allclose(one.forces.pressure, other.forces.pressure, rtol=0, atol=1e-8)
+    assert kept.counters.factorizations <= always.counters.factorizations - 2
+    assert kept.counters.linear_solves <= 3 * always.counters.linear_solves
+
+
+def test_loads_that_follow_each_other_need_hardly_any():
+    problem = yielding()
+    options = NewtonOptions(tolerance=1e-10, keep="across")
+    method, start, solves = Newton(problem, options), None, []
+    for load in np.linspace(-0.03, -0.04, 6):
+        problem = yielding(load)
+        method.turn_to(problem)
+        begun = method.counters.linear_solves
+        start, outcome = method.solve(start)
+        assert outcome.converged
+        solves.append(method.counters.linear_solves - begun)
+    fresh, _ = Newton(problem, NewtonOptions(tolerance=1e-10)).solve()
+    assert np.allclose(start.x, fresh.x, rtol=0, atol=1e-8 * np.abs(fresh.x).max())
+    assert method.counters.factorizations <= 4
+    assert max(solves[1:]) <= 10
+
+
+def test_a_solve_does_not_depend_on_those_before_unless_that_is_asked_for():
+    problem = yielding()
+    near, _ = Newton(yielding(-0.031), NewtonOptions()).solve()
+    fresh, used = (Newton(problem, NewtonOptions()) for _ in range(2))
+    used.solve()
+    assert used.solve(near)[0].near(fresh.solve(near)[0])
+
+
+class Body:
+    """Stands for increments that are all of one rank."""
+
+    @staticmethod
+    def products(ones, others):
+        return ones.T @ others
+
+
+def begun(reached: float) -> tuple[Kept, Iterate]:
+    """Return the rule after one step with a new factorisation, which led to a residual."""
+    state = yielding().start()
+    kept = Kept(1e-8, Body.products, 10.0)
+    iterate, keep = kept.turn(Iterate(state), 1.0)
+    assert not keep
+    kept.mixed(state, replace(state, x=state.x + 1.0))
+    iterate, keep = kept.turn(Iterate(state), reached)
+    assert keep
+    return kept, iterate
+
+
+@pytest.mark.parametrize(("rate", "keeps"), [(0.1, True), (0.5, False)])
+def test_it_is_kept_as_long_as_that_is_fast(rate, keeps):
+    kept, iterate = begun(1e-3)
+    assert kept.turn(Iterate(iterate.state), 1e-3 * rate)[1] is keeps
+
+
+def test_a_step_that_makes_things_worse_is_taken_back():
+    kept, iterate = begun(1e-3)
+    again, keep = kept.turn(Iterate(iterate.state), 2e-3)
+    assert again is iterate and not keep
+
+
+def test_the_acceleration_solves_what_is_linear_in_as_many_steps_as_there_are_rates():
+    """The fixed point x = a - D x has two rates: its third step is exact."""
+    state = yielding().start()
+    rates = np.where(np.arange(state.x.size) % 2, 0.3, 0.6)
+    goal = np.linspace(1.0, 2.0, state.x.size)
+    kept = Kept(1e-8, Body.products, 10.0)
+    for _ in range(3):
+        end = replace(state, x=goal + rates * (state.x - goal))
+        state = kept.mixed(state, end)
+    assert np.allclose(state.x, goal, rtol=0, atol=1e-9)
