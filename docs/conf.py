@@ -20,10 +20,14 @@ exclude_patterns = ["results/**"]
 html_theme = "alabaster"
 html_theme_options = {
     "description": "Frictional contact in FEniCSx",
-    "page_width": "1100px",
+    "page_width": "1240px",
+    "sidebar_width": "250px",
+    "body_max_width": "none",  # lines of code have 100 characters
+    "code_font_size": "0.8em",
     "fixed_sidebar": True,
 }
 html_static_path = []
+html_show_copyright = False
 autodoc_typehints = "none"
 autodoc_member_order = "bysource"
 napoleon_numpy_docstring = True
@@ -34,8 +38,13 @@ default_role = "code"
 
 
 def _bars(_: Any, __: str, ___: str, ____: Any, _____: Any, lines: list[str]) -> None:
-    """Let |x| be what it says in docstrings, and no substitution."""
+    """Let |x| be what it says in docstrings, and no substitution; several attributes one field."""
+    section = ""
     for i, line in enumerate(lines):
+        if lines[i + 1 : i + 2] and re.fullmatch("-{3,}", lines[i + 1]):
+            section = line
+        if section == "Attributes" and re.fullmatch(r"\w+(, \w+)+", line):
+            lines[i] = line = line.replace(", ", ",")
         pieces = re.split(r"(``?[^`]*``?)", line)
         lines[i] = "".join(p if p.startswith("`") else p.replace("|", r"\|") for p in pieces)
 

@@ -23,7 +23,7 @@ class Item(NamedTuple):
 
 SUMMARY: Mapping[str, Item] = {
     "title": Item("", "Title of the case."),
-    "units": Item("", "Names of the units, those of `[units]`."),
+    "units": Item("", "Names of the units, those of `[case] units`."),
     "converged": Item("", "Whether all residuals are within the tolerance."),
     "reason": Item("", "Why the run ended, in words."),
     "method": Item("", "The method, as in `[solver]`."),

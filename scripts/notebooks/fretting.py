@@ -23,7 +23,7 @@ case = load_case(CASES / "fretting.toml", changes)
 solution = solve(case)
 print(solution.outcome.reason)
 rows = [record.row for record in solution.steps]
-print(len(rows), "steps:", ", ".join(rows[0]))
+print(len(rows), "steps")
 
 # %%
 moved = np.array([row["driven_x"] for row in rows])
