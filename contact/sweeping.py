@@ -34,8 +34,8 @@ from contact.methods.report import Monitor, tell
 from contact.methods.steps import since, solve_step
 from contact.output.folder import on_root
 from contact.output.rerun import difference
+from contact.output.rows import contact_columns, moving_columns
 from contact.output.solution import Solution
-from contact.output.summary import count, largest_displacement
 from contact.output.table import contact_table
 from contact.output.tables import write_csv
 from contact.problem.held import check_potential
@@ -208,17 +208,11 @@ def _write(folder: Path, rows: Sequence[Mapping[str, Any]]) -> None:
 
 def _row(solution: Solution) -> dict[str, Any]:
     """Return what the table says of a solution. Collective."""
-    problem = solution.problem
-    counts = count(problem.comm, contact_table(solution))
-    force = zip("xyz", solution.contact_force, strict=False)
     return {
         "converged": solution.converged,
-        "max_pressure": problem.nodes.maximum(solution.pressure),
-        **{f"contact_force_{axis}": float(component) for axis, component in force},
-        "contact_nodes": counts["stick"] + counts["slip"],
-        "stick_nodes": counts["stick"],
-        "slip_nodes": counts["slip"],
-        "max_displacement": largest_displacement(solution),
+        **contact_columns(solution, contact_table(solution)),
+        "contact_area": solution.contact_area,
+        **moving_columns(solution),
         "outer_iterations": len(solution.history.records),
         "linear_solves": solution.counters.linear_solves,
         "factorizations": solution.counters.factorizations,

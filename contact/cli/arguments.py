@@ -12,7 +12,7 @@ from mpi4py import MPI
 from contact import __version__
 from contact.cli import materials, new, plot, sweep
 from contact.errors import InputError
-from contact.output.reference import summary_help
+from contact.output.reference import files_help
 
 DESCRIPTION = """\
 Frictional contact of elasto-plastic and piezoelectric bodies. A problem is a case file;
@@ -65,19 +65,20 @@ def _parser() -> _Parser:
         command = commands.add_parser(name, help=text, description=text, **common)
         command.usage = f"contact {name} CASE.toml [options] [PETSc options]"
         optional: dict[str, Any] = {"nargs": "?"} if name == "solve" else {}
-        command.add_argument("case", metavar="CASE.toml", help="case file", **optional)
+        command.add_argument("case", metavar="CASE.toml", help="case file (TOML)", **optional)
         command.add_argument(
             "--set",
             action="append",
             default=[],
             metavar="KEY=VALUE",
-            help="replace a value of the case file; may be repeated",
+            help="replace a value of the case file, for instance load.0.traction='[0, -1]'; may be "
+            "repeated",
         )
         command.add_argument("--help", action="help", help="show this help and leave")
         command.add_argument("--plot", action="store_true", help=drawn)
         if name == "solve":
             command.usage = f"contact {name} CASE.toml --out DIR [options] [PETSc options]"
-            command.epilog = summary_help()
+            command.epilog = files_help("summary.json", "contact.csv", "steps.csv", "history.csv")
             command.formatter_class = argparse.RawDescriptionHelpFormatter
             command.add_argument("--out", metavar="DIR", help="folder for results")
             command.add_argument(

@@ -10,12 +10,15 @@ from mpi4py import MPI
 from contact.cli.ending import CONVERGED, NOT_CONVERGED
 from contact.errors import InputError
 from contact.output.folder import result_folder
+from contact.output.reference import files_help
 
 
 def add_parser(commands: Any, common: dict[str, Any]) -> None:
     """Add the command to the parser's commands."""
     text = "solve a case for several values of some keys: sweep.csv, one row a value"
     command = commands.add_parser("sweep", help=text, description=text, **common)
+    command.epilog = files_help("sweep.csv")
+    command.formatter_class = argparse.RawDescriptionHelpFormatter
     command.usage = "contact sweep CASE.toml --over KEY=V1,V2,... --out DIR [options]"
     command.add_argument("case", metavar="CASE.toml", help="case file")
     command.add_argument(
@@ -37,6 +40,7 @@ def add_parser(commands: Any, common: dict[str, Any]) -> None:
         "--cold", action="store_true", help="start each solve from rest, not from the one before"
     )
     command.add_argument("--quiet", action="store_true", help="show no progress")
+    command.add_argument("--log", metavar="FILE", help="write a log to the end of a file")
     command.add_argument("--help", action="help", help="show this help and leave")
 
 
@@ -51,7 +55,8 @@ def run(options: argparse.Namespace, comm: MPI.Intracomm) -> int:
     if not options.out:
         raise InputError("--out: missing; accepted: a folder to write to")
     axes = [Axis.of(text) for text in options.over]
-    with result_folder(options.out, comm) as folder, progress(comm, options.quiet) as monitor:
+    shown = progress(comm, options.quiet, options.log)
+    with result_folder(options.out, comm) as folder, shown as monitor:
         rows = sweep(
             options.case, axes, folder.path, options.set, monitor, comm, warm=not options.cold
         )

@@ -186,12 +186,27 @@ _AGAINST: dict[str, Item] = {
     "u_z": Item("length", "The same; in space."),
 }
 
+_SWEEP: dict[str, Item] = {
+    "KEY": Item("", "What was swept, a column a key: the value of this row."),
+    "converged": Item("", "As in `summary.json`; rows that are not are computed again."),
+    "contact_force_x": Item("force", "As in `summary.json`; `_y`, in space `_z`."),
+    "max_pressure": Item("stress", "The same; `contact_nodes`, `stick_nodes`, `slip_nodes`."),
+    "max_displacement": Item("length", "The same."),
+    "contact_area": Item("area", "The same; in the plane a length."),
+    "rigid_x": Item("length", "As in `steps.csv`, and so are the others there of what moves."),
+    "charge_PART": Item("charge", "The same; `potential_PART`."),
+    "outer_iterations": Item("", "As in `summary.json`; `linear_solves`, `factorizations`."),
+    "kkt": Item("", "The largest residual."),
+    "seconds": Item("s", "For this row."),
+}
+
 #: Tables by the name of their file.
 TABLES: Mapping[str, Mapping[str, Item]] = {
     "contact.csv": _NODE,
     "contact-against.csv": _AGAINST,
     "history.csv": _HISTORY,
     "steps.csv": _STEPS,
+    "sweep.csv": _SWEEP,
 }
 
 #: Fields of fields.vtu; the derived ones have a companion NAME_cell, cell by cell.

@@ -37,6 +37,8 @@ INTRODUCTION = """\
 | `figure-*.png` | with `--plot`, and by `contact plot DIR` |
 | `animation-*.gif` | of an evolution, by `contact plot DIR --animate` |
 
+`contact sweep` leaves `sweep.csv`, one row a case, and `sweep.toml`, what was swept.
+
 They replace those of an earlier run all together, once they are complete; other files in DIR are
 left alone. Results of another problem are replaced with `--overwrite` only: the same one may be
 solved again by another method, to another tolerance, with other outputs.
@@ -118,14 +120,18 @@ def _rows(items: Mapping[str, Item], what: str) -> Iterator[str]:
         yield f"| `{name}` | {item.unit or '—'} | {text} |"
 
 
-def summary_help() -> str:
-    """Return the keys of the summary with their meanings, for the command line's help."""
-    lines = ["keys of summary.json (signs, units and the other files: docs/output.md):"]
-    for name, item in SUMMARY.items():
-        unit = f" ({item.unit})" if item.unit else ""
-        text = f"{_first(item.text)}{unit}"
-        lines += textwrap.wrap(f"  {name:<20}{text}", 98, subsequent_indent=22 * " ")
-    return "\n".join(lines)
+def files_help(*names: str) -> str:
+    """Return the keys or columns of some files, for the command line's help."""
+    lines = []
+    for name in names:
+        columns = name.endswith(".csv")
+        items, what = (TABLES[name], "columns") if columns else (SUMMARY, "keys")
+        lines += ["", f"{what} of {name}:"]
+        for key, item in items.items():
+            unit = f" ({item.unit})" if item.unit else ""
+            text = f"{_first(item.text)}{unit}"
+            lines += textwrap.wrap(f"  {key:<20}{text}", 98, subsequent_indent=22 * " ")
+    return "\n".join([*lines, "", "signs, units, all files: docs/output.md"]).lstrip("\n")
 
 
 def _first(text: str) -> str:

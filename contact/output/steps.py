@@ -12,11 +12,9 @@ from mpi4py import MPI
 
 from contact.body.amplitude import Moving, steady
 from contact.methods.steps import LoadStep
-from contact.output.balances import charge_balance
-from contact.output.motions import rigid_columns
 from contact.output.record import StepRecord
+from contact.output.rows import contact_columns, moving_columns
 from contact.output.solution import Solution
-from contact.output.summary import count, largest_displacement
 from contact.output.table import Table, contact_table, csv_columns
 from contact.output.tables import write_csv
 from contact.output.unloading import Unloading
@@ -72,33 +70,21 @@ class StepRecorder:
         energies: Balance,
         now: Moment,
     ) -> dict[str, float]:
-        problem, counts = step.problem, count(step.problem.comm, table)
-        axes = "xyz"[: problem.dim]
-        force = solution.contact_force
-        row: dict[str, float] = {"t": step.state.time}
-        row |= {f"contact_force_{axis}": float(f) for axis, f in zip(axes, force, strict=True)}
+        axes = "xyz"[: step.problem.dim]
+        row = {"t": step.state.time, **contact_columns(solution, table)}
         row |= {
-            "max_pressure": problem.nodes.maximum(solution.pressure),
-            "contact_nodes": counts["stick"] + counts["slip"],
-            "stick_nodes": counts["stick"],
-            "slip_nodes": counts["slip"],
-            "max_displacement": largest_displacement(solution),
             "work": energies.work,
             "energy": energies.energy,
             "dissipation": energies.dissipation,
             "linear_solves": step.counters.linear_solves,
             "factorizations": step.counters.factorizations,
             "kkt": step.outcome.kkt.largest,
+            **moving_columns(solution),
         }
-        row |= rigid_columns(problem, step.state)
         if self._nodes is not None:
-            moved, driving = _driven(problem, self._nodes, now)
+            moved, driving = _driven(step.problem, self._nodes, now)
             row |= {f"driven_{axis}": float(u) for axis, u in zip(axes, moved, strict=True)}
             row |= {f"driven_force_{a}": float(f) for a, f in zip(axes, driving, strict=True)}
-        if problem.piezoelectric:
-            charges = charge_balance(problem, step.state)
-            row |= {f"charge_{part}": charge for part, charge in charges.electrodes.items()}
-            row["charge_foundation"] = charges.foundation
         return row
 
 

@@ -2,13 +2,14 @@
 
 import csv
 import json
+import re
 from pathlib import Path
 
 import pytest
 
 from contact.output.described import BODY, SUMMARY, SURFACE, TABLES
 from contact.output.files import write_outputs
-from contact.output.reference import PAGE, page, summary_help
+from contact.output.reference import PAGE, files_help, page
 from contact.output.vtu import read_vtu
 from contact.solving import solve
 from tests.output.test_output import block, electric
@@ -75,6 +76,7 @@ def test_the_page_is_made_from_this() -> None:
 
 
 def test_help_names_every_key() -> None:
-    lines = summary_help().splitlines()
-    assert all(len(line) <= 100 for line in lines)
-    assert [line.split()[0] for line in lines[1:] if line[2] != " "] == list(SUMMARY)
+    for name, items in {"summary.json": SUMMARY, **TABLES}.items():
+        lines = files_help(name).splitlines()
+        assert all(len(line) <= 100 for line in lines)
+        assert [line.split()[0] for line in lines if re.match(r"  \S", line)] == list(items)
