@@ -21,9 +21,18 @@ def anchored(case: Case) -> Case:
     return case.model_copy(update={"mesh": mesh})
 
 
-def to_toml(case: Case) -> str:
-    """Return a case file that gives the same case again, without what its method ignores."""
-    data = case.model_dump(by_alias=True, exclude_none=True)
+def to_toml(case: Case, dimension: int | None = None) -> str:
+    """Return a case file that gives the same case again, without what its method ignores.
+
+    Parameters
+    ----------
+    case
+        The case.
+    dimension
+        Of its mesh, if it is known: what has no effect there is left out.
+    """
+    ignored = {"space": {"kinematics"}} if dimension == 3 else None
+    data = case.model_dump(by_alias=True, exclude_none=True, exclude=ignored)
     return "\n".join(_table(data, ())).strip() + "\n"
 
 

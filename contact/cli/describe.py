@@ -21,7 +21,7 @@ def describe(case: Case, problem: ContactProblem) -> str:
     layout = problem.equilibrium.layout
     library = environment.blas()
     lines = [
-        to_toml(case),
+        to_toml(case, domain.dim),
         f"# mesh: {cells} cells in {domain.dim}-D on {comm.size} rank(s), largest extent "
         f"{domain.size:g}",
         "# parts of its boundary, with their facets:",

@@ -70,6 +70,8 @@ def _sizes(problem: ContactProblem) -> list[str]:
     gap = problem.nodes.gap
     least = comm.allreduce(float(gap.min(initial=np.inf)), op=MPI.MIN)
     largest = comm.allreduce(float(gap.max(initial=-np.inf)), op=MPI.MAX)
+    if expected == 0:
+        return ["# warning: nothing is loaded or moved: all results will be 0"]
     lines = [
         f"# expected: displacements of some {expected:.2g} (loads, over the contact part, on a "
         f"block of the body's size; prescribed {moved:.2g}); gap {least:.3g} to {largest:.3g}"

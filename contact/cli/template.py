@@ -13,12 +13,13 @@ from contact.mesh.domain import Domain
 
 
 def case_text(domain: Domain, mesh: Path, path: Path) -> str:
-    """Return a case that holds the highest part and lets the lowest one touch. Collective."""
+    """Return a case that presses the highest part down onto the lowest one. Collective."""
     heights = _heights(domain)
     order = sorted(heights, key=lambda name: (heights[name], name))
     lowest, highest = order[0], order[-1]
     d = domain.dim
-    held, pull = ["0.0"] * d, ["0.0"] * (d - 1) + ["-1.0"]
+    pressed = _along(d, -float(f"{1e-3 * domain.size:.0e}"))
+    ground = _along(d, _lowest(domain))
     try:
         name = str(mesh.resolve().relative_to(path.resolve().parent))
     except ValueError:
@@ -29,6 +30,9 @@ def case_text(domain: Domain, mesh: Path, path: Path) -> str:
 # A case to begin with; every key is described in docs/case-file.md.
 # Units are yours, but all the same: with mm and N, stresses are in MPa.
 title = {literal(mesh.stem)}
+
+[case]
+# units = {{ length = "mm", stress = "MPa" }}    # for labels of figures
 
 [mesh]
 file = {literal(name)}
@@ -42,17 +46,17 @@ poisson = 0.3
 # yield_strain = 0.002
 
 [[fixed]]                     # the part that lies highest; "free" for a component that is not held
-on = {literal(highest)}
-displacement = [{", ".join(held)}]
+{f"on = {literal(highest)}":<30}# or a list of parts
+displacement = {pressed}
 
 # [[load]]                    # force per area, on any part but those of [contact]
 # on = {literal(highest)}
-# traction = [{", ".join(pull)}]
+# traction = {_along(d, -1.0)}
 
 [contact]                     # the part that lies lowest
 on = {literal(lowest)}
-gap = 0.0                     # to a rigid foundation along the part's normal; or a shape:
-# foundation = {{ shape = "plane", point = [{", ".join(held)}], normal = [{", ".join(_up(d))}] }}
+foundation = {{ shape = "plane", point = {ground}, normal = {_along(d, 1.0)} }}
+# gap = 0.0                   # instead: to a foundation along the part's normal; a formula, too
 
 [friction]
 law = "coulomb"
@@ -64,8 +68,15 @@ tolerance = 1e-8
 """
 
 
-def _up(dim: int) -> list[str]:
-    return ["0.0"] * (dim - 1) + ["1.0"]
+def _along(dim: int, value: float) -> str:
+    """Return a vector along the last axis, as TOML."""
+    return literal([0.0] * (dim - 1) + [value])
+
+
+def _lowest(domain: Domain) -> float:
+    """Return the least last coordinate of the mesh. Collective."""
+    x = domain.mesh.geometry.x[:, domain.dim - 1]
+    return domain.comm.allreduce(float(x.min(initial=np.inf)), op=MPI.MIN) + 0.0
 
 
 def _heights(domain: Domain) -> dict[str, float]:

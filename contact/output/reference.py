@@ -37,11 +37,11 @@ INTRODUCTION = """\
 | `figure-*.png` | with `--plot`, and by `contact plot DIR` |
 | `animation-*.gif` | of an evolution, by `contact plot DIR --animate` |
 
-`contact sweep` leaves `sweep.csv`, one row a case, and `sweep.toml`, what was swept.
-
 They replace those of an earlier run all together, once they are complete; other files in DIR are
 left alone. Results of another problem are replaced with `--overwrite` only: the same one may be
 solved again by another method, to another tolerance, with other outputs.
+
+`contact sweep` leaves `sweep.csv`, one row a case, and `sweep.toml`, what was swept.
 
 **Units.** All is in the units of the case: with millimetres and newtons, stresses are in MPa. In
 the plane, forces and charges are those of a unit of depth; of bodies of revolution they are those

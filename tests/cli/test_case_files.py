@@ -1,66 +1,13 @@
-"""Wrong case files and meshes, through the command line: one message each, exit status 2."""
+"""Wrong case files and meshes: one message each, exit status 2."""
 
-import os
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
-from mpi4py import MPI
-from petsc4py import PETSc
 
-from contact.cli.main import BAD_INPUT, CONVERGED, NOT_CONVERGED, main
+from contact.cli.main import BAD_INPUT, CONVERGED, main
+from tests.cli.running import BAR, MESH, PIEZO, refuse, run, write
 
 FIXTURES = Path(__file__).parents[2] / "meshes" / "fixtures"
-
-BAR = """
-[mesh]
-generator = "rectangle"
-size = [2.0, 1.0]
-cells = [4, 2]
-[mesh.parts.half]
-side = "bottom"
-to = 1.0
-[material]
-law = "log"
-young = 1.0
-poisson = 0.3
-yield_strain = 0.05
-[[fixed]]
-on = "left"
-displacement = [0.0, 0.0]
-[[load]]
-on = "top"
-traction = [0.0, -0.001]
-[contact]
-on = "bottom"
-gap = 0.0
-[friction]
-law = "coulomb"
-mu = 0.3
-"""
-
-PIEZO = """
-[material.piezo]
-e31 = -5.4
-e33 = 15.8
-e15 = 12.3
-beta11 = 8.1
-beta33 = 7.4
-"""
-
-MESH = """
-[mesh]
-file = "{file}"
-[material]
-young = 1.0
-poisson = 0.3
-[[fixed]]
-on = "left"
-displacement = [0.0, 0.0]
-[contact]
-on = "bottom"
-"""
 
 #: Name -> (text that is replaced, its replacement, words of the message).
 WRONG = {
@@ -231,38 +178,6 @@ MESHES = {
 }
 
 
-def run(case: Path, *options: str, capfd: pytest.CaptureFixture[str]) -> tuple[int, list[str]]:
-    """Solve a case by the command line; return the exit status and the lines of stderr."""
-    MPI.COMM_WORLD.barrier()
-    out = case.parent / "out"
-    status = main(["solve", str(case), "--out", str(out), "--quiet", *options])
-    lines = [line for line in capfd.readouterr().err.splitlines() if line.strip()]
-    if status == BAD_INPUT:
-        assert not out.exists(), "bad input must leave nothing behind"
-    return status, lines
-
-
-def write(folder: Path, text: str, name: str = "case.toml") -> Path:
-    """Write a case file, on rank 0."""
-    path = folder / name
-    if MPI.COMM_WORLD.rank == 0:
-        path.write_text(text)
-    return path
-
-
-def refuse(case: Path, words: list[str], capfd: pytest.CaptureFixture[str], *options: str) -> None:
-    """Check that a case is refused with one message that names the file and holds the words."""
-    status, lines = run(case, *options, capfd=capfd)
-    assert status == BAD_INPUT
-    if MPI.COMM_WORLD.rank == 0:
-        assert len(lines) == 1, lines
-        assert lines[0].startswith("contact: ")
-        missing = [word for word in [case.name, *words] if word not in lines[0]]
-        assert not missing, f"{missing} not in: {lines[0]}"
-    else:
-        assert lines == []
-
-
 def test_the_base_case_is_right(shared_tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
     """What the wrong cases differ from converges."""
     status, _ = run(write(shared_tmp_path, BAR), capfd=capfd)
@@ -304,85 +219,6 @@ def test_missing_files(shared_tmp_path: Path, capfd: pytest.CaptureFixture[str])
     refuse(write(shared_tmp_path, MESH.format(file="absent.msh")), ["absent.msh"], capfd)
 
 
-@pytest.mark.parametrize(
-    ("options", "words"),
-    [
-        (["--set", "material.young"], ["material.young", "no assignment"]),
-        (["--set", "material.young=-1"], ["material.young", "-1"]),
-        (["--set", "load.3.on=top"], ["load", "3"]),
-        (["--outt", "x"], ["--outt", "--out"]),
-        (["--out", ""], ["--out", "no folder"]),
-    ],
-)
-def test_wrong_command_line(
-    options: list[str],
-    words: list[str],
-    shared_tmp_path: Path,
-    capfd: pytest.CaptureFixture[str],
-) -> None:
-    """Options and overrides are checked as the file is."""
-    status, lines = run(write(shared_tmp_path, BAR), *options, capfd=capfd)
-    assert status == BAD_INPUT
-    assert len(lines) == 1
-    assert all(word in lines[0] for word in words), lines
-
-
-@pytest.mark.parametrize(
-    ("option", "value", "method"),
-    [
-        ("contact_ksp_type", "foo", "newton"),
-        ("contact_pc_factor_mat_solver_type", "foo", "uzawa"),
-        ("penalty_snes_type", "foo", "penalty"),
-    ],
-)
-def test_wrong_petsc_options(
-    option: str, value: str, method: str, shared_tmp_path: Path, capfd: pytest.CaptureFixture[str]
-) -> None:
-    """What PETSc does not know is bad input, and nothing is left in its options."""
-    options = PETSc.Options()
-    options[option] = value
-    before = set(options.getAll())
-    try:
-        case = write(shared_tmp_path, BAR + f"[solver]\nmethod = '{method}'\n")
-        refuse(case, ["PETSc", value, option.split("_")[0]], capfd)
-        assert set(options.getAll()) == before
-    finally:
-        options.delValue(option)
-
-
-@pytest.mark.parametrize("name", ["pulled off", "potential of an open contact", "overflow"])
-@pytest.mark.parametrize("method", ["uzawa", "newton"])
-def test_problem_without_solution(
-    name: str, method: str, shared_tmp_path: Path, capfd: pytest.CaptureFixture[str]
-) -> None:
-    """Loads that nothing balances and undetermined potentials are bad input too."""
-    if name == "pulled off":
-        text = BAR.replace("[0.0, 0.0]", '[0.0, "free"]').replace("-0.001", "0.001")
-        words = ["pull the body off"]
-    elif name == "overflow":
-        text = BAR.replace("-0.001", "-1e149").replace("young = 1.0", "young = 1e-149")
-        words = ["numbers overflow"]
-    else:
-        text = BAR.replace("[[load]]", PIEZO + "[[load]]").replace("gap = 0.0", "gap = 0.5")
-        text += "\n[electric]\nlaw = 'perfect'\nk_e = 1.0\n"
-        words = ["potential is not determined"]
-    text += f"\n[solver]\nmethod = '{method}'\n"
-    refuse(write(shared_tmp_path, text), words, capfd)
-
-
-@pytest.mark.parallel
-@pytest.mark.parametrize("method", ["uzawa", "newton"])
-def test_held_nodes_that_conduct_determine_the_potential(
-    method: str, shared_tmp_path: Path, capfd: pytest.CaptureFixture[str]
-) -> None:
-    """Where the body rests on supports and is open elsewhere, the current flows through those."""
-    text = BAR.replace("[[load]]", PIEZO + "[[load]]").replace("gap = 0.0", 'gap = "0.5*(x>1)"')
-    text = text.replace("[[load]]", '[[fixed]]\non = "half"\ndisplacement = [0.0, 0.0]\n[[load]]')
-    text += f"\n[electric]\nk_e = 1.0\nphi_f = 2.0\n[solver]\nmethod = '{method}'\n"
-    status, lines = run(write(shared_tmp_path, text), capfd=capfd)
-    assert status == CONVERGED, lines
-
-
 @pytest.mark.parallel
 @pytest.mark.parametrize(
     "name",
@@ -406,37 +242,3 @@ def test_all_ranks_refuse_together(
 ) -> None:
     """What only some ranks can see makes all of them leave, with one message."""
     test_wrong_case_file(name, shared_tmp_path, capfd)
-
-
-@pytest.mark.parallel
-def test_not_converged_writes_outputs(
-    shared_tmp_path: Path, capfd: pytest.CaptureFixture[str]
-) -> None:
-    """One outer iteration is too few: exit status 1, and the outputs say so."""
-    case = write(shared_tmp_path, BAR.replace("mu = 0.3", 'mu = { law = "slip", rho = 1e4 }'))
-    options = ("--set", "solver.method=uzawa", "--set", "solver.max_outer=1")
-    status, lines = run(case, *options, capfd=capfd)
-    assert status == NOT_CONVERGED
-    if MPI.COMM_WORLD.rank == 0:  # --quiet is about progress alone
-        assert "contact: stopped: not converged in 1 outer iterations" in lines[-1]
-    summary = (shared_tmp_path / "out" / "summary.json").read_text()
-    assert '"converged": false' in summary
-    assert "not converged in 1 outer iterations" in summary
-
-
-@pytest.mark.parametrize(("asked", "status"), [(False, CONVERGED), (True, BAD_INPUT)])
-def test_petsc_obeys_no_file_that_lies_in_the_folder(asked, status, tmp_path):
-    """It comes with a case of somebody else's, and may name libraries to be loaded."""
-    (tmp_path / "case.toml").write_text(BAR)
-    for name in (".petscrc", "petscrc"):
-        (tmp_path / name).write_text("-contact_pc_factor_mat_solver_type nonsense\n")
-    options = ["-options_file", ".petscrc"] if asked else []
-    command = [sys.executable, "-m", "contact", "solve", "case.toml", "--out", "out", *options]
-    done = subprocess.run(
-        command,
-        cwd=tmp_path,
-        env={**os.environ, "PYTHONPATH": str(FIXTURES.parents[1])},
-        capture_output=True,
-        text=True,
-    )
-    assert done.returncode == status, done.stderr

@@ -139,6 +139,16 @@ def test_runs_directly_where_fenicsx_is(launcher):
     assert launcher.roots() == []
 
 
+def test_a_package_of_a_virtual_environment_is_not_hidden(launcher):
+    launcher.fake("python3")
+    folder = launcher.elsewhere / "venv"
+    folder.mkdir()
+    for name, text in (("python3", "echo 0.1.0"), ("tool", 'echo "<$PYTHONPATH>"')):
+        (folder / name).write_text(f"#!{shutil.which('bash')}\n{text}\n")
+        (folder / name).chmod(0o755)
+    assert launcher.run(str(folder / "tool"))[1] == "<>\n"
+
+
 def test_threads_under_mpi_only_where_the_user_set_none(launcher):
     launcher.fake("python3")
     variables = "$OMP_NUM_THREADS $PRTE_MCA_rmaps_default_mapping_policy $OMPI_MCA_topo"

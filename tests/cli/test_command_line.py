@@ -1,0 +1,78 @@
+"""Wrong command lines, and PETSc's options."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from petsc4py import PETSc
+
+from contact.cli.main import BAD_INPUT, CONVERGED
+from tests.cli.running import BAR, refuse, run, write
+
+ROOT = Path(__file__).parents[2]
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        (["--set", "material.young"], ["material.young", "no assignment"]),
+        (["--set", "material.young=-1"], ["material.young", "-1"]),
+        (["--set", "load.3.on=top"], ["load", "3"]),
+        (["--outt", "x"], ["--outt", "--out"]),
+        (["--out", ""], ["--out", "no folder"]),
+    ],
+)
+def test_wrong_command_line(
+    options: list[str],
+    words: list[str],
+    shared_tmp_path: Path,
+    capfd: pytest.CaptureFixture[str],
+) -> None:
+    """Options and overrides are checked as the file is."""
+    status, lines = run(write(shared_tmp_path, BAR), *options, capfd=capfd)
+    assert status == BAD_INPUT
+    assert len(lines) == 1
+    assert all(word in lines[0] for word in words), lines
+
+
+@pytest.mark.parametrize(
+    ("option", "value", "method"),
+    [
+        ("contact_ksp_type", "foo", "newton"),
+        ("contact_pc_factor_mat_solver_type", "foo", "uzawa"),
+        ("penalty_snes_type", "foo", "penalty"),
+    ],
+)
+def test_wrong_petsc_options(
+    option: str, value: str, method: str, shared_tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    """What PETSc does not know is bad input, and nothing is left in its options."""
+    options = PETSc.Options()
+    options[option] = value
+    before = set(options.getAll())
+    try:
+        case = write(shared_tmp_path, BAR + f"[solver]\nmethod = '{method}'\n")
+        refuse(case, ["PETSc", value, option.split("_")[0]], capfd)
+        assert set(options.getAll()) == before
+    finally:
+        options.delValue(option)
+
+
+@pytest.mark.parametrize(("asked", "status"), [(False, CONVERGED), (True, BAD_INPUT)])
+def test_petsc_obeys_no_file_that_lies_in_the_folder(asked, status, tmp_path):
+    """It comes with a case of somebody else's, and may name libraries to be loaded."""
+    (tmp_path / "case.toml").write_text(BAR)
+    for name in (".petscrc", "petscrc"):
+        (tmp_path / name).write_text("-contact_pc_factor_mat_solver_type nonsense\n")
+    options = ["-options_file", ".petscrc"] if asked else []
+    command = [sys.executable, "-m", "contact", "solve", "case.toml", "--out", "out", *options]
+    done = subprocess.run(
+        command,
+        cwd=tmp_path,
+        env={**os.environ, "PYTHONPATH": str(ROOT)},
+        capture_output=True,
+        text=True,
+    )
+    assert done.returncode == status, done.stderr
