@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from math import ceil, log10
 
 import numpy as np
 from numpy.typing import NDArray
 from petsc4py import PETSc
 
+from contact.linear.faults import petsc_options
 from contact.linear.stiff_nodes import StiffNodes
 from contact.typing import Array
 
@@ -32,14 +32,10 @@ class Hierarchy:
         A solver with GAMG, set up with the body's operator.
     nodes
         Owned nodes that may have contact blocks, local numbers, shape (n,).
-    set_up
-        Sets the solver up for the operator as it is.
     """
 
-    def __init__(
-        self, ksp: PETSc.KSP, nodes: NDArray[np.int32], set_up: Callable[[], None]
-    ) -> None:
-        self._ksp, self._set_up = ksp, set_up
+    def __init__(self, ksp: PETSc.KSP, nodes: NDArray[np.int32]) -> None:
+        self._ksp = ksp
         self._stiff = StiffNodes(ksp.getPC(), nodes)
         self._most = ksp.getTolerances()[3]
         self._lost = np.inf
@@ -68,6 +64,11 @@ class Hierarchy:
         self._ksp.getPC().setReusePreconditioner(False)
         self._set_up()
         self._lost, self._rate = 0.0, None
+
+    def _set_up(self) -> None:
+        self._ksp.setOperators(*self._ksp.getOperators())
+        with petsc_options(self._ksp.getOptionsPrefix()):
+            self._ksp.setUp()
 
     def solve(self, rhs: PETSc.Vec, solution: PETSc.Vec) -> tuple[int, bool]:
         """Solve. Collective.

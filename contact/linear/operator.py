@@ -181,13 +181,14 @@ class SparseOperator:
                 if inserts:
                     insert_blocks(self.matrix, nodes, own + TOUCH * rest)
                 self.set_up(symmetric=True)
-            self._hierarchy = Hierarchy(self.ksp, nodes, lambda: self.set_up(self.symmetric))
+            self._hierarchy = Hierarchy(self.ksp, nodes)
         if inserts:
             insert_blocks(self.matrix, nodes, own + rest)
         if self._hierarchy is None:
             self.set_up(self.symmetric)
             self.counters.factorizations += 1
         else:
+            self.matrix.setOption(PETSc.Mat.Option.SYMMETRIC, self.symmetric)
             self.counters.factorizations += self._hierarchy.follow(own, rest)
         return True
 

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import gc
+import weakref
+
 import numpy as np
 import pytest
 from mpi4py import MPI
@@ -80,6 +83,21 @@ def test_coarse_levels_are_renewed_when_iterations_say_so() -> None:
     direct = operator_of(problem, "lu")
     direct.update("secant", x, 0 * sticks)
     assert body.norm(found - direct.solve(load)) <= 1e-5 * body.norm(found)
+
+
+def test_an_operator_is_freed_at_once() -> None:
+    """It holds most of the memory, and ranks would collect a cycle at different times."""
+    problem = mechanics.leaning_block(SELF, 4)
+    operator = operator_of(problem, "iterative")
+    operator.update("secant", problem.start().x, sticking(problem))
+    operator.solve(problem.equilibrium.external(), 1e-6)
+    left = weakref.ref(operator)
+    gc.disable()
+    try:
+        del operator
+        assert left() is None
+    finally:
+        gc.enable()
 
 
 @pytest.mark.parallel
