@@ -11,12 +11,14 @@
 # rigid table: the washer presses on it, a load pulls at its upright. Does the foot lift off?
 
 # %%
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
 import gmsh
 import numpy as np
-from dolfinx.io import gmshio
 from mpi4py import MPI
 
-from contact import Body, Contact, Domain, Fixed, Friction, Linear, Load, Plane, Problem, solve
+from contact import Body, Contact, Fixed, Friction, Linear, Load, Plane, Problem, from_msh, solve
 
 gmsh.initialize()
 gmsh.option.setNumber("General.Terminal", 0)
@@ -38,8 +40,7 @@ occ.synchronize()
 # Faces get their names by where they lie. The disk has cut the washer's seat out of the foot's top.
 
 # %%
-TAGS = {"bottom": 1, "washer": 2, "tip": 3}
-faces = {name: [] for name in TAGS}
+faces = {"bottom": [], "washer": [], "tip": []}
 for dim, tag in gmsh.model.getEntities(2):
     if len(gmsh.model.getAdjacencies(2, tag)[0]) != 1:
         continue  # no face of the body
@@ -52,14 +53,15 @@ for dim, tag in gmsh.model.getEntities(2):
     elif low[2] > 30 - 1e-3:
         faces["tip"].append(tag)
 for name, tags in faces.items():
-    gmsh.model.addPhysicalGroup(2, tags, TAGS[name], name=name)
-gmsh.model.addPhysicalGroup(3, [t for _, t in gmsh.model.getEntities(3)], 1)
+    gmsh.model.addPhysicalGroup(2, tags, name=name)
+gmsh.model.addPhysicalGroup(3, [t for _, t in gmsh.model.getEntities(3)], name="bracket")
 gmsh.option.setNumber("Mesh.MeshSizeMax", 3.0)
 gmsh.model.mesh.generate(3)
-mesh, _, facet_tags, *_ = gmshio.model_to_mesh(gmsh.model, MPI.COMM_WORLD, 0)
-gmsh.finalize()
-
-domain = Domain.from_mesh(mesh, facet_tags, TAGS)
+with TemporaryDirectory() as folder:
+    file = Path(folder, "bracket.msh")
+    gmsh.write(str(file))
+    gmsh.finalize()
+    domain = from_msh(MPI.COMM_WORLD, file)
 print({name: len(domain.facets(name)) for name in domain.parts}, "facets")
 
 # %% [markdown]
