@@ -1,15 +1,17 @@
 """GetFEM and this code side by side: a block that is pressed and pushed on another one.
 
-``python3 -m scripts.benchmarks.peer_pair [MU]``: the meshes of the recipe `two_blocks` for both,
-P1. GetFEM integrates its augmented Lagrangian at Gauss points of the upper block's facets, with
-continuous multipliers: displacements agree to the order of the mesh, not to rounding.
+python3 -m scripts.benchmarks.peer_pair [--out DIR] [--coarse]
+
+The meshes of the recipe `two_blocks` for both, P1. GetFEM integrates its augmented Lagrangian at
+Gauss points of the upper block's facets, with continuous multipliers: displacements agree to the
+order of the mesh, not to rounding.
 """
 
 from __future__ import annotations
 
-import sys
 import tempfile
 import time
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -18,7 +20,8 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 import meshes
-from contact import Solution, parse_case, solve
+from contact import Case, build_problem, parse_case, solve_problem
+from scripts.reporting import Report, parser
 
 SIZES = {"lower_size": 0.08, "upper_size": 0.06}
 YOUNG, POISSON = {"upper": 1.0, "lower": 3.0}, 0.3
@@ -29,23 +32,21 @@ BODIES = {"lower": 1, "upper": 2}
 LOWER_BOTTOM, LOWER_TOP, UPPER_BOTTOM, UPPER_TOP = 3, 5, 7, 9
 
 
-def ours(mu: float) -> Solution:
-    """Solve with this code."""
+def given(mu: float, sizes: Mapping[str, float]) -> Case:
+    """Return the problem for this code."""
     materials = [{"on": name, "young": e, "poisson": POISSON} for name, e in YOUNG.items()]
-    return solve(
-        parse_case(
-            {
-                "mesh": {"generator": "two_blocks", **SIZES},
-                "material": materials,
-                "fixed": [
-                    {"on": "lower_bottom", "displacement": [0.0, 0.0]},
-                    {"on": "upper_top", "displacement": TOP},
-                ],
-                "contact": {"on": "upper_bottom", "against": "lower_top"},
-                "friction": {"law": "coulomb", "mu": mu},
-                "solver": {"tolerance": 1e-10},
-            }
-        )
+    return parse_case(
+        {
+            "mesh": {"generator": "two_blocks", **sizes},
+            "material": materials,
+            "fixed": [
+                {"on": "lower_bottom", "displacement": [0.0, 0.0]},
+                {"on": "upper_top", "displacement": TOP},
+            ],
+            "contact": {"on": "upper_bottom", "against": "lower_top"},
+            "friction": {"law": "coulomb", "mu": mu},
+            "solver": {"tolerance": 1e-10},
+        }
     )
 
 
@@ -79,22 +80,25 @@ def model(path: Path, mu: float) -> tuple[gf.Model, dict[str, Any]]:
     return made, owned
 
 
-def main(arguments: list[str]) -> None:
-    """Solve with both, and compare."""
-    mu = float(arguments[0]) if arguments else 0.3
-    solution = ours(mu)
+def compare(mu: float, finer: int) -> dict[str, Any]:
+    """Solve with both on one mesh; return what they took, and how far apart they are."""
+    sizes = {name: size / finer for name, size in SIZES.items()}
+    case = given(mu, sizes)
+    own_problem = build_problem(case)
+    begin = time.process_time()
+    solution = solve_problem(own_problem, case.solver)
+    own_seconds = time.process_time() - begin
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "blocks.msh"
-        meshes.write("two_blocks", path, version=2.2, **SIZES)
+        meshes.write("two_blocks", path, version=2.2, **sizes)
         problem, owned = model(path, mu)
-        begin = time.perf_counter()
+        begin = time.process_time()
         steps, good = problem.solve("max_res", 1e-10, "max_iter", 100, "lsolver", "mumps")
-        seconds = time.perf_counter() - begin
-    print(f"GetFEM: converged {bool(good)}, {int(steps)} steps, solve {seconds:.3g} s")
-    print(f"ours:   converged {solution.converged}, solve {solution.seconds['solve']:.3g} s")
+        seconds = time.process_time() - begin
+    assert solution.converged and good
     space = solution.displacement.function_space
     points, values = space.tabulate_dof_coordinates()[:, :2], solution.displacement.x.array
-    largest = np.abs(values).max()
+    apart = 0.0
     for name, sign in (("upper", 1.0), ("lower", -1.0)):
         # Nodes of both bodies lie on y = 0.
         own = sign * points[:, 1] > 1e-9
@@ -102,9 +106,32 @@ def main(arguments: list[str]) -> None:
         inside = sign * theirs[:, 1] > 1e-9
         _, nearest = cKDTree(points[own]).query(theirs[inside])
         found = problem.variable(name).reshape(-1, 2)[inside]
-        apart = np.abs(values.reshape(-1, 2)[own][nearest] - found).max()
-        print(f"{name}: displacements differ by {apart / largest:.1e} of the largest")
+        difference = np.abs(values.reshape(-1, 2)[own][nearest] - found).max()
+        apart = max(apart, float(difference / np.abs(values).max()))
+    return {
+        "mu": mu,
+        "unknowns": own_problem.equilibrium.layout.free.size,
+        "apart": apart,
+        "GetFEM: steps": int(steps),
+        "seconds": seconds,
+        "ours: steps": len(solution.history.records),
+        "seconds ": own_seconds,
+    }
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Write the table."""
+    options = parser(__doc__, "peer_pair").parse_args(arguments)
+    finer = (1, 2) if options.coarse else (1, 2, 4)
+    rows = [compare(mu, n) for mu in (0.0, 0.3) for n in finer]
+    Report(options.out).table(
+        "peer-pair",
+        "A block pressed on another one and pushed along: GetFEM and this code on the same meshes",
+        {name: [row[name] for row in rows] for name in rows[0]},
+        "Seconds of the processor for the solve, one thread. Largest difference of the "
+        "displacements over the largest of them.",
+    )
 
 
 if __name__ == "__main__":
-    main(sys.argv[1:])
+    main()

@@ -97,7 +97,7 @@ class Loop:
         return np.asarray(sign * factor * (2 * along - first))
 
 
-def turn(poisson: float, elements: float, steps: int) -> Loop:
+def turn(poisson: float, elements: float, steps: int, degree: int = 1) -> Loop:
     """Press, push, and move there and back.
 
     Parameters
@@ -108,6 +108,8 @@ def turn(poisson: float, elements: float, steps: int) -> Loop:
         In Hertz's a, or about.
     steps
         From the middle to an end of the way.
+    degree
+        Of the space.
     """
     width = np.sqrt(RADIUS / 2 * PRESS)
     case = {
@@ -120,6 +122,7 @@ def turn(poisson: float, elements: float, steps: int) -> Loop:
             "contact_width": 1.3 * width,
             "growth": 0.5,
         },
+        "space": {"degree": degree},
         "material": {"young": YOUNG, "poisson": poisson},
         "fixed": [
             {"on": "symmetry_y", "displacement": ["free", 0.0, "free"]},

@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 
-from contact import parse_case, solve
+from contact import load_case, parse_case, solve
 from contact.output.table import contact_table
+from scripts.cases import CASES
 from scripts.studies.mindlin import turn
 from scripts.studies.pairs import converges, random_case
 from scripts.studies.two_bodies import approach, middle, pressed
@@ -95,6 +96,17 @@ def test_no_pressure_stands_on_an_axis():
         }
         table = contact_table(solve(parse_case(given)))
         assert table["x"].min() > 0.1 * size and table["pressure"].max() < 3100
+
+
+def test_curved_sides_of_degree_2():
+    """Facets that bulge as the bodies do: pressures of neighbours lie on one curve."""
+    case = load_case(CASES / "cylinder-on-block.toml", ["friction.mu=0", "space.degree=2"])
+    table = contact_table(solve(case))
+    x, pressure = table["x"], table["pressure"]
+    a = 6.2146
+    near = x < 0.8 * a
+    exact = 3585.4 * np.sqrt(1 - (x[near] / a) ** 2)
+    np.testing.assert_allclose(pressure[near], exact, rtol=5e-3)
 
 
 def half_cylinders(size, steps):

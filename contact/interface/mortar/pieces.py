@@ -79,6 +79,9 @@ def common_points(
     inverse = np.linalg.inv(projected[pair])
     on_master = np.einsum("pqb,pbc->pqc", on_slave, inverse)
     gap = np.einsum("pqc,pc->pq", on_master, height[pair])
+    for side, facets, places_on in ((slave, i[pair], on_slave), (master, j[pair], on_master)):
+        cosine = np.abs(np.einsum("pd,pd->p", side.normal[facets], direction[i[pair]]))
+        gap -= side.height(facets, places_on) / cosine[:, None]
     size = (size_of(corners)[pair] * share[pair, part])[:, None] * weights
     points = np.repeat(pair, weights.size)
     places = on_slave.reshape(-1, d)

@@ -11,6 +11,7 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 
 from contact import _compat
+from contact.interface.mortar.bulge import bulges, pairs_of
 from contact.mesh.domain import Domain
 from contact.typing import Array
 
@@ -28,6 +29,9 @@ class Surface:
         Coordinates of the corners, shape (f, d, d) (length).
     normal
         Unit normals out of the body, shape (f, d).
+    bulge
+        How far the surface is above them (`contact.interface.mortar.bulge`), shape (f, edges):
+        what functions of the space can follow, hence none at degree 1.
     degree
         Of the space.
     revolved
@@ -37,6 +41,7 @@ class Surface:
     nodes: NDArray[np.int64]
     corners: Array
     normal: Array
+    bulge: Array
     degree: int
     revolved: bool = False
 
@@ -65,6 +70,18 @@ class Surface:
         }
         return replace(self, **arrays)
 
+    def height(self, facets: NDArray[np.intp], barycentric: Array) -> Array:
+        """Return how far the surface is above facets at points, (p, q), along their normals.
+
+        Parameters
+        ----------
+        facets, barycentric
+            The facets, and points on each, shapes (p,) and (p, q, d).
+        """
+        edges = pairs_of(self.corners.shape[1])
+        products = np.stack([barycentric[..., i] * barycentric[..., j] for i, j in edges], axis=2)
+        return np.asarray(np.einsum("pqe,pe->pq", products, self.bulge[facets]))
+
     def turn(self, facets: NDArray[np.intp], barycentric: Array) -> Array:
         """Return the circumferences through points of facets; 1 unless revolved, shape (p,).
 
@@ -80,7 +97,7 @@ class Surface:
 
 
 def surface_of(domain: Domain, space: fem.FunctionSpace, part: str) -> Surface:
-    """Return the facets of a part that this rank owns.
+    """Return the facets of a part that this rank owns. Collective.
 
     Raises
     ------
@@ -103,10 +120,14 @@ def surface_of(domain: Domain, space: fem.FunctionSpace, part: str) -> Surface:
     corners = np.take_along_axis(x, vertices[:, :, None], axis=1)
     inside = np.take_along_axis(x, place[:, None, None], axis=1)[:, 0]
     numbers = space.dofmap.index_map.local_to_global(nodes.ravel().astype(np.int32))
+    names = np.asarray(numbers, dtype=np.int64).reshape(nodes.shape)
+    normal = _outward(corners, inside)
+    bulge = bulges(names[:, :d], corners, normal, domain.comm)
     return Surface(
-        np.asarray(numbers, dtype=np.int64).reshape(nodes.shape),
+        names,
         corners,
-        _outward(corners, inside),
+        normal,
+        bulge if degree == 2 else np.zeros_like(bulge),
         degree,
         domain.revolved,
     )
