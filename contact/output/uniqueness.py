@@ -183,7 +183,10 @@ def conductivity(solution: Solution) -> Iterator[Remark]:
     if PerfectConductivity in laws:
         yield (
             'the current jumps as the gap closes, electric.law = "perfect": (h~5)(e) fails, and no '
-            'theorem says that there is a solution or only one; "shifted" is continuous',
+            "theorem says that there is a solution or only one. Where contact ends within the "
+            "part, the place of its edge is not determined: a potential that lifts the body to the "
+            "foundation leaves an interval for it, with a pressure that is singular there, one "
+            'that pushes it off no place; "shifted" with a large delta is continuous and decides',
             False,
         )
 

@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 
 pytest.importorskip("gmsh")
-from contact import load_case, solve
+from contact import load_case, parse_case, solve
 from contact.errors import InputError
 from contact.library.reading import find
 from forms.elasticity import hexagonal
 from scripts.cases import CASES
 from scripts.studies import half_space
-from scripts.studies.indentation import Setting, extrapolated
+from scripts.studies.indentation import CURVATURE, Setting, extrapolated
 from scripts.studies.indentation_figures import BALL, TIME, charges
 
 #: Material -> E* insulating and conducting (GPa), |Q/P| of a grounded indenter (pC/N): published
@@ -143,3 +143,34 @@ def test_the_charge_of_a_ball_that_is_driven_at_constant_velocity():
         theory = 8 / 3 * abs(n21) * np.sqrt(BALL) * (velocity * times) ** 1.5
         assert found[velocity] == pytest.approx(theory, rel=5e-3)
     assert found[2e-6] / found[1e-6] == pytest.approx(2**1.5, rel=5e-3)
+
+
+def gap_beyond(share: float) -> tuple[float, bool]:
+    """Return the least gap beyond a part that ends within the interval of radii, and if all press.
+
+    Of a ball at 0.002 GV that conducts where it touches only.
+    """
+    setting = Setting("PZT-4", "ball", 0.002, 8.0)
+    first, last = np.sqrt(CURVATURE * setting.depth), setting.radius
+    # The box of 30 radii shifts the interval by 1.1 %.
+    radius = 1.0107 * (first + share * (last - first))
+    data = setting.case(30.0, f"mesh.radius={radius}").model_dump(exclude_unset=True)
+    data["electric"] = {"law": "perfect", "k_e": 1e6, "phi_f": 0.002}
+    solution = solve(parse_case(data))
+    body = solution.problem.equilibrium
+    points, u = body.layout.points, body.nodal(solution.state.x)[:, 1]
+    beyond = (points[:, 1] > -1e-12) & (points[:, 0] > radius * (1 + 1e-9))
+    gap = points[beyond, 0] ** 2 / (2 * CURVATURE) - setting.depth - u[beyond]
+    return float(gap.min()), bool(solution.converged and np.all(solution.status != "open"))
+
+
+def test_conduction_in_contact_alone_leaves_the_radius_open():
+    """Each radius from sqrt(R delta) to the closed form's ends a contact: docs/indentation.md."""
+    for share in (0.25, 0.75):
+        gap, pressed = gap_beyond(share)
+        assert pressed
+        assert gap > 0
+    gap, pressed = gap_beyond(-0.5)
+    assert pressed
+    assert gap < 0
+    assert not gap_beyond(1.5)[1]
