@@ -72,57 +72,60 @@ def find_pair(
         If the parts share nodes or overlap, follow what is rigid, do not face each other, or no
         node can move.
     """
-    domain, space, d = body.domain, body.space, body.dim
-    comm, index_map = domain.comm, space.dofmap.index_map
-    slave = surface_of(domain, space, part)
-    master = surface_of(domain, space, against).gathered(comm)
-    names = f"{part!r} and {against!r}"
-    common = np.intersect1d(slave.nodes, master.nodes).size
-    if comm.allreduce(common, op=MPI.SUM) > 0:
-        raise InputError(
-            f"{key}.against: the parts {names} share nodes; accepted: parts of two bodies whose "
-            "meshes are apart"
-        )
-    reach = REACH * domain.size
-    coupling = couple(slave, master, reach, comm)
-    begin, end = index_map.local_range
-    free = body.free
-    _check_apart(body, coupling, f"{key}.against: {names}")
-    stuck = _stuck(coupling, free, begin, end, comm)
-    if stuck.size:
-        coupling = couple(slave, master, reach, comm, stuck)
-    if coupling.nodes.size == 0:
-        raise InputError(
-            f"{key}.against: no facets of {names} face each other within {reach:.3g}, or their "
-            "nodes are held there; accepted: sides of two bodies that look at each other"
-        )
+    what = f"{key}.against: {part!r} and {against!r}"
+    slave = surface_of(body.domain, body.space, part)
+    master = surface_of(body.domain, body.space, against).gathered(body.comm)
+    coupling = _coupled(body, slave, master, what)
+    begin, end = body.layout.index_map.local_range
     here = np.flatnonzero((coupling.nodes >= begin) & (coupling.nodes < end))
     local = (coupling.nodes[here] - begin).astype(np.int32)
-    points = space.tabulate_dof_coordinates()[local, :d]
+    d = body.dim
+    points, normal = body.space.tabulate_dof_coordinates()[local, :d], coupling.normal[here]
     gap, cut = coupling.gap[here], 0.0
     if not press:
-        gap, cut = _apart(gap, slave, body, coupling, f"{key}.against: {names}")
-    _, added = distance.measure(points, coupling.normal[here])
-    moves = free[local, :d]
-    admissible = coupling.normal[here] * moves
+        gap, cut = _apart(gap, slave, body, coupling, what)
+    _, added = distance.measure(points, normal)
+    moves = body.free[local, :d]
+    admissible = normal * moves
     length = np.linalg.norm(admissible, axis=1)
     direction = admissible / length[:, None]
     tangent = -direction[:, :, None] * direction[:, None, :]
     tangent[:, np.arange(d), np.arange(d)] += moves
     nodes = ContactNodes(
-        comm,
+        body.comm,
         local,
         points,
         coupling.weight[here],
         direction,
         tangent,
         (gap + added) / length,
-        space.dofmap.index_map_bs,
+        body.block_size,
         cut,
-        domain.revolved,
-        body.masters.still(local.size, space.dofmap.index_map_bs),
+        body.domain.revolved,
+        body.masters.still(local.size, body.block_size),
     )
     return Pair(nodes, coupling)
+
+
+def _coupled(body: BodyEquilibrium, slave: Surface, master: Surface, what: str) -> Coupling:
+    """Return the operator without slave nodes whose normal is fixed. Collective."""
+    common = np.intersect1d(slave.nodes, master.nodes).size
+    if body.comm.allreduce(common, op=MPI.SUM) > 0:
+        raise InputError(
+            f"{what} share nodes; accepted: parts of two bodies whose meshes are apart"
+        )
+    reach = REACH * body.domain.size
+    coupling = couple(slave, master, reach, body.comm)
+    _check_apart(body, coupling, what)
+    stuck = _stuck(body, coupling)
+    if stuck.size:
+        coupling = couple(slave, master, reach, body.comm, stuck)
+    if coupling.nodes.size == 0:
+        raise InputError(
+            f"{what} have no facets that face each other within {reach:.3g}, or their nodes are "
+            "held there; accepted: sides of two bodies that look at each other"
+        )
+    return coupling
 
 
 def _check_apart(body: BodyEquilibrium, coupling: Coupling, what: str) -> None:
@@ -137,14 +140,13 @@ def _check_apart(body: BodyEquilibrium, coupling: Coupling, what: str) -> None:
         )
 
 
-def _stuck(
-    coupling: Coupling, free: NDArray[np.bool_], begin: int, end: int, comm: MPI.Intracomm
-) -> NDArray[np.int64]:
+def _stuck(body: BodyEquilibrium, coupling: Coupling) -> NDArray[np.int64]:
     """Return the slave nodes of all ranks whose normal is fixed. Collective."""
+    begin, end = body.layout.index_map.local_range
     here = np.flatnonzero((coupling.nodes >= begin) & (coupling.nodes < end))
-    moves = free[coupling.nodes[here] - begin, : coupling.normal.shape[1]]
+    moves = body.free[coupling.nodes[here] - begin, : body.dim]
     held = np.linalg.norm(coupling.normal[here] * moves, axis=1) <= 0.5
-    found = np.concatenate(comm.allgather(coupling.nodes[here[held]]))
+    found = np.concatenate(body.comm.allgather(coupling.nodes[here[held]]))
     return np.unique(np.concatenate([NOTHING, found]))
 
 
