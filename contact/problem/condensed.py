@@ -282,9 +282,8 @@ class Condensation:
         everywhere = np.concatenate(self.full.comm.allgather(moved))
         if self._pairs is not None:
             everywhere = self._pairs.expand(everywhere)
-        if self._masters is None:
-            return self._schur.expand(everywhere)
-        return self._masters.expand(self._schur, everywhere)
+        masters, schur = self._masters, self._schur
+        return masters.expand(schur, everywhere) if masters else schur.expand(everywhere)
 
 
 def _at_kept_nodes(interface: Interface) -> Interface:
