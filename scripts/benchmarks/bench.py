@@ -169,12 +169,14 @@ def against_getfem(report: Report, coarse: bool) -> None:
             write("quarter_disc", mesh, version=2.2, size=max(0.8, 16 / n), **sizes)
             for mu in ("0.0", "0.2"):
                 rows.append({"problem": "Hertz", "cells": n, "mu": mu, **pair("hertz", mesh, mu)})
+    for n in (4, 8) if coarse else (8, 12, 16):
+        rows.append({"problem": "block", "cells": n, "mu": "0.3", **pair("block", str(n), "0.3")})
     report.table(
         "bench-getfem",
-        "Against GetFEM: Example 7.2 with a linear material, and Example 7.1",
+        "Against GetFEM: Example 7.2 with a linear material, Example 7.1, and a block in space",
         columns(rows),
-        "Cells a unit length of the bar, and on Hertz's half-width. Seconds of the whole Newton "
-        "solve, the faster of two, both warm; a run of GetFEM that took more than "
+        "Cells a unit length of the bar and the block, and on Hertz's half-width. Seconds of the "
+        "whole Newton solve, the faster of two, both warm; a run of GetFEM that took more than "
         f"{PATIENCE:.0f} s in its two rounds is shown as inf. GetFEM: integral contact brick, "
         "augmented Lagrangian, r = E, residual 1e-10; its contact integrals and our nodal "
         "multipliers are different discretisations of order h.",

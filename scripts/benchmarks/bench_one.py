@@ -5,6 +5,7 @@ Start it as `python3 -m scripts.benchmarks.bench_one` with one of::
     CASE.toml [key=value ...]      a case file of scripts/cases
     bar N MU                       Example 7.2, linear material, constant mu
     hertz DISC.msh MU              Example 7.1 on a mesh file, constant mu
+    block N MU                     a block in space, linear material, constant mu
     ratio DIM N cold|nested        a nonlinear solve and one linear solve
     phases DIM N                   seconds by phase
 """
@@ -16,7 +17,7 @@ import resource
 import sys
 import tempfile
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -35,17 +36,22 @@ from scripts.cases import CASES, bar
 COMM = MPI.COMM_WORLD
 
 
-def block(n: int, **solver: Any) -> Case:
-    """Return a block of 2 x 1 x 1 with Coulomb friction and Hencky material in space."""
+#: Materials of the block.
+LINEAR = {"young": 1.0, "poisson": 0.3}
+HENCKY = {**LINEAR, "law": "log", "yield_strain": 0.02}
+
+
+def block(n: int, material: Mapping[str, Any] = HENCKY, mu: float = 0.3, **solver: Any) -> Case:
+    """Return a block of 2 x 1 x 1 with Coulomb friction, in space."""
     return parse_case(
         {
             "title": "block",
             "mesh": {"generator": "box", "size": [2.0, 1.0, 1.0], "cells": [2 * n, n, n]},
-            "material": {"law": "log", "young": 1.0, "poisson": 0.3, "yield_strain": 0.02},
+            "material": material,
             "fixed": [{"on": "left", "displacement": [0.0, 0.0, 0.0]}],
             "load": [{"on": "top", "traction": [0.0, 0.005, -0.02]}],
             "contact": {"on": "bottom"},
-            "friction": {"law": "coulomb", "mu": 0.3},
+            "friction": {"law": "coulomb", "mu": mu},
             "solver": {"method": "newton", **solver},
         }
     )
@@ -113,6 +119,13 @@ def hertz_with_constant_friction(path: str, mu: str) -> dict[str, Any]:
     case = load_case(CASES / "hertz.toml", [f"friction.mu={mu}"])
     case = case.model_copy(update={"mesh": Mesh(file=path)})
     warm(case, lambda: load_case(CASES / "hertz.toml", [f"friction.mu={mu}"]))
+    return described(solve_problem(build_problem(case), case.solver))
+
+
+def block_with_constant_friction(n: str, mu: str) -> dict[str, Any]:
+    """Measure the block that GetFEM solves too."""
+    case = block(int(n), LINEAR, float(mu))
+    warm(case, lambda: block(4, LINEAR, float(mu)))
     return described(solve_problem(build_problem(case), case.solver))
 
 
@@ -199,6 +212,7 @@ def phases(dimension: str, n: str) -> dict[str, Any]:
 MEASUREMENTS = {
     "bar": bar_with_constant_friction,
     "hertz": hertz_with_constant_friction,
+    "block": block_with_constant_friction,
     "ratio": ratio,
     "phases": phases,
 }

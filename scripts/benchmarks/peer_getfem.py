@@ -1,10 +1,13 @@
-"""The peer of the benchmark: GetFEM on the bar of Example 7.2, and on Hertz's cylinder.
+"""The peer of the benchmark: GetFEM on the bar of Example 7.2, Hertz's cylinder, a block in space.
 
 Start it as `python3 -m scripts.benchmarks.peer_getfem` with `bar N MU [--rounds K]`, linear
 material, N cells per unit length, the same triangles as ours; or with `hertz DISC.msh MU`,
-Example 7.1 on a mesh file of format 2.2. Prints one line of JSON: seconds of assembly and of the
-whole Newton solve (the fastest of K rounds in one warm process), steps, and values to compare
-with. Integral contact brick with an augmented Lagrangian, r = E, MUMPS.
+Example 7.1 on a mesh file of format 2.2; or with `block N MU`, that of `bench_one` with a linear
+material, the same tetrahedra as ours. `--solver gmres/ilu` takes another linear solver. Prints
+one line of JSON: seconds of assembly and of the whole Newton solve (the fastest of K rounds in one
+warm process), steps, and values to compare with. Integral contact brick with an augmented
+Lagrangian, r = E; in space its unsymmetric version with De Saxce's projection (option 4), as the
+first one does not converge there.
 """
 
 from __future__ import annotations
@@ -16,6 +19,9 @@ from dataclasses import dataclass
 
 import getfem as gf
 import numpy as np
+from mpi4py import MPI
+
+from contact.mesh.grid import box
 
 #: Regions of the boundary.
 HELD, CONTACT, LOADED = 1, 2, 3
@@ -30,13 +36,13 @@ class Setting:
     held
         Diagonal of the matrix that picks the components held on HELD.
     traction
-        Vertical, on LOADED.
+        On LOADED.
     """
 
     mesh: gf.Mesh
     young: float
-    held: tuple[float, float]
-    traction: float
+    held: tuple[float, ...]
+    traction: tuple[float, ...]
 
 
 def triangles(n: int) -> np.ndarray:
@@ -60,15 +66,15 @@ def outer_faces(mesh: gf.Mesh) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     return faces, mesh.normal_of_faces(faces), np.array(middles).T
 
 
-def bar(n: int) -> Setting:
+def bar(cells: str) -> Setting:
     """Return the bar of Example 7.2 with a linear material."""
     mesh = gf.Mesh("empty", 2)
-    mesh.add_convex(gf.GeoTrans("GT_PK(2,1)"), triangles(n))
+    mesh.add_convex(gf.GeoTrans("GT_PK(2,1)"), triangles(int(cells)))
     faces, normals, middles = outer_faces(mesh)
     mesh.set_region(HELD, faces[:, normals[0] < -0.5])
     mesh.set_region(CONTACT, faces[:, normals[1] < -0.5])
     mesh.set_region(LOADED, faces[:, (normals[1] > 0.5) & (middles[0] > 2.0)])
-    return Setting(mesh, 1.0, (1.0, 1.0), -0.005)
+    return Setting(mesh, 1.0, (1.0, 1.0), (0.0, -0.005))
 
 
 def hertz(path: str) -> Setting:
@@ -80,17 +86,31 @@ def hertz(path: str) -> Setting:
     mesh.set_region(HELD, faces[:, symmetry])
     mesh.set_region(CONTACT, faces[:, ~symmetry & ~top])
     mesh.set_region(LOADED, faces[:, top])
-    return Setting(mesh, 2000.0, (1.0, 0.0), -100.0)
+    return Setting(mesh, 2000.0, (1.0, 0.0), (0.0, -100.0))
+
+
+def block(cells: str) -> Setting:
+    """Return the block in space of `bench_one`, with a linear material."""
+    n = int(cells)
+    ours = box(MPI.COMM_SELF, (0.0, 0.0, 0.0), (2.0, 1.0, 1.0), (2 * n, n, n)).mesh.geometry
+    mesh = gf.Mesh("empty", 3)
+    mesh.add_convex(
+        gf.GeoTrans("GT_PK(3,1)"), np.moveaxis(ours.x[ours.dofmap], 2, 0).swapaxes(1, 2)
+    )
+    faces, normals, _ = outer_faces(mesh)
+    mesh.set_region(HELD, faces[:, normals[0] < -0.5])
+    mesh.set_region(CONTACT, faces[:, normals[2] < -0.5])
+    mesh.set_region(LOADED, faces[:, normals[2] > 0.5])
+    return Setting(mesh, 1.0, (1.0, 1.0, 1.0), (0.0, 0.005, -0.02))
 
 
 def model(setting: Setting, mu: float) -> tuple[gf.Model, tuple[object, ...]]:
     """Return the contact problem as a GetFEM model, and what has to live as long as it."""
-    mesh, young, poisson = setting.mesh, setting.young, 0.3
-    u = gf.MeshFem(mesh, 2)
-    u.set_fem(gf.Fem("FEM_PK(2,1)"))
-    obstacle = gf.MeshFem(mesh, 1)
-    obstacle.set_fem(gf.Fem("FEM_PK(2,1)"))
-    rule = gf.MeshIm(mesh, gf.Integ("IM_TRIANGLE(4)"))
+    mesh, young, poisson, dim = setting.mesh, setting.young, 0.3, len(setting.traction)
+    u, obstacle = gf.MeshFem(mesh, dim), gf.MeshFem(mesh, 1)
+    for space in (u, obstacle):
+        space.set_fem(gf.Fem(f"FEM_PK({dim},1)"))
+    rule = gf.MeshIm(mesh, gf.Integ("IM_TRIANGLE(4)" if dim == 2 else "IM_TETRAHEDRON(5)"))
     made = gf.Model("real")
     made.add_fem_variable("u", u)
     made.add_initialized_data("lame", [young * poisson / ((1 + poisson) * (1 - 2 * poisson))])
@@ -104,14 +124,14 @@ def model(setting: Setting, mu: float) -> tuple[gf.Model, tuple[object, ...]]:
         made.add_generalized_Dirichlet_condition_with_multipliers(
             rule, "u", u, HELD, "zero", "held"
         )
-    made.add_initialized_data("load", [0.0, setting.traction])
+    made.add_initialized_data("load", list(setting.traction))
     made.add_source_term_brick(rule, "u", "load", LOADED)
     made.add_filtered_fem_variable("lambda", u, CONTACT)
     made.add_initialized_data("r", [young])
     made.add_initialized_data("friction", [mu])
-    made.add_initialized_fem_data("obstacle", obstacle, obstacle.eval("y"))
+    made.add_initialized_fem_data("obstacle", obstacle, obstacle.eval("y" if dim == 2 else "z"))
     made.add_integral_contact_with_rigid_obstacle_brick(
-        rule, "u", "lambda", "obstacle", "r", "friction", CONTACT, 1
+        rule, "u", "lambda", "obstacle", "r", "friction", CONTACT, 1 if dim == 2 else 4
     )
     return made, (u, obstacle, rule)
 
@@ -119,22 +139,23 @@ def model(setting: Setting, mu: float) -> tuple[gf.Model, tuple[object, ...]]:
 def main() -> None:
     """Solve, and print what it took."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("problem", choices=("bar", "hertz"))
+    parser.add_argument("problem", choices=("bar", "hertz", "block"))
     parser.add_argument("mesh", help="cells per unit length, or the mesh file")
     parser.add_argument("mu", type=float)
     parser.add_argument("--rounds", type=int, default=2)
+    parser.add_argument("--solver", default="mumps")
     given = parser.parse_args()
     best: dict[str, float] = {}
     for _ in range(given.rounds):
-        setting = bar(int(given.mesh)) if given.problem == "bar" else hertz(given.mesh)
+        setting = {"bar": bar, "hertz": hertz, "block": block}[given.problem](given.mesh)
         problem, _owners = model(setting, given.mu)
         begin = time.perf_counter()
         problem.assembly()
         assembled = time.perf_counter()
-        steps, converged = problem.solve("max_res", 1e-10, "max_iter", 60, "lsolver", "mumps")
+        steps, converged = problem.solve("max_res", 1e-10, "max_iter", 60, "lsolver", given.solver)
         seconds = time.perf_counter() - assembled
         if not best or seconds < best["solve"]:
-            u = problem.variable("u").reshape(-1, 2)
+            u = problem.variable("u").reshape(-1, len(setting.traction))
             best = {
                 "assembly": assembled - begin,
                 "solve": seconds,
