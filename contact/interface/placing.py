@@ -87,13 +87,17 @@ def _corners(space: fem.FunctionSpace) -> NDArray[np.int32]:
     return np.unique(cells[:, np.concatenate(corners)])
 
 
-def _chord_depth(domain: Domain, part: str, obstacle: Obstacle) -> float:
-    """Return how deep nodes on straight facets of a curved part may lie in the obstacle."""
+def _chord_depth(domain: Domain, part: str, obstacle: Obstacle, points: Array) -> float:
+    """Return how deep nodes on straight facets of a curved part may lie in the obstacle.
+
+    `points` are those of this rank that do.
+    """
     facets = domain.facets(part)
     longest = np.max(domain.mesh.h(domain.dim - 1, facets), initial=0.0) if facets.size else 0.0
     length = 2**domain.levels * float(domain.comm.allreduce(longest, op=MPI.MAX))
     # The contact direction may be the body's, a little aside.
-    return 1.1 * obstacle.chord_depth(length)
+    deepest = domain.comm.allreduce(obstacle.chord_depth(length, points), op=MPI.MAX)
+    return 1.1 * float(deepest)
 
 
 @contextmanager
@@ -139,12 +143,12 @@ def _place(
         return gap, 0.0
     rounding = 1e-5 * domain.size  # that of mesh files
     tolerance = np.full_like(gap, rounding)
-    chord = max(rounding, _chord_depth(domain, *contact))
+    depth = np.where(facing > 0, -gap, 0.0)
+    chord = max(rounding, _chord_depth(domain, *contact, found.points[depth > rounding]))
     if domain.levels > 0:
         tolerance[:] = chord
     elif space.ufl_element().embedded_superdegree > 1:
         tolerance[~np.isin(found.nodes, _corners(space))] = chord
-    depth = np.where(facing > 0, -gap, 0.0)
     cut = domain.comm.allreduce(np.max(depth, initial=0.0), op=MPI.MAX)
     if domain.comm.allreduce(bool(np.any(depth > tolerance)), op=MPI.LOR):
         raise InputError(

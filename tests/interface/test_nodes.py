@@ -8,7 +8,8 @@ from mpi4py import MPI
 from contact.body.description import Body, Fixed, Load
 from contact.errors import InputError
 from contact.interface.friction import Friction
-from contact.interface.obstacle import GapFunction, Plane, Sphere
+from contact.interface.obstacle import GapFunction, Level, Plane, Sphere
+from contact.interface.obstacle.protocol import Shape
 from contact.mesh.domain import from_mesh
 from contact.mesh.grid import rectangle
 from contact.mesh.refinement import refined
@@ -155,37 +156,50 @@ def test_two_bodies_that_differ_by_a_rotation_have_the_same_contact():
     assert np.abs(ours["u_t"][order] @ q - expected["u_t"]).max() < 1e-9
 
 
-def around_a_circle(radius, degree=1, levels=0, cells=24, direction="foundation"):
+class Circle(Level):
+    """The circle about (0, 2) as a formula."""
+
+    def __init__(self, _, radius, *, direction):
+        super().__init__(lambda x: np.hypot(x[:, 0], x[:, 1] - 2.0) - radius, direction)
+
+
+def around_a_circle(
+    radius, degree=1, levels=0, cells=24, direction="foundation", shape: type[Shape] = Sphere
+):
     """Return the nodes of the arch's upper side, a concave arc of radius 1, on a circle."""
     domain = arch(cells)
     for _ in range(levels):
         domain = refined(domain)
     body = Body(LAW, [Fixed("arc", (ZERO, ZERO))])
-    circle = Sphere((0.0, 2.0), radius, direction=direction)
+    circle = shape((0.0, 2.0), radius, direction=direction)
     return ContactProblem(domain, body, Contact("top", circle), degree=degree).nodes
 
 
+@pytest.mark.parametrize("shape", [Sphere, Circle])
 @pytest.mark.parametrize("direction", ["foundation", "body"])
 @pytest.mark.parametrize(("degree", "levels"), [(1, 0), (1, 1), (1, 2), (2, 0), (2, 1)])
-def test_straight_facets_around_a_circle_touch_it(degree, levels, direction):
+def test_straight_facets_around_a_circle_touch_it(degree, levels, direction, shape):
     """The corners lie on the circle, all other nodes in it by the depth of the chords."""
     cells = 6
-    nodes = around_a_circle(1.0, degree, levels, cells, direction)
+    nodes = around_a_circle(1.0, degree, levels, cells, direction, shape)
     depth = 1 - np.cos(np.pi / 6 / cells)
     assert np.abs(nodes.gap).max() < 1e-12
     assert nodes.cut == pytest.approx(depth if (degree, levels) != (1, 0) else 0.0)
-    loose = around_a_circle(1.0 - 0.5 * depth, degree, levels, cells, direction)
+    loose = around_a_circle(1.0 - 0.5 * depth, degree, levels, cells, direction, shape)
     assert loose.gap.min() == pytest.approx(0.5 * depth if (degree, levels) == (1, 0) else 0.0)
     assert loose.gap.max() == pytest.approx(0.5 * depth, rel=0.01)
 
 
+@pytest.mark.parametrize("shape", [Sphere, Circle])
 @pytest.mark.parametrize(("degree", "levels"), [(1, 0), (1, 1), (2, 0), (2, 1)])
-def test_a_circle_larger_than_its_hole_is_refused(degree, levels):
+def test_a_circle_larger_than_its_hole_is_refused(degree, levels, shape):
     with pytest.raises(InputError, match="cuts it at rest"):
-        around_a_circle(1.01, degree, levels)
+        around_a_circle(1.01, degree, levels, shape=shape)
 
 
 def test_chords_do_not_reach_into_a_sphere_around_the_body():
-    assert Sphere((0.0, 0.0), 1.0).chord_depth(0.2) == pytest.approx(1 - np.sqrt(1 - 0.01))
-    assert Sphere((0.0, 0.0, 0.0), 1.0).chord_depth(0.3) == pytest.approx(1 - np.sqrt(1 - 0.03))
-    assert Sphere((0.0, 0.0), 1.0, inside=True).chord_depth(0.2) == 0.0
+    none, solid = np.zeros((0, 2)), np.zeros((0, 3))
+    assert Sphere((0.0, 0.0), 1.0).chord_depth(0.2, none) == pytest.approx(1 - np.sqrt(1 - 0.01))
+    ball = Sphere((0.0, 0.0, 0.0), 1.0)
+    assert ball.chord_depth(0.3, solid) == pytest.approx(1 - np.sqrt(1 - 0.03))
+    assert Sphere((0.0, 0.0), 1.0, inside=True).chord_depth(0.2, none) == 0.0

@@ -174,6 +174,21 @@ def test_a_surface_of_triangles_is_second_order():
     assert np.log2(errors[0] / errors[2]) / 2 == pytest.approx(2, abs=0.15)
 
 
+def test_surfaces_and_formulas_reach_into_facets_as_deep_as_the_ball():
+    points = np.random.default_rng(3).normal(size=(50, 3))
+    points /= np.linalg.norm(points, axis=1)[:, None] * 1.001
+    known = Sphere((0.0, 0.0, 0.0), 1.0).chord_depth(0.3, points)
+    formula = Level(lambda x: x[:, 0] ** 2 + x[:, 1] ** 2 + x[:, 2] ** 2 - 1)
+    assert Triangles(ball(40)).chord_depth(0.3, points) == pytest.approx(known, rel=0.1)
+    exact = Level(lambda x: np.linalg.norm(x, axis=1) - 1)
+    assert exact.chord_depth(0.3, points) == pytest.approx(known, rel=0.02)
+    # A distance that is not quite one says it nearly.
+    assert formula.chord_depth(0.3, points) == pytest.approx(known, rel=0.1)
+    room = Level(lambda x: 1 - np.linalg.norm(x, axis=1))
+    assert room.chord_depth(0.3, points) == 0.0
+    assert room.chord_depth(0.3, points[:0]) == 0.0
+
+
 def test_signs_at_edges_and_corners():
     """In front of the edges and corners of a cube faces alone do not tell the side."""
     corners = np.array(np.meshgrid(*[[-1.0, 1.0]] * 3)).reshape(3, -1).T

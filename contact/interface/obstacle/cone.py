@@ -45,6 +45,6 @@ class Cone(Shape):
         radial = radial + np.where(length > 0, along / tip[:, 0], -1.0)[:, None] * unit
         return np.where(beyond, length, side), np.where(beyond[:, None], radial, normal)
 
-    def chord_depth(self, length: float) -> float:
+    def chord_depth(self, length: float, points: Array) -> float:
         """Return how deep the tip reaches beyond a facet that it divides in two."""
         return float(0.5 * length / np.tan(np.deg2rad(self.half_angle)))

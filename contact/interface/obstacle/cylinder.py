@@ -53,7 +53,7 @@ class Cylinder(Shape):
         leaving = (b > 0) & (radius > self.radius) & (not self.inside)
         return np.where(met & ~leaving, gap, np.inf)
 
-    def chord_depth(self, length: float) -> float:
+    def chord_depth(self, length: float, points: Array) -> float:
         """Return the sagitta of a chord across the axis; of a strip there is none."""
         flat = self.inside or len(self.axis) == 2
         return 0.0 if flat else sagitta(length, self.radius, 2)

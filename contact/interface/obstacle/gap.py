@@ -32,7 +32,7 @@ class GapFunction:
     direction = "body"
     is_shape = False
 
-    def chord_depth(self, length: float) -> float:
+    def chord_depth(self, length: float, points: Array) -> float:
         """Return 0: given gaps are not those of a shape."""
         return 0.0
 

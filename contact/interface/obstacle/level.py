@@ -43,7 +43,3 @@ class Level(Shape):
         size = np.linalg.norm(slope, axis=1)
         known = np.where(size > 0, size, np.nan)
         return self.function(points) / known, slope / known[:, None]
-
-    def chord_depth(self, length: float) -> float:
-        """Return 0: the curvature is not known."""
-        return 0.0

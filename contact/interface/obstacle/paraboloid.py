@@ -52,6 +52,6 @@ class Paraboloid(Shape):
         normal = (s / big / length)[:, None] * away - unit / length[:, None]
         return (across * s / big - up) / length, normal
 
-    def chord_depth(self, length: float) -> float:
+    def chord_depth(self, length: float, points: Array) -> float:
         """Return the sagitta at the tip, where the curvature is largest."""
         return sagitta(length, self.radius, len(self.apex))

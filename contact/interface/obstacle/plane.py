@@ -28,7 +28,7 @@ class Plane(Shape):
     direction: str = "foundation"
     along: tuple[float, ...] = ()
 
-    def chord_depth(self, length: float) -> float:
+    def chord_depth(self, length: float, points: Array) -> float:
         """Return 0: chords of a plane lie in it."""
         return 0.0
 

@@ -31,13 +31,15 @@ class Obstacle(Protocol):
         Gaps that are given as such are what was asked for.
         """
 
-    def chord_depth(self, length: float) -> float:
+    def chord_depth(self, length: float, points: Array) -> float:
         """Return how deep straight facets reach into the obstacle that their corners touch.
 
         Parameters
         ----------
         length
             Longest edge of the facets.
+        points
+            Nodes that lie in the obstacle, on this rank, shape (n, d).
         """
 
     def measure(self, points: Array, body_normal: Array) -> tuple[Array, Array]:
@@ -70,6 +72,26 @@ class Shape(ABC):
 
         Normals are those of the nearest points; NaN where there is none.
         """
+
+    def chord_depth(self, length: float, points: Array) -> float:
+        """Return how deep straight facets reach into the obstacle that their corners touch.
+
+        As far as the distance rises from the nodes along the surface, up to the corners: a ball
+        has its sagitta. What is known in closed form says it without the nodes.
+        """
+        if len(points) == 0:
+            return 0.0
+        distance, normal = self.distance(points)
+        dim = points.shape[1]
+        # The last vectors of an orthonormal basis that begins with the normal.
+        tangents = np.linalg.svd(np.nan_to_num(normal)[:, None, :])[2][:, 1:]
+        rise = [
+            sum(self.distance(points + sign * reach(length, dim) * tangent)[0] for sign in (-1, 1))
+            / 2
+            - distance
+            for tangent in np.moveaxis(tangents, 1, 0)
+        ]
+        return float(np.max(np.nan_to_num(rise), initial=0.0))
 
     def ray(self, points: Array, rays: Array) -> Array:
         """Return how far the surface is along unit vectors, shape (n,): infinite if never met."""
@@ -140,10 +162,14 @@ def sagitta(length: float, radius: float, dim: int) -> float:
     dim
         Of space.
     """
-    # A facet lies in a ball of this radius (Jung's theorem). Facets of a curve that are
-    # longer than its radius do not represent it.
-    sine = min(length / radius * np.sqrt((dim - 1) / (2 * dim)), 0.5)
+    # Facets of a curve that are longer than its radius do not represent it.
+    sine = min(reach(length, dim) / radius, 0.5)
     return float(radius * sine**2 / (1 + np.sqrt(1 - sine**2)))
+
+
+def reach(length: float, dim: int) -> float:
+    """Return the radius of a ball that holds a facet with a longest edge (Jung's theorem)."""
+    return float(length * np.sqrt((dim - 1) / (2 * dim)))
 
 
 def split(points: Array, origin: tuple[float, ...], axis: tuple[float, ...]) -> tuple[Array, ...]:

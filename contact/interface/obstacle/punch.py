@@ -47,6 +47,6 @@ class Punch(Shape):
         second = np.where(out, np.maximum(face, 0.0) / scale, side <= face)
         return outside + within - e, first[:, None] * away - second[:, None] * unit
 
-    def chord_depth(self, length: float) -> float:
+    def chord_depth(self, length: float, points: Array) -> float:
         """Return the sagitta at the edge, across it; a sharp one fits into no facets."""
         return 0.0 if self.edge_radius == 0 else sagitta(length, self.edge_radius, 2)

@@ -53,6 +53,6 @@ class Sphere(Shape):
         away = (along > 0) & (distance > self.radius) & (not self.inside)
         return np.where((root >= 0) & ~away, gap, np.inf)
 
-    def chord_depth(self, length: float) -> float:
+    def chord_depth(self, length: float, points: Array) -> float:
         """Return the sagitta of facets outside of the ball; within it they keep off."""
         return 0.0 if self.inside else sagitta(length, self.radius, len(self.centre))

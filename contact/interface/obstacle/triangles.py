@@ -35,10 +35,6 @@ class Triangles(Shape):
     direction: str = "foundation"
     along: tuple[float, ...] = ()
 
-    def chord_depth(self, length: float) -> float:
-        """Return 0: the surface is what its triangles are."""
-        return 0.0
-
     @cached_property
     def _tree(self) -> cKDTree:
         return cKDTree(self.corners.mean(axis=1))
