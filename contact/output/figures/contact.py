@@ -116,7 +116,8 @@ def draw_line(
     if len(parts) == 1:
         for ax in grid[:, 0]:
             handles = _handles([ax])
-            columns = len(handles) if width > NARROW else 2
+            # A page has room for four beside each other.
+            columns = 2 if width <= NARROW else len(handles) if len(handles) <= 4 else 3
             ax.legend(handles=handles, ncols=columns, loc="lower left", bbox_to_anchor=(0, 1))
     else:
         for ax, part in zip(grid[0], parts, strict=True):
