@@ -41,6 +41,8 @@ def _set_kept(factor: PETSc.Mat, kept: PETSc.IS) -> None:
 
 def _complement(factor: PETSc.Mat, size: int) -> Array:
     """Return a copy of the Schur complement that a factorisation holds."""
+    if size == 0:
+        return np.zeros((0, 0))
     handle, values = ctypes.c_void_p(), ctypes.c_void_p()
     _check(
         _petsc.MatFactorCreateSchurComplement(
@@ -50,7 +52,7 @@ def _complement(factor: PETSc.Mat, size: int) -> Array:
     _check(_petsc.MatDenseGetArrayRead(handle, ctypes.byref(values)))
     pointer = ctypes.cast(values, ctypes.POINTER(ctypes.c_double))
     # PETSc stores it by columns.
-    matrix = np.ctypeslib.as_array(pointer, (size, size)).T.copy() if size else np.zeros((0, 0))
+    matrix = np.ctypeslib.as_array(pointer, (size, size)).T.copy()
     _check(_petsc.MatDenseRestoreArrayRead(handle, ctypes.byref(values)))
     _check(_petsc.MatDestroy(ctypes.byref(handle)))
     return matrix
@@ -116,9 +118,13 @@ class SchurComplement:
         )
         left = np.concatenate([part for parts in gathered for part in parts])
         eliminated = (self._inside + begin).astype(PETSc.IntType)
+        # Those left that this rank's eliminated ones know of: its own share is no larger.
+        met = np.isin(left, columns[inside[rows]]) if self.comm.size > 1 else left >= 0
+        self._met, border = np.flatnonzero(met), left[met]
         self._left = PETSc.IS().createGeneral(left, PETSc.COMM_SELF)
-        self._local = PETSc.IS().createGeneral(np.concatenate([eliminated, left]), PETSc.COMM_SELF)
-        self._eliminated, self._prefix = eliminated.size, prefix
+        local = np.concatenate([eliminated, border])
+        self._local = PETSc.IS().createGeneral(local, PETSc.COMM_SELF)
+        self._eliminated, self._prefix, self._failed = eliminated.size, prefix, False
         self._factor: PETSc.PC | None = None
         self._part: PETSc.Mat | None = None
 
@@ -143,9 +149,10 @@ class SchurComplement:
         k = self.size
         if self._between == 0:
             return total
-        self._coupling = total[:k, k:]
+        self._coupling = total[:k, k:].copy()
         self._lu = lu_factor(total[k:, k:], check_finite=False)
-        return total[:k, :k] - self._coupling @ self._solve_between(total[k:, :k])
+        through = self._coupling @ self._solve_between(total[k:, :k])
+        return np.subtract(total[:k, :k], through, out=through)
 
     def _eliminate(self, part: PETSc.Mat) -> Array:
         """Eliminate the first unknowns of the local matrix; return what is left."""
@@ -153,8 +160,9 @@ class SchurComplement:
             return _dense(part)
         factor = self._factorised(part)
         factor.setMumpsIcntl(*INTERIOR_SOLVE)
-        left = _complement(factor, self.dense_size)
-        return left if factor.getMumpsInfog(1) >= 0 else np.full_like(left, np.nan)
+        left = _complement(factor, self._met.size)
+        self._failed = factor.getMumpsInfog(1) < 0
+        return np.full_like(left, np.nan) if self._failed else left
 
     def _factorised(self, part: PETSc.Mat) -> PETSc.Mat:
         """Factorise the local matrix with as much workspace as it takes.
@@ -184,18 +192,26 @@ class SchurComplement:
         pc.setFactorSolverType("mumps")
         pc.setFromOptions()
         pc.setFactorSetUpSolverType()
-        end = self._eliminated + self.dense_size
+        end = self._eliminated + self._met.size
         kept = np.arange(self._eliminated, end, dtype=PETSc.IntType)
-        _set_kept(pc.getFactorMatrix(), PETSc.IS().createGeneral(kept, PETSc.COMM_SELF))
+        if kept.size > 0:
+            _set_kept(pc.getFactorMatrix(), PETSc.IS().createGeneral(kept, PETSc.COMM_SELF))
         return pc
 
     def _assembled(self, matrix: PETSc.Mat, own: Array) -> Array:
         """Add up what the ranks have eliminated, and what they have left."""
         (left,) = matrix.createSubMatrices([self._left], [self._left])
-        remaining = _dense(left)
-        own = own - remaining
-        self.comm.Allreduce(MPI.IN_PLACE, own, op=MPI.SUM)
-        return own + remaining
+        starts, columns, values = left.getValuesCSR()
+        rows = np.repeat(np.arange(self.dense_size), np.diff(starts))
+        total = np.zeros((self.dense_size, self.dense_size))
+        total[np.ix_(self._met, self._met)] = own
+        both = np.isin(rows, self._met) & np.isin(columns, self._met)
+        total[rows[both], columns[both]] -= values[both]
+        if self._failed:
+            total[:] = np.nan
+        self.comm.Allreduce(MPI.IN_PLACE, total, op=MPI.SUM)
+        total[rows, columns] += values
+        return total
 
     def _solve_inside(self, values: Array) -> Array:
         """Solve with the eliminated unknowns alone, the others being 0."""
@@ -212,7 +228,7 @@ class SchurComplement:
         return np.asarray(lu_solve(self._lu, values, check_finite=False))
 
     def _times(self, inside: Array, left: Array) -> Array:
-        """Return the local part of the matrix times values of all its unknowns."""
+        """Return the local part of the matrix times values of its unknowns."""
         assert self._part is not None
         vector, image = self._part.createVecs()
         vector.array[:] = np.concatenate([inside, left])
@@ -237,7 +253,8 @@ class SchurComplement:
         total[self._rows] = rhs[np.concatenate([self._kept, self._shared])]
         if np.abs(rhs[self._inside]).max(initial=0.0) > rounding:
             inside = self._solve_inside(rhs[self._inside])
-            total -= self._times(inside, np.zeros(self.dense_size))[self._eliminated :]
+            met = np.zeros(self._met.size)
+            total[self._met] -= self._times(inside, met)[self._eliminated :]
         self.comm.Allreduce(MPI.IN_PLACE, total, op=MPI.SUM)
         if self._between == 0:
             return total
@@ -250,7 +267,7 @@ class SchurComplement:
         if self._between > 0:
             between = self._solve_between(self._rhs_between - self._coupling.T @ kept)
             left = np.concatenate([kept, between])
-        coupled = self._times(np.zeros(self._eliminated), left)[: self._eliminated]
+        coupled = self._times(np.zeros(self._eliminated), left[self._met])[: self._eliminated]
         solution = np.zeros(self._rhs.size)
         solution[self._inside] = self._solve_inside(self._rhs[self._inside] - coupled)
         solution[np.concatenate([self._kept, self._shared])] = left[self._rows]

@@ -53,10 +53,8 @@ class CondensedBody:
         Its factors, where some have been made.
     residual
         Condensed internal forces minus loads where the body was linearised, all ranks.
-    at
-        The owned kept unknowns there.
-    own
-        Where these are among those of all ranks.
+    at, own
+        The owned kept unknowns there, and where these are among those of all ranks.
     size
         Norm of the loads and reactions of the whole body.
     """
@@ -177,6 +175,7 @@ class Condensation:
         self._matrix = full.equilibrium.create_matrix()
         self._kind = ""
         self._schur: SchurComplement | None = None
+        self._stiffness: Array = np.zeros((0, 0))
 
     def turn_to(self, full: ContactProblem) -> None:
         """Go on with another step of the same problem; what is factorised remains."""
@@ -188,10 +187,8 @@ class Condensation:
 
         Parameters
         ----------
-        kind
-            "secant" or "tangent".
-        state
-            Where.
+        kind, state
+            "secant" or "tangent", and where.
         keep
             Whether to take what was factorised last, wherever that was.
 
@@ -208,6 +205,7 @@ class Condensation:
         body = self.full.equilibrium
         same = keep or (body.linear and kind == self._kind)
         if self._schur is None or not same:
+            self._stiffness, self._factors = np.zeros((0, 0)), Factors()  # room for new ones
             self._bulk.assemble(self._matrix, kind, state.x)
             balance(self._matrix, body.layout)
             if self._schur is None:
@@ -220,7 +218,7 @@ class Condensation:
                 self._stiffness = self._masters.eliminate(self._schur, self._stiffness)
             if self._pairs is not None:
                 self._stiffness = self._pairs.eliminate(self._stiffness)
-            self._kind, self._factors = kind, Factors()
+            self._kind = kind
             self.counters.factorizations += 1
         residual = body.internal_forces(state.x) - body.external(state.time)
         check_overflow(body.layout, self._matrix.norm(), body.norm(residual))
