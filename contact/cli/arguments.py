@@ -5,12 +5,11 @@ from __future__ import annotations
 import argparse
 import difflib
 from collections.abc import Sequence
-from typing import Any, NoReturn
-
-from mpi4py import MPI
+from typing import Any
 
 from contact import __version__
 from contact.cli import materials, new, plot, sweep
+from contact.cli.options import COMMON, Parser, add_case, add_command, add_help, add_progress
 from contact.errors import InputError
 from contact.output.reference import files_help
 
@@ -29,76 +28,49 @@ Ctrl-C, 143 by SIGTERM: what a solve had reached is written
 POSITIONAL = ("command", "case", "folder", "name", "mesh")
 
 
-class _Parser(argparse.ArgumentParser):
-    """A parser that raises InputError, and prints its help on one rank alone."""
-
-    def error(self, message: str) -> NoReturn:
-        raise InputError(f"{message}; accepted: {' '.join(self.format_usage().split())}")
-
-    def _print_message(self, message: str, file: Any = None) -> None:
-        if MPI.COMM_WORLD.rank == 0:
-            super()._print_message(message, file)
-
-
-def _parser() -> _Parser:
-    # PETSc's options begin with one dash and any letter, -h among them.
-    common: dict[str, Any] = {"add_help": False, "allow_abbrev": False}
-    parser = _Parser(
-        prog="contact",
-        description=DESCRIPTION,
-        epilog=EXIT,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-        **common,
-    )
-    parser.add_argument("--help", action="help", help="show this help and leave")
+def _parser() -> Parser:
+    parser = Parser(prog="contact", description=DESCRIPTION, epilog=EXIT, **COMMON)
+    add_help(parser)
     parser.add_argument(
         "--version", action="version", version=f"contact {__version__}", help="show the version"
     )
     commands = parser.add_subparsers(
         dest="command", required=True, metavar="new|check|solve|sweep|plot|materials"
     )
-    setup = "draw the set-up too: CASE-setup.png and .pdf in the present folder"
-    for name, text, drawn in (
-        ("solve", "solve a case and write the results", "draw the figures too"),
-        ("check", "validate a case and print it with its mesh parts and unknowns", setup),
-    ):
-        command = commands.add_parser(name, help=text, description=text, **common)
-        command.usage = f"contact {name} CASE.toml [options] [PETSc options]"
-        optional: dict[str, Any] = {"nargs": "?"} if name == "solve" else {}
-        command.add_argument("case", metavar="CASE.toml", help="case file (TOML)", **optional)
-        command.add_argument(
-            "--set",
-            action="append",
-            default=[],
-            metavar="KEY=VALUE",
-            help="replace a value of the case file, for instance load.0.traction='[0, -1]'; may be "
-            "repeated",
-        )
-        command.add_argument("--help", action="help", help="show this help and leave")
-        command.add_argument("--plot", action="store_true", help=drawn)
-        if name == "solve":
-            command.usage = f"contact {name} CASE.toml --out DIR [options] [PETSc options]"
-            command.epilog = files_help("summary.json", "contact.csv", "steps.csv", "history.csv")
-            command.formatter_class = argparse.RawDescriptionHelpFormatter
-            command.add_argument("--out", metavar="DIR", help="folder for results")
-            command.add_argument(
-                "--restart",
-                metavar="DIR",
-                help="go on with an evolution that was ended, from the checkpoints in DIR: the "
-                "case is known, and the results go there too unless told otherwise",
-            )
-            command.add_argument("--quiet", action="store_true", help="show no progress")
-            command.add_argument("--log", metavar="FILE", help="write a log to the end of a file")
-            command.add_argument(
-                "--overwrite",
-                action="store_true",
-                help="replace results of another case, if DIR has any",
-            )
-    new.add_parser(commands, common)
-    sweep.add_parser(commands, common)
-    plot.add_parser(commands, common)
-    materials.add_parser(commands, common)
+    new.add_parser(commands)
+    _add_check(commands)
+    _add_solve(commands)
+    sweep.add_parser(commands)
+    plot.add_parser(commands)
+    materials.add_parser(commands)
     return parser
+
+
+def _add_check(commands: Any) -> None:
+    text = "validate a case and print it with its mesh parts and unknowns"
+    command = add_command(commands, "check CASE.toml [options] [PETSc options]", text)
+    add_case(command)
+    setup = "draw the set-up too: CASE-setup.png and .pdf in the present folder"
+    command.add_argument("--plot", action="store_true", help=setup)
+
+
+def _add_solve(commands: Any) -> None:
+    files = files_help("summary.json", "contact.csv", "steps.csv", "history.csv")
+    usage = "solve CASE.toml --out DIR [options] [PETSc options]"
+    command = add_command(commands, usage, "solve a case and write the results", files)
+    add_case(command, optional=True)
+    command.add_argument("--plot", action="store_true", help="draw the figures too")
+    command.add_argument("--out", metavar="DIR", help="folder for results")
+    command.add_argument(
+        "--restart",
+        metavar="DIR",
+        help="go on with an evolution that was ended, from the checkpoints in DIR: the case is "
+        "known, and the results go there too unless told otherwise",
+    )
+    add_progress(command)
+    command.add_argument(
+        "--overwrite", action="store_true", help="replace results of another case, if DIR has any"
+    )
 
 
 def parse(arguments: Sequence[str]) -> tuple[argparse.Namespace, list[str]]:
@@ -112,11 +84,7 @@ def parse(arguments: Sequence[str]) -> tuple[argparse.Namespace, list[str]]:
     if "-h" in arguments:
         arguments = ["--help" if argument == "-h" else argument for argument in arguments]
     options, rest = _parser().parse_known_args(arguments)
-    known = [
-        f"--{name}"
-        for name in vars(options)
-        if name not in ("command", "case", "folder", "name", "mesh")
-    ]
+    known = [f"--{name}" for name in vars(options) if name not in POSITIONAL]
     known.append("--help")
     for i, argument in enumerate(rest):
         follows = i > 0 and rest[i - 1].startswith("-")

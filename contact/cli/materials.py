@@ -11,19 +11,18 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 
 from contact.cli.ending import CONVERGED
+from contact.cli.options import add_command
 from contact.library.entry import Entry
 from contact.library.reading import PACKAGED, find, library
 from contact.output.folder import on_root
 
 
-def add_parser(commands: Any, common: dict[str, Any]) -> None:
+def add_parser(commands: Any) -> None:
     """Add the command to the parser's commands."""
     text = "list the materials that have a name, or show one with what follows from it"
-    command = commands.add_parser("materials", help=text, description=text, **common)
-    command.usage = "contact materials [NAME] [--file FILE]"
+    command = add_command(commands, "materials [NAME] [--file FILE]", text)
     command.add_argument("name", nargs="?", metavar="NAME", help="material to show")
     command.add_argument("--file", metavar="FILE", help="a library of one's own (TOML)")
-    command.add_argument("--help", action="help", help="show this help and leave")
 
 
 def run(options: argparse.Namespace, comm: MPI.Intracomm) -> int:

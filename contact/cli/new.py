@@ -9,18 +9,17 @@ from typing import Any
 from mpi4py import MPI
 
 from contact.cli.ending import CONVERGED
+from contact.cli.options import add_command
 from contact.errors import InputError
 from contact.output.folder import on_root
 
 
-def add_parser(commands: Any, common: dict[str, Any]) -> None:
+def add_parser(commands: Any) -> None:
     """Add the command to the parser's commands."""
     text = "write a commented case file for a mesh file, with its parts"
-    command = commands.add_parser("new", help=text, description=text, **common)
-    command.usage = "contact new MESH.msh [--case CASE.toml]"
+    command = add_command(commands, "new MESH.msh [--case CASE.toml]", text)
     command.add_argument("mesh", metavar="MESH.msh", help="Gmsh file with named physical groups")
     command.add_argument("--case", metavar="FILE", help="file to write; MESH.toml by default")
-    command.add_argument("--help", action="help", help="show this help and leave")
 
 
 def run(options: argparse.Namespace, comm: MPI.Intracomm) -> int:

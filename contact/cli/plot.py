@@ -10,6 +10,7 @@ from typing import Any
 from mpi4py import MPI
 
 from contact.cli.ending import CONVERGED
+from contact.cli.options import add_command
 from contact.errors import InputError
 from contact.output.folder import on_root
 
@@ -17,11 +18,10 @@ _LENGTH = re.compile(r"(\d+(?:\.\d*)?)\s*(mm|cm|in)")
 _INCHES = {"mm": 1 / 25.4, "cm": 1 / 2.54, "in": 1.0}
 
 
-def add_parser(commands: Any, common: dict[str, Any]) -> None:
+def add_parser(commands: Any) -> None:
     """Add the command to the parser's commands."""
     text = "draw the figures of a run again, from its files"
-    command = commands.add_parser("plot", help=text, description=text, **common)
-    command.usage = "contact plot DIR [options]"
+    command = add_command(commands, "plot DIR [options]", text)
     command.add_argument("folder", metavar="DIR", help="folder with the results of a run")
     command.add_argument(
         "--field",
@@ -43,7 +43,6 @@ def add_parser(commands: Any, common: dict[str, Any]) -> None:
         action="store_true",
         help="draw animation-FIELD.gif instead, the deformed body over the steps of an evolution",
     )
-    command.add_argument("--help", action="help", help="show this help and leave")
 
 
 def run(options: argparse.Namespace, comm: MPI.Intracomm) -> int:

@@ -8,19 +8,22 @@ from typing import Any
 from mpi4py import MPI
 
 from contact.cli.ending import CONVERGED, NOT_CONVERGED
+from contact.cli.options import add_case, add_command, add_progress
 from contact.errors import InputError
 from contact.output.folder import result_folder
 from contact.output.reference import files_help
 
 
-def add_parser(commands: Any, common: dict[str, Any]) -> None:
+def add_parser(commands: Any) -> None:
     """Add the command to the parser's commands."""
     text = "solve a case for several values of some keys: sweep.csv, one row a value"
-    command = commands.add_parser("sweep", help=text, description=text, **common)
-    command.epilog = files_help("sweep.csv")
-    command.formatter_class = argparse.RawDescriptionHelpFormatter
-    command.usage = "contact sweep CASE.toml --over KEY=V1,V2,... --out DIR [options]"
-    command.add_argument("case", metavar="CASE.toml", help="case file")
+    command = add_command(
+        commands,
+        "sweep CASE.toml --over KEY=V1,V2,... --out DIR [options]",
+        text,
+        files_help("sweep.csv"),
+    )
+    add_case(command)
     command.add_argument(
         "--over",
         action="append",
@@ -28,20 +31,11 @@ def add_parser(commands: Any, common: dict[str, Any]) -> None:
         metavar="KEY=V1,V2,...",
         help="the values of a key; may be repeated, for all combinations",
     )
-    command.add_argument(
-        "--set",
-        action="append",
-        default=[],
-        metavar="KEY=VALUE",
-        help="replace a value of the case file; may be repeated",
-    )
     command.add_argument("--out", metavar="DIR", help="folder for the table; rows in it are kept")
     command.add_argument(
         "--cold", action="store_true", help="start each solve from rest, not from the one before"
     )
-    command.add_argument("--quiet", action="store_true", help="show no progress")
-    command.add_argument("--log", metavar="FILE", help="write a log to the end of a file")
-    command.add_argument("--help", action="help", help="show this help and leave")
+    add_progress(command)
 
 
 def run(options: argparse.Namespace, comm: MPI.Intracomm) -> int:

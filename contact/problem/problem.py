@@ -6,9 +6,7 @@ from collections.abc import Sequence
 from copy import copy
 from dataclasses import dataclass, replace
 
-import numpy as np
 from mpi4py import MPI
-from numpy.typing import NDArray
 
 from contact.body.description import Body
 from contact.body.equilibrium import BodyEquilibrium
@@ -268,11 +266,6 @@ class ContactProblem:
     def nodes(self) -> ContactNodes:
         """The contact nodes."""
         return self.interface.jump
-
-    @property
-    def free(self) -> NDArray[np.bool_]:
-        """Which unknowns of the owned nodes are not fixed, shape (nodes, block size)."""
-        return self.equilibrium.free
 
     def nodal(self, state: State) -> Array:
         """Return the unknowns at the owned contact nodes, shape (n, block size)."""

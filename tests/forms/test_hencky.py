@@ -241,7 +241,7 @@ def scattered(problem, seed):
     random, unknowns = np.random.default_rng(seed), problem.equilibrium.owned
     size = 3 * XI / problem.domain.mesh.geometry.x.max()
     x = size * random.standard_normal(unknowns)
-    direction = random.standard_normal(unknowns) * problem.free.ravel()
+    direction = random.standard_normal(unknowns) * problem.equilibrium.free.ravel()
     return x, direction / np.linalg.norm(direction)
 
 
@@ -282,7 +282,7 @@ def test_tangent_is_the_derivative_of_the_internal_forces(cases, case):
     matrix.mult(vector, product)
     h = 1e-6 * XI
     forces = [body.internal_forces(base + t * h * direction) for t in (1, -1)]
-    slope = np.where(problem.free.ravel(), (forces[0] - forces[1]) / (2 * h), 0.0)
+    slope = np.where(problem.equilibrium.free.ravel(), (forces[0] - forces[1]) / (2 * h), 0.0)
     assert np.linalg.norm(product.array - slope) < 2e-4 * np.linalg.norm(slope)
 
 
@@ -294,7 +294,7 @@ def test_the_secant_form_with_frozen_modulus(cases, case):
     forces = body.internal_forces(x)
     matrix = operator_at(problem, "secant", x).matrix
     assert matrix.isSymmetric(1e-12)
-    free = problem.free.ravel()
+    free = problem.equilibrium.free.ravel()
     vector, product = matrix.createVecs()
     # Columns of fixed unknowns are eliminated: take their displacement as 0.
     vector.array[:] = np.where(free, x, 0.0)

@@ -90,8 +90,9 @@ def test_zero_at_the_solution(solved):
 def test_a_wrong_displacement_is_out_of_equilibrium(solved):
     problem = solved.problem
     random = np.random.default_rng(0)
-    shake = 1e-4 * random.standard_normal(problem.equilibrium.owned) * problem.free.ravel()
-    shake.reshape(-1, problem.equilibrium.block_size)[problem.nodes.nodes] = 0.0
+    body = problem.equilibrium
+    shake = 1e-4 * random.standard_normal(body.owned) * body.free.ravel()
+    shake.reshape(-1, body.block_size)[problem.nodes.nodes] = 0.0
     found = evaluate(problem, State(solved.state.x + shake, solved.forces))
     assert found.equilibrium > 1e-4
     assert found.contact <= SMALL
