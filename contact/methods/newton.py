@@ -97,11 +97,13 @@ class Newton:
         if options.condense and isinstance(problem, ContactProblem):
             body = condensation(problem, self.counters, options.linear)
             if body is not None:
+                self._pays = pays(problem)
+                # Where the whole body comes first, its loop has found out already.
+                inner = options if self._pays else replace(options, patience=SHORT)
                 self._condensed = MaterialStep(
-                    body, options, self._moduli, _solve_condensed, self.history, self.counters,
+                    body, inner, self._moduli, _solve_condensed, self.history, self.counters,
                     SLOWER,
                 )  # fmt: skip
-                self._pays = pays(problem)
 
     def turn_to(self, problem: Problem) -> None:
         """Go on with another step of the same problem; what is factorised remains."""
