@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import logging
 import math
-import os
 
 from mpi4py import MPI
 
@@ -16,6 +15,7 @@ from contact.mesh.reader import from_msh, from_recipe
 from contact.mesh.refinement import refined
 from contact.mesh.rotation import rotate
 from contact.methods.interrupt import deaf
+from meshes.grading import memory
 
 #: Bytes that making the mesh takes for a cell, without any unknowns (seen: 235 to 345).
 CELL_MEMORY = 200
@@ -74,14 +74,13 @@ def _check_memory(comm: MPI.Intracomm, cells: int, refine: int, dim: int) -> Non
     Say of a large one what it takes, for that may be long.
     """
     total = cells * 2 ** (dim * refine)
-    machine = os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
-    memory = comm.allreduce(machine, op=MPI.MIN)
+    least = comm.allreduce(memory(), op=MPI.MIN)
     needed = total * CELL_MEMORY / comm.size
     what = f"mesh.refine: {refine} refinements of {cells:.3g} cells, " if refine else "mesh: "
-    if needed > memory:
+    if needed > least:
         raise InputError(
             f"{what}{total:.3g} cells take more memory, {needed / 1e9:.3g} GB a rank, than there "
-            f"is, {memory / 1e9:.3g} GB; accepted: fewer cells (mesh.cells, mesh.refine), or more "
+            f"is, {least / 1e9:.3g} GB; accepted: fewer cells (mesh.cells, mesh.refine), or more "
             "ranks on more machines"
         )
     if total > MANY and comm.rank == 0:

@@ -1,32 +1,24 @@
 """Bars and blocks on a foundation along their lower side."""
 
-from collections.abc import Sequence
 from itertools import pairwise
 from typing import Any
 
+from contact.errors import InputError
+from meshes.grading import Sizes, finish
+from meshes.pieces import Points, polygon
 
-def _polygon(
-    corners: Sequence[tuple[float, float]], size: float, contact_size: float, bottom: Sequence[int]
-) -> tuple[Any, int, list[int]]:
-    """Make a polygon graded towards the edges ``bottom``: Gmsh, the body, the edges."""
+
+def _sizes(size: float, contact_size: float) -> Sizes:
+    """Return the sizes of a bar, whose contact part is a side of it."""
+    return Sizes(size, contact_size, 2.0 * contact_size, 0.25)
+
+
+def _polygon(corners: Points) -> tuple[Any, list[int], list[list[int]]]:
+    """Make a polygon: Gmsh, the body, the edges."""
     import gmsh
 
-    from meshes.grading import grade
-
-    geo = gmsh.model.geo
-    points = [geo.addPoint(x, y, 0) for x, y in corners]
-    edges = [geo.addLine(a, b) for a, b in pairwise([*points, points[0]])]
-    body = geo.addPlaneSurface([geo.addCurveLoop(edges)])
-    geo.synchronize()
-    grade(
-        gmsh,
-        size=size,
-        contact_size=contact_size,
-        width=2.0 * contact_size,
-        growth=0.25,
-        curves=[edges[i] for i in bottom],
-    )
-    return gmsh, body, edges
+    body, edges = polygon(gmsh.model.geo, corners)
+    return gmsh, body, [[edge] for edge in edges]
 
 
 def bar(
@@ -42,33 +34,25 @@ def bar(
     Parts: ``left``, ``right``, ``bottom``, ``top``, ``loaded`` (the top from x =
     ``loaded_from`` on). The elements have ``contact_size`` at the bottom, ``size`` far away.
     """
-    from contact.errors import InputError
-    from meshes.grading import finish
-
     if loaded_from >= length:
         raise InputError(f"loaded_from must be less than the length {length}; given: {loaded_from}")
-    gmsh, body, edges = _polygon(
-        [(0, 0), (length, 0), (length, height), (loaded_from, height), (0, height)],
-        size,
-        contact_size,
-        [0],
+    gmsh, body, (bottom, right, loaded, rest, left) = _polygon(
+        [(0, 0), (length, 0), (length, height), (loaded_from, height), (0, height)]
     )
-    bottom, right, loaded, rest, left = ([edge] for edge in edges)
     parts = {"left": left, "right": right, "bottom": bottom, "top": loaded + rest}
-    finish(gmsh, 2, [body], {**parts, "loaded": loaded})
+    sizes = _sizes(size, contact_size)
+    finish(gmsh, 2, body, {**parts, "loaded": loaded}, sizes, curves=bottom)
 
 
 def piezo_bar(
     *, length: float = 8.0, height: float = 4.0, size: float = 0.4, contact_size: float = 0.2
 ) -> None:
     """Bar of Example 8.1, unstructured; parts ``left``, ``right``, ``bottom``, ``top``."""
-    from meshes.grading import finish
-
-    gmsh, body, edges = _polygon(
-        [(0, 0), (length, 0), (length, height), (0, height)], size, contact_size, [0]
+    gmsh, body, (bottom, right, top, left) = _polygon(
+        [(0, 0), (length, 0), (length, height), (0, height)]
     )
-    bottom, right, top, left = ([edge] for edge in edges)
-    finish(gmsh, 2, [body], {"left": left, "right": right, "bottom": bottom, "top": top})
+    parts = {"left": left, "right": right, "bottom": bottom, "top": top}
+    finish(gmsh, 2, body, parts, _sizes(size, contact_size), curves=bottom)
 
 
 def bar_on_ends(
@@ -84,20 +68,15 @@ def bar_on_ends(
     Parts: ``left``, ``right``, ``top``, ``bottom_ends`` (the bottom up to ``end`` from either
     side), ``contact`` (the bottom between them).
     """
-    from contact.errors import InputError
-    from meshes.grading import finish
-
     if 2.0 * end >= length:
         raise InputError(f"end must be less than half the length {length}; given: {end}")
-    gmsh, body, edges = _polygon(
-        [(0, 0), (end, 0), (length - end, 0), (length, 0), (length, height), (0, height)],
-        size,
-        contact_size,
-        [0, 1, 2],
+    gmsh, body, (first, contact, last, right, top, left) = _polygon(
+        [(0, 0), (end, 0), (length - end, 0), (length, 0), (length, height), (0, height)]
     )
-    first, contact, last, right, top, left = ([edge] for edge in edges)
+    bottom = first + contact + last
     parts = {"left": left, "right": right, "top": top, "bottom_ends": first + last}
-    finish(gmsh, 2, [body], {**parts, "contact": contact})
+    sizes = _sizes(size, contact_size)
+    finish(gmsh, 2, body, {**parts, "contact": contact}, sizes, curves=bottom)
 
 
 def block(
@@ -115,8 +94,6 @@ def block(
     """
     import gmsh
 
-    from meshes.grading import finish, grade
-
     geo = gmsh.model.geo
     points = [geo.addPoint(x, y, 0) for x, y in ((0, 0), (width, 0), (width, depth), (0, depth))]
     edges = [geo.addLine(a, b) for a, b in pairwise([*points, points[0]])]
@@ -125,18 +102,9 @@ def block(
     top, body, front, right, back, left = (
         tag for _, tag in geo.extrude([(2, bottom)], 0, 0, height)
     )
-    geo.synchronize()
-    grade(
-        gmsh,
-        size=size,
-        contact_size=contact_size,
-        width=2.0 * contact_size,
-        growth=0.25,
-        surfaces=[bottom],
-    )
     sides = {"left": left, "right": right, "front": front, "back": back}
     parts = {name: [face] for name, face in {**sides, "bottom": bottom, "top": top}.items()}
-    finish(gmsh, 3, [body], parts)
+    finish(gmsh, 3, [body], parts, _sizes(size, contact_size), surfaces=[bottom])
 
 
 def column(

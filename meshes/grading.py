@@ -4,7 +4,7 @@ import logging
 import math
 import os
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 from contact.errors import InputError
 
@@ -17,13 +17,29 @@ LONG = 60.0
 logger = logging.getLogger("contact.mesh")
 
 
+class Sizes(NamedTuple):
+    """Sizes of elements near something and far away.
+
+    Attributes
+    ----------
+    far, near
+        Far away, and up to a distance.
+    width
+        This distance.
+    growth
+        From there on, a unit length.
+    """
+
+    far: float
+    near: float
+    width: float
+    growth: float
+
+
 def grade(
     gmsh: Any,
+    sizes: Sizes,
     *,
-    size: float,
-    contact_size: float,
-    width: float,
-    growth: float,
     points: Sequence[int] = (),
     curves: Sequence[int] = (),
     surfaces: Sequence[int] = (),
@@ -32,16 +48,16 @@ def grade(
 ) -> None:
     """Set the element size by the distance to some entities.
 
-    It is ``contact_size`` up to the distance ``width`` and then grows by ``growth`` a unit
-    length, up to ``size``. At ``edges``, points in the plane and curves in space, it is
-    ``edge_size``, and grows from there.
+    At ``edges``, points in the plane and curves in space, it is ``edge_size``, and grows from
+    there.
 
     Raises
     ------
     InputError
         If Gmsh, on one core, has not the memory for that.
     """
-    near = min(contact_size, size)
+    size, near, width, growth = sizes
+    near = min(near, size)
     # The first elements of the ramp count too.
     _check_count(gmsh, size, near, width + near / growth, 2 if surfaces else 1 if curves else 0)
     zone = {"PointsList": points, "CurvesList": curves, "SurfacesList": surfaces}
@@ -96,6 +112,11 @@ def _check_count(gmsh: Any, size: float, near: float, width: float, flat: int) -
     check_cells(max(far, zone))
 
 
+def memory() -> int:
+    """Return the memory of the machine (bytes)."""
+    return os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
+
+
 def check_cells(count: float) -> None:
     """Refuse more cells than the memory holds, and say what many take.
 
@@ -109,7 +130,7 @@ def check_cells(count: float) -> None:
     InputError
         If Gmsh has not the memory for them.
     """
-    machine = os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
+    machine = memory()
     if count > math.log10(machine / CELL_MEMORY):
         raise InputError(
             f"the sizes ask for at least 1e{math.floor(count)} cells, which take more memory than "
@@ -129,8 +150,17 @@ def finish(
     dim: int,
     body: Sequence[int] | Mapping[str, Sequence[int]],
     parts: Mapping[str, Sequence[int]],
+    sizes: Sizes | None = None,
+    **near: Any,
 ) -> None:
-    """Name the body, or several, and the parts (entities of dimension dim - 1); make the mesh."""
+    """Name the body, or several, and the parts (entities of dimension dim - 1); make the mesh.
+
+    With sizes the geometry is Gmsh's own, and the elements are graded towards ``near``, as `grade`
+    takes it.
+    """
+    if sizes is not None:
+        gmsh.model.geo.synchronize()
+        grade(gmsh, sizes, **near)
     bodies = body if isinstance(body, Mapping) else {"body": body}
     for name, entities in bodies.items():
         gmsh.model.addPhysicalGroup(dim, list(entities), name=name)

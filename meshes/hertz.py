@@ -2,6 +2,10 @@
 
 import math
 
+from contact.errors import InputError
+from meshes.grading import Sizes, finish
+from meshes.pieces import half, quarter
+
 
 def quarter_disc(
     *,
@@ -19,24 +23,10 @@ def quarter_disc(
     """
     import gmsh
 
-    from meshes.grading import finish, grade
-
-    geo = gmsh.model.geo
-    low, side, centre = (geo.addPoint(*p) for p in ((0, 0, 0), (radius, radius, 0), (0, radius, 0)))
-    arc = geo.addCircleArc(low, centre, side)
-    top = geo.addLine(side, centre)
-    symmetry = geo.addLine(centre, low)
-    body = geo.addPlaneSurface([geo.addCurveLoop([arc, top, symmetry])])
-    geo.synchronize()
-    grade(
-        gmsh,
-        size=size,
-        contact_size=contact_size,
-        width=contact_width,
-        growth=growth,
-        points=[low],
-    )
-    finish(gmsh, 2, [body], {"symmetry": [symmetry], "top": [top], "contact": [arc]})
+    made = quarter(gmsh.model.geo, radius, radius)
+    parts = {"symmetry": made.sides, "top": made.cut, "contact": made.round}
+    sizes = Sizes(size, contact_size, contact_width, growth)
+    finish(gmsh, 2, made.body, parts, sizes, points=[made.low])
 
 
 def half_disc(
@@ -53,26 +43,9 @@ def half_disc(
     """
     import gmsh
 
-    from meshes.grading import finish, grade
-
-    geo = gmsh.model.geo
-    low, right, left, centre = (
-        geo.addPoint(*p)
-        for p in ((0, 0, 0), (radius, radius, 0), (-radius, radius, 0), (0, radius, 0))
-    )
-    arcs = [geo.addCircleArc(left, centre, low), geo.addCircleArc(low, centre, right)]
-    top = [geo.addLine(right, centre), geo.addLine(centre, left)]
-    body = geo.addPlaneSurface([geo.addCurveLoop([*arcs, *top])])
-    geo.synchronize()
-    grade(
-        gmsh,
-        size=size,
-        contact_size=contact_size,
-        width=contact_width,
-        growth=growth,
-        points=[low],
-    )
-    finish(gmsh, 2, [body], {"top": top, "contact": arcs})
+    made = half(gmsh.model.geo, radius, radius)
+    sizes = Sizes(size, contact_size, contact_width, growth)
+    finish(gmsh, 2, made.body, {"top": made.cut, "contact": made.round}, sizes, points=[made.low])
 
 
 def disc(
@@ -90,9 +63,6 @@ def disc(
     degrees, at most 90, of the highest point). Sizes as in `quarter_disc`.
     """
     import gmsh
-
-    from contact.errors import InputError
-    from meshes.grading import finish, grade
 
     if top_angle > 90.0:
         raise InputError(f"top_angle must be at most 90 degrees; given: {top_angle}")
@@ -112,17 +82,15 @@ def disc(
         geo.addCircleArc(a, centre, b) for a, b in zip(points, points[1:] + points[:1], strict=True)
     ]
     body = geo.addPlaneSurface([geo.addCurveLoop(arcs)])
-    geo.synchronize()
-    grade(
+    top = arcs[2:] if top_angle == 90.0 else arcs[3:5]
+    finish(
         gmsh,
-        size=size,
-        contact_size=contact_size,
-        width=contact_width,
-        growth=growth,
+        2,
+        [body],
+        {"contact": arcs[:2], "top": top},
+        Sizes(size, contact_size, contact_width, growth),
         points=[points[1]],
     )
-    top = arcs[2:] if top_angle == 90.0 else arcs[3:5]
-    finish(gmsh, 2, [body], {"contact": arcs[:2], "top": top})
 
 
 def sphere(
@@ -139,8 +107,6 @@ def sphere(
     ``contact`` (the round surface). Sizes as in `quarter_disc`.
     """
     import gmsh
-
-    from meshes.grading import finish, grade
 
     geo = gmsh.model.geo
     low, on_x, on_y, centre = (
@@ -159,15 +125,6 @@ def sphere(
     symmetry_x = geo.addPlaneSurface([geo.addCurveLoop([arc_y, -axis, edge_y])])
     top = geo.addPlaneSurface([geo.addCurveLoop([arc_top, -edge_y, -edge_x])])
     body = geo.addVolume([geo.addSurfaceLoop([contact, symmetry_y, symmetry_x, top])])
-    geo.synchronize()
-    grade(
-        gmsh,
-        size=size,
-        contact_size=contact_size,
-        width=contact_width,
-        growth=growth,
-        points=[low],
-    )
     finish(
         gmsh,
         3,
@@ -178,4 +135,6 @@ def sphere(
             "top": [top],
             "contact": [contact],
         },
+        Sizes(size, contact_size, contact_width, growth),
+        points=[low],
     )

@@ -3,6 +3,7 @@
 from itertools import pairwise
 
 from contact.errors import InputError
+from meshes.grading import Sizes, finish
 
 
 def half_space(
@@ -23,8 +24,6 @@ def half_space(
     """
     import gmsh
 
-    from meshes.grading import finish, grade
-
     _check(radius, extent)
     geo = gmsh.model.geo
     low, corner, rim, edge, origin = (
@@ -35,22 +34,15 @@ def half_space(
     free, contact = geo.addLine(rim, edge), geo.addLine(edge, origin)
     axis = geo.addLine(origin, low)
     body = geo.addPlaneSurface([geo.addCurveLoop([bottom, side, free, contact, axis])])
-    geo.synchronize()
-    grade(
-        gmsh,
-        size=size,
-        contact_size=contact_size,
-        width=0.5 * radius,
-        growth=growth,
-        curves=[contact],
-        edges=[edge],
-        edge_size=edge_size,
-    )
     finish(
         gmsh,
         2,
         [body],
         {"axis": [axis], "contact": [contact], "free": [free], "side": [side], "bottom": [bottom]},
+        Sizes(size, contact_size, 0.5 * radius, growth),
+        curves=[contact],
+        edges=[edge],
+        edge_size=edge_size,
     )
 
 
@@ -69,8 +61,6 @@ def half_cylinder(
     (y = 0), ``side``, ``bottom``. Sizes as in `half_space`.
     """
     import gmsh
-
-    from meshes.grading import finish, grade
 
     _check(radius, extent)
     geo = gmsh.model.geo
@@ -100,17 +90,6 @@ def half_cylinder(
         for k in range(2)
     ]
     body = geo.addVolume([geo.addSurfaceLoop([contact, free, bottom, symmetry, *side])])
-    geo.synchronize()
-    grade(
-        gmsh,
-        size=size,
-        contact_size=contact_size,
-        width=0.5 * radius,
-        growth=growth,
-        surfaces=[contact],
-        edges=edge,
-        edge_size=edge_size,
-    )
     finish(
         gmsh,
         3,
@@ -122,6 +101,10 @@ def half_cylinder(
             "side": side,
             "bottom": [bottom],
         },
+        Sizes(size, contact_size, 0.5 * radius, growth),
+        surfaces=[contact],
+        edges=edge,
+        edge_size=edge_size,
     )
 
 

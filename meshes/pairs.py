@@ -1,12 +1,10 @@
 """Two bodies, or three, that touch each other: each a region of its own, with its own nodes."""
 
 import math
-from collections.abc import Sequence
-from typing import Any
 
 from contact.errors import InputError
-
-Points = Sequence[tuple[float, float]]
+from meshes.grading import Sizes, check_cells, finish
+from meshes.pieces import half, half_ball, polygon, quarter
 
 
 def two_blocks(
@@ -25,8 +23,6 @@ def two_blocks(
     """
     import gmsh
 
-    from meshes.grading import check_cells, finish
-
     bodies: dict[str, list[int]] = {}
     parts: dict[str, list[int]] = {}
     for name, width, low, high, size in (
@@ -36,7 +32,7 @@ def two_blocks(
         check_cells(math.log10(width / size) + math.log10((high - low) / size))
         half = width / 2
         corners = [(-half, low), (half, low), (half, high), (-half, high)]
-        bodies[name], sides = _polygon(gmsh.model.geo, corners, size)
+        bodies[name], sides = polygon(gmsh.model.geo, corners, size)
         places = ("bottom", "right", "top", "left")
         parts |= {f"{name}_{p}": [s] for p, s in zip(places, sides, strict=True)}
     gmsh.model.geo.synchronize()
@@ -59,8 +55,6 @@ def two_boxes(
     (y), ``bottom``, ``top``.
     """
     import gmsh
-
-    from meshes.grading import check_cells, finish
 
     model, bodies = gmsh.model, {}
     parts: dict[str, list[int]] = {}
@@ -97,34 +91,26 @@ def cylinder_on_block(
     """
     import gmsh
 
-    from meshes.grading import finish, grade
-
     geo = gmsh.model.geo
-    low, side, centre = (geo.addPoint(*p) for p in ((0, 0, 0), (radius, radius, 0), (0, radius, 0)))
-    arc = geo.addCircleArc(low, centre, side)
-    top = geo.addLine(side, centre)
-    axis = geo.addLine(centre, low)
-    cylinder = geo.addPlaneSurface([geo.addCurveLoop([arc, top, axis])])
+    cylinder = quarter(geo, radius, radius)
     corners = [(0.0, -height), (width, -height), (width, 0.0), (0.0, 0.0)]
-    block, (bottom, right, upper, left) = _polygon(geo, corners)
-    geo.synchronize()
-    grade(
-        gmsh,
-        size=size,
-        contact_size=contact_size,
-        width=contact_width,
-        growth=growth,
-        points=[low],
-    )
+    block, (bottom, right, upper, left) = polygon(geo, corners)
     parts = {
-        "arc": [arc],
+        "arc": cylinder.round,
         "block_top": [upper],
-        "symmetry": [axis, left],
-        "top": [top],
+        "symmetry": [*cylinder.sides, left],
+        "top": cylinder.cut,
         "block_bottom": [bottom],
         "block_right": [right],
     }
-    finish(gmsh, 2, {"cylinder": [cylinder], "block": block}, parts)
+    finish(
+        gmsh,
+        2,
+        {"cylinder": cylinder.body, "block": block},
+        parts,
+        Sizes(size, contact_size, contact_width, growth),
+        points=[cylinder.low],
+    )
 
 
 def two_half_cylinders(
@@ -142,30 +128,16 @@ def two_half_cylinders(
     """
     import gmsh
 
-    from meshes.grading import finish, grade
-
     geo, bodies, touching = gmsh.model.geo, {}, []
     parts: dict[str, list[int]] = {}
-    for name, sign in (("upper", 1.0), ("lower", -1.0)):
-        y = sign * radius
-        middle, right, left, centre = (
-            geo.addPoint(*p, 0) for p in ((0, 0), (radius, y), (-radius, y), (0, y))
-        )
-        arcs = [geo.addCircleArc(left, centre, middle), geo.addCircleArc(middle, centre, right)]
-        cut = [geo.addLine(right, centre), geo.addLine(centre, left)]
-        bodies[name] = [geo.addPlaneSurface([geo.addCurveLoop([*arcs, *cut])])]
-        parts |= {f"{name}_arc": arcs, f"{name}_cut": cut}
-        touching.append(middle)
-    geo.synchronize()
-    grade(
-        gmsh,
-        size=size,
-        contact_size=contact_size,
-        width=contact_width,
-        growth=growth,
-        points=touching,
+    for name, y in (("upper", radius), ("lower", -radius)):
+        cap = half(geo, radius, y)
+        bodies[name] = cap.body
+        parts |= {f"{name}_arc": cap.round, f"{name}_cut": cap.cut}
+        touching.append(cap.low)
+    finish(
+        gmsh, 2, bodies, parts, Sizes(size, contact_size, contact_width, growth), points=touching
     )
-    finish(gmsh, 2, bodies, parts)
 
 
 def two_balls(
@@ -185,28 +157,17 @@ def two_balls(
     """
     import gmsh
 
-    from meshes.grading import finish, grade
-
     geo, bodies, touching = gmsh.model.geo, {}, []
     parts: dict[str, list[int]] = {"symmetry": []}
     for name, y in (("upper", radius), ("lower", -radius)):
-        low, side, centre = (geo.addPoint(*p, 0) for p in ((0, 0), (radius, y), (0, y)))
-        arc, cut = geo.addCircleArc(low, centre, side), geo.addLine(side, centre)
-        axis = geo.addLine(centre, low)
-        bodies[name] = [geo.addPlaneSurface([geo.addCurveLoop([arc, cut, axis])])]
-        parts |= {f"{name}_arc": [arc], f"{name}_cut": [cut]}
-        parts["symmetry"].append(axis)
-        touching.append(low)
-    geo.synchronize()
-    grade(
-        gmsh,
-        size=size,
-        contact_size=contact_size,
-        width=contact_width,
-        growth=growth,
-        points=touching,
+        cap = quarter(geo, radius, y)
+        bodies[name] = cap.body
+        parts |= {f"{name}_arc": cap.round, f"{name}_cut": cap.cut}
+        parts["symmetry"] += cap.sides
+        touching.append(cap.low)
+    finish(
+        gmsh, 2, bodies, parts, Sizes(size, contact_size, contact_width, growth), points=touching
     )
-    finish(gmsh, 2, bodies, parts)
 
 
 def two_spheres(
@@ -227,58 +188,22 @@ def two_spheres(
     """
     import gmsh
 
-    from meshes.grading import finish, grade
-
     if quarters not in (1, 2):
         raise InputError(f"quarters of the mesh recipe must be 1 or 2; given: {quarters:g}")
     bodies: dict[str, list[int]] = {}
     parts: dict[str, list[int]] = {}
     touching = []
     for name, z in (("upper", radius), ("lower", -radius)):
-        body, low = _half_ball(gmsh.model.geo, radius, z, int(quarters))
-        bodies[name] = body["volumes"]
-        parts |= {f"{name}_round": body["round"], f"{name}_cut": body["cut"]}
-        first, *_, last = body["sides"]
+        cap = half_ball(gmsh.model.geo, radius, z, int(quarters))
+        bodies[name] = cap.body
+        parts |= {f"{name}_round": cap.round, f"{name}_cut": cap.cut}
+        first, *_, last = cap.sides
         parts.setdefault("symmetry_y", []).append(first)
         parts.setdefault("symmetry_x" if quarters == 1 else "symmetry_y", []).append(last)
-        touching.append(low)
-    gmsh.model.geo.synchronize()
-    grade(
-        gmsh,
-        size=size,
-        contact_size=contact_size,
-        width=contact_width,
-        growth=growth,
-        points=touching,
+        touching.append(cap.low)
+    finish(
+        gmsh, 3, bodies, parts, Sizes(size, contact_size, contact_width, growth), points=touching
     )
-    finish(gmsh, 3, bodies, parts)
-
-
-def _half_ball(
-    geo: Any, radius: float, z: float, quarters: int
-) -> tuple[dict[str, list[int]], int]:
-    """Return quarters of a half ball that touches the origin, about its axis, and that point.
-
-    They are given as volumes, the surfaces ``round`` and ``cut``, and ``sides`` from y = 0 on.
-    """
-    low, centre = geo.addPoint(0, 0, 0), geo.addPoint(0, 0, z)
-    axis = geo.addLine(centre, low)
-    places = [(radius, 0), (0, radius), (-radius, 0)][: quarters + 1]
-    rims = [geo.addPoint(x, y, z) for x, y in places]
-    arcs = [geo.addCircleArc(low, centre, rim) for rim in rims]
-    spokes = [geo.addLine(centre, rim) for rim in rims]
-    made: dict[str, list[int]] = {"volumes": [], "round": [], "cut": [], "sides": []}
-    for arc, spoke in zip(arcs, spokes, strict=True):
-        made["sides"].append(geo.addPlaneSurface([geo.addCurveLoop([axis, arc, -spoke])]))
-    for k in range(quarters):
-        rim = geo.addCircleArc(rims[k], centre, rims[k + 1])
-        loop = geo.addCurveLoop([arcs[k], rim, -arcs[k + 1]])
-        made["round"].append(geo.addSurfaceFilling([loop]))
-        cut = geo.addCurveLoop([spokes[k], rim, -spokes[k + 1]])
-        made["cut"].append(geo.addPlaneSurface([cut]))
-        around = [made["round"][k], made["cut"][k], *made["sides"][k : k + 2]]
-        made["volumes"].append(geo.addVolume([geo.addSurfaceLoop(around)]))
-    return made, low
 
 
 def ball_between_plates(
@@ -299,8 +224,6 @@ def ball_between_plates(
     """
     import gmsh
 
-    from meshes.grading import finish, grade
-
     geo = gmsh.model.geo
     low, side, high, centre = (
         geo.addPoint(*p, 0) for p in ((0, 0), (radius, radius), (0, 2 * radius), (0, radius))
@@ -311,24 +234,14 @@ def ball_between_plates(
     bodies, parts = {"ball": [ball]}, {"ball_bottom": arcs[:1], "ball_top": arcs[1:]}
     for name, y in (("lower", -height), ("upper", 2 * radius)):
         corners = [(0.0, y), (width, y), (width, y + height), (0.0, y + height)]
-        bodies[name], (bottom, _, top, left) = _polygon(geo, corners)
+        bodies[name], (bottom, _, top, left) = polygon(geo, corners)
         parts |= {f"{name}_bottom": [bottom], f"{name}_top": [top]}
         axis.append(left)
-    geo.synchronize()
-    grade(
+    finish(
         gmsh,
-        size=size,
-        contact_size=contact_size,
-        width=contact_width,
-        growth=growth,
+        2,
+        bodies,
+        {**parts, "symmetry": axis},
+        Sizes(size, contact_size, contact_width, growth),
         points=[low, high],
     )
-    finish(gmsh, 2, bodies, {**parts, "symmetry": axis})
-
-
-def _polygon(geo: Any, corners: Points, size: float = 0.0) -> tuple[list[int], list[int]]:
-    """Return the surface of a polygon, and its sides, the first from the first corner on."""
-    points = [geo.addPoint(x, y, 0, size) for x, y in corners]
-    ends = [*points[1:], points[0]]
-    sides = [geo.addLine(a, b) for a, b in zip(points, ends, strict=True)]
-    return [geo.addPlaneSurface([geo.addCurveLoop(sides)])], sides

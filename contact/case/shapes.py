@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from abc import abstractmethod
+from collections.abc import Callable
 from typing import TYPE_CHECKING, Annotated, ClassVar, Literal, TypeAlias
 
 import numpy as np
@@ -45,9 +45,12 @@ class Shape(Section):
                 raise fault(key, vector, f"{len(first[1])} numbers, as {first[0]} has")
         return self
 
-    @abstractmethod
+    #: What it stands for, made of the section's values in their order.
+    made: ClassVar[Callable[..., Obstacle]]
+
     def obstacle(self, aim: Aim) -> Obstacle:
         """Return the shape itself, for a contact direction."""
+        return type(self).made(*(value for key, value in self if key != "shape"), *aim)
 
 
 class Plane(Shape):
@@ -55,45 +58,37 @@ class Plane(Shape):
 
     directions = ("normal",)
 
+    made = obstacle.Plane
     shape: Literal["plane"] = Field(description="A plane.")
     point: Vector = Field(description="A point of the plane.")
     normal: Vector = Field(description="Normal towards the body, of any length.")
-
-    def obstacle(self, aim: Aim) -> obstacle.Plane:
-        """Return the plane."""
-        return obstacle.Plane(self.point, self.normal, *aim)
 
 
 class Sphere(Shape):
     """`foundation = { shape = "sphere", ... }`: rigid sphere, in the plane a circle."""
 
+    made = obstacle.Sphere
     shape: Literal["sphere"] = Field(description="A sphere or circle.")
     centre: Vector = Field(description="Centre.")
     radius: Positive = Field(description="Radius.")
     inside: Switch = Field(default=False, description="`true`: the body lies inside the sphere.")
 
-    def obstacle(self, aim: Aim) -> obstacle.Sphere:
-        """Return the sphere."""
-        return obstacle.Sphere(self.centre, self.radius, self.inside, *aim)
-
 
 class Cylinder(Shape):
     """`foundation = { shape = "cylinder", ... }`: rigid cylinder without ends, or a bore."""
 
+    made = obstacle.Cylinder
     shape: Literal["cylinder"] = Field(description="A cylinder; in the plane a strip.")
     point: Vector = Field(description="A point of its axis.")
     axis: Vector = Field(description="Its axis, of any length.")
     radius: Positive = Field(description="Radius.")
     inside: Switch = Field(default=False, description="`true`: the body lies in the bore.")
 
-    def obstacle(self, aim: Aim) -> obstacle.Cylinder:
-        """Return the cylinder."""
-        return obstacle.Cylinder(self.point, self.axis, self.radius, self.inside, *aim)
-
 
 class Cone(Shape):
     """`foundation = { shape = "cone", ... }`: rigid cone, in the plane a wedge."""
 
+    made = obstacle.Cone
     shape: Literal["cone"] = Field(description="A cone.")
     apex: Vector = Field(description="Its tip.")
     axis: Vector = Field(description="From the tip into the cone, of any length.")
@@ -101,27 +96,21 @@ class Cone(Shape):
         float, Field(gt=0, lt=90), Accepted("an angle between 0 and 90 degrees, both excluded")
     ] = Field(description="Between axis and side (degrees).")
 
-    def obstacle(self, aim: Aim) -> obstacle.Cone:
-        """Return the cone."""
-        return obstacle.Cone(self.apex, self.axis, self.half_angle, *aim)
-
 
 class Paraboloid(Shape):
     """`foundation = { shape = "paraboloid", ... }`: rigid paraboloid, in the plane a parabola."""
 
+    made = obstacle.Paraboloid
     shape: Literal["paraboloid"] = Field(description="A paraboloid h = r^2/(2 R).")
     apex: Vector = Field(description="Its tip.")
     axis: Vector = Field(description="From the tip into the paraboloid, of any length.")
     radius: Positive = Field(description="Radius of curvature R at the tip.")
 
-    def obstacle(self, aim: Aim) -> obstacle.Paraboloid:
-        """Return the paraboloid."""
-        return obstacle.Paraboloid(self.apex, self.axis, self.radius, *aim)
-
 
 class Punch(Shape):
     """`foundation = { shape = "punch", ... }`: rigid flat punch, in the plane a rectangle."""
 
+    made = obstacle.Punch
     shape: Literal["punch"] = Field(description="A cylinder with a flat face.")
     centre: Vector = Field(description="Centre of the face.")
     axis: Vector = Field(description="From the face into the punch, of any length.")
@@ -135,10 +124,6 @@ class Punch(Shape):
         if self.edge_radius > self.radius:
             raise fault("edge_radius", self.edge_radius, f"at most the radius, {self.radius:g}")
         return self
-
-    def obstacle(self, aim: Aim) -> obstacle.Punch:
-        """Return the punch."""
-        return obstacle.Punch(self.centre, self.axis, self.radius, self.edge_radius, *aim)
 
 
 class Distance(Shape):
