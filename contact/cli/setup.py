@@ -14,6 +14,7 @@ from matplotlib.figure import Figure
 from contact import _compat
 from contact.case.file import Case
 from contact.mesh.domain import Domain, Indices
+from contact.mesh.entities import exterior_facets
 from contact.output.figures.figures import STYLE, axes_of, heading
 from contact.output.figures.setup import (
     ELECTRODE,
@@ -40,16 +41,18 @@ def draw_setup(case: Case, problem: ContactProblem) -> Figure | None:
     for other in (0, domain.dim):
         domain.mesh.topology.create_connectivity(domain.dim - 1, other)
     roles = list(_roles(case, problem))
-    cells = _corners(domain, domain.dim, _owned(domain))
+    # Of a body in space its boundary is seen.
+    seen = (2, _owned(domain)) if domain.dim == 2 else (2, exterior_facets(domain.mesh))
+    simplices = _corners(domain, *seen)
     nodes = problem.nodes
     near = np.isfinite(nodes.gap)
     surface = nodes.gather((nodes.points + nodes.gap[:, None] * nodes.normal)[near])
-    if domain.comm.rank > 0 or cells is None or any(role is None for role in roles):
+    if domain.comm.rank > 0 or simplices is None or any(role is None for role in roles):
         return None
     given = [role for role in roles if role is not None]
     with matplotlib.rc_context(STYLE):
         draw = draw_plane if domain.dim == 2 else draw_space
-        figure = draw(cells, given, surface, case.case.units, axes_of(domain.revolved))
+        figure = draw(simplices, given, surface, case.case.units, axes_of(domain.revolved))
         figure.suptitle(heading(case.title), fontsize="medium")
     return figure
 

@@ -1,5 +1,7 @@
 """The set-up of any case in one figure: `contact check --plot`."""
 
+import io
+
 import matplotlib
 import pytest
 from matplotlib.collections import LineCollection
@@ -23,6 +25,7 @@ def test_every_case_has_a_picture(name):
     """All that is given stands in the legend, and the dimensions of a plane body beside it."""
     case = load_case(CASES / f"{name}.toml", SMALL[name])
     figure = draw_setup(case, build_problem(case))
+    figure.savefig(io.BytesIO(), dpi=30)
     (legend,) = figure.legends
     words = [text.get_text() for text in legend.get_texts()]
     for fixed in case.fixed:

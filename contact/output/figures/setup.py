@@ -153,12 +153,14 @@ def _dimensions(ax: Axes, low: Array, high: Array, units: Units) -> None:
 
 
 def draw_space(
-    cells: Array, roles: Sequence[Role], surface: Array, units: Units, axes: str
+    boundary: Array, roles: Sequence[Role], surface: Array, units: Units, axes: str
 ) -> Figure:
-    """Draw a body in space by its parts; see `draw_plane`."""
+    """Draw a body in space by the facets of its boundary; see `draw_plane`."""
     figure = Figure(figsize=(6.9, 6.0))
     figure.set_layout_engine("none")
     ax: Any = figure.add_axes((0.05, 0.22, 0.9, 0.7), projection="3d")
+    faint = {"facecolor": (0.9, 0.9, 0.9, 0.25), "edgecolor": "0.75", "linewidths": 0.15}
+    ax.add_collection3d(Poly3DCollection(list(boundary), **faint))
     for role in roles:
         colour = "0.6" if role.hatched else role.colour
         edge = {"edgecolor": "0.3", "linewidths": 0.2, "alpha": 0.15 if role.hatched else 0.5}
@@ -166,13 +168,13 @@ def draw_space(
         ax.plot([], [], "s", color=colour, label=role.words)
         if role.force is not None and np.any(role.force):
             centre = role.facets.mean(axis=1)
-            reach = 0.2 * float(np.ptp(cells.reshape(-1, 3), axis=0).max())
+            reach = 0.2 * float(np.ptp(boundary.reshape(-1, 3), axis=0).max())
             step = reach * role.force / np.linalg.norm(role.force, axis=1).max()
             chosen = np.linspace(0, len(centre) - 1, min(ARROWS, len(centre))).astype(int)
             start = (centre - step)[chosen]
             ax.quiver(*start.T, *step[chosen].T, color=LOADED, lw=0.8)
     ax.plot(*surface.T, ".", ms=2, color=FOUNDATION, label="foundation")
-    low, high = cells.min(axis=(0, 1)), cells.max(axis=(0, 1))
+    low, high = boundary.min(axis=(0, 1)), boundary.max(axis=(0, 1))
     ax.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), zlim=(low[2], high[2]))
     ax.set_box_aspect(high - low)
     for name in "xyz":
