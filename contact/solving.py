@@ -150,13 +150,16 @@ def solve_problem(
         method = METHODS[settings.method](problem, settings, stop)
         setup = time.perf_counter() - begin
         state, outcome = solve_step(problem, method, start)
+    history, counters = method.history, method.counters
+    # Its operators are most of what there is in memory, which what is said of the solution needs.
+    del method
     check_potential(problem, state)
     solution = Solution(
         problem=problem,
         state=state,
         outcome=outcome,
-        history=method.history,
-        counters=method.counters,
+        history=history,
+        counters=counters,
         method=settings.method,
         start="zero slip" if start is None else words,
         seconds={

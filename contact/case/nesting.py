@@ -12,7 +12,7 @@ from contact.errors import InputError
 COARSEST = 4
 
 #: Meshes with fewer nodes than this take longer to be set up than they save.
-SMALL = 1000
+SMALL = 500
 
 
 def coarser_cases(case: Case, levels: int | None = None) -> list[Case]:

@@ -20,15 +20,15 @@ from contact.output.solution import Solution
 from contact.solving import solve_problem
 from scripts.benchmarks.bench_one import one_linear_solve, problem_case, unknowns, warm
 
-#: Phase -> the end of the file's name, and the function.
+#: Phase -> the end of the file's name, and the function; none of them calls another one.
 PHASES = {
     "assembly of matrices": ("body/equilibrium.py", "assemble"),
-    "set-up of multigrid, factorisation": ("linear/operator.py", "set_up"),
+    "set-up of multigrid, factorisation": ("~", "<method 'setUp' of 'petsc4py.PETSc.KSP' objects>"),
     "contact in multigrid": ("linear/stiff_nodes.py", "follow"),
     "iterations, solves": ("~", "<method 'solve' of 'petsc4py.PETSc.KSP' objects>"),
     "residual forces": ("body/equilibrium.py", "_forces"),
     "contact laws": ("interface/linearised.py", "linearise"),
-    "contact nodes, condensed": ("problem/condensed.py", "linearise"),
+    "dense solves at contact nodes": ("methods/newton.py", "_solve_condensed"),
     "transfer from mesh to mesh": ("methods/nested.py", "prolong"),
 }
 
