@@ -22,6 +22,7 @@ from dolfinx import fem
 from matplotlib import rcParams
 from matplotlib.figure import Figure
 from mpi4py import MPI
+from PIL import Image
 
 from contact import Case, InputError, Solution, solve, solve_problem
 from contact.body.constants import constant
@@ -39,7 +40,7 @@ from forms.kinematics import deviator_squared, strain
 ONE_COLUMN, TWO_COLUMNS = 85 / 25.4, 175 / 25.4
 
 #: Dots per inch of pictures, and of what is an image in a PDF.
-DPI = 300
+DPI, PDF_DPI = 300, 200
 
 rcParams.update(STYLE)
 rcParams.update(
@@ -94,10 +95,11 @@ class Report:
         if MPI.COMM_WORLD.rank > 0:
             return
         self.out.mkdir(parents=True, exist_ok=True)
-        for ending in ("png", "pdf"):
+        for ending, dpi in (("png", DPI), ("pdf", PDF_DPI)):
             figure.savefig(
-                self.out / f"{name}.{ending}", dpi=DPI, bbox_inches="tight", pad_inches=0.02
+                self.out / f"{name}.{ending}", dpi=dpi, bbox_inches="tight", pad_inches=0.02
             )
+        pack(self.out / f"{name}.png")
         length = max(len(column) for column in data.values())
         padded = {key: [*column, *[""] * (length - len(column))] for key, column in data.items()}
         self._csv(name, padded)
@@ -118,6 +120,13 @@ class Report:
     def _fragment(self, name: str, caption: str, body: str, note: str) -> None:
         parts = [f"**{caption}**", body, *([note] if note else []), f"Numbers: `{name}.csv`"]
         (self.out / f"{name}.md").write_text("\n\n".join(parts) + "\n")
+
+
+def pack(path: Path) -> None:
+    """Write a PNG file with a palette of its own: a third of the size."""
+    with Image.open(path) as picture:
+        packed = picture.convert("RGB").quantize(256, dither=Image.Dither.NONE)
+    packed.save(path, optimize=True, dpi=(DPI, DPI))
 
 
 def _escaped(lines: Sequence[Sequence[str]]) -> list[list[str]]:

@@ -1,101 +1,160 @@
-"""How the contact pressure converges: closed form 4 in L2 and in the discrete H^-1/2.
+"""How the contact pressure converges in L2 and in the discrete H^-1/2, against exact solutions.
+
+Closed form 4, in the plane and in space, and Hertz's cylinder and ball.
 
 `python3 -m scripts.studies.pressure_convergence [--out DIR] [--coarse]`, also under mpirun.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from matplotlib.ticker import NullLocator
 
 from contact import InputError, solve_problem
 from contact.methods.options import NewtonOptions
-from scripts.reporting import ONE_COLUMN, Report, observed_orders, options, subplots
+from contact.problem.problem import ContactProblem
+from contact.typing import Array
+from scripts.reporting import TWO_COLUMNS, Report, observed_orders, options, subplots
 from scripts.studies.dual_norm import DualNorm
 from scripts.studies.exact_solutions import Singular
+from scripts.studies.hertz_exact import Line, Point
 
 NOTE = (
-    "Closed form 4: p = |A| sqrt(x - x_0), of H^s for s < 1 on Gamma_3: approximation alone gives "
-    "order 1 in L2 and 3/2 in H^-1/2. Errors are of the nodal pressures against the exact ones at "
+    "Closed form 4: p = |A| sqrt(x - x_0), in the plane and in a slice of space; Hertz: "
+    "p = p_0 sqrt(1 - r^2/a^2) of a cylinder and a ball, the body being cut out of the half space "
+    "with Hertz's displacements inside it prescribed where it is cut, so that no assumption of "
+    "Hertz's adds an error. All are of H^s for s < 1 on Gamma_3: approximation alone gives order 1 "
+    "in L2 and 3/2 in H^-1/2. Errors are of the nodal pressures against the exact ones at "
     "the nodes, relative, in the lumped L2(Gamma_3) and in the norm dual to the energy of the "
     "displacements of the same mesh, for which the body condensed onto Gamma_3 is inverted. Where "
-    "x_0 lies between two nodes matters: they are root mean squares over three places. The nodal "
-    "multiplier with lumped products is that of dual (biorthogonal) functions up to the "
-    "order of the quadrature: nodal values p_i act with int phi_i, which decouples the contact "
-    "conditions node by node. The pair is inf-sup stable uniformly in h, for displacements of "
-    "degree 1 with dual multipliers of degree 1 on the same nodes, as Wohlmuth (SIAM J. Numer. "
-    "Anal. 38 (2000) 989) and Hueeber and Wohlmuth (SIAM J. Numer. Anal. 43 (2005) 156) show, who "
-    "prove the order of the best approximation for Signorini's problem, up to the regularity of "
-    "the solution; for degree 2, Hueeber, Mair and Wohlmuth (Appl. Numer. Math. 54 (2005) 555)."
+    "the contact ends between two nodes matters: they are root mean squares over three places. The "
+    "nodal multiplier with lumped products is that of dual (biorthogonal) functions: nodal values "
+    "p_i act with int phi_i, which decouples the contact conditions node by node. The pair is "
+    "inf-sup stable uniformly in h (Wohlmuth, SIAM J. Numer. Anal. 38 (2000) 989); Hueeber and "
+    "Wohlmuth (SIAM J. Numer. Anal. 43 (2005) 156) prove order 1 in the energy and H^-1/2 for "
+    "degree 1, and Hueeber, Mair and Wohlmuth (Appl. Numer. Math. 54 (2005) 555) treat degree 2. "
+    "On quadratic triangles the functions are those of Popp, Wohlmuth, Gee and Wall (SIAM J. Sci. "
+    "Comput. 34 (2012) B421), alpha = 1/5, so that vertices carry forces; see docs/theory.md."
 )
-
 
 #: Where the contact ends between two nodes, as a part of their distance.
 PLACES = (1 / 6, 1 / 2, 5 / 6)
 
 
-def measured(exact: Singular, n: int, degree: int) -> tuple[tuple[float, float], float]:
+@dataclass(frozen=True)
+class Series:
+    """A problem with its exact pressure, on meshes of several sizes.
+
+    Attributes
+    ----------
+    make
+        Returns the exact solution for a place where the contact ends.
+    problem
+        Returns its problem, given cells and degree.
+    pressure
+        Returns its pressure at points.
+    cells
+        By degree.
+    """
+
+    make: Callable[[float], Any]
+    problem: Callable[[Any, int, int], ContactProblem]
+    pressure: Callable[[Any, Array], Array]
+    cells: Mapping[int, tuple[int, ...]]
+
+
+def _singular(problem: Callable[[Any, int, int], ContactProblem], cells: Any) -> Series:
+    return Series(lambda x: Singular(x0=x), problem, lambda s, x: s.pressure(x[:, 0]), cells)
+
+
+def _hertz(kind: Callable[[float], Any], cells: Mapping[int, tuple[int, ...]]) -> Series:
+    return Series(kind, lambda s, n, k: s.problem(n, k), lambda s, x: s.pressure(x), cells)
+
+
+IN_PLANE = {1: (8, 16, 32, 64), 2: (8, 16, 32, 64)}
+
+SERIES = {
+    "closed form 4": _singular(lambda s, n, k: s.problem(n, k), IN_PLANE),
+    "closed form 4 in space": _singular(
+        lambda s, n, k: s.in_space(n, k), {1: (8, 16, 32), 2: (4, 8, 16)}
+    ),
+    "Hertz's cylinder": _hertz(Line, IN_PLANE),
+    "Hertz's ball": _hertz(Point, {1: (4, 8, 16), 2: (2, 4, 8)}),
+}
+
+
+def measured(
+    series: Series, n: int, degree: int, places: Sequence[float] = PLACES
+) -> tuple[Array, float]:
     """Return the relative errors of the pressure in L2 and H^-1/2, and the residual. Collective."""
-    problem = exact.problem(n, degree)
-    solution = solve_problem(problem, NewtonOptions(tolerance=1e-10))
-    if not solution.converged:
-        raise InputError(f"closed form 4, {n} cells: {solution.outcome.reason}")
-    given = exact.pressure(problem.nodes.points[:, 0])
-    error, dual, norm = solution.pressure - given, DualNorm(problem), problem.nodes.norm
-    ratios = norm(error) / norm(given), dual.pressure(error) / dual.pressure(given)
-    return ratios, solution.outcome.kkt.largest
+    squares, residual = np.zeros(2), 0.0
+    for place in places:
+        exact = series.make((np.floor(0.53 * n) + place) / n)
+        problem = series.problem(exact, n, degree)
+        solution = solve_problem(problem, NewtonOptions(tolerance=1e-10))
+        if not solution.converged:
+            raise InputError(f"{n} cells: {solution.outcome.reason}")
+        given = series.pressure(exact, problem.nodes.points)
+        error, dual, norm = solution.pressure - given, DualNorm(problem), problem.nodes.norm
+        ratios = norm(error) / norm(given), dual.pressure(error) / dual.pressure(given)
+        squares += np.square(ratios) / len(places)
+        residual = max(residual, solution.outcome.kkt.largest)
+    return np.sqrt(squares), residual
 
 
-def main(arguments: Sequence[str] | None = None) -> dict[int, list[float]]:
-    """Make table and figure; return the dual errors by degree. Collective."""
+def main(arguments: Sequence[str] | None = None) -> dict[tuple[str, int], Array]:
+    """Make table and figure; return the errors by problem and degree, (meshes, 2). Collective."""
     chosen = options(__doc__, "pressure_convergence", arguments)
     report = Report(chosen.out)
-    cells = (8, 16, 32) if chosen.coarse else (8, 16, 32, 64)
     names = (
-        "degree", "cells", "p in L2", "order", "fitted", "p in H^-1/2", "its order", "its fit",
-        "residual",
+        "problem", "degree", "cells", "p in L2", "order", "fitted", "p in H^-1/2", "its order",
+        "its fit", "residual",
     )  # fmt: skip
     columns: dict[str, list[object]] = {name: [] for name in names}
-    figure, axes = subplots(size=(ONE_COLUMN, 2.8))
+    figure, axes = subplots(1, 4, size=(TWO_COLUMNS, 2.6), sharey=True)
     found = {}
-    for degree in (1, 2):
-        lumped, dual = [], []
-        for n in cells:
-            squares, residual = np.zeros(2), 0.0
-            for place in PLACES:
-                errors, left = measured(Singular(x0=(np.floor(0.53 * n) + place) / n), n, degree)
-                squares, residual = squares + np.square(errors), max(residual, left)
-            mean = np.sqrt(squares / len(PLACES))
-            lumped.append(float(mean[0]))
-            dual.append(float(mean[1]))
-            columns["residual"].append(residual)
-        h = 1 / np.array(cells)
-        columns["degree"] += [degree] * len(cells)
-        columns["cells"] += [f"{n} x {n}" for n in cells]
-        columns["p in L2"] += lumped
-        columns["order"] += observed_orders(h, lumped)
-        columns["p in H^-1/2"] += dual
-        for key, values in (("fitted", lumped), ("its fit", dual)):
-            slope = float(np.polyfit(np.log(h), np.log(values), 1)[0])
-            columns[key] += [*[np.nan] * (len(cells) - 1), slope]
-        columns["its order"] += observed_orders(h, dual)
-        found[degree] = dual
-        marker = "os"[degree - 1]
-        axes.loglog(h, lumped, f"{marker}-", ms=3, color="C0", label=f"$L^2$, P{degree}")
-        axes.loglog(h, dual, f"{marker}-", ms=3, color="C1", label=f"$H^{{-1/2}}$, P{degree}")
-    for power in (1.0, 1.5):
-        axes.loglog(h, 0.3 * h**power, "k:", lw=0.8)
-        axes.annotate(f"slope {power:g}", (h[-1], 0.3 * h[-1] ** power), fontsize=6, va="top")
-    axes.set(xlabel="$h$", ylabel="relative error of $p$")
-    axes.set_xticks(h, [f"1/{n}" for n in cells])
-    axes.xaxis.set_minor_locator(NullLocator())
-    axes.legend(fontsize=6)
-    caption = "Convergence of the contact pressure, closed form 4"
+    for ax, (name, series) in zip(axes, SERIES.items(), strict=True):
+        for degree, cells in series.cells.items():
+            cells = cells[:2] if chosen.coarse else cells
+            places = PLACES[1:2] if chosen.coarse else PLACES
+            rows = [measured(series, n, degree, places) for n in cells]
+            errors = found[name, degree] = np.array([ratios for ratios, _ in rows])
+            h = 1 / np.array(cells)
+            columns["problem"] += [name] * len(cells)
+            columns["degree"] += [degree] * len(cells)
+            columns["cells"] += [int(n) for n in cells]
+            columns["residual"] += [residual for _, residual in rows]
+            keys = (("p in L2", "order", "fitted"), ("p in H^-1/2", "its order", "its fit"))
+            for k, (value, order, fit) in enumerate(keys):
+                slope = float(np.polyfit(np.log(h), np.log(errors[:, k]), 1)[0])
+                columns[value] += errors[:, k].tolist()
+                columns[order] += observed_orders(h, errors[:, k].tolist())
+                columns[fit] += [*[np.nan] * (len(cells) - 1), slope]
+                label = f"{('$L^2$', '$H^{-1/2}$')[k]}, P{degree}"
+                ax.loglog(h, errors[:, k], f"{'os'[degree - 1]}-", ms=3, color=f"C{k}", label=label)
+            print(name, degree, errors.tolist(), flush=True)
+        _finish(ax, name, sorted({n for cells in series.cells.values() for n in cells}))
+    axes[0].set_ylabel("relative error of $p$")
+    axes[0].legend(fontsize=6)
+    caption = "Convergence of the contact pressure"
     report.table("pressure-convergence-table", caption, columns, NOTE)
     report.figure("pressure-convergence", caption, figure, columns)
     return found
+
+
+def _finish(ax: Any, title: str, cells: Sequence[int]) -> None:
+    h = 1 / np.array([cells[-1], cells[0]])
+    for power in (1.0, 1.5):
+        ax.loglog(h, 0.3 * h**power, "k:", lw=0.8)
+        ax.annotate(f"{power:g}", (h[0], 0.3 * h[0] ** power), fontsize=6, va="top")
+    ax.set(xlabel="$h$")
+    ax.set_title(title, fontsize=8)
+    ax.set_xticks(1 / np.array(cells), [f"1/{n}" for n in cells], fontsize=6)
+    ax.xaxis.set_minor_locator(NullLocator())
 
 
 if __name__ == "__main__":

@@ -44,6 +44,17 @@ the decay of (7.16) rho, and prints the latter for chapter 7 alone: here it is 1
 height, which meshes resolve; earlier versions took a thousandth of its size, and what that did is
 shown beside. c_nu = 10, alpha_nu = 2 and n_nu = 0.1 are not printed either.
 
+Formulas too: (1.13) has g of |dev eps|^2, and (7.8) by the letter would yield where that is xi_0.
+Such a material softens beyond |dev eps|^2 = e xi_0, against (h1)(b), and in Example 7.2 next to
+nothing would yield. xi_0 is taken for a limit of |dev eps| itself, for which d(g t)/dt = mu_1
+xi_0/t > 0; `argument = "square"` takes the letter. psi of (1.34) rises behind the gap, where
+(1.26) allows nothing: as printed no foundation conducts. Here it has risen where the gap closes
+(`shifted`), and (h~5)(d), psi = 0 for u_nu <= rho, does not hold. For the same reason p_nu(u_nu -
+rho) of (1.29) is never more than 0; it is drawn as printed, and with a layer of thickness 0.1
+before the rigid part. f_2 = 1600 of Example 7.1, a force per area in its text, is a line load in
+its formulas for p and b, and so it is here. R = identity, with which the thesis computes, is no R
+of (h3): existence is proved for smoothed pressures (*Non-local friction at work*).
+
 **How iterations are ended.** (3.45), (3.46) and (4.38) are as printed. (5.38) and (6.40) add u and
 phi in L2(Omega); the program measures phi in its own unit, sqrt(mu_1/beta) of the body, in which
 both are comparable whatever the units, and the thesis adds them as they are. With it the counts of

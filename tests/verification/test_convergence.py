@@ -7,6 +7,7 @@ import csv
 import numpy as np
 import pytest
 from dolfinx import fem
+from mpi4py import MPI
 
 from contact.body.norms import errors
 from contact.mesh.grid import rectangle
@@ -17,6 +18,8 @@ from forms.kinematics import strain
 from scripts.reporting import Report
 from scripts.studies import convergence_mechanics as study
 from scripts.studies import nonlocal_friction
+from scripts.studies.fixed_point_rates import fixed_points, secant_rate
+from scripts.studies.grading import grade, pulled
 from scripts.thesis import figures_mechanics, table_7_2
 from tests.problems.mechanics import bar
 
@@ -68,6 +71,25 @@ def test_norms(comm):
     assert (ratio.l2, ratio.h1, ratio.energy) == (1.0, 1.0, 1.0)
 
 
+def test_a_grid_is_pulled_towards_lines():
+    """Elements beside a line are n^-power wide; lines, and what is in the middle, stay."""
+    x = pulled(np.linspace(0.0, 1.0, 9), 2.0)
+    assert x[[0, 1, 4, 7, 8]] == pytest.approx([0.0, 0.5 / 16, 0.5, 1 - 0.5 / 16, 1.0])
+    domain = rectangle(MPI.COMM_SELF, [0.0, 0.0], [4.0, 1.0], [16, 4])
+    grade(domain, 2.0, ((0.0, 2.0, 4.0), (0.0, 1.0)))
+    found = np.unique(domain.mesh.geometry.x[:, 0])
+    assert found[[0, 1, 8, 9, 16]] == pytest.approx([0.0, 1 / 16, 2.0, 2 + 1 / 16, 4.0])
+    assert np.unique(domain.mesh.geometry.x[:, 1]) == pytest.approx([0.0, 1 / 8, 0.5, 7 / 8, 1.0])
+
+
+def test_graded_meshes_give_back_what_the_corners_take(tmp_path):
+    found = study.graded_meshes(Report(tmp_path), coarse=True)
+    uniform, graded = (found[f"P1, power {q:g}"] for q in (1.0, 1.5))
+    assert np.all(graded < 0.93 * uniform)
+    orders = [np.log2(table[0] / table[1])[1] for table in (uniform, graded)]
+    assert orders[1] > orders[0] + 0.05
+
+
 def test_figure_7_6(tmp_path):
     found = study.figure_7_6(Report(tmp_path), coarse=True)
     for label, table in found.items():
@@ -99,7 +121,7 @@ def test_theorem_4_3(tmp_path):
 
 def test_rates_of_the_fixed_points(tmp_path):
     """Theorems 3.2 and 4.5: linear convergence, with friction or without."""
-    rates = study.fixed_points(Report(tmp_path), coarse=True)
+    rates = fixed_points(Report(tmp_path), coarse=True)
     with (tmp_path / "fixed-point-rates.csv").open() as stream:
         rows = {row["iteration"]: row for row in csv.DictReader(stream)}
     assert set(rows) == set(rates)
@@ -111,9 +133,9 @@ def test_rates_of_the_fixed_points(tmp_path):
 
 
 def test_rate_of_the_secant_iteration():
-    assert study.secant_rate(0.04) == 0.0
-    assert study.secant_rate(0.05 * np.e) == pytest.approx(0.5)
-    assert study.secant_rate(0.05 * np.e**4) == pytest.approx(0.8)
+    assert secant_rate(0.04) == 0.0
+    assert secant_rate(0.05 * np.e) == pytest.approx(0.5)
+    assert secant_rate(0.05 * np.e**4) == pytest.approx(0.8)
 
 
 def test_theorem_4_2(tmp_path):

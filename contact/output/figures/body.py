@@ -9,6 +9,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection, PolyCollection
 from matplotlib.figure import Figure
+from mpl_toolkits.axes_grid1 import make_axes_locatable
 
 from contact.output.figures.contact import BLUE, UNNAMED, ends
 from contact.output.figures.picture import Picture
@@ -18,6 +19,12 @@ from contact.typing import Array
 
 #: Quantiles of the values at which colours end where some values lie far beyond.
 OUTLIERS = (0.005, 0.995)
+
+#: Openings of less than this part of the drawing are not seen in it.
+SEEN = 0.005
+
+#: Height of the strip beneath that shows them (inches).
+STRIP = 0.75
 
 
 def draw_plane(
@@ -29,6 +36,9 @@ def draw_plane(
     units: Units = UNNAMED,
 ) -> Figure:
     """Draw a plane body over its outline at rest and the foundation.
+
+    Where it lifts off by less than can be seen at the scale of the displacements, the opening is
+    drawn beneath at its own.
 
     Parameters
     ----------
@@ -48,7 +58,9 @@ def draw_plane(
         width = 2 * picture.box[1, 0]
     inches = float(matplotlib.rcParams["figure.figsize"][0])
     tall = float(np.clip(0.92 * height / width, 0.19, 0.87))
-    figure = Figure(figsize=(inches, tall * inches + 1.4))
+    lifted = None if mirrored else _lift_off(picture, table)
+    strip = 0.0 if lifted is None else STRIP
+    figure = Figure(figsize=(inches, tall * inches + 1.4 + strip))
     ax = figure.subplots()
     rest = {"colors": "black", "lw": 0.5, "ls": (0, (6, 4))}
     for side in (-1, 1) if mirrored else (1,):
@@ -67,7 +79,27 @@ def draw_plane(
     ax.set_xlabel(units.label(f"${axes[0]}$", "length"))
     ax.set_ylabel(units.label(f"${axes[1]}$", "length"))
     ax.set_title(with_scale(title, picture.scale), fontsize="medium")
+    if lifted is not None:
+        below = make_axes_locatable(ax).append_axes("bottom", strip - 0.1, pad=0.1, sharex=ax)
+        below.fill_between(*lifted, color=BLUE, lw=0.8)
+        most = lifted[1].max()
+        below.set_yticks([0.0, most], ["0", f"{most:.2g}"])
+        below.set_ylim(0.0, 1.2 * most)
+        below.set_ylabel(units.label("opening", "length"))
+        below.set_xlabel(ax.get_xlabel())
+        ax.set_xlabel("")
+        ax.tick_params(labelbottom=False)
     return figure
+
+
+def _lift_off(picture: Picture, table: Table) -> tuple[Array, Array] | None:
+    """Return x and how far a straight Gamma_3 is open there, if that is too little to be seen."""
+    x, opening = np.asarray(table["x"]), np.asarray(table["gap"] - table["u_n"])
+    opening = np.where(table["status"] == "open", np.maximum(opening, 0.0), 0.0)
+    seen = picture.scale * opening.max(initial=0.0) / np.ptp(picture.box, axis=0).max()
+    level = np.ptp(table["y"]) <= 1e-9 * np.ptp(x) and "entry" in table
+    alone = level and np.ptp(table["entry"]) == 0 and np.all(table["rigid"])
+    return (x, opening) if alone and 0 < seen < SEEN else None
 
 
 def _ranged(shown: Any, picture: Picture) -> str:
