@@ -56,7 +56,7 @@ NOTES = {
     "8.3": "Nothing is conducted.",
     "8.4": "Crossed diagonals, as symmetric as the bar. With the default ramp there is one patch, "
     "and all settles; no node of Gamma_3 is held, and the force falls until what is left is the "
-    "place of the end of the contact between two nodes, 0.03 %; the largest pressure is "
+    "place of the end of the contact between two nodes, 0.06 %; the largest pressure is "
     "that of the middle once the mesh shows the narrow zone in which the bar sticks, between "
     "slips to either side. With the steep ramp nothing settles.",
     "8.4, k_e = 0.6": "As before, with less current.",

@@ -117,7 +117,6 @@ def _table(path: Path, link: str) -> str:
 def gather(results: Path, page: Path) -> None:
     """Write the page, and copy pictures and numbers beside it."""
     place = page.with_suffix("")
-    shutil.rmtree(place, ignore_errors=True)
     sections = [INTRODUCTION]
     for part in PARTS:
         folder = results / part.script
@@ -126,6 +125,7 @@ def gather(results: Path, page: Path) -> None:
             continue
         sections.append(section(part, folder, place.name))
         target = place / part.script
+        shutil.rmtree(target, ignore_errors=True)
         target.mkdir(parents=True)
         for path in (path for kind in ("png", "pdf", "csv") for path in folder.glob(f"*.{kind}")):
             shutil.copy(path, target)
