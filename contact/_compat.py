@@ -48,6 +48,16 @@ def facet_entities(mesh: Mesh, facets: npt.NDArray[np.int32]) -> npt.NDArray[np.
     return np.asarray(compute(fem.IntegralType.exterior_facet, mesh.topology, facets, *dim))
 
 
+def collapse(
+    subspace: fem.FunctionSpace,
+) -> tuple[fem.FunctionSpace, npt.NDArray[np.int32]]:
+    """Subspace as a space of its own, and its dofs' numbers in the whole space. Collective."""
+    space, dofs = subspace.collapse()
+    # One array a cell type since 0.11.
+    several = len(dofs) > 0 and np.ndim(dofs[0]) > 0
+    return space, np.asarray(dofs[0] if several else dofs, dtype=np.int32)
+
+
 def keeps_inverted_blocks() -> bool:
     """Whether PETSc takes a matrix's inverted nodal blocks for valid when its values change.
 

@@ -11,6 +11,7 @@ from dolfinx.la import InsertMode
 from mpi4py import MPI
 from numpy.typing import NDArray
 
+from contact._compat import collapse
 from contact.body.amplitude import Amplitude, Moving, steady, values_at
 from contact.body.description import Body, Field
 from contact.errors import InputError
@@ -108,7 +109,7 @@ def supports_of(domain: Domain, space: fem.FunctionSpace, body: Body) -> list[Su
 def _axis(domain: Domain, space: fem.FunctionSpace) -> Support:
     """Return u_r = 0 where r = 0."""
     subspace = space.sub(0)
-    scalar, _ = subspace.collapse()
+    scalar, _ = collapse(subspace)
     dofs = fem.locate_dofs_geometrical((subspace, scalar), lambda x: on_axis(domain, x.T))
     return _nothing(subspace, fem.Function(scalar), dofs)
 
@@ -149,7 +150,7 @@ def _support(
 ) -> Support:
     dim, facets = domain.dim, domain.facets(part)
     subspace = space.sub(component)
-    scalar, _ = subspace.collapse()
+    scalar, _ = collapse(subspace)
     data = fem.Function(scalar)
     dofs = fem.locate_dofs_topological((subspace, scalar), dim - 1, facets)
     # On the part alone: a formula need not make sense elsewhere.
@@ -175,13 +176,13 @@ def without_field(space: fem.FunctionSpace, cells: NDArray[np.int32]) -> Support
         Owned piezoelectric cells.
     """
     subspace = space.sub(space.dofmap.index_map_bs - 1)
-    scalar, to_whole = subspace.collapse()
+    scalar, to_whole = collapse(subspace)
     inside = fem.Function(scalar)
     inside.x.array[scalar.dofmap.list[cells].ravel()] = 1.0
     inside.x.scatter_reverse(InsertMode.add)
     inside.x.scatter_forward()
     nodes = np.flatnonzero(inside.x.array == 0).astype(np.int32)
-    dofs = [np.asarray(to_whole, dtype=np.int32)[nodes], nodes]
+    dofs = [to_whole[nodes], nodes]
     return _nothing(subspace, fem.Function(scalar), dofs)
 
 

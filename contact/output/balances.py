@@ -17,6 +17,7 @@ from dolfinx import fem
 from dolfinx.la import InsertMode
 from mpi4py import MPI
 
+from contact._compat import collapse
 from contact.body.constants import constant
 from contact.body.loads import expression
 from contact.errors import InputError
@@ -226,7 +227,7 @@ def _electric_dofs(problem: ContactProblem, part: str) -> Array:
     """Return the owned electric unknowns on a part."""
     body = problem.equilibrium
     subspace = body.space.sub(problem.dim)
-    scalar, _ = subspace.collapse()
+    scalar, _ = collapse(subspace)
     facets = problem.domain.facets(part)
     dofs = fem.locate_dofs_topological((subspace, scalar), problem.dim - 1, facets)[0]
     return dofs[dofs < body.owned]
