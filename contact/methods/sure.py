@@ -28,13 +28,13 @@ from contact.typing import Array
 INTERIOR_POINT = "interior point"
 
 #: Times that a layer and a current are linearised anew, and the change that ends it.
-MOST_ANSWERS, SETTLED = 60, 1e-10
+MOST_ANSWERS, SETTLED = 200, 1e-10
 
 #: Tolerance of a Tresca problem within Haslinger's loop.
 INNER = 1e-10
 
 #: Least share of a step that is taken between two of these times.
-LEAST_SHARE = 1 / 16
+LEAST_SHARE = 1 / 64
 
 Bound = Callable[[Array, Array], Array]
 
