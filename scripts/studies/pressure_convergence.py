@@ -90,12 +90,10 @@ SERIES = {
 }
 
 
-def measured(
-    series: Series, n: int, degree: int, places: Sequence[float] = PLACES
-) -> tuple[Array, float]:
+def measured(series: Series, n: int, degree: int) -> tuple[Array, float]:
     """Return the relative errors of the pressure in L2 and H^-1/2, and the residual. Collective."""
     squares, residual = np.zeros(2), 0.0
-    for place in places:
+    for place in PLACES:
         exact = series.make((np.floor(0.53 * n) + place) / n)
         problem = series.problem(exact, n, degree)
         solution = solve_problem(problem, NewtonOptions(tolerance=1e-10))
@@ -104,7 +102,7 @@ def measured(
         given = series.pressure(exact, problem.nodes.points)
         error, dual, norm = solution.pressure - given, DualNorm(problem), problem.nodes.norm
         ratios = norm(error) / norm(given), dual.pressure(error) / dual.pressure(given)
-        squares += np.square(ratios) / len(places)
+        squares += np.square(ratios) / len(PLACES)
         residual = max(residual, solution.outcome.kkt.largest)
     return np.sqrt(squares), residual
 
@@ -123,8 +121,7 @@ def main(arguments: Sequence[str] | None = None) -> dict[tuple[str, int], Array]
     for ax, (name, series) in zip(axes, SERIES.items(), strict=True):
         for degree, cells in series.cells.items():
             cells = cells[:2] if chosen.coarse else cells
-            places = PLACES[1:2] if chosen.coarse else PLACES
-            rows = [measured(series, n, degree, places) for n in cells]
+            rows = [measured(series, n, degree) for n in cells]
             errors = found[name, degree] = np.array([ratios for ratios, _ in rows])
             h = 1 / np.array(cells)
             columns["problem"] += [name] * len(cells)
