@@ -53,7 +53,7 @@ class Waves:
     direction = "foundation"
     is_shape = True
 
-    def chord_depth(self, length: float) -> float:
+    def chord_depth(self, length: float, points: np.ndarray) -> float:
         """Return how deep edges of a length reach into a crest between their ends."""
         return self.depth * (np.pi * length / self.length) ** 2 / 2
 
