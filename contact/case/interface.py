@@ -238,6 +238,8 @@ class Contact(Section):
     def _check(self) -> Contact:
         if self.against is not None and self.foundation is not None:
             raise fault("against", Words("both against and foundation"), "one of them")
+        if self.against is not None and self.rigid is not None:
+            raise fault("rigid", Words("both against and rigid"), "one of them")
         if self.against is not None and meet(self.against, self.on):
             raise fault("against", self.against, "another part than `on`")
         if self.gap is not None and self.foundation is not None:

@@ -157,6 +157,16 @@ def case(**more):
             r"contact\.against: both against and foundation; accepted: one of them",
         ),
         (
+            {
+                "contact": {
+                    "on": "upper_bottom",
+                    "against": "lower_top",
+                    "rigid": {"displacement": [0.0, 0.01]},
+                }
+            },
+            r"contact\.rigid: both against and rigid; accepted: one of them",
+        ),
+        (
             {"contact": {"on": "upper_top", "against": "lower_top"}, "load": []},
             r"contact\.against: 'upper_top' and 'lower_top' have no facets that face each other",
         ),
