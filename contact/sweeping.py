@@ -135,14 +135,14 @@ def sweep(
     # All of them before the first is solved.
     cases = on_root(comm, lambda: [load_case(path, [*overrides, *_set(p)]) for p in points])
     text = to_toml(load_case(path, [*overrides, *_set(points[0])]))
-    done = on_root(comm, lambda: _begin(folder, names, text))
+    kept = on_root(comm, lambda: _begin(folder, names, text))
     rows: list[dict[str, Any]] = []
     tell(logger, 0.0, "%d cases", len(cases))
     with stop_on_signal(comm, monitor) as stop:
         runner = _Runner(comm, stop, warm)
         for point, case in zip(points, cases, strict=True):
-            row = done.get(tuple(point.values()))
-            if row is None:
+            row = kept.pop(tuple(point.values()), None)
+            if row is None or row["converged"] != "True":
                 begin = time.perf_counter()
                 solution = runner.solve(case)
                 if solution.outcome.signal:
@@ -152,7 +152,8 @@ def sweep(
                 said = f"{', '.join(_set(point))}: {solution.outcome.reason}"
                 tell(logger, (len(rows) + 1) / len(cases), said)
             rows.append(row)
-            on_root(comm, lambda: _write(folder, rows))
+            # What has not come up yet, or is not asked for, remains.
+            on_root(comm, lambda: _write(folder, [*rows, *kept.values()]))
     return rows
 
 
@@ -181,8 +182,7 @@ def _begin(folder: Path, names: list[str], text: str) -> dict[tuple[str, ...], d
             f"--out {folder}: given a sweep over other keys; accepted: one over "
             f"{', '.join(names)}, or another folder"
         )
-    kept = (row for row in rows if row["converged"] == "True")
-    return {tuple(row[name] for name in names): dict(row) for row in kept}
+    return {tuple(row[name] for name in names): dict(row) for row in rows}
 
 
 def _without(text: str, names: list[str]) -> dict[str, Any]:

@@ -1,11 +1,13 @@
 """contact sweep: one row a value, resumable, warm-started, over several keys."""
 
 import csv
+import signal
 
 import pytest
 
 from contact.cli.main import main
 from contact.errors import InputError
+from contact.methods.interrupt import Interrupted
 from contact.sweeping import Axis
 from tests.problems.bar import BAR
 
@@ -45,6 +47,26 @@ def test_two_keys_and_rows_that_are_there(sweep):
     _, more = sweep(*longer, *linear)
     assert len(more) == 6
     assert [row for row in more if row["friction.mu"] != "0.6"] == rows  # seconds too
+
+
+def test_rows_of_other_values_remain(sweep):
+    _, rows = sweep("--over", "friction.mu=0.2,0.4")
+    status, more = sweep("--over", "friction.mu=0.3")
+    assert status == 0
+    assert [row["friction.mu"] for row in more] == ["0.3", "0.2", "0.4"]
+    assert more[1:] == rows
+
+
+def test_rows_that_come_later_remain_where_the_sweep_is_ended(sweep, monkeypatch):
+    _, rows = sweep("--over", "friction.mu=0.2,0.4")
+
+    def stopped(*_):
+        raise Interrupted(signal.SIGTERM)
+
+    monkeypatch.setattr("contact.sweeping._Runner.solve", stopped)
+    status, more = sweep("--over", "friction.mu=0.2,0.3,0.4")
+    assert status == 128 + signal.SIGTERM
+    assert more == rows
 
 
 @pytest.mark.parametrize("law", ["linear", "log"])
