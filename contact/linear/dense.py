@@ -101,16 +101,22 @@ class DenseOperator:
             change = self._blocks - factors.blocks
             differs = change != 0
             self._changed = np.flatnonzero((differs.any(axis=2) | differs.any(axis=1)).ravel())
-        if factors.lower_upper is None or self._changed.size > FEW * bulk.stiffness.shape[0]:
+        few = (
+            factors.lower_upper is not None and self._changed.size <= FEW * bulk.stiffness.shape[0]
+        )
+        if not few or (self._changed.size > 0 and not self._correct(change)):
             factors.make(bulk.stiffness, self._blocks)
             self._changed = np.zeros(0, dtype=np.int64)
-        elif self._changed.size > 0:
-            self._correct(change)
         self.counters.factorizations += 1
         return True
 
-    def _correct(self, change: Array) -> None:
-        """Correct the factors for blocks that differ by a change, at the unknowns that it meets."""
+    def _correct(self, change: Array) -> bool:
+        """Correct the factors for blocks that differ by a change, at the unknowns that it meets.
+
+        Returns
+        -------
+        Whether they can be corrected: not where they, or what they would become, are singular.
+        """
         changed, size = self._changed, change.shape[1]
         unit = np.zeros((self.bulk.stiffness.shape[0], changed.size), order="F")
         unit[changed, np.arange(changed.size)] = 1.0
@@ -118,7 +124,9 @@ class DenseOperator:
         node, component = np.divmod(changed, size)
         among = change[node[:, None], component[:, None], component]
         self._change = np.where(node[:, None] == node, among, 0.0)
-        self._inner = np.eye(changed.size) + self._change @ self._columns[changed]
+        inner = np.eye(changed.size) + self._change @ self._columns[changed]
+        self._inner, self._pivots, info = dgetrf(inner)
+        return bool(info == 0 and np.isfinite(self._inner).all())
 
     def solve(self, rhs: Array, rtol: float | None = None, guess: Array | None = None) -> Array:
         """Solve for the owned unknowns. Collective; see `operator.SparseOperator.solve`."""
@@ -133,7 +141,7 @@ class DenseOperator:
         solution = self.bulk.factors.solve(rhs)
         if self._changed.size > 0:
             known = self._change @ solution[self._changed]
-            solution -= self._columns @ np.linalg.solve(self._inner, known)
+            solution -= self._columns @ dgetrs(self._inner, self._pivots, known)[0]
         return solution
 
     def _times(self, values: Array) -> Array:

@@ -52,3 +52,17 @@ def test_solves_are_those_of_the_whole_matrix_however_many_blocks_change(changed
     rhs = np.where(bulk.free.ravel(), random.standard_normal(NODES * SIZE), 0.0)
     expected = np.linalg.solve(bulk.total(blocks), rhs)
     assert np.allclose(other.solve(rhs), expected, rtol=0, atol=1e-12 * np.abs(expected).max())
+
+
+def test_blocks_that_alone_hold_a_node_are_taken_away():
+    """The whole matrix is singular then: a solution without numbers, not an error."""
+    bulk = Bulk()
+    bulk.stiffness[20:22] = bulk.stiffness[:, 20:22] = 0.0
+    blocks = np.zeros((NODES, SIZE, SIZE))
+    blocks[10] = np.eye(SIZE)
+    operator = DenseOperator(bulk, Counters())
+    operator.update("secant", np.zeros(0), blocks)
+    operator.update("secant", np.zeros(0), np.zeros_like(blocks))
+    assert not np.isfinite(operator.solve(np.ones(NODES * SIZE))).all()
+    operator.update("secant", np.zeros(0), blocks)
+    assert np.allclose(operator.solve(np.ones(NODES * SIZE))[20:22], 1.0)
