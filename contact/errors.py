@@ -6,3 +6,7 @@ class InputError(ValueError):
 
     The command line prints the message alone and leaves with exit status 2.
     """
+
+
+class SingularError(InputError):
+    """A linear system has no solution, for nothing holds the body where it is linearised."""

@@ -7,7 +7,7 @@ from contextlib import contextmanager
 
 from petsc4py import PETSc
 
-from contact.errors import InputError
+from contact.errors import InputError, SingularError
 from contact.linear.layout import Layout
 from contact.tolerances import HUGE
 
@@ -62,7 +62,7 @@ def no_solution(pc: PETSc.PC, prefix: str) -> InputError:
             f"rank), a larger -{prefix}mat_mumps_icntl_14 (percent of workspace beyond "
             'the estimate), or linear = "iterative" in [solver]'
         )
-    return InputError(
+    return SingularError(
         "the linear system is singular: the body can move freely; fix enough "
         "displacement components (or, for a piezoelectric body, a potential)"
     )

@@ -75,7 +75,7 @@ class NewtonLoop:
             before, kept = residuals, iterate
             taken = self.step(iterate, tangent, residuals, bound)
             if taken is None:
-                return kept, self._end(residuals, "the condensed contact problem is not solved")
+                return kept, self._end(residuals, self.step.fault)
             iterate = taken.iterate
             residuals = evaluate(problem, iterate.state)
             worse = self.step.following.worsened(residuals.largest)

@@ -58,6 +58,8 @@ class MaterialStep:
         Notes of records that tell of slower methods.
     """
 
+    fault = "the condensed contact problem is not solved"
+
     def __init__(
         self,
         condensation: Condensation,

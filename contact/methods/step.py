@@ -12,6 +12,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from contact.errors import SingularError
 from contact.interface.interface import Interface
 from contact.interface.linearised import MORE_SOFTENING, LinearisedContact, Moduli, linearise
 from contact.interface.multipliers import Multipliers
@@ -79,6 +80,8 @@ class Step(Protocol):
     """A step of Newton's method."""
 
     following: Following
+    #: What is said where a step cannot be taken.
+    fault: str
 
     def begin(self) -> None:
         """Forget the steps before: a new loop begins."""
@@ -111,6 +114,8 @@ class WholeStep:
     counters
         Where factorisations and solves are counted.
     """
+
+    fault = "nothing holds the body that far from rest"
 
     def __init__(
         self, problem: Problem, options: NewtonOptions, moduli: Moduli, counters: Counters
@@ -164,7 +169,13 @@ class WholeStep:
         here = replace(state, forces=contact.forces)
         residual = residual_forces(self.problem, here)
         jump.transpose((jump.weight * shift)[:, None] * jump.normal, residual)
-        increment = self.operator.solve(-residual, FORCING)
+        try:
+            increment = self.operator.solve(-residual, FORCING)
+        except SingularError:
+            if body.linear or iterate.status is None:
+                raise
+            self._kind, self._operator = "", None  # MUMPS does not begin anew after that
+            return None  # at rest something has held it: it has been moved too far
         moved = jump.apply(increment)
         change = np.einsum("nij,nj->ni", contact.blocks, moved)
         vectors = contact.forces.vectors(jump) + change[:, : interface.dim]

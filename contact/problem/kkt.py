@@ -16,7 +16,7 @@ from contact.typing import Array
 
 #: Forces at a node that count as rounding, over those that hold it alone where it is; and over
 #: loads, contact forces and reactions of the body.
-ROUNDING, MOST_ROUNDING = 1e-14, 0.1
+ROUNDING, MOST_ROUNDING = 1e-14, 1e-4
 
 
 @dataclass(frozen=True)

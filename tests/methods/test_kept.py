@@ -63,6 +63,17 @@ def test_a_solve_does_not_depend_on_those_before_unless_that_is_asked_for():
     assert used.solve(near)[0].near(fresh.solve(near)[0])
 
 
+def test_a_body_that_flies_away_is_not_said_to_be_free():
+    """Nothing is left of its stiffness there, and the matrix singular; it is clamped all the same.
+
+    Hencky's stress grows like a logarithm: it would have to be stretched beyond all numbers.
+    """
+    law, friction = Log(1.0, 0.3, yield_strain=7.34e-4), Friction(ConstantCoefficient(1.0))
+    problem = mechanics.bar(SELF, 8, 0.01417, law=law, friction=friction)
+    _, outcome = Newton(problem, NewtonOptions(max_outer=60)).solve()
+    assert not outcome.converged
+
+
 class Body:
     """Stands for increments that are all of one rank."""
 

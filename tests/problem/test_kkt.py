@@ -1,6 +1,7 @@
 """The residuals that decide: zero at the solution, and each fault raises the right one."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -97,6 +98,19 @@ def test_a_wrong_displacement_is_out_of_equilibrium(solved):
     assert found.equilibrium > 1e-4
     assert found.contact <= SMALL
     assert found.friction <= SMALL
+
+
+def test_rounding_is_a_small_part_of_the_loads(solved):
+    """Of a body that has flown away, or is far softer than at rest."""
+    problem = solved.problem
+    body, scales = problem.equilibrium, problem.scales
+    shake = np.random.default_rng(0).standard_normal(body.owned) * body.free.ravel()
+    shake.reshape(-1, body.block_size)[problem.nodes.nodes] = 0.0
+    stiff = SimpleNamespace(
+        equilibrium=body, interface=problem.interface, scales=replace(scales, stiffness=1e30)
+    )
+    found = evaluate(stiff, State(solved.state.x + 1e-4 * shake, solved.forces))
+    assert found.equilibrium > 1e-4
 
 
 def test_penetration_and_gaps_under_pressure_break_the_contact_law(solved):
