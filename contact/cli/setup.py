@@ -92,6 +92,8 @@ def _roles(case: Case, problem: ContactProblem) -> Iterable[Role | None]:
 def _contact_words(case: Case, key: str, section: Any) -> str:
     """Return what may touch, and what is said of friction and current."""
     words = [f"contact: {section.on}"]
+    if section.against is not None:
+        words[0] += f" against {section.against}"
     if section.gap is not None and _said(section.gap) != "0":
         words.append(f"gap {_said(section.gap)}")
     friction, electric = case.friction_of(key, section)[1], case.electric_of(key, section)[1]

@@ -41,6 +41,13 @@ def test_every_case_has_a_picture(name):
         assert (min(ends), max(ends)) == (2.0, 4.0)
 
 
+def test_contacts_of_two_bodies_name_both_sides():
+    case = load_case(CASES / "two-blocks.toml", ("mesh.lower_size=0.5", "mesh.upper_size=0.5"))
+    (legend,) = draw_setup(case, build_problem(case)).legends
+    words = [text.get_text() for text in legend.get_texts()]
+    assert "contact: upper_bottom against lower_top, coulomb friction" in words
+
+
 def test_check_writes_it(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     before = dict(matplotlib.rcParams)
