@@ -23,6 +23,9 @@ OUTLIERS = (0.005, 0.995)
 #: Openings of less than this part of the drawing are not seen in it.
 SEEN = 0.005
 
+#: Part of the drawing's width from which on a boundary has a strip of its own.
+WIDE = 0.25
+
 #: Height of the strip beneath that shows them (inches).
 STRIP = 0.75
 
@@ -83,9 +86,10 @@ def draw_plane(
         below = make_axes_locatable(ax).append_axes("bottom", strip - 0.1, pad=0.1, sharex=ax)
         below.fill_between(*lifted, color=BLUE, lw=0.8)
         most = lifted[1].max()
-        below.set_yticks([0.0, most], ["0", f"{most:.2g}"])
-        below.set_ylim(0.0, 1.2 * most)
-        below.set_ylabel(units.label("opening", "length"))
+        below.set_yticks([])  # their labels have no room: the axes stands outside of the layout
+        below.set_ylim(0.0, 2.0 * most)
+        said = f"{units.label('opening', 'length')}, at most {most:.2g}"
+        below.text(0.01, 0.93, said, transform=below.transAxes, va="top", fontsize="small")
         below.set_xlabel(ax.get_xlabel())
         ax.set_xlabel("")
         ax.tick_params(labelbottom=False)
@@ -97,7 +101,8 @@ def _lift_off(picture: Picture, table: Table) -> tuple[Array, Array] | None:
     x, opening = np.asarray(table["x"]), np.asarray(table["gap"] - table["u_n"])
     opening = np.where(table["status"] == "open", np.maximum(opening, 0.0), 0.0)
     seen = picture.scale * opening.max(initial=0.0) / np.ptp(picture.box, axis=0).max()
-    level = np.ptp(table["y"]) <= 1e-9 * np.ptp(x) and "entry" in table
+    width = np.ptp(picture.box[:, 0])
+    level = np.ptp(x) > WIDE * width and np.ptp(table["y"]) <= 1e-9 * np.ptp(x) and "entry" in table
     alone = level and np.ptp(table["entry"]) == 0 and np.all(table["rigid"])
     return (x, opening) if alone and 0 < seen < SEEN else None
 
