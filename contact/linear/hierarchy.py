@@ -22,9 +22,9 @@ class Hierarchy:
     To multiply out all coarse operators takes as long as `PRICE` iterations, and from one step of
     Newton's method to the next little changes. So the smoother of the finest level and the
     interpolation at the contact nodes follow the operator in each of them, the coarse levels only
-    once the iterations that have been lost without them would have paid for that. No sequence of
-    operators then costs more than twice what the best choice would have cost. A solve that
-    loses as many by itself goes on with new ones.
+    once the iterations that have been lost without them would have paid for that: the rule of
+    those who do not know how often they will ski, and buy when they have paid as much for
+    hiring. A solve that loses as many by itself goes on with new ones.
 
     Parameters
     ----------
