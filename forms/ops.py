@@ -26,6 +26,11 @@ def symbolic(a: Value) -> Expr:
     return ufl.as_ufl(a)
 
 
+def is_unlimited(limit: Value) -> bool:
+    """Tell whether a limit is infinite: compiled forms know no infinity."""
+    return isinstance(limit, float) and limit == np.inf
+
+
 def maximum(a: Value, b: Value) -> Value:
     """Return the larger of two values, pointwise."""
     return ufl.max_value(a, b) if is_symbolic(a, b) else np.maximum(a, b)

@@ -106,9 +106,9 @@ class ConductivityPieces(Pieces):
         """Whether one of them does."""
         return any(law.follows_gap for law in self.laws)
 
-    def at(self, s: Array, pressed: Array, loaded: Array | None = None) -> Array:
+    def at(self, s: Array, pressed: Array, loaded: Array) -> Array:
         """Return the conductivity at all nodes."""
-        return self._each("at", s, pressed, pressed if loaded is None else loaded)
+        return self._each("at", s, pressed, loaded)
 
     def gap_slope(self, s: Array, pressed: Array) -> Array:
         """Return the derivative by s."""

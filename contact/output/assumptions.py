@@ -11,7 +11,8 @@ from mpi4py import MPI
 from contact.output.solution import Solution
 from contact.problem.problem import ContactProblem
 from forms.elasticity import Anisotropic
-from forms.hencky import Hencky, MonotonicityReport, check_monotonicity
+from forms.hencky import Hencky
+from forms.monotonicity import MonotonicityReport, check_monotonicity
 
 #: What there is to say, if anything, and whether it is good news.
 Remark: TypeAlias = tuple[str, bool]

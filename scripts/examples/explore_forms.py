@@ -25,7 +25,7 @@ import numpy as np
 import ufl
 
 from forms.foundation import augmented_lagrangian
-from forms.hencky import Linear, Log, check_monotonicity, energy_density, secant_form
+from forms.hencky import Linear, Log, energy_density, secant_form
 from forms.kinematics import strain
 from forms.laws import (
     Compliance,
@@ -34,6 +34,7 @@ from forms.laws import (
     ShiftedConductivity,
     SlipCoefficient,
 )
+from forms.monotonicity import check_monotonicity
 from forms.piezo import hexagonal, saddle_form, symmetrised_form
 
 # %% [markdown]

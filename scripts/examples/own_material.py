@@ -8,7 +8,8 @@ from pathlib import Path
 from mpi4py import MPI
 
 from contact import Solution, load_case, solve
-from forms.hencky import UserLaw, check_monotonicity
+from forms.hencky import UserLaw
+from forms.monotonicity import check_monotonicity
 from forms.ops import Value, exp
 
 BAR = Path(__file__).parents[1] / "cases" / "bar.toml"

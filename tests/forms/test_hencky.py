@@ -5,37 +5,14 @@ from itertools import pairwise
 import numpy as np
 import pytest
 import ufl
-from dolfinx import fem
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from mpi4py import MPI
 from scipy.integrate import quad
 
-from contact.body.description import Body, Fixed
-from contact.linear.operator import SparseOperator
-from contact.problem.problem import Contact, ContactProblem
-from forms.hencky import (
-    Linear,
-    Log,
-    UserLaw,
-    check_monotonicity,
-    energy_density,
-    secant_stress,
-    stress,
-)
-from forms.kinematics import deviator, deviator_squared, strain, von_mises
-from forms.ops import exp
-from tests.problems.mechanics import Affine, bar, leaning_block, pressed_block
+from forms.hencky import Log, energy_density, secant_stress, stress
+from forms.kinematics import deviator, deviator_squared, von_mises
+from tests.problems.materials import LAWS, XI
 
-XI = 0.05
-LAWS = {
-    "linear": Linear(1.0, 0.3),
-    "norm": Log(2.0, 0.25, yield_strain=XI),
-    "square": Log(2.0, 0.25, yield_strain=XI**2, argument="square"),
-    "norm with floor": Log(2.0, 0.25, yield_strain=XI, g_min=0.4),
-    "square with floor": Log(2.0, 0.25, yield_strain=XI**2, argument="square", g_min=0.3),
-    "user": UserLaw(2.0, 0.25, modulus=lambda t: 0.3 + 0.5 * exp(-t / XI)),
-}
 every_law = pytest.mark.parametrize("name", LAWS)
 
 
@@ -175,134 +152,10 @@ def test_the_law_of_the_thesis(argument):
     assert number(symbolic) == pytest.approx(law.secant_modulus(t[700] ** 2), rel=1e-14)
 
 
-def test_monotonicity_is_reported():
-    law, t_max = Log(1.0, 0.3, yield_strain=XI), 0.4
-    report = check_monotonicity(law, t_max)
-    assert report.holds
-    assert report.alpha == pytest.approx(law.shear * XI / t_max, rel=1e-3)
-    assert report.beta == pytest.approx(law.shear, rel=1e-12)
-    assert report.g_0 == pytest.approx(law.secant_modulus(t_max**2), rel=1e-12)
-    assert report.largest == pytest.approx(law.shear, rel=1e-12)
-    # With the square as the argument the law softens beyond xi = e xi_0.
-    square = Log(1.0, 0.3, yield_strain=XI, argument="square")
-    turn = np.sqrt(np.e * XI)
-    assert check_monotonicity(square, 0.99 * turn).holds
-    assert not check_monotonicity(square, 1.05 * turn).holds
-    # A floor keeps (h1) on every range: alpha is the slope where the floor begins.
-    floored = Log(1.0, 0.3, yield_strain=XI, g_min=0.1)
-    start = np.sqrt(floored._floor_start)
-    for t_max in (2 * start, 10 * start):
-        alpha = check_monotonicity(floored, t_max, 20000).alpha
-        assert alpha == pytest.approx(floored.shear * XI / start, rel=1e-2)
-    assert check_monotonicity(Linear(1.0, 0.3), 0.0).holds
-
-
-@pytest.mark.parametrize(("poisson", "dim", "holds"), [
-    (-0.5, 2, False), (0.12, 2, False), (0.13, 2, True), (-0.01, 3, False), (0.01, 3, True),
-])  # fmt: skip
-def test_g_is_bounded_by_the_bulk_modulus(poisson, dim, holds):
-    """(h1)(a): g <= (d/2) k_0, so nu >= 1/8 in the plane and nu >= 0 in space, g being mu_1."""
-    report = check_monotonicity(Linear(1.0, poisson), 0.1, dim=dim)
-    assert (report.hardens, report.bounded, report.holds) == (True, holds, holds)
-    assert report.ceiling == pytest.approx(dim / 2 / (3 - 6 * poisson))
-
-
 @pytest.mark.parametrize("bad", [dict(argument="cube"), dict(g_min=-0.1), dict(g_min=0.5)])
 def test_a_law_that_makes_no_sense_is_refused(bad):
     with pytest.raises(ValueError, match=next(iter(bad))):
         Log(1.0, 0.3, yield_strain=XI, **bad)
-
-
-def problems():
-    for name, law in LAWS.items():
-        yield f"{name} P1", bar(MPI.COMM_SELF, 4, law=law)
-        yield f"{name} P2", bar(MPI.COMM_SELF, 2, law=law, degree=2)
-    solid = leaning_block(MPI.COMM_SELF, 1, 2)
-    yield "norm in space P2", solid
-    floating = pressed_block(MPI.COMM_SELF, 3, 1)
-    held = Body(LAWS["norm"], [Fixed("left", [Affine((0.0,) * 3)] * 3)])
-    yield (
-        "norm in space P1",
-        ContactProblem(floating.domain, held, Contact("bottom", floating.contacts[0].foundation)),
-    )
-
-
-@pytest.fixture(scope="module")
-def cases():
-    return dict(problems())
-
-
-NAMES = [f"{name} P{p}" for name in LAWS for p in (1, 2)]
-NAMES += ["norm in space P2", "norm in space P1"]
-
-
-def scattered(problem, seed):
-    """Return a random displacement with strains around and beyond yield, and a direction."""
-    random, unknowns = np.random.default_rng(seed), problem.equilibrium.owned
-    size = 3 * XI / problem.domain.mesh.geometry.x.max()
-    x = size * random.standard_normal(unknowns)
-    direction = random.standard_normal(unknowns) * problem.equilibrium.free.ravel()
-    return x, direction / np.linalg.norm(direction)
-
-
-def operator_at(problem, kind, x):
-    """Return the operator of the body, linearised at unknowns, without any blocks."""
-    nodes, bs = problem.nodes.nodes, problem.equilibrium.block_size
-    operator = SparseOperator(problem.equilibrium, nodes)
-    operator.update(kind, x, np.zeros((nodes.size, bs, bs)))
-    return operator
-
-
-@pytest.mark.parametrize("case", NAMES)
-def test_internal_forces_are_the_derivative_of_the_assembled_energy(cases, case):
-    """B(u; u, v) = d/dt M(u + t v), with shear strains and all."""
-    problem, body = cases[case], cases[case].equilibrium
-    base, direction = scattered(problem, 1)
-    at = body.function(base)
-    u, _ = body.split(at)
-    degree = 1 if body.degree == 1 else 4
-    dx = problem.domain.dx(metadata={"quadrature_degree": degree})
-    stored = fem.form(energy_density(problem.body.law, strain(u)) * dx)
-    work, h = float(body.internal_forces(base) @ direction), 1e-5 * XI
-    energies = []
-    for t in (2, 1, -1, -2):
-        at.x.array[:] = base + t * h * direction
-        energies.append(fem.assemble_scalar(stored))
-    slope = (8 * (energies[1] - energies[2]) - (energies[0] - energies[3])) / (12 * h)
-    assert work == pytest.approx(slope, rel=1e-5, abs=1e-9)
-
-
-@pytest.mark.parametrize("case", NAMES)
-def test_tangent_is_the_derivative_of_the_internal_forces(cases, case):
-    problem, body = cases[case], cases[case].equilibrium
-    base, direction = scattered(problem, 2)
-    matrix = operator_at(problem, "tangent", base).matrix
-    vector, product = matrix.createVecs()
-    vector.array[:] = direction
-    matrix.mult(vector, product)
-    h = 1e-6 * XI
-    forces = [body.internal_forces(base + t * h * direction) for t in (1, -1)]
-    slope = np.where(problem.equilibrium.free.ravel(), (forces[0] - forces[1]) / (2 * h), 0.0)
-    assert np.linalg.norm(product.array - slope) < 2e-4 * np.linalg.norm(slope)
-
-
-@pytest.mark.parametrize("case", ["norm P1", "norm P2", "norm in space P2"])
-def test_the_secant_form_with_frozen_modulus(cases, case):
-    """B(u; v, w) is linear and symmetric in v and w; B(u; u, w) are the internal forces."""
-    problem, body = cases[case], cases[case].equilibrium
-    x, _ = scattered(problem, 3)
-    forces = body.internal_forces(x)
-    matrix = operator_at(problem, "secant", x).matrix
-    assert matrix.isSymmetric(1e-12)
-    free = problem.equilibrium.free.ravel()
-    vector, product = matrix.createVecs()
-    # Columns of fixed unknowns are eliminated: take their displacement as 0.
-    vector.array[:] = np.where(free, x, 0.0)
-    inner = body.internal_forces(np.where(free, x, 0.0), secant_at=x)
-    matrix.mult(vector, product)
-    assert np.abs(product.array - inner)[free].max() < 1e-13
-    twice = body.internal_forces(2 * x, secant_at=x)  # the frozen modulus stays
-    assert np.abs(twice - 2 * forces).max() < 1e-13
 
 
 def test_the_secant_stress_takes_the_modulus_from_the_frozen_strain():

@@ -127,7 +127,7 @@ def test_values_of_the_printed_laws():
     assert Compliance(0.5)(np.array([-1.0, 0.2, 3.0])).tolist() == [0.0, 0.2, 0.5]
     factor = PotentialFactor(10.0, 2.0, 128.0)
     assert factor(np.array([0.0, -64.0, 128.0, 1e9])).tolist() == [10.0, 15.0, 20.0, 20.0]
-    assert PerfectConductivity(3.0)(np.array([True, False])).tolist() == [3.0, 0.0]
+    assert PerfectConductivity(3.0).at(None, None, np.array([True, False])).tolist() == [3.0, 0.0]
 
 
 @pytest.fixture(scope="module")
@@ -158,4 +158,5 @@ def test_ufl_and_numpy_agree(law, nodal):
 
 def test_the_flag_of_the_perfect_conductor_in_ufl(nodal):
     law, s = PerfectConductivity(3.0), np.linspace(-1, 1, 61)
-    assert nodal(lambda x: law(ufl.gt(x, 0.05)), s) == pytest.approx(law(s > 0.05))
+    flagged = nodal(lambda x: law.at(x, None, ufl.gt(x, 0.05)), s)
+    assert flagged == pytest.approx(law.at(s, None, s > 0.05))

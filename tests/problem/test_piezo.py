@@ -297,7 +297,7 @@ def test_conductivity_laws():
     assert np.allclose(shifted(s), [0, 0, 1, 2, 2, 2])
     ramp = RampConductivity(2.0, 2.0)
     assert np.allclose(ramp(s), [0, 0, 0, 0, 0.4, 2])
-    assert np.allclose(PerfectConductivity(2.0)(s > 0), [0, 0, 0, 0, 2, 2])
+    assert np.allclose(PerfectConductivity(2.0).at(s, s > 0, s > 0), [0, 0, 0, 0, 2, 2])
     assert np.allclose(Truncation(0.3)(s), [-0.3, -0.3, -0.25, 0, 0.1, 0.3])
 
 
