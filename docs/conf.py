@@ -1,13 +1,12 @@
 """Sphinx: `make docs`, or ``python3 -m sphinx -W docs build/docs``."""
 
 import re
+import shutil
 import sys
 from pathlib import Path
 from typing import Any
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
-
-from pygments.lexers.special import TextLexer
 
 import contact
 
@@ -36,6 +35,18 @@ napoleon_use_ivar = True
 suppress_warnings = ["myst.xref_missing"]
 default_role = "code"
 
+# Pages can be read without a network where MathJax is at hand; its SVG needs no fonts.
+MATHJAX = Path("/usr/share/javascript/mathjax")  # Debian's version 2 comes with PETSc
+if MATHJAX.is_dir():
+    myst_update_mathjax = False  # that is for version 3
+    mathjax_path = "mathjax/MathJax.js"
+    mathjax2_config = {
+        "jax": ["input/TeX", "output/SVG"],
+        "extensions": ["tex2jax.js", "MathEvents.js", "TeX/AMSmath.js", "TeX/AMSsymbols.js"],
+        "showMathMenu": False,
+        "messageStyle": "none",
+    }
+
 
 def _bars(_: Any, __: str, ___: str, ____: Any, _____: Any, lines: list[str]) -> None:
     """Let |x| be what it says in docstrings, and no substitution; several attributes one field."""
@@ -58,8 +69,21 @@ def _present(app: Any, name: str, source: list[str]) -> None:
         source[0] = "\n".join(kept)
 
 
+def _mathjax(app: Any) -> None:
+    """Put what the pages need of MathJax beside them."""
+    needed = ("MathJax.js", "extensions", "jax/element", "jax/input/TeX")
+    for part in (*needed, *(f"jax/output/SVG/{x}" for x in ("*.js", "autoload", "fonts/TeX"))):
+        for source in MATHJAX.glob(part):
+            target = Path(app.outdir, "_static", "mathjax", source.relative_to(MATHJAX))
+            target.parent.mkdir(parents=True, exist_ok=True)
+            if source.is_dir():
+                shutil.copytree(source, target, dirs_exist_ok=True)
+            else:
+                shutil.copy(source, target)
+
+
 def setup(app: Any) -> None:
-    """Connect what docstrings need, before napoleon reads them, and the index."""
+    """Connect what docstrings need, before napoleon reads them, the index, and MathJax."""
     app.connect("autodoc-process-docstring", _bars, priority=400)
     app.connect("source-read", _present)
-    app.add_lexer("mermaid", TextLexer)  # the forge draws it
+    app.connect("builder-inited", _mathjax)

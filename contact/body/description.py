@@ -40,9 +40,9 @@ class Fixed:
     on
         Name of the part, or a list of names.
     displacement
-        A value a component, each as `fields.field` takes it: a number, a function of x, UFL, a
-        dolfinx Function; None or "free" leaves a component free. Or one UFL expression or
-        Function of vectors.
+        A list with a value a component, as dolfinx asks for it too, each as `fields.field` takes
+        it: a number, a function of x, UFL, a dolfinx Function; None or "free" leaves a component
+        free. Or one UFL expression or Function of vectors.
     potential
         Of a piezoelectric body, likewise; None leaves it free.
     amplitude

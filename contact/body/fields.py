@@ -65,8 +65,8 @@ def vector(value: Given) -> tuple[Any, ...] | None:
         return tuple(Ufl(value[i]) for i in range(value.ufl_shape[0]))
     if not isinstance(value, Sequence | np.ndarray) or isinstance(value, str):
         raise InputError(
-            f"given {value!r} for a vector; accepted: a list with an entry a component, or UFL "
-            "or a Function of vectors"
+            f"given {value!r} for a vector; accepted: a list with an entry a component, such as "
+            "[0.0, 0.0] in the plane, or UFL or a Function of vectors"
         )
     return tuple(None if isinstance(v, str) and v == "free" else field(v) for v in value)
 

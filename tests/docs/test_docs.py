@@ -63,3 +63,6 @@ def test_pages_build_without_warnings(tmp_path: Path) -> None:
     done = subprocess.run(command, capture_output=True, text=True, timeout=300)
     assert done.returncode == 0, done.stderr
     assert "Domain.from_mesh" in (tmp_path / "api.html").read_text()
+    if Path("/usr/share/javascript/mathjax").is_dir():  # formulas are drawn without a network
+        assert "_static/mathjax/MathJax.js" in (tmp_path / "theory.html").read_text()
+        assert (tmp_path / "_static/mathjax/jax/output/SVG/jax.js").exists()
