@@ -1,92 +1,31 @@
-"""The compliant layer and the current: laws, derivatives, closed forms of one column."""
+"""The compliant layer and the current: closed forms of one column, by each method."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
-import ufl
-from dolfinx import fem
 from mpi4py import MPI
 
-from contact import InputError
 from contact import solve as solve_case
 from contact.body.description import Body, Fixed
-from contact.interface.current import Conductor
 from contact.interface.friction import Friction
 from contact.interface.layer import Layer
-from contact.interface.nodes import ContactNodes
-from contact.interface.response import FoundationResponse
 from contact.mesh.grid import box, rectangle
 from contact.methods.fixed_point import FixedPoint
 from contact.methods.newton import Newton
-from contact.methods.options import OPTIONS, NewtonOptions, PenaltyOptions
+from contact.methods.options import NewtonOptions, PenaltyOptions
 from contact.problem.problem import Contact, ContactProblem
-from forms.foundation import compliance
 from forms.hencky import Linear
 from forms.laws import (
     Compliance,
     ConstantCoefficient,
     PotentialFactor,
-    RampConductivity,
-    ShiftedConductivity,
-    Truncation,
 )
 from forms.ops import positive_part
 from tests.problems.compliance import PIEZO_REGIMES, REGIMES, LayerColumn
 from tests.problems.mechanics import affine_vector, flat, leaning_block, solve
-
-
-def random_nodes(n: int, dim: int, block_size: int, rng: np.random.Generator) -> ContactNodes:
-    """Return contact nodes without a mesh, for the pointwise laws."""
-    normal = rng.standard_normal((n, dim))
-    normal /= np.linalg.norm(normal, axis=1)[:, None]
-    tangent = np.eye(dim) - normal[:, :, None] * normal[:, None, :]
-    return ContactNodes(
-        MPI.COMM_SELF,
-        np.arange(n, dtype=np.int32),
-        np.zeros((n, dim)),
-        np.ones(n),
-        normal,
-        tangent,
-        rng.uniform(0.0, 0.4, n),
-        block_size,
-    )
-
-
-@pytest.mark.parametrize("dim", [2, 3])
-@pytest.mark.parametrize("psi", [ShiftedConductivity(0.7, 2.0), RampConductivity(0.7, 2.0)])
-def test_jacobian_is_the_derivative_of_the_force(dim, psi):
-    rng = np.random.default_rng(3)
-    nodes = random_nodes(200, dim, dim + 1, rng)
-    layer = Layer(0.2, Compliance(0.3), PotentialFactor(5.0, 2.0, 3.0))
-    response = FoundationResponse(nodes, layer, Conductor(psi, 1.5, Truncation(4.0)), 1.7, 1.0)
-    x = rng.standard_normal((200, dim + 1))
-    pressure = response.layer_pressure(x) - 100.0  # no node presses on the rigid part
-    jacobian = response.jacobian(x, pressure)
-    assert np.count_nonzero(jacobian[:, 0, -1]) > 20  # layer reached, h_nu rising
-    assert np.count_nonzero(jacobian[:, -1, 0]) > 20
-    h = 1e-7
-    for k in range(dim + 1):
-        step = np.zeros(dim + 1)
-        step[k] = h
-        slope = (response.force(x + step, pressure) - response.force(x - step, pressure)) / (2 * h)
-        assert np.abs(jacobian[:, :, k] - slope).max() < 1e-6
-
-
-def test_block_is_the_symmetric_part_without_the_frozen_factors():
-    rng = np.random.default_rng(4)
-    nodes = random_nodes(50, 2, 3, rng)
-    layer = Layer(0.2, Compliance(0.3), PotentialFactor(5.0, 1.0))
-    conductor = Conductor(ShiftedConductivity(0.7, 0.0), 1.5)
-    response = FoundationResponse(nodes, layer, conductor, 1.7, 1.0)
-    x = rng.standard_normal((50, 3))
-    block = response.block(x, np.zeros(50))
-    assert np.allclose(block, block.transpose(0, 2, 1), rtol=1e-14)
-    # Without dependence of h_nu on the potential and of psi on the gap nothing is left out.
-    assert np.allclose(block, response.jacobian(x, np.zeros(50)), rtol=1e-14)
 
 
 def check_column(column: LayerColumn, dim: int = 2, degree: int = 1, **options) -> str:
@@ -204,70 +143,6 @@ def test_penalty_on_columns(column):
     assert np.abs(solution.pressure - layer - rest).max() < 1e-9 + 100 * eps * rest
 
 
-@dataclass(frozen=True)
-class Made:
-    """A law made of two functions."""
-
-    value: Callable[[np.ndarray], np.ndarray]
-    slope: Callable[[np.ndarray], np.ndarray]
-
-    def __call__(self, s):
-        return self.value(s)
-
-    def derivative(self, s):
-        return self.slope(s)
-
-
-ONE, ZERO = (lambda s: 1.0 + 0 * s), (lambda s: 0 * s)
-NO_LAYERS = {
-    "presses before": Layer(0.2, Made(lambda s: 0.01 + positive_part(s), ONE), Made(ONE, ZERO)),
-    "p_nu is negative": Layer(0.2, Made(lambda s: -positive_part(s), ONE), Made(ONE, ZERO)),
-    "p_nu or its derivative is no number": Layer(0.2, Made(np.sqrt, ONE), Made(ONE, ZERO)),
-    "h_nu is negative": Layer(0.2, Compliance(0.1), PotentialFactor(-1.0)),
-    "h_nu or its derivative": Layer(0.2, Compliance(0.1), Made(lambda s: 1 / s, ZERO)),
-    "p_nu has no method": Layer(0.2, positive_part, Made(ONE, ZERO)),
-    "thickness is -0.1": Layer(-0.1, Compliance(0.1), PotentialFactor(1.0)),
-    "thickness is nan": Layer(np.nan, Compliance(0.1), PotentialFactor(1.0)),
-}
-
-
-@pytest.mark.parametrize("words", NO_LAYERS)
-def test_what_is_no_layer_is_refused(words):
-    bare = leaning_block(MPI.COMM_SELF, 2)
-    contact = replace(bare.contacts[0], layer=NO_LAYERS[words])
-    with pytest.raises(InputError, match=words):
-        ContactProblem(bare.domain, bare.body, contact)
-
-
-def hump(s):
-    return positive_part(s) * np.exp(-positive_part(s) / 0.05)
-
-
-def hump_slope(s):
-    return np.where(s > 0, (1 - s / 0.05) * np.exp(-positive_part(s) / 0.05), 0.0)
-
-
-@pytest.mark.parametrize("method", ["uzawa", "newton", "penalty"])
-def test_falling_law_is_solved_with_a_warning(method):
-    column = LayerColumn(0.3, p_nu=Made(hump, hump_slope))
-    solution = solve_case(column.problem(), OPTIONS[method](tolerance=1e-10))
-    assert solution.converged, solution.outcome
-    assert any("p_nu falls" in warning for warning in solution.warnings)
-    assert np.allclose(solution.normal_displacement, column.solution()[0], rtol=0, atol=1e-8)
-
-
-def test_layer_thicker_than_the_gap_presses_at_rest_with_a_warning():
-    column = LayerColumn(0.0, touch=-0.1, gap=0.05)
-    solution = solve_case(column.problem(), NewtonOptions(tolerance=1e-11))
-    assert solution.converged
-    assert any("presses on the body at rest" in warning for warning in solution.warnings)
-    u_n, _, layer, _, _ = column.solution()
-    assert layer > 1.0
-    assert np.allclose(solution.normal_displacement, u_n, rtol=0, atol=1e-10)
-    plain = solve_case(REGIMES["linear"].problem(), NewtonOptions())
-    assert not any("layer" in warning or "p_nu" in warning for warning in plain.warnings)
-
-
 @pytest.mark.parametrize("regime", ["linear", "saturated", "rigid"])
 def test_lagged_layer_reaches_the_same_solution(regime):
     # As in the thesis; it contracts only where the layer is softer than the column.
@@ -314,24 +189,6 @@ def test_friction_bound_takes_the_layer_and_the_rigid_part_together(dim, c_nu, r
     assert np.abs(loop.state.forces.pressure - (pressure - share)).max() < 1e-10
     assert np.abs(loop.state.forces.friction[:, 0] - mu * pressure).max() < 1e-10
     assert np.abs(nodal[:, 0] - slip).max() < 1e-10
-
-
-def test_the_form_j_1_is_the_nodal_force():
-    column = PIEZO_REGIMES["linear"]
-    problem = column.problem()
-    body, state = problem.equilibrium, solve(problem).state
-    u, phi = body.split(body.function(state.x))
-    v, _ = body.split(ufl.TestFunction(body.space))
-    nu = ufl.FacetNormal(problem.domain.mesh)
-    ds = problem.domain.ds("bottom")(metadata={"quadrature_rule": "vertex", "quadrature_degree": 1})
-    form = compliance(u, v, nu, column.p_nu, column.h_nu, column.touch, phi - column.phi_f)
-    vector = fem.assemble_vector(fem.form(form * ds)).array
-    nodal = np.zeros_like(vector)
-    pressure = problem.interface.response.layer_pressure(problem.nodal(state))
-    nodes = problem.nodes
-    nodes.transpose((nodes.weight * pressure)[:, None] * nodes.normal, nodal)
-    assert np.abs(nodal).max() > 1.0
-    assert np.abs(vector - nodal).max() < 1e-12
 
 
 @pytest.mark.parallel

@@ -8,7 +8,7 @@ import pytest
 from contact.errors import InputError
 from contact.output.field_files import body_share
 from contact.solving import solve
-from tests.output.test_output import block, written
+from tests.problems.written import block, written
 
 PRESSURE = 0.1
 

@@ -6,6 +6,7 @@ import pytest
 from contact import Solution, load_case, solve
 from contact.case.file import parse_case
 from scripts.cases import CASES
+from tests.problems.written import block
 
 
 def reviewed(name: str, *overrides: str) -> Solution:
@@ -113,3 +114,33 @@ def test_large_strains_are_warned_of():
     assert made.largest_strain == pytest.approx(1.5, rel=1e-9)
     assert made.least_volume == pytest.approx(-0.5, rel=1e-9)
     assert "pass through itself" in said(large.warnings, "strains are not small")
+
+
+@pytest.mark.parametrize("nested", [False, True])
+def test_the_warning_says_where_the_iteration_started(nested: bool) -> None:
+    """Several solutions may exist: which one is found depends on the start."""
+    case = block(
+        2,
+        mesh={"generator": "rectangle", "size": [2.0, 1.0], "cells": [16, 8]},
+        friction={"law": "coulomb", "mu": {"law": "slip", "rho": 1e4}},
+        solver={"nested": nested},
+    )
+    start = "the solution on a coarser mesh" if nested else "zero slip"
+    assert any(f"reached from {start}" in text for text in solve(case).warnings)
+
+
+@pytest.mark.parallel
+def test_a_gap_that_was_forgotten() -> None:
+    """A curved part without a gap fits its foundation; a plane one lies on it."""
+    disc = {
+        "mesh": {"generator": "half_disc", "size": 2.0, "contact_size": 0.5},
+        "fixed": [{"on": "top", "displacement": [0.0, -0.01]}],
+        "friction": {},
+    }
+    (warning,) = (
+        w for w in solve(block(2, contact={"on": "contact"}, **disc)).warnings if "curved" in w
+    )
+    assert warning.startswith("the part contact is curved and its gap is 0 everywhere")
+    plane = {"shape": "plane", "point": [0.0, 0.0], "normal": [0.0, 1.0]}
+    for other in (block(2), block(2, contact={"on": "contact", "foundation": plane}, **disc)):
+        assert not any("curved and its gap" in text for text in solve(other).warnings)

@@ -9,7 +9,7 @@ from mpi4py import MPI
 from contact import Body, Contact, InputError, Linear, Load, Problem, load_case, solve
 from contact.mesh.grid import rectangle
 from scripts.cases import CASES
-from tests.output.test_output import block, electric
+from tests.problems.written import block, electric
 
 
 @pytest.mark.parallel

@@ -11,7 +11,7 @@ from contact.cli.main import BAD_INPUT, CONVERGED, main
 from contact.output.files import write_outputs
 from contact.output.vtu import VTU, Grid, gathered, read_vtu, write_vtu
 from contact.solving import solve
-from tests.output.test_output import block, electric
+from tests.problems.written import block, electric
 
 ROOT = MPI.COMM_WORLD.rank == 0
 

@@ -1,0 +1,194 @@
+"""The piezoelectric material: tensors turned, refused, and the two forms."""
+
+import numpy as np
+import pytest
+import ufl
+from dolfinx import fem, mesh
+from mpi4py import MPI
+
+from forms.piezo import (
+    VOIGT,
+    Piezo,
+    coupling_number,
+    coupling_stress,
+    electric_displacement,
+    from_voigt,
+    saddle_form,
+    symmetrised_form,
+)
+from tests.problems.piezo import (
+    COUPLING,
+    PERMITTIVITY,
+    SCALED,
+    SI,
+    hencky,
+    pzt,
+)
+
+CRYSTAL = SCALED.crystal()
+
+
+def voigt(crystal: Piezo):
+    e = np.array([[crystal.e[i, j, k] for j, k in VOIGT] for i in range(3)])
+    return e, crystal.beta
+
+
+def test_short_form_is_the_full_matrix():
+    e = [
+        [0, 0, 0, 0, COUPLING["e15"], 0],
+        [0, 0, 0, COUPLING["e15"], 0, 0],
+        [COUPLING["e31"], COUPLING["e31"], COUPLING["e33"], 0, 0, 0],
+    ]
+    beta = np.diag([PERMITTIVITY["beta11"], PERMITTIVITY["beta11"], PERMITTIVITY["beta33"]])
+    full = from_voigt(e, beta)
+    assert np.array_equal(full.e, CRYSTAL.e)
+    assert np.array_equal(full.beta, CRYSTAL.beta)
+    assert np.array_equal(voigt(full)[0], e)
+
+
+def test_plane_reduction_is_the_printed_law():
+    """Equation (8.2) with (x, y) = (X2, X3)."""
+    a, b, c, p, q = 0.3, -0.7, 0.2, 1.1, -0.4  # eps_xx, eps_yy, eps_xy, phi_x, phi_y
+    eps = ufl.as_matrix([[a, c], [c, b]])
+    square = mesh.create_unit_square(MPI.COMM_SELF, 1, 1)
+    x = ufl.SpatialCoordinate(square)
+    phi = p * x[0] + q * x[1]
+    plane = CRYSTAL.in_plane()
+    d = [value(electric_displacement(plane, eps, phi)[i], square) for i in range(2)]
+    s = [[value(coupling_stress(plane, phi)[i, j], square) for j in range(2)] for i in range(2)]
+    e31, e33, e15 = COUPLING["e31"], COUPLING["e33"], COUPLING["e15"]
+    b11, b33 = PERMITTIVITY["beta11"], PERMITTIVITY["beta33"]
+    assert d == pytest.approx([2 * e15 * c - b11 * p, e31 * a + e33 * b - b33 * q], rel=1e-13)
+    assert np.allclose(s, [[e31 * q, e15 * p], [e15 * p, e33 * q]], rtol=1e-13)
+
+
+def value(expression, domain) -> float:
+    return float(fem.assemble_scalar(fem.form(expression * ufl.dx(domain))))
+
+
+def test_quarter_turns_and_poling_axis():
+    turned = CRYSTAL.poled_along([0.0, 1.0, 0.0])
+    assert np.allclose(turned.e[1, 1, 1], COUPLING["e33"])
+    assert np.allclose(turned.e[1, 0, 0], COUPLING["e31"])
+    assert np.allclose(turned.beta, np.diag([*np.diag(CRYSTAL.beta)[[0, 2]], CRYSTAL.beta[0, 0]]))
+    back = turned.rotated([[1, 0, 0], [0, 0, -1], [0, 1, 0]])
+    assert np.allclose(back.e, CRYSTAL.e, atol=1e-14)
+    flipped = CRYSTAL.poled_along([0.0, 0.0, -1.0])
+    assert np.allclose(flipped.e, -CRYSTAL.e)
+    # Class 6mm is isotropic about its axis, and the plane reduction is a turn of it.
+    c, s = np.cos(0.3), np.sin(0.3)
+    about = CRYSTAL.rotated([[c, -s, 0], [s, c, 0], [0, 0, 1]])
+    assert np.allclose(about.e, CRYSTAL.e, atol=1e-14)
+    assert np.allclose(CRYSTAL.in_plane().e, turned.e, atol=1e-14)
+
+
+@pytest.mark.parametrize("axis", [[0.0, 0.0, 0.0], [1.0, 0.0], [np.nan, 0.0, 1.0]])
+def test_bad_axis_is_refused(axis):
+    with pytest.raises(ValueError, match="a vector"):
+        CRYSTAL.poled_along(axis)
+
+
+BAD = {
+    "shape": (np.zeros((3, 5)), np.eye(3), "3 x 6"),
+    "not symmetric": (np.zeros((3, 6)), np.eye(3) + np.eye(3, k=1), "symmetric"),
+    "indefinite": (np.zeros((3, 6)), np.diag([1.0, -1.0, 1.0]), "positive definite"),
+    "infinite": (np.full((3, 6), np.inf), np.eye(3), "finite"),
+}
+
+
+@pytest.mark.parametrize("name", BAD)
+def test_bad_material_is_refused(name):
+    e, beta, message = BAD[name]
+    with pytest.raises(ValueError, match=message):
+        from_voigt(e, beta)
+
+
+def test_bad_tensors_are_refused():
+    lopsided = CRYSTAL.e.copy()
+    lopsided[0, 1, 2] += 1.0
+    with pytest.raises(ValueError, match="last two indices"):
+        Piezo(lopsided, CRYSTAL.beta).check()
+    with pytest.raises(ValueError, match="orthogonal"):
+        CRYSTAL.rotated(2 * np.eye(3))
+    with pytest.raises(ValueError, match="determinant"):
+        CRYSTAL.rotated(-np.eye(3))
+    with pytest.raises(ValueError, match="out of it"):
+        CRYSTAL.poled_along([1.0, 1.0, 1.0]).check_plane()
+
+
+def test_coupling_number():
+    """The coupling of a strain e: (e:eps)^2/(beta C) is maximal over all strains."""
+    number = coupling_number(SCALED.law(), CRYSTAL)
+    shear = COUPLING["e15"] ** 2 / (SCALED.law().shear * PERMITTIVITY["beta11"])
+    assert 0.88 < shear < number < 1.0
+    assert coupling_number(SI.law(), SI.crystal()) == pytest.approx(number, rel=1e-12)
+    turned = CRYSTAL.poled_along([1.0, -2.0, 0.5])
+    assert coupling_number(SCALED.law(), turned) == pytest.approx(number, rel=1e-12)
+
+
+def test_stored_energy_is_positive():
+    """B(x; y, y) = 2 W(eps, grad phi) > 0: the coupling cancels, however large."""
+    square = mesh.create_unit_square(MPI.COMM_SELF, 2, 2)
+    space = fem.functionspace(square, ("Lagrange", 1, (3,)))
+    rng = np.random.default_rng(1)
+    for scale in (0.0, 1.0, 1e3):
+        crystal = SCALED.crystal(scale).in_plane()
+        x = fem.Function(space)
+        x.x.array[:] = rng.standard_normal(x.x.array.size)
+        u, phi = ufl.as_vector([x[0], x[1]]), x[2]
+        form = saddle_form(SCALED.law(), crystal, u, u, phi, u, phi)
+        bare = saddle_form(SCALED.law(), Piezo(0 * crystal.e, crystal.beta), u, u, phi, u, phi)
+        assert value(form, square) == pytest.approx(value(bare, square), rel=1e-9)
+        assert value(form, square) > 0
+
+
+def both_forms(dim: int, degree: int, law):
+    """Return the matrices of the saddle and the symmetrised form, and their space."""
+    if dim == 2:
+        body = mesh.create_unit_square(MPI.COMM_SELF, 4, 3)
+    else:
+        body = mesh.create_unit_cube(MPI.COMM_SELF, 2, 2, 1)
+    space = fem.functionspace(body, ("Lagrange", degree, (dim + 1,)))
+    frozen = fem.Function(space)
+    frozen.interpolate(lambda x: np.array([0.5 * x[0] * x[1]] * dim + [0 * x[0]]))
+    trial, test = ufl.TrialFunction(space), ufl.TestFunction(space)
+
+    def split(f):
+        return ufl.as_vector([f[i] for i in range(dim)]), f[dim]
+
+    (u, phi), (v, xi), (u_0, _) = split(trial), split(test), split(frozen)
+    dx = ufl.Measure("dx", body, metadata={"quadrature_degree": 4})
+    matrices = []
+    for form in (saddle_form, symmetrised_form):
+        compiled = fem.form(form(law, pzt(dim), u_0, u, phi, v, xi) * dx)
+        matrices.append(fem.assemble_matrix(compiled).to_scipy())
+    return space, matrices
+
+
+@pytest.mark.parametrize("law", [SCALED.law(), hencky(0.1)], ids=["linear", "log"])
+@pytest.mark.parametrize("degree", [1, 2])
+@pytest.mark.parametrize("dim", [2, 3])
+def test_forms_agree_entry_by_entry(dim, degree, law):
+    _, (saddle, symmetrised) = both_forms(dim, degree, law)
+    sign = np.ones(saddle.shape[0])
+    sign[dim :: dim + 1] = -1.0
+    saddle, symmetrised = saddle.toarray(), symmetrised.toarray()
+    size = np.abs(saddle).max()
+    assert np.abs(saddle * sign[:, None] - symmetrised).max() <= 1e-15 * size
+    assert np.abs(symmetrised - symmetrised.T).max() <= 1e-14 * size
+    assert np.abs(saddle - saddle.T).max() > 1e-2 * size
+    assert np.linalg.eigvalsh(saddle + saddle.T).min() > -1e-12 * size
+    assert np.linalg.eigvalsh(symmetrised).min() < -1e-2 * size
+
+
+@pytest.mark.parametrize("dim", [2, 3])
+def test_solutions_of_both_forms_agree(dim):
+    space, (saddle, symmetrised) = both_forms(dim, 1, SCALED.law())
+    x = space.tabulate_dof_coordinates()
+    free = np.flatnonzero(np.repeat(x[:, 0] > 1e-9, dim + 1))
+    load = np.random.default_rng(2).standard_normal(saddle.shape[0])
+    sign = np.ones(load.size)
+    sign[dim :: dim + 1] = -1.0
+    a = np.linalg.solve(saddle.toarray()[np.ix_(free, free)], load[free])
+    b = np.linalg.solve(symmetrised.toarray()[np.ix_(free, free)], (sign * load)[free])
+    assert np.abs(a - b).max() <= 1e-10 * np.abs(a).max()

@@ -1,0 +1,87 @@
+"""What is no layer is refused, and what is unusual of one is said."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+
+from contact import InputError
+from contact import solve as solve_case
+from contact.interface.layer import Layer
+from contact.methods.options import OPTIONS, NewtonOptions
+from contact.problem.problem import ContactProblem
+from forms.laws import (
+    Compliance,
+    PotentialFactor,
+)
+from forms.ops import positive_part
+from tests.problems.compliance import REGIMES, LayerColumn
+from tests.problems.mechanics import leaning_block
+
+
+@dataclass(frozen=True)
+class Made:
+    """A law made of two functions."""
+
+    value: Callable[[np.ndarray], np.ndarray]
+    slope: Callable[[np.ndarray], np.ndarray]
+
+    def __call__(self, s):
+        return self.value(s)
+
+    def derivative(self, s):
+        return self.slope(s)
+
+
+ONE, ZERO = (lambda s: 1.0 + 0 * s), (lambda s: 0 * s)
+NO_LAYERS = {
+    "presses before": Layer(0.2, Made(lambda s: 0.01 + positive_part(s), ONE), Made(ONE, ZERO)),
+    "p_nu is negative": Layer(0.2, Made(lambda s: -positive_part(s), ONE), Made(ONE, ZERO)),
+    "p_nu or its derivative is no number": Layer(0.2, Made(np.sqrt, ONE), Made(ONE, ZERO)),
+    "h_nu is negative": Layer(0.2, Compliance(0.1), PotentialFactor(-1.0)),
+    "h_nu or its derivative": Layer(0.2, Compliance(0.1), Made(lambda s: 1 / s, ZERO)),
+    "p_nu has no method": Layer(0.2, positive_part, Made(ONE, ZERO)),
+    "thickness is -0.1": Layer(-0.1, Compliance(0.1), PotentialFactor(1.0)),
+    "thickness is nan": Layer(np.nan, Compliance(0.1), PotentialFactor(1.0)),
+}
+
+
+@pytest.mark.parametrize("words", NO_LAYERS)
+def test_what_is_no_layer_is_refused(words):
+    bare = leaning_block(MPI.COMM_SELF, 2)
+    contact = replace(bare.contacts[0], layer=NO_LAYERS[words])
+    with pytest.raises(InputError, match=words):
+        ContactProblem(bare.domain, bare.body, contact)
+
+
+def hump(s):
+    return positive_part(s) * np.exp(-positive_part(s) / 0.05)
+
+
+def hump_slope(s):
+    return np.where(s > 0, (1 - s / 0.05) * np.exp(-positive_part(s) / 0.05), 0.0)
+
+
+@pytest.mark.parametrize("method", ["uzawa", "newton", "penalty"])
+def test_falling_law_is_solved_with_a_warning(method):
+    column = LayerColumn(0.3, p_nu=Made(hump, hump_slope))
+    solution = solve_case(column.problem(), OPTIONS[method](tolerance=1e-10))
+    assert solution.converged, solution.outcome
+    assert any("p_nu falls" in warning for warning in solution.warnings)
+    assert np.allclose(solution.normal_displacement, column.solution()[0], rtol=0, atol=1e-8)
+
+
+def test_layer_thicker_than_the_gap_presses_at_rest_with_a_warning():
+    column = LayerColumn(0.0, touch=-0.1, gap=0.05)
+    solution = solve_case(column.problem(), NewtonOptions(tolerance=1e-11))
+    assert solution.converged
+    assert any("presses on the body at rest" in warning for warning in solution.warnings)
+    u_n, _, layer, _, _ = column.solution()
+    assert layer > 1.0
+    assert np.allclose(solution.normal_displacement, u_n, rtol=0, atol=1e-10)
+    plain = solve_case(REGIMES["linear"].problem(), NewtonOptions())
+    assert not any("layer" in warning or "p_nu" in warning for warning in plain.warnings)

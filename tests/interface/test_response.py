@@ -1,0 +1,92 @@
+"""The foundation's answer node by node: derivatives, and the weak form that it stands for."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import ufl
+from dolfinx import fem
+from mpi4py import MPI
+
+from contact.interface.current import Conductor
+from contact.interface.layer import Layer
+from contact.interface.nodes import ContactNodes
+from contact.interface.response import FoundationResponse
+from forms.foundation import compliance
+from forms.laws import (
+    Compliance,
+    PotentialFactor,
+    RampConductivity,
+    ShiftedConductivity,
+    Truncation,
+)
+from tests.problems.compliance import PIEZO_REGIMES
+from tests.problems.mechanics import solve
+
+
+def random_nodes(n: int, dim: int, block_size: int, rng: np.random.Generator) -> ContactNodes:
+    """Return contact nodes without a mesh, for the pointwise laws."""
+    normal = rng.standard_normal((n, dim))
+    normal /= np.linalg.norm(normal, axis=1)[:, None]
+    tangent = np.eye(dim) - normal[:, :, None] * normal[:, None, :]
+    return ContactNodes(
+        MPI.COMM_SELF,
+        np.arange(n, dtype=np.int32),
+        np.zeros((n, dim)),
+        np.ones(n),
+        normal,
+        tangent,
+        rng.uniform(0.0, 0.4, n),
+        block_size,
+    )
+
+
+@pytest.mark.parametrize("dim", [2, 3])
+@pytest.mark.parametrize("psi", [ShiftedConductivity(0.7, 2.0), RampConductivity(0.7, 2.0)])
+def test_jacobian_is_the_derivative_of_the_force(dim, psi):
+    rng = np.random.default_rng(3)
+    nodes = random_nodes(200, dim, dim + 1, rng)
+    layer = Layer(0.2, Compliance(0.3), PotentialFactor(5.0, 2.0, 3.0))
+    response = FoundationResponse(nodes, layer, Conductor(psi, 1.5, Truncation(4.0)), 1.7, 1.0)
+    x = rng.standard_normal((200, dim + 1))
+    pressure = response.layer_pressure(x) - 100.0  # no node presses on the rigid part
+    jacobian = response.jacobian(x, pressure)
+    assert np.count_nonzero(jacobian[:, 0, -1]) > 20  # layer reached, h_nu rising
+    assert np.count_nonzero(jacobian[:, -1, 0]) > 20
+    h = 1e-7
+    for k in range(dim + 1):
+        step = np.zeros(dim + 1)
+        step[k] = h
+        slope = (response.force(x + step, pressure) - response.force(x - step, pressure)) / (2 * h)
+        assert np.abs(jacobian[:, :, k] - slope).max() < 1e-6
+
+
+def test_block_is_the_symmetric_part_without_the_frozen_factors():
+    rng = np.random.default_rng(4)
+    nodes = random_nodes(50, 2, 3, rng)
+    layer = Layer(0.2, Compliance(0.3), PotentialFactor(5.0, 1.0))
+    conductor = Conductor(ShiftedConductivity(0.7, 0.0), 1.5)
+    response = FoundationResponse(nodes, layer, conductor, 1.7, 1.0)
+    x = rng.standard_normal((50, 3))
+    block = response.block(x, np.zeros(50))
+    assert np.allclose(block, block.transpose(0, 2, 1), rtol=1e-14)
+    # Without dependence of h_nu on the potential and of psi on the gap nothing is left out.
+    assert np.allclose(block, response.jacobian(x, np.zeros(50)), rtol=1e-14)
+
+
+def test_the_form_j_1_is_the_nodal_force():
+    column = PIEZO_REGIMES["linear"]
+    problem = column.problem()
+    body, state = problem.equilibrium, solve(problem).state
+    u, phi = body.split(body.function(state.x))
+    v, _ = body.split(ufl.TestFunction(body.space))
+    nu = ufl.FacetNormal(problem.domain.mesh)
+    ds = problem.domain.ds("bottom")(metadata={"quadrature_rule": "vertex", "quadrature_degree": 1})
+    form = compliance(u, v, nu, column.p_nu, column.h_nu, column.touch, phi - column.phi_f)
+    vector = fem.assemble_vector(fem.form(form * ds)).array
+    nodal = np.zeros_like(vector)
+    pressure = problem.interface.response.layer_pressure(problem.nodal(state))
+    nodes = problem.nodes
+    nodes.transpose((nodes.weight * pressure)[:, None] * nodes.normal, nodal)
+    assert np.abs(nodal).max() > 1.0
+    assert np.abs(vector - nodal).max() < 1e-12

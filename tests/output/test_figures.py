@@ -1,0 +1,49 @@
+"""The figures of a solution."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from contact.output.table import contact_table, held_points
+from contact.solving import solve
+from tests.problems.written import block, electric
+
+
+@pytest.mark.parametrize("dim", [2, 3])
+def test_figures(dim: int, shared_tmp_path: Path) -> None:
+    """All figures are drawn."""
+    from contact.output.figures.figures import write_figures
+
+    if dim == 3:
+        pytest.importorskip("pyvista")
+    files = write_figures(solve(electric(dim)), shared_tmp_path)
+    assert [file.name for file in files] == [
+        "figure-contact.png",
+        "figure-deformed.png",
+        "figure-potential.png",
+    ]
+    assert all(file.stat().st_size > 10_000 for file in files)
+
+
+def test_figures_begin_at_the_edge_of_the_body() -> None:
+    """The clamped corner is no contact node, but the axis and the foundation reach it."""
+    from contact.output.figures.body import draw_plane
+    from contact.output.figures.contact import draw_line
+    from contact.output.figures.picture import picture
+
+    case = block(
+        2,
+        fixed=[{"on": "left", "displacement": [0.0, 0.0]}],
+        load=[{"on": "top", "traction": [0.0, -0.1]}],
+    )
+    solution = solve(case)
+    table, held = contact_table(solution), held_points(solution.problem)
+    assert table is not None
+    assert table["x"].min() == 0.25
+    np.testing.assert_allclose(held, [[0.0, 0.0]], atol=1e-15)
+    assert draw_line(table, held=held).axes[0].get_xlim() == pytest.approx((0.0, 2.0))
+    drawn = picture(solution, "von_mises", "stress")
+    assert drawn is not None
+    line = draw_plane(drawn, table).axes[0].lines[0].get_xdata()
+    assert (np.min(line), np.max(line)) == pytest.approx((0.0, 2.0))

@@ -1,0 +1,82 @@
+"""What a solve that is interrupted leaves."""
+
+import signal
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+
+from contact.build import build_problem
+from contact.linear.operator import SparseOperator
+from contact.methods.load_steps import load_steps
+from contact.methods.newton import Newton
+from contact.methods.options import NewtonOptions
+from contact.methods.report import Record
+from contact.problem.kkt import evaluate
+from contact.solving import solve, solve_problem
+from tests.problems.written import block, written
+
+
+@pytest.mark.parallel
+def test_interrupted_solve_keeps_its_results(shared_tmp_path: Path) -> None:
+    """A signal on one rank ends the solve on all of them, and what was computed is written."""
+    handler = signal.getsignal(signal.SIGINT)
+
+    def press(record: Record) -> None:
+        if record.iteration == 1 and MPI.COMM_WORLD.rank == 0:
+            signal.raise_signal(signal.SIGINT)
+
+    solution = solve(block(2, solver={"method": "uzawa"}), monitor=press)
+    assert not solution.converged
+    assert solution.history.records[-1].iteration == 1
+    summary, rows = written(solution, shared_tmp_path)
+    assert summary["reason"] == "interrupted (SIGINT)"
+    assert len(rows) == 9
+    assert signal.getsignal(signal.SIGINT) is handler
+
+
+@pytest.mark.parallel
+def test_a_solve_stops_between_inner_iterations(
+    shared_tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A signal in a long inner loop is not left waiting for its end."""
+    solve_once = SparseOperator.solve
+
+    def press(operator: SparseOperator, *args: Any, **options: Any) -> Any:
+        if operator.counters.linear_solves == 5 and MPI.COMM_WORLD.rank == 0:
+            signal.raise_signal(signal.SIGTERM)
+        return solve_once(operator, *args, **options)
+
+    monkeypatch.setattr(SparseOperator, "solve", press)
+    solution = solve(block(2, solver={"method": "uzawa"}))
+    assert solution.counters.linear_solves == 6
+    assert solution.outcome.signal == signal.SIGTERM
+    summary, _ = written(solution, shared_tmp_path)
+    assert summary["reason"] == "interrupted (SIGTERM)"
+    assert summary["outer_iterations"] == len(solution.history.records)
+
+
+def test_an_interrupted_load_step_is_judged_by_the_full_load(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """The residuals of a solve that ends in a load step are those of the problem itself."""
+    problem = build_problem(block(2))
+    notes = []
+
+    def stepped(method: Newton, _: object) -> Any:
+        return load_steps(method.whole_loop())
+
+    def press(record: Record) -> None:
+        notes.append(record.note)
+        signal.raise_signal(signal.SIGINT)
+
+    monkeypatch.setattr(Newton, "_roads", stepped)
+    solution = solve_problem(problem, NewtonOptions(condense=False), press)
+    assert solution.outcome.signal == signal.SIGINT
+    assert [note.split()[:2] for note in notes] == [["load", "0.25"]]
+    state = solution.state
+    assert state.time == 1.0
+    np.testing.assert_array_equal(state.x, problem.equilibrium.prescribe(state.x))
+    assert solution.outcome.kkt == evaluate(problem, state)
