@@ -1,0 +1,112 @@
+"""Foundations of triangles: distances, signs at edges, STL files."""
+
+from __future__ import annotations
+
+import time
+
+import numpy as np
+import pytest
+
+from contact.errors import InputError
+from contact.interface.obstacle import (
+    Level,
+    Sphere,
+    Triangles,
+)
+from contact.interface.obstacle.stl import read_stl
+
+POINTS = np.random.default_rng(0).normal(size=(1000, 3))
+
+
+def ball(n):
+    """Return the triangles of a sphere of radius 1, n along a quarter of its equator."""
+    theta, phi = np.linspace(0, np.pi, 2 * n + 1), np.linspace(0, 2 * np.pi, 4 * n + 1)
+    t, p = np.meshgrid(theta, phi, indexing="ij")
+    x = np.stack([np.sin(t) * np.cos(p), np.sin(t) * np.sin(p), np.cos(t)], axis=-1)
+    a, b, c, d = x[:-1, :-1], x[1:, :-1], x[1:, 1:], x[:-1, 1:]
+    made = np.concatenate([np.stack(k, axis=2).reshape(-1, 3, 3) for k in ((a, b, c), (a, c, d))])
+    area = np.linalg.norm(np.cross(made[:, 1] - made[:, 0], made[:, 2] - made[:, 0]), axis=1)
+    return made[area > 1e-12]
+
+
+def test_a_surface_of_triangles_is_second_order():
+    points = POINTS[np.linalg.norm(POINTS, axis=1) > 0.3]
+    radius = np.linalg.norm(points, axis=1)
+    errors = []
+    for n in (8, 16, 32):
+        distance, normal = Triangles(ball(n)).distance(points)
+        errors.append(np.abs(distance - radius + 1).max())
+        assert np.array_equal(distance > 0, radius > 1) or np.abs(radius - 1).min() < errors[-1]
+        surface = points - distance[:, None] * normal
+        assert np.abs(np.linalg.norm(surface, axis=1) - 1).max() < (2 / n) ** 2
+    assert np.log2(errors[0] / errors[2]) / 2 == pytest.approx(2, abs=0.15)
+
+
+def test_surfaces_and_formulas_reach_into_facets_as_deep_as_the_ball():
+    points = np.random.default_rng(3).normal(size=(50, 3))
+    points /= np.linalg.norm(points, axis=1)[:, None] * 1.001
+    known = Sphere((0.0, 0.0, 0.0), 1.0).chord_depth(0.3, points)
+    formula = Level(lambda x: x[:, 0] ** 2 + x[:, 1] ** 2 + x[:, 2] ** 2 - 1)
+    assert Triangles(ball(40)).chord_depth(0.3, points) == pytest.approx(known, rel=0.1)
+    exact = Level(lambda x: np.linalg.norm(x, axis=1) - 1)
+    assert exact.chord_depth(0.3, points) == pytest.approx(known, rel=0.02)
+    # A distance that is not quite one says it nearly.
+    assert formula.chord_depth(0.3, points) == pytest.approx(known, rel=0.1)
+    room = Level(lambda x: 1 - np.linalg.norm(x, axis=1))
+    assert room.chord_depth(0.3, points) == 0.0
+    assert room.chord_depth(0.3, points[:0]) == 0.0
+
+
+def test_signs_at_edges_and_corners():
+    """In front of the edges and corners of a cube faces alone do not tell the side."""
+    corners = np.array(np.meshgrid(*[[-1.0, 1.0]] * 3)).reshape(3, -1).T
+    from scipy.spatial import ConvexHull
+
+    hull = ConvexHull(corners)
+    made = corners[hull.simplices]
+    flip = np.einsum(
+        "mi,mi->m", np.cross(made[:, 1] - made[:, 0], made[:, 2] - made[:, 0]), made[:, 0]
+    )
+    made[flip < 0] = made[flip < 0][:, ::-1]
+    points = 2.5 * POINTS
+    distance, _ = Triangles(made).distance(points)
+    out = np.maximum(np.abs(points) - 1, 0)
+    exact = np.linalg.norm(out, axis=1) + np.minimum(np.abs(points).max(axis=1) - 1, 0)
+    assert np.abs(distance - exact).max() < 1e-12
+
+
+def test_a_hundred_thousand_triangles_in_a_second():
+    shape = Triangles(ball(112))
+    assert len(shape.corners) > 1e5
+    direction = np.random.default_rng(3).normal(size=(10_000, 3))
+    points = direction / np.linalg.norm(direction, axis=1)[:, None] * 1.02
+    begin = time.process_time()
+    distance, _ = shape.distance(points)
+    seconds = time.process_time() - begin
+    assert np.abs(distance - 0.02).max() < (np.pi / 224) ** 2
+    assert seconds < 1
+
+
+def test_stl_files(tmp_path):
+    made = ball(4)
+    binary = np.zeros(len(made), [("n", "<f4", 3), ("c", "<f4", (3, 3)), ("a", "<u2")])
+    binary["c"] = made
+    one, two = tmp_path / "binary.stl", tmp_path / "text.stl"
+    one.write_bytes(bytes(80) + np.uint32(len(made)).tobytes() + binary.tobytes())
+    facets = "".join(
+        "facet normal 0 0 0\nouter loop\n"
+        + "".join(f"vertex {x:.9g} {y:.9g} {z:.9g}\n" for x, y, z in triangle)
+        + "endloop\nendfacet\n"
+        for triangle in made
+    )
+    two.write_text(f"solid ball\n{facets}endsolid ball\n")
+    assert np.abs(read_stl(one) - made).max() < 1e-7
+    assert np.abs(read_stl(two) - made).max() < 1e-7
+    for name, content in (
+        ("empty.stl", b""),
+        ("other.stl", b"vertex a b c"),
+        ("cut.stl", b"vertex 1 2 3"),
+    ):
+        (tmp_path / name).write_bytes(content)
+        with pytest.raises(InputError, match=name):
+            read_stl(tmp_path / name)
