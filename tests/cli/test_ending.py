@@ -1,6 +1,5 @@
 """How the command line begins and ends: PETSc's options, exit statuses, processes."""
 
-import os
 import shutil
 import signal
 import subprocess
@@ -10,11 +9,8 @@ from pathlib import Path
 
 import pytest
 
-from contact import case
+from tests.problems.processes import BAR, RANKS, SMALL, command, environment, processes
 
-CLONE = Path(case.__file__).parents[2]
-BAR = CLONE / "scripts/cases/bar.toml"
-SMALL = ["--set", "mesh.cells=[16, 4]", "--quiet"]
 BOX = """
 title = "Box"
 [mesh]
@@ -35,26 +31,14 @@ mu = 0.3
 [solver]
 linear = "lu"
 """
-RANKS = pytest.mark.parametrize("ranks", [1, 2])
-
-
-def environment() -> dict[str, str]:
-    """Return the environment without what says that this is a rank itself."""
-    kept = {k: v for k, v in os.environ.items() if not k.startswith(("OMPI_", "PMIX_", "PRTE_"))}
-    own = {"btl": "self,sm", "topo": "basic", "mpi_yield_when_idle": "1"}
-    root = {"OMPI_ALLOW_RUN_AS_ROOT": "1", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1"}
-    mca = {f"OMPI_MCA_{key}": value for key, value in own.items()}
-    return kept | root | mca | {"PYTHONPATH": str(CLONE), "OMP_NUM_THREADS": "1"}
 
 
 def start(*arguments: str, ranks: int = 1, before: str = "") -> subprocess.Popen[str]:
     """Start the command line, after some Python, in a session of its own."""
     if ranks > 1 and shutil.which("mpirun") is None:
         pytest.skip("there is no mpirun")
-    program = f"import sys\n{before}\nfrom contact.cli.main import main\nsys.exit(main())"
-    launch = [] if ranks == 1 else ["mpirun", "--oversubscribe", "-n", str(ranks)]
     return subprocess.Popen(
-        [*launch, sys.executable, "-c", program, *arguments],
+        command(*arguments, ranks=ranks, before=before),
         env=environment(),
         stdout=subprocess.PIPE,
         stderr=subprocess.STDOUT,
@@ -144,14 +128,14 @@ def test_ranks_end_with_a_killed_launcher(tmp_path: Path) -> None:
     assert process.stdout is not None
     while "iteration 0" not in process.stdout.readline():
         assert process.poll() is None
-    ranks = children(process.pid)
+    ranks = {rank.pid for rank in processes() if rank.parent == process.pid}
     assert len(ranks) == 2
     process.send_signal(signal.SIGKILL)
     process.communicate(timeout=60)
     end = time.monotonic() + 10
-    while any(alive(rank) for rank in ranks) and time.monotonic() < end:
+    while ranks & {left.pid for left in processes()} and time.monotonic() < end:
         time.sleep(0.05)
-    assert not any(alive(rank) for rank in ranks)
+    assert not ranks & {left.pid for left in processes()}
 
 
 MESHING = """
@@ -181,24 +165,3 @@ def test_a_signal_ends_a_long_meshing_at_once(number: int, tmp_path: Path) -> No
     process.send_signal(number)
     process.communicate(timeout=10)
     assert process.returncode == -number
-
-
-def children(parent: int) -> list[int]:
-    """Return the processes that a process has started."""
-    found = []
-    for stat in Path("/proc").glob("[0-9]*/stat"):
-        try:
-            fields = stat.read_text().rpartition(")")[2].split()
-        except OSError:
-            continue
-        if int(fields[1]) == parent:
-            found.append(int(stat.parent.name))
-    return found
-
-
-def alive(pid: int) -> bool:
-    """Whether a process is there and no zombie."""
-    try:
-        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
-    except OSError:
-        return False
