@@ -83,6 +83,14 @@ class Lagged:
         slip = interface.slip_length(iterate)
         self._modulus = penalty_friction_modulus(bound, slip, eps.slip)
 
+    def acts(self) -> bool:
+        """Tell whether there is friction anywhere at that iterate. Collective."""
+        return self._interface.jump.maximum(self._modulus) > 0
+
+    def stick(self) -> None:
+        """Hold all nodes as stiffly along the foundation as across it."""
+        self._modulus = np.full_like(self._modulus, 1 / self._eps.contact)
+
     def forces(self, nodal: Array) -> Multipliers:
         """Return the forces."""
         pressure, _ = _pressure(self._interface, nodal, self._eps)

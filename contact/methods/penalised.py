@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from petsc4py import PETSc
 
-from contact.errors import InputError
+from contact.errors import InputError, SingularError
 from contact.interface.penalised import NodalLaw, Regularisation, outer
 from contact.linear.bordered import Packing
 from contact.linear.faults import petsc_options
@@ -95,7 +95,15 @@ class PenalisedProblem:
             solution.array[:] = np.nan
 
     def solve(self, law: NodalLaw, state: State, implicit: bool) -> tuple[Array, int, str]:
-        """Solve from a state; return the unknowns, the iterations and what went wrong."""
+        """Solve from a state; return the unknowns, the iterations and what went wrong.
+
+        Raises
+        ------
+        SingularError
+            If nothing holds the body at an iterate.
+        InputError
+            If numbers overflow, where the laws are not implicit.
+        """
         body, interface = self._body, self._interface
         nodal = interface.jump.apply(state.x)
         self._law, self._implicit, self._nodal = law, implicit, nodal
@@ -122,7 +130,7 @@ class PenalisedProblem:
         self._error = None
         self._iterate.array[:] = self._packing.packed(body.owned_part(state.x) + self._touch())
         self.snes.solve(None, self._iterate)
-        if self._error is not None and not implicit:
+        if isinstance(self._error, SingularError) or (self._error and not implicit):
             raise self._error
         reason = self.snes.getConvergedReason()
         note = "" if reason > 0 else f"SNES stopped with reason {reason}"
@@ -144,6 +152,7 @@ class PenalisedProblem:
         n, d = jump.normal.shape
         blocks = np.zeros((n, jump.block_size, jump.block_size))
         blocks[:, :d, :d] = spring[:, None, None] * outer(jump.normal, jump.normal)
+        blocks[:, :d, :d] += self._law.block(nodal)
         self.operator.update("secant", state.x, interface.weighted(blocks, state.x))
         rhs = body.external(state.time) - body.internal_forces(state.x)
         jump.transpose(-(jump.weight * spring * opening)[:, None] * jump.normal, rhs)

@@ -24,6 +24,7 @@ import numpy as np
 from mpi4py import MPI
 
 from contact.body.norms import domain_norm
+from contact.errors import SingularError
 from contact.interface.penalised import (
     Implicit,
     Lagged,
@@ -37,6 +38,7 @@ from contact.methods.penalised import PenalisedProblem
 from contact.methods.report import History, Monitor, Outcome, Record
 from contact.methods.stagnation import Stagnation
 from contact.problem.kkt import KKT, evaluate
+from contact.problem.mobility import held_by_friction
 from contact.problem.problem import ContactProblem
 from contact.problem.state import State
 from contact.tolerances import LAWS_HOLD
@@ -44,6 +46,9 @@ from contact.typing import Array
 
 #: What to do about an end without convergence.
 HARDER = "the larger eps_contact and eps_slip, the easier the problem"
+
+#: What is said where the linear system is singular, though the body was held at rest.
+LOST = "the body has been moved to where nothing holds it"
 
 #: Least part of the displacement that a step is taken to add to it.
 LEAST_ADDED = 1e-2
@@ -172,6 +177,8 @@ class Penalty:
             seconds = time.perf_counter() - begin
             self.history.add(Record(iteration, inner, residuals, change, seconds, note))
             residual = residuals.equilibrium
+            if note == LOST and not failed:
+                return self._outcome(residuals, f"{LOST}; {HARDER}")
             if not np.isfinite(residual):
                 return self._outcome(residuals, "the iteration diverged")
             if options.stopping == "thesis":
@@ -192,15 +199,31 @@ class Penalty:
         """Solve (4.32), or the penalised problem itself, by SNES from the state."""
         interface = self.problem.interface
         nodal = interface.jump.apply(self.state.x)
-        law: NodalLaw = Lagged(interface, self._eps, nodal)
-        if implicit:
-            law = Implicit(interface, self._eps)
+        law: NodalLaw = Implicit(interface, self._eps) if implicit else self._lagged(nodal)
         symmetric = not (implicit and interface.friction.acts)
         if symmetric not in self._solvers:
             self._solvers[symmetric] = PenalisedProblem(
                 self.problem, self.options, self._eps, self.counters, symmetric
             )
-        return self._solvers[symmetric].solve(law, self.state, implicit)
+        solver = self._solvers[symmetric]
+        try:
+            return solver.solve(law, self.state, implicit)
+        except SingularError:
+            taken = solver.snes.getIterationNumber()
+            if taken == 0 and not self.history.records:
+                raise
+            del self._solvers[symmetric]  # MUMPS does not begin anew after that
+            return self.state.x, taken, LOST
+
+    def _lagged(self, nodal: Array) -> Lagged:
+        """Return the laws with the friction of an iterate; of stuck nodes where that has none.
+
+        At rest nothing presses, and there is no friction. What friction alone holds would fly away.
+        """
+        law = Lagged(self.problem.interface, self._eps, nodal)
+        if self.problem.frictional and not law.acts() and held_by_friction(self.problem):
+            law.stick()
+        return law
 
     def _change(self, old: Array, new: Array) -> float:
         """Return the relative change (3.46) of the friction bound."""

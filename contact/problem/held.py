@@ -2,29 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from types import MappingProxyType
-
 import numpy as np
 from mpi4py import MPI
-from numpy.typing import NDArray
 
-from contact.body.motions import rigid_motions
-from contact.body.rigid import Rigid
 from contact.errors import InputError
-from contact.mesh.pieces import connected_pieces
+from contact.problem.mobility import ROUNDING, Group, groups, null_space
 from contact.problem.problem import ContactProblem
 from contact.problem.state import State
 from contact.typing import Array
-
-#: Rigid motions in the order of `rigid_motions`.
-NAMES = {
-    2: ["translation along x", "translation along y", "rotation"],
-    3: [f"{kind} {axis}" for kind in ("translation along", "rotation about") for axis in "xyz"],
-}
-
-#: Eigenvalues of the Gram matrices below are between 0 and about 1.
-ROUNDING = 1e-9
 
 
 def check_held(problem: ContactProblem) -> None:
@@ -32,124 +17,51 @@ def check_held(problem: ContactProblem) -> None:
 
     Two things are asked for: supports and contact (in the tangential directions too if there
     is friction) leave no rigid motion at all, and the loads do not pull the body off the
-    foundation where that alone holds it. Pieces that are not connected are checked one by one,
-    but for those that touch each other, or that a rigid part or a foundation joins: they are
-    checked together, with its motion.
+    foundation where that alone holds it.
 
     Raises
     ------
     InputError
         If the body can move freely or is pulled off.
     """
-    piece, count = connected_pieces(problem.equilibrium.space)
-    joined = _joined(problem, piece, count)
-    for k in np.flatnonzero(~joined):
-        _check_group(problem, piece, [k], count)
-    if joined.any():
-        _check_group(problem, piece, [*np.flatnonzero(joined)], count, _free_motions(problem))
+    for group in groups(problem):
+        _check_group(problem, group)
 
 
-def _free_motions(problem: ContactProblem) -> dict[int, str]:
-    """Return the global unknowns that are motions and not given, with their names."""
-    return {
-        member.begin + k: f"{NAMES[problem.dim][k]} of what is rigid"
-        for member in problem.equilibrium.masters.members
-        if isinstance(member.what, Rigid)
-        for k in np.flatnonzero(member.free)
-    }
-
-
-def _joined(problem: ContactProblem, piece: NDArray[np.int32], count: int) -> NDArray[np.bool_]:
-    """Tell which pieces touch something that moves freely, or each other, (count,). Collective."""
-    free, nodes, ties = [*_free_motions(problem)], problem.nodes, problem.equilibrium.masters.ties
-    touched = np.zeros(count, dtype=np.intc)
-    if free and nodes.motion is not None:
-        moves = np.abs(nodes.motion[:, :, free]).max(axis=(1, 2), initial=0.0) > 0
-        touched[piece[nodes.nodes[moves]]] = 1
-        rows = np.flatnonzero(np.abs(ties[:, free]).sum(axis=1) > 0)
-        touched[piece[rows // problem.equilibrium.block_size]] = 1
-    if nodes.links is not None and nodes.links.between:
-        touched[piece[nodes.links.local]] = 1
-    problem.comm.Allreduce(MPI.IN_PLACE, touched, op=MPI.MAX)
-    return touched > 0
-
-
-def _check_group(
-    problem: ContactProblem,
-    piece: NDArray[np.int32],
-    group: list[int],
-    count: int,
-    moving: Mapping[int, str] = MappingProxyType({}),
-) -> None:
-    """Check pieces of the mesh, with the global unknowns that move them. Collective.
-
-    Parameters
-    ----------
-    problem
-        The problem.
-    piece
-        The piece of each owned node, shape (nodes,).
-    group, count
-        The pieces that are checked, and how many there are in all.
-    moving
-        Global unknowns, with their names.
-    """
-    body, nodes, d = problem.equilibrium, problem.nodes, problem.dim
-    points, masters = body.layout.points, body.masters
-    columns, names, centres, centre = [], [], [], _centre(problem)
-    own_names = NAMES[d][1:2] if problem.domain.revolved else NAMES[d]
-    for k in group:
-        inside, size = piece == k, problem.domain.size
-        if count > 1:
-            centre, size = _middle(problem, points[inside])
-        rigid = rigid_motions((points[inside] - centre) / size, problem.domain.revolved)
-        motions = np.zeros((*body.free.shape, rigid.shape[2]))
-        motions[inside, :d] = rigid
-        centres.append(centre)
-        still = np.zeros(masters.size)
-        columns += [np.append(motion.ravel(), still) for motion in np.moveaxis(motions, 2, 0)]
-        names += own_names
-    for k, name in moving.items():
-        columns.append(np.append(np.zeros(body.owned), np.eye(masters.size)[k]))
-        names.append(name)
-    moved = np.stack(columns, axis=1)
-    # Relative to what holds it: supports, and rigid parts where nodes follow them.
-    apart = moved[: body.owned] - masters.ties @ moved[body.owned :]
-    fixed = ~body.free.copy()
-    fixed[:, d:] = False
-    supports = _gram(problem, apart[fixed.ravel()][:, None, :])
-    free = _null_space(supports)
+def _check_group(problem: ContactProblem, group: Group) -> None:
+    """Check pieces of the mesh. Collective."""
+    free = null_space(group.supports)
     if free.shape[1] == 0:
         return
-    at_contact = np.stack([nodes.apply(body.local(column)) for column in columns], axis=2)
-    normal = np.einsum("ni,nim->nm", nodes.normal, at_contact[:, :d])
-    touching = _gram(problem, normal[:, None, :])
-    tangential = np.einsum("nij,njm->nim", nodes.tangent, at_contact[:, :d])
-    if problem.frictional:
-        touching = touching + _gram(problem, tangential)
-    loose = _null_space(supports + touching)
+    loose = null_space(group.held(problem.frictional))
     if loose.shape[1] > 0:
-        whole = "the body, or what is rigid," if moving else "the body"
-        if count > 1:
-            own = np.linalg.norm(loose[: len(group) * len(own_names)], axis=1)
-            moves = own.reshape(len(group), -1).max(axis=1) > 1e-6
-            where = " and ".join(
-                f"({', '.join(f'{x:.4g}' for x in c)})" for c in np.array(centres)[moves]
-            )
-            which = "the one" if np.count_nonzero(moves) == 1 else "what is"
-            whole = f"the mesh has {count} pieces that share no nodes, and {which} about {where}"
-        raise InputError(
-            f"{whole} is not held: it can move as a rigid body ({_describe(loose, names)}); "
-            "accepted: displacement components fixed so that it cannot"
-            + (", or regions that share the nodes between them" if count > 1 else "")
-        )
+        raise InputError(_what_is_loose(problem, group, loose))
+    body = problem.equilibrium
     loads = body.external(problem.time)
     on_masters = loads[body.owned :]
-    own = np.where(np.isin(piece, group)[:, None], body.nodal(loads), 0.0).ravel()
-    work = moved[: body.owned].T @ own
-    work = problem.comm.allreduce(work, op=MPI.SUM) + moved[body.owned :].T @ on_masters
+    own = np.where(group.inside[:, None], body.nodal(loads), 0.0).ravel()
+    work = problem.comm.allreduce(group.moved[: body.owned].T @ own, op=MPI.SUM)
+    work = work + group.moved[body.owned :].T @ on_masters
     scale = problem.comm.allreduce(float(np.abs(own).sum()), op=MPI.SUM)
-    _check_loads(problem, work, scale + np.abs(on_masters).sum(), free, normal, tangential)
+    _check_loads(problem, work, scale + np.abs(on_masters).sum(), free, group)
+
+
+def _what_is_loose(problem: ContactProblem, group: Group, loose: Array) -> str:
+    """Say which pieces can move, and how."""
+    count = group.count
+    whole = "the body, or what is rigid," if group.moving else "the body"
+    if count > 1:
+        one = 1 if problem.domain.revolved else 3 * (problem.dim - 1)
+        own = np.linalg.norm(loose[: len(group.pieces) * one], axis=1)
+        moves = own.reshape(len(group.pieces), -1).max(axis=1) > 1e-6
+        where = " and ".join(f"({', '.join(f'{x:.4g}' for x in c)})" for c in group.centres[moves])
+        which = "the one" if np.count_nonzero(moves) == 1 else "what is"
+        whole = f"the mesh has {count} pieces that share no nodes, and {which} about {where}"
+    return (
+        f"{whole} is not held: it can move as a rigid body ({_describe(loose, group.names)}); "
+        "accepted: displacement components fixed so that it cannot"
+        + (", or regions that share the nodes between them" if count > 1 else "")
+    )
 
 
 def check_potential(problem: ContactProblem, state: State) -> None:
@@ -180,34 +92,6 @@ def check_potential(problem: ContactProblem, state: State) -> None:
         )
 
 
-def _centre(problem: ContactProblem) -> Array:
-    """Return the mean of the contact nodes: rotations about it are well scaled."""
-    nodes = problem.nodes
-    weight = nodes.sum(np.ones_like(nodes.weight))
-    return np.array([nodes.sum(x) for x in nodes.points.T]) / weight
-
-
-def _middle(problem: ContactProblem, points: Array) -> tuple[Array, float]:
-    """Return the middle of the box around points of all ranks, and its diagonal."""
-    low, high = points.min(axis=0, initial=np.inf), points.max(axis=0, initial=-np.inf)
-    problem.comm.Allreduce(MPI.IN_PLACE, low, op=MPI.MIN)
-    problem.comm.Allreduce(MPI.IN_PLACE, high, op=MPI.MAX)
-    return (low + high) / 2, float(np.linalg.norm(high - low))
-
-
-def _gram(problem: ContactProblem, rows: Array) -> Array:
-    """Return the sum over all ranks of the products of rows (n, k, m), scaled to about 1."""
-    total = problem.comm.allreduce(np.einsum("nkm,nkl->ml", rows, rows), op=MPI.SUM)
-    scale = np.trace(total)
-    return np.asarray(total / scale if scale > 0 else total)
-
-
-def _null_space(gram: Array) -> Array:
-    """Return an orthonormal basis of the null space, shape (m, k)."""
-    values, vectors = np.linalg.eigh(gram)
-    return vectors[:, values < ROUNDING]
-
-
 def _describe(motions: Array, names: list[str]) -> str:
     """Name the axis motions that a space of rigid motions contains, or count it."""
     contained = np.linalg.norm(motions, axis=1) > 1 - 1e-6
@@ -223,12 +107,7 @@ def _describe(motions: Array, names: list[str]) -> str:
 
 
 def _check_loads(
-    problem: ContactProblem,
-    work: Array,
-    scale: float,
-    free: Array,
-    normal: Array,
-    tangential: Array,
+    problem: ContactProblem, work: Array, scale: float, free: Array, group: Group
 ) -> None:
     """Refuse loads that no contact force can balance.
 
@@ -244,8 +123,8 @@ def _check_loads(
         Of the loads on the rigid motions, shape (m,), and the size of the loads.
     free
         The motions that no support holds, shape (m, k).
-    normal, tangential
-        All motions at the contact nodes, shapes (n, m) and (n, d, m).
+    group
+        Has all motions at the contact nodes.
     """
     friction = problem.interface.friction
     mu = 0.0 if friction.law is None else friction.law.maximum
@@ -254,8 +133,10 @@ def _check_loads(
         return
     comm, work = problem.comm, work @ free
     # |m_tau| <= sqrt(d) times its largest component: a cone of planes inside the cone.
-    across = [np.sqrt(problem.dim) * mu * part @ free for part in np.moveaxis(tangential, 1, 0)]
-    rows = [normal @ free + sign * part for part in across for sign in (-1, 1)]
+    across = [
+        np.sqrt(problem.dim) * mu * part @ free for part in np.moveaxis(group.tangential, 1, 0)
+    ]
+    rows = [group.normal @ free + sign * part for part in across for sign in (-1, 1)]
     cone = np.concatenate([problem.nodes.gather(row) for row in rows])
     pulled = False
     if comm.rank == 0 and np.abs(work).max() > ROUNDING * scale:

@@ -7,10 +7,11 @@ from mpi4py import MPI
 from contact import parse_case, solve
 from contact.body.description import Body, Fixed, Load, Material
 from contact.build import build_problem
-from contact.errors import InputError
+from contact.errors import InputError, SingularError
 from contact.interface.friction import Friction
 from contact.interface.obstacle import GapFunction
 from contact.interface.pairing import find_pair
+from contact.linear.operator import SparseOperator
 from contact.methods.options import OPTIONS
 from contact.output.balances import charge_balance
 from contact.output.table import contact_table
@@ -28,7 +29,7 @@ NOTHING = GapFunction(lambda points: np.zeros(len(points)))
 ZERO = constant(0.0, 2)
 
 
-def pushed(comm, degree=1, dim=2, mu=0.3, supports=(), **given):
+def pushed(comm, degree=1, dim=2, mu=0.3, supports=(), gap=0.0, **given):
     """Return a block that is pressed on another one and pushed along; friction may hold it."""
     zero = constant(0.0, dim)
     force = [constant(c, dim) for c in (0.001, *[0.0] * (dim - 2), -0.01)]
@@ -38,7 +39,8 @@ def pushed(comm, degree=1, dim=2, mu=0.3, supports=(), **given):
         [Fixed("bottom", [zero] * dim), *supports],
         [Load("top", force)],
     )
-    pair = Contact("under", NOTHING, friction=Friction(ConstantCoefficient(mu)), against="over")
+    distance = GapFunction(lambda points: np.full(len(points), gap))
+    pair = Contact("under", distance, friction=Friction(ConstantCoefficient(mu)), against="over")
     cells = (6, 9) if dim == 2 else (2, 3)
     return ContactProblem(Blocks(dim, *cells, **given).domain(comm), body, pair, degree=degree)
 
@@ -70,6 +72,34 @@ def test_penalty_comes_near():
         assert outcome.converged
         errors.append(np.abs(state.x - exact.x).max() / np.abs(exact.x).max())
     assert errors[0] < 0.1 and errors[1] == pytest.approx(errors[0] / 2, rel=0.2)
+
+
+@pytest.mark.parametrize("degree", [1, 2])
+@pytest.mark.parametrize("gap", [0.0, 0.01])
+def test_penalties_find_what_friction_alone_holds(degree, gap):
+    """At rest nothing presses: without friction the upper block would fly away."""
+    problem = pushed(MPI.COMM_SELF, degree, gap=gap)
+    exact, outcome = METHODS["newton"](problem, OPTIONS["newton"](tolerance=1e-11), None).solve()
+    assert outcome.converged
+    state, outcome = METHODS["penalty"](problem, OPTIONS["penalty"](), None).solve()
+    assert outcome.converged, outcome.ended
+    assert np.abs(state.x - exact.x).max() < 0.02 * np.abs(exact.x).max()
+
+
+def test_penalties_that_lose_a_body_have_not_converged(monkeypatch):
+    """It was held at rest: that it is lost on the way is no fault of the input."""
+    method = METHODS["penalty"](pushed(MPI.COMM_SELF), OPTIONS["penalty"](), None)
+    solve, calls = SparseOperator.solve, []
+
+    def singular(operator, *given):
+        calls.append(given)
+        if len(calls) > 2:
+            raise SingularError("singular")
+        return solve(operator, *given)
+
+    monkeypatch.setattr(SparseOperator, "solve", singular)
+    _, outcome = method.solve()
+    assert not outcome.converged and "moved to where nothing holds it" in outcome.ended
 
 
 @pytest.mark.parallel

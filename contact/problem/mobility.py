@@ -1,0 +1,215 @@
+"""The rigid motions of the pieces of a mesh, and what supports and contact see of them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from types import MappingProxyType
+
+import numpy as np
+from mpi4py import MPI
+from numpy.typing import NDArray
+
+from contact.body.motions import rigid_motions
+from contact.body.rigid import Rigid
+from contact.mesh.pieces import connected_pieces
+from contact.problem.problem import ContactProblem
+from contact.typing import Array
+
+#: Rigid motions in the order of `rigid_motions`.
+NAMES = {
+    2: ["translation along x", "translation along y", "rotation"],
+    3: [f"{kind} {axis}" for kind in ("translation along", "rotation about") for axis in "xyz"],
+}
+
+#: Eigenvalues of the Gram matrices below are between 0 and about 1.
+ROUNDING = 1e-9
+
+
+@dataclass(frozen=True)
+class Group:
+    """Pieces of the mesh that are held together or not at all, and their m rigid motions.
+
+    Attributes
+    ----------
+    problem
+        The problem.
+    pieces, count
+        Which pieces they are, and how many the mesh has.
+    inside
+        Which owned nodes are theirs.
+    moved
+        The motions, of owned unknowns and global ones, shape (owned + global, m).
+    names, centres
+        The names of the motions, and the middles of the pieces.
+    supports
+        Gram matrix of the motions where supports hold the body, shape (m, m).
+    moving
+        Whether global unknowns are among them.
+    """
+
+    problem: ContactProblem
+    pieces: list[int]
+    count: int
+    inside: NDArray[np.bool_]
+    moved: Array
+    names: list[str]
+    centres: Array
+    supports: Array
+    moving: bool
+
+    @cached_property
+    def _at_contact(self) -> Array:
+        body, nodes = self.problem.equilibrium, self.problem.nodes
+        moved = [nodes.apply(body.local(column))[:, : body.dim] for column in self.moved.T]
+        return np.stack(moved, axis=2)
+
+    @cached_property
+    def normal(self) -> Array:
+        """The motions at the contact nodes of this rank along the normal, (n, m). Collective."""
+        return np.einsum("ni,nim->nm", self.problem.nodes.normal, self._at_contact)
+
+    @cached_property
+    def tangential(self) -> Array:
+        """The others, shape (n, d, m). Collective."""
+        return np.einsum("nij,njm->nim", self.problem.nodes.tangent, self._at_contact)
+
+    def held(self, friction: bool) -> Array:
+        """Return the Gram matrix where supports and contact hold the body, (m, m). Collective.
+
+        Parameters
+        ----------
+        friction
+            Whether contact holds it in the tangential directions too.
+        """
+        held = self.supports + _gram(self.problem, self.normal[:, None, :])
+        return held + _gram(self.problem, self.tangential) if friction else held
+
+
+def groups(problem: ContactProblem) -> Iterator[Group]:
+    """Give the pieces of the mesh one by one, but those together that something joins. Collective.
+
+    That is for those that touch each other, or that a rigid part or a foundation joins: they are
+    looked at together, with its motion.
+    """
+    piece, count = connected_pieces(problem.equilibrium.space)
+    joined = _joined(problem, piece, count)
+    for k in np.flatnonzero(~joined):
+        yield _group(problem, piece, [k], count)
+    if joined.any():
+        yield _group(problem, piece, [*np.flatnonzero(joined)], count, _free_motions(problem))
+
+
+def held_by_friction(problem: ContactProblem) -> bool:
+    """Tell whether without friction a rigid motion of a body were free. Collective."""
+    return any([null_space(group.held(friction=False)).size > 0 for group in groups(problem)])
+
+
+def _free_motions(problem: ContactProblem) -> dict[int, str]:
+    """Return the global unknowns that are motions and not given, with their names."""
+    return {
+        member.begin + k: f"{NAMES[problem.dim][k]} of what is rigid"
+        for member in problem.equilibrium.masters.members
+        if isinstance(member.what, Rigid)
+        for k in np.flatnonzero(member.free)
+    }
+
+
+def _joined(problem: ContactProblem, piece: NDArray[np.int32], count: int) -> NDArray[np.bool_]:
+    """Tell which pieces touch something that moves freely, or each other, (count,). Collective."""
+    free, nodes, ties = [*_free_motions(problem)], problem.nodes, problem.equilibrium.masters.ties
+    touched = np.zeros(count, dtype=np.intc)
+    if free and nodes.motion is not None:
+        moves = np.abs(nodes.motion[:, :, free]).max(axis=(1, 2), initial=0.0) > 0
+        touched[piece[nodes.nodes[moves]]] = 1
+        rows = np.flatnonzero(np.abs(ties[:, free]).sum(axis=1) > 0)
+        touched[piece[rows // problem.equilibrium.block_size]] = 1
+    if nodes.links is not None and nodes.links.between:
+        touched[piece[nodes.links.local]] = 1
+    problem.comm.Allreduce(MPI.IN_PLACE, touched, op=MPI.MAX)
+    return touched > 0
+
+
+def _group(
+    problem: ContactProblem,
+    piece: NDArray[np.int32],
+    pieces: list[int],
+    count: int,
+    moving: Mapping[int, str] = MappingProxyType({}),
+) -> Group:
+    """Return pieces of the mesh with their motions. Collective.
+
+    Parameters
+    ----------
+    problem
+        The problem.
+    piece
+        The piece of each owned node, shape (nodes,).
+    pieces, count
+        Those asked for, and how many there are in all.
+    moving
+        Global unknowns that move them, with their names.
+    """
+    body, d = problem.equilibrium, problem.dim
+    points, masters = body.layout.points, body.masters
+    columns, names, centres, centre = [], [], [], _centre(problem)
+    own_names = NAMES[d][1:2] if problem.domain.revolved else NAMES[d]
+    for k in pieces:
+        inside, size = piece == k, problem.domain.size
+        if count > 1:
+            centre, size = _middle(problem, points[inside])
+        rigid = rigid_motions((points[inside] - centre) / size, problem.domain.revolved)
+        motions = np.zeros((*body.free.shape, rigid.shape[2]))
+        motions[inside, :d] = rigid
+        centres.append(centre)
+        still = np.zeros(masters.size)
+        columns += [np.append(motion.ravel(), still) for motion in np.moveaxis(motions, 2, 0)]
+        names += own_names
+    for k, name in moving.items():
+        columns.append(np.append(np.zeros(body.owned), np.eye(masters.size)[k]))
+        names.append(name)
+    moved = np.stack(columns, axis=1)
+    # Relative to what holds it: supports, and rigid parts where nodes follow them.
+    apart = moved[: body.owned] - masters.ties @ moved[body.owned :]
+    fixed = ~body.free.copy()
+    fixed[:, d:] = False
+    return Group(
+        problem,
+        pieces,
+        count,
+        np.isin(piece, pieces),
+        moved,
+        names,
+        np.array(centres),
+        _gram(problem, apart[fixed.ravel()][:, None, :]),
+        bool(moving),
+    )
+
+
+def _centre(problem: ContactProblem) -> Array:
+    """Return the mean of the contact nodes: rotations about it are well scaled."""
+    nodes = problem.nodes
+    weight = nodes.sum(np.ones_like(nodes.weight))
+    return np.array([nodes.sum(x) for x in nodes.points.T]) / weight
+
+
+def _middle(problem: ContactProblem, points: Array) -> tuple[Array, float]:
+    """Return the middle of the box around points of all ranks, and its diagonal."""
+    low, high = points.min(axis=0, initial=np.inf), points.max(axis=0, initial=-np.inf)
+    problem.comm.Allreduce(MPI.IN_PLACE, low, op=MPI.MIN)
+    problem.comm.Allreduce(MPI.IN_PLACE, high, op=MPI.MAX)
+    return (low + high) / 2, float(np.linalg.norm(high - low))
+
+
+def _gram(problem: ContactProblem, rows: Array) -> Array:
+    """Return the sum over all ranks of the products of rows (n, k, m), scaled to about 1."""
+    total = problem.comm.allreduce(np.einsum("nkm,nkl->ml", rows, rows), op=MPI.SUM)
+    scale = np.trace(total)
+    return np.asarray(total / scale if scale > 0 else total)
+
+
+def null_space(gram: Array) -> Array:
+    """Return an orthonormal basis of the null space, shape (m, k)."""
+    values, vectors = np.linalg.eigh(gram)
+    return vectors[:, values < ROUNDING]
