@@ -252,7 +252,7 @@ class Solution:
 
         A node is in contact where p + c (u_nu - rho) > 0 for the multiplier p, or where the
         layer presses; c = E / size as in the residuals. There it slips if |lambda_f + c u_tau|
-        exceeds the friction bound (always without friction), and sticks else. What is below
+        exceeds the friction bound (always where that is 0), and sticks else. What is below
         1e-9 of the largest pressure counts as rounding.
         """
         interface, nodal = self.problem.interface, self.nodal
@@ -260,4 +260,5 @@ class Solution:
         status = interface.status(nodal, self.forces, self.friction_bound, rounding=rounding)
         layer = interface.response.layer_pressure(nodal) > rounding
         touches = (status & CLOSED > 0) | layer
-        return np.where(touches, np.where(status & STICKS > 0, "stick", "slip"), "open")
+        sticks = (status & STICKS > 0) & (self.friction_bound > 0)
+        return np.where(touches, np.where(sticks, "stick", "slip"), "open")

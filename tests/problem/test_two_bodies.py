@@ -290,6 +290,8 @@ def test_two_pairs_have_two_laws():
     force = [upwards[below].sum(), upwards[above].sum()]
     assert force[1] > 0 and force[0] == pytest.approx(-force[1], rel=0.02)
     assert np.abs(table["tau"][above]).max() < 1e-10 < 0.1 < np.abs(table["tau"][below]).max()
+    # On the axis, too, where nothing can slip.
+    assert set(table["status"][above]) == {"open", "slip"}
 
 
 #: Two columns on each other: heights 1, permittivities, conductance of the contact, voltage.
