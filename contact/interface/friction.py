@@ -51,6 +51,12 @@ class Friction:
         object.__setattr__(self, "tresca", field(self.tresca))
         object.__setattr__(self, "mu", field(self.mu))
 
+    @property
+    def given(self) -> bool:
+        """Whether there is any."""
+        laws = (self.coefficient, self.tresca, self.mu, self.law)
+        return any(law is not None for law in laws)
+
     def law_at(self, points: Array) -> FrictionLaw | None:
         """Return the law at nodes of coordinates (n, d); None without friction. Collective."""
         if self.tresca is not None:

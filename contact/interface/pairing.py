@@ -48,12 +48,14 @@ def find_pair(
     distance: Obstacle,
     key: str = "contact",
     press: bool = False,
+    friction: bool = False,
 ) -> Pair:
     """Collect the nodes of a part that may touch another one. Collective.
 
     A node whose normal is fixed by a Dirichlet condition is left out, and its multiplier is
-    handed over to its neighbours; a fixed tangential component is removed from its tangent
-    projector.
+    handed over to its neighbours. With friction that is so too where a tangential component is
+    fixed, but not on the other side, on which it would act; where both are, or there is no
+    friction, it is removed from the tangent projector.
 
     Parameters
     ----------
@@ -65,17 +67,19 @@ def find_pair(
         What messages call the contact.
     press
         Whether the bodies may overlap at rest, and press each other out.
+    friction
+        Whether there is friction between them.
 
     Raises
     ------
     InputError
-        If the parts share nodes or overlap, follow what is rigid, do not face each other, or no
-        node can move.
+        If the parts share nodes or overlap, follow what is rigid, do not face each other, no
+        node can move, or supports along the part would take friction off the other side.
     """
     what = f"{key}.against: {part!r} and {against!r}"
     slave = surface_of(body.domain, body.space, part)
     master = surface_of(body.domain, body.space, against).gathered(body.comm)
-    coupling = _coupled(body, slave, master, what)
+    coupling = _coupled(body, slave, master, what, friction)
     begin, end = body.layout.index_map.local_range
     here = np.flatnonzero((coupling.nodes >= begin) & (coupling.nodes < end))
     local = (coupling.nodes[here] - begin).astype(np.int32)
@@ -107,8 +111,10 @@ def find_pair(
     return Pair(nodes, coupling)
 
 
-def _coupled(body: BodyEquilibrium, slave: Surface, master: Surface, what: str) -> Coupling:
-    """Return the operator without slave nodes whose normal is fixed. Collective."""
+def _coupled(
+    body: BodyEquilibrium, slave: Surface, master: Surface, what: str, friction: bool
+) -> Coupling:
+    """Return the operator without slave nodes that carry no multiplier. Collective."""
     common = np.intersect1d(slave.nodes, master.nodes).size
     if body.comm.allreduce(common, op=MPI.SUM) > 0:
         raise InputError(
@@ -118,6 +124,8 @@ def _coupled(body: BodyEquilibrium, slave: Surface, master: Surface, what: str) 
     coupling = couple(slave, master, reach, body.comm)
     _check_apart(body, coupling, what)
     stuck = _stuck(body, coupling)
+    if friction:
+        stuck = np.union1d(stuck, _one_sided(body, slave, coupling, stuck, what))
     if stuck.size:
         coupling = couple(slave, master, reach, body.comm, stuck)
     if coupling.nodes.size == 0:
@@ -148,6 +156,43 @@ def _stuck(body: BodyEquilibrium, coupling: Coupling) -> NDArray[np.int64]:
     held = np.linalg.norm(coupling.normal[here] * moves, axis=1) <= 0.5
     found = np.concatenate(body.comm.allgather(coupling.nodes[here[held]]))
     return np.unique(np.concatenate([NOTHING, found]))
+
+
+def _one_sided(
+    body: BodyEquilibrium,
+    slave: Surface,
+    coupling: Coupling,
+    stuck: NDArray[np.int64],
+    what: str,
+) -> NDArray[np.int64]:
+    """Return slave nodes with a component that is fixed, but free on the other side. Collective.
+
+    But for those whose normal is fixed.
+
+    Raises
+    ------
+    InputError
+        If they fill facets, and not only a rim.
+    """
+    d = body.dim
+    begin, end = body.layout.index_map.local_range
+    every = np.concatenate([coupling.nodes, coupling.masters])
+    here = np.flatnonzero((every >= begin) & (every < end))
+    fixed = np.zeros((every.size, d), dtype=np.intc)
+    fixed[here] = ~body.free[every[here] - begin, :d]
+    body.comm.Allreduce(MPI.IN_PLACE, fixed, op=MPI.SUM)
+    own, opposite = np.split(fixed, [coupling.nodes.size])
+    one_sided = (own > 0) & (np.abs(coupling.other) @ opposite <= 0)
+    one_sided[np.isin(coupling.nodes, stuck)] = False
+    filled = any(
+        np.isin(slave.nodes, coupling.nodes[one_sided[:, i]]).all(axis=1).any() for i in range(d)
+    )
+    if body.comm.allreduce(filled, op=MPI.LOR):
+        raise InputError(
+            f"{what}: supports hold the first along its surface, where friction would pull at "
+            "the second; accepted: on and against exchanged, supports on its rim, no friction"
+        )
+    return coupling.nodes[one_sided.any(axis=1)]
 
 
 def _apart(

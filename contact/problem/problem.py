@@ -187,7 +187,8 @@ class ContactProblem:
         body = self.equilibrium
         if contact.against is not None:
             sides = contact.on, contact.against
-            pair = find_pair(body, *sides, contact.foundation, key, contact.press)
+            frictional = contact.friction.given
+            pair = find_pair(body, *sides, contact.foundation, key, contact.press, frictional)
             laws = contact.friction, contact.layer, contact.conductor
             return Entry(contact.on, pair.nodes, *laws, coupling=pair.coupling)
         nodes, mixing = find_nodes(body, contact.on, contact.foundation, key, contact.press)

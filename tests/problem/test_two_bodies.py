@@ -218,6 +218,15 @@ def case(**more):
             },
             r"contact\.against: .* no facets that face each other within .*, or their nodes",
         ),
+        (
+            {
+                "fixed": [
+                    {"on": "lower_bottom", "displacement": [0.0, 0.0]},
+                    {"on": "upper_bottom", "displacement": [0.0, "free"]},
+                ]
+            },
+            "supports hold the first along its surface, where friction would pull at the second",
+        ),
     ],
 )
 def test_what_is_refused(more, message):

@@ -161,6 +161,30 @@ def test_a_rim_that_is_held_carries_no_multiplier(
     np.testing.assert_allclose(state.x.reshape(-1, dim), x @ strain.T, rtol=0, atol=1e-12)
 
 
+@pytest.mark.parallel
+@pytest.mark.parametrize(("dim", "degree"), KINDS, ids=NAMES)
+def test_a_rim_that_is_held_along_the_surface(dim: int, degree: int) -> None:
+    """Friction acts there on the other body, which is not held: a constant shear passes."""
+    given = blocks(dim)
+    law = Linear(1.0, 0.3)
+    strain = np.diag([0.002, 0.001, -0.01][-dim:]) + 0.002 * (1 - np.eye(dim))
+    stress = (law.bulk - 2 * law.shear / 3) * np.trace(strain) * np.eye(dim)
+    stress += 2 * law.shear * strain
+    linear, axes = [Linearly(row) for row in strain], np.eye(dim)
+    outward = {"left": -axes[0], "right": axes[0], "front": -axes[1], "back": axes[1]}
+    outward["top"] = axes[-1]
+    loads = [Load(part, constants(stress @ outward[part])) for part in ("top", *SIDES[dim])]
+    fixed = [Fixed("bottom", linear), Fixed("upper_left", [linear[0], *[None] * (dim - 1)])]
+    problem = ContactProblem(
+        given.domain(COMM), Body(law, fixed, loads), contact("under", "over", 2.0), degree=degree
+    )
+    state = solve(problem, 1e-12)
+    x = problem.equilibrium.space.tabulate_dof_coordinates()[:, :dim]
+    np.testing.assert_allclose(state.x.reshape(-1, dim), x @ strain.T, rtol=0, atol=1e-12)
+    vectors = state.forces.vectors(problem.nodes)
+    np.testing.assert_allclose(vectors, -problem.nodes.normal @ stress, rtol=0, atol=1e-11)
+
+
 @pytest.mark.parametrize(("dim", "degree"), KINDS, ids=NAMES)
 def test_matching_meshes_are_one_body(dim: int, degree: int) -> None:
     """Tied by friction along matching meshes, two blocks bend as one does."""
