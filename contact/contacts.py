@@ -78,7 +78,7 @@ def make_contacts(
 
 def _foundation(key: str, section: sections.Contact, domain: Domain) -> Obstacle:
     if section.foundation is not None:
-        return section.foundation.obstacle((section.direction, section.axis or ()))
+        return section.foundation.obstacle(section.direction, section.axis or ())
     assert section.gap is not None  # filled in by the section
     rounding = -1e-12 * domain.size
     return GapFunction(NodalField(f"{key}.gap", section.gap, domain.comm, rounding).numpy)

@@ -17,9 +17,6 @@ from contact.interface.obstacle.stl import read_stl
 from contact.settings import Accepted, Positive, Switch
 from contact.typing import Array
 
-#: Direction of contact, and the axis where it is given.
-Aim: TypeAlias = tuple[str, tuple[float, ...]]
-
 
 class Shape(Section):
     """A rigid shape. A new one is a section like those below, entered in `Foundation`."""
@@ -45,12 +42,13 @@ class Shape(Section):
                 raise fault(key, vector, f"{len(first[1])} numbers, as {first[0]} has")
         return self
 
-    #: What it stands for, made of the section's values in their order.
+    #: What it stands for, made of the section's values by their names.
     made: ClassVar[Callable[..., Obstacle]]
 
-    def obstacle(self, aim: Aim) -> Obstacle:
-        """Return the shape itself, for a contact direction."""
-        return type(self).made(*(value for key, value in self if key != "shape"), *aim)
+    def obstacle(self, direction: str, along: tuple[float, ...]) -> Obstacle:
+        """Return the shape itself, for a contact direction, and the axis where that is "axis"."""
+        values = {key: value for key, value in self if key != "shape"}
+        return type(self).made(**values, direction=direction, along=along)
 
 
 class Plane(Shape):
@@ -135,9 +133,9 @@ class Distance(Shape):
         "that."
     )
 
-    def obstacle(self, aim: Aim) -> obstacle.Level:
+    def obstacle(self, direction: str, along: tuple[float, ...]) -> obstacle.Level:
         """Return the shape."""
-        return obstacle.Level(_Quiet(self.distance), *aim)
+        return obstacle.Level(_Quiet(self.distance), direction=direction, along=along)
 
 
 class Surface(Shape):
@@ -151,9 +149,9 @@ class Surface(Shape):
         "file."
     )
 
-    def obstacle(self, aim: Aim) -> obstacle.Triangles:
+    def obstacle(self, direction: str, along: tuple[float, ...]) -> obstacle.Triangles:
         """Read the surface."""
-        return obstacle.Triangles(read_stl(self.file), *aim)
+        return obstacle.Triangles(read_stl(self.file), direction=direction, along=along)
 
 
 class _Quiet:

@@ -131,11 +131,11 @@ def test_plane():
     direction, gap = plane.measure(points, down)
     assert direction.tolist() == [[0.0, -1.0]] * 2
     assert gap == pytest.approx([1.5, 0.0])
-    direction, gap = Plane((0.0, -1.0), (0.0, 1.0), "body").measure(points[[0, 0]], down)
+    direction, gap = Plane((0.0, -1.0), (0.0, 1.0), direction="body").measure(points[[0, 0]], down)
     assert direction is down
     assert gap == pytest.approx([1.5, 1.5 / np.cos(0.3)])
     # A normal that does not lead to the foundation never meets it.
-    away = Plane((0.0, -1.0), (0.0, 1.0), "body").measure(points, -down)[1]
+    away = Plane((0.0, -1.0), (0.0, 1.0), direction="body").measure(points, -down)[1]
     assert np.all(np.isinf(away))
 
 
@@ -152,13 +152,13 @@ def test_sphere_along_its_radius_and_along_the_body_s_normal(inside):
     assert gap == pytest.approx(np.abs(distance - 2.0))
     nearly = direction + 0.1 * random.standard_normal((20, 3))
     nearly /= np.linalg.norm(nearly, axis=1)[:, None]
-    along, gap = Sphere((1.0, 0.0, 0.0), 2.0, inside, "body").measure(points, nearly)
+    along, gap = Sphere((1.0, 0.0, 0.0), 2.0, inside, direction="body").measure(points, nearly)
     touching = points + gap[:, None] * along
     met = np.isfinite(gap)
     assert met.any()
     assert np.linalg.norm(touching - sphere.centre, axis=1)[met] == pytest.approx(2.0)
     assert np.all(gap[met] > 0)
-    away = Sphere((1.0, 0.0, 0.0), 2.0, False, "body").measure(points, unit)[1]
+    away = Sphere((1.0, 0.0, 0.0), 2.0, False, direction="body").measure(points, unit)[1]
     assert inside or np.all(np.isinf(away)), "a ray that leads away never touches"
 
 
@@ -172,5 +172,7 @@ def test_a_foundation_that_no_node_can_reach_is_refused():
     example = bar(MPI.COMM_SELF, 4)
     with pytest.raises(InputError, match="bottom"):
         ContactProblem(
-            example.domain, example.body, Contact("bottom", Plane((0, 9), (0, -1), "body"))
+            example.domain,
+            example.body,
+            Contact("bottom", Plane((0, 9), (0, -1), direction="body")),
         )

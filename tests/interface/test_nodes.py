@@ -9,7 +9,6 @@ from contact.body.description import Body, Fixed, Load
 from contact.errors import InputError
 from contact.interface.friction import Friction
 from contact.interface.obstacle import GapFunction, Level, Plane, Sphere
-from contact.interface.obstacle.protocol import Shape
 from contact.mesh.domain import from_mesh
 from contact.mesh.grid import rectangle
 from contact.mesh.refinement import refined
@@ -56,7 +55,7 @@ def test_directions_and_gaps_of_a_curved_part_over_a_plane():
     theirs = on_arch(plane)
     assert theirs.normal == pytest.approx(np.tile([0.0, -1.0], (25, 1)))
     assert theirs.gap == pytest.approx(theirs.points[:, 1] + 0.1)
-    own = on_arch(Plane((0.0, -0.1), (0.0, 1.0), "body"))
+    own = on_arch(Plane((0.0, -0.1), (0.0, 1.0), direction="body"))
     # Along either direction, the gap ends on the plane.
     assert (own.points + own.gap[:, None] * own.normal)[:, 1] == pytest.approx(-0.1)
     assert np.all(own.gap >= theirs.gap - 1e-15)
@@ -156,26 +155,22 @@ def test_two_bodies_that_differ_by_a_rotation_have_the_same_contact():
     assert np.abs(ours["u_t"][order] @ q - expected["u_t"]).max() < 1e-9
 
 
-class Circle(Level):
-    """The circle about (0, 2) as a formula."""
-
-    def __init__(self, _, radius, *, direction):
-        super().__init__(lambda x: np.hypot(x[:, 0], x[:, 1] - 2.0) - radius, direction)
+def circle(_, radius, *, direction):
+    """Return the circle about (0, 2) as a formula."""
+    return Level(lambda x: np.hypot(x[:, 0], x[:, 1] - 2.0) - radius, direction=direction)
 
 
-def around_a_circle(
-    radius, degree=1, levels=0, cells=24, direction="foundation", shape: type[Shape] = Sphere
-):
+def around_a_circle(radius, degree=1, levels=0, cells=24, direction="foundation", shape=Sphere):
     """Return the nodes of the arch's upper side, a concave arc of radius 1, on a circle."""
     domain = arch(cells)
     for _ in range(levels):
         domain = refined(domain)
     body = Body(LAW, [Fixed("arc", (ZERO, ZERO))])
-    circle = shape((0.0, 2.0), radius, direction=direction)
-    return ContactProblem(domain, body, Contact("top", circle), degree=degree).nodes
+    rigid = shape((0.0, 2.0), radius, direction=direction)
+    return ContactProblem(domain, body, Contact("top", rigid), degree=degree).nodes
 
 
-@pytest.mark.parametrize("shape", [Sphere, Circle])
+@pytest.mark.parametrize("shape", [Sphere, circle])
 @pytest.mark.parametrize("direction", ["foundation", "body"])
 @pytest.mark.parametrize(("degree", "levels"), [(1, 0), (1, 1), (1, 2), (2, 0), (2, 1)])
 def test_straight_facets_around_a_circle_touch_it(degree, levels, direction, shape):
@@ -190,7 +185,7 @@ def test_straight_facets_around_a_circle_touch_it(degree, levels, direction, sha
     assert loose.gap.max() == pytest.approx(0.5 * depth, rel=0.01)
 
 
-@pytest.mark.parametrize("shape", [Sphere, Circle])
+@pytest.mark.parametrize("shape", [Sphere, circle])
 @pytest.mark.parametrize(("degree", "levels"), [(1, 0), (1, 1), (2, 0), (2, 1)])
 def test_a_circle_larger_than_its_hole_is_refused(degree, levels, shape):
     with pytest.raises(InputError, match="cuts it at rest"):

@@ -123,7 +123,7 @@ def test_closed_forms_along_the_axis():
     edge = (r > 0.7) & (r < 0.999)
     assert np.allclose(gap[r < 0.7], 0.1, rtol=1e-13)
     assert np.allclose(gap[edge], 0.4 - np.sqrt(0.09 - (r[edge] - 0.7) ** 2), rtol=1e-9)
-    ball = Sphere((0.0, 4.1), 4.0, False, "axis", (0.0, 1.0)).measure(points, up)[1]
+    ball = Sphere((0.0, 4.1), 4.0, **aim).measure(points, up)[1]
     assert np.allclose(ball, 4.1 - np.sqrt(16 - r**2), rtol=1e-13)
 
 

@@ -20,15 +20,11 @@ class Cone(Shape):
         Its tip, and the axis from there into the cone, of any length.
     half_angle
         Between the axis and the side (degrees), above 0 and below 90.
-    direction, along
-        As for a sphere.
     """
 
     apex: tuple[float, ...]
     axis: tuple[float, ...]
     half_angle: float
-    direction: str = "foundation"
-    along: tuple[float, ...] = ()
 
     def distance(self, points: Array) -> tuple[Array, Array]:
         """Return distances and normals; those of the tip where it is nearest."""

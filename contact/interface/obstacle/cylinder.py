@@ -21,16 +21,12 @@ class Cylinder(Shape):
         the axis lies in the plane: a strip, or about the axis of a body of revolution a shaft.
     inside
         Whether the body lies inside.
-    direction, along
-        As for a sphere.
     """
 
     point: tuple[float, ...]
     axis: tuple[float, ...]
     radius: float
     inside: bool = False
-    direction: str = "foundation"
-    along: tuple[float, ...] = ()
 
     def distance(self, points: Array) -> tuple[Array, Array]:
         """Return distances and normals."""

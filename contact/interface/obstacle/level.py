@@ -23,13 +23,9 @@ class Level(Shape):
     function
         Signed distance of points of shape (n, d), positive outside, shape (n,). Its slope need
         not be 1: it is divided by it, which is exact on the surface, and nearly so close to it.
-    direction, along
-        As for a sphere.
     """
 
     function: Callable[[Array], Array]
-    direction: str = "foundation"
-    along: tuple[float, ...] = ()
 
     def distance(self, points: Array) -> tuple[Array, Array]:
         """Return distances and normals; NaN where the function has no slope."""

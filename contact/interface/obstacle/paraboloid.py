@@ -20,15 +20,11 @@ class Paraboloid(Shape):
         Its tip, and the axis from there into the paraboloid, of any length.
     radius
         Radius of curvature R > 0 at the tip.
-    direction, along
-        As for a sphere.
     """
 
     apex: tuple[float, ...]
     axis: tuple[float, ...]
     radius: float
-    direction: str = "foundation"
-    along: tuple[float, ...] = ()
 
     def distance(self, points: Array) -> tuple[Array, Array]:
         """Return distances and normals, by the cubic equation of the nearest point.

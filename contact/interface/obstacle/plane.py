@@ -18,15 +18,10 @@ class Plane(Shape):
     ----------
     point, normal
         A point of the plane and its normal towards the body, length d.
-    direction, along
-        "foundation": contact along the plane's normal (default); "body": along the body's;
-        "axis": along a given direction.
     """
 
     point: tuple[float, ...]
     normal: tuple[float, ...]
-    direction: str = "foundation"
-    along: tuple[float, ...] = ()
 
     def chord_depth(self, length: float, points: Array) -> float:
         """Return 0: chords of a plane lie in it."""

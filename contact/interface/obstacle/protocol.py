@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
@@ -54,15 +55,21 @@ class Obstacle(Protocol):
         """
 
 
+@dataclass(frozen=True, kw_only=True)
 class Shape(ABC):
     """What shapes share: the contact direction, and gaps along rays.
 
-    A shape is a frozen dataclass with two fields besides its own: `direction`, and `along`, the
-    direction from the body towards the foundation where that is "axis".
+    Parameters
+    ----------
+    direction
+        "foundation": contact along the shape's normal (default); "body": along the body's;
+        "axis": along a given direction.
+    along
+        That direction, from the body towards the foundation, of any length.
     """
 
-    direction: str
-    along: tuple[float, ...]
+    direction: str = "foundation"
+    along: tuple[float, ...] = ()
 
     is_shape = True
 

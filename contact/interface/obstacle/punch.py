@@ -22,16 +22,12 @@ class Punch(Shape):
         Of the punch, > 0.
     edge_radius
         By which its edge is rounded, at most the radius; 0: sharp.
-    direction, along
-        As for a sphere.
     """
 
     centre: tuple[float, ...]
     axis: tuple[float, ...]
     radius: float
     edge_radius: float = 0.0
-    direction: str = "foundation"
-    along: tuple[float, ...] = ()
 
     def distance(self, points: Array) -> tuple[Array, Array]:
         """Return distances and normals: those of a smaller punch, less the edge radius."""

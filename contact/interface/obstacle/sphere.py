@@ -20,16 +20,11 @@ class Sphere(Shape):
         Centre, length d, and radius > 0 (a circle in 2-D).
     inside
         Whether the body lies inside the sphere.
-    direction, along
-        "foundation": contact along the sphere's radius (default); "body": along the body's
-        normal; "axis": along a given direction.
     """
 
     centre: tuple[float, ...]
     radius: float
     inside: bool = False
-    direction: str = "foundation"
-    along: tuple[float, ...] = ()
 
     def distance(self, points: Array) -> tuple[Array, Array]:
         """Return distances and normals."""

@@ -27,13 +27,9 @@ class Triangles(Shape):
     ----------
     corners
         Shape (m, 3, 3). None is degenerate.
-    direction, along
-        As for a sphere.
     """
 
     corners: Array
-    direction: str = "foundation"
-    along: tuple[float, ...] = ()
 
     @cached_property
     def _tree(self) -> cKDTree:
