@@ -15,6 +15,7 @@ from scipy import sparse
 
 from contact.errors import InputError
 from contact.linear.change import Change, in_circles
+from contact.mesh.entities import owned_among
 from contact.typing import Array
 
 
@@ -146,16 +147,14 @@ def make_links(
             "themselves; accepted: contacts that form no circle, such as one of two that are each "
             "other's opposite"
         )
-    begin, end = index_map.local_range
-    here = np.flatnonzero((every >= begin) & (every < end))
-    local = (every[here] - begin).astype(np.int32)
+    here, local = owned_among(index_map, every)
     flags = np.zeros((every.size, free.shape[1]), dtype=np.intc)
     flags[here] = free[local]
     comm.Allreduce(MPI.IN_PLACE, flags, op=MPI.SUM)
     change = Change.of(every, replaced, jumps, flags > 0)
     none = np.zeros(0, dtype=np.intp)
     links = Links(comm, jumps, change, slaves, masters.size > 0, none, none, here, local)
-    return links.at(nodes.astype(np.int64) + begin)
+    return links.at(index_map.local_to_global(nodes))
 
 
 def _over(rows: Rows, every: NDArray[np.int64]) -> sparse.csr_array:

@@ -15,6 +15,7 @@ from contact.interface.mortar.integration import NOTHING
 from contact.interface.mortar.surface import Surface, surface_of
 from contact.interface.nodes import ContactNodes
 from contact.interface.obstacle import Obstacle
+from contact.mesh.entities import owned_among
 from contact.mesh.pieces import connected_pieces
 from contact.typing import Array
 
@@ -80,9 +81,7 @@ def find_pair(
     slave = surface_of(body.domain, body.space, part)
     master = surface_of(body.domain, body.space, against).gathered(body.comm)
     coupling = _coupled(body, slave, master, what, friction)
-    begin, end = body.layout.index_map.local_range
-    here = np.flatnonzero((coupling.nodes >= begin) & (coupling.nodes < end))
-    local = (coupling.nodes[here] - begin).astype(np.int32)
+    here, local = owned_among(body.layout.index_map, coupling.nodes)
     d = body.dim
     points, normal = body.space.tabulate_dof_coordinates()[local, :d], coupling.normal[here]
     gap, cut = coupling.gap[here], 0.0
@@ -138,10 +137,9 @@ def _coupled(
 
 def _check_apart(body: BodyEquilibrium, coupling: Coupling, what: str) -> None:
     """Refuse nodes that follow something rigid or an electrode. Collective."""
-    begin, end = body.layout.index_map.local_range
     taking = np.concatenate([coupling.slaves, coupling.masters])
-    here = taking[(taking >= begin) & (taking < end)] - begin
-    if body.comm.allreduce(bool(body.masters.tied[here].any()), op=MPI.LOR):
+    _, local = owned_among(body.layout.index_map, taking)
+    if body.comm.allreduce(bool(body.masters.tied[local].any()), op=MPI.LOR):
         raise InputError(
             f"{what}: their nodes follow a rigid part or an electrode of unknown potential; "
             "accepted: parts apart from these"
@@ -150,9 +148,8 @@ def _check_apart(body: BodyEquilibrium, coupling: Coupling, what: str) -> None:
 
 def _stuck(body: BodyEquilibrium, coupling: Coupling) -> NDArray[np.int64]:
     """Return the slave nodes of all ranks whose normal is fixed. Collective."""
-    begin, end = body.layout.index_map.local_range
-    here = np.flatnonzero((coupling.nodes >= begin) & (coupling.nodes < end))
-    moves = body.free[coupling.nodes[here] - begin, : body.dim]
+    here, local = owned_among(body.layout.index_map, coupling.nodes)
+    moves = body.free[local, : body.dim]
     held = np.linalg.norm(coupling.normal[here] * moves, axis=1) <= 0.5
     found = np.concatenate(body.comm.allgather(coupling.nodes[here[held]]))
     return np.unique(np.concatenate([NOTHING, found]))
@@ -222,9 +219,8 @@ def _apart(
 def _connected(body: BodyEquilibrium, coupling: Coupling) -> bool:
     """Tell whether both sides are on the same piece of the mesh. Collective."""
     piece, count = connected_pieces(body.space)
-    begin, end = body.layout.index_map.local_range
     found = np.zeros((2, count), dtype=np.intc)
     for k, nodes in enumerate((coupling.slaves, coupling.masters)):
-        found[k, piece[nodes[(nodes >= begin) & (nodes < end)] - begin]] = 1
+        found[k, piece[owned_among(body.layout.index_map, nodes)[1]]] = 1
     body.comm.Allreduce(MPI.IN_PLACE, found, op=MPI.MAX)
     return bool(found.all(axis=0).any())

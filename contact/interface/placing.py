@@ -18,6 +18,7 @@ from contact.interface.mortar.surface import surface_of
 from contact.interface.nodes import ContactNodes
 from contact.interface.obstacle import Obstacle
 from contact.mesh.domain import Domain
+from contact.mesh.entities import owned_among
 from contact.typing import Array
 
 
@@ -70,10 +71,9 @@ def candidates(domain: Domain, space: fem.FunctionSpace, part: str) -> Candidate
     # Nodes whose function has no mean on Gamma_3 carry none: P2 vertices of edges where they meet
     # the axis of a body of revolution.
     heavy = lumped.weight > 1e-9 * lumped.weight.sum() / max(lumped.weight.size, 1)
-    begin, end = space.dofmap.index_map.local_range
-    here = np.flatnonzero(heavy & (lumped.nodes >= begin) & (lumped.nodes < end))
+    here, nodes = owned_among(space.dofmap.index_map, lumped.nodes)
+    here, nodes = here[heavy[here]], nodes[heavy[here]]
     numbers, normal = lumped.nodes[here], lumped.normal[here]
-    nodes = (numbers - begin).astype(np.int32)
     points = space.tabulate_dof_coordinates()[nodes, : domain.dim]
     normal = normal / np.linalg.norm(normal, axis=1)[:, None]
     weight = lumped.weight[here]

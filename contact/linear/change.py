@@ -17,6 +17,7 @@ from scipy.sparse import csgraph
 from contact.linear.bordered import BorderedOperator, shell
 from contact.linear.layout import Layout
 from contact.linear.operator import Bulk, SparseOperator
+from contact.mesh.entities import owned_among
 from contact.typing import Array
 
 
@@ -81,7 +82,7 @@ class Change:
         size, index_map = layout.block_size, layout.index_map
         begin, end = index_map.local_range
         columns = self.nodes[:, None] * size + np.arange(size)
-        here = np.flatnonzero((self.nodes >= begin) & (self.nodes < end))
+        here, _ = owned_among(index_map, self.nodes)
         local = (columns[here] - begin * size).ravel()
         own = (here[:, None] * size + np.arange(size)).ravel()
         entries = matrix[own].tocoo()

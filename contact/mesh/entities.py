@@ -1,4 +1,4 @@
-"""Facets, groups of indices, and the extent of a mesh."""
+"""Facets, what this rank owns, groups of indices, and the extent of a mesh."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from typing import Any, TypeAlias
 import numpy as np
 import numpy.typing as npt
 from dolfinx import mesh as dmesh
+from dolfinx.common import IndexMap
 from mpi4py import MPI
 
 Indices: TypeAlias = npt.NDArray[np.int32]
@@ -32,6 +33,26 @@ def combinations(
         numbers[members] = len(combined) + within
         combined += [(*combined[old], position) for old in met]
     return numbers, tuple(combined)
+
+
+def owned_among(
+    index_map: IndexMap, numbers: npt.NDArray[np.int64]
+) -> tuple[npt.NDArray[np.intp], Indices]:
+    """Return which of global numbers are those of this rank, and the local numbers of these."""
+    begin, end = index_map.local_range
+    here = np.flatnonzero((numbers >= begin) & (numbers < end))
+    return here, (numbers[here] - begin).astype(np.int32)
+
+
+def cells_at(mesh: dmesh.Mesh, facets: Indices) -> tuple[Indices, npt.NDArray[np.intp]]:
+    """Return the cell behind each facet of the boundary, and which of its facets that is."""
+    topology, dim = mesh.topology, mesh.topology.dim
+    topology.create_connectivity(dim - 1, dim)
+    topology.create_connectivity(dim, dim - 1)
+    to_cell, to_facet = topology.connectivity(dim - 1, dim), topology.connectivity(dim, dim - 1)
+    cells = to_cell.array[to_cell.offsets[facets]]
+    place = np.argmax(to_facet.array.reshape(-1, dim + 1)[cells] == facets[:, None], axis=1)
+    return cells, place
 
 
 def extent(mesh: dmesh.Mesh) -> float:

@@ -8,6 +8,7 @@ import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
 
+from contact.mesh.entities import cells_at, owned_among
 from contact.mesh.pieces import connected_pieces
 from contact.output.solution import Solution
 from contact.problem.problem import ContactProblem
@@ -50,9 +51,8 @@ def choices(solution: Solution) -> Iterator[tuple[str, bool]]:
 def _partly(solution: Solution, nodes: NDArray[np.int64], sides: str) -> tuple[str, bool]:
     """Warn of nodes that carry pressure though less than half of their area faces anything."""
     problem = solution.problem
-    begin, end = problem.equilibrium.layout.index_map.local_range
-    here = nodes[(nodes >= begin) & (nodes < end)] - begin
-    pressed = np.isin(problem.nodes.nodes, here) & (solution.pressure > 0)
+    _, local = owned_among(problem.equilibrium.layout.index_map, nodes)
+    pressed = np.isin(problem.nodes.nodes, local) & (solution.pressure > 0)
     count = problem.comm.allreduce(int(pressed.sum()), op=MPI.SUM)
     if count == 0:
         return "", True
@@ -69,8 +69,7 @@ def _side(problem: ContactProblem, part: str) -> tuple[float, float]:
     d, facets = domain.dim, domain.facets(part)
     sizes = domain.mesh.h(d - 1, facets) if facets.size else np.zeros(0)
     total = problem.comm.allreduce(np.array([sizes.sum(), sizes.size]), op=MPI.SUM)
-    to_cell = domain.mesh.topology.connectivity(d - 1, d)
-    cells = to_cell.array[to_cell.offsets[facets]]
+    cells, _ = cells_at(domain.mesh, facets)
     youngs = [
         float(material.law.young)
         for material, own in zip(body.body.materials, body.cells, strict=True)
@@ -95,12 +94,11 @@ def passing(solution: Solution) -> tuple[str, bool]:
     piece, count = connected_pieces(problem.equilibrium.space)
     if count == 1:
         return "", True
-    begin, end = problem.equilibrium.layout.index_map.local_range
     met = np.zeros(count, dtype=np.intc)
     for entry in problem.entries:
         if entry.coupling is not None:
             both = np.concatenate([entry.coupling.slaves, entry.coupling.masters])
-            met[piece[both[(both >= begin) & (both < end)] - begin]] = 1
+            met[piece[owned_among(problem.equilibrium.layout.index_map, both)[1]]] = 1
     problem.comm.Allreduce(MPI.IN_PLACE, met, op=MPI.MAX)
     alone = count - int(np.count_nonzero(met))
     if alone == 0:

@@ -16,6 +16,7 @@ from contact.interface.entries import Entry
 from contact.interface.mortar.coupling import Coupling
 from contact.interface.mortar.lumping import Lumping
 from contact.interface.mortar.surface import surface_of
+from contact.mesh.entities import owned_among
 from contact.output.solved import Solved
 from contact.output.table import Table
 from contact.output.vtu import VTU, Grid
@@ -76,10 +77,9 @@ def _acting(
     problem: ContactProblem, entry: Entry, coupling: Coupling, lumped: Lumping, own: Array
 ) -> Array:
     """Return what stresses at this rank's contact nodes are on the other side, shape (m, k)."""
-    begin = problem.equilibrium.layout.index_map.local_range[0]
+    names = problem.equilibrium.layout.index_map.local_to_global(entry.nodes.nodes)
     forces = np.zeros((coupling.nodes.size, own.shape[1]))
-    rows = np.searchsorted(coupling.nodes, entry.nodes.nodes.astype(np.int64) + begin)
-    forces[rows] = entry.nodes.weight[:, None] * own
+    forces[np.searchsorted(coupling.nodes, names)] = entry.nodes.weight[:, None] * own
     problem.comm.Allreduce(MPI.IN_PLACE, forces, op=MPI.SUM)
     on_nodes = np.zeros((lumped.nodes.size, own.shape[1]))
     on_nodes[np.searchsorted(lumped.nodes, coupling.masters)] = coupling.other.T @ forces
@@ -92,10 +92,9 @@ def _acting(
 
 def _everywhere(problem: ContactProblem, nodes: NDArray[np.int64], values: Array) -> Array:
     """Return the values of owned nodes at nodes of all ranks, given by global numbers."""
-    begin, end = problem.equilibrium.layout.index_map.local_range
-    here = np.flatnonzero((nodes >= begin) & (nodes < end))
+    here, local = owned_among(problem.equilibrium.layout.index_map, nodes)
     found = np.zeros((nodes.size, values.shape[1]))
-    found[here] = values[nodes[here] - begin]
+    found[here] = values[local]
     problem.comm.Allreduce(MPI.IN_PLACE, found, op=MPI.SUM)
     return found
 

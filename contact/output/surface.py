@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from contact.mesh.entities import cells_at
 from contact.output.solved import Solved
 from contact.output.table import Table, tangent_of
 from contact.output.vtu import VTU, Grid, Values
@@ -17,16 +18,10 @@ STATUS = {"none": -1, "open": 0, "stick": 1, "slip": 2}
 
 def _facet_nodes(problem: ContactProblem, part: str) -> NDArray[np.int32]:
     """Return the local nodes of each owned facet of a part, corners first, shape (m, k)."""
-    mesh, space = problem.domain.mesh, problem.equilibrium.space
-    facets = problem.domain.facets(part)
-    topology, dim = mesh.topology, mesh.topology.dim
-    topology.create_connectivity(dim - 1, dim)
-    topology.create_connectivity(dim, dim - 1)
-    to_cell, to_facet = topology.connectivity(dim - 1, dim), topology.connectivity(dim, dim - 1)
-    cells = to_cell.array[to_cell.offsets[facets]]
-    place = np.argmax(to_facet.array.reshape(-1, dim + 1)[cells] == facets[:, None], axis=1)
+    domain, space, d = problem.domain, problem.equilibrium.space, problem.dim
+    cells, place = cells_at(domain.mesh, domain.facets(part))
     layout = space.dofmap.dof_layout
-    closure = np.array([sorted(layout.entity_closure_dofs(dim - 1, i)) for i in range(dim + 1)])
+    closure = np.array([sorted(layout.entity_closure_dofs(d - 1, i)) for i in range(d + 1)])
     return np.take_along_axis(space.dofmap.list[cells], closure[place], axis=1)
 
 

@@ -11,6 +11,7 @@ from scipy import sparse
 from scipy.sparse import csgraph
 
 from contact.interface.placing import candidates
+from contact.mesh.entities import cells_at
 from contact.output.solved import Solved
 from contact.problem.problem import ContactProblem
 from contact.typing import Array
@@ -136,12 +137,7 @@ def _links(problem: ContactProblem) -> NDArray[np.int64]:
     """Return the global numbers of neighbours on the owned facets of Gamma_3, shape (m, 2)."""
     mesh, space = problem.domain.mesh, problem.equilibrium.space
     facets = np.concatenate([problem.domain.facets(contact.on) for contact in problem.contacts])
-    topology = mesh.topology
-    topology.create_connectivity(1, 2)
-    topology.create_connectivity(2, 1)
-    to_cell, to_facet = topology.connectivity(1, 2), topology.connectivity(2, 1)
-    cells = to_cell.array[to_cell.offsets[facets]]
-    place = np.argmax(to_facet.array.reshape(-1, 3)[cells] == facets[:, None], axis=1)
+    cells, place = cells_at(mesh, facets)
     layout = space.dofmap.dof_layout
     closure = np.array([layout.entity_closure_dofs(1, i) for i in range(3)])
     # Both ends, then the middle node if there is one.

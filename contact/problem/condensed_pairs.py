@@ -15,6 +15,7 @@ from scipy.linalg import lu_factor, lu_solve
 from contact.body.equilibrium import BodyEquilibrium
 from contact.interface.interface import Interface
 from contact.linear.change import Change
+from contact.mesh.entities import owned_among
 from contact.typing import Array
 
 
@@ -38,14 +39,13 @@ class CondensedPairs:
 
     def __init__(self, body: BodyEquilibrium, interface: Interface, change: Change) -> None:
         layout, comm = body.layout, body.comm
-        begin, end = layout.index_map.local_range
-        here = change.nodes[(change.nodes >= begin) & (change.nodes < end)] - begin
+        _, here = owned_among(layout.index_map, change.nodes)
         coupled = interface.coupled
-        self.nodes: NDArray[np.int32] = np.setdiff1d(here, coupled).astype(np.int32)
+        self.nodes: NDArray[np.int32] = np.setdiff1d(here, coupled)
         self.offset = layout.block_size * sum(comm.allgather(coupled.size)[: comm.rank])
         kept = np.concatenate([coupled, self.nodes])
         is_jump = np.arange(kept.size) < coupled.size
-        numbers = np.concatenate(comm.allgather(kept + begin))
+        numbers = np.concatenate(comm.allgather(layout.index_map.local_to_global(kept)))
         jumps = np.repeat(np.concatenate(comm.allgather(is_jump)), layout.block_size)
         free = np.concatenate(comm.allgather(layout.free[kept])).ravel()
         self._change = _among(change, numbers, layout.block_size)

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from contact import _compat
 from contact.interface.mortar.bulge import bulges, pairs_of
 from contact.mesh.domain import Domain
+from contact.mesh.entities import cells_at
 from contact.typing import Array
 
 
@@ -106,11 +107,7 @@ def surface_of(domain: Domain, space: fem.FunctionSpace, part: str) -> Surface:
     """
     mesh, d = domain.mesh, domain.dim
     facets = domain.facets(part)
-    mesh.topology.create_connectivity(d - 1, d)
-    mesh.topology.create_connectivity(d, d - 1)
-    to_cell, to_facet = mesh.topology.connectivity(d - 1, d), mesh.topology.connectivity(d, d - 1)
-    cells = to_cell.array[to_cell.offsets[facets]]
-    place = np.argmax(to_facet.array.reshape(-1, d + 1)[cells] == facets[:, None], axis=1)
+    cells, place = cells_at(mesh, facets)
     degree = space.ufl_element().embedded_superdegree
     local = _local_nodes(space, degree)[place]
     nodes = np.take_along_axis(space.dofmap.list[cells], local, axis=1)
