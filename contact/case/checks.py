@@ -13,9 +13,8 @@ from pydantic import BaseModel
 from contact.case.evolution import check_evolution, check_time
 from contact.case.formula import Expression
 from contact.case.moving import check_moving, moving
-from contact.case.shapes import Distance
 from contact.case.showing import listed
-from contact.case.types import Words, fault
+from contact.case.types import Words, as_given, fault
 from contact.mesh.together import members
 from contact.tolerances import HUGE
 
@@ -39,8 +38,7 @@ def check_sections(case: Case) -> None:
     _check_lagged(case)
     check_evolution(case)
     for path, formula in _formulas(case):
-        if isinstance(formula, Expression):
-            check_time(case, path, formula)
+        check_time(case, path, formula)
     _check_contacts(case)
     check_moving(case)
     if case.mesh.dimension is not None:
@@ -50,32 +48,37 @@ def check_sections(case: Case) -> None:
 
 def check_sizes(case: Case) -> None:
     """Raise a fault if a number is so large or so small that its square is none any more."""
-    for path, number in _numbers((), case):
+    for path, value in _values((), case):
+        number = value
+        if isinstance(value, Expression):
+            number = value.value if value.is_constant else 0.0
         if number != 0 and math.isfinite(number) and not 1 / HUGE <= abs(number) <= HUGE:
             accepted = f"0, or sizes from {1 / HUGE:g} to {HUGE:g}, whose squares do not overflow"
-            raise fault(".".join(path), number, accepted)
+            raise fault(path, number, accepted)
 
 
-def _numbers(path: tuple[str, ...], value: Any) -> Iterator[tuple[tuple[str, ...], float]]:
-    """Give all numbers below a value of the case, with their paths."""
+def _values(path: tuple[str, ...], value: Any) -> Iterator[tuple[str, float | Expression]]:
+    """Give all numbers and formulas below a value of the case, with their paths."""
     match value:
-        case Expression():
-            if value.is_constant:
-                yield path, value.value
-        case int() | float():
-            yield path, value
+        case Expression() | int() | float():
+            yield ".".join(path), value
         case tuple():
             for i, entry in enumerate(value):
-                yield from _numbers((*path, str(i)), entry)
+                yield from _values((*path, str(i)), entry)
         case Mapping():
             for key, entry in value.items():
-                yield from _numbers((*path, key), entry)
+                yield from _values((*path, key), entry)
         case BaseModel():
             for name, field in type(value).model_fields.items():
-                yield from _numbers((*path, field.alias or name), getattr(value, name))
+                yield from _values((*path, field.alias or name), getattr(value, name))
         case _ if is_dataclass(value):
             for entry in fields(value):
-                yield from _numbers((*path, entry.name), getattr(value, entry.name))
+                yield from _values((*path, entry.name), getattr(value, entry.name))
+
+
+def _formulas(case: Case) -> Iterator[tuple[str, Expression]]:
+    found = _values((), case)
+    return ((path, value) for path, value in found if isinstance(value, Expression))
 
 
 def check_mesh(case: Case, dimension: int, parts: Iterable[str]) -> None:
@@ -191,39 +194,15 @@ def _vectors(case: Case) -> Iterator[tuple[str, tuple[Any, ...] | None]]:
         yield from ((f"{path}.{key}", vector) for key, vector in section.vectors())
 
 
-def _formulas(case: Case) -> Iterator[tuple[str, Any]]:
-    for path, vector in _vectors(case):
-        yield from ((f"{path}.{k}", component) for k, component in enumerate(vector or ()))
-    for i, fixed in enumerate(case.fixed):
-        yield f"fixed.{i}.potential", fixed.potential
-    for i, load in enumerate(case.load):
-        for key in ("pressure", "charge", "body_charge"):
-            yield f"load.{i}.{key}", getattr(load, key)
-    for i, electrode in enumerate(case.electrode):
-        yield f"electrode.{i}.charge", electrode.charge
-    for path, section in moving(case):
-        yield from ((f"{path}.{key}", value) for key, value in section.formulas())
-    for path, contact in case.contacts:
-        yield f"{path}.gap", contact.gap
-        if isinstance(contact.foundation, Distance):
-            yield f"{path}.foundation.distance", contact.foundation.distance
-        key, friction = case.friction_of(path, contact)
-        yield f"{key}.bound", friction.bound
-        yield f"{key}.mu", friction.mu
-        key, electric = case.electric_of(path, contact)
-        yield f"{key}.phi_f", None if electric is None else electric.phi_f
-
-
 def _check_vectors(case: Case, dimension: int) -> None:
     """Vectors have as many components as space, and the plane has no z."""
     for path, section in moving(case):
         section.check_dimension(path, dimension)
     for path, vector in _vectors(case):
         if vector is not None and len(vector) != dimension:
-            given = [v.source if isinstance(v, Expression) else v for v in vector]
-            raise fault(path, given, f"{dimension} components in {dimension}-D")
+            raise fault(path, as_given(vector), f"{dimension} components in {dimension}-D")
     for path, formula in _formulas(case):
-        if isinstance(formula, Expression) and dimension == 2 and "z" in formula.names:
+        if dimension == 2 and "z" in formula.names:
             raise fault(path, formula.source, "formulas in x and y in the plane")
     for path, contact in case.contacts:
         only = None if contact.foundation is None else contact.foundation.only

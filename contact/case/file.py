@@ -30,7 +30,8 @@ from contact.case.rigid import Electrode, RigidPart
 from contact.case.shapes import Plane, Sphere
 from contact.case.showing import clipped
 from contact.case.solver import DEFAULT, Solver
-from contact.case.types import FromTable, Section, Text, as_tuple, entries, one_or_more
+from contact.case.types import FromTable, Section, Text, as_tuple
+from contact.case.unions import entries, one_or_more
 from contact.errors import InputError
 from contact.output.options import OutputOptions
 from contact.output.units import Units

@@ -14,15 +14,15 @@ from contact.case.rigid import Rigid
 from contact.case.shapes import Foundation
 from contact.case.types import (
     AmplitudeName,
+    Direction,
     NonNegative,
     NonNegativeFormula,
     Section,
     TimeFormula,
-    Vector,
     Words,
     fault,
-    one_of,
 )
+from contact.case.unions import one_of
 from contact.mesh.together import meet
 from contact.settings import Accepted, Positive, Switch
 from forms.laws import Coulomb, FrictionLaw, SlipCoefficient
@@ -170,7 +170,7 @@ class Contact(Section):
         "or along `axis`, as the closed forms of indentation take it; cones and edges need that. "
         "With a gap it is the body's.",
     )
-    axis: Vector | None = Field(
+    axis: Direction | None = Field(
         default=None,
         description='With `direction = "axis"`: that direction, from the body towards the '
         "foundation, of any length.",
@@ -248,8 +248,6 @@ class Contact(Section):
             given = Words("missing") if self.axis is None else self.axis
             accepted = 'a vector with direction = "axis", and with that alone'
             raise fault("axis", given, accepted)
-        if self.axis is not None and not any(self.axis):
-            raise fault("axis", self.axis, "a vector that is not zero")
         if self.axis is not None and self.foundation is None:
             raise fault("direction", self.direction, "axis with a foundation that is a shape")
         if self.overlap == "press" and self.foundation is None:

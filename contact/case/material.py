@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
+from contact.case.accepted import accepted_by
 from contact.case.types import (
     Names,
     NonNegative,
@@ -19,7 +20,6 @@ from contact.case.types import (
     Text,
     Triple,
     Words,
-    accepted_by,
     as_tuple,
     fault,
 )

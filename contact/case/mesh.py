@@ -20,6 +20,7 @@ from contact.case.types import (
     Words,
     as_tuple,
     fault,
+    not_zero,
 )
 from contact.mesh import grid
 from contact.settings import Accepted, Count, Positive
@@ -119,7 +120,7 @@ class Mesh(Section):
         description="Angle (degrees) by which the mesh is turned about the origin of "
         "coordinates, counter-clockwise; in space about `axis`.",
     )
-    axis: Triple | None = Field(
+    axis: Annotated[Triple, not_zero] | None = Field(
         default=None, description="Axis of the rotation in space. Default: y, `[0, 1, 0]`."
     )
     refine: Annotated[int, Field(ge=0, le=10), Accepted("a whole number from 0 to 10")] = Field(
@@ -191,8 +192,6 @@ class Mesh(Section):
         if (self.generator is None) == (self.file is None):
             given = "neither generator nor file" if self.file is None else "generator and file"
             raise fault("generator", Words(given), "one of generator and file")
-        if self.axis is not None and not any(self.axis):
-            raise fault("axis", self.axis, "a vector that is not zero")
         if self.diagonal is not None and self.generator != "rectangle":
             raise fault("diagonal", self.diagonal, "diagonal for a rectangle only")
         if self.generator is not None and self.sides:

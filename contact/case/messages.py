@@ -9,9 +9,10 @@ from typing import Any, Literal, get_args, get_origin
 from pydantic import ValidationError
 from pydantic_core import ErrorDetails, PydanticCustomError
 
+from contact.case.accepted import accepted_by, keys_of, sections_of
 from contact.case.body import Load
 from contact.case.showing import listed, path_of, shown
-from contact.case.types import UNKNOWN, Section, Words, accepted_by, keys_of, sections_of
+from contact.case.types import UNKNOWN, Section, Words
 
 #: What a user may look for in a load, and where it is.
 FORCES = {

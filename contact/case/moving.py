@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from typing import Any, TypeAlias
 
 from contact.case.rigid import NOTHING, Moving
-from contact.case.types import Words, fault
+from contact.case.types import Words, as_given, fault
 from contact.mesh.together import meet
 
 #: `contact.case.file.Case`.
@@ -48,8 +48,7 @@ def _check_along_axis(path: str, section: Moving) -> None:
     """Raise a fault if something moves otherwise than along the axis of a body of revolution."""
     across = (section.displacement or (NOTHING,))[0]
     if across != NOTHING:
-        given = across if isinstance(across, str) else across.source
         accepted = "0 across the axis of a body of revolution"
-        raise fault(f"{path}.displacement.0", given, accepted)
+        raise fault(f"{path}.displacement.0", as_given(across), accepted)
     if any(turn != NOTHING for turn in section.turns):
         raise fault(f"{path}.rotation", Words("given"), "no rotation of a body of revolution")

@@ -16,10 +16,11 @@ from pydantic.fields import FieldInfo
 
 import meshes
 from contact.case import grammar as formulas
+from contact.case.accepted import accepted_by, either, keys_of, sections_of
 from contact.case.file import Case
 from contact.case.solver import DEFAULT
 from contact.case.text import literal
-from contact.case.types import Section, accepted_by, either, keys_of, sections_of
+from contact.case.types import Section
 from contact.methods.options import OPTIONS
 from contact.settings import ReadWith
 

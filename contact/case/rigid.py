@@ -15,6 +15,7 @@ from contact.case.types import (
     TimeFormula,
     Vector,
     Words,
+    as_given,
     as_tuple,
     fault,
 )
@@ -102,11 +103,13 @@ class Moving(Section):
         for k, force in enumerate(self.force or ()):
             free = k < len(moves) and moves[k] == "free"
             if force != NOTHING and not free:
-                raise fault(f"force.{k}", shown(force), 'a force where the displacement is "free"')
+                raise fault(
+                    f"force.{k}", as_given(force), 'a force where the displacement is "free"'
+                )
         for k, moment in enumerate(self.moments):
             if moment != NOTHING and (k >= len(self.turns) or self.turns[k] != "free"):
                 key = f"moment.{k}" if isinstance(self.moment, tuple) else "moment"
-                raise fault(key, shown(moment), 'a moment where the rotation is "free"')
+                raise fault(key, as_given(moment), 'a moment where the rotation is "free"')
         if self.centre is None and any(turn != NOTHING for turn in self.turns):
             raise fault("centre", Words("missing"), "a point about which it turns")
         return self
@@ -115,11 +118,6 @@ class Moving(Section):
         """Give the keys that have as many components as space."""
         for key in ("displacement", "force", "centre"):
             yield key, getattr(self, key)
-
-    def formulas(self) -> Iterator[tuple[str, Any]]:
-        """Give what may be a formula besides."""
-        for key, values in (("rotation", self.turns), ("moment", self.moments)):
-            yield from ((key, value) for value in values)
 
     def check_dimension(self, key: str, dimension: int) -> None:
         """Raise a fault if a rotation is none of the plane, or of space."""
@@ -131,7 +129,7 @@ class Moving(Section):
                 fits = dimension == 2 or value == NOTHING
             if not fits:
                 accepted = "one angle or moment in the plane, a list of 3 in space"
-                raise fault(f"{key}.{name}", shown(value), accepted)
+                raise fault(f"{key}.{name}", as_given(value), accepted)
 
 
 class Rigid(Moving):
@@ -152,10 +150,3 @@ class Electrode(Section):
     amplitude: AmplitudeName | None = Field(
         default=None, description="Factor of the charge as a function of time, see `[evolution]`."
     )
-
-
-def shown(given: Any) -> Any:
-    """Return a value of the case as a message shows it."""
-    if isinstance(given, tuple):
-        return [shown(value) for value in given]
-    return given.source if isinstance(given, Expression) else given

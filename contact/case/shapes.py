@@ -9,7 +9,8 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from contact.case.formula import Expression
-from contact.case.types import Formula, NonNegative, Section, Text, Vector, fault, one_of
+from contact.case.types import Direction, Formula, NonNegative, Section, Text, Vector, fault
+from contact.case.unions import one_of
 from contact.errors import InputError
 from contact.interface import obstacle
 from contact.interface.obstacle import Obstacle
@@ -20,9 +21,6 @@ from contact.typing import Array
 
 class Shape(Section):
     """A rigid shape. A new one is a section like those below, entered in `Foundation`."""
-
-    #: Keys of vectors that may not be zero.
-    directions: ClassVar[tuple[str, ...]] = ("axis",)
 
     #: The only dimension in which there is the shape, if it is not both.
     only: ClassVar[int | None] = None
@@ -36,8 +34,6 @@ class Shape(Section):
     def _check_vectors(self) -> Shape:
         first = next(iter(self.vectors.items()), None)
         for key, vector in self.vectors.items():
-            if key in self.directions and not any(vector):
-                raise fault(key, vector, "a vector that is not zero")
             if first is not None and len(vector) != len(first[1]):
                 raise fault(key, vector, f"{len(first[1])} numbers, as {first[0]} has")
         return self
@@ -54,12 +50,10 @@ class Shape(Section):
 class Plane(Shape):
     """`foundation = { shape = "plane", ... }`: rigid half space."""
 
-    directions = ("normal",)
-
     made = obstacle.Plane
     shape: Literal["plane"] = Field(description="A plane.")
     point: Vector = Field(description="A point of the plane.")
-    normal: Vector = Field(description="Normal towards the body, of any length.")
+    normal: Direction = Field(description="Normal towards the body, of any length.")
 
 
 class Sphere(Shape):
@@ -78,7 +72,7 @@ class Cylinder(Shape):
     made = obstacle.Cylinder
     shape: Literal["cylinder"] = Field(description="A cylinder; in the plane a strip.")
     point: Vector = Field(description="A point of its axis.")
-    axis: Vector = Field(description="Its axis, of any length.")
+    axis: Direction = Field(description="Its axis, of any length.")
     radius: Positive = Field(description="Radius.")
     inside: Switch = Field(default=False, description="`true`: the body lies in the bore.")
 
@@ -89,7 +83,7 @@ class Cone(Shape):
     made = obstacle.Cone
     shape: Literal["cone"] = Field(description="A cone.")
     apex: Vector = Field(description="Its tip.")
-    axis: Vector = Field(description="From the tip into the cone, of any length.")
+    axis: Direction = Field(description="From the tip into the cone, of any length.")
     half_angle: Annotated[
         float, Field(gt=0, lt=90), Accepted("an angle between 0 and 90 degrees, both excluded")
     ] = Field(description="Between axis and side (degrees).")
@@ -101,7 +95,7 @@ class Paraboloid(Shape):
     made = obstacle.Paraboloid
     shape: Literal["paraboloid"] = Field(description="A paraboloid h = r^2/(2 R).")
     apex: Vector = Field(description="Its tip.")
-    axis: Vector = Field(description="From the tip into the paraboloid, of any length.")
+    axis: Direction = Field(description="From the tip into the paraboloid, of any length.")
     radius: Positive = Field(description="Radius of curvature R at the tip.")
 
 
@@ -111,7 +105,7 @@ class Punch(Shape):
     made = obstacle.Punch
     shape: Literal["punch"] = Field(description="A cylinder with a flat face.")
     centre: Vector = Field(description="Centre of the face.")
-    axis: Vector = Field(description="From the face into the punch, of any length.")
+    axis: Direction = Field(description="From the face into the punch, of any length.")
     radius: Positive = Field(description="Radius of the punch.")
     edge_radius: NonNegative = Field(
         default=0.0, description="Radius by which the edge is rounded; 0: sharp."

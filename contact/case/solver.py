@@ -8,8 +8,10 @@ from typing import TYPE_CHECKING, Annotated, Any, TypeAlias
 
 from pydantic import AfterValidator, BeforeValidator, Discriminator, PlainSerializer
 
+from contact.case.accepted import either
 from contact.case.showing import shown
-from contact.case.types import UNKNOWN, FromTable, either, fault, union_of
+from contact.case.types import UNKNOWN, FromTable, fault
+from contact.case.unions import union_of
 from contact.methods.options import (
     OPTIONS,
     FixedPointOptions,

@@ -5,9 +5,9 @@ import tomllib
 import pytest
 
 from contact.case import reference
+from contact.case.accepted import keys_of, sections_of
 from contact.case.file import Case, parse_case
 from contact.case.text import to_toml
-from contact.case.types import keys_of, sections_of
 from contact.methods.options import OPTIONS, NewtonOptions, with_method
 from tests.problems.bar import changed
 
