@@ -163,6 +163,16 @@ def _set(point: Mapping[str, str]) -> list[str]:
 
 def _begin(folder: Path, names: list[str], text: str) -> dict[tuple[str, ...], dict[str, Any]]:
     """Return the rows that are there already. On one rank."""
+    rows: list[dict[str, Any]] = []
+    if (folder / TABLE).is_file():
+        with (folder / TABLE).open(newline="", encoding="utf-8") as file:
+            rows = list(csv.DictReader(file))
+    swept = list(itertools.takewhile(lambda column: column != "converged", rows[0] if rows else ()))
+    if rows and swept != names:
+        raise InputError(
+            f"--out {folder}: given a sweep over other keys; accepted: one over "
+            f"{', '.join(swept)}, or another folder"
+        )
     before = folder / CASE
     if before.is_file():
         place = difference(*(_without(t, names) for t in (before.read_text("utf-8"), text)))
@@ -173,15 +183,6 @@ def _begin(folder: Path, names: list[str], text: str) -> dict[tuple[str, ...], d
             )
     else:
         before.write_text(text, encoding="utf-8")
-    if not (folder / TABLE).is_file():
-        return {}
-    with (folder / TABLE).open(newline="", encoding="utf-8") as file:
-        rows = list(csv.DictReader(file))
-    if rows and list(rows[0])[: len(names)] != names:
-        raise InputError(
-            f"--out {folder}: given a sweep over other keys; accepted: one over "
-            f"{', '.join(names)}, or another folder"
-        )
     return {tuple(row[name] for name in names): dict(row) for row in rows}
 
 

@@ -66,15 +66,18 @@ def _sizes(problem: ContactProblem) -> list[str]:
     )
     moved = comm.allreduce(float(np.abs(given).max(initial=0.0)), op=MPI.MAX)
     moved = max(moved, float(np.abs(body.motion(start)).max(initial=0.0)))
-    expected = max(total / scales.area / scales.young * scales.size, moved)
+    pressed = total / scales.area / scales.young * scales.size
+    expected = max(pressed, moved)
     gap = problem.nodes.gap
+    gap = np.where(np.abs(gap) < 1e-12 * scales.size, 0.0, gap)  # rounding is no gap
     least = comm.allreduce(float(gap.min(initial=np.inf)), op=MPI.MIN)
     largest = comm.allreduce(float(gap.max(initial=-np.inf)), op=MPI.MAX)
     if expected == 0:
         return ["# warning: nothing is loaded or moved: all results will be 0"]
     lines = [
-        f"# expected: displacements of some {expected:.2g} (loads, over the contact part, on a "
-        f"block of the body's size; prescribed {moved:.2g}); gap {least:.3g} to {largest:.3g}"
+        f"# expected: displacements of some {expected:.2g} (prescribed {moved:.2g}, by the loads "
+        f"{pressed:.2g} if they pressed a block of the body's size); gap {least:.3g} to "
+        f"{largest:.3g}"
     ]
     if expected > LARGE * scales.size:
         lines.append(

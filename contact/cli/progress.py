@@ -71,11 +71,21 @@ def progress(
             handler.close()
 
 
+class _Named(logging.Formatter):
+    """Calls a warning one."""
+
+    def format(self, record: logging.LogRecord) -> str:
+        """Return the line of a record."""
+        text = super().format(record)
+        return f"warning: {text}" if record.levelno >= logging.WARNING else text
+
+
 class _Ranked(logging.Handler):
     """Follows what leads, the highest of the loggers in `RANKS` that has spoken so far."""
 
     def __init__(self, level: int) -> None:
         super().__init__(level)
+        self.setFormatter(_Named())
         self._lead = RANKS.index(OUTER)
         self._last = time.monotonic()
 
@@ -100,13 +110,12 @@ class _Lines(_Ranked):
 
     def __init__(self, quiet: bool) -> None:
         super().__init__(logging.WARNING if quiet else logging.DEBUG)
-        self._stream = logging.StreamHandler(sys.stderr)
 
     def emit(self, record: logging.LogRecord) -> None:
         """Write a line."""
         leads = self._leads(record.name) and record.levelno >= logging.INFO
         if self._silent_for(0.0 if leads else SELDOM) and (leads or record.name in RANKS):
-            self._stream.emit(record)
+            print(self.format(record), file=sys.stderr, flush=True)
 
 
 class _Bar(_Ranked):

@@ -112,6 +112,8 @@ def stop_on_signal(comm: MPI.Intracomm, monitor: Monitor | None) -> Iterator[Sto
         yield stop
     finally:
         for number, handler in before.items():
+            if isinstance(handler, Ending) and stop.caught:
+                handler.deaf_until = since[0] + REPEAT
             signal.signal(number, handler)
 
 
@@ -124,12 +126,17 @@ class Ending:
     caught
         The signals so far. Where the exception is lost, in a library that swallows it, the next
         solve stops for them.
+    deaf_until
+        Until when a signal is an echo of the one that has stopped a solve (monotonic seconds).
     """
 
     caught: list[int] = field(default_factory=list)
+    deaf_until: float = -math.inf
 
     def __call__(self, number: int, frame: FrameType | None) -> None:
         """Note a signal, and raise KeyboardInterrupt or `Terminated`."""
+        if time.monotonic() < self.deaf_until:
+            return
         self.caught.append(number)
         raise Terminated if number == signal.SIGTERM else KeyboardInterrupt
 

@@ -114,13 +114,14 @@ class History:
         self.records.append(record)
         logger.log(
             self.level,
-            "iteration %d: %d solves, residuals %.2e %.2e %.2e %s",
+            "iteration %d: %d linear solve%s; equilibrium %.1e, contact %.1e, friction %.1e%s",
             record.iteration,
             record.inner,
+            "" if record.inner == 1 else "s",
             record.kkt.equilibrium,
             record.kkt.contact,
             record.kkt.friction,
-            record.note,
+            f" ({record.note})" if record.note else "",
         )
         if self.monitor is not None:
             self.monitor(record)

@@ -178,7 +178,7 @@ def resolution(solution: Solution) -> Remark:
     if across >= ACROSS:
         return "", True
     return (
-        f"the contact zone is too coarse to mean anything: {across:.3g} nodes across it; accepted: "
-        f"{ACROSS} at least, for instance elements of at most {width / ACROSS:.2g} there",
+        f"the mesh is too coarse for the pressures: {across:.3g} nodes across the contact zone; "
+        f"accepted: {ACROSS} at least, for instance elements of at most {width / ACROSS:.2g} there",
         False,
     )

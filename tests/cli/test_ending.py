@@ -8,7 +8,9 @@ import time
 from pathlib import Path
 
 import pytest
+from mpi4py import MPI
 
+from contact.methods.interrupt import Interrupted, ending_on_signal, stop_on_signal
 from tests.problems.processes import BAR, RANKS, SMALL, command, environment, processes
 
 BOX = """
@@ -165,3 +167,14 @@ def test_a_signal_ends_a_long_meshing_at_once(number: int, tmp_path: Path) -> No
     process.send_signal(number)
     process.communicate(timeout=10)
     assert process.returncode == -number
+
+
+def test_an_echo_of_a_signal_does_not_keep_results_from_being_written() -> None:
+    """A launcher and its process group both deliver it, the one after the solve has stopped."""
+    with ending_on_signal():
+        with pytest.raises(Interrupted), stop_on_signal(MPI.COMM_SELF, None) as stop:
+            signal.raise_signal(signal.SIGTERM)
+            stop.poll()
+        signal.raise_signal(signal.SIGTERM)
+    with ending_on_signal(), pytest.raises(KeyboardInterrupt):
+        signal.raise_signal(signal.SIGTERM)

@@ -79,7 +79,7 @@ def test_the_bar_is_over_what_leads() -> None:
         tell(steps, 0.75, "t = 1.5 of 2")  # of the next case, whose share is that of the sweep
         assert shown.n == 0.5
         logging.getLogger("contact.solve").warning("several solutions may exist")
-        assert shown.above == ["several solutions may exist"]
+        assert shown.above == ["warning: several solutions may exist"]
     finally:
         logger.setLevel(level)
         logger.removeHandler(bar)

@@ -114,8 +114,8 @@ def test_another_sweep_is_not_overwritten(sweep, capfd):
         capfd.readouterr().err
     )
     assert sweep("--over", "load.0.traction.1=-0.1")[0] == 2
-    err = capfd.readouterr().err
-    assert "given a sweep" in err
+    words = "given a sweep over other keys; accepted: one over friction.mu, or another folder"
+    assert words in capfd.readouterr().err
 
 
 def test_commas_within_lists_and_texts():

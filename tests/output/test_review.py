@@ -71,7 +71,7 @@ def test_what_a_conductivity_gives_up_is_said(law, good, words):
 @pytest.mark.parametrize("kinematics", ["axisymmetric", "plane_strain"])
 def test_contact_that_is_too_coarse_is_warned_of(kinematics):
     """A ball, or half a cylinder, that touches with a node or two; the named size is enough."""
-    words, plate = "too coarse to mean anything", {"point": [0.0, 0.0], "normal": [0.0, 1.0]}
+    words, plate = "too coarse for the pressures", {"point": [0.0, 0.0], "normal": [0.0, 1.0]}
     mesh = {"generator": "quarter_disc", "radius": 10.0, "contact_width": 2.0, "size": 2.0}
     data = {
         "space": {"kinematics": kinematics},

@@ -274,9 +274,12 @@ def test_signals_reach_the_command(launcher, kind):
 
 
 @pytest.mark.parametrize("kind", [signal.SIGTERM, signal.SIGINT])
-@pytest.mark.parametrize("status", [0, 1])
-def test_signals_reach_the_ranks_and_not_their_launcher(launcher, kind, status):
-    """Open MPI's would kill them before they have written anything, and leave with 1."""
+@pytest.mark.parametrize(("status", "times"), [(0, 1), (1, 1), (1, 2)])
+def test_signals_reach_the_ranks_and_not_their_launcher(launcher, kind, status, times):
+    """Open MPI's would kill them before they have written anything, and leave with 1.
+
+    The same signal again at once is an echo, as of ``timeout``, which signals the group too.
+    """
     launcher.fake("python3")
     rank = f"trap 'echo written; exit {status or 128 + kind}' {kind.name[3:]}; echo ready; "
     launcher.fake(
@@ -287,7 +290,8 @@ def test_signals_reach_the_ranks_and_not_their_launcher(launcher, kind, status):
     process = launcher.start("mpirun", "-n", "1")
     assert process.stdout is not None
     assert process.stdout.readline() == "ready\n"
-    process.send_signal(kind)
+    for _ in range(times):
+        process.send_signal(kind)
     out, _ = process.communicate(timeout=30)
     assert (process.returncode, out) == (128 + kind, "written\n")
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Any
 
 import matplotlib
@@ -10,7 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure
 
-from contact.output.figures.contact import BLUE, ORANGE, UNNAMED, ZONES
+from contact.output.figures.contact import BLUE, NARROW, ORANGE, UNNAMED, ZONES
 from contact.output.surface import STATUS
 from contact.output.units import Units
 from contact.output.vtu import VTU
@@ -25,42 +26,107 @@ def draw_surface(
     The arguments are those of `draw_line`.
     """
     view, names = _view(surface)
-    flat = surface.grid.points @ view.T
-    width = float(matplotlib.rcParams["figure.figsize"][0])
-    figure = Figure(figsize=(width, 0.6 * width))
-    # Placed by hand: the automatic layouts leave no room below axes of equal scale.
-    figure.set_layout_engine("none")
     panels = [(surface, "contact pressure")]
     if opposite is not None:
         panels.append((opposite, "on the other side"))
-    wide, step = (0.38, 0.5) if opposite is None else (0.25, 0.31)
-    *lefts, right = (
-        figure.add_axes((0.1 + k * step, 0.34, wide, 0.5)) for k in range(len(panels) + 1)
-    )
+    low, high = _shown(surface, surface.grid.points @ view.T)
+    sheet = _Sheet.of(len(panels) + 1, float((high - low)[1] / (high - low)[0]), bool(title))
+    figure = Figure(figsize=sheet.size)
+    # Placed by hand: the automatic layouts leave no room below axes of equal scale.
+    figure.set_layout_engine("none")
+    *lefts, right = (figure.add_axes(sheet.panel(k)) for k in range(len(panels) + 1))
     highest = float(np.nanmax(surface.at_points["pressure"], initial=0.0))
     for ax, (side, _) in zip(lefts, panels, strict=True):
         shown = _draw_pressure(ax, side, view, highest)
-    bar = figure.add_axes((0.1, 0.15, wide + (len(panels) - 1) * step, 0.03))
     figure.colorbar(
-        shown, cax=bar, orientation="horizontal", label=units.label(r"$-\sigma_\nu$", "stress")
-    )
-    _draw_status(right, surface, view)
-    middle = 0.1 + len(panels) * step + wide / 2
-    figure.legend(
-        ncols=3 if opposite is None else 1, handletextpad=0.2, loc="center",
-        bbox_to_anchor=(middle, 0.165),
+        shown, cax=figure.add_axes(sheet.bar), orientation="horizontal",
+        label=units.label(r"$-\sigma_\nu$", "stress"),
     )  # fmt: skip
+    _draw_status(right, surface, view, 0.1 * float((high - low).max()))
+    columns = 1 if len(panels) > 1 and not sheet.stacked else 3
+    place = {"loc": "upper center", "bbox_to_anchor": sheet.legend}
+    figure.legend(ncols=columns, handletextpad=0.2, **place)
     titles = [*(name for _, name in panels), "status, friction (arrows)"]
     for ax, name in zip((*lefts, right), titles, strict=True):
         ax.set_aspect("equal")
-        ax.margins(0.04)
-        _zoom(ax, surface, flat)
+        ax.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]))
         ax.set_title(name, fontsize="medium")
         ax.set_xlabel(units.label(f"${names[0]}$", "length"))
-    lefts[0].set_ylabel(units.label(f"${names[1]}$", "length"))
+        if sheet.stacked or ax is lefts[0]:
+            ax.set_ylabel(units.label(f"${names[1]}$", "length"))
     if title:
-        figure.suptitle(title, fontsize="large")
+        figure.suptitle(title, fontsize="large", y=sheet.heading)
     return figure
+
+
+@dataclass(frozen=True)
+class _Sheet:
+    """Where the panels go: beside each other, on a narrow figure one below the other.
+
+    Attributes
+    ----------
+    count, stacked
+        Number of panels, and whether they are one below the other.
+    width, em
+        Of the figure and of its letters (inches).
+    wide, tall
+        Of a panel.
+    head
+        Of the title.
+    """
+
+    count: int
+    stacked: bool
+    width: float
+    em: float
+    wide: float
+    tall: float
+    head: float
+
+    @classmethod
+    def of(cls, count: int, aspect: float, titled: bool) -> _Sheet:
+        """Return the sheet for panels of an aspect, as wide as figures are by their settings."""
+        width = float(matplotlib.rcParams["figure.figsize"][0])
+        em = float(matplotlib.rcParams["font.size"]) / 72
+        stacked = width < NARROW
+        wide = (width - em) / (1 if stacked else count) - 4.5 * em
+        tall = wide * float(np.clip(aspect, 0.25, 1.25))
+        return cls(count, stacked, width, em, wide, tall, 3 * em if titled else 0.5 * em)
+
+    @property
+    def size(self) -> tuple[float, float]:
+        """Width and height of the figure (inches)."""
+        rows = self.count if self.stacked else 1
+        foot = (7.5 if self.stacked else 5.5) * self.em
+        return self.width, self.head + rows * (self.tall + 6 * self.em) + foot
+
+    @property
+    def heading(self) -> float:
+        """Where the title begins."""
+        return 1 - 0.8 * self.em / self.size[1]
+
+    @property
+    def bar(self) -> tuple[float, float, float, float]:
+        """Place of the colours, below the panels that they are of."""
+        last = self.panel(0 if self.stacked else self.count - 2)
+        left = 4.5 * self.em / self.width
+        below = (5.5 if self.stacked else 4.0) * self.em / self.size[1]
+        return left, below, last[0] + last[2] - left, 0.7 * self.em / self.size[1]
+
+    @property
+    def legend(self) -> tuple[float, float]:
+        """Place of the middle of the legend's upper edge."""
+        left, _, wide, _ = self.panel(self.count - 1)
+        return left + wide / 2, (2.2 if self.stacked else 5.0) * self.em / self.size[1]
+
+    def panel(self, k: int) -> tuple[float, float, float, float]:
+        """Return the place of a panel, in shares of the figure."""
+        row, column = (k, 0) if self.stacked else (0, k)
+        width, height = self.size
+        left = 4.5 * self.em + column * (self.wide + 4.5 * self.em)
+        top = self.head + 2 * self.em + row * (self.tall + 6 * self.em)
+        bottom = height - top - self.tall
+        return left / width, bottom / height, self.wide / width, self.tall / height
 
 
 def _draw_pressure(ax: Axes, side: VTU, view: Array, highest: float) -> Any:
@@ -75,8 +141,8 @@ def _draw_pressure(ax: Axes, side: VTU, view: Array, highest: float) -> Any:
     return ax.tripcolor(*flat.T, drawn, values, **colours)
 
 
-def _draw_status(ax: Axes, surface: VTU, view: Array) -> None:
-    """Draw what sticks and slips, and friction as arrows."""
+def _draw_status(ax: Axes, surface: VTU, view: Array, reach: float) -> None:
+    """Draw what sticks and slips, and friction as arrows of some length at most."""
     flat = surface.grid.points @ view.T
     ax.add_collection(PolyCollection(list(flat[_triangles(surface)]), facecolor="#F2F2F2", lw=0))
     status = np.asarray(surface.at_points["status"])
@@ -85,7 +151,7 @@ def _draw_status(ax: Axes, surface: VTU, view: Array) -> None:
         chosen = status == STATUS[zone]
         if np.any(chosen):
             ax.scatter(*flat[chosen].T, color=colour, s=size, lw=0, label=ZONES[zone][1])
-    _arrows(ax, surface, flat, view)
+    _arrows(ax, surface, flat, view, reach)
 
 
 def _triangles(surface: VTU) -> Any:
@@ -97,8 +163,8 @@ def _triangles(surface: VTU) -> Any:
     return np.concatenate([cells[:, corners] for corners in quarters])
 
 
-def _arrows(ax: Axes, surface: VTU, flat: Array, view: Array) -> None:
-    """Draw the friction stress, its largest arrow a tenth of the contact part, within the axes."""
+def _arrows(ax: Axes, surface: VTU, flat: Array, view: Array, reach: float) -> None:
+    """Draw the friction stress, its largest arrow of a given length."""
     traction, normal = (np.asarray(surface.at_points[name]) for name in ("traction", "normal"))
     along = traction - np.einsum("ni,ni->n", traction, normal)[:, None] * normal
     friction = np.nan_to_num(along @ view.T)
@@ -107,11 +173,8 @@ def _arrows(ax: Axes, surface: VTU, flat: Array, view: Array) -> None:
     if not acting.size:
         return
     chosen = acting[_thinned(flat[acting], 16)]
-    scale = size[chosen].max() / (0.1 * np.ptp(flat, axis=0).max())
-    ends = flat[chosen] + friction[chosen] / scale
-    exact = {"angles": "xy", "scale_units": "xy", "scale": scale}
+    exact = {"angles": "xy", "scale_units": "xy", "scale": size[chosen].max() / reach}
     ax.quiver(*flat[chosen].T, *friction[chosen].T, color="black", width=0.004, **exact)
-    ax.update_datalim(ends)
 
 
 def _view(surface: VTU) -> tuple[Array, tuple[str, str]]:
@@ -132,15 +195,14 @@ def _view(surface: VTU) -> tuple[Array, tuple[str, str]]:
     return np.array([first, np.cross(mean, first)]), ("x_1", "x_2")
 
 
-def _zoom(ax: Axes, surface: VTU, flat: Array) -> None:
-    """Show what touches and as much around it, where that is a small piece of the whole."""
+def _shown(surface: VTU, flat: Array) -> tuple[Array, Array]:
+    """Return the corners of what is shown: all, or a small piece that touches and its vicinity."""
     touching = flat[np.asarray(surface.at_points["status"]) > STATUS["open"]]
-    whole = np.ptp(flat, axis=0).max()
-    if len(touching) and (size := np.ptp(touching, axis=0).max()) < 0.3 * whole:
-        low, high = touching.min(axis=0), touching.max(axis=0)
-        margin = max(0.4 * size, 0.02 * whole)
-        ax.set_xlim(low[0] - margin, high[0] + margin)
-        ax.set_ylim(low[1] - margin, high[1] + margin)
+    whole = float(np.ptp(flat, axis=0).max())
+    margin = 0.13 * whole  # room for the arrows
+    if len(touching) and (size := float(np.ptp(touching, axis=0).max())) < 0.3 * whole:
+        flat, margin = touching, max(0.4 * size, 0.02 * whole)
+    return flat.min(axis=0) - margin, flat.max(axis=0) + margin
 
 
 def _thinned(flat: Array, count: int) -> Array:

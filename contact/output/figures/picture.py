@@ -167,7 +167,10 @@ def scalar(body: VTU, field: str) -> tuple[Array, bool]:
             return values, in_cells
         if values.ndim > 1 and len(part) == (2 if values.shape[1] == 9 else 1):
             return values[:, int("".join(str("xyz".index(i)) for i in part), 3)], in_cells
-    accepted = [name if np.ndim(v) == 1 else f"{name}[_x..]" for name, v in body.at_points.items()]
+    endings = {1: "", 2: "[_x, ...]", 3: "[_x, ...]", 9: "[_xx, ...]"}
+    accepted = [
+        f"{name}{endings.get(np.size(v) // len(v), '')}" for name, v in body.at_points.items()
+    ]
     raise InputError(f"--field {field}: no such field; accepted: {', '.join(sorted(accepted))}")
 
 

@@ -161,6 +161,7 @@ def draw_space(
     ax: Any = figure.add_axes((0.05, 0.22, 0.9, 0.7), projection="3d")
     faint = {"facecolor": (0.9, 0.9, 0.9, 0.25), "edgecolor": "0.75", "linewidths": 0.15}
     ax.add_collection3d(Poly3DCollection(list(boundary), **faint))
+    seen = [boundary.reshape(-1, 3)]
     for role in roles:
         colour = "0.6" if role.hatched else role.colour
         edge = {"edgecolor": "0.3", "linewidths": 0.2, "alpha": 0.15 if role.hatched else 0.5}
@@ -173,8 +174,10 @@ def draw_space(
             chosen = np.linspace(0, len(centre) - 1, min(ARROWS, len(centre))).astype(int)
             start = (centre - step)[chosen]
             ax.quiver(*start.T, *step[chosen].T, color=LOADED, lw=0.8)
+            seen.append(start)
     ax.plot(*surface.T, ".", ms=2, color=FOUNDATION, label="foundation")
-    low, high = boundary.min(axis=(0, 1)), boundary.max(axis=(0, 1))
+    points = np.concatenate(seen)
+    low, high = points.min(axis=0), points.max(axis=0)
     ax.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), zlim=(low[2], high[2]))
     ax.set_box_aspect(high - low)
     for name in "xyz":
