@@ -122,6 +122,12 @@ class Report:
         (self.out / f"{name}.md").write_text("\n\n".join(parts) + "\n")
 
 
+def append(columns: Mapping[str, list[Any]], *row: Any) -> None:
+    """Append a row to columns of equal lengths."""
+    for column, value in zip(columns.values(), row, strict=True):
+        column.append(value)
+
+
 def pack(path: Path) -> None:
     """Write a PNG file with a palette of its own: a third of the size."""
     with Image.open(path) as picture:

@@ -16,7 +16,7 @@ import numpy as np
 
 from contact import Solution, build_problem
 from contact.methods.options import Options, PenaltyOptions, with_method
-from scripts.reporting import Report, observed_orders, parser
+from scripts.reporting import Report, append, observed_orders, parser
 from scripts.studies.agreement_examples import TOLERANCE, Example, examples
 from scripts.studies.branches import AGREE, DISTURBANCE, Branches
 
@@ -107,7 +107,8 @@ def agreement(report: Report, compared: Sequence[Compared]) -> None:
         newton, uzawa = one.runs["newton"], one.runs["uzawa"]
         apart = one.branches.difference(uzawa, newton)
         dofmap = one.branches.problem.equilibrium.space.dofmap
-        row = (
+        append(
+            columns,
             one.example.label,
             dofmap.index_map.size_global * dofmap.index_map_bs,
             newton.outcome.kkt.largest,
@@ -123,8 +124,6 @@ def agreement(report: Report, compared: Sequence[Compared]) -> None:
             len(one.branches.solutions),
             one.branches.warned(newton),
         )
-        for column, value in zip(columns.values(), row, strict=True):
-            column.append(value)
     report.table(
         "agreement",
         f"Newton's method and block relaxation, both to residuals of {TOLERANCE:g}",
@@ -156,7 +155,8 @@ def limits(report: Report, compared: Sequence[Compared]) -> None:
         near, apart = zip(*map(one.branches.nearest, runs), strict=True)
         u = [float(np.nanmax([each.u, each.phi])) for each in apart]
         p = [each.pressure for each in apart]
-        row = (
+        append(
+            columns,
             one.example.label,
             all(run.converged for run in runs),
             path(near),
@@ -165,8 +165,6 @@ def limits(report: Report, compared: Sequence[Compared]) -> None:
             p[-1],
             last_order(near, p),
         )
-        for column, value in zip(columns.values(), row, strict=True):
-            column.append(value)
     report.table(
         "agreement-penalty",
         "The penalty method as eps -> 0: distance to the solution with multipliers",
@@ -212,7 +210,8 @@ def solutions(report: Report, compared: Sequence[Compared]) -> None:
         # Disturbed starts may lead to further ones; these are not looked at in turn.
         for letter, found in list(branches.solutions.items()):
             others = int(branches.problem.comm.allreduce(np.sum(found.status != first.status)))
-            row = (
+            append(
+                columns,
                 one.example.label,
                 letter,
                 ", ".join(name for name, to in one.letters.items() if to == letter),
@@ -223,8 +222,6 @@ def solutions(report: Report, compared: Sequence[Compared]) -> None:
                 branches.residuals(found).largest,
                 *held(one, found),
             )
-            for column, value in zip(columns.values(), row, strict=True):
-                column.append(value)
     if columns["example"]:
         report.table(
             "agreement-branches",

@@ -14,7 +14,7 @@ from contact.methods.options import FixedPointOptions, Options, PenaltyOptions
 from contact.output.fields import DerivedFields
 from contact.typing import Array
 from scripts.cases import bar
-from scripts.reporting import TWO_COLUMNS, Report, iterates, subplots
+from scripts.reporting import TWO_COLUMNS, Report, append, iterates, subplots
 from scripts.studies.mesh_series import RHO
 
 
@@ -108,7 +108,8 @@ def fixed_points(report: Report, coarse: bool) -> dict[str, float]:
         middle = distances[len(distances) // 3 : max(len(distances) - 3, len(distances) // 3 + 2)]
         rate = float((middle[-1] / middle[0]) ** (1 / max(len(middle) - 1, 1)))
         rates[iteration.label] = rate
-        row = (
+        append(
+            columns,
             iteration.label,
             len(distances) + 1,
             rate,
@@ -116,8 +117,6 @@ def fixed_points(report: Report, coarse: bool) -> dict[str, float]:
             secant_rate(strain),
             residual,
         )
-        for column, value in zip(columns.values(), row, strict=True):
-            column.append(value)
         data[iteration.label] = distances
         ax = axes[0 if iteration.eps is None else 1]
         ax.semilogy(np.arange(1, distances.size + 1), distances, "o-", ms=2, label=iteration.label)

@@ -20,7 +20,7 @@ from contact.typing import Array
 from forms.elasticity import isotropic
 from forms.piezo import hexagonal_voigt
 from scripts.cases import CASES
-from scripts.reporting import Report, options, solved
+from scripts.reporting import Report, append, options, solved
 from scripts.studies import half_space
 from scripts.studies.half_space import HalfSpace, Indentation
 
@@ -223,7 +223,8 @@ def table(report: Report, fineness: float, materials: Sequence[str] = MATERIALS)
                 setting = Setting(material, shape, potential, fineness)
                 found, boxes = extrapolated(setting)
                 kind = "insulating" if potential is None else f"at {potential:g} GV"
-                row = (
+                append(
+                    columns,
                     material,
                     shape,
                     kind,
@@ -234,8 +235,6 @@ def table(report: Report, fineness: float, materials: Sequence[str] = MATERIALS)
                     boxes[-1].force,
                     found.unknowns,
                 )
-                for name, value in zip(names, row, strict=True):
-                    columns[name].append(value)
     note = (
         "Ratios of the computed to the closed form at the computed contact radius (that of the "
         "punch is given), extrapolated from boxes of 30 and 60 contact radii; phi is the potential "

@@ -18,7 +18,7 @@ from contact.methods.fixed_point import FixedPoint
 from contact.methods.options import FixedPointOptions
 from contact.typing import Array
 from scripts.cases import CASES
-from scripts.reporting import TWO_COLUMNS, Report, iterates, options, subplots
+from scripts.reporting import TWO_COLUMNS, Report, append, iterates, options, subplots
 from scripts.studies.product_norm import ProductNorm
 
 #: k_e of the figure.
@@ -105,9 +105,7 @@ def theorem_5_2(report: Report, coarse: bool) -> dict[str, float]:
         for k_e in shown:
             found, converged = errors(name, cells, k_e, lagged, 40)
             rates[f"{how}, {k_e:g}"] = rate_of(found)
-            row = (k_e, how, found.size, converged, rate_of(found))
-            for column, value in zip(columns.values(), row, strict=True):
-                column.append(value)
+            append(columns, k_e, how, found.size, converged, rate_of(found))
             data[f"{how}, k_e = {k_e:g}"] = found
             steps = np.arange(1, found.size + 1)
             ax.semilogy(steps, found, "o-", ms=2, label=f"$k_e = {k_e:g}$")

@@ -22,7 +22,7 @@ from typing import Any
 import numpy as np
 
 from contact.cli.main import main as command_line
-from scripts.reporting import Report, parser
+from scripts.reporting import Report, append, parser
 
 COUNT, COARSE_COUNT, SEED = 9000, 60, 19
 #: Seconds that a run may compute, and last on a busy machine.
@@ -252,8 +252,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
                 (given.out / f"mutation-{number}.toml").write_bytes(file.read_bytes())
                 row = (number, name, wrong, round(seconds, 1), " ".join(said.split())[-160:])
                 print(*row, flush=True)
-                for key, value in zip(columns, row, strict=True):
-                    rows[key].append(value)
+                append(rows, *row)
     print("endings:", dict(sorted(ends.items())))
     Report(given.out).table("mutations", f"Faults among {count} damaged cases", rows)
     return 1 if rows["number"] else 0

@@ -14,7 +14,7 @@ from contact import Solution
 from contact.body.norms import errors
 from contact.output.table import Table, contact_table
 from scripts.cases import bar
-from scripts.reporting import TWO_COLUMNS, Report, options, solved, subplots
+from scripts.reporting import TWO_COLUMNS, Report, append, options, solved, subplots
 
 RHO = 1e4
 LOADS = (-0.005, -0.05)
@@ -65,7 +65,8 @@ def study(report: Report, n: int, load: float) -> dict[str, Solution]:
         status = nodes.gather(solution.status)
         records = uzawa.history.records
         force = solution.contact_force
-        row = (
+        append(
+            columns,
             label,
             len(solution.history.records),
             solution.counters.linear_solves,
@@ -80,8 +81,6 @@ def study(report: Report, n: int, load: float) -> dict[str, Solution]:
             solution.outcome.kkt.largest,
             uzawa.outcome.kkt.largest,
         )
-        for name, value in zip(names, row, strict=True):
-            columns[name].append(value)
         solutions[label], tables[label] = solution, contact_table(solution)
     name = f"nonlocal-{abs(load):g}".replace(".", "_")
     where = f"Example 7.2, f2 = {load:g}, rho = {RHO:g}, {4 * n} x {n} cells"

@@ -23,7 +23,7 @@ from contact.methods.options import with_method
 from contact.output.files import write_outputs
 from contact.output.options import OutputOptions
 from contact.problem.kkt import evaluate
-from scripts.reporting import Report, parser
+from scripts.reporting import Report, append, parser
 from scripts.studies.sweep import problems
 
 COUNT, COARSE_COUNT, SEED = 500, 10, 21
@@ -61,8 +61,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
                 shown = [" ".join(f"{pair[i]:.2e}" for pair in pairs) for i in (0, 1)]
                 row = (case.source, method, limit, True, *shown)
                 print(*row, flush=True)
-                for key, value in zip(columns, row, strict=True):
-                    rows[key].append(value)
+                append(rows, *row)
     print("endings:", dict(sorted(ends.items())))
     Report(given.out).table("random_ends", f"False ends among {count} cases", rows)
     return 1 if rows["case"] else 0

@@ -24,7 +24,7 @@ from typing import Any
 import numpy as np
 
 from contact.output import transaction
-from scripts.reporting import Report, parser
+from scripts.reporting import Report, append, parser
 
 COUNT, COARSE_COUNT, SEED = 120, 8, 23
 CASE = Path(__file__).parents[1] / "cases/bar.toml"
@@ -144,8 +144,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         if wrong:
             row = (number, ranks, kind.name, writing, status, wrong)
             print(*row, flush=True)
-            for key, value in zip(columns, row, strict=True):
-                rows[key].append(value)
+            append(rows, *row)
     for end, times in sorted(ends.items()):
         print(f"{times:4d}  {end}")
     Report(given.out).table("signals", f"Faults after {count} signals", rows)

@@ -18,7 +18,7 @@ from mpi4py import MPI
 from contact import Solution, build_problem, solve_problem
 from contact.case.file import Case, parse_case
 from contact.methods.options import with_method
-from scripts.reporting import Report, parser
+from scripts.reporting import Report, append, parser
 from scripts.studies import hard_problems
 
 METHODS = ("newton", "uzawa")
@@ -242,8 +242,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
                 _difference(solution, first or solution),
             )
             first = first or solution
-            for key, value in zip(rows, row, strict=True):
-                rows[key].append(value)
+            append(rows, *row)
             if MPI.COMM_WORLD.rank == 0 and (
                 not solution.converged or fallback or not row[-1] <= AGREE
             ):
@@ -284,8 +283,7 @@ def summary(rows: dict[str, list[Any]], methods: Sequence[str]) -> dict[str, lis
             values = (name, method, chosen.sum(), converged.sum(), (converged & plain).sum())
             both = np.array(rows["difference"])[chosen & np.array(rows["converged"])]
             values += (int(np.median(solves)), solves.max(), both.max(initial=0.0))
-            for key, value in zip(table, values, strict=True):
-                table[key].append(value)
+            append(table, *values)
     return table
 
 

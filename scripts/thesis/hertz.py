@@ -17,7 +17,7 @@ from contact.meshing import make_domain
 from contact.output.figures.body import draw_plane
 from contact.output.figures.picture import picture
 from contact.output.table import contact_table
-from scripts.reporting import TWO_COLUMNS, Report, options, solved, subplots
+from scripts.reporting import TWO_COLUMNS, Report, append, options, solved, subplots
 from scripts.thesis.hertz_problems import Cylinder, Sphere, cylinder, sphere
 
 
@@ -139,7 +139,8 @@ def cylinders(report: Report, fineness: float) -> Mapping[tuple[object, ...], So
         part = load / 2 if shape == "quarter_disc" else load
         solution, found = run(case, part)
         solutions[load, mu, direction, shape] = solution
-        row = (
+        append(
+            columns,
             shape,
             load,
             mu,
@@ -151,8 +152,6 @@ def cylinders(report: Report, fineness: float) -> Mapping[tuple[object, ...], So
             found.force_error,
             solution.outcome.kkt.largest,
         )
-        for name, value in zip(names, row, strict=True):
-            columns[name].append(value)
     report.table(
         "hertz-cylinder",
         "Cylinder on a plane (Example 7.1): half-width and peak pressure over Hertz's",
@@ -258,7 +257,8 @@ def spheres(report: Report, levels: Sequence[tuple[float, int]]) -> dict[str, li
             "approach": approach(solution) / hertz.axial(hertz.radius),
             "force": found.force_error,
         }
-        row = (
+        append(
+            columns,
             fineness,
             degree,
             space.dofmap.index_map.size_global * space.dofmap.index_map_bs,
@@ -267,8 +267,6 @@ def spheres(report: Report, levels: Sequence[tuple[float, int]]) -> dict[str, li
             len(solution.history.records),
             solution.outcome.kkt.largest,
         )
-        for name, value in zip(names, row, strict=True):
-            columns[name].append(value)
         for key, value in values.items():
             ratios[key].append(value)
     report.table(

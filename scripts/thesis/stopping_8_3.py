@@ -13,7 +13,7 @@ from contact import build_problem
 from contact.body.equilibrium import BodyEquilibrium
 from contact.body.norms import domain_norm
 from contact.problem.state import State
-from scripts.reporting import Report, iterates, options
+from scripts.reporting import Report, append, iterates, options
 from scripts.thesis.tables_compliance import EPS_FP, LAGGED, case_of
 
 #: The thesis's count.
@@ -75,12 +75,15 @@ def main(arguments: Sequence[str] | None = None) -> None:
             body = problem.equilibrium
             # The start is at rest; the iteration after which nothing moves is the last that counts.
             states, outcome = iterates(problem, case.solver)
-            row = (
-                what, rule, THESIS,
-                count(body, states, 1.0), count(body, states, body.phi_scale), outcome.kkt.largest,
-            )  # fmt: skip
-            for key, value in zip(names, row, strict=True):
-                columns[key].append(value)
+            append(
+                columns,
+                what,
+                rule,
+                THESIS,
+                count(body, states, 1.0),
+                count(body, states, body.phi_scale),
+                outcome.kkt.largest,
+            )
     Report(chosen.out).table(
         "stopping-8-3",
         f"Example 8.3: iterations of Algorithm 8 until (6.40) with eps_fp = 1e-5, {cells[0]} x "

@@ -14,7 +14,7 @@ import numpy as np
 
 from contact import Solution, build_problem, solve_problem
 from scripts.cases import bar
-from scripts.reporting import Report, parser
+from scripts.reporting import Report, append, parser
 
 LOADS = (-0.005, -0.05)
 RHO = (1e5, 1e6, 1e7, 6e7)
@@ -212,9 +212,7 @@ def literal(report: Report, n: int, limit: int) -> list[Run]:
         options = (PLAIN, f"solver.r={LITERAL}", f"solver.max_inner={limit}", "solver.max_outer=6")
         one = run(n, load, RHO[0], *STOPPING, *options)
         rule = "6 iterations" if np.isnan(one.change) else "(3.46)"
-        row = (load, RHO[0], one.outer, one.solves, one.residual, one.seconds, rule)
-        for column, value in zip(columns.values(), row, strict=True):
-            column.append(value)
+        append(columns, load, RHO[0], one.outer, one.solves, one.residual, one.seconds, rule)
         found.append(one)
     report.table(
         "table-7-1-literal",

@@ -16,7 +16,7 @@ from contact.case.file import Friction
 from contact.output.solution import Solution
 from contact.problem.problem import ContactProblem
 from scripts.cases import bar
-from scripts.reporting import Report, observed_orders, options, solved, subplots
+from scripts.reporting import Report, append, observed_orders, options, solved, subplots
 from scripts.studies.dual_norm import DualNorm
 
 LOADS = (-0.005, -0.05)
@@ -92,7 +92,7 @@ def table(report: Report, n: int) -> None:
             alone = checked(penalty(problem, n, load, eps, lagged, "solver.max_outer=1000"))
             honest = checked(penalty(problem, n, load, eps))
             error, kkt = distance(reference, honest), honest.outcome.kkt
-            _append(
+            append(
                 counts,
                 load,
                 eps,
@@ -104,7 +104,7 @@ def table(report: Report, n: int) -> None:
                 *_counts(honest),
                 kkt.equilibrium,
             )
-            _append(
+            append(
                 measured,
                 load,
                 eps,
@@ -147,11 +147,6 @@ def checked(solution: Solution) -> Solution:
     if not solution.converged:
         raise InputError(f"penalty: {solution.outcome.reason}")
     return solution
-
-
-def _append(columns: dict[str, list[object]], *row: object) -> None:
-    for column, value in zip(columns.values(), row, strict=True):
-        column.append(value)
 
 
 def _counts(solution: Solution) -> tuple[int, int]:
