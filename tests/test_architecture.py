@@ -19,19 +19,8 @@ LAYERS = (
     {"methods"},
     {"output"},
     {"case"},
-    {
-        "blame",
-        "build",
-        "contacts",
-        "evolving",
-        "given",
-        "materials",
-        "meshing",
-        "moving",
-        "nesting",
-        "solving",
-        "sweeping",
-    },
+    {"build"},
+    {"evolving", "nesting", "solving", "sweeping"},
     {"cli"},
 )
 

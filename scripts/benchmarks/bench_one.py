@@ -169,7 +169,7 @@ def ratio(dimension: str, n: str, start: str) -> dict[str, Any]:
 
 def phases(dimension: str, n: str) -> dict[str, Any]:
     """Measure mesh and forms, assembly, factorisation, one solve, everything, and output."""
-    from contact.meshing import make_domain
+    from contact.build.meshing import make_domain
     from contact.output.files import write_outputs
     from contact.problem.kkt import evaluate, residual_forces
 

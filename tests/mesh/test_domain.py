@@ -7,11 +7,11 @@ from dolfinx import fem
 from dolfinx import mesh as dmesh
 from mpi4py import MPI
 
+from contact.build.meshing import make_domain
 from contact.case.mesh import Mesh as MeshSection
 from contact.errors import InputError
 from contact.mesh.domain import from_mesh
 from contact.mesh.grid import Piece, box, rectangle
-from contact.meshing import make_domain
 from tests.problems.sizes import integral, measures
 
 COMM = MPI.COMM_WORLD

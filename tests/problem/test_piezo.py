@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
+from contact.build.materials import piezo, rotation
 from contact.case.material import Material
 from contact.errors import InputError
 from contact.interface.friction import Friction
-from contact.materials import piezo, rotation
 from contact.methods.fixed_point import FixedPoint
 from contact.methods.newton import Newton
 from contact.methods.options import FixedPointOptions, NewtonOptions
