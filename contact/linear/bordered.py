@@ -4,7 +4,8 @@ With u = u^ + R q the unknowns u^ at contact nodes are distances to what moves, 
 blocks act on them as if nothing moved, and the matrix is [[K, K R], [R^T K, R^T K R]] with blocks
 in its first corner alone. Either way it takes one solve: a factorisation solves for the columns of
 K R together with the right-hand side; for an iterative solver q is eliminated, which takes a matrix
-of rank m from K and leaves its preconditioner as it is.
+of rank m from K and leaves its preconditioner as it is. Where it is asked for a few digits, what
+it leaves is left to the rows of nodes: the balance of what moves is met to rounding.
 
 Right-hand sides and solutions have the values of q, the same on all ranks, behind the owned ones;
 they belong to u and q, not to u^.
@@ -116,6 +117,7 @@ class BorderedOperator:
         self._owned, self._free = bulk.layout.free.size, np.flatnonzero(bulk.free)
         self._responses = np.zeros((self._owned, self._free.size))
         self._inverse = np.zeros((self._free.size, self._free.size))
+        self._gives = np.zeros_like(self._inverse)
 
     @property
     def symmetric(self) -> bool:
@@ -134,7 +136,10 @@ class BorderedOperator:
     def _eliminate(self, blocks: Array) -> None:
         """Eliminate those of q that anything resists, for an iterative solver. Collective."""
         bulk, inner, free = self._bulk, self._inner, self._free
-        held = self._held(blocks)
+        motion, pushed = self._pushed(blocks)
+        held = self._held(pushed)
+        resists = bulk.layout.comm.allreduce(motion.T @ pushed, op=MPI.SUM)
+        self._gives = np.linalg.pinv(resists, rcond=NOTHING)
         stiffness, turned = np.linalg.eigh(held.T @ bulk.corner[np.ix_(free, free)] @ held)
         basis = held @ turned
         self._inverse = basis / stiffness @ basis.T
@@ -148,16 +153,25 @@ class BorderedOperator:
         inner.system = PETSc.Mat().createLRC(inner.matrix, columns, factors, columns)
         inner.ksp.setOperators(inner.system, inner.ksp.getOperators()[1])
 
-    def _held(self, blocks: Array) -> Array:
+    @property
+    def _dofs(self) -> NDArray[np.intp]:
+        """Owned unknowns of the nodes with blocks."""
+        size = self._bulk.layout.block_size
+        return (self._nodes[:, None] * size + np.arange(size)).ravel()
+
+    def _pushed(self, blocks: Array) -> tuple[Array, Array]:
+        """Return R at the nodes with blocks, and the blocks times it, (dofs, free) both."""
+        n, size, free = self._nodes.size, self._bulk.layout.block_size, self._free
+        motion = self._bulk.motions[self._dofs][:, free].toarray()
+        nodal = motion.reshape(n, size, free.size)
+        return motion, np.einsum("nij,njk->nik", blocks, nodal).reshape(-1, free.size)
+
+    def _held(self, pushed: Array) -> Array:
         """Return a basis of the free motions that parts or blocks resist, (free, k). Collective."""
         bulk, free = self._bulk, self._free
-        size = bulk.layout.block_size
-        dofs = (self._nodes[:, None] * size + np.arange(size)).ravel()
-        motion = bulk.motions[dofs][:, free].toarray().reshape(self._nodes.size, size, free.size)
-        pushed = np.einsum("nij,njk->nik", blocks, motion).reshape(-1, free.size)
         gram = bulk.layout.comm.allreduce(pushed.T @ pushed, op=MPI.SUM)
         other = np.ones(self._owned)
-        other[dofs] = 0.0
+        other[self._dofs] = 0.0
         tied = bulk.motions[:, free].multiply(other[:, None]).toarray()
         parts = bulk.layout.comm.allreduce(tied.T @ tied, op=MPI.SUM)
         gram = sum(part / max(np.abs(part).max(initial=0.0), 1e-300) for part in (gram, parts))
@@ -185,7 +199,11 @@ class BorderedOperator:
             relative = first - self._responses @ moved
         q = np.zeros(bulk.free.size)
         q[free] = moved
-        return np.concatenate([relative + bulk.motions @ q, q])
+        solution = np.concatenate([relative + bulk.motions @ q, q])
+        if self._inner.iterative and rtol is not None:  # blocks are stiff then: q hardly moves
+            left = rhs[self._owned :] - self.multiply(solution)[self._owned :]
+            solution[self._owned :][free] += self._gives @ left[free]
+        return solution
 
     def _condense(self, columns: Array) -> None:
         """Find the inverse of the stiffness against q, given the columns' responses. Collective."""
