@@ -49,6 +49,5 @@ def make_operator(
             size = body.layout.block_size
             dofs = nodes[: motion.shape[0], None] * size + np.arange(size)
             motions = masters.with_foundations(dofs, motion)
-        motions = motions if changed is None else changed.relative(motions)
         inner = BorderedOperator(BorderedBulk(bulk, motions, masters.free), nodes, **options)
     return inner if changed is None else ChangedOperator(changed, inner, masters.size)

@@ -193,11 +193,6 @@ class ChangedBulk:
         (matrix.multTranspose if transposed else matrix.mult)(vector, image)
         return np.concatenate([image.array, values[owned:]])
 
-    def relative(self, motions: sparse.csr_array) -> sparse.csr_array:
-        """Return columns of owned values in these unknowns, shape (owned, m). Collective."""
-        columns = [self.times(self.inverse, column) for column in motions.T.toarray()]
-        return sparse.csr_array(np.reshape(columns, (motions.shape[1], -1)).T)
-
     def take_apart(self, matrix: PETSc.Mat) -> PETSc.Mat:
         """Fill a matrix with K as it was assembled last; see `operator.Bulk`. Collective."""
         matrix.zeroEntries()

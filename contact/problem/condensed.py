@@ -22,7 +22,7 @@ from contact.linear.faults import check_overflow, petsc_options
 from contact.linear.operator import Bulk, Counters
 from contact.linear.schur import SchurComplement
 from contact.problem.condensed_masters import CondensedMasters
-from contact.problem.condensed_pairs import CondensedPairs
+from contact.problem.kept_unknowns import KeptUnknowns
 from contact.problem.problem import ContactProblem
 from contact.problem.scales import Scales
 from contact.problem.state import State
@@ -166,11 +166,9 @@ class Condensation:
         self.counters = counters
         self.nodes = full.interface.coupled
         self.turn_to(full)
-        body, change = full.equilibrium, full.interface.change
-        pairs = None if change is None else CondensedPairs(body, full.interface, change)
-        self._pairs = pairs
-        kept = self._kept().size
-        self._masters = CondensedMasters.of(body, full.interface, kept)
+        body = full.equilibrium
+        self._kept = KeptUnknowns(body, full.interface)
+        self._masters = CondensedMasters.of(body, full.interface, self._kept)
         self._bulk: Bulk = body if self._masters is None else self._masters.bulk
         self._matrix = full.equilibrium.create_matrix()
         self._kind = ""
@@ -209,15 +207,13 @@ class Condensation:
             self._bulk.assemble(self._matrix, kind, state.x)
             balance(self._matrix, body.layout)
             if self._schur is None:
-                self._schur = SchurComplement(self._matrix, self._kept(), PREFIX)
+                self._schur = SchurComplement(self._matrix, self._kept.unknowns, PREFIX)
             if self._schur.dense_size > LARGEST:
                 return None
             with petsc_options(PREFIX):
                 self._stiffness = self._schur.factorise(self._matrix)
             if self._masters is not None:
                 self._stiffness = self._masters.eliminate(self._schur, self._stiffness)
-            if self._pairs is not None:
-                self._stiffness = self._pairs.eliminate(self._stiffness)
             self._kind = kind
             self.counters.factorizations += 1
         residual = body.internal_forces(state.x) - body.external(state.time)
@@ -227,14 +223,11 @@ class Condensation:
         # Where the loads go on as before, the prediction of a step is in equilibrium but for that.
         inside = body.layout.mask(-residual[: body.owned])
         forces = -self._schur.condense(inside, ROUNDING * size)
-        begin = self._schur.offset
         if self._masters is not None:
             forces = self._masters.forces(forces, residual)
-        if self._pairs is not None:
-            begin, forces = self._pairs.offset, self._pairs.forces(forces)
         if not (np.isfinite(self._stiffness).all() and np.isfinite(forces).all()):
             return None
-        at = self._at(state.x)
+        at, begin = self._at(state.x), self._kept.offset
         condensed = CondensedBody(
             body.comm,
             body.dim,
@@ -258,12 +251,6 @@ class Condensation:
         others = body.nodal(x)[self.nodes[jump.nodes.size :]]
         return np.concatenate([jump.apply(x), others]).ravel()
 
-    def _kept(self) -> NDArray[np.int32]:
-        bs, nodes = self.full.equilibrium.block_size, self.nodes
-        if self._pairs is not None:
-            nodes = np.concatenate([nodes, self._pairs.nodes])
-        return (nodes[:, None] * bs + np.arange(bs, dtype=np.int32)).ravel()
-
     def expand(self, condensed: CondensedProblem, x: Array) -> Array:
         """Return the increment of the full problem's owned unknowns. Collective.
 
@@ -278,8 +265,6 @@ class Condensation:
         self.counters.linear_solves += 1
         moved = x - condensed.equilibrium.at
         everywhere = np.concatenate(self.full.comm.allgather(moved))
-        if self._pairs is not None:
-            everywhere = self._pairs.expand(everywhere)
         masters, schur = self._masters, self._schur
         return masters.expand(schur, everywhere) if masters else schur.expand(everywhere)
 

@@ -48,8 +48,6 @@ def condensation(problem: ContactProblem, counters: Counters, kind: str) -> Cond
     layout = problem.equilibrium.layout
     large = kind == "auto" and layout.dim == 3 and layout.unknowns > DIRECT
     many = problem.nodes.size * layout.block_size > LARGEST
-    # Other bodies and global unknowns are not eliminated together.
-    both = problem.interface.change is not None and problem.equilibrium.masters.size > 0
-    if chosen or kind == "iterative" or large or many or both:
+    if chosen or kind == "iterative" or large or many:
         return None
     return Condensation(problem, counters)

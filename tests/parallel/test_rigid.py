@@ -44,6 +44,8 @@ def test_plates_and_electrodes_move_alike(make, condense):
     alike(make(), NewtonOptions(tolerance=1e-11, condense=condense), 1e-8)
 
 
-def test_a_ball_in_space_moves_alike():
-    case = indented(3, 3, displacement=[0.0, 0.0, "free"], force=[0.0, 0.0, -0.02])
-    alike(case, NewtonOptions(tolerance=1e-10, condense=False), 1e-7)
+@pytest.mark.parametrize(("degree", "condense"), [(1, False), (2, True), (2, False)])
+def test_a_ball_in_space_moves_alike(degree, condense):
+    ball = indented(3, 3, displacement=[0.0, 0.0, "free"], force=[0.0, 0.0, -0.02])
+    case = ball.model_copy(update={"space": ball.space.model_copy(update={"degree": degree})})
+    alike(case, NewtonOptions(tolerance=1e-10, condense=condense), 1e-7)
