@@ -17,7 +17,7 @@ Geometry: `from_msh` reads a Gmsh file, `Domain.from_mesh` takes dolfinx's mesh 
 Body: `Body`, `Material`, `Fixed`, `Load`; `Linear`, `Log`, `UserLaw`, `Piezo`; `Rigid` with its
 `Motion`, and `Electrode`.
 Contact: `Contact` with a gap, or a `Plane`, `Sphere`, `Cylinder`, `Cone`, `Paraboloid`, `Punch`,
-`Level`, `Triangles`; `Layer`; `Friction`, `SlipCoefficient`, `Coulomb`;
+`Level`, `Triangles`, a `Shape` of your own; `Layer`; `Friction`, `SlipCoefficient`, `Coulomb`;
 `Conductor` with `ShiftedConductivity`, `RampConductivity`, `PerfectConductivity`.
 Solving: `Problem`, `solve`, `evolve`; `NewtonOptions`, `FixedPointOptions`, `PenaltyOptions`.
 Case files: `Case`, `load_case`, `parse_case`, `build_problem`.
@@ -54,6 +54,7 @@ if TYPE_CHECKING:
         Paraboloid,
         Plane,
         Punch,
+        Shape,
         Sphere,
         Triangles,
     )
@@ -87,7 +88,7 @@ _HOMES = {
     "contact.interface.friction": "Friction",
     "contact.interface.layer": "Layer",
     "contact.interface.obstacle": "Cone Cylinder GapFunction Level Paraboloid Plane Punch "
-    "Sphere Triangles",
+    "Shape Sphere Triangles",
     "contact.mesh.domain": "Domain",
     "contact.mesh.reader": "from_msh",
     "contact.methods.options": "FixedPointOptions NewtonOptions PenaltyOptions",
@@ -136,6 +137,7 @@ __all__ = [
     "Punch",
     "RampConductivity",
     "Rigid",
+    "Shape",
     "ShiftedConductivity",
     "SlipCoefficient",
     "Solution",

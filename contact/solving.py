@@ -70,6 +70,11 @@ def solve(
         be ignored.
     """
     begin = time.perf_counter()
+    if not isinstance(settings, Options | None):
+        raise InputError(
+            f"given {settings!r} for a method; accepted: NewtonOptions(), FixedPointOptions(), "
+            "PenaltyOptions()"
+        )
     if isinstance(case, ContactProblem):
         given = {"folder": folder, "restart": restart, **replacements}
         _refuse(given, "a problem that is built already")

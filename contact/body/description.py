@@ -145,6 +145,8 @@ class Body:
     ----------
     law
         Law of the stress.
+    fixed, loads
+        Supports and loads, one or several.
     piezo
         Piezoelectric tensors in the body's axes, or None.
     regions
@@ -161,6 +163,12 @@ class Body:
     regions: tuple[Material, ...] = ()
     rigid: tuple[Rigid, ...] = ()
     electrodes: tuple[Electrode, ...] = ()
+
+    def __post_init__(self) -> None:
+        """Accept one support or one load without a list."""
+        for name, kind in (("fixed", Fixed), ("loads", Load)):
+            if isinstance(getattr(self, name), kind):
+                object.__setattr__(self, name, (getattr(self, name),))
 
     @staticmethod
     def piecewise(
@@ -195,7 +203,7 @@ class Body:
         return float(np.sqrt(self.law.shear / permittivity))
 
     def check(self, dim: int) -> None:
-        """Refuse tensors that are none of a material, or none of a plane body.
+        """Refuse constants that are none of a material, or none of a plane body.
 
         Raises
         ------
@@ -203,6 +211,12 @@ class Body:
             If they are not.
         """
         for material in self.materials:
+            young, poisson = float(material.law.young), float(material.law.poisson)
+            if not ((young > 0 and -1 < poisson < 0.5) or isinstance(material.law, Anisotropic)):
+                raise InputError(
+                    f"material: given Young's modulus {young:g} and Poisson's ratio {poisson:g}; "
+                    "accepted: a modulus > 0, a ratio between -1 and 0.5, both excluded"
+                )
             for name, tensors in (("", material.law), ("piezoelectric ", material.piezo)):
                 if not isinstance(tensors, Anisotropic | Piezo):
                     continue

@@ -207,7 +207,7 @@ def _check_vectors(case: Case, dimension: int) -> None:
     for path, contact in case.contacts:
         only = None if contact.foundation is None else contact.foundation.only
         if only is not None and only != dimension:
-            words = Words(f"in {dimension}-D")
+            words = Words(f'given "{contact.foundation.shape}" in {dimension}-D')
             raise fault(f"{path}.foundation.shape", words, f"this shape in {only}-D only")
     if dimension == 3 and case.space.kinematics == "axisymmetric":
         accepted = '"plane_strain" with a mesh in space, where it has no effect'

@@ -61,7 +61,9 @@ class Evolution(Section):
 
     times: Increasing = Field(description="Ends of the stages; the body is at rest at the first.")
     steps: Annotated[
-        tuple[Count, ...], as_tuple, Accepted("a list of whole numbers from 1, one for each stage")
+        tuple[Count, ...],
+        as_tuple,
+        Accepted("a list of whole numbers from 1 to 10000000, one for each stage"),
     ] = Field(description="Number of equal steps in each stage.")
     amplitudes: dict[Text, Amplitude] = Field(
         default={},

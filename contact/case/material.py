@@ -237,7 +237,8 @@ class Material(Section):
             entry = self.entry
         except InputError as error:
             key = "library" if self.library is not None and str(error)[0] == "/" else "name"
-            raise fault(key, self.name, str(error)) from None
+            words, _, accepted = str(error).partition("; accepted: ")
+            raise fault(key, Words(words), accepted) from None
         own = ("law", *ISOTROPIC, "stiffness", *SHORT, "yield_strain", "piezo")
         for key in own:
             if getattr(self, key) is not None:

@@ -68,6 +68,11 @@ class Domain:
     notes: tuple[str, ...] = ()
     revolved: bool = False
 
+    def __repr__(self) -> str:
+        """Return what can be named, not the facets of each part."""
+        names = f"parts {', '.join(self.parts) or 'none'}; regions {', '.join(self.regions)}"
+        return f"<Domain: {self.mesh.topology.index_map(self.dim).size_global} cells; {names}>"
+
     @staticmethod
     def from_mesh(
         mesh: dmesh.Mesh,

@@ -132,6 +132,10 @@ class ContactProblem:
     ) -> None:
         self.domain, self.body = domain, body
         given = [contact] if isinstance(contact, Contact) else contact
+        if not all(isinstance(contact, Contact) for contact in given):
+            raise InputError(
+                f"given {contact!r} for a contact; accepted: Contact(part), or several"
+            )
         self.contacts = tuple(
             replace(
                 contact,

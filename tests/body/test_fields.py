@@ -10,7 +10,19 @@ from dolfinx import fem
 from dolfinx import mesh as dmesh
 from mpi4py import MPI
 
-from contact import Body, Contact, Domain, Fixed, Friction, InputError, Linear, Load, Problem, solve
+from contact import (
+    Body,
+    Contact,
+    Domain,
+    Fixed,
+    Friction,
+    InputError,
+    Linear,
+    Load,
+    Problem,
+    Sphere,
+    solve,
+)
 from contact.body.fields import field, vector
 
 pytestmark = pytest.mark.parallel
@@ -99,6 +111,14 @@ def test_vectors() -> None:
     assert vector(["free", None]) == (None, None)
 
 
+def made(law: Linear, contact: Any = None) -> Problem:
+    """Return a problem whose one support is no list."""
+    mesh, tags = square()
+    domain = Domain.from_mesh(mesh, tags, {"bottom": 3, "top": 7})
+    assert repr(domain) == "<Domain: 64 cells; parts bottom, top; regions body>"
+    return Problem(domain, Body(law, Fixed("top", [0.0, -0.01])), contact or Contact("bottom"))
+
+
 @pytest.mark.parametrize(
     ("make", "words"),
     [
@@ -108,9 +128,13 @@ def test_vectors() -> None:
         (lambda: Load("top", pressure=True), "accepted: a number, a function of x"),
         (lambda: Friction(0.3), r"accepted: Friction\(mu=0.3\)"),
         (lambda: field(ufl.Identity(2)), "UFL of shape"),
+        (lambda: Sphere((0.0, -1.0), -1.0), "accepted: a radius > 0"),
+        (lambda: made(Linear(10.0, 0.6)), "Poisson's ratio 0.6; accepted"),
+        (lambda: made(Linear(10.0, 0.3), "bottom"), r"accepted: Contact\(part"),
+        (lambda: solve(made(Linear(10.0, 0.3)), "newton"), r"accepted: NewtonOptions\(\)"),
     ],
 )
-def test_what_is_no_field(make: Callable[[], object], words: str) -> None:
+def test_what_is_none(make: Callable[[], object], words: str) -> None:
     with pytest.raises(InputError, match=words):
         make()
 

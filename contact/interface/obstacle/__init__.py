@@ -10,7 +10,7 @@ from contact.interface.obstacle.gap import GapFunction
 from contact.interface.obstacle.level import Level
 from contact.interface.obstacle.paraboloid import Paraboloid
 from contact.interface.obstacle.plane import Plane
-from contact.interface.obstacle.protocol import Obstacle
+from contact.interface.obstacle.protocol import Obstacle, Shape
 from contact.interface.obstacle.punch import Punch
 from contact.interface.obstacle.sphere import Sphere
 from contact.interface.obstacle.triangles import Triangles
@@ -24,6 +24,7 @@ __all__ = [
     "Paraboloid",
     "Plane",
     "Punch",
+    "Shape",
     "Sphere",
     "Triangles",
 ]

@@ -9,6 +9,7 @@ from typing import Protocol
 
 import numpy as np
 
+from contact.errors import InputError
 from contact.typing import Array
 
 #: Cosine of the steepest angle at which a ray still leads to a surface.
@@ -72,6 +73,11 @@ class Shape(ABC):
     along: tuple[float, ...] = ()
 
     is_shape = True
+
+    def __post_init__(self) -> None:
+        """Refuse a radius that is none."""
+        if not getattr(self, "radius", 1.0) > 0:
+            raise InputError(f"{self!r}: accepted: a radius > 0")
 
     @abstractmethod
     def distance(self, points: Array) -> tuple[Array, Array]:

@@ -89,6 +89,8 @@ def picture(solution: Solved, field: str, label: str) -> Picture | None:
     problem = solution.problem
     names = ("displacement", field, field.rpartition("_")[0])
     share = body_share(problem, solution.state, names)
+    if not share.at_points.keys() & names[1:] and field != "displacement":
+        share = body_share(problem, solution.state)  # for the message, which lists what there is
     body, held = gathered(problem.comm, share), held_points(problem)
     return None if body is None else drawn(body, held, field, label)
 
