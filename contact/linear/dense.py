@@ -1,7 +1,8 @@
 """A dense operator at kept nodes, the same on all ranks, plus a small block at each node.
 
-From one step of a contact problem to the next few nodes change what they do. The factors are kept
-until many have, and corrected for those few: Sherman, Morrison and Woodbury.
+The first rank factorises it, and solves for all: factors are as large as the operator. From one
+step of a contact problem to the next few nodes change what they do. The factors are kept until many
+have, and corrected for those few: Sherman, Morrison and Woodbury.
 """
 
 from __future__ import annotations
@@ -14,6 +15,7 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 from scipy.linalg.lapack import dgetrf, dgetrs
 
+from contact.linear.first_rank import from_first
 from contact.linear.operator import Counters
 from contact.typing import Array
 
@@ -68,7 +70,7 @@ class DenseBulk(Protocol):
 
     @property
     def factors(self) -> Factors:
-        """Its factors, where some have been made."""
+        """Its factors, where some have been made: on the first rank alone."""
 
     @property
     def own(self) -> slice:
@@ -95,20 +97,23 @@ class DenseOperator:
     def update(self, kind: str, x: Array, blocks: Array, *, constant: bool = False) -> bool:
         """Add up and factorise. Collective; see `operator.SparseOperator.update`."""
         bulk, free = self.bulk, self.bulk.free.astype(float)
-        factors = bulk.factors
         self._blocks = _gather(bulk, blocks * free[:, :, None] * free[:, None, :])
+        if bulk.comm.rank == 0:
+            self._factorise()
+        self.counters.factorizations += 1
+        return True
+
+    def _factorise(self) -> None:
+        """Factorise, or correct the factors that there are."""
+        factors, stiffness = self.bulk.factors, self.bulk.stiffness
         if factors.lower_upper is not None:
             change = self._blocks - factors.blocks
             differs = change != 0
             self._changed = np.flatnonzero((differs.any(axis=2) | differs.any(axis=1)).ravel())
-        few = (
-            factors.lower_upper is not None and self._changed.size <= FEW * bulk.stiffness.shape[0]
-        )
+        few = factors.lower_upper is not None and self._changed.size <= FEW * stiffness.shape[0]
         if not few or (self._changed.size > 0 and not self._correct(change)):
-            factors.make(bulk.stiffness, self._blocks)
+            factors.make(stiffness, self._blocks)
             self._changed = np.zeros(0, dtype=np.int64)
-        self.counters.factorizations += 1
-        return True
 
     def _correct(self, change: Array) -> bool:
         """Correct the factors for blocks that differ by a change, at the unknowns that it meets.
@@ -132,10 +137,13 @@ class DenseOperator:
         """Solve for the owned unknowns. Collective; see `operator.SparseOperator.solve`."""
         total = _gather(self.bulk, np.where(self.bulk.free.ravel(), rhs, 0.0))
         self.counters.linear_solves += 1
-        solution = self._solve(total)
+        return from_first(self.bulk.comm, lambda: self._refined(total), total.size)[self.bulk.own]
+
+    def _refined(self, rhs: Array) -> Array:
+        solution = self._solve(rhs)
         if self._changed.size > 0:  # stiff blocks that were taken away have left their rounding
-            solution += self._solve(total - self._times(solution))
-        return solution[self.bulk.own]
+            solution += self._solve(rhs - self._times(solution))
+        return solution
 
     def _solve(self, rhs: Array) -> Array:
         solution = self.bulk.factors.solve(rhs)

@@ -1,13 +1,12 @@
 """The body seen from a few of its nodes: a dense Schur complement by static substructuring.
 
 Each rank eliminates the nodes that are coupled to its own and to kept ones only, by a sparse
-factorisation; what is left is dense, small, and the same on all ranks. In the plane the kept
-nodes are so few that the dense matrix has about as many entries as the mesh has nodes.
+factorisation; what is left between the ranks is eliminated by the first one, and what is left then
+is dense, small, and the same on all ranks. In the plane the kept nodes are so few that the dense
+matrix has about as many entries as the mesh has nodes.
 """
 
 from __future__ import annotations
-
-import ctypes
 
 import numpy as np
 from mpi4py import MPI
@@ -15,53 +14,9 @@ from numpy.typing import NDArray
 from petsc4py import PETSc
 from scipy.linalg import lu_factor, lu_solve
 
+from contact.linear.first_rank import from_first
+from contact.linear.partial import PartialFactorisation
 from contact.typing import Array
-
-#: MUMPS's ICNTL(26): 0 solves with the eliminated unknowns, the kept ones being 0.
-INTERIOR_SOLVE = (26, 0)
-
-#: MUMPS's INFOG(1) where its workspace was too small: that of integers, and that of numbers.
-TOO_SMALL = (-8, -9)
-
-#: MUMPS's ICNTL(14): by how many percent its workspace exceeds the estimate, at most.
-MOST_WORKSPACE = 50_000
-
-# petsc4py has no Schur complements of factorisations.
-_petsc = ctypes.CDLL(PETSc.__file__)
-
-
-def _check(code: int) -> None:
-    if code != 0:
-        raise PETSc.Error(code)
-
-
-def _set_kept(factor: PETSc.Mat, kept: PETSc.IS) -> None:
-    _check(_petsc.MatFactorSetSchurIS(ctypes.c_void_p(factor.handle), ctypes.c_void_p(kept.handle)))
-
-
-def _complement(factor: PETSc.Mat, size: int) -> Array:
-    """Return a copy of the Schur complement that a factorisation holds."""
-    if size == 0:
-        return np.zeros((0, 0))
-    handle, values = ctypes.c_void_p(), ctypes.c_void_p()
-    _check(
-        _petsc.MatFactorCreateSchurComplement(
-            ctypes.c_void_p(factor.handle), ctypes.byref(handle), None
-        )
-    )
-    _check(_petsc.MatDenseGetArrayRead(handle, ctypes.byref(values)))
-    pointer = ctypes.cast(values, ctypes.POINTER(ctypes.c_double))
-    # PETSc stores it by columns.
-    matrix = np.ctypeslib.as_array(pointer, (size, size)).T.copy()
-    _check(_petsc.MatDenseRestoreArrayRead(handle, ctypes.byref(values)))
-    _check(_petsc.MatDestroy(ctypes.byref(handle)))
-    return matrix
-
-
-def _dense(matrix: PETSc.Mat) -> Array:
-    """Return a small local matrix as an array."""
-    dense = matrix.convert("dense", out=PETSc.Mat())
-    return np.array(dense.getDenseArray(), order="C")
 
 
 def _ordered(matrix: PETSc.Mat, inside: NDArray[np.int64]) -> NDArray[np.int64]:
@@ -121,11 +76,15 @@ class SchurComplement:
         # Those left that this rank's eliminated ones know of: its own share is no larger.
         met = np.isin(left, columns[inside[rows]]) if self.comm.size > 1 else left >= 0
         self._met, border = np.flatnonzero(met), left[met]
-        self._left = PETSc.IS().createGeneral(left, PETSc.COMM_SELF)
+        #: Those that each rank's eliminated ones know of, on the first rank.
+        self._mets = self.comm.gather(self._met)
+        # The first rank adds up, and needs what is left; the others what they take off.
+        self._left = np.arange(left.size) if self._mets else self._met
+        self._left_set = PETSc.IS().createGeneral(left[self._left], PETSc.COMM_SELF)
         local = np.concatenate([eliminated, border])
         self._local = PETSc.IS().createGeneral(local, PETSc.COMM_SELF)
-        self._eliminated, self._prefix, self._failed = eliminated.size, prefix, False
-        self._factor: PETSc.PC | None = None
+        self._eliminated = eliminated.size
+        self._inner = PartialFactorisation(eliminated.size, prefix)
         self._part: PETSc.Mat | None = None
 
     @property
@@ -143,9 +102,16 @@ class SchurComplement:
             self._part.setOption(PETSc.Mat.Option.SYMMETRIC, True)
         else:
             matrix.createSubMatrices([self._local], [self._local], submats=[self._part])
-        total = self._eliminate(self._part)
-        if self.comm.size > 1:
-            total = self._assembled(matrix, total)
+        total = self._inner.factorise(self._part)
+        if self.comm.size == 1:
+            return total
+        added = self._added(matrix, total)
+        del total
+        k = self.size
+        return from_first(self.comm, lambda: self._without_between(added), k, k)
+
+    def _without_between(self, total: Array) -> Array:
+        """Eliminate the unknowns between the ranks from what is left, on the first one."""
         k = self.size
         if self._between == 0:
             return total
@@ -154,86 +120,36 @@ class SchurComplement:
         through = self._coupling @ self._solve_between(total[k:, :k])
         return np.subtract(total[:k, :k], through, out=through)
 
-    def _eliminate(self, part: PETSc.Mat) -> Array:
-        """Eliminate the first unknowns of the local matrix; return what is left."""
-        if self._eliminated == 0:
-            return _dense(part)
-        factor = self._factorised(part)
-        factor.setMumpsIcntl(*INTERIOR_SOLVE)
-        left = _complement(factor, self._met.size)
-        self._failed = factor.getMumpsInfog(1) < 0
-        return np.full_like(left, np.nan) if self._failed else left
+    def _added(self, matrix: PETSc.Mat, own: Array) -> Array:
+        """Add up what the ranks have eliminated, and what they have left, on the first one.
 
-    def _factorised(self, part: PETSc.Mat) -> PETSc.Mat:
-        """Factorise the local matrix with as much workspace as it takes.
-
-        MUMPS's estimate is far too low where few unknowns are eliminated and many kept.
+        The others have nothing of it. Collective.
         """
-        if self._factor is None:
-            self._factor = self._analysed(part)
-        workspace = 10
-        while True:
-            self._factor.setOperators(part)
-            self._factor.setUp()
-            factor = self._factor.getFactorMatrix()
-            workspace = 4 * max(workspace, factor.getMumpsIcntl(14))
-            if factor.getMumpsInfog(1) not in TOO_SMALL or workspace > MOST_WORKSPACE:
-                return factor
-            # PETSc does not factorise again with one that has failed for want of memory.
-            self._factor = self._analysed(part)
-            self._factor.getFactorMatrix().setMumpsIcntl(14, workspace)
-
-    def _analysed(self, part: PETSc.Mat) -> PETSc.PC:
-        """Return a factorisation that keeps the last unknowns of a local matrix."""
-        pc = PETSc.PC().create(PETSc.COMM_SELF)
-        pc.setOptionsPrefix(self._prefix)
-        pc.setOperators(part)
-        pc.setType("cholesky")
-        pc.setFactorSolverType("mumps")
-        pc.setFromOptions()
-        pc.setFactorSetUpSolverType()
-        end = self._eliminated + self._met.size
-        kept = np.arange(self._eliminated, end, dtype=PETSc.IntType)
-        if kept.size > 0:
-            _set_kept(pc.getFactorMatrix(), PETSc.IS().createGeneral(kept, PETSc.COMM_SELF))
-        return pc
-
-    def _assembled(self, matrix: PETSc.Mat, own: Array) -> Array:
-        """Add up what the ranks have eliminated, and what they have left."""
-        (left,) = matrix.createSubMatrices([self._left], [self._left])
+        (left,) = matrix.createSubMatrices([self._left_set], [self._left_set])
         starts, columns, values = left.getValuesCSR()
-        rows = np.repeat(np.arange(self.dense_size), np.diff(starts))
+        rows = np.repeat(self._left, np.diff(starts))
+        columns = self._left[columns]
+        # Each rank has the matrix of what its eliminated ones know of in its share.
+        place = np.full(self.dense_size, -1)
+        place[self._met] = np.arange(self._met.size)
+        row, column = place[rows], place[columns]
+        both = (row >= 0) & (column >= 0)
+        own[row[both], column[both]] -= values[both]
+        if self._mets is None:
+            self.comm.Send(own, 0)
+            return own[:0]
         total = np.zeros((self.dense_size, self.dense_size))
-        total[np.ix_(self._met, self._met)] = own
-        both = np.isin(rows, self._met) & np.isin(columns, self._met)
-        total[rows[both], columns[both]] -= values[both]
-        if self._failed:
-            total[:] = np.nan
-        self.comm.Allreduce(MPI.IN_PLACE, total, op=MPI.SUM)
-        total[rows, columns] += values
+        total[rows, columns] = values
+        total[np.ix_(self._met, self._met)] += own
+        for rank, met in enumerate(self._mets[1:], 1):
+            share = np.empty((met.size, met.size))
+            self.comm.Recv(share, rank)
+            total[np.ix_(met, met)] += share
         return total
-
-    def _solve_inside(self, values: Array) -> Array:
-        """Solve with the eliminated unknowns alone, the others being 0."""
-        if self._eliminated == 0:
-            return values
-        assert self._factor is not None and self._part is not None
-        solution, rhs = self._part.createVecs()
-        rhs.array[: self._eliminated] = values
-        self._factor.getFactorMatrix().solve(rhs, solution)
-        return solution.array[: self._eliminated].copy()
 
     def _solve_between(self, values: Array) -> Array:
         """Solve with the unknowns between the ranks; what is no number remains none."""
         return np.asarray(lu_solve(self._lu, values, check_finite=False))
-
-    def _times(self, inside: Array, left: Array) -> Array:
-        """Return the local part of the matrix times values of its unknowns."""
-        assert self._part is not None
-        vector, image = self._part.createVecs()
-        vector.array[:] = np.concatenate([inside, left])
-        self._part.mult(vector, image)
-        return image.array
 
     def condense(self, rhs: Array, rounding: float = 0.0) -> Array:
         """Return what an owned right-hand side becomes on the kept unknowns, on all ranks.
@@ -252,23 +168,31 @@ class SchurComplement:
         total = np.zeros(self.dense_size)
         total[self._rows] = rhs[np.concatenate([self._kept, self._shared])]
         if np.abs(rhs[self._inside]).max(initial=0.0) > rounding:
-            inside = self._solve_inside(rhs[self._inside])
+            inside = self._inner.solve(rhs[self._inside])
             met = np.zeros(self._met.size)
-            total[self._met] -= self._times(inside, met)[self._eliminated :]
+            total[self._met] -= self._inner.times(inside, met)[self._eliminated :]
         self.comm.Allreduce(MPI.IN_PLACE, total, op=MPI.SUM)
         if self._between == 0:
             return total
-        self._rhs_between = total[self.size :]
-        return total[: self.size] - self._coupling @ self._solve_between(self._rhs_between)
+        kept, self._rhs_between = np.split(total, [self.size])
+        return from_first(
+            self.comm,
+            lambda: kept - self._coupling @ self._solve_between(self._rhs_between),
+            self.size,
+        )
 
     def expand(self, kept: Array) -> Array:
         """Return the owned solution that goes with values of the kept unknowns on all ranks."""
         left = kept
         if self._between > 0:
-            between = self._solve_between(self._rhs_between - self._coupling.T @ kept)
+            between = from_first(
+                self.comm,
+                lambda: self._solve_between(self._rhs_between - self._coupling.T @ kept),
+                self._between,
+            )
             left = np.concatenate([kept, between])
-        coupled = self._times(np.zeros(self._eliminated), left[self._met])[: self._eliminated]
+        coupled = self._inner.times(np.zeros(self._eliminated), left[self._met])[: self._eliminated]
         solution = np.zeros(self._rhs.size)
-        solution[self._inside] = self._solve_inside(self._rhs[self._inside] - coupled)
+        solution[self._inside] = self._inner.solve(self._rhs[self._inside] - coupled)
         solution[np.concatenate([self._kept, self._shared])] = left[self._rows]
         return solution

@@ -50,7 +50,7 @@ class CondensedBody:
     stiffness
         The Schur complement, on all ranks.
     factors
-        Its factors, where some have been made.
+        Its factors, where some have been made: on the first rank alone.
     residual
         Condensed internal forces minus loads where the body was linearised, all ranks.
     at, own

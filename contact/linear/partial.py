@@ -1,0 +1,137 @@
+"""A sparse factorisation that stops before the last unknowns: MUMPS's Schur complement."""
+
+from __future__ import annotations
+
+import ctypes
+
+import numpy as np
+from petsc4py import PETSc
+
+from contact.typing import Array
+
+#: MUMPS's ICNTL(26): 0 solves with the eliminated unknowns, the kept ones being 0.
+INTERIOR_SOLVE = (26, 0)
+
+#: MUMPS's INFOG(1) where its workspace was too small: that of integers, and that of numbers.
+TOO_SMALL = (-8, -9)
+
+#: MUMPS's ICNTL(14): by how many percent its workspace exceeds the estimate, at most.
+MOST_WORKSPACE = 50_000
+
+# petsc4py has no Schur complements of factorisations.
+_petsc = ctypes.CDLL(PETSc.__file__)
+
+
+def _check(code: int) -> None:
+    if code != 0:
+        raise PETSc.Error(code)
+
+
+def _set_kept(factor: PETSc.Mat, kept: PETSc.IS) -> None:
+    _check(_petsc.MatFactorSetSchurIS(ctypes.c_void_p(factor.handle), ctypes.c_void_p(kept.handle)))
+
+
+def _complement(factor: PETSc.Mat, size: int) -> Array:
+    """Return a copy of the Schur complement that a factorisation holds."""
+    if size == 0:
+        return np.zeros((0, 0))
+    handle, values = ctypes.c_void_p(), ctypes.c_void_p()
+    _check(
+        _petsc.MatFactorCreateSchurComplement(
+            ctypes.c_void_p(factor.handle), ctypes.byref(handle), None
+        )
+    )
+    _check(_petsc.MatDenseGetArrayRead(handle, ctypes.byref(values)))
+    pointer = ctypes.cast(values, ctypes.POINTER(ctypes.c_double))
+    # PETSc stores it by columns.
+    matrix = np.ctypeslib.as_array(pointer, (size, size)).T.copy()
+    _check(_petsc.MatDenseRestoreArrayRead(handle, ctypes.byref(values)))
+    _check(_petsc.MatDestroy(ctypes.byref(handle)))
+    return matrix
+
+
+def _dense(matrix: PETSc.Mat) -> Array:
+    """Return a small local matrix as an array."""
+    dense = matrix.convert("dense", out=PETSc.Mat())
+    return np.array(dense.getDenseArray(), order="C")
+
+
+class PartialFactorisation:
+    """The first unknowns of a symmetric matrix of this rank, eliminated.
+
+    Parameters
+    ----------
+    first
+        How many they are.
+    prefix
+        Prefix of PETSc options of the factorisation.
+    """
+
+    def __init__(self, first: int, prefix: str) -> None:
+        self._first, self._prefix = first, prefix
+        self._factor: PETSc.PC | None = None
+        self._matrix: PETSc.Mat | None = None
+
+    def factorise(self, matrix: PETSc.Mat) -> Array:
+        """Eliminate them; return the Schur complement, which is no number if they are singular.
+
+        The matrix is kept; another one has the same pattern.
+        """
+        self._matrix = matrix
+        if self._first == 0:
+            return _dense(matrix)
+        factor = self._factorised(matrix)
+        factor.setMumpsIcntl(*INTERIOR_SOLVE)
+        left = _complement(factor, matrix.getSize()[0] - self._first)
+        return np.full_like(left, np.nan) if factor.getMumpsInfog(1) < 0 else left
+
+    def _factorised(self, matrix: PETSc.Mat) -> PETSc.Mat:
+        """Factorise the local matrix with as much workspace as it takes.
+
+        MUMPS's estimate is far too low where few unknowns are eliminated and many kept.
+        """
+        if self._factor is None:
+            self._factor = self._analysed(matrix)
+        workspace = 10
+        while True:
+            self._factor.setOperators(matrix)
+            self._factor.setUp()
+            factor = self._factor.getFactorMatrix()
+            workspace = 4 * max(workspace, factor.getMumpsIcntl(14))
+            if factor.getMumpsInfog(1) not in TOO_SMALL or workspace > MOST_WORKSPACE:
+                return factor
+            # PETSc does not factorise again with one that has failed for want of memory.
+            self._factor = self._analysed(matrix)
+            self._factor.getFactorMatrix().setMumpsIcntl(14, workspace)
+
+    def _analysed(self, matrix: PETSc.Mat) -> PETSc.PC:
+        """Return a factorisation that keeps the last unknowns of a local matrix."""
+        pc = PETSc.PC().create(PETSc.COMM_SELF)
+        pc.setOptionsPrefix(self._prefix)
+        pc.setOperators(matrix)
+        pc.setType("cholesky")
+        pc.setFactorSolverType("mumps")
+        pc.setFromOptions()
+        pc.setFactorSetUpSolverType()
+        kept = np.arange(self._first, matrix.getSize()[0], dtype=PETSc.IntType)
+        if kept.size > 0:
+            _set_kept(pc.getFactorMatrix(), PETSc.IS().createGeneral(kept, PETSc.COMM_SELF))
+        return pc
+
+    def solve(self, values: Array) -> Array:
+        """Solve with the first unknowns alone, the others being 0."""
+        if self._first == 0:
+            return values
+        assert self._factor is not None and self._matrix is not None
+        solution, rhs = self._matrix.createVecs()
+        rhs.array[: self._first] = values
+        self._factor.getFactorMatrix().solve(rhs, solution)
+        return solution.array[: self._first].copy()
+
+    def times(self, first: Array, last: Array) -> Array:
+        """Return the matrix times values of its unknowns."""
+        assert self._matrix is not None
+        vector, image = self._matrix.createVecs()
+        vector.array[:] = np.concatenate([first, last])
+        self._matrix.mult(vector, image)
+        return np.asarray(image.array)
