@@ -2,12 +2,10 @@
 
 Start it as `python3 -m scripts.benchmarks.bench_one` with one of::
 
-    CASE.toml [key=value ...]      a case file of scripts/cases
     bar N MU                       Example 7.2, linear material, constant mu
     hertz DISC.msh MU              Example 7.1 on a mesh file, constant mu
     block N MU                     a block in space, linear material, constant mu
-    ratio DIM N cold|nested        a nonlinear solve and one linear solve
-    phases DIM N                   seconds by phase
+    ratio DIM N [cold]             a nonlinear solve and one linear solve; cold: on that mesh alone
 """
 
 from __future__ import annotations
@@ -15,10 +13,8 @@ from __future__ import annotations
 import json
 import resource
 import sys
-import tempfile
 import time
 from collections.abc import Callable, Mapping
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -28,7 +24,7 @@ from contact import Case, build_problem, load_case, solve_problem
 from contact.case.file import parse_case
 from contact.case.mesh import Mesh
 from contact.linear.operator import SparseOperator
-from contact.nesting import nested_start
+from contact.nesting import nested_start, pays
 from contact.output.solution import Solution
 from contact.problem.problem import ContactProblem
 from scripts.cases import CASES, bar
@@ -81,7 +77,7 @@ def described(solution: Solution) -> dict[str, Any]:
     u = solution.state.x.reshape(-1, body.block_size)[:, : body.dim]
     largest = float(np.linalg.norm(u, axis=1).max(initial=0.0))
     return {
-        "dofs": unknowns(solution.problem),
+        "unknowns": unknowns(solution.problem),
         "converged": solution.converged,
         "outer": len(solution.history.records),
         "solves": solution.counters.linear_solves,
@@ -96,15 +92,6 @@ def described(solution: Solution) -> dict[str, Any]:
 def warm(case: Case, coarse: Callable[[], Case]) -> None:
     """Compile the forms of a case on a small mesh."""
     solve_problem(build_problem(coarse()), case.solver)
-
-
-def from_file(name: str, *changes: str) -> dict[str, Any]:
-    """Measure a case file."""
-    case = load_case(CASES / name, changes)
-    warm(case, lambda: case)
-    problem = build_problem(case)
-    start = nested_start(case, problem) if getattr(case.solver, "nested", False) else None
-    return described(solve_problem(problem, case.solver, start=start))
 
 
 def bar_with_constant_friction(n: str, mu: str) -> dict[str, Any]:
@@ -141,72 +128,35 @@ def one_linear_solve(problem: ContactProblem) -> tuple[float, int]:
     return time.process_time() - begin, operator.counters.linear_iterations
 
 
-def ratio(dimension: str, n: str, start: str) -> dict[str, Any]:
+def solved(case: Case, problem: ContactProblem, start: str) -> Solution:
+    """Solve from zero: on the finest mesh alone if the start is cold, else as the program does."""
+    begun = nested_start(case, problem) if start != "cold" and pays(case, problem) else None
+    return solve_problem(problem, case.solver, start=begun)
+
+
+def ratio(dimension: str, n: str, start: str = "") -> dict[str, Any]:
     """Measure a nonlinear solve in units of one linear solve on the same mesh, in CPU seconds."""
     case = problem_case(int(dimension), int(n))
     warm(case, lambda: problem_case(int(dimension), 4))
     problem = build_problem(case)
     linear, iterations = one_linear_solve(problem)
     begin, computing = time.perf_counter(), time.process_time()
-    nested = nested_start(case, problem) if start == "nested" else None
-    result = described(solve_problem(problem, case.solver, start=nested))
+    result = described(solved(case, problem, start))
     computed = time.process_time() - computing
     return {
-        "dofs": result["dofs"],
+        "unknowns": result["unknowns"],
         "converged": result["converged"],
         "solves": result["solves"],
         "set-ups": result["factorizations"],
-        "contact_solves": result["contact_solves"],
-        "linear_iterations": result["linear_iterations"] / result["solves"],
-        "one_iterations": iterations,
-        "solve": time.perf_counter() - begin,
+        "contact solves": result["contact_solves"],
+        "iterations a solve": result["linear_iterations"] / result["solves"],
+        "of one solve": iterations,
+        "seconds": time.perf_counter() - begin,
         "CPU seconds": computed,
         "one": linear,
         "ratio": computed / linear,
-        "bytes_per_dof": memory() / result["dofs"],
+        "bytes an unknown": memory() / result["unknowns"],
     }
-
-
-def phases(dimension: str, n: str) -> dict[str, Any]:
-    """Measure mesh and forms, assembly, factorisation, one solve, everything, and output."""
-    from contact.build.meshing import make_domain
-    from contact.output.files import write_outputs
-    from contact.problem.kkt import evaluate, residual_forces
-
-    case = problem_case(int(dimension), int(n))
-    warm(case, lambda: problem_case(int(dimension), 4))
-    clock = {"dofs": 0.0}
-    last = time.perf_counter()
-
-    def lap(name: str) -> None:
-        nonlocal last
-        COMM.Barrier()
-        now = time.perf_counter()
-        clock[name] = now - last
-        last = now
-
-    domain = make_domain(case.mesh, COMM)
-    lap("mesh")
-    problem = build_problem(case, domain=domain)
-    state = problem.start()
-    lap("forms and contact nodes")
-    residual = residual_forces(problem, state)
-    lap("residual")
-    body, nodes = problem.equilibrium, problem.nodes.nodes
-    operator = SparseOperator(body, nodes)
-    operator.update("secant", state.x, np.zeros((nodes.size, body.block_size, body.block_size)))
-    lap("assembly and factorisation")
-    operator.solve(-residual, 1e-8)
-    lap("one solve")
-    evaluate(problem, state)
-    lap("KKT residuals")
-    solution = solve_problem(problem, case.solver)
-    lap("all Newton steps")
-    with tempfile.TemporaryDirectory() as folder:
-        write_outputs(solution, Path(COMM.bcast(folder)) / "out")
-        lap("output")
-    clock["dofs"] = body.space.dofmap.index_map.size_global * body.block_size
-    return {**clock, "solve": clock["all Newton steps"], "steps": solution.counters.linear_solves}
 
 
 MEASUREMENTS = {
@@ -214,7 +164,6 @@ MEASUREMENTS = {
     "hertz": hertz_with_constant_friction,
     "block": block_with_constant_friction,
     "ratio": ratio,
-    "phases": phases,
 }
 
 
@@ -223,8 +172,8 @@ def main() -> None:
     import logging
 
     logging.getLogger("contact").setLevel(logging.ERROR)
-    first, *rest = sys.argv[1:]
-    result = MEASUREMENTS[first](*rest) if first in MEASUREMENTS else from_file(first, *rest)
+    name, *rest = sys.argv[1:]
+    result = MEASUREMENTS[name](*rest)
     if COMM.rank == 0:
         print(json.dumps(result))
 

@@ -1,21 +1,19 @@
 """Two boxes on each other in space beside one box of the same size: iterations and time.
 
-``python3 -m scripts.benchmarks.pair_space [SIZE]``: SIZE is that of the elements, 0.06 for some
-50 000 unknowns, 0.028 for 500 000. Both are pressed and pushed, with friction below, and solved by
-Newton's method with multigrid, one after the other; seconds are those of the processor.
+``python3 -m scripts.benchmarks.pair_space [--out DIR] [--coarse] [--size SIZE]``: SIZE is that of
+the elements, 0.06 for some 50 000 unknowns, 0.028 for 500 000. Both are pressed and pushed, with
+friction below, and solved by Newton's method with multigrid, one after the other; seconds are those
+of the processor.
 """
 
 from __future__ import annotations
 
-import sys
 import time
+from collections.abc import Sequence
 from typing import Any
 
-import petsc4py
-
-petsc4py.init(sys.argv)
-
-from contact import build_problem, parse_case, solve_problem  # noqa: E402
+from contact import build_problem, parse_case, solve_problem
+from scripts.reporting import Report, parser
 
 FRICTION = {"law": "coulomb", "mu": 0.3}
 TRACTION = [0.001, 0.0, -0.01]
@@ -54,22 +52,35 @@ def two(size: float) -> dict[str, Any]:
     }
 
 
-def main(arguments: list[str]) -> None:
-    """Solve both, and print what they took."""
-    size = float(arguments[0]) if arguments else 0.06
-    for name, given in (("one", one(size)), ("two", two(size))):
-        case = parse_case(given)
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Solve both, and write what they took."""
+    made = parser(__doc__, "pair_space")
+    made.add_argument("--size", type=float, default=0.06)
+    given = made.parse_args(arguments)
+    size, rows = 0.15 if given.coarse else given.size, []
+    for name, data in (("one", one(size)), ("two", two(size))):
+        case = parse_case(data)
         problem = build_problem(case)
         begin = time.process_time()
         solution = solve_problem(problem, case.solver)
         seconds, counters = time.process_time() - begin, solution.counters
-        print(
-            f"{name}: {problem.equilibrium.layout.free.size} unknowns, converged "
-            f"{solution.converged}, {counters.linear_solves} solves, "
-            f"{counters.linear_iterations} iterations, {seconds:.3g} s",
-            flush=True,
+        rows.append(
+            {
+                "bodies": name,
+                "unknowns": problem.equilibrium.layout.unknowns,
+                "converged": solution.converged,
+                "solves": counters.linear_solves,
+                "iterations": counters.linear_iterations,
+                "seconds": seconds,
+            }
         )
+    Report(given.out).table(
+        "pair-space",
+        "Two boxes in space that are pressed and pushed, beside one of the same size",
+        {key: [row[key] for row in rows] for key in rows[0]},
+        "Friction, linear materials, meshes that do not match. Seconds of the processor.",
+    )
 
 
 if __name__ == "__main__":
-    main(sys.argv[1:])
+    main()

@@ -1,31 +1,37 @@
 """Where the time of a nonlinear solve goes, beside one linear solve on the same mesh.
 
-``python3 -m scripts.benchmarks.phases DIM N [cold|nested]``: seconds of this process by phase, with
-how often each has been gone through. Nothing but what the profiler sees is measured: a phase is a
-function of the program.
+``python3 -m scripts.benchmarks.phases DIM N [cold]``: seconds of this process by phase, with how
+often each has been gone through; cold: without coarser meshes. Nothing but what the profiler sees
+is measured: a phase is a function of the program. The last line is the same as JSON.
 """
 
 from __future__ import annotations
 
 import cProfile
+import json
 import pstats
 import sys
 import time
 from collections.abc import Callable
 from typing import Any, TypeVar
 
-from contact.build import build_problem
-from contact.nesting import nested_start
-from contact.output.solution import Solution
-from contact.solving import solve_problem
-from scripts.benchmarks.bench_one import one_linear_solve, problem_case, unknowns, warm
+from contact import build_problem
+from scripts.benchmarks.bench_one import (
+    one_linear_solve,
+    problem_case,
+    solved,
+    unknowns,
+    warm,
+)
 
 #: Phase -> the end of the file's name, and the function; none of them calls another one.
 PHASES = {
     "assembly of matrices": ("body/equilibrium.py", "assemble"),
     "set-up of multigrid, factorisation": ("~", "<method 'setUp' of 'petsc4py.PETSc.KSP' objects>"),
+    "Schur complement, factorisation": ("linear/schur.py", "factorise"),
     "contact in multigrid": ("linear/stiff_nodes.py", "follow"),
     "iterations, solves": ("~", "<method 'solve' of 'petsc4py.PETSc.KSP' objects>"),
+    "solves with the factors": ("~", "<method 'solve' of 'petsc4py.PETSc.Mat' objects>"),
     "residual forces": ("body/equilibrium.py", "_forces"),
     "contact laws": ("interface/linearised.py", "linearise"),
     "dense solves at contact nodes": ("methods/newton.py", "_solve_condensed"),
@@ -48,18 +54,14 @@ def profiled(action: Callable[[], Result]) -> tuple[Result, float, dict[str, tup
     return result, stats.total_tt, found
 
 
-def measure(dimension: int, n: int, start: str) -> dict[str, Any]:
+def measure(dimension: int, n: int, start: str = "") -> dict[str, Any]:
     """Measure a nonlinear solve and one linear solve."""
     case = problem_case(dimension, n)
     warm(case, lambda: problem_case(dimension, 4))
     problem = build_problem(case)
 
-    def nonlinear() -> Solution:
-        begun = nested_start(case, problem) if start == "nested" else None
-        return solve_problem(problem, case.solver, start=begun)
-
     _, one, linear = profiled(lambda: one_linear_solve(problem))
-    solution, whole, newton = profiled(nonlinear)
+    solution, whole, newton = profiled(lambda: solved(case, problem, start))
     nothing = (0, 0.0)
     return {
         "unknowns": unknowns(problem),
@@ -76,13 +78,14 @@ def measure(dimension: int, n: int, start: str) -> dict[str, Any]:
 def main() -> None:
     """Print the table."""
     dimension, n, *start = sys.argv[1:]
-    found = measure(int(dimension), int(n), start[0] if start else "nested")
+    found = measure(int(dimension), int(n), *start)
     print({key: found[key] for key in ("unknowns", "converged", "steps", "iterations", "set-ups")})
     print(f"{'':36} {'linear':>14} {'nonlinear':>14}")
     for phase, (count, seconds, times, longer) in found["phases"].items():
         print(f"{phase:36} {count:5d} {seconds:8.2f} {times:5d} {longer:8.2f}")
     print(f"{'all':36} {found['linear']:14.2f} {found['whole']:14.2f}")
     print(f"{'in linear solves':36} {1:14} {found['whole'] / found['linear']:14.2f}")
+    print(json.dumps(found))
 
 
 if __name__ == "__main__":

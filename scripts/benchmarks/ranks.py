@@ -15,7 +15,7 @@ from typing import Any
 from mpi4py import MPI
 from petsc4py import PETSc
 
-from contact.build import build_problem
+from contact import build_problem
 from contact.solving import solve_problem
 from scripts.benchmarks.bench_one import block, problem_case, unknowns, warm
 

@@ -1,0 +1,177 @@
+"""Beside plain dolfinx 0.9: `NonlinearProblem`, `NewtonSolver`, and a penalty for contact.
+
+python3 -m scripts.benchmarks.peer_plain [--out DIR] [--coarse]
+
+Example 7.2 with Hencky's law and a constant coefficient of friction, on one mesh for both. Contact
+is kappa <-u_nu>_+, friction Coulomb's law with u_tau/|u_tau| made smooth, the load is applied in
+steps where Newton's method does not converge otherwise; the forms are derived by
+UFL, and MUMPS solves. What the penalty changes is measured against the solution of this code on the
+same mesh, whose contact conditions hold to its tolerance.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import ufl
+from dolfinx import fem
+from dolfinx.fem.petsc import NonlinearProblem
+from dolfinx.nls.petsc import NewtonSolver
+from mpi4py import MPI
+
+from contact import Solution, build_problem, solve_problem
+from contact.problem.problem import ContactProblem
+from forms.hencky import Log, stress
+from forms.kinematics import embed, strain
+from scripts.cases import bar
+from scripts.reporting import Report, parser
+
+MU, LOAD = 0.5, -0.05
+
+#: Slip at which friction has 70 % of its bound, a 25th of the largest one (length).
+SMOOTH = 1e-4
+
+#: The smallest part of the load that is applied in a step.
+SMALLEST = 2.0**-8
+
+#: Newton's steps after which a load step has failed.
+MOST_STEPS = 60
+
+#: Of each step of Newton's method: whole ones fail with loads of a hundredth too.
+DAMPING = 0.5
+
+#: Penalties, in Young's modulus over the height of the bar.
+PENALTIES = 1e1, 1e2, 1e3, 1e4
+
+
+class Plain:
+    """The bar with a penalty, as a user of dolfinx writes it.
+
+    Parameters
+    ----------
+    problem
+        Our problem: its mesh, parts and function space are taken, so that values can be compared.
+    kappa
+        Contact pressure over penetration (stress/length).
+    """
+
+    def __init__(self, problem: ContactProblem, kappa: float) -> None:
+        domain, space = problem.domain, problem.equilibrium.space
+        self.u = u = fem.Function(space)
+        v = ufl.TestFunction(space)
+        self.load = fem.Constant(domain.mesh, 0.0)
+        pressure = kappa * ufl.max_value(-u[1], 0.0)
+        friction = MU * pressure * u[0] / ufl.sqrt(u[0] ** 2 + SMOOTH**2)
+        form = ufl.inner(stress(Log(1.0, 0.3, yield_strain=0.05), strain(u)), embed(strain(v)))
+        # The stress is constant in each cell.
+        residual = form * ufl.dx(metadata={"quadrature_degree": 1})
+        residual -= self.load * v[1] * domain.ds("loaded")
+        residual += (friction * v[0] - pressure * v[1]) * domain.ds("bottom")
+        dofs = fem.locate_dofs_geometrical(space, lambda x: x[0] < 1e-9)
+        held = fem.dirichletbc(np.zeros(2), dofs, space)
+        self._problem = NonlinearProblem(residual, u, [held])
+
+    def solve(self) -> tuple[int, int]:
+        """Solve; return load steps and Newton's steps, with those of steps that failed.
+
+        Raises
+        ------
+        RuntimeError
+            If not even the smallest load steps converge.
+        """
+        reached, part, load_steps, taken = 0.0, 1.0, 0, 0
+        while reached < 1.0:
+            before = self.u.x.array.copy()
+            self.load.value = LOAD * (reached + part)
+            load_steps += 1
+            found = self._newton()
+            taken += MOST_STEPS if found is None else found
+            if found is not None:
+                reached += part
+                continue
+            self.u.x.array[:], part = before, part / 2
+            if part < SMALLEST:
+                raise RuntimeError("Newton's method does not converge")
+        return load_steps, taken
+
+    def _newton(self) -> int | None:
+        """Return the steps of a solve with this load; None if it fails."""
+        # MUMPS does not go on once it has met numbers that are none.
+        solver = NewtonSolver(MPI.COMM_WORLD, self._problem)
+        solver.rtol, solver.atol, solver.max_it = 1e-8, 1e-14, MOST_STEPS
+        solver.relaxation_parameter = DAMPING
+        krylov = solver.krylov_solver
+        krylov.setType("preonly")
+        krylov.getPC().setType("lu")
+        krylov.getPC().setFactorSolverType("mumps")
+        try:
+            return int(solver.solve(self.u)[0])
+        except RuntimeError:
+            return None
+
+
+def compare(ours: Solution, seconds: float, kappa: float) -> dict[str, Any]:
+    """Solve with a penalty; return what it takes, and how far it is from our solution."""
+    problem = ours.problem
+    plain = Plain(problem, kappa)
+    begin = time.process_time()
+    try:
+        load_steps, steps = plain.solve()
+    except RuntimeError:
+        plain.u.x.array[:], load_steps, steps = np.nan, 0, 0
+    taken = time.process_time() - begin
+    nodal = problem.nodes.apply(plain.u.x.array)
+    depth = np.maximum(-nodal[:, 1], 0.0)
+    weight = problem.nodes.weight
+
+    def norm(values: np.ndarray) -> float:
+        return float(np.sqrt(np.sum(weight * values**2)))
+
+    largest = np.abs(ours.state.x).max()
+    moved = np.abs(plain.u.x.array - ours.state.x).max()
+    force = np.sum(weight * kappa * depth)
+    return {
+        "kappa H/E": kappa,
+        "load steps": load_steps,
+        "Newton's steps": steps,
+        "seconds": taken,
+        "ours": seconds,
+        "ratio": taken / seconds,
+        "penetration / max |u|": depth.max() / largest,
+        "displacement": moved / largest,
+        "contact force": abs(force / np.sum(weight * ours.pressure) - 1),
+        "pressure": norm(kappa * depth - ours.pressure) / norm(ours.pressure),
+    }
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Write the table."""
+    given = parser(__doc__, "peer_plain").parse_args(arguments)
+    rows = []
+    for n in (8,) if given.coarse else (32, 64):
+        case = bar(n, LOAD, 1.0, f"friction.mu={MU}")
+        problem = build_problem(case)
+        solve_problem(problem, case.solver)  # its forms are compiled
+        Plain(problem, 1.0)
+        begin = time.process_time()
+        ours = solve_problem(problem, case.solver)
+        seconds = time.process_time() - begin
+        for kappa in PENALTIES[1:3] if given.coarse else PENALTIES:
+            rows.append({"cells a unit": n, **compare(ours, seconds, kappa)})
+    Report(given.out).table(
+        "peer-plain",
+        "Plain dolfinx with a penalty beside this code, on the same meshes",
+        {name: [row[name] for row in rows] for name in rows[0]},
+        "Seconds of the processor for the nonlinear solve, forms compiled, one thread. Penetration "
+        "and displacements over the largest displacement; the contact force and, in L2 of the "
+        "contact boundary, the pressure, relative. Ours meets equilibrium, contact and friction to "
+        "1e-8. Newton's steps are halved there, for whole ones diverge even with small parts of "
+        "the load; those of load steps that fail count, 60 each.",
+    )
+
+
+if __name__ == "__main__":
+    main()
