@@ -9,6 +9,7 @@ from dolfinx import mesh as dmesh
 from mpi4py import MPI
 
 from contact.case.text import literal
+from contact.interface.facing import facing_parts
 from contact.mesh.domain import Domain
 
 
@@ -57,7 +58,7 @@ displacement = {pressed}
 on = {literal(lowest)}
 foundation = {{ shape = "plane", point = {ground}, normal = {_along(d, 1.0)} }}
 # gap = 0.0                   # instead: to a foundation along the part's normal; a formula, too
-
+{_pairs(domain)}
 [friction]
 law = "coulomb"
 mu = 0.2
@@ -66,6 +67,25 @@ mu = 0.2
 method = "newton"
 tolerance = 1e-8
 """
+
+
+def _pairs(domain: Domain) -> str:
+    """Return contacts between bodies to choose from, as comments. Collective."""
+    pairs = facing_parts(domain)
+    if not pairs:
+        return ""
+    text = "".join(
+        f"""#
+# [[contact]]
+# on = {literal(on)}
+# against = {literal(against)}
+"""
+        for on, against in pairs
+    )
+    return f"""
+# Bodies of this mesh that can touch each other: these instead, and hold the lowest part, too.
+# Friction and current can be given for each; `on` is the finer side here, or take the softer body.
+{text}"""
 
 
 def _along(dim: int, value: float) -> str:

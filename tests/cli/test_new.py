@@ -8,6 +8,7 @@ import pytest
 from contact.case.file import load_case
 from contact.cli.expected import mean_ratio
 from contact.cli.main import BAD_INPUT, CONVERGED, main
+from meshes import write
 
 FIXTURES = Path(__file__).parents[2] / "meshes" / "fixtures"
 
@@ -52,6 +53,25 @@ def test_a_case_to_begin_with(dim: int, tmp_path: Path, capsys: pytest.CaptureFi
     assert main(["new", str(mesh)]) == BAD_INPUT
     assert "is there already; accepted: another name" in capsys.readouterr().err
     assert path.read_text() == text
+
+
+def test_contacts_between_bodies_are_offered(tmp_path: Path) -> None:
+    """Without the signs of a comment they make a case that can be checked."""
+    mesh = tmp_path / "ball.msh"
+    write("ball_between_plates", mesh, size=0.4, contact_size=0.1)
+    assert main(["new", str(mesh)]) == CONVERGED
+    lines = mesh.with_suffix(".toml").read_text().splitlines()
+    own = lines.index("# [[contact]]")
+    offered = [line.removeprefix("#").strip() for line in lines[own : lines.index("[friction]")]]
+    begin = lines.index("[contact]                     # the part that lies lowest")
+    lines[begin : lines.index("[friction]")] = offered
+    lines += ["[[fixed]]", 'on = "lower_bottom"', "displacement = [0.0, 0.0]"]
+    mesh.with_suffix(".toml").write_text("\n".join(lines))
+    contacts = load_case(mesh.with_suffix(".toml")).contact
+    sides = {frozenset((contact.on, contact.against)) for contact in contacts}
+    expected = [("ball_bottom", "lower_top"), ("ball_top", "upper_bottom")]
+    assert sides == {frozenset(pair) for pair in expected}
+    assert main(["check", str(mesh.with_suffix(".toml"))]) == CONVERGED
 
 
 @pytest.mark.parametrize("name", ["nothing.msh", "bad/no-groups.msh"])
