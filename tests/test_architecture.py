@@ -19,6 +19,7 @@ LAYERS = (
     {"methods"},
     {"output"},
     {"case"},
+    {"building"},
     {"build"},
     {"evolving", "nesting", "solving", "sweeping"},
     {"cli"},

@@ -13,7 +13,7 @@ from mpi4py import MPI
 
 from contact import Solution, build_problem
 from contact.body.norms import errors
-from contact.build.meshing import make_domain
+from contact.building.meshing import make_domain
 from contact.mesh.transfer import carry
 from contact.methods.report import Outcome
 from contact.typing import Array

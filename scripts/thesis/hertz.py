@@ -13,7 +13,7 @@ from mpi4py import MPI
 
 from contact import Case, Solution, build_problem
 from contact.body.norms import volume
-from contact.build.meshing import make_domain
+from contact.building.meshing import make_domain
 from contact.output.figures.body import draw_plane
 from contact.output.figures.picture import picture
 from contact.output.table import contact_table

@@ -6,7 +6,7 @@ import time
 import pytest
 from mpi4py import MPI
 
-from contact import meshing
+from contact.building import meshing
 from contact.case.file import parse_case
 from contact.case.showing import LIST, clipped, listed, path_of, shown
 from contact.cli.main import main

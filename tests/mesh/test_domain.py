@@ -7,7 +7,7 @@ from dolfinx import fem
 from dolfinx import mesh as dmesh
 from mpi4py import MPI
 
-from contact.build.meshing import make_domain
+from contact.building.meshing import make_domain
 from contact.case.mesh import Mesh as MeshSection
 from contact.errors import InputError
 from contact.mesh.domain import from_mesh

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from contact.build.materials import piezo, rotation
+from contact.building.materials import piezo, rotation
 from contact.case.material import Material
 from contact.errors import InputError
 from contact.interface.friction import Friction

@@ -10,20 +10,20 @@ from itertools import product
 import numpy as np
 from mpi4py import MPI
 
-from contact.build.blame import to_blame
 from contact.body.description import Body, Fixed, Load
+from contact.building.blame import to_blame
+from contact.building.contacts import make_contacts
+from contact.building.given import amplitude, check_range, loading_field
+from contact.building.materials import make_materials
+from contact.building.meshing import make_domain
+from contact.building.moving import make_electrodes, make_rigid
 from contact.case import file as sections
 from contact.case.replaced import check_replaced
-from contact.build.contacts import make_contacts
 from contact.errors import InputError
-from contact.build.given import amplitude, check_range, loading_field
 from contact.interface.layer import Layer
 from contact.interface.obstacle import Obstacle
-from contact.build.materials import make_materials
 from contact.mesh.domain import Domain
 from contact.mesh.revolution import revolved
-from contact.build.meshing import make_domain
-from contact.build.moving import make_electrodes, make_rigid
 from contact.problem.held import check_held
 from contact.problem.problem import ContactProblem
 from contact.tolerances import HUGE

@@ -7,10 +7,10 @@ from mpi4py import MPI
 
 from contact.body.amplitude import steady
 from contact.body.norms import volume
+from contact.building.given import NodalField, amplitude, given_field
 from contact.case import file as sections
 from contact.case.formula import Expression
 from contact.errors import InputError
-from contact.build.given import NodalField, amplitude, given_field
 from contact.interface.current import Conductor
 from contact.interface.friction import Friction
 from contact.interface.layer import Layer

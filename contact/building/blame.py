@@ -23,7 +23,7 @@ def to_blame(loads: Sequence[Any], domain: Domain, time: float = 1.0) -> str:
     Parameters
     ----------
     loads
-        Loads of the body, whose fields know their keys in the case file (`contact.build.given.NodalField`).
+        Loads of the body, whose fields know their keys in the case file (`given.NodalField`).
     domain
         The domain.
     time

@@ -7,10 +7,10 @@ from collections.abc import Sequence
 import numpy as np
 
 from contact.body.rigid import Electrode, Motion, Rigid, Timed
+from contact.building.given import amplitude
 from contact.case import file as sections
 from contact.case.formula import Expression
 from contact.case.rigid import NOTHING, Moving
-from contact.build.given import amplitude
 
 
 def make_rigid(case: sections.Case, dim: int) -> tuple[Rigid, ...]:
