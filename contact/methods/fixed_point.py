@@ -9,8 +9,8 @@ and piezoelectric bodies, rigid and compliant foundations differ in what there i
 - Algorithm 6, Problem (PV2): also h_nu, or all of the layer's force j_1 where it is lagged.
 - Algorithm 8, Problem (PV1): as Algorithm 6 without friction and current.
 
-All four are `FixedPoint.solve` with `_step`, `_base_residual` and `_update_bound`; their inner
-Algorithms 2, 5, 7 and 9 are `uzawa.block_relaxation`. What differs is `Interface.response`.
+Their inner Algorithms 2, 5, 7 and 9 are `uzawa.block_relaxation`; what differs is
+`Interface.response`. Where it fails, the best iterate is left, by the thesis's rules the last.
 """
 
 from __future__ import annotations
@@ -24,19 +24,13 @@ import numpy as np
 from contact.body.equilibrium import BodyEquilibrium
 from contact.body.norms import domain_norm
 from contact.linear.operator import Counters, Operator
+from contact.methods import uzawa
+from contact.methods.best import Best
 from contact.methods.following import Following
 from contact.methods.options import FixedPointOptions
 from contact.methods.report import History, Monitor, Outcome, Record
 from contact.methods.softness import softer_r, spectrum
 from contact.methods.stagnation import Stagnation
-from contact.methods.uzawa import (
-    Linearised,
-    Relaxation,
-    augmentation,
-    automatic_r,
-    block_relaxation,
-    split,
-)
 from contact.problem.kkt import KKT, evaluate, residual_forces
 from contact.problem.protocols import Problem
 from contact.problem.state import State
@@ -85,7 +79,7 @@ class FixedPoint:
     def __post_init__(self) -> None:
         """Choose r and set up the operator."""
         options, body = self.options, self.problem.equilibrium
-        self.r = automatic_r(self.problem.scales) if options.r == "auto" else options.r
+        self.r = uzawa.automatic_r(self.problem.scales) if options.r == "auto" else options.r
         self._softened = False
         self.operator = self._new_operator(symmetric=True)
         self.history = History(self.monitor)
@@ -93,7 +87,7 @@ class FixedPoint:
         thesis = options.stopping == "thesis"
         inner = options.inner_tolerance or max(options.tolerance / 10, PRECISION)
         self._forget()
-        self._relaxation = Relaxation(
+        self._relaxation = uzawa.Relaxation(
             self.r,
             inner,
             options.max_inner,
@@ -153,7 +147,7 @@ class FixedPoint:
         if interface.response.normal_law(nodal) is not None:
             pressure = interface.pressure(nodal, start.forces)
         z = np.column_stack([pressure, start.forces.friction])
-        z = z + self.r * split(interface, nodal, frictional)
+        z = z + self.r * uzawa.split(interface, nodal, frictional)
         return self._solve(z, interface.bound(nodal, start.forces), 1, start.x)
 
     def _solve(self, z: Array, bound: Array, first: int, secant_at: Array) -> tuple[State, Outcome]:
@@ -162,6 +156,7 @@ class FixedPoint:
         body, frictional = problem.equilibrium, problem.interface.friction.acts
         tangent = options.material_step == "tangent"
         stagnation = Stagnation(PATIENCE, PROGRESS)
+        best: Best[tuple[State, KKT]] = Best()
         for iteration in range(first, options.max_outer + 1):
             friction = frictional and iteration > 0
             if friction and first == 0 and iteration == 1:
@@ -179,18 +174,19 @@ class FixedPoint:
             secant_at = self.state.x
             residuals = evaluate(problem, self.state)
             self._residual = residuals.largest
+            best.see((self.state, residuals), residuals.largest)
             change, bound = self._update_bound(bound, iteration == 0)
             note = "tangent" if kind == "tangent" else ""
-            self.history.add(
-                Record(iteration, inner, residuals, change, time.perf_counter() - begin, note)
-            )
+            seconds = time.perf_counter() - begin
+            self.history.add(Record(iteration, inner, residuals, change, seconds, note))
             if options.stopping == "thesis":
                 if iteration > first and self._thesis_criterion(change, previous):
                     return self._end(residuals, "the thesis's criterion is met")
             elif residuals.largest <= options.tolerance:
                 return self._end(residuals)
             if not np.isfinite(residuals.largest):
-                return self._end(residuals, "the iteration diverged")
+                ended = "the iteration diverged"
+                break
             if options.material_step == "auto" and not body.linear:
                 # Far from the solution the tangent is too soft and overshoots.
                 tangent = residuals.largest < (NEAR if not tangent else 2 * stagnation.best)
@@ -199,8 +195,13 @@ class FixedPoint:
             if given_up and options.stopping == "residual":
                 far = self._stalled and stagnation.best > NEAR
                 why = f": {spectrum(self.options.r, self.r)}" if far else ""
-                return self._end(residuals, f"the residual stalled at {stagnation.best:.2e}{why}")
-        return self._end(residuals, f"not converged in {options.max_outer} outer iterations")
+                ended = f"the residual stalled at {stagnation.best:.2e}{why}"
+                break
+        else:
+            ended = f"not converged in {options.max_outer} outer iterations"
+        if best.found is not None and options.stopping == "residual":
+            self.state, residuals = best.found
+        return self._end(residuals, ended)
 
     def _soften(self) -> bool:
         """Take r from the body's softest mode, once; tell whether it has changed."""
@@ -220,13 +221,13 @@ class FixedPoint:
         """Freeze, solve the frozen problem, and move the state."""
         problem, interface, state = self.problem, self.problem.interface, self.state
         body, nodal = problem.equilibrium, interface.jump.apply(state.x)
-        blocks = augmentation(interface.jump, self.r, friction)
+        blocks = uzawa.augmentation(interface.jump, self.r, friction)
         if interface.response.active:
             pressure = interface.pressure(nodal, state.forces)
             blocks = blocks + self._current_block(nodal, pressure)
         about = secant_at if kind == "secant" else state.x
         self.operator.update(kind, about, interface.weighted(blocks, state.x), constant=body.linear)
-        step = Linearised(
+        step = uzawa.Linearised(
             self.operator,
             self._base_residual(nodal, secant_at),
             body.owned_part(state.x),
@@ -236,7 +237,7 @@ class FixedPoint:
             friction,
         )
         poll = self.poll or self.history.poll
-        result = block_relaxation(interface, step, z, self._relaxation, self._norm, poll)
+        result = uzawa.block_relaxation(interface, step, z, self._relaxation, self._norm, poll)
         self._stalled = result.stalled
         x = body.moved(state.x, result.increment)
         self.state = replace(state, x=x, forces=result.forces)

@@ -157,8 +157,8 @@ class Newton:
         search = self.search
         self.history.restart()
         iterate, outcome = self._roads(iterate)
-        if not outcome.converged and search.best is not None:
-            iterate = search.best
+        if not outcome.converged and search.best.found is not None:
+            iterate = search.best.found
             outcome = replace(outcome, kkt=evaluate(self.problem, iterate.state))
         search.at = iterate
         return iterate, outcome
@@ -200,7 +200,8 @@ class Newton:
         Without friction first: where the body touches, Newton's method mostly finds the rest.
         """
         for friction in (False, True) if problem.interface.friction.acts else (False,):
-            start = problem.start() if self.search.best is None else self.search.best.state
+            best = self.search.best.found
+            start = problem.start() if best is None else best.state
             poll, goal = self.history.poll, self.options.tolerance
             found = solve_convex(problem, start, poll, friction, goal)
             if found is None:

@@ -33,6 +33,7 @@ from contact.interface.penalised import (
     penalised_forces,
 )
 from contact.linear.operator import Counters
+from contact.methods.best import Best
 from contact.methods.options import PenaltyOptions
 from contact.methods.penalised import PenalisedProblem
 from contact.methods.report import History, Monitor, Outcome, Record
@@ -157,7 +158,7 @@ class Penalty:
         interface = problem.interface
         # The lagged friction modulus can creep: what counts is the last hundred iterations.
         stagnation = Stagnation(PATIENCE, PROGRESS)
-        best = np.inf
+        best: Best[tuple[State, KKT]] = Best()
         # The residual below which material and friction become implicit.
         switch = {"secant": 0.0, "auto": 1e-2, "tangent": np.inf}[options.material_step]
         bound: Array = np.zeros(interface.jump.gap.size)
@@ -177,23 +178,29 @@ class Penalty:
             seconds = time.perf_counter() - begin
             self.history.add(Record(iteration, inner, residuals, change, seconds, note))
             residual = residuals.equilibrium
+            best.see((self.state, residuals), residual)
             if note == LOST and not failed:
-                return self._outcome(residuals, f"{LOST}; {HARDER}")
+                ended = f"{LOST}; {HARDER}"
+                break
             if not np.isfinite(residual):
-                return self._outcome(residuals, "the iteration diverged")
+                ended = "the iteration diverged"
+                break
             if options.stopping == "thesis":
                 if self._thesis_criterion(previous):
                     return self._outcome(residuals, "the thesis's criterion is met")
             elif residual <= options.tolerance:
                 return self._outcome(residuals)
-            best = min(best, residual)
-            switch = best / 10 if failed else switch
-            if stagnation(residual) and options.stopping == "residual":
-                words = f"the residual stalled at {best:.2e}; {HARDER}"
-                return self._outcome(residuals, words)
+            stalled = stagnation(residual)
+            switch = stagnation.best / 10 if failed else switch
+            if stalled and options.stopping == "residual":
+                ended = f"the residual stalled at {stagnation.best:.2e}; {HARDER}"
+                break
             implicit = residual < switch
-        words = f"not converged in {options.max_outer} outer iterations; {HARDER}"
-        return self._outcome(residuals, words)
+        else:
+            ended = f"not converged in {options.max_outer} outer iterations; {HARDER}"
+        if best.found is not None and options.stopping == "residual":
+            self.state, residuals = best.found
+        return self._outcome(residuals, ended)
 
     def _step(self, implicit: bool) -> tuple[Array, int, str]:
         """Solve (4.32), or the penalised problem itself, by SNES from the state."""

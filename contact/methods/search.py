@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-import numpy as np
-
+from contact.methods.best import Best
 from contact.methods.options import NewtonOptions
 from contact.methods.report import History
 from contact.methods.step import Iterate
@@ -26,15 +25,14 @@ class Search:
     at
         What the last step has left.
     best
-        The iterate with the least residual; None before the first step.
+        The iterate with the least residual.
     """
 
     problem: Problem
     options: NewtonOptions
     history: History
     at: Iterate
-    best: Iterate | None = None
-    _least: float = field(default=np.inf, init=False)
+    best: Best[Iterate] = field(default_factory=Best)
 
     @property
     def left(self) -> int:
@@ -44,5 +42,5 @@ class Search:
     def see(self, iterate: Iterate, residuals: KKT) -> None:
         """Remember an iterate. One at a part of the load is nowhere the best."""
         self.at = iterate
-        if iterate.state.time == self.problem.time and residuals.largest < self._least:
-            self.best, self._least = iterate, residuals.largest
+        if iterate.state.time == self.problem.time:
+            self.best.see(iterate, residuals.largest)

@@ -1,0 +1,63 @@
+"""A method that fails leaves the best of what it has met."""
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+
+from contact.interface.friction import Friction
+from contact.methods.best import Best
+from contact.methods.fixed_point import FixedPoint
+from contact.methods.options import FixedPointOptions, PenaltyOptions
+from contact.methods.penalty import Penalty
+from contact.problem.kkt import evaluate
+from forms.laws import ConstantCoefficient
+from tests.problems import mechanics
+
+
+def test_the_least_residual_is_the_best_and_no_number_is_none():
+    best: Best[str] = Best()
+    for name, residual in (("lost", np.nan), ("far", np.inf)):
+        best.see(name, residual)
+    assert best.found is None
+    for name, residual in (("a", 0.5), ("b", 0.1), ("c", 0.2), ("d", np.nan)):
+        best.see(name, residual)
+    assert best.found == "b"
+
+
+@pytest.mark.parametrize("factor", [3.0, np.nan], ids=["worse", "no numbers"])
+@pytest.mark.parametrize("stopping", ["residual", "thesis"])
+@pytest.mark.parametrize(
+    ("method", "options"), [(FixedPoint, FixedPointOptions), (Penalty, PenaltyOptions)]
+)
+def test_the_best_iterate_is_left_where_the_last_one_is_worse(
+    monkeypatch, method, options, stopping, factor
+):
+    """Of the penalty method that ended without numbers, these were the solution."""
+    problem = mechanics.bar(
+        MPI.COMM_SELF, 4, -0.05, friction=Friction(ConstantCoefficient(0.5)), law=None
+    )
+    limits = options(tolerance=1e-14, max_outer=4, stopping=stopping, eps_fp=1e-30)
+    solver, kind = method(problem, limits), type(problem.start())
+    whole = solver._step
+
+    def spoilt(*arguments):
+        made = whole(*arguments)
+        if len(solver.history.records) < 3:
+            return made
+        if method is Penalty:
+            return factor * made[0], *made[1:]
+        solver.state = kind(factor * solver.state.x, solver.state.forces)
+        return made
+
+    monkeypatch.setattr(solver, "_step", spoilt)
+    state, outcome = solver.solve()
+    assert not outcome.converged
+    # The penalty method solves for equilibrium, and the laws hold as its penalties let them.
+    name = "equilibrium" if method is Penalty else "largest"
+    sizes = [getattr(record.kkt, name) for record in solver.history.records]
+    assert not sizes[-1] <= min(sizes[:-1])
+    if stopping == "residual":
+        assert outcome.kkt == evaluate(problem, state)
+        assert getattr(outcome.kkt, name) == min(sizes[:-1])
+    else:
+        assert getattr(outcome.kkt, name) == pytest.approx(sizes[-1], nan_ok=True)
