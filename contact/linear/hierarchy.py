@@ -24,7 +24,8 @@ class Hierarchy:
     interpolation at the contact nodes follow the operator in each of them, the coarse levels only
     once the iterations that have been lost without them would have paid for that: the rule of
     those who do not know how often they will ski, and buy when they have paid as much for
-    hiring. A solve that loses as many by itself goes on with new ones.
+    hiring. A solve that loses as many by itself goes on with new ones. No solve takes more
+    iterations than `ksp_max_it` allows.
 
     Parameters
     ----------
@@ -80,26 +81,26 @@ class Hierarchy:
         jump = self._stiff.jump(rhs)
         rhs.axpy(-1.0, self._ksp.getOperators()[0] * jump)
         solution.axpy(-1.0, jump)
-        taken, renewed = self._iterate(rhs, solution)
+        taken, renewed = self._iterate(rhs, solution, self._most)
         solution.axpy(1.0, jump)
         return taken, renewed
 
-    def _iterate(self, rhs: PETSc.Vec, solution: PETSc.Vec) -> tuple[int, bool]:
+    def _iterate(self, rhs: PETSc.Vec, solution: PETSc.Vec, most: int) -> tuple[int, bool]:
         ksp, digits = self._ksp, -log10(self._ksp.getTolerances()[0])
         if self._rate is None:
-            ksp.setTolerances(max_it=self._most)
+            ksp.setTolerances(max_it=most)
             ksp.solve(rhs, solution)
             self._rate = ksp.getIterationNumber() / digits
             return ksp.getIterationNumber(), False
         fresh = self._rate * digits
-        ksp.setTolerances(max_it=ceil(fresh) + PRICE)
+        ksp.setTolerances(max_it=min(ceil(fresh) + PRICE, most))
         ksp.solve(rhs, solution)
         taken = ksp.getIterationNumber()
-        if ksp.getConvergedReason() > 0:
+        if ksp.getConvergedReason() > 0 or taken >= most:
             self._lost += max(taken - fresh, 0.0)
             return taken, False
         begun = ksp.getConvergedReason() == PETSc.KSP.ConvergedReason.DIVERGED_MAX_IT
         self._renew()
         ksp.setInitialGuessNonzero(begun)
-        again, _ = self._iterate(rhs, solution)
+        again, _ = self._iterate(rhs, solution, most - taken)
         return taken + again, True

@@ -8,6 +8,7 @@ import weakref
 import numpy as np
 import pytest
 from mpi4py import MPI
+from petsc4py import PETSc
 
 from contact.linear.hierarchy import PRICE
 from contact.linear.operator import Counters, SparseOperator
@@ -83,6 +84,24 @@ def test_coarse_levels_are_renewed_when_iterations_say_so() -> None:
     direct = operator_of(problem, "lu")
     direct.update("secant", x, 0 * sticks)
     assert body.norm(found - direct.solve(load)) <= 1e-5 * body.norm(found)
+
+
+@pytest.mark.parallel
+def test_no_solve_takes_more_iterations_than_are_allowed() -> None:
+    """The limit of the first solve was forgotten in those that follow it."""
+    problem, most = mechanics.leaning_block(WORLD, 12), 5
+    body, weight = problem.equilibrium, problem.nodes.weight[:, None, None]
+    x, load, sticks = problem.start().x, body.external(), weight * sticking(problem)
+    options = PETSc.Options()
+    options["contact_ksp_max_it"] = most
+    try:
+        operator = operator_of(problem, "iterative")
+        for count, blocks in enumerate((sticks, 1.1 * sticks, 0 * sticks, 0 * sticks), start=1):
+            operator.update("secant", x, blocks, constant=count > 1)
+            operator.solve(load, 1e-9)
+            assert operator.counters.linear_iterations == count * most
+    finally:
+        options.delValue("contact_ksp_max_it")
 
 
 def test_an_operator_is_freed_at_once() -> None:
