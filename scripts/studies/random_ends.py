@@ -2,7 +2,8 @@
 
 `python3 -m scripts.studies.random_ends [--out DIR] [--coarse] [--count N]`. Cases of both sweeps
 are solved by a random method with a random `max_outer`. What `summary.json` then says is held
-against the residuals of the state in a problem that was built anew, at the whole load.
+against the residuals of the state in a problem that was built anew, at the whole load, and against
+the forces and charges that its numbers leave out of balance (`raw_balance`).
 """
 
 from __future__ import annotations
@@ -24,12 +25,13 @@ from contact.output.files import write_outputs
 from contact.output.options import OutputOptions
 from contact.problem.kkt import evaluate
 from scripts.reporting import Report, append, parser
+from scripts.studies.raw_balance import imbalance
 from scripts.studies.sweep import problems
 
 COUNT, COARSE_COUNT, SEED = 500, 10, 21
 METHODS = "newton", "uzawa", "penalty"
-#: Rounding of a residual that is computed once more.
-ROUNDING = 1.01
+#: Rounding of a residual that is computed once more, and of rounding that is seen by other means.
+ROUNDING, OTHER = 1.01, 2.0
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -41,7 +43,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     rng = np.random.default_rng(SEED)
     drawn = [case for hard in (False, True) for _, case in problems(False, hard=hard)]
     ends = Counter[str]()
-    columns = ("case", "method", "max_outer", "converged", "residuals", "allowed")
+    columns = ("case", "method", "max_outer", "rounding", "residuals", "raw", "allowed")
     rows: dict[str, list[Any]] = {name: [] for name in columns}
     with tempfile.TemporaryDirectory() as folder:
         for number in rng.integers(len(drawn), size=count):
@@ -57,9 +59,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
             ends[f"{method}: {'converged' if summary['converged'] else 'not converged'}"] += 1
             pairs = [(getattr(residuals, name), getattr(allowed, name)) for name in summary["kkt"]]
             holds = all(value <= ROUNDING * most for value, most in pairs)
+            raw = imbalance(solution)
+            most = ROUNDING * allowed.equilibrium + OTHER * summary["rounding"]
+            holds &= raw.force <= most * raw.applied and raw.charge <= most * raw.electrified
             if summary["converged"] and not holds:
                 shown = [" ".join(f"{pair[i]:.2e}" for pair in pairs) for i in (0, 1)]
-                row = (case.source, method, limit, True, *shown)
+                left = f"{raw.force:.2e} of {raw.applied:.2e}, "
+                left += f"{raw.charge:.2e} of {raw.electrified:.2e}"
+                row = (case.source, method, limit, summary["rounding"], shown[0], left, shown[1])
                 print(*row, flush=True)
                 append(rows, *row)
     print("endings:", dict(sorted(ends.items())))
