@@ -1,7 +1,12 @@
 """Tolerances and limits that more than one place needs."""
 
+import sys
+
 #: Residual of contact and friction above which a penalised solution approximates nothing.
 LAWS_HOLD = 0.1
+
+#: Distance of 1 from the next larger number.
+EPS = sys.float_info.epsilon
 
 #: The least tolerance: rounding keeps relative residuals from falling below.
 PRECISION = 1e-15

@@ -10,11 +10,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from contact.errors import InputError
+from contact.tolerances import EPS
 from contact.typing import Array
 from forms.laws import PenetrationLaw, StiffnessLaw
 from forms.ops import Value
-
-EPS = float(np.finfo(float).eps)
 
 
 @dataclass(frozen=True)

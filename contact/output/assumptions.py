@@ -182,3 +182,16 @@ def resolution(solution: Solution) -> Remark:
         f"accepted: {ACROSS} at least, for instance elements of at most {width / ACROSS:.2g} there",
         False,
     )
+
+
+def rounding(solution: Solution) -> Remark:
+    """Say where forces balance to their rounding alone, which is more than the tolerance."""
+    granted, asked = solution.outcome.kkt.rounding, solution.outcome.allowed.equilibrium
+    if granted <= asked:
+        return "", True
+    return (
+        f"rounding decides how well the forces balance: {granted:.1e} of them is no more than what "
+        f"that of the displacements makes of the stresses, and does not count, though the "
+        f"tolerance is {asked:g}; a mesh with fewer cells along a slender body has less of it",
+        False,
+    )

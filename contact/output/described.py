@@ -42,6 +42,11 @@ SUMMARY: Mapping[str, Item] = {
         "What is left of the equations, each relative to its own size: `equilibrium` (forces), "
         "`contact` (no penetration, no tension, one of them zero), `friction` (stick or slip).",
     ),
+    "rounding": Item(
+        "",
+        "Forces out of balance that are no more than rounding, over all forces: `equilibrium` is "
+        "without them. More than the tolerance in slender bodies alone, with a warning then.",
+    ),
     "max_pressure": Item("stress", "Largest contact pressure, -σ_ν >= 0."),
     "contact_area": Item(
         "area", "Sum of the weights of the nodes that touch; in the plane a length."

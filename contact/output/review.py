@@ -41,6 +41,7 @@ def review(solution: Solution) -> None:
         assumptions.preload(solution),
         assumptions.falling(solution),
         assumptions.resolution(solution),
+        assumptions.rounding(solution),
         uniqueness.theorem(solution),
         uniqueness.sliding(solution),
         *uniqueness.conductivity(solution),

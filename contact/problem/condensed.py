@@ -239,11 +239,7 @@ class Condensation:
             slice(begin, begin + at.size),
             size,
         )
-        # Of kept nodes close to each other in a deep cell it is far more than of nodes on average.
-        stiffest = float(np.abs(np.diag(self._stiffness)).max(initial=0.0))
-        scales = self.full.scales
-        scales = replace(scales, stiffness=max(scales.stiffness, stiffest))
-        return CondensedProblem(condensed, self._interface, scales, state.time)
+        return CondensedProblem(condensed, self._interface, self.full.scales, state.time)
 
     def _at(self, x: Array) -> Array:
         """Return the owned kept unknowns: jumps, then what is at the other kept nodes."""

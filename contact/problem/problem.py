@@ -221,30 +221,24 @@ class ContactProblem:
             )
         return held
 
-    def _extents(self, domain: Domain) -> tuple[float, float]:
-        """Return the area of Gamma_3 and the volume of the body."""
-        area = sum(volume(domain, domain.ds(contact.on)) for contact in self.contacts)
-        return area, volume(domain, domain.dx)
+    def _area(self, domain: Domain) -> float:
+        """Return the area of Gamma_3. Collective."""
+        return sum(volume(domain, domain.ds(contact.on)) for contact in self.contacts)
 
     def _scales(self) -> Scales:
         domain, law, d = self.domain, self.body.law, self.dim
-        area, whole = self._extents(domain)
-        mesh_area, mesh_whole = area, whole
-        if domain.revolved:
-            # Of the mesh itself, which is but the half plane of the body.
-            mesh_area, mesh_whole = self._extents(replace(domain, revolved=False))
-        nodes = self.equilibrium.layout.index_map.size_global
-        cell = (mesh_whole / nodes) ** (1 / d)
+        area = self._area(domain)
+        # Of the mesh itself, which may be but the half plane of the body.
+        mesh_area = self._area(replace(domain, revolved=False)) if domain.revolved else area
         return Scales(
             young=float(law.young),
             poisson=float(law.poisson),
             bulk=float(law.bulk),
             shear=float(law.shear),
             size=domain.size,
-            height=whole / area,
+            height=volume(domain, domain.dx) / area,
             area=area,
             spacing=(mesh_area / self.nodes.size) ** (1 / (d - 1)),
-            stiffness=float(law.bulk + 4 / 3 * law.shear) * whole / mesh_whole * cell ** (d - 2),
         )
 
     @property

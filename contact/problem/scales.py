@@ -21,8 +21,6 @@ class Scales:
         Of Gamma_3 (length^(d - 1)); of a body of revolution over the full turn (length^2).
     spacing
         Of the contact nodes (length).
-    stiffness
-        Of one node alone against a displacement (force/length).
     """
 
     young: float
@@ -33,7 +31,6 @@ class Scales:
     height: float
     area: float
     spacing: float
-    stiffness: float
 
     @property
     def plane_modulus(self) -> float:

@@ -86,6 +86,8 @@ def test_rounding_does_not_keep_a_long_beam_from_its_solution():
     assert solution.converged, solution.outcome.reason
     assert [record.note for record in solution.history.records] == ["interior point"]
     assert solution.counters.contact_solves < 100
+    assert 1e-10 < solution.outcome.kkt.rounding < 1e-7
+    assert any("rounding decides how well the forces balance" in w for w in solution.warnings)
 
 
 @pytest.mark.parametrize("mu", [0.0, 0.3])

@@ -9,6 +9,7 @@ from scipy.linalg.lapack import dpotrs
 
 from contact.methods.convex.cones import Array, Cones, Step, dot
 from contact.methods.convex.reduced import Reduced, cholesky
+from contact.tolerances import EPS
 
 #: Shares of the way to the rim of a cone that a step takes.
 SHORTEST, LONGEST = 0.9, 0.999
@@ -22,8 +23,6 @@ SINKING = 0.1
 
 #: Stiffness against free motions, beside 1 of the nodes: what contact does not hold drifts.
 DRIFT = 1e-8
-
-EPS = float(np.finfo(float).eps)
 
 
 @dataclass(frozen=True)

@@ -15,6 +15,8 @@ from numpy.typing import NDArray
 from scipy.linalg import solve_triangular
 from scipy.linalg.lapack import dpotrf, dtrtri
 
+from contact.tolerances import EPS
+
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
@@ -22,8 +24,6 @@ Mask = NDArray[np.bool_]
 #: the next one is that many times larger. A beam 1000 times as long as thick has some 1e-13, and
 #: the next is 39 times that; rounding leaves up to 1e-13 of a body with many nodes behind it.
 NULL, JUMP = 1e-12, 1e3
-
-EPS = float(np.finfo(float).eps)
 
 #: Free motions that can be found: 6 a body, and some to spare.
 MOTIONS = 16
