@@ -12,8 +12,9 @@ NOTEBOOKS = sorted((Path(__file__).parents[2] / "scripts" / "notebooks").glob("[
 def test_notebook(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("MPLBACKEND", "Agg")
     pyplot = pytest.importorskip("matplotlib.pyplot")
-    if "import gmsh" in path.read_text():
-        pytest.importorskip("gmsh")
+    for module in ("gmsh", "pyvista"):
+        if f"import {module}" in path.read_text():
+            pytest.importorskip(module)
     runpy.run_path(str(path))
     pyplot.close("all")
 
