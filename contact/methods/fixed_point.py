@@ -25,6 +25,7 @@ from contact.body.equilibrium import BodyEquilibrium
 from contact.body.norms import domain_norm
 from contact.linear.operator import Counters, Operator
 from contact.methods import uzawa
+from contact.methods.augmentation import augmentation, automatic_r
 from contact.methods.best import Best
 from contact.methods.following import Following
 from contact.methods.options import FixedPointOptions
@@ -79,7 +80,7 @@ class FixedPoint:
     def __post_init__(self) -> None:
         """Choose r and set up the operator."""
         options, body = self.options, self.problem.equilibrium
-        self.r = uzawa.automatic_r(self.problem.scales) if options.r == "auto" else options.r
+        self.r = automatic_r(self.problem.scales) if options.r == "auto" else options.r
         self._softened = False
         self.operator = self._new_operator(symmetric=True)
         self.history = History(self.monitor)
@@ -221,7 +222,7 @@ class FixedPoint:
         """Freeze, solve the frozen problem, and move the state."""
         problem, interface, state = self.problem, self.problem.interface, self.state
         body, nodal = problem.equilibrium, interface.jump.apply(state.x)
-        blocks = uzawa.augmentation(interface.jump, self.r, friction)
+        blocks = augmentation(interface.jump, self.r, friction)
         if interface.response.active:
             pressure = interface.pressure(nodal, state.forces)
             blocks = blocks + self._current_block(nodal, pressure)
@@ -261,10 +262,9 @@ class FixedPoint:
         So is the layer's pressure, unless it is lagged. The contact flag of the perfect
         conductor still looks at the last pressure.
         """
-        interface, forces = self.problem.interface, self.state.forces
-        jump = interface.jump
+        interface, jump = self.problem.interface, self.problem.interface.jump
         residual = residual_forces(self.problem, self.state, secant_at)
-        unknown = forces.vectors(jump)
+        unknown = self.state.forces.vectors(jump)
         if interface.response.normal_law(nodal) is not None:
             unknown += interface.response.layer_pressure(nodal)[:, None] * jump.normal
         jump.transpose(-jump.weight[:, None] * unknown, residual)

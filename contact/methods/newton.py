@@ -23,6 +23,7 @@ from contact.interface.linearised import Moduli
 from contact.interface.multipliers import Multipliers
 from contact.interface.status import touching
 from contact.linear.operator import Counters
+from contact.methods.augmentation import automatic_r
 from contact.methods.frozen_friction import FROZEN_FRICTION, frozen_friction
 from contact.methods.load_steps import load_steps
 from contact.methods.loop import NewtonLoop
@@ -33,7 +34,6 @@ from contact.methods.report import History, Monitor, Outcome
 from contact.methods.search import Search
 from contact.methods.step import Iterate, WholeStep
 from contact.methods.sure import INTERIOR_POINT, solve_convex
-from contact.methods.uzawa import automatic_r
 from contact.problem.condensed import CondensedProblem
 from contact.problem.condensing import condensation, pays
 from contact.problem.kkt import evaluate

@@ -17,7 +17,7 @@ from mpi4py import MPI
 from contact.errors import InputError
 from contact.interface.jump import Jump
 from contact.linear.operator import Operator
-from contact.methods.uzawa import augmentation, automatic_r
+from contact.methods.augmentation import augmentation, automatic_r
 from contact.problem.protocols import Problem
 from contact.typing import Array
 

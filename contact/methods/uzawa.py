@@ -9,7 +9,6 @@ which `acceleration` speeds up.
 from __future__ import annotations
 
 import logging
-import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -25,7 +24,6 @@ from contact.interface.residuals import interface_residuals
 from contact.linear.operator import Operator
 from contact.methods.acceleration import ResidualMinimiser
 from contact.methods.stagnation import Stagnation
-from contact.problem.scales import Scales
 from contact.typing import Array
 from forms.foundation import contact_multiplier
 
@@ -127,25 +125,6 @@ class RelaxationResult:
     stalled: bool = False
 
 
-def automatic_r(scales: Scales) -> float:
-    """Return r* = 1.39 E'/sqrt(h H), the geometric mean of the Steklov spectrum's ends.
-
-    E' = E/(1 - nu^2); h is the spacing of the contact nodes and H the volume of the body over
-    the area of Gamma_3. Good to a factor of a few, which acceleration makes up for.
-    """
-    return 1.39 * scales.plane_modulus / math.sqrt(scales.spacing * scales.height)
-
-
-def augmentation(jump: Jump, r: float, friction: bool) -> Array:
-    """Return the nodal blocks of r u_nu v_nu [+ r u_tau v_tau], without weights, (n, bs, bs)."""
-    n, d = jump.normal.shape
-    blocks = np.zeros((n, jump.block_size, jump.block_size))
-    blocks[:, :d, :d] = jump.normal[:, :, None] * jump.normal[:, None, :]
-    if friction:
-        blocks[:, :d, :d] += jump.tangent
-    return r * blocks
-
-
 def split(interface: Interface, nodal: Array, friction: bool) -> Array:
     """Return normal displacements and what slips side by side, shape (n, 1 + d).
 
@@ -157,30 +136,89 @@ def split(interface: Interface, nodal: Array, friction: bool) -> Array:
     return np.column_stack([interface.jump.normal_component(nodal), slip])
 
 
-def _project(jump: Jump, z: Array, r: float, bound: Array, law: NormalLaw | None) -> Array:
-    """Return the new multipliers, Steps 2 and 3: (3.43) and the friction disc."""
-    if law is None:
-        pressure = contact_multiplier(z[:, 0], r, 0.0, jump.gap)
-    else:
-        pressure = law.pressure(z[:, 0], r)
-    return np.column_stack([pressure, project_disc(z[:, 1:], bound)])
+@dataclass
+class _Projection:
+    """Steps 2 and 3, from z of shape (n, 1 + d) to the new multipliers: (3.43) and the disc.
+
+    Attributes
+    ----------
+    jump
+        The contact nodes.
+    r
+        Augmentation parameter.
+    bound, law
+        Friction bound and layer, as in `Linearised`.
+    """
+
+    jump: Jump
+    r: float
+    bound: Array
+    law: NormalLaw | None
+
+    def __call__(self, z: Array) -> Array:
+        """Return the new multipliers."""
+        if self.law is None:
+            pressure = contact_multiplier(z[:, 0], self.r, 0.0, self.jump.gap)
+        else:
+            pressure = self.law.pressure(z[:, 0], self.r)
+        return np.column_stack([pressure, project_disc(z[:, 1:], self.bound)])
+
+    def derivative(self, z: Array, directions: Array) -> Array:
+        """Return their derivatives along directions of shape (n, 1 + d, k)."""
+        if self.law is None:
+            slope = np.where(z[:, 0] > self.r * self.jump.gap, 1.0, 0.0)
+        else:
+            slope = self.law.pressure_slope(z[:, 0], self.r)
+        normal = slope[:, None, None] * directions[:, :1]
+        tangential = disc_derivative(z[:, 1:], self.bound, directions[:, 1:])
+        return np.concatenate([normal, tangential], axis=1)
+
+    def accelerator(self, depth: int) -> ResidualMinimiser | None:
+        """Return what speeds up the iteration of z, as a flat array; None with depth 0."""
+        if depth == 0:
+            return None
+        jump, shape = self.jump, (self.jump.weight.size, 1 + self.jump.normal.shape[1])
+        weights = np.repeat(jump.weight, shape[1])
+
+        def inner(a: Array, b: Array) -> Array:
+            return np.asarray(jump.comm.allreduce(a.T @ (weights[:, None] * b), op=MPI.SUM))
+
+        def project(flat: Array) -> Array:
+            return self(flat.reshape(shape)).ravel()
+
+        def derivative(flat: Array, directions: Array) -> Array:
+            columns = directions.reshape(*shape, directions.shape[1])
+            return self.derivative(flat.reshape(shape), columns).reshape(directions.shape)
+
+        return ResidualMinimiser(inner, project, derivative, depth)
 
 
-def _derivative(
-    jump: Jump,
-    z: Array,
-    r: float,
-    bound: Array,
-    law: NormalLaw | None,
-    directions: Array,
-) -> Array:
-    """Return the derivatives of `_project` along directions of shape (n, 1 + d, k)."""
-    if law is None:
-        slope = np.where(z[:, 0] > r * jump.gap, 1.0, 0.0)
-    else:
-        slope = law.pressure_slope(z[:, 0], r)
-    normal = slope[:, None, None] * directions[:, :1]
-    return np.concatenate([normal, disc_derivative(z[:, 1:], bound, directions[:, 1:])], axis=1)
+class _Changes:
+    """How much an iteration changes, for the thesis's criterion (3.45).
+
+    Parameters
+    ----------
+    project
+        From z to the multipliers.
+    x
+        The iterate's owned unknowns.
+    norm
+        L2(Omega) norm of owned unknowns.
+    """
+
+    def __init__(self, project: _Projection, x: Array, norm: Callable[[Array], float]) -> None:
+        self._project, self._x, self._norm = project, x, norm
+        self._last: tuple[Array, Array] | None = None
+
+    def squares(self, increment: Array, image: Array) -> tuple[float, float] | None:
+        """Return the squares of the change and of the size; None after the first iteration."""
+        jump, norm, last = self._project.jump, self._norm, self._last
+        phi = (image - self._project(image)) * (1 / self._project.r)
+        self._last = increment, phi
+        if last is None:
+            return None
+        change = norm(increment - last[0]) ** 2 + jump.norm(phi - last[1]) ** 2
+        return change, norm(self._x + increment) ** 2 + jump.norm(phi) ** 2
 
 
 def _vectors(jump: Jump, pairs: Array) -> Array:
@@ -213,25 +251,10 @@ def block_relaxation(
     poll
         Called before every iteration, on all ranks; what it raises ends the relaxation.
     """
-    jump, r, bound, law = interface.jump, parameters.r, step.bound, step.law
-    weights = np.repeat(jump.weight, z.shape[1])
-
-    def inner(a: Array, b: Array) -> Array:
-        return np.asarray(jump.comm.allreduce(a.T @ (weights[:, None] * b), op=MPI.SUM))
-
-    def project(flat: Array) -> Array:
-        return _project(jump, flat.reshape(z.shape), r, bound, law).ravel()
-
-    def derivative(flat: Array, directions: Array) -> Array:
-        columns = directions.reshape(*z.shape, directions.shape[1])
-        slopes = _derivative(jump, flat.reshape(z.shape), r, bound, law, columns)
-        return slopes.reshape(directions.shape)
-
-    accelerator = None
-    if parameters.depth > 0:
-        accelerator = ResidualMinimiser(inner, project, derivative, parameters.depth)
-    old_increment: Array | None = None
-    old_phi: Array | None = None
+    jump, r, law = interface.jump, parameters.r, step.law
+    project = _Projection(jump, r, step.bound, law)
+    accelerator = project.accelerator(parameters.depth)
+    changes = None if domain_norm is None else _Changes(project, step.x, domain_norm)
     residual, forces = np.inf, Multipliers.zero(jump)
     increment: Array = np.zeros(step.x.size)
     start = split(interface, step.nodal, step.friction)
@@ -239,7 +262,7 @@ def block_relaxation(
     for iteration in range(1, parameters.max_iterations + 1):
         if poll is not None:
             poll()
-        multiplier = _project(jump, z, r, bound, law)
+        multiplier = project(z)
         q = 2 * multiplier - z
         rhs = -step.residual
         jump.transpose(-jump.weight[:, None] * _vectors(jump, q + r * start), rhs)
@@ -251,28 +274,22 @@ def block_relaxation(
         layer = 0.0 if law is None else law.layer(u[:, 0])
         forces = Multipliers(total[:, 0] - layer, total[:, 1:])
         if parameters.single_loop and step.friction:
-            bound = interface.bound(nodal, forces)
-        residual = max(interface_residuals(interface, nodal, forces, bound))
+            project.bound = interface.bound(nodal, forces)
+        residual = max(interface_residuals(interface, nodal, forces, project.bound))
         logger.debug("inner iteration %d: residual %.2e", iteration, residual)
         phi = (z - multiplier) * (1 / r)
         image = multiplier + r * (phi + parameters.over_relaxation * (u - phi))
-        measured = residual
+        measured, done = residual, residual <= parameters.tolerance or not np.isfinite(residual)
         if parameters.thesis_tolerance is not None:
-            assert domain_norm is not None
-            phi = (image - _project(jump, image, r, bound, law)) * (1 / r)
-            if old_phi is not None and old_increment is not None:
-                moved, projected = increment - old_increment, phi - old_phi
-                change = domain_norm(moved) ** 2 + jump.norm(projected) ** 2
-                size = domain_norm(step.x + increment) ** 2
-                size += jump.norm(phi) ** 2
-                if change < parameters.thesis_tolerance**2 * size:
-                    return RelaxationResult(increment, forces, image, iteration, residual)
+            assert changes is not None
+            squares, done = changes.squares(increment, image), False
+            if squares is not None:
+                change, size = squares
+                done = change < parameters.thesis_tolerance**2 * size
                 measured = float(np.sqrt(change / size)) if size > 0 else 0.0
-            old_phi, old_increment = phi, increment
-        elif residual <= parameters.tolerance or not np.isfinite(residual):
-            return RelaxationResult(increment, forces, image, iteration, residual)
-        if stagnation(measured):
-            return RelaxationResult(increment, forces, image, iteration, residual, stalled=True)
+        stalled = not done and stagnation(measured)
+        if done or stalled:
+            return RelaxationResult(increment, forces, image, iteration, residual, stalled)
         z = image
         if accelerator is not None:
             newest = (total + r * u).ravel()

@@ -7,11 +7,11 @@ from mpi4py import MPI
 from contact import build_problem
 from contact.case.file import parse_case
 from contact.linear.operator import Counters
+from contact.methods.augmentation import automatic_r
 from contact.methods.fixed_point import FixedPoint
 from contact.methods.options import FixedPointOptions
 from contact.methods.softness import softer_r
 from contact.methods.sure import solve_convex
-from contact.methods.uzawa import automatic_r
 from contact.problem.condensed import Condensation
 from contact.problem.kkt import evaluate
 from contact.solving import solve

@@ -10,9 +10,9 @@ from contact.body.description import Body
 from contact.interface.friction import Friction
 from contact.interface.projections import disc_derivative, project_disc, project_half_line
 from contact.methods.acceleration import ResidualMinimiser
+from contact.methods.augmentation import automatic_r
 from contact.methods.fixed_point import FixedPoint
 from contact.methods.options import FixedPointOptions
-from contact.methods.uzawa import automatic_r
 from contact.problem.problem import Contact, ContactProblem
 from contact.problem.state import State
 from forms.hencky import Linear, Log

@@ -8,9 +8,9 @@ from mpi4py import MPI
 
 from contact.interface.friction import Friction
 from contact.linear.operator import SparseOperator
+from contact.methods.augmentation import augmentation, automatic_r
 from contact.methods.fixed_point import FixedPoint
 from contact.methods.options import FixedPointOptions
-from contact.methods.uzawa import augmentation, automatic_r
 from contact.output.balances import charge_balance
 from contact.problem.kkt import residual_forces
 from forms.laws import ConstantCoefficient, SlipCoefficient

@@ -1,0 +1,30 @@
+"""The augmentation r of (3.34): a value that fits a body, and what it adds to the operator."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from contact.interface.jump import Jump
+from contact.problem.scales import Scales
+from contact.typing import Array
+
+
+def automatic_r(scales: Scales) -> float:
+    """Return r* = 1.39 E'/sqrt(h H), the geometric mean of the Steklov spectrum's ends.
+
+    E' = E/(1 - nu^2); h is the spacing of the contact nodes and H the volume of the body over
+    the area of Gamma_3. Good to a factor of a few, which acceleration makes up for.
+    """
+    return 1.39 * scales.plane_modulus / math.sqrt(scales.spacing * scales.height)
+
+
+def augmentation(jump: Jump, r: float, friction: bool) -> Array:
+    """Return the nodal blocks of r u_nu v_nu [+ r u_tau v_tau], without weights, (n, bs, bs)."""
+    n, d = jump.normal.shape
+    blocks = np.zeros((n, jump.block_size, jump.block_size))
+    blocks[:, :d, :d] = jump.normal[:, :, None] * jump.normal[:, None, :]
+    if friction:
+        blocks[:, :d, :d] += jump.tangent
+    return r * blocks
