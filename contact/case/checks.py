@@ -232,5 +232,5 @@ def _check_parts(case: Case, parts: list[str]) -> None:
     for path, name in ((path, name) for path, on in used for name in members(on)):
         if name not in parts:
             near = difflib.get_close_matches(name, parts, n=1)
-            hint = f" (did you mean {near[0]}?)" if near else ""
+            hint = f" (did you mean {listed(near)}?)" if near else ""
             raise fault(path, name, f"a part of the mesh: {listed(sorted(parts))}{hint}")

@@ -16,12 +16,17 @@ from contact.output.reference import files_help
 DESCRIPTION = """\
 Frictional contact of elasto-plastic and piezoelectric bodies. A problem is a case file;
 contact new MESH.msh writes one to begin with, contact check says what is in it, contact solve
-solves it, contact plot draws what came out. Documentation: docs/index.md.
+solves it, contact plot draws what came out. Documentation: docs/ of the sources.
 """
 EXIT = """\
 exit status: 0 converged; 1 not converged, results are written all the same; 2 bad input, or no
 place for the results: one message, nothing is written; 70 a fault of the program; 130 stopped by
 Ctrl-C, 143 by SIGTERM: what a solve had reached is written
+"""
+
+PETSC = """\
+PETSc's options have one dash, those of the linear solver the prefix contact_, and come last:
+-contact_ksp_monitor -contact_pc_type gamg
 """
 
 #: Names of arguments that are no options.
@@ -57,7 +62,8 @@ def _add_check(commands: Any) -> None:
 def _add_solve(commands: Any) -> None:
     files = files_help("summary.json", "contact.csv", "steps.csv", "history.csv")
     usage = "solve CASE.toml --out DIR [options] [PETSc options]"
-    command = add_command(commands, usage, "solve a case and write the results", files)
+    text = "solve a case and write the results"
+    command = add_command(commands, usage, text, f"{PETSC}\n{files}")
     add_case(command, optional=True)
     command.add_argument("--plot", action="store_true", help="draw the figures too")
     command.add_argument("--out", metavar="DIR", help="folder for results")

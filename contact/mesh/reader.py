@@ -89,7 +89,7 @@ def _read(file: Path) -> Model:
         if not out.exists():
             said = " ".join(done.stdout.decode(errors="replace").split())
             said = said.replace(str(plain), file.name)
-            raise InputError(f"Gmsh says: {said}")
+            raise InputError(f"Gmsh says: {said or 'nothing, and reads nothing of it'}")
         return Model.load(out)
 
 
