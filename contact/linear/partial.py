@@ -50,6 +50,11 @@ def _complement(factor: PETSc.Mat, size: int) -> Array:
     return matrix
 
 
+def _range(begin: int, end: int) -> PETSc.IS:
+    """Return the numbers from one to before another."""
+    return PETSc.IS().createStride(end - begin, begin, 1, PETSc.COMM_SELF)
+
+
 def _dense(matrix: PETSc.Mat) -> Array:
     """Return a small local matrix as an array."""
     dense = matrix.convert("dense", out=PETSc.Mat())
@@ -70,19 +75,20 @@ class PartialFactorisation:
     def __init__(self, first: int, prefix: str) -> None:
         self._first, self._prefix = first, prefix
         self._factor: PETSc.PC | None = None
-        self._matrix: PETSc.Mat | None = None
 
     def factorise(self, matrix: PETSc.Mat) -> Array:
         """Eliminate them; return the Schur complement, which is no number if they are singular.
 
-        The matrix is kept; another one has the same pattern.
+        Another matrix has the same pattern.
         """
-        self._matrix = matrix
+        first, end = self._first, matrix.getSize()[0]
+        inside, rest = (_range(*ends) for ends in ((0, first), (first, end)))
+        (self._coupling,) = matrix.createSubMatrices([rest], [inside])
         if self._first == 0:
             return _dense(matrix)
         factor = self._factorised(matrix)
         factor.setMumpsIcntl(*INTERIOR_SOLVE)
-        left = _complement(factor, matrix.getSize()[0] - self._first)
+        left = _complement(factor, end - first)
         return np.full_like(left, np.nan) if factor.getMumpsInfog(1) < 0 else left
 
     def _factorised(self, matrix: PETSc.Mat) -> PETSc.Mat:
@@ -113,25 +119,32 @@ class PartialFactorisation:
         pc.setFactorSolverType("mumps")
         pc.setFromOptions()
         pc.setFactorSetUpSolverType()
-        kept = np.arange(self._first, matrix.getSize()[0], dtype=PETSc.IntType)
-        if kept.size > 0:
-            _set_kept(pc.getFactorMatrix(), PETSc.IS().createGeneral(kept, PETSc.COMM_SELF))
+        kept = _range(self._first, matrix.getSize()[0])
+        if kept.getSize() > 0:
+            _set_kept(pc.getFactorMatrix(), kept)
         return pc
 
     def solve(self, values: Array) -> Array:
         """Solve with the first unknowns alone, the others being 0."""
         if self._first == 0:
             return values
-        assert self._factor is not None and self._matrix is not None
-        solution, rhs = self._matrix.createVecs()
+        assert self._factor is not None
+        factor = self._factor.getFactorMatrix()
+        solution, rhs = factor.createVecs()
         rhs.array[: self._first] = values
-        self._factor.getFactorMatrix().solve(rhs, solution)
+        factor.solve(rhs, solution)
         return solution.array[: self._first].copy()
 
-    def times(self, first: Array, last: Array) -> Array:
-        """Return the matrix times values of its unknowns."""
-        assert self._matrix is not None
-        vector, image = self._matrix.createVecs()
-        vector.array[:] = np.concatenate([first, last])
-        self._matrix.mult(vector, image)
+    def to_last(self, first: Array) -> Array:
+        """Return what values of the first unknowns are in the last rows."""
+        vector, image = self._coupling.createVecs()
+        vector.array[:] = first
+        self._coupling.mult(vector, image)
+        return np.asarray(image.array)
+
+    def to_first(self, last: Array) -> Array:
+        """Return what values of the last unknowns are in the first rows."""
+        image, vector = self._coupling.createVecs()
+        vector.array[:] = last
+        self._coupling.multTranspose(vector, image)
         return np.asarray(image.array)

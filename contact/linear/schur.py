@@ -13,23 +13,41 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 from petsc4py import PETSc
 from scipy.linalg import lu_factor, lu_solve
+from scipy.sparse import csr_array
+from scipy.sparse.csgraph import breadth_first_order
 
 from contact.linear.first_rank import from_first
 from contact.linear.partial import PartialFactorisation
 from contact.typing import Array
 
 
-def _ordered(matrix: PETSc.Mat, inside: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Return owned unknowns in the order of Cuthill and McKee.
+def _farthest_first(
+    rows: NDArray[np.int64], columns: NDArray[np.int64], inside: NDArray[np.bool_]
+) -> NDArray[np.int64]:
+    """Return the unknowns inside, those first that are farthest from the others.
 
     Where a Schur complement is asked for, MUMPS orders by minimum degree alone. That breaks its
-    many ties by the order given, and this one leaves it a quarter less work than most.
+    many ties by the order given, and this one leaves it the least work, on structured meshes half
+    of what the order of Cuthill and McKee does.
+
+    Parameters
+    ----------
+    rows, columns
+        Which unknowns of this rank know of each other.
+    inside
+        Which of them are to be ordered, shape (unknowns,).
     """
-    rows = PETSc.IS().createGeneral(
-        (inside + matrix.getOwnershipRange()[0]).astype(PETSc.IntType), PETSc.COMM_SELF
-    )
-    (part,) = matrix.createSubMatrices([rows], [rows])
-    return inside[part.getOrdering("rcm")[0].getIndices()] if inside.size else inside
+    # From one more node, which leads to all that are not inside, breadth comes first.
+    size, outside = inside.size, np.flatnonzero(~inside)
+    rows = np.concatenate([rows, np.full(outside.size, size)])
+    columns = np.concatenate([columns, outside])
+    known = np.ones(rows.size, dtype=np.int8)
+    graph = csr_array((known, (rows, columns)), shape=(size + 1, size + 1))
+    near = breadth_first_order(graph, size, return_predecessors=False)[1:]
+    near = near[inside[near]]
+    alone = inside.copy()
+    alone[near] = False
+    return np.concatenate([np.flatnonzero(alone), near[::-1]])
 
 
 class SchurComplement:
@@ -56,7 +74,8 @@ class SchurComplement:
         shared[kept] = False
         inside = np.ones(end - begin, dtype=bool)
         inside[kept] = inside[shared] = False
-        self._inside = _ordered(matrix, np.flatnonzero(inside))
+        own = (columns >= begin) & (columns < end)
+        self._inside = _farthest_first(rows[own], columns[own] - begin, inside)
         # The kept ones first, then those between the ranks, each in rank order.
         self._kept, self._shared = kept, np.flatnonzero(shared)
         mine = [(part + begin).astype(PETSc.IntType) for part in (kept, self._shared)]
@@ -83,7 +102,6 @@ class SchurComplement:
         self._left_set = PETSc.IS().createGeneral(left[self._left], PETSc.COMM_SELF)
         local = np.concatenate([eliminated, border])
         self._local = PETSc.IS().createGeneral(local, PETSc.COMM_SELF)
-        self._eliminated = eliminated.size
         self._inner = PartialFactorisation(eliminated.size, prefix)
         self._part: PETSc.Mat | None = None
 
@@ -169,8 +187,7 @@ class SchurComplement:
         total[self._rows] = rhs[np.concatenate([self._kept, self._shared])]
         if np.abs(rhs[self._inside]).max(initial=0.0) > rounding:
             inside = self._inner.solve(rhs[self._inside])
-            met = np.zeros(self._met.size)
-            total[self._met] -= self._inner.times(inside, met)[self._eliminated :]
+            total[self._met] -= self._inner.to_last(inside)
         self.comm.Allreduce(MPI.IN_PLACE, total, op=MPI.SUM)
         if self._between == 0:
             return total
@@ -191,7 +208,7 @@ class SchurComplement:
                 self._between,
             )
             left = np.concatenate([kept, between])
-        coupled = self._inner.times(np.zeros(self._eliminated), left[self._met])[: self._eliminated]
+        coupled = self._inner.to_first(left[self._met])
         solution = np.zeros(self._rhs.size)
         solution[self._inside] = self._inner.solve(self._rhs[self._inside] - coupled)
         solution[np.concatenate([self._kept, self._shared])] = left[self._rows]

@@ -7,6 +7,9 @@ from dolfinx import fem
 from mpi4py import MPI
 from numpy.typing import NDArray
 
+#: Times that cells apart from each other are looked for: more find hardly any.
+ROUNDS = 3
+
 
 def carry(coarse: fem.Function, space: fem.FunctionSpace) -> fem.Function:
     """Return the interpolant of a function in a space on another mesh. Collective.
@@ -37,8 +40,23 @@ def carry(coarse: fem.Function, space: fem.FunctionSpace) -> fem.Function:
 
 
 def _covering(space: fem.FunctionSpace) -> NDArray[np.int32]:
-    """Return owned cells that have all nodes among theirs: a fraction of the cells in space."""
+    """Return owned cells that have all nodes among theirs, few of them twice.
+
+    Each point of each of them is looked for. First cells that share no node, by chance; then
+    any for the nodes that are left.
+    """
     topology = space.mesh.topology
     nodes = space.dofmap.list[: topology.index_map(topology.dim).size_local]
-    _, first = np.unique(nodes, return_index=True)
-    return np.unique(first // nodes.shape[1]).astype(np.int32)
+    cells = np.random.default_rng(0).permutation(nodes.shape[0]).astype(np.int32)
+    uncovered = np.zeros(nodes.max(initial=-1) + 1, dtype=bool)
+    uncovered[nodes] = True
+    last = np.zeros(uncovered.size, dtype=np.int32)
+    found = []
+    for _ in range(ROUNDS):
+        cells = cells[uncovered[nodes[cells]].all(axis=1)]
+        last[nodes[cells]] = cells[:, None]
+        apart = cells[(last[nodes[cells]] == cells[:, None]).all(axis=1)]
+        uncovered[nodes[apart]] = False
+        found.append(apart)
+    last[nodes] = np.arange(nodes.shape[0], dtype=np.int32)[:, None]
+    return np.unique(np.concatenate([*found, last[uncovered]]))

@@ -148,8 +148,9 @@ class NewtonOptions(Options):
     Attributes
     ----------
     nested
-        `true`: solve on coarser meshes first and start from there. Default: where that saves
-        time: in space, from 40000 unknowns on, where there are coarser meshes.
+        `true`: solve on coarser meshes first and start from there. Default: where that saves time
+        and there are coarser meshes: in space from 40000 unknowns on, in the plane from 100000 on
+        if the material yields.
     nested_levels
         Number of nested meshes. Default: all that save time.
     max_iterations

@@ -1,0 +1,31 @@
+"""What a material that yields costs in the plane: factorisations and steps, not seconds."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from contact import nesting, solve
+from scripts.cases import bar
+
+CASE = -0.05, 1e5, "friction.mu=0.5"
+
+
+def test_a_large_body_that_yields_is_factorised_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The tangent is that of a coarser mesh's solution, without being asked for."""
+    cold = solve(bar(32, *CASE))
+    assert cold.start == "zero slip"
+    monkeypatch.setitem(nesting.MANY, 2, 8000)
+    found = solve(bar(32, *CASE))
+    assert found.start == "the solution on a coarser mesh"
+    assert found.converged
+    assert found.counters.factorizations == 1
+    assert found.counters.linear_solves < cold.counters.linear_solves
+    assert np.allclose(found.pressure, cold.pressure, rtol=0, atol=1e-6 * cold.pressure.max())
+
+
+@pytest.mark.parametrize("changes", [["solver.nested=false"], ["material.law=linear"]])
+def test_else_it_starts_from_rest(monkeypatch: pytest.MonkeyPatch, changes: list[str]) -> None:
+    """A linear body is factorised once in any case."""
+    monkeypatch.setitem(nesting.MANY, 2, 100)
+    assert solve(bar(8, *CASE, *changes)).start == "zero slip"
