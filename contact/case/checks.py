@@ -12,7 +12,7 @@ from pydantic import BaseModel
 
 from contact.case.evolution import check_evolution, check_time
 from contact.case.formula import Expression
-from contact.case.moving import check_moving, moving
+from contact.case.rigid import check_moving, moving
 from contact.case.showing import listed
 from contact.case.types import Words, as_given, fault
 from contact.mesh.together import members

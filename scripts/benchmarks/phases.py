@@ -35,7 +35,7 @@ PHASES = {
     "residual forces": ("body/equilibrium.py", "_forces"),
     "contact laws": ("interface/linearised.py", "linearise"),
     "dense solves at contact nodes": ("methods/newton.py", "_solve_condensed"),
-    "transfer from mesh to mesh": ("methods/nested.py", "prolong"),
+    "transfer from mesh to mesh": ("nesting.py", "prolong"),
 }
 
 Result = TypeVar("Result")
