@@ -3,24 +3,26 @@
 from __future__ import annotations
 
 import csv
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
+from contact.methods.report import Record
 from contact.output.solution import Solution
 from contact.output.table import Table, csv_columns
 
-HISTORY = (
-    "iteration",
-    "inner",
-    "equilibrium",
-    "contact",
-    "friction",
-    "change",
-    "seconds",
-    "note",
-    "contact_solves",
-)
+#: Columns of ``history.csv``, and what they say of a record.
+HISTORY: Mapping[str, Callable[[Record], Any]] = {
+    "iteration": lambda record: record.iteration,
+    "inner": lambda record: record.inner,
+    "equilibrium": lambda record: record.kkt.equilibrium,
+    "contact": lambda record: record.kkt.contact,
+    "friction": lambda record: record.kkt.friction,
+    "change": lambda record: record.change,
+    "seconds": lambda record: record.seconds,
+    "note": lambda record: record.note,
+    "contact_solves": lambda record: record.contact,
+}
 
 
 def write_tables(solution: Solution, table: Table, folder: Path) -> None:
@@ -34,29 +36,15 @@ def write_tables(solution: Solution, table: Table, folder: Path) -> None:
         Where to.
     """
     write_table(csv_columns(table), folder / "contact.csv")
-    write_csv(folder / "history.csv", HISTORY, _history(solution))
+    records = solution.history.records
+    rows = ([value(record) for value in HISTORY.values()] for record in records)
+    write_csv(folder / "history.csv", HISTORY, rows)
 
 
 def write_table(columns: Table, path: Path) -> None:
     """Write columns. On one rank."""
     rows = zip(*(column.tolist() for column in columns.values()), strict=True)
     write_csv(path, columns, rows)
-
-
-def _history(solution: Solution) -> Iterable[tuple[Any, ...]]:
-    for r in solution.history.records:
-        k = r.kkt
-        yield (
-            r.iteration,
-            r.inner,
-            k.equilibrium,
-            k.contact,
-            k.friction,
-            r.change,
-            r.seconds,
-            r.note,
-            r.contact,
-        )
 
 
 def write_csv(path: Path, header: Iterable[str], rows: Iterable[Iterable[Any]]) -> None:

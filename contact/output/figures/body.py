@@ -83,17 +83,22 @@ def draw_plane(
     ax.set_ylabel(units.label(f"${axes[1]}$", "length"))
     ax.set_title(with_scale(title, picture.scale), fontsize="medium")
     if lifted is not None:
-        below = make_axes_locatable(ax).append_axes("bottom", strip - 0.1, pad=0.1, sharex=ax)
-        below.fill_between(*lifted, color=BLUE, lw=0.8)
-        most = lifted[1].max()
-        below.set_yticks([])  # their labels have no room: the axes stands outside of the layout
-        below.set_ylim(0.0, 2.0 * most)
-        said = f"{units.label('opening', 'length')}, at most {most:.2g}"
-        below.text(0.01, 0.93, said, transform=below.transAxes, va="top", fontsize="small")
-        below.set_xlabel(ax.get_xlabel())
-        ax.set_xlabel("")
-        ax.tick_params(labelbottom=False)
+        _strip(ax, *lifted, units)
     return figure
+
+
+def _strip(ax: Axes, where: Array, opening: Array, units: Units) -> None:
+    """Draw an opening beneath the body, at a scale of its own."""
+    below = make_axes_locatable(ax).append_axes("bottom", STRIP - 0.1, pad=0.1, sharex=ax)
+    below.fill_between(where, opening, color=BLUE, lw=0.8)
+    most = opening.max()
+    below.set_yticks([])  # their labels have no room: the axes stands outside of the layout
+    below.set_ylim(0.0, 2.0 * most)
+    said = f"{units.label('opening', 'length')}, at most {most:.2g}"
+    below.text(0.01, 0.93, said, transform=below.transAxes, va="top", fontsize="small")
+    below.set_xlabel(ax.get_xlabel())
+    ax.set_xlabel("")
+    ax.tick_params(labelbottom=False)
 
 
 def _lift_off(picture: Picture, table: Table) -> tuple[Array, Array] | None:

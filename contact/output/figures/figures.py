@@ -204,14 +204,22 @@ def collect(solution: Solved, fields: Sequence[str] = ()) -> Drawing | None:
             pictures.append((name, made))
     if table is None or surface is None:
         return None
-    title, plane = heading(solution.title), solution.problem.dim == 2
-    axes, mirror = axes_of(solution.problem.domain.revolved), solution.output.mirror
     course = None
     if solution.steps:
         tables = [record.table for record in solution.steps if record.table is not None]
         course = Course([record.row for record in solution.steps], tables)
     return Drawing(
-        title, plane, table, held, surface, pictures, axes, mirror, solution.units, course, opposite
+        title=heading(solution.title),
+        plane=solution.problem.dim == 2,
+        table=table,
+        held=held,
+        surface=surface,
+        pictures=pictures,
+        axes=axes_of(solution.problem.domain.revolved),
+        mirror=solution.output.mirror,
+        units=solution.units,
+        course=course,
+        opposite=opposite,
     )
 
 

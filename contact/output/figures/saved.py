@@ -61,14 +61,23 @@ def read_drawing(folder: Path, fields: Sequence[str] = (), mirror: bool = False)
     opposite = None
     if f"{AGAINST}.vtu" in summary.get("files", ()):
         opposite = read(folder, f"{AGAINST}.vtu", read_vtu)
-    title, axes = heading(summary["title"]), axes_of(summary.get("kinematics") == "axisymmetric")
     course = None
     if "steps.csv" in summary.get("files", ()):
         course = Course(
             read(folder, "steps.csv", _rows), read(folder, "contact-steps.csv", _tables)
         )
     return Drawing(
-        title, d == 2, table, held, surface, pictures, axes, mirror, units, course, opposite
+        title=heading(summary["title"]),
+        plane=d == 2,
+        table=table,
+        held=held,
+        surface=surface,
+        pictures=pictures,
+        axes=axes_of(summary.get("kinematics") == "axisymmetric"),
+        mirror=mirror,
+        units=units,
+        course=course,
+        opposite=opposite,
     )
 
 
