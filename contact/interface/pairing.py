@@ -86,7 +86,7 @@ def find_pair(
     points, normal = body.space.tabulate_dof_coordinates()[local, :d], coupling.normal[here]
     gap, cut = coupling.gap[here], 0.0
     if not press:
-        gap, cut = _apart(gap, slave, body, coupling, what)
+        gap, cut = _apart(here, slave, body, coupling, what)
     _, added = distance.measure(points, normal)
     moves = body.free[local, :d]
     admissible = normal * moves
@@ -193,18 +193,21 @@ def _one_sided(
 
 
 def _apart(
-    gap: Array, slave: Surface, body: BodyEquilibrium, coupling: Coupling, what: str
+    here: NDArray[np.intp], slave: Surface, body: BodyEquilibrium, coupling: Coupling, what: str
 ) -> tuple[Array, float]:
-    """Refuse bodies that overlap; return gaps >= 0, and the largest depth taken for 0. Collective.
+    """Refuse bodies that overlap; return gaps without depths, and the largest depth. Collective.
 
     Facets are chords of what is curved: those of two sides that lie on each other cut each other
-    by h^2/8 times the difference of the curvatures.
+    by h^2/8 times the difference of the curvatures. That is taken off; what is negative between
+    sides that are apart remains, as in front of foundations, for the mean of a gap that touches 0
+    within a facet is.
     """
-    comm = body.comm
+    comm, gap = body.comm, coupling.gap[here]
+    least = np.minimum(coupling.apart[here], 0.0)
     longest = comm.allreduce(2 * float(slave.radii.max(initial=0.0)), op=MPI.MAX)
-    cut = comm.allreduce(float(np.max(-gap, initial=0.0)), op=MPI.MAX)
+    cut = comm.allreduce(float(np.max(least - gap, initial=0.0)), op=MPI.MAX)
     if cut <= CHORDS * longest:
-        return np.maximum(gap, 0.0), cut if cut > 1e-5 * body.domain.size else 0.0
+        return np.maximum(gap, least), cut if cut > 1e-5 * body.domain.size else 0.0
     if _connected(body, coupling):
         raise InputError(
             f"{what} are sides of one body that look away from each other; accepted: parts of two "

@@ -1,6 +1,7 @@
 """The dual mortar operator by itself: exact on any pair of meshes."""
 
 import time
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -10,7 +11,7 @@ from scipy.spatial import Delaunay
 from contact.body.description import Body, Fixed
 from contact.body.equilibrium import BodyEquilibrium
 from contact.interface.mortar.basis import basis, positive_change, rule, size_of
-from contact.interface.mortar.bulge import bulges
+from contact.interface.mortar.bulge import bulges, pairs_of
 from contact.interface.mortar.clipping import clipped
 from contact.interface.mortar.coupling import couple
 from contact.interface.mortar.surface import Surface, surface_of
@@ -193,6 +194,24 @@ def test_concentric_arcs(degree) -> None:
         np.testing.assert_allclose(found.normal[inner], radial, atol=1e-12)
     assert errors[0] < (1 / 20) ** 2 / (4 if degree == 1 else 2000)
     assert errors[1] < errors[0] / 3
+
+
+def test_a_bowl_that_touches_within_facets_does_not_cut_them() -> None:
+    """Those of |x - c|^2 over two triangles of degree 2, c in the middle of the edge between."""
+    slave, points = flat(3, 2, 1, 0.0, 1.0, 1)
+    bowl, _ = flat(3, 2, 1, 0.5, -1.0, 1, FIRST)
+    edges = [bowl.corners[:, j] - bowl.corners[:, i] for i, j in pairs_of(3)]
+    found = couple(slave, replace(bowl, bulge=np.sum(np.square(edges), axis=2).T), 1.0)
+    values = np.sum((points[:, :2] - 0.5) ** 2, axis=1)
+    vertices = {0.5: 0.5, 0.25: (0.25 - 0.2) / 0.6, 0.0: -0.2 / 0.6}  # S of the positive functions
+    expected = [vertices[value] for value in values[found.nodes].round(9)]
+    np.testing.assert_allclose(found.gap, expected, atol=1e-12)
+    np.testing.assert_allclose(found.apart, found.gap, atol=1e-12)
+    lower = replace(slave, corners=slave.corners + np.array([0.0, 0.0, 0.1]))
+    cut = couple(lower, replace(bowl, bulge=np.sum(np.square(edges), axis=2).T), 1.0)
+    np.testing.assert_allclose(cut.gap, np.array(expected) - 0.1, atol=1e-12)
+    deepest = int(np.argmin(cut.gap))
+    assert cut.apart[deepest] > cut.gap[deepest] + 0.1
 
 
 def oriented(points, triangles, outwards):

@@ -51,6 +51,9 @@ class Coupling:
         Unit vectors from the slave to the master, between their normals, shape (n, d).
     gap
         Mean distance along them, shape (n,) (length).
+    apart
+        What it would be if the sides did not cut each other, shape (n,). It may be negative too:
+        means are taken with functions that change their sign.
     covered
         Share of int N~_j that faces the master, shape (n,).
     slaves
@@ -67,6 +70,7 @@ class Coupling:
     weight: Array
     normal: Array
     gap: Array
+    apart: Array
     covered: Array
     slaves: NDArray[np.int64]
     own: sparse.csr_array
@@ -120,7 +124,7 @@ def _assembled(parts: Parts, d: int, degree: int, without: NDArray[np.int64]) ->
     kept = np.flatnonzero((covered > LEAST_COVERED) & ~np.isin(every, without))
     normal = summed(parts.normal)[kept]
     normal = normal / np.linalg.norm(normal, axis=1)[:, None]
-    mean = summed(parts.gap)[kept] / weight[kept, None]
+    across = np.einsum("nsd,nd->sn", summed(parts.gap)[kept], normal) / weight[kept]
     masters, columns = np.unique(parts.columns, return_inverse=True)
     rows = np.searchsorted(every, parts.rows)
     other = sparse.csr_array((parts.values, (rows, columns)), shape=(every.size, masters.size))
@@ -134,7 +138,7 @@ def _assembled(parts: Parts, d: int, degree: int, without: NDArray[np.int64]) ->
         every[kept],
         weight[kept],
         normal,
-        np.einsum("nd,nd->n", mean, normal),
+        *across,
         covered[kept],
         every,
         sparse.csr_array(own),

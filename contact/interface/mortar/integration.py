@@ -92,8 +92,11 @@ class Parts:
         int Phi_i N~_j over what faces the master, shape (f, k, k).
     whole
         int Phi_i over all of the facet, shape (f, k).
-    normal, gap
-        int Phi_i times the direction, and times the vector across, shape (f, k, d).
+    normal
+        int Phi_i times the direction, shape (f, k, d).
+    gap
+        int Phi_i times the vector across, everywhere and where the sides do not cut each other,
+        shape (f, k, 2, d).
     rows, columns, values
         int Phi_i (N_l o Pi): numbers of the heir and of the master's node, shape (e,).
     """
@@ -130,12 +133,13 @@ def integrate(slave: Surface, master: Surface, reach: float, heirs: Heirs) -> Pa
     change = positive_change(slave.corners.shape[1], slave.degree)
     dual, weight = _dual(slave, found, change)
     dual, own = heirs.shares @ dual, heirs.shares * weight[:, None, :]
-    gap = np.zeros(weight.shape)
+    gap = np.zeros((*weight.shape, 2))
     entries: list[Entries] = [(NOTHING, NOTHING, np.zeros(0))]
     for points in found:
         phi = np.einsum("pij,pj->pi", dual[points.slave], _functions(points, slave, change))
         phi *= points.weight[:, None]
-        _add(gap, points.slave, phi * points.gap[:, None])
+        across = np.column_stack([points.gap, np.maximum(points.gap, 0.0)])
+        _add(gap, points.slave, phi[:, :, None] * across[:, None, :])
         entries.append(_master_entries(points, phi, heirs.nodes, master))
     return Parts(
         slave.nodes,
@@ -143,7 +147,7 @@ def integrate(slave: Surface, master: Surface, reach: float, heirs: Heirs) -> Pa
         own,
         np.einsum("fij,fj->fi", heirs.shares, integrals(slave)),
         own.sum(axis=2)[:, :, None] * direction[:, None, :],
-        gap[:, :, None] * direction[:, None, :],
+        gap[:, :, :, None] * direction[:, None, None, :],
         *(np.concatenate(part) for part in zip(*entries, strict=True)),
     )
 
