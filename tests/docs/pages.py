@@ -2,7 +2,7 @@
 
 A block after the comment ``<!-- file: NAME -->`` is a file that the reader writes. Else blocks of
 ``python`` are executed, each with the names of those before; ``sh`` line by line; ``toml`` is read.
-Other languages (``console``, ``text``) show what is not executed.
+Other languages (``bash``, ``text``) show what is not executed.
 """
 
 import re
@@ -78,4 +78,4 @@ def _command(words: list[str], place: str) -> None:
     elif words[:1] == ["python3"]:
         runpy.run_path(words[1], run_name="__main__")
     else:
-        assert not words, f"{place}: what runs {words[0]!r}? console blocks are not executed"
+        assert not words, f"{place}: what runs {words[0]!r}? bash blocks are not executed"

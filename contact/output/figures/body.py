@@ -26,6 +26,9 @@ SEEN = 0.005
 #: Part of the drawing's width from which on a boundary has a strip of its own.
 WIDE = 0.25
 
+#: Scaled gaps up to this part of Gamma_3 are drawn.
+FAR = 0.2
+
 #: Height of the strip beneath that shows them (inches).
 STRIP = 0.75
 
@@ -153,7 +156,10 @@ def _body(ax: Axes, picture: Picture, side: int) -> Any:
 
 
 def _foundation(ax: Axes, table: Table, scale: float, edges: Array, side: int) -> None:
-    """Draw the foundation as far as it faces Gamma_3, moved as the displacements are scaled."""
+    """Draw the foundation as far as it faces Gamma_3, moved as the displacements are scaled.
+
+    Not where it is far: gaps to a curved shape, scaled like the displacements, are no shape.
+    """
     points = np.column_stack([table["x"], table["y"]])
     normal, gap = np.column_stack([table["nu_x"], table["nu_y"]]), table["gap"] + table["moved"]
     points = np.concatenate([edges[:1], points, edges[1:]])
@@ -161,10 +167,12 @@ def _foundation(ax: Axes, table: Table, scale: float, edges: Array, side: int) -
     gap = np.concatenate([gap[:1], gap, gap[-1:]])
     points, normal = points * [side, 1], normal * [side, 1]
     surface = points + scale * gap[:, None] * normal
-    ax.plot(*surface.T, color="black", lw=0.5)
-    thick = 0.03 * np.ptp(points, axis=0).max()
-    band = np.concatenate([surface, (surface + thick * normal)[::-1]])
-    ax.fill(*band.T, facecolor="none", edgecolor=BLUE, hatch="////", lw=0)
+    extent = np.ptp(points, axis=0).max()
+    near = np.flatnonzero(scale * gap <= max(FAR * extent, 2 * scale * gap.min()))
+    for run in np.split(near, np.flatnonzero(np.diff(near) > 1) + 1):
+        ax.plot(*surface[run].T, color="black", lw=0.5)
+        band = np.concatenate([surface[run], (surface + 0.03 * extent * normal)[run[::-1]]])
+        ax.fill(*band.T, facecolor="none", edgecolor=BLUE, hatch="////", lw=0)
 
 
 def with_scale(title: str, scale: float) -> str:
