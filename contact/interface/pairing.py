@@ -80,7 +80,7 @@ def find_pair(
     what = f"{key}.against: {part!r} and {against!r}"
     slave = surface_of(body.domain, body.space, part)
     master = surface_of(body.domain, body.space, against).gathered(body.comm)
-    coupling = _coupled(body, slave, master, what, friction)
+    coupling = _coupled(body, slave, master, what, part if friction else None)
     here, local = owned_among(body.layout.index_map, coupling.nodes)
     d = body.dim
     points, normal = body.space.tabulate_dof_coordinates()[local, :d], coupling.normal[here]
@@ -111,9 +111,17 @@ def find_pair(
 
 
 def _coupled(
-    body: BodyEquilibrium, slave: Surface, master: Surface, what: str, friction: bool
+    body: BodyEquilibrium, slave: Surface, master: Surface, what: str, rough: str | None
 ) -> Coupling:
-    """Return the operator without slave nodes that carry no multiplier. Collective."""
+    """Return the operator without slave nodes that carry no multiplier. Collective.
+
+    Parameters
+    ----------
+    body, slave, master, what
+        The sides, and what messages call them.
+    rough
+        The part that the slave side is, if there is friction.
+    """
     common = np.intersect1d(slave.nodes, master.nodes).size
     if body.comm.allreduce(common, op=MPI.SUM) > 0:
         raise InputError(
@@ -123,8 +131,11 @@ def _coupled(
     coupling = couple(slave, master, reach, body.comm)
     _check_apart(body, coupling, what)
     stuck = _stuck(body, coupling)
-    if friction:
-        stuck = np.union1d(stuck, _one_sided(body, slave, coupling, stuck, what))
+    if rough is not None:
+        one_sided = _one_sided(body, coupling)
+        one_sided[np.isin(coupling.nodes, stuck)] = False
+        _check_rim(body, slave, rough, [coupling.nodes[lost] for lost in one_sided.T], what)
+        stuck = np.union1d(stuck, coupling.nodes[one_sided.any(axis=1)])
     if stuck.size:
         coupling = couple(slave, master, reach, body.comm, stuck)
     if coupling.nodes.size == 0:
@@ -155,41 +166,40 @@ def _stuck(body: BodyEquilibrium, coupling: Coupling) -> NDArray[np.int64]:
     return np.unique(np.concatenate([NOTHING, found]))
 
 
-def _one_sided(
-    body: BodyEquilibrium,
-    slave: Surface,
-    coupling: Coupling,
-    stuck: NDArray[np.int64],
-    what: str,
-) -> NDArray[np.int64]:
-    """Return slave nodes with a component that is fixed, but free on the other side. Collective.
-
-    But for those whose normal is fixed.
-
-    Raises
-    ------
-    InputError
-        If they fill facets, and not only a rim.
-    """
-    d = body.dim
-    begin, end = body.layout.index_map.local_range
+def _one_sided(body: BodyEquilibrium, coupling: Coupling) -> NDArray[np.bool_]:
+    """Tell which components of slave nodes are fixed, but free on the other side. Collective."""
     every = np.concatenate([coupling.nodes, coupling.masters])
-    here = np.flatnonzero((every >= begin) & (every < end))
-    fixed = np.zeros((every.size, d), dtype=np.intc)
-    fixed[here] = ~body.free[every[here] - begin, :d]
+    here, local = owned_among(body.layout.index_map, every)
+    fixed = np.zeros((every.size, body.dim), dtype=np.intc)
+    fixed[here] = ~body.free[local, : body.dim]
     body.comm.Allreduce(MPI.IN_PLACE, fixed, op=MPI.SUM)
     own, opposite = np.split(fixed, [coupling.nodes.size])
-    one_sided = (own > 0) & (np.abs(coupling.other) @ opposite <= 0)
-    one_sided[np.isin(coupling.nodes, stuck)] = False
-    filled = any(
-        np.isin(slave.nodes, coupling.nodes[one_sided[:, i]]).all(axis=1).any() for i in range(d)
-    )
+    return (own > 0) & (np.abs(coupling.other) @ opposite <= 0)
+
+
+def _check_rim(
+    body: BodyEquilibrium, slave: Surface, part: str, lost: list[NDArray[np.int64]], what: str
+) -> None:
+    """Refuse supports that hold facets, not only a rim, where the other side is free. Collective.
+
+    Parameters
+    ----------
+    body, slave, part, what
+        The slave side, and what messages call the contact.
+    lost
+        Its nodes where a component is fixed, but free on the other side, for each of them.
+    """
+    facets, filled = body.domain.facets(part), False
+    for support in body.body.fixed:
+        held = np.isin(facets, body.domain.facets(support.on))
+        for given, nodes in zip(support.displacement or (), lost, strict=False):
+            if given is not None:
+                filled |= bool((held & np.isin(slave.nodes, nodes).all(axis=1)).any())
     if body.comm.allreduce(filled, op=MPI.LOR):
         raise InputError(
             f"{what}: supports hold the first along its surface, where friction would pull at "
             "the second; accepted: on and against exchanged, supports on its rim, no friction"
         )
-    return coupling.nodes[one_sided.any(axis=1)]
 
 
 def _apart(
