@@ -168,7 +168,7 @@ def _foundation(ax: Axes, table: Table, scale: float, edges: Array, side: int) -
     points, normal = points * [side, 1], normal * [side, 1]
     surface = points + scale * gap[:, None] * normal
     extent = np.ptp(points, axis=0).max()
-    near = np.flatnonzero(scale * gap <= max(FAR * extent, 2 * scale * gap.min()))
+    near = np.flatnonzero((scale == 1) | (scale * gap <= max(FAR * extent, 2 * scale * gap.min())))
     for run in np.split(near, np.flatnonzero(np.diff(near) > 1) + 1):
         ax.plot(*surface[run].T, color="black", lw=0.5)
         band = np.concatenate([surface[run], (surface + 0.03 * extent * normal)[run[::-1]]])
