@@ -39,6 +39,8 @@ class ResidualMinimiser:
         Maps z and directions, shape (m, k), to the directional derivatives of P, (m, k).
     depth
         Number of directions kept.
+    anew
+        Whether to begin anew when there are so many, instead of leaving out the oldest.
     sweeps
         Most Gauss-Newton steps in one search.
 
@@ -55,10 +57,11 @@ class ResidualMinimiser:
         project: Callable[[Array], Array],
         derivative: Callable[[Array, Array], Array],
         depth: int,
+        anew: bool = False,
         sweeps: int = 20,
     ) -> None:
         self._inner, self._project, self._derivative = inner, project, derivative
-        self._sweeps = sweeps
+        self._sweeps, self._anew = sweeps, anew
         self._directions: deque[Array] = deque(maxlen=depth)
         self._best: Array | None = None
 
@@ -72,6 +75,9 @@ class ResidualMinimiser:
         image
             The z with which the plain block relaxation would go on.
         """
+        if self._anew and len(self._directions) == self._directions.maxlen:
+            self._directions.clear()
+            self._best = None
         new, old = np.stack([force, z]), self._best
         if old is None:
             self._best = new

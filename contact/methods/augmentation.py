@@ -1,4 +1,4 @@
-"""The augmentation r of (3.34): a value that fits a body, and what it adds to the operator."""
+"""The augmentation r of (3.34): a value that fits a body, what it adds and what it acts on."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 
+from contact.interface.interface import Interface
 from contact.interface.jump import Jump
 from contact.problem.scales import Scales
 from contact.typing import Array
@@ -28,3 +29,14 @@ def augmentation(jump: Jump, r: float, friction: bool) -> Array:
     if friction:
         blocks[:, :d, :d] += jump.tangent
     return r * blocks
+
+
+def split(interface: Interface, nodal: Array, friction: bool) -> Array:
+    """Return normal displacements and what slips side by side, shape (n, 1 + d).
+
+    Without friction the slips are no unknowns of the relaxation, and 0 here.
+    """
+    slip = interface.slip(nodal)
+    if not friction:
+        slip = np.zeros_like(slip)
+    return np.column_stack([interface.jump.normal_component(nodal), slip])

@@ -25,12 +25,12 @@ from contact.body.equilibrium import BodyEquilibrium
 from contact.body.norms import domain_norm
 from contact.linear.operator import Counters, Operator
 from contact.methods import uzawa
-from contact.methods.augmentation import augmentation, automatic_r
+from contact.methods.augmentation import augmentation, automatic_r, split
 from contact.methods.best import Best
 from contact.methods.following import Following
 from contact.methods.options import FixedPointOptions
 from contact.methods.report import History, Monitor, Outcome, Record
-from contact.methods.softness import softer_r, spectrum
+from contact.methods.softness import Softer, softer, spectrum
 from contact.methods.stagnation import Stagnation
 from contact.problem.kkt import KKT, evaluate, residual_forces
 from contact.problem.protocols import Problem
@@ -42,8 +42,8 @@ from contact.typing import Array
 #: block relaxation gets no further either.
 PATIENCE, PATIENCE_STALLED, PROGRESS = 25, 3, 0.9
 
-#: Earlier solves that the acceleration uses where the body is soft: its spectrum is wide.
-LONG_MEMORY = 100
+#: What a relaxation that was given up has left, over its tolerance, from which on r does not fit.
+FAR = 100
 
 #: Residual below which frozen coefficients give way to their derivatives.
 NEAR = 1e-2
@@ -82,6 +82,7 @@ class FixedPoint:
         options, body = self.options, self.problem.equilibrium
         self.r = automatic_r(self.problem.scales) if options.r == "auto" else options.r
         self._softened = False
+        self._softer: Softer | None = None
         self.operator = self._new_operator(symmetric=True)
         self.history = History(self.monitor)
         self.state = self.problem.start()
@@ -109,7 +110,7 @@ class FixedPoint:
 
     def _forget(self) -> None:
         """Begin a solve: it does not depend on an earlier one."""
-        self._stalled, self._residual = False, np.inf
+        self._stalled, self._far, self._residual = False, False, np.inf
         self._following = Following(NEAR)
         if not self.operator.symmetric:
             self.operator = self._new_operator(symmetric=True)
@@ -148,7 +149,7 @@ class FixedPoint:
         if interface.response.normal_law(nodal) is not None:
             pressure = interface.pressure(nodal, start.forces)
         z = np.column_stack([pressure, start.forces.friction])
-        z = z + self.r * uzawa.split(interface, nodal, frictional)
+        z = z + self.r * split(interface, nodal, frictional)
         return self._solve(z, interface.bound(nodal, start.forces), 1, start.x)
 
     def _solve(self, z: Array, bound: Array, first: int, secant_at: Array) -> tuple[State, Outcome]:
@@ -163,11 +164,11 @@ class FixedPoint:
             if friction and first == 0 and iteration == 1:
                 # The slip without friction is a bad guess, and so is the contact that goes with it.
                 z = np.zeros_like(z)
-            if self._stalled and self._residual > NEAR and self._soften():
+            if self._far and (start := self._soften(friction)) is not None:
                 # What was found with an r that does not fit is worse than nothing.
                 self.state, secant_at = problem.start(), body.rest()
-                z, bound = np.zeros_like(z), np.zeros_like(bound)
-                stagnation = Stagnation(PATIENCE, PROGRESS)
+                z, bound = start, np.zeros_like(bound)
+                stagnation, best = Stagnation(PATIENCE, PROGRESS), Best()
             previous = self.state
             # Newton's tangent of a zero strain is the secant, and cheaper.
             kind = "tangent" if tangent and iteration > first else "secant"
@@ -194,8 +195,7 @@ class FixedPoint:
             patience = PATIENCE_STALLED if self._stalled else PATIENCE
             given_up = stagnation(residuals.largest, patience)
             if given_up and options.stopping == "residual":
-                far = self._stalled and stagnation.best > NEAR
-                why = f": {spectrum(self.options.r, self.r)}" if far else ""
+                why = f": {spectrum(problem, options.r, self._softer)}" if self._far else ""
                 ended = f"the residual stalled at {stagnation.best:.2e}{why}"
                 break
         else:
@@ -204,17 +204,16 @@ class FixedPoint:
             self.state, residuals = best.found
         return self._end(residuals, ended)
 
-    def _soften(self) -> bool:
-        """Take r from the body's softest mode, once; tell whether it has changed."""
+    def _soften(self, friction: bool) -> Array | None:
+        """Take r from the body's softest mode, once; return where to begin if it has changed."""
         possible = self.options.r == "auto" and self.options.stopping == "residual"
-        r = softer_r(self.problem, self.operator) if possible and not self._softened else None
-        self._softened = True
-        if r is None:
-            return False
-        self.r = r
-        depth = LONG_MEMORY if self._relaxation.depth else 0
-        self._relaxation = replace(self._relaxation, r=r, depth=depth)
-        return True
+        if not possible or self._softened:
+            return None
+        self._softened, self._softer = True, softer(self.problem, self.operator, friction)
+        if self._softer is None:
+            return None
+        self.r, self._relaxation = self._softer.r, self._softer.fit(self._relaxation)
+        return self._softer.z
 
     def _step(
         self, bound: Array, z: Array, friction: bool, kind: str, secant_at: Array
@@ -240,6 +239,7 @@ class FixedPoint:
         poll = self.poll or self.history.poll
         result = uzawa.block_relaxation(interface, step, z, self._relaxation, self._norm, poll)
         self._stalled = result.stalled
+        self._far = result.stalled and result.residual > FAR * self._relaxation.tolerance
         x = body.moved(state.x, result.increment)
         self.state = replace(state, x=x, forces=result.forces)
         return result.iterations, result.z

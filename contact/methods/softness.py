@@ -4,12 +4,13 @@ A mode of Gamma_3 with the stiffness sigma contracts by sigma/(sigma + r) where 
 and by r/(sigma + r) where it is free: r has to stand in the middle of the spectrum. Of a block the
 ends are known, 1.1 E'/H and 1.92 E'/h. A slender body is softer than that by many orders of
 magnitude, and only its operator says by how many. A parameter for each node, from the flexibility
-of that node alone, does not do: what is wide is the spectrum of all together.
+of that node alone, does no better: what is wide is the spectrum of all together.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass, replace
 
 import numpy as np
 from mpi4py import MPI
@@ -17,22 +18,53 @@ from mpi4py import MPI
 from contact.errors import InputError
 from contact.interface.jump import Jump
 from contact.linear.operator import Operator
-from contact.methods.augmentation import augmentation, automatic_r
+from contact.methods.augmentation import augmentation, automatic_r, split
+from contact.methods.uzawa import Relaxation
+from contact.problem.kkt import residual_forces
 from contact.problem.protocols import Problem
 from contact.typing import Array
+
+#: Earlier solves that the acceleration uses. It begins anew when it has so many, as it may have
+#: come to what is the best among these alone.
+MEMORY = 60
 
 #: Lanczos's steps: the softest mode stands out.
 STEPS = 12
 
 #: Springs in all modes while the softest is looked for, over r*.
-SHIFT = 1e-10
+SHIFT = 1e-14
 
 #: Modes softer than this, over the shift, are motions that nothing but contact holds.
 FREE = 10.0
 
 
-def softer_r(problem: Problem, operator: Operator) -> float | None:
-    """Return r in the middle of the spectrum at rest, where that is below r*. Collective.
+@dataclass(frozen=True)
+class Softer:
+    """What fits a soft body.
+
+    Attributes
+    ----------
+    r
+        The parameter (stress/length).
+    sigma
+        Stiffness of the softest mode (stress/length).
+    z
+        What the relaxation begins with, shape (n, 1 + d): r u without contact; 0 where contact
+        alone holds the body.
+    """
+
+    r: float
+    sigma: float
+    z: Array
+
+    def fit(self, relaxation: Relaxation) -> Relaxation:
+        """Return the relaxation with this r, and memory for a wide spectrum."""
+        depth = MEMORY if relaxation.depth else 0
+        return replace(relaxation, r=self.r, depth=depth, anew=True)
+
+
+def softer(problem: Problem, operator: Operator, friction: bool) -> Softer | None:
+    """Return what fits a body that is softer than a block; None for others. Collective.
 
     Parameters
     ----------
@@ -40,11 +72,8 @@ def softer_r(problem: Problem, operator: Operator) -> float | None:
         The contact problem.
     operator
         Its operator; what it holds is replaced.
-
-    Returns
-    -------
-    The parameter (stress/length); None if the body is no softer than a block, or if nothing is
-    found.
+    friction
+        Whether tangential forces act.
     """
     interface, body, state = problem.interface, problem.equilibrium, problem.start()
     jump, star = interface.jump, automatic_r(problem.scales)
@@ -59,21 +88,33 @@ def softer_r(problem: Problem, operator: Operator) -> float | None:
 
     try:
         operator.update("secant", state.x, blocks, constant=body.linear)
-        sigma = softest(jump, solve, shift)
+        sigma, held = softest(jump, solve, shift)
+        loads = -residual_forces(problem, state)
+        free = jump.apply(operator.solve(loads)) if held else np.zeros_like(nodal)
     except InputError:  # nothing but contact holds it, and the springs are too soft to be seen
         return None
     block = 1.1 * problem.scales.plane_modulus / problem.scales.height
-    return None if sigma is None or sigma >= block else star * float(np.sqrt(sigma / block))
+    if sigma is None or sigma >= block:
+        return None
+    r = star * float(np.sqrt(sigma / block))
+    return Softer(r, sigma, r * split(interface, nodal + free, friction))
 
 
-def spectrum(given: float | str, r: float) -> str:
-    """Say why the block relaxation may have stalled with r, "auto" or given."""
+def spectrum(problem: Problem, given: float | str, softer: Softer | None) -> str:
+    """Say why the block relaxation may have stalled, with r "auto" or given, and fitted or not."""
     if given != "auto":
-        return f'r = {r:.3g} was given, r = "auto" fits it to the body'
-    return f"some modes of the body are too soft for r = {r:.3g}, others too stiff"
+        return f'r = {given:.3g} was given, r = "auto" fits it to the body'
+    star = automatic_r(problem.scales)
+    if softer is None:
+        return f"r = {star:.3g} is that of a block, and the body has no softer modes"
+    stiffest = 1.92 * problem.scales.plane_modulus / problem.scales.spacing
+    return (
+        f"contact moves modes of the body with stiffnesses from {softer.sigma:.2g} to "
+        f"{stiffest:.2g} (stress/length); neither r = {star:.2g} nor {softer.r:.2g} fits all"
+    )
 
 
-def softest(jump: Jump, solve: Callable[[Array], Array], shift: float) -> float | None:
+def softest(jump: Jump, solve: Callable[[Array], Array], shift: float) -> tuple[float | None, bool]:
     """Return the least stiffness of a mode of the normal displacements. Collective.
 
     Parameters
@@ -88,8 +129,8 @@ def softest(jump: Jump, solve: Callable[[Array], Array], shift: float) -> float 
 
     Returns
     -------
-    The Ritz value of a few steps of Lanczos's method in L2(Gamma_3) (stress/length); None if all
-    that was found is free.
+    The Ritz value of a few steps of Lanczos's method in L2(Gamma_3) (stress/length), None if all
+    that was found is free; and whether nothing was free.
     """
     basis: list[Array] = []
     images: list[Array] = []
@@ -113,11 +154,11 @@ def softest(jump: Jump, solve: Callable[[Array], Array], shift: float) -> float 
         images.append(solve(basis[-1]))
         vector = images[-1]
     if not basis:
-        return None
+        return None, False
     matrix = np.array([[inner(a, b) for b in images] for a in basis])
     if not np.isfinite(matrix).all():
-        return None
+        return None, False
     values = np.linalg.eigvalsh((matrix + matrix.T) / 2)
     stiffness = 1 / values[values > 0] - shift
     held = stiffness[stiffness > FREE * shift]
-    return float(held.min()) if held.size else None
+    return (float(held.min()) if held.size else None), held.size == stiffness.size

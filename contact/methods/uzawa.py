@@ -23,6 +23,7 @@ from contact.interface.projections import disc_derivative, project_disc
 from contact.interface.residuals import interface_residuals
 from contact.linear.operator import Operator
 from contact.methods.acceleration import ResidualMinimiser
+from contact.methods.augmentation import split
 from contact.methods.stagnation import Stagnation
 from contact.typing import Array
 from forms.foundation import contact_multiplier
@@ -54,6 +55,8 @@ class Relaxation:
         If given, stop by the thesis's criterion (3.45) with this epsilon instead.
     single_loop
         Whether the friction bound is updated in every iteration.
+    anew
+        Whether the acceleration begins anew after as many solves as it uses.
     """
 
     r: float
@@ -63,6 +66,7 @@ class Relaxation:
     over_relaxation: float = 1.0
     thesis_tolerance: float | None = None
     single_loop: bool = False
+    anew: bool = False
 
 
 @dataclass(frozen=True)
@@ -125,17 +129,6 @@ class RelaxationResult:
     stalled: bool = False
 
 
-def split(interface: Interface, nodal: Array, friction: bool) -> Array:
-    """Return normal displacements and what slips side by side, shape (n, 1 + d).
-
-    Without friction the slips are no unknowns of the relaxation, and 0 here.
-    """
-    slip = interface.slip(nodal)
-    if not friction:
-        slip = np.zeros_like(slip)
-    return np.column_stack([interface.jump.normal_component(nodal), slip])
-
-
 @dataclass
 class _Projection:
     """Steps 2 and 3, from z of shape (n, 1 + d) to the new multipliers: (3.43) and the disc.
@@ -173,7 +166,7 @@ class _Projection:
         tangential = disc_derivative(z[:, 1:], self.bound, directions[:, 1:])
         return np.concatenate([normal, tangential], axis=1)
 
-    def accelerator(self, depth: int) -> ResidualMinimiser | None:
+    def accelerator(self, depth: int, anew: bool) -> ResidualMinimiser | None:
         """Return what speeds up the iteration of z, as a flat array; None with depth 0."""
         if depth == 0:
             return None
@@ -190,7 +183,7 @@ class _Projection:
             columns = directions.reshape(*shape, directions.shape[1])
             return self.derivative(flat.reshape(shape), columns).reshape(directions.shape)
 
-        return ResidualMinimiser(inner, project, derivative, depth)
+        return ResidualMinimiser(inner, project, derivative, depth, anew)
 
 
 class _Changes:
@@ -253,7 +246,7 @@ def block_relaxation(
     """
     jump, r, law = interface.jump, parameters.r, step.law
     project = _Projection(jump, r, step.bound, law)
-    accelerator = project.accelerator(parameters.depth)
+    accelerator = project.accelerator(parameters.depth, parameters.anew)
     changes = None if domain_norm is None else _Changes(project, step.x, domain_norm)
     residual, forces = np.inf, Multipliers.zero(jump)
     increment: Array = np.zeros(step.x.size)
@@ -279,7 +272,9 @@ def block_relaxation(
         logger.debug("inner iteration %d: residual %.2e", iteration, residual)
         phi = (z - multiplier) * (1 / r)
         image = multiplier + r * (phi + parameters.over_relaxation * (u - phi))
-        measured, done = residual, residual <= parameters.tolerance or not np.isfinite(residual)
+        done = residual <= parameters.tolerance or not np.isfinite(residual)
+        # Not the residual: where nothing touches yet it is small, beside the stress of closing.
+        measured = jump.norm(total - project(total + r * u))
         if parameters.thesis_tolerance is not None:
             assert changes is not None
             squares, done = changes.squares(increment, image), False
