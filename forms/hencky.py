@@ -184,6 +184,11 @@ class UserLaw(Isotropic):
     modulus
         The function g(t); it must accept UFL expressions and NumPy arrays.
 
+    Raises
+    ------
+    ValueError
+        If the function is none, or takes no UFL.
+
     Notes
     -----
     The energy is integrated by a 12-point Gauss rule on [0, t], exact for a polynomial g of
@@ -191,6 +196,16 @@ class UserLaw(Isotropic):
     """
 
     modulus: Callable[[Value], Value] = field(kw_only=True)
+
+    def __post_init__(self) -> None:
+        """Refuse what UFL cannot take, before it stands in a form."""
+        try:
+            self.modulus(ufl.variable(ufl.as_ufl(1e-3)))
+        except (TypeError, ValueError, AttributeError) as error:
+            raise ValueError(
+                f"modulus: {error}; accepted: a function of t = |dev eps| by arithmetic and the "
+                "functions of forms.ops, for UFL and NumPy alike"
+            ) from error
 
     def secant_modulus(self, q: Value) -> Value:
         """Return g(sqrt(q)), kept away from the kink of the square root at q = 0."""

@@ -117,8 +117,11 @@ class Callback:
         return self._values(x)
 
     def _values(self, x: Array) -> Array:
-        values = np.asarray(self.function(x), dtype=float)
-        return np.broadcast_to(values, x.shape[1:]).astype(float)
+        try:
+            values = np.asarray(self.function(x), dtype=float)
+            return np.broadcast_to(values, x.shape[1:]).astype(float)
+        except (TypeError, ValueError) as error:
+            raise InputError(f"given {self.function!r}: {error}; accepted: {ACCEPTED}") from error
 
 
 @dataclass(frozen=True, eq=False)

@@ -18,7 +18,7 @@ from forms.laws import ConstantCoefficient, Coulomb, FrictionCoefficient, Fricti
 
 @dataclass(frozen=True)
 class Friction:
-    """Friction on the contact part: none, or what one of the first four says.
+    """Friction on the contact part: none, or what one of these says, and a radius.
 
     Attributes
     ----------
@@ -30,9 +30,15 @@ class Friction:
     radius
         Radius of the smoothing operator R; 0 for R = identity.
     mu
-        Coulomb's mu, a number or function of position likewise, instead of `coefficient`.
+        Coulomb's mu, a number or function of position likewise; or a `coefficient`, which it then
+        becomes.
     law
         Any other law, for instance with a coefficient that depends on the pressure.
+
+    Raises
+    ------
+    InputError
+        If several are given, or something else.
     """
 
     coefficient: FrictionCoefficient | None = None
@@ -48,14 +54,22 @@ class Friction:
                 f"Friction({self.coefficient}): accepted: Friction(mu={self.coefficient}), a "
                 "coefficient, or Friction(tresca=...), a bound"
             )
+        if sum(law is not None for law in self._laws) > 1:
+            raise InputError("Friction: accepted: one of coefficient, tresca, mu and law")
+        if hasattr(self.mu, "lipschitz"):
+            object.__setattr__(self, "coefficient", self.mu)
+            object.__setattr__(self, "mu", None)
         object.__setattr__(self, "tresca", field(self.tresca))
         object.__setattr__(self, "mu", field(self.mu))
 
     @property
+    def _laws(self) -> tuple[object, ...]:
+        return self.coefficient, self.tresca, self.mu, self.law
+
+    @property
     def given(self) -> bool:
         """Whether there is any."""
-        laws = (self.coefficient, self.tresca, self.mu, self.law)
-        return any(law is not None for law in laws)
+        return any(law is not None for law in self._laws)
 
     def law_at(self, points: Array) -> FrictionLaw | None:
         """Return the law at nodes of coordinates (n, d); None without friction. Collective."""

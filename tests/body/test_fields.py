@@ -20,6 +20,7 @@ from contact import (
     Linear,
     Load,
     Problem,
+    SlipCoefficient,
     Sphere,
     solve,
 )
@@ -127,7 +128,9 @@ def made(law: Linear, contact: Any = None) -> Problem:
         (lambda: Fixed("top", ["x", 0.0]), "accepted: a number, a function of x"),
         (lambda: Load("top", pressure=True), "accepted: a number, a function of x"),
         (lambda: Friction(0.3), r"accepted: Friction\(mu=0.3\)"),
+        (lambda: Friction(mu=0.3, tresca=1.0), "accepted: one of coefficient, tresca, mu and law"),
         (lambda: field(ufl.Identity(2)), "UFL of shape"),
+        (lambda: field(lambda x: x[:2]).numpy(np.zeros((3, 2))), "accepted: a number, a function"),
         (lambda: Sphere((0.0, -1.0), -1.0), "accepted: a radius > 0"),
         (lambda: made(Linear(10.0, 0.6)), "Poisson's ratio 0.6; accepted"),
         (lambda: made(Linear(10.0, 0.3), "bottom"), r"accepted: Contact\(part"),
@@ -144,3 +147,8 @@ def test_a_function_of_another_mesh() -> None:
     function = fem.Function(fem.functionspace(elsewhere, ("Lagrange", 1)))
     with pytest.raises(InputError, match="not defined everywhere"):
         field(function).numpy(np.zeros((1, 2)))
+
+
+def test_a_coefficient_that_depends_on_the_slip_is_a_coefficient() -> None:
+    weaker = SlipCoefficient(0.3, 0.2, 10.0)
+    assert Friction(mu=weaker) == Friction(weaker)
