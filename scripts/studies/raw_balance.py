@@ -32,7 +32,8 @@ class Imbalance:
         Euclidean norms over the nodes: of the forces left; of loads, contact forces and
         reactions, added up (force).
     charge, electrified
-        The same of charges; 0 without a potential (charge).
+        The same of charges, but for what flows through nodes that a support holds; 0 without a
+        potential (charge).
     """
 
     force: float
@@ -57,6 +58,11 @@ def imbalance(solution: Solution) -> Imbalance:
         for i, value in enumerate(fixed.displacement or ()):
             free[nodes, i] &= value is None
         loose[nodes] &= fixed.potential is None
+    # Nodes that a support holds conduct as well, but are no contact nodes: they have no row.
+    for contact in problem.contacts:
+        facets = problem.domain.facets(contact.on)
+        nodes = fem.locate_dofs_topological(body.space, d - 1, facets)
+        loose[np.setdiff1d(nodes, problem.nodes.nodes)] = False
     norm = np.linalg.norm
     applied = norm(loads) + norm(touch) + norm(left[~free])
     electrified = norm(flux) + norm(charge[~loose])

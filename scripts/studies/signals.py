@@ -1,9 +1,14 @@
 """Runs that are ended by signals: the earlier result or the new one is there whole, always.
 
-`python3 -m scripts.studies.signals [--out DIR] [--coarse] [--count N]`. One bar is solved again and
-again into one folder, each time under another load, on one rank and on two. Half of the runs get
-their signal (SIGINT, SIGTERM or SIGKILL, with two ranks sent to the launcher) at a random time,
-half while they write. Each result is then held against its own load, and no process may be left.
+`python3 -m scripts.studies.signals [--out DIR] [--coarse] [--count N] [--kills N]`. One bar is
+solved again and again into one folder, each time under another load, on one rank and on two. Half
+of the runs get their signal (SIGINT, SIGTERM or SIGKILL, with two ranks sent to the launcher) at a
+random time, half while they write. Each result is then held against its own load, and no process
+may be left.
+
+Then evolutions with friction are killed at random times, on one rank and on two, and go on from
+their checkpoints on one, two or three; one is killed again and again, on 1, 2 and 3 ranks, and ends
+on 1. Their steps are held against those of a run that nothing interrupts.
 """
 
 from __future__ import annotations
@@ -11,31 +16,36 @@ from __future__ import annotations
 import csv
 import json
 import os
+import shutil
 import signal
 import subprocess
 import sys
 import time
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from contact.output import transaction
 from scripts.reporting import Report, append, parser
 
 COUNT, COARSE_COUNT, SEED = 120, 8, 23
-CASE = Path(__file__).parents[1] / "cases/bar.toml"
+KILLS, COARSE_KILLS = 20, 2
+CASES = Path(__file__).parents[1] / "cases"
 SIGNALS = signal.SIGINT, signal.SIGTERM, signal.SIGKILL
 #: Seconds that a run may need to end after its signal, and a whole one.
 GRACE, LIMIT = 60.0, 300.0
+#: Largest difference between steps with and without a restart, relative to the largest number.
+AGREE = 1e-10
 
 
 def command(folder: Path, number: int, ranks: int) -> list[str]:
     """Return the command that solves the bar under its load."""
-    launcher = [] if ranks == 1 else ["mpirun", "--oversubscribe", "-n", str(ranks)]
     settings = {
         "title": f"run {number}",
         "mesh.cells": "[32, 8]",
@@ -43,9 +53,30 @@ def command(folder: Path, number: int, ranks: int) -> list[str]:
         "friction.mu": "0.3",
         "solver.method": "newton",
     }
+    given = [str(CASES / "bar.toml"), "--out", str(folder), "--plot", "--overwrite"]
+    return solving(ranks, given, settings)
+
+
+def solving(ranks: int, given: Sequence[str], settings: Mapping[str, str]) -> list[str]:
+    """Return a command that solves on some ranks."""
+    launcher = [] if ranks == 1 else ["mpirun", "--oversubscribe", "-n", str(ranks)]
     pairs = [f"--set={key}={value}" for key, value in settings.items()]
-    run = [sys.executable, "-m", "contact", "solve", str(CASE), "--out", str(folder), *pairs]
-    return [*launcher, *run, "--quiet", "--plot", "--overwrite"]
+    run = [sys.executable, "-m", "contact", "solve", *given, *pairs, "--quiet"]
+    return [*launcher, *run]
+
+
+def evolution(folder: Path, ranks: int) -> list[str]:
+    """Return the command that begins an evolution, or goes on with it."""
+    if any(folder.glob("checkpoints*/0*.npz")):
+        return solving(ranks, ["--restart", str(folder)], {})
+    settings = {
+        "mesh.cells": "[16, 8]",
+        "evolution.steps": "[2, 3, 6, 6]",
+        "solver.tolerance": "1e-12",
+        "output.fields": '"none"',
+    }
+    given = [str(CASES / "fretting.toml"), "--out", str(folder), "--overwrite"]
+    return solving(ranks, given, settings)
 
 
 def load_of(number: int) -> float:
@@ -74,16 +105,24 @@ def wait_until_writing(process: subprocess.Popen[bytes], folder: Path) -> None:
         time.sleep(0.001)
 
 
+def wait_for_step(process: subprocess.Popen[bytes], folder: Path, count: int) -> None:
+    """Wait until a run has left some checkpoints."""
+    while process.poll() is None and not any(folder.glob(f"checkpoints/{count:05d}.npz")):
+        time.sleep(0.001)
+
+
 def disturbed(
-    folder: Path, number: int, ranks: int, kind: signal.Signals, writing: bool, delay: float
+    started: list[str],
+    kind: signal.Signals,
+    delay: float,
+    wait: Callable[[subprocess.Popen[bytes]], None] | None = None,
 ) -> tuple[int, int]:
     """Run and send a signal; return the status and how many processes are left after it."""
-    started = command(folder, number, ranks)
     process = subprocess.Popen(
         started, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, start_new_session=True
     )
-    if writing:
-        wait_until_writing(process, folder)
+    if wait is not None:
+        wait(process)
     time.sleep(delay)
     if process.poll() is None:
         process.send_signal(kind)
@@ -119,12 +158,70 @@ def fault(folder: Path, accepted: set[int]) -> str:
     return ""
 
 
+def table(path: Path) -> dict[str, NDArray[Any]]:
+    """Return the columns of a CSV file; those of what it took to solve are left out."""
+    with path.open() as stream:
+        rows = list(csv.DictReader(stream))
+    counts = "linear_solves", "factorizations", "kkt"
+    return {name: np.array([row[name] for row in rows]) for name in rows[0] if name not in counts}
+
+
+def difference(one: Path, other: Path) -> float:
+    """Return the largest difference between columns of two files, over the largest number there."""
+    first, second = table(one), table(other)
+    if {name: len(column) for name, column in first.items()} != {
+        name: len(column) for name, column in second.items()
+    }:
+        return np.inf
+    largest = 0.0
+    for name, column in first.items():
+        if name == "status":
+            largest = max(largest, float(np.any(column != second[name])))
+            continue
+        a, b = column.astype(float), second[name].astype(float)
+        largest = max(largest, float(np.abs(a - b).max() / (np.abs(a).max() or 1.0)))
+    return largest
+
+
+def killed(folder: Path, count: int, rng: np.random.Generator) -> dict[str, list[Any]]:
+    """Kill evolutions, let them go on, and return how far their steps are from those of one."""
+    whole = folder / "whole"
+    begin = time.monotonic()
+    subprocess.run(evolution(whole, 1), check=True, stdout=subprocess.DEVNULL)
+    seconds = time.monotonic() - begin
+    rows: dict[str, list[Any]] = {
+        name: [] for name in ("run", "ranks", "statuses", "steps left", "left", "difference")
+    }
+    ways = [[1 + number % 2, int(rng.integers(1, 4))] for number in range(count)]
+    for number, way in enumerate([*ways, [1, 2, 3, 1]]):
+        run, statuses, steps, left = folder / f"evolution-{number}", [], [], 0
+        for ranks in way[:-1]:
+            delay, wait = rng.uniform(0.2, 1.0) * seconds, None
+            if len(way) > 2:
+                count = sum(steps[-1:]) + 2
+                delay, wait = 0.0, partial(wait_for_step, folder=run, count=count)
+            status, remain = disturbed(evolution(run, ranks), signal.SIGKILL, delay, wait)
+            statuses, left = [*statuses, status], left + remain
+            steps.append(len(list(run.glob("checkpoints/0*.npz"))))
+        if not (run / transaction.SUMMARY).exists():
+            subprocess.run(evolution(run, way[-1]), check=True, stdout=subprocess.DEVNULL)
+        far = max(difference(whole / f, run / f) for f in ("steps.csv", "contact-steps.csv"))
+        lists = (" ".join(map(str, these)) for these in (way, statuses, steps))
+        row = (number, *lists, left, far)
+        print(*row, flush=True)
+        append(rows, *row)
+        shutil.rmtree(run)
+    return rows
+
+
 def main(arguments: Sequence[str] | None = None) -> int:
     """Disturb runs and look at what they leave."""
     options = parser(__doc__, "signals")
-    options.add_argument("--count", type=int, help="number of signals")
+    options.add_argument("--count", type=int, help="number of signals to the bar")
+    options.add_argument("--kills", type=int, help="number of evolutions to kill")
     given = options.parse_args(arguments)
-    count = given.count or (COARSE_COUNT if given.coarse else COUNT)
+    count = (COARSE_COUNT if given.coarse else COUNT) if given.count is None else given.count
+    kills = (COARSE_KILLS if given.coarse else KILLS) if given.kills is None else given.kills
     rng, folder = np.random.default_rng(SEED), given.out / "runs"
     begin = time.monotonic()
     subprocess.run(command(folder, 0, 1), check=True, stdout=subprocess.DEVNULL)
@@ -136,7 +233,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         ranks, kind = 1 + number % 2, SIGNALS[number // 2 % 3]
         writing = bool(number // 6 % 2)
         delay = float(rng.uniform(0.0, 0.5 if writing else seconds))
-        status, left = disturbed(folder, number, ranks, kind, writing, delay)
+        wait = partial(wait_until_writing, folder=folder) if writing else None
+        status, left = disturbed(command(folder, number, ranks), kind, delay, wait)
         wrong = fault(folder, {before, number}) or (f"{left} processes left" if left else "")
         before = int(json.loads((folder / "summary.json").read_text())["title"].split()[1])
         what = "new result" if before == number else "earlier result"
@@ -148,7 +246,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
     for end, times in sorted(ends.items()):
         print(f"{times:4d}  {end}")
     Report(given.out).table("signals", f"Faults after {count} signals", rows)
-    return 1 if rows["run"] else 0
+    steps = killed(given.out / "evolutions", kills, rng)
+    Report(given.out).table("kills", f"Evolutions that went on after {kills} kills", steps)
+    far = max(steps["difference"]) > AGREE or any(steps["left"])
+    return 1 if rows["run"] or far else 0
 
 
 if __name__ == "__main__":
