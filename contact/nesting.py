@@ -45,9 +45,10 @@ def pays(case: Case, problem: ContactProblem) -> bool:
 
 def _levels(case: Case, problem: ContactProblem) -> int | None:
     """Return the number of meshes, the finest one counted; None for all that pay."""
-    given = case.solver.nested_levels if isinstance(case.solver, NewtonOptions) else None
+    newton = case.solver if isinstance(case.solver, NewtonOptions) else NewtonOptions()
     # In the plane a second coarser one takes more time than it saves on the first.
-    return 2 if given is None and problem.dim == 2 and not case.solver.nested else given
+    one = newton.nested_levels is None and problem.dim == 2 and not newton.nested
+    return 2 if one else newton.nested_levels
 
 
 def nested_start(case: Case, problem: ContactProblem, **replacements: Any) -> State:

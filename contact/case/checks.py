@@ -49,9 +49,10 @@ def check_sections(case: Case) -> None:
 def check_sizes(case: Case) -> None:
     """Raise a fault if a number is so large or so small that its square is none any more."""
     for path, value in _values((), case):
-        number = value
         if isinstance(value, Expression):
             number = value.value if value.is_constant else 0.0
+        else:
+            number = value
         if number != 0 and math.isfinite(number) and not 1 / HUGE <= abs(number) <= HUGE:
             accepted = f"0, or sizes from {1 / HUGE:g} to {HUGE:g}, whose squares do not overflow"
             raise fault(path, number, accepted)

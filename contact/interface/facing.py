@@ -10,6 +10,7 @@ from contact.interface.mortar.coupling import couple
 from contact.interface.mortar.surface import Surface, surface_of
 from contact.interface.pairing import CHORDS, REACH
 from contact.mesh.domain import Domain
+from contact.mesh.entities import owned_among
 from contact.mesh.pieces import connected_pieces
 
 
@@ -22,14 +23,14 @@ def facing_parts(domain: Domain) -> list[tuple[str, str]]:
     piece, count = connected_pieces(space)
     if count == 1:
         return []
-    comm, begin = domain.comm, space.dofmap.index_map.local_range[0]
+    comm = domain.comm
     sides: list[tuple[float, str, Surface, Surface, int]] = []
     for name in sorted(domain.parts):
         own = surface_of(domain, space, name)
         every = own.gathered(comm)
-        here = np.unique(every.nodes) - begin
+        _, local = owned_among(space.dofmap.index_map, every.nodes.ravel())
         there = np.zeros(count, dtype=np.intc)
-        there[piece[here[(here >= 0) & (here < piece.size)]]] = 1
+        there[piece[local]] = 1
         comm.Allreduce(MPI.IN_PLACE, there, op=MPI.MAX)
         if there.sum() == 1:
             sides.append((float(every.radii.mean()), name, own, every, int(there.argmax())))

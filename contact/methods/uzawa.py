@@ -19,6 +19,7 @@ from contact.interface.interface import Interface
 from contact.interface.jump import Jump
 from contact.interface.layer import NormalLaw
 from contact.interface.multipliers import Multipliers
+from contact.interface.nodes import ContactNodes
 from contact.interface.projections import disc_derivative, project_disc
 from contact.interface.residuals import interface_residuals
 from contact.linear.operator import Operator
@@ -143,7 +144,7 @@ class _Projection:
         Friction bound and layer, as in `Linearised`.
     """
 
-    jump: Jump
+    jump: ContactNodes
     r: float
     bound: Array
     law: NormalLaw | None

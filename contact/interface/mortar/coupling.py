@@ -124,7 +124,7 @@ def _assembled(parts: Parts, d: int, degree: int, without: NDArray[np.int64]) ->
     kept = np.flatnonzero((covered > LEAST_COVERED) & ~np.isin(every, without))
     normal = summed(parts.normal)[kept]
     normal = normal / np.linalg.norm(normal, axis=1)[:, None]
-    across = np.einsum("nsd,nd->sn", summed(parts.gap)[kept], normal) / weight[kept]
+    gap, apart = np.einsum("nsd,nd->sn", summed(parts.gap)[kept], normal) / weight[kept]
     masters, columns = np.unique(parts.columns, return_inverse=True)
     rows = np.searchsorted(every, parts.rows)
     other = sparse.csr_array((parts.values, (rows, columns)), shape=(every.size, masters.size))
@@ -138,7 +138,8 @@ def _assembled(parts: Parts, d: int, degree: int, without: NDArray[np.int64]) ->
         every[kept],
         weight[kept],
         normal,
-        *across,
+        gap,
+        apart,
         covered[kept],
         every,
         sparse.csr_array(own),
