@@ -1,6 +1,6 @@
-"""Semismooth Newton: against the block relaxation, its rate, its fall-backs, nested meshes."""
+"""Semismooth Newton: against the block relaxation, its rate, nested meshes."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 import pytest
@@ -11,31 +11,20 @@ from contact.case.file import Case, parse_case
 from contact.case.nesting import coarser_cases
 from contact.errors import InputError
 from contact.interface.friction import Friction
-from contact.interface.linearised import Moduli, linearise
 from contact.interface.multipliers import Multipliers
-from contact.interface.status import CLOSED, FREE, SLIDES, STICKS
 from contact.methods.fixed_point import FixedPoint
-from contact.methods.load_steps import load_steps
 from contact.methods.newton import Newton
 from contact.methods.options import FixedPointOptions, NewtonOptions
-from contact.methods.report import Outcome
-from contact.problem.kkt import KKT, evaluate
 from contact.problem.problem import ContactProblem
 from contact.problem.state import State
 from contact.solving import solve
 from forms.hencky import Linear, Log
-from forms.laws import ConstantCoefficient, Coulomb, SlipCoefficient
+from forms.laws import ConstantCoefficient, SlipCoefficient
 from scripts.cases import bar
 from tests.problems import mechanics
+from tests.problems.mechanics import newton
 
 SELF = MPI.COMM_SELF
-
-
-def newton(problem: ContactProblem, **options) -> Newton:
-    method = Newton(problem, NewtonOptions(**{"tolerance": 1e-10, **options}))
-    _, outcome = method.solve()
-    assert outcome.converged, outcome
-    return method
 
 
 def compare(one: ContactProblem, other: ContactProblem, tolerance: float) -> None:
@@ -157,55 +146,6 @@ def test_the_iterative_solver_finds_the_same_solution():
     assert np.allclose(exact.state.x, method.state.x, rtol=0, atol=1e-9)
 
 
-@pytest.mark.parametrize("dimension", [2, 3])
-def test_blocks_are_the_derivative_of_the_contact_forces(dimension):
-    """Compare with finite differences at a sliding and sticking iterate, away from kinks."""
-    problem = mechanics.bar(SELF, 4) if dimension == 2 else mechanics.leaning_block(SELF, 2)
-    friction = replace(problem.interface.friction, law=Coulomb(ConstantCoefficient(0.4)))
-    interface = replace(problem.interface, friction=friction)
-    rng = np.random.default_rng(3)
-    nodal = 1e-3 * rng.standard_normal((problem.nodes.gap.size, dimension))
-    n, nodes = nodal.shape[0], problem.nodes
-    forces = Multipliers(
-        rng.uniform(0.5, 1.0, n),
-        np.einsum("nij,nj->ni", nodes.tangent, 0.3 * rng.standard_normal((n, dimension))),
-    )
-    moduli = Moduli(20.0, 20.0, 20.0)
-    before = np.full(n, FREE, dtype=np.int8)
-    base = linearise(interface, nodal, forces, moduli, before, forces.pressure * 0.4)
-    assert {CLOSED + SLIDES, CLOSED + STICKS} <= set(base.status.tolist())
-    sticks = base.status & STICKS > 0
-    # a sticking node pushes with lambda + gamma u_tau, a pressed one with p + gamma (u_nu - rho)
-    direction = 1e-6 * rng.standard_normal(nodal.shape)
-    moved = linearise(interface, nodal + direction, forces, moduli, before, forces.pressure * 0.4)
-    difference = moved.forces.vectors(problem.nodes) - base.forces.vectors(problem.nodes)
-    predicted = np.einsum("nij,nj->ni", base.blocks, direction)[:, :dimension]
-    assert np.allclose(difference[sticks], predicted[sticks], rtol=1e-6, atol=1e-12)
-    normal = nodes.normal_component(difference)
-    assert np.allclose(normal, nodes.normal_component(predicted), rtol=1e-6, atol=1e-12)
-
-
-@pytest.mark.parametrize("softening", [0.25, np.inf])
-def test_falling_friction_is_followed_as_far_as_allowed(softening):
-    """With no limit, the block is the derivative of mu(|u_tau|) p along the slip."""
-    problem = mechanics.bar(SELF, 4, friction=Friction(SlipCoefficient(0.5, 0.2, 1e3)))
-    nodes = problem.nodes
-    nodal = np.zeros((nodes.nodes.size, 2))
-    nodal[:, 0] = 1e-3
-    pressure = np.full(nodes.nodes.size, 0.5)
-    forces = Multipliers(pressure, 0.3 * pressure[:, None] * [1.0, 0.0])
-    moduli = Moduli(200.0, 20.0, 1e6)
-    before = np.full(nodes.nodes.size, CLOSED + SLIDES, dtype=np.int8)
-    base = linearise(problem.interface, nodal, forces, moduli, before, softening=softening)
-    assert base.settled
-    step = np.array([1e-8, 0.0])
-    moved = linearise(problem.interface, nodal + step, forces, moduli, before, softening=softening)
-    change = (moved.forces.friction - base.forces.friction)[:, 0] / step[0]
-    assert np.all(change < -0.25 * 20.0)
-    expected = np.maximum(change, -softening * moduli.nodal)
-    assert np.allclose(base.blocks[:, 0, 0], expected, rtol=1e-4)
-
-
 def bar_case(n: int, *changes: str) -> Case:
     """Return Example 7.2 with ten times its load and a constant mu."""
     return bar(n, -0.05, 1.0, "friction.mu=0.5", "solver.tolerance=1e-10", *changes)
@@ -237,87 +177,6 @@ def test_a_linear_material_is_assembled_once_and_solved_exactly():
     assert method.counters.linear_solves <= 2
     whole = newton(problem, condense=False)
     assert whole.counters.factorizations <= whole.counters.linear_solves <= 8
-
-
-@pytest.mark.parametrize(
-    ("friction", "note"),
-    [
-        (Friction(ConstantCoefficient(0.5)), "frozen friction"),
-        (Friction(), "block relaxation"),
-    ],
-)
-def test_slower_methods_take_over_where_newton_gives_up(friction, note):
-    problem = mechanics.bar(SELF, 8, -0.05, friction=friction)
-    method = newton(problem, max_iterations=2, condense=False)
-    assert any(record.note.startswith(note) for record in method.history.records)
-
-
-@pytest.mark.parametrize("method", ["newton", "uzawa"])
-def test_the_number_of_outer_iterations_is_limited(method):
-    solution = solve(bar_case(8, f"solver.method={method}", "solver.max_outer=2"), comm=SELF)
-    assert not solution.outcome.converged
-    # the frictionless start of the fixed point is its iteration 0
-    assert len(solution.history.records) <= 3
-
-
-def test_load_steps_that_end_early_have_not_converged():
-    """The last step's convergence was taken for that of the whole load."""
-    case = {
-        "mesh": {"generator": "rectangle", "size": [40.0, 1.0], "cells": [80, 2]},
-        "material": {"young": 1.0, "poisson": 0.3},
-        "fixed": [{"on": side, "displacement": [0.0, 0.0]} for side in ("left", "right")],
-        "load": [{"on": "top", "traction": [0.0, -3.90625e-5]}],
-        "contact": {"on": "bottom", "gap": 0.3},
-        "friction": {"law": "coulomb", "mu": 0.3},
-    }
-    problem = build_problem(parse_case(case), SELF)
-    method = Newton(problem, NewtonOptions())
-    loads: list[float] = []
-
-    class FailsLate:
-        """Two steps of load, the second of which fails."""
-
-        search = method.search
-
-        def run(self, iterate, note="", bound=None, goal=0.0):
-            loads.append(iterate.state.time)
-            residual = 0.0 if iterate.state.time <= 0.25 else 1.0
-            kkt = KKT(residual, residual, residual)
-            return iterate, Outcome(kkt, method.options.allowed, "" if residual == 0 else "no")
-
-    iterate, outcome = load_steps(FailsLate())
-    assert max(loads) > 0.25
-    assert not outcome.converged
-    assert "load steps ended at 0.25 of the load" in outcome.reason
-    assert iterate.state.time == 1.0
-    assert outcome.kkt == evaluate(problem, iterate.state)
-
-
-def test_a_method_cannot_call_itself_converged(monkeypatch):
-    """What it says of its end is one thing, the residuals of the whole problem another."""
-
-    def boast(method: Newton, start=None):
-        outcome = Outcome(KKT(0.0, 0.0, 0.0), KKT(1.0, 1.0, 1.0), "all is well")
-        return method.problem.start(0.1), outcome
-
-    monkeypatch.setattr(Newton, "solve", boast)
-    solution = solve(bar_case(4), comm=SELF)
-    assert not solution.converged
-    assert solution.outcome.kkt == evaluate(solution.problem, solution.state)
-    assert solution.state.time == 1.0
-    assert "all is well, but the equilibrium residual is 1.00e+00" in solution.outcome.reason
-
-
-def test_the_best_iterate_is_what_is_left_of_a_failure():
-    """Where the limit ends the fall-backs, what they were left at may be far from anything."""
-    problem = mechanics.bar(SELF, 8, -0.05, friction=Friction(ConstantCoefficient(0.5)))
-    limits = NewtonOptions(tolerance=1e-14, condense=False, max_outer=6, max_iterations=3)
-    method = Newton(problem, limits)
-    state, outcome = method.solve()
-    assert not outcome.converged
-    assert "frozen friction" in method.history.records[-1].note
-    assert outcome.kkt == evaluate(problem, state)
-    assert outcome.kkt.largest == min(record.kkt.largest for record in method.history.records)
 
 
 def pushed_block(push: float) -> dict:

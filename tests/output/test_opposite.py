@@ -21,9 +21,9 @@ from contact.output.opposite import opposite_surface
 from contact.output.vtu import read_vtu
 from contact.problem.problem import Contact, ContactProblem
 from forms.hencky import Linear
-from tests.problem.test_two_bodies import case
 from tests.problems.blocks import Blocks
 from tests.problems.mechanics import constant
+from tests.problems.pairs import case
 
 COMM = MPI.COMM_WORLD
 

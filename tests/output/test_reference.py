@@ -12,8 +12,7 @@ from contact.output.files import write_outputs
 from contact.output.reference import PAGE, files_help, page
 from contact.output.vtu import read_vtu
 from contact.solving import solve
-from tests.problem.test_rigid import column, plate
-from tests.problems.rigid import indented
+from tests.problems.rigid import column, indented, plate
 from tests.problems.written import block, electric
 
 #: Derived fields have a companion cell by cell.

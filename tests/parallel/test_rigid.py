@@ -4,8 +4,7 @@ import pytest
 from mpi4py import MPI
 
 from contact.methods.options import FixedPointOptions, NewtonOptions, PenaltyOptions
-from tests.problem.test_rigid import column, plate
-from tests.problems.rigid import indented, solved
+from tests.problems.rigid import column, indented, plate, solved
 
 pytestmark = pytest.mark.parallel
 

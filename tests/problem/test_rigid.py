@@ -1,4 +1,4 @@
-"""Foundations and parts that move as rigid bodies, and electrodes of unknown potential."""
+"""Foundations that move as rigid bodies."""
 
 from itertools import pairwise
 
@@ -12,12 +12,11 @@ from contact.errors import InputError
 from contact.interface.multipliers import Multipliers
 from contact.methods.newton import Newton
 from contact.methods.options import FixedPointOptions, NewtonOptions, PenaltyOptions
-from contact.output.balances import charge_balance
 from contact.output.figures.saved import plot
 from contact.problem.kkt import evaluate, residual_forces
 from contact.problem.state import State
 from contact.solving import build_problem, solve
-from tests.problems.rigid import PIEZO, indented, solved
+from tests.problems.rigid import indented, solved
 
 SELF = MPI.COMM_SELF
 
@@ -139,104 +138,6 @@ def test_supports_on_an_inclined_normal_take_their_share(condense):
     assert moved["rigid"]["force"][1] == pytest.approx(-0.01, rel=1e-10)
 
 
-def plate(**more):
-    """Return a block under a plate that stays plane, on a plane without friction."""
-    data = {
-        "mesh": {
-            "generator": "rectangle",
-            "origin": [0.0, 0.0],
-            "size": [2.0, 1.0],
-            "cells": [12, 6],
-        },
-        "material": {"young": 1.0, "poisson": 0.3},
-        "fixed": [{"on": "left", "displacement": [0.0, "free"]}],
-        "rigid": [
-            {
-                "on": "top",
-                "displacement": [0.0, "free"],
-                "force": [0.0, -0.02],
-                "rotation": "free",
-                "moment": 0.002,
-                "centre": [1.0, 1.0],
-            }
-        ],
-        "contact": {"on": "bottom"},
-    }
-    return parse_case({**data, **more})
-
-
-@pytest.mark.parametrize("condense", [True, False])
-def test_a_plate_stays_plane_and_balances_force_and_moment(condense):
-    solution, moved = solved(plate(), SELF, NewtonOptions(tolerance=1e-10, condense=condense))
-    part, problem = moved["rigid_parts"]["top"], solution.problem
-    points, u = problem.equilibrium.layout.points, problem.equilibrium.nodal(solution.state.x)
-    top = points[:, 1] > 1.0 - 1e-9
-    angle = np.deg2rad(part["rotation"])
-    assert u[top, 1] == pytest.approx(part["displacement"][1] + angle * (points[top, 0] - 1.0))
-    assert np.abs(u[top, 0]).max() < 1e-15
-    weight, x = problem.nodes.weight, problem.nodes.points[:, 0]
-    assert weight @ solution.pressure == pytest.approx(0.02, rel=1e-12)
-    # The moment of the pressure, of the plate and of what holds it and the symmetry line sideways.
-    assert part["force"][1] == pytest.approx(-0.02, rel=1e-12)
-    assert part["moment"] == pytest.approx(0.002, rel=1e-10)
-    assert weight @ (solution.pressure * (x - 1.0)) < 0
-
-
-def test_columns_under_a_plate_shorten_as_hooke_says():
-    data = plate().model_dump(exclude_unset=True)
-    data["rigid"] = [{"on": "top", "displacement": [0.0, "free"], "force": [0.0, -0.02]}]
-    data["material"]["poisson"] = 0.0
-    solution, moved = solved(parse_case(data), SELF)
-    assert moved["rigid_parts"]["top"]["displacement"] == pytest.approx([0.0, -0.01], abs=1e-12)
-    assert solution.pressure == pytest.approx(0.01, rel=1e-10)
-
-
-def column(**more):
-    """Return a piezoelectric column of height 2 on an electrode, pressed by 1e-3."""
-    data = {
-        "mesh": {"generator": "rectangle", "size": [1.0, 2.0], "cells": [3, 6]},
-        "material": {"young": 100.0, "poisson": 0.3, "piezo": PIEZO},
-        "fixed": [
-            {"on": "left", "displacement": [0.0, "free"]},
-            {"on": "right", "displacement": [0.0, "free"]},
-            {"on": "bottom", "potential": 0.0},
-        ],
-        "load": [{"on": "top", "traction": [0.0, -1e-3]}],
-        "electrode": [{"on": "top"}],
-        "contact": {"on": "bottom"},
-    }
-    return parse_case({**data, **more})
-
-
-@pytest.mark.parametrize("charge", [0.0, 2e-3])
-@pytest.mark.parametrize(
-    "solver",
-    [
-        NewtonOptions(tolerance=1e-10),
-        NewtonOptions(tolerance=1e-10, condense=False),
-        NewtonOptions(tolerance=1e-10, condense=False, linear="iterative"),
-        FixedPointOptions(tolerance=1e-10),
-        PenaltyOptions(eps_contact=1e-8),
-    ],
-)
-def test_an_open_electrode_reads_the_potential_of_a_column(charge, solver):
-    solution, moved = solved(column(electrode=[{"on": "top", "charge": charge}]), SELF, solver)
-    young, nu = 100.0, 0.3
-    c = young * (1 - nu) / ((1 + nu) * (1 - 2 * nu))
-    # sigma = c eps - e E, D = e eps + beta E, with D.nu = charge/width at the top.
-    matrix = np.array([[c, PIEZO["e33"]], [PIEZO["e33"], -PIEZO["beta33"]]])
-    strain, slope = np.linalg.solve(matrix, [-1e-3, charge])
-    found = moved["electrodes"]["top"]
-    assert found["potential"] == pytest.approx(2.0 * slope, rel=1e-8)
-    assert found["charge"] == pytest.approx(charge, rel=1e-8, abs=1e-12)
-    body = solution.problem.equilibrium
-    top = body.nodal(solution.state.x)[body.layout.points[:, 1] > 2.0 - 1e-9, 1]
-    assert top == pytest.approx(2.0 * strain, abs=1e-10)
-    charges = charge_balance(solution.problem, solution.state)
-    assert charges.electrodes["top"] == pytest.approx(charge, rel=1e-8, abs=1e-12)
-    assert charges.total == pytest.approx(0.0, abs=1e-12)
-
-
 def test_a_press_fit_presses():
     data = indented(n=8, displacement=[0.0, 0.0]).model_dump(exclude_unset=True)
     data["contact"]["foundation"]["centre"] = [1.0, 1.98]
@@ -248,69 +149,6 @@ def test_a_press_fit_presses():
     # The ball that overlaps and the ball that is driven in differ in their normals alone.
     assert pressed.contact_force[1] == pytest.approx(driven.contact_force[1], rel=0.03)
     assert pressed.contact_force[1] > 0.004
-
-
-@pytest.mark.parametrize(
-    ("changes", "words"),
-    [
-        ({"force": [0.0, -1.0]}, r"contact.rigid.force.1: given -1.0; accepted: .* \"free\""),
-        ({"rotation": 1.0, "centre": None}, "contact.rigid.centre: missing"),
-        ({"rotation": [0.0, 0.0, 1.0]}, "contact.rigid.rotation: given"),
-        ({"displacement": [0.0, 0.0, 0.0]}, "2 components in 2-D"),
-        ({"displacement": [0.0, "fre"]}, "displacement.1: .* unknown name fre"),
-        ({"displacement": [0.0, "-0.01*t"]}, r"a formula in t with \[evolution\] only"),
-        ({"displacement": [0.0, "x"]}, "displacement.1: .* depends on the place"),
-        ({"amplitude": "press"}, r"an amplitude with \[evolution\] only"),
-        ({"displacement": [0.0, "free"], "force": [0.0, 0.01]}, "pull the body off"),
-        ({"rotation": "free"}, r"can move as a rigid body \(rotation of what is rigid\)"),
-    ],
-)
-def test_bad_motions_are_refused(changes, words):
-    data = indented().model_dump(exclude_unset=True)
-    data["friction"] = {"law": "none"}
-    rigid = {**data["contact"]["rigid"], **changes}
-    data["contact"]["rigid"] = {key: value for key, value in rigid.items() if value is not None}
-    with pytest.raises(InputError, match=words):
-        build_problem(parse_case(data), SELF)
-
-
-@pytest.mark.parametrize("changes", [{"displacement": ["free", 0.0]}, {"rotation": 1.0}])
-def test_nothing_leaves_the_axis_of_revolution(changes):
-    data = indented().model_dump(exclude_unset=True)
-    data["space"] = {"kinematics": "axisymmetric"}
-    data["contact"]["foundation"]["centre"] = [0.0, 2.0]
-    data["contact"]["rigid"] |= changes
-    with pytest.raises(InputError, match="of a body of revolution"):
-        build_problem(parse_case(data), SELF)
-
-
-@pytest.mark.parametrize(
-    ("rigid", "words"),
-    [
-        ([{"on": "bottom"}], "rigid.0.on.*beside the contact part"),
-        ([{"on": "top"}, {"on": "top"}], "rigid.1.on"),
-        ([{"on": "top"}, {"on": "right"}], "shares nodes with another"),
-        ([{"on": "right"}], "contact.on.*shares nodes with a rigid part"),
-        ([{"on": "top", "displacement": ["free", 0.0]}], "a support fixes a component"),
-        ([{"on": "roof"}], "rigid.0.on.*a part of the mesh"),
-    ],
-)
-def test_bad_rigid_parts_are_refused(rigid, words):
-    with pytest.raises(InputError, match=words):
-        build_problem(plate(rigid=rigid), SELF)
-
-
-def test_bad_electrodes_are_refused():
-    with pytest.raises(InputError, match=r"electrode.0.on.*potential is not fixed"):
-        column(electrode=[{"on": "bottom"}])
-    with pytest.raises(InputError, match=r"electrode.*\[material.piezo\]"):
-        plate(electrode=[{"on": "top"}])
-    with pytest.raises(InputError, match="shares nodes with an electrode"):
-        build_problem(
-            column(electrode=[{"on": "right"}], electric={"k_e": 1.0}, fixed=[
-                {"on": "left", "displacement": [0.0, "free"], "potential": 0.0}]),
-            SELF,
-        )  # fmt: skip
 
 
 def stepped(amplitudes=None, **rigid):

@@ -1,4 +1,4 @@
-"""Two bodies: how they are held, methods and ranks that agree, and what is refused."""
+"""Two bodies: how they are held, and methods and ranks that agree."""
 
 import numpy as np
 import pytest
@@ -6,11 +6,9 @@ from mpi4py import MPI
 
 from contact import parse_case, solve
 from contact.body.description import Body, Fixed, Load, Material
-from contact.build import build_problem
 from contact.errors import InputError, SingularError
 from contact.interface.friction import Friction
 from contact.interface.obstacle import GapFunction
-from contact.interface.pairing import find_pair
 from contact.linear.operator import SparseOperator
 from contact.methods.options import OPTIONS
 from contact.output.balances import charge_balance
@@ -23,6 +21,7 @@ from forms.laws import ConstantCoefficient
 from tests.problems.blocks import Blocks
 from tests.problems.everywhere import pressures
 from tests.problems.mechanics import constant
+from tests.problems.pairs import case
 
 COMM = MPI.COMM_WORLD
 NOTHING = GapFunction(lambda points: np.zeros(len(points)))
@@ -145,133 +144,6 @@ def test_a_body_may_be_held_by_contact_alone(pair):
         check_held(held([guided], PRESS, mu=0.0, pair=pair))
 
 
-def case(**more):
-    return {
-        "mesh": {"generator": "two_blocks", "lower_size": 0.3, "upper_size": 0.3},
-        "material": {"young": 100.0, "poisson": 0.3},
-        "fixed": [{"on": "lower_bottom", "displacement": [0.0, 0.0]}],
-        "load": [{"on": "upper_top", "traction": [0.0, -1.0]}],
-        "contact": {"on": "upper_bottom", "against": "lower_top"},
-        "friction": {"law": "coulomb", "mu": 0.3},
-        **more,
-    }
-
-
-@pytest.mark.parametrize(
-    ("more", "message"),
-    [
-        (
-            {"contact": {"on": "upper_bottom", "against": "upper_bottom"}},
-            r'contact\.against: given "upper_bottom"; accepted: another part than `on`',
-        ),
-        (
-            {"contact": {"on": "upper_bottom", "against": "upper_left"}},
-            r"contact\.against: 'upper_bottom' and 'upper_left' share nodes",
-        ),
-        (
-            {"contact": {"on": "upper_bottom", "against": "upper_top"}},
-            "'upper_bottom' and 'upper_top' are sides of one body that look away from each other",
-        ),
-        (
-            {"contact": {"on": "upper_bottom", "against": "lower_tip"}},
-            r'contact\.against: given "lower_tip"; accepted: a part of the mesh',
-        ),
-        (
-            {
-                "contact": {
-                    "on": "upper_bottom",
-                    "against": "lower_top",
-                    "foundation": {"shape": "plane", "point": [0, 0], "normal": [0, 1]},
-                }
-            },
-            r"contact\.against: both against and foundation; accepted: one of them",
-        ),
-        (
-            {
-                "contact": {
-                    "on": "upper_bottom",
-                    "against": "lower_top",
-                    "rigid": {"displacement": [0.0, 0.01]},
-                }
-            },
-            r"contact\.rigid: both against and rigid; accepted: one of them",
-        ),
-        (
-            {"contact": {"on": "upper_top", "against": "lower_top"}, "load": []},
-            r"contact\.against: 'upper_top' and 'lower_top' have no facets that face each other",
-        ),
-        (
-            {
-                "contact": [
-                    {"on": "upper_bottom", "against": "lower_top"},
-                    {"on": "lower_top", "against": "upper_bottom"},
-                ]
-            },
-            "contact nodes follow, by way of what is opposite, themselves",
-        ),
-        (
-            {
-                "fixed": [
-                    {"on": "lower_bottom", "displacement": [0.0, 0.0]},
-                    {"on": "upper_bottom", "displacement": ["free", 0.0]},
-                ]
-            },
-            r"contact\.against: .* no facets that face each other within .*, or their nodes",
-        ),
-        (
-            {
-                "fixed": [
-                    {"on": "lower_bottom", "displacement": [0.0, 0.0]},
-                    {"on": "upper_bottom", "displacement": [0.0, "free"]},
-                ]
-            },
-            "supports hold the first along its surface, where friction would pull at the second",
-        ),
-    ],
-)
-def test_what_is_refused(more, message):
-    with pytest.raises(InputError, match=message):
-        build_problem(parse_case(case(**more)))
-
-
-def test_overlapping_bodies_are_refused():
-    domain = Blocks(2, 5, 8).domain(MPI.COMM_SELF)
-    nodes = np.unique(domain.mesh.geometry.dofmap[domain.cells("upper")])
-    domain.mesh.geometry.x[nodes, 1] -= 0.2
-    body = Body(Linear(1.0, 0.3), [Fixed("bottom", [ZERO, ZERO])])
-    problem = ContactProblem(
-        domain, body, Contact("left", GapFunction(lambda p: np.full(len(p), 9.0)))
-    )
-    with pytest.raises(InputError, match=r"the bodies overlap at rest, by up to 0\.2"):
-        find_pair(problem.equilibrium, "under", "over", NOTHING)
-    pair = find_pair(problem.equilibrium, "under", "over", NOTHING, press=True)
-    np.testing.assert_allclose(pair.nodes.gap, -0.2, atol=1e-12)
-
-
-def test_what_is_said_of_the_choice_of_sides():
-    """The coarser, or the stiffer side should not be the one with the multipliers."""
-    fine = {"generator": "two_blocks", "lower_size": 0.1, "upper_size": 0.3}
-    warned = solve(parse_case(case(mesh=fine))).warnings
-    assert any("times finer" in warning and "exchanged" in warning for warning in warned)
-    moduli = {"upper": 1e4, "lower": 1e2}
-    stiff = [{"on": name, "young": young, "poisson": 0.3} for name, young in moduli.items()]
-    warned = solve(parse_case(case(material=stiff))).warnings
-    assert any("100 times softer" in warning for warning in warned)
-    swapped = {"on": "lower_top", "against": "upper_bottom"}
-    said = solve(parse_case(case(mesh=fine, contact=swapped))).warnings
-    assert not any("exchanged" in warning for warning in said)
-
-
-def test_bodies_that_may_pass_through_each_other_are_named():
-    """Only the upper block can touch a foundation: nothing keeps it off the lower one."""
-    foundation = {"shape": "plane", "point": [0.0, -0.05], "normal": [0.0, 1.0]}
-    contact = {"on": "upper_bottom", "foundation": foundation}
-    solution = solve(parse_case(case(contact=contact)))
-    assert solution.converged
-    assert any("2 of them can pass through the others" in w for w in solution.warnings)
-    assert not any("pass through" in w for w in solve(parse_case(case())).warnings)
-
-
 def test_two_pairs_have_two_laws():
     """A ball between plates: friction below, none above, and the column `on` says which."""
     given = {
@@ -379,8 +251,3 @@ def test_a_rigid_plate_presses_a_block_on_another(comm):
     assert -pushed_in.contact_force[1] == pytest.approx(1.5, rel=1e-9)
     np.testing.assert_allclose(pressures(pushed_in), pressures(pressed), rtol=0, atol=1e-8)
     assert pressed.contact_force == pytest.approx(pushed_in.contact_force, rel=1e-9)
-
-
-def test_regions_of_one_material_are_named():
-    notes = solve(parse_case(case())).notes
-    assert any("the regions lower, upper have one material" in note for note in notes)

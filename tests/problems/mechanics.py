@@ -14,7 +14,8 @@ from contact.interface.obstacle import GapFunction, Plane
 from contact.mesh.domain import Domain
 from contact.mesh.grid import box, rectangle
 from contact.methods.fixed_point import FixedPoint
-from contact.methods.options import FixedPointOptions
+from contact.methods.newton import Newton
+from contact.methods.options import FixedPointOptions, NewtonOptions
 from contact.methods.report import Outcome
 from contact.problem.problem import Contact, ContactProblem
 from contact.typing import Array
@@ -199,6 +200,14 @@ def solve(problem: ContactProblem, tolerance: float = 1e-10, **options) -> Fixed
 def attempt(problem: ContactProblem, **options) -> tuple[FixedPoint, Outcome]:
     loop = FixedPoint(problem, FixedPointOptions(**options))
     return loop, loop.solve()[1]
+
+
+def newton(problem: ContactProblem, **options) -> Newton:
+    """Solve by Newton's method and insist on convergence."""
+    method = Newton(problem, NewtonOptions(**{"tolerance": 1e-10, **options}))
+    _, outcome = method.solve()
+    assert outcome.converged, outcome
+    return method
 
 
 def contact_data(loop: FixedPoint) -> dict[str, Array]:

@@ -43,3 +43,46 @@ def solved(
     solution = solve(case, settings or NewtonOptions(tolerance=1e-10), comm=comm)
     assert solution.converged, solution.outcome.reason
     return solution, movements(solution.problem, solution.state)
+
+
+def plate(**more):
+    """Return a block under a plate that stays plane, on a plane without friction."""
+    data = {
+        "mesh": {
+            "generator": "rectangle",
+            "origin": [0.0, 0.0],
+            "size": [2.0, 1.0],
+            "cells": [12, 6],
+        },
+        "material": {"young": 1.0, "poisson": 0.3},
+        "fixed": [{"on": "left", "displacement": [0.0, "free"]}],
+        "rigid": [
+            {
+                "on": "top",
+                "displacement": [0.0, "free"],
+                "force": [0.0, -0.02],
+                "rotation": "free",
+                "moment": 0.002,
+                "centre": [1.0, 1.0],
+            }
+        ],
+        "contact": {"on": "bottom"},
+    }
+    return parse_case({**data, **more})
+
+
+def column(**more):
+    """Return a piezoelectric column of height 2 on an electrode, pressed by 1e-3."""
+    data = {
+        "mesh": {"generator": "rectangle", "size": [1.0, 2.0], "cells": [3, 6]},
+        "material": {"young": 100.0, "poisson": 0.3, "piezo": PIEZO},
+        "fixed": [
+            {"on": "left", "displacement": [0.0, "free"]},
+            {"on": "right", "displacement": [0.0, "free"]},
+            {"on": "bottom", "potential": 0.0},
+        ],
+        "load": [{"on": "top", "traction": [0.0, -1e-3]}],
+        "electrode": [{"on": "top"}],
+        "contact": {"on": "bottom"},
+    }
+    return parse_case({**data, **more})

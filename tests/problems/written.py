@@ -7,6 +7,7 @@ from pathlib import Path
 from contact.case.file import Case, parse_case
 from contact.output.files import write_outputs
 from contact.output.solution import Solution
+from tests.problems.rigid import PIEZO
 
 
 def block(dim: int, degree: int = 1, **sections: object) -> Case:
@@ -28,9 +29,6 @@ def block(dim: int, degree: int = 1, **sections: object) -> Case:
             **sections,
         }
     )
-
-
-PIEZO = {"e31": -5.4, "e33": 15.8, "e15": 12.3, "beta11": 8.13866, "beta33": 7.37455}
 
 
 def electric(dim: int) -> Case:

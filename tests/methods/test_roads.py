@@ -1,0 +1,106 @@
+"""What Newton's method falls back on, and what is left where nothing helps."""
+
+import pytest
+from mpi4py import MPI
+
+from contact.build import build_problem
+from contact.case.file import Case, parse_case
+from contact.interface.friction import Friction
+from contact.methods.load_steps import load_steps
+from contact.methods.newton import Newton
+from contact.methods.options import NewtonOptions
+from contact.methods.report import Outcome
+from contact.problem.kkt import KKT, evaluate
+from contact.solving import solve
+from forms.laws import ConstantCoefficient
+from scripts.cases import bar
+from tests.problems import mechanics
+from tests.problems.mechanics import newton
+
+SELF = MPI.COMM_SELF
+
+
+def bar_case(n: int, *changes: str) -> Case:
+    """Return Example 7.2 with ten times its load and a constant mu."""
+    return bar(n, -0.05, 1.0, "friction.mu=0.5", "solver.tolerance=1e-10", *changes)
+
+
+@pytest.mark.parametrize(
+    ("friction", "note"),
+    [
+        (Friction(ConstantCoefficient(0.5)), "frozen friction"),
+        (Friction(), "block relaxation"),
+    ],
+)
+def test_slower_methods_take_over_where_newton_gives_up(friction, note):
+    problem = mechanics.bar(SELF, 8, -0.05, friction=friction)
+    method = newton(problem, max_iterations=2, condense=False)
+    assert any(record.note.startswith(note) for record in method.history.records)
+
+
+@pytest.mark.parametrize("method", ["newton", "uzawa"])
+def test_the_number_of_outer_iterations_is_limited(method):
+    solution = solve(bar_case(8, f"solver.method={method}", "solver.max_outer=2"), comm=SELF)
+    assert not solution.outcome.converged
+    # the frictionless start of the fixed point is its iteration 0
+    assert len(solution.history.records) <= 3
+
+
+def test_load_steps_that_end_early_have_not_converged():
+    """The last step's convergence was taken for that of the whole load."""
+    case = {
+        "mesh": {"generator": "rectangle", "size": [40.0, 1.0], "cells": [80, 2]},
+        "material": {"young": 1.0, "poisson": 0.3},
+        "fixed": [{"on": side, "displacement": [0.0, 0.0]} for side in ("left", "right")],
+        "load": [{"on": "top", "traction": [0.0, -3.90625e-5]}],
+        "contact": {"on": "bottom", "gap": 0.3},
+        "friction": {"law": "coulomb", "mu": 0.3},
+    }
+    problem = build_problem(parse_case(case), SELF)
+    method = Newton(problem, NewtonOptions())
+    loads: list[float] = []
+
+    class FailsLate:
+        """Two steps of load, the second of which fails."""
+
+        search = method.search
+
+        def run(self, iterate, note="", bound=None, goal=0.0):
+            loads.append(iterate.state.time)
+            residual = 0.0 if iterate.state.time <= 0.25 else 1.0
+            kkt = KKT(residual, residual, residual)
+            return iterate, Outcome(kkt, method.options.allowed, "" if residual == 0 else "no")
+
+    iterate, outcome = load_steps(FailsLate())
+    assert max(loads) > 0.25
+    assert not outcome.converged
+    assert "load steps ended at 0.25 of the load" in outcome.reason
+    assert iterate.state.time == 1.0
+    assert outcome.kkt == evaluate(problem, iterate.state)
+
+
+def test_a_method_cannot_call_itself_converged(monkeypatch):
+    """What it says of its end is one thing, the residuals of the whole problem another."""
+
+    def boast(method: Newton, start=None):
+        outcome = Outcome(KKT(0.0, 0.0, 0.0), KKT(1.0, 1.0, 1.0), "all is well")
+        return method.problem.start(0.1), outcome
+
+    monkeypatch.setattr(Newton, "solve", boast)
+    solution = solve(bar_case(4), comm=SELF)
+    assert not solution.converged
+    assert solution.outcome.kkt == evaluate(solution.problem, solution.state)
+    assert solution.state.time == 1.0
+    assert "all is well, but the equilibrium residual is 1.00e+00" in solution.outcome.reason
+
+
+def test_the_best_iterate_is_what_is_left_of_a_failure():
+    """Where the limit ends the fall-backs, what they were left at may be far from anything."""
+    problem = mechanics.bar(SELF, 8, -0.05, friction=Friction(ConstantCoefficient(0.5)))
+    limits = NewtonOptions(tolerance=1e-14, condense=False, max_outer=6, max_iterations=3)
+    method = Newton(problem, limits)
+    state, outcome = method.solve()
+    assert not outcome.converged
+    assert "frozen friction" in method.history.records[-1].note
+    assert outcome.kkt == evaluate(problem, state)
+    assert outcome.kkt.largest == min(record.kkt.largest for record in method.history.records)

@@ -1,0 +1,67 @@
+"""Parts that move as rigid bodies, and electrodes of unknown potential."""
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+
+from contact.case.file import parse_case
+from contact.methods.options import FixedPointOptions, NewtonOptions, PenaltyOptions
+from contact.output.balances import charge_balance
+from tests.problems.rigid import PIEZO, column, plate, solved
+
+SELF = MPI.COMM_SELF
+
+
+@pytest.mark.parametrize("condense", [True, False])
+def test_a_plate_stays_plane_and_balances_force_and_moment(condense):
+    solution, moved = solved(plate(), SELF, NewtonOptions(tolerance=1e-10, condense=condense))
+    part, problem = moved["rigid_parts"]["top"], solution.problem
+    points, u = problem.equilibrium.layout.points, problem.equilibrium.nodal(solution.state.x)
+    top = points[:, 1] > 1.0 - 1e-9
+    angle = np.deg2rad(part["rotation"])
+    assert u[top, 1] == pytest.approx(part["displacement"][1] + angle * (points[top, 0] - 1.0))
+    assert np.abs(u[top, 0]).max() < 1e-15
+    weight, x = problem.nodes.weight, problem.nodes.points[:, 0]
+    assert weight @ solution.pressure == pytest.approx(0.02, rel=1e-12)
+    # The moment of the pressure, of the plate and of what holds it and the symmetry line sideways.
+    assert part["force"][1] == pytest.approx(-0.02, rel=1e-12)
+    assert part["moment"] == pytest.approx(0.002, rel=1e-10)
+    assert weight @ (solution.pressure * (x - 1.0)) < 0
+
+
+def test_columns_under_a_plate_shorten_as_hooke_says():
+    data = plate().model_dump(exclude_unset=True)
+    data["rigid"] = [{"on": "top", "displacement": [0.0, "free"], "force": [0.0, -0.02]}]
+    data["material"]["poisson"] = 0.0
+    solution, moved = solved(parse_case(data), SELF)
+    assert moved["rigid_parts"]["top"]["displacement"] == pytest.approx([0.0, -0.01], abs=1e-12)
+    assert solution.pressure == pytest.approx(0.01, rel=1e-10)
+
+
+@pytest.mark.parametrize("charge", [0.0, 2e-3])
+@pytest.mark.parametrize(
+    "solver",
+    [
+        NewtonOptions(tolerance=1e-10),
+        NewtonOptions(tolerance=1e-10, condense=False),
+        NewtonOptions(tolerance=1e-10, condense=False, linear="iterative"),
+        FixedPointOptions(tolerance=1e-10),
+        PenaltyOptions(eps_contact=1e-8),
+    ],
+)
+def test_an_open_electrode_reads_the_potential_of_a_column(charge, solver):
+    solution, moved = solved(column(electrode=[{"on": "top", "charge": charge}]), SELF, solver)
+    young, nu = 100.0, 0.3
+    c = young * (1 - nu) / ((1 + nu) * (1 - 2 * nu))
+    # sigma = c eps - e E, D = e eps + beta E, with D.nu = charge/width at the top.
+    matrix = np.array([[c, PIEZO["e33"]], [PIEZO["e33"], -PIEZO["beta33"]]])
+    strain, slope = np.linalg.solve(matrix, [-1e-3, charge])
+    found = moved["electrodes"]["top"]
+    assert found["potential"] == pytest.approx(2.0 * slope, rel=1e-8)
+    assert found["charge"] == pytest.approx(charge, rel=1e-8, abs=1e-12)
+    body = solution.problem.equilibrium
+    top = body.nodal(solution.state.x)[body.layout.points[:, 1] > 2.0 - 1e-9, 1]
+    assert top == pytest.approx(2.0 * strain, abs=1e-10)
+    charges = charge_balance(solution.problem, solution.state)
+    assert charges.electrodes["top"] == pytest.approx(charge, rel=1e-8, abs=1e-12)
+    assert charges.total == pytest.approx(0.0, abs=1e-12)
