@@ -34,6 +34,7 @@ from contact.linear.change import Change
 from contact.linear.layout import Layout
 from contact.linear.operator import Counters
 from contact.mesh.domain import Domain
+from contact.tolerances import MOST_ROUNDING
 from contact.typing import Array
 
 
@@ -111,6 +112,11 @@ class BodyEquilibrium:
     def linear(self) -> bool:
         """Whether the operator is the same at all states."""
         return self.body.linear
+
+    @property
+    def most_rounding(self) -> float:
+        """Most that counts as rounding, over loads, contact forces and reactions."""
+        return MOST_ROUNDING
 
     @property
     def piezoelectric(self) -> bool:

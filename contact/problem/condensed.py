@@ -34,6 +34,10 @@ LARGEST = 4200
 #: What is left of equilibrium inside the body that counts as nothing, over its loads.
 ROUNDING = 1e-13
 
+#: Most that counts as rounding at the contact nodes, over the loads. Not as little as for the whole
+#: body, by which the solution is judged once more.
+MOST_ROUNDING = 1e-3
+
 PREFIX = "contact_"
 
 
@@ -69,7 +73,7 @@ class CondensedBody:
     own: slice
     size: float
 
-    linear = True
+    linear, most_rounding = True, MOST_ROUNDING
 
     @property
     def block_size(self) -> int:

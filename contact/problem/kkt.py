@@ -22,10 +22,6 @@ SHAKE = 1e-8
 #: Residuals that fall no further are 0.6 to 1 of that; solves leave a few times as much.
 MARGIN = 4.0
 
-#: Most that counts as rounding, over loads, contact forces and reactions. A beam 1000 times as
-#: long as thick has 6e-6 of its loads; where it is more, too little is known of the forces.
-MOST_ROUNDING = 1e-5
-
 
 @dataclass(frozen=True)
 class KKT:
@@ -41,8 +37,9 @@ class KKT:
     friction
         |lambda_f - proj(lambda_f + c u_tau)| / |p| with the final bound s.
     rounding
-        What has been subtracted from the first, over the same: `_rounding`, but not more than
-        `MOST_ROUNDING`. None where no load acts and nothing touches: all forces are rounding then.
+        What has been subtracted from the first, over the same: `_rounding`, but not more than the
+        `most_rounding` of the body. None where no load acts and nothing touches: all forces are
+        rounding then.
     """
 
     equilibrium: float
@@ -116,7 +113,7 @@ def evaluate(problem: Problem, state: State) -> KKT:
     loads, pushes = body.load_size(state.time), body.norm(contact_forces)
     scale = loads + pushes + body.norm(body.reactions(residual))
     unbalanced = body.norm(body.unbalanced(residual))
-    rounding, most, acted = 0.0, MOST_ROUNDING * scale, loads > 0
+    rounding, most, acted = 0.0, body.most_rounding * scale, loads > 0
     if not acted or unbalanced <= most:
         rounding = _rounding(problem, state)
         acted = acted or pushes > rounding

@@ -50,6 +50,10 @@ class Equilibrium(Protocol):
     def linear(self) -> bool:
         """Whether the operator is the same at all unknowns."""
 
+    @property
+    def most_rounding(self) -> float:
+        """Most that counts as rounding, over loads, contact forces and reactions."""
+
     def rest(self) -> Array:
         """Return the local unknowns of the body at rest."""
 
