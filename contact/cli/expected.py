@@ -7,6 +7,7 @@ from mpi4py import MPI
 
 from contact import _compat
 from contact.output.assumptions import fitting
+from contact.problem.expected import expected_displacements
 from contact.problem.problem import ContactProblem
 from contact.typing import Array
 
@@ -57,16 +58,8 @@ def _quality(problem: ContactProblem) -> list[str]:
 
 def _sizes(problem: ContactProblem) -> list[str]:
     """Say how far loads and prescribed values move the body, about, and how far it may go."""
-    body, scales, d = problem.equilibrium, problem.scales, problem.dim
-    comm = problem.comm
-    loads, start = body.external(problem.time), problem.start().x
-    forces, given = (body.nodal(values)[:, :d] for values in (loads, start))
-    total = (
-        comm.allreduce(float(np.abs(forces).sum()), op=MPI.SUM) + np.abs(body.motion(loads)).sum()
-    )
-    moved = comm.allreduce(float(np.abs(given).max(initial=0.0)), op=MPI.MAX)
-    moved = max(moved, float(np.abs(body.motion(start)).max(initial=0.0)))
-    pressed = total / scales.area / scales.young * scales.size
+    comm, scales, loads = problem.comm, problem.scales, problem.equilibrium.external(problem.time)
+    pressed, moved = expected_displacements(problem, loads, problem.start().x)
     expected = max(pressed, moved)
     gap = problem.nodes.gap
     gap = np.where(np.abs(gap) < 1e-12 * scales.size, 0.0, gap)  # rounding is no gap

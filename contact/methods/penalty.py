@@ -21,7 +21,6 @@ import time
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from mpi4py import MPI
 
 from contact.body.norms import domain_norm
 from contact.errors import SingularError
@@ -38,6 +37,7 @@ from contact.methods.options import PenaltyOptions
 from contact.methods.penalised import PenalisedProblem
 from contact.methods.report import History, Monitor, Outcome, Record
 from contact.methods.stagnation import Stagnation
+from contact.problem.expected import expected_displacements
 from contact.problem.kkt import KKT, evaluate
 from contact.problem.mobility import held_by_friction
 from contact.problem.problem import ContactProblem
@@ -77,24 +77,13 @@ def automatic_eps(problem: ContactProblem) -> Regularisation:
     """
     body, scales = problem.equilibrium, problem.scales
     loads, prescribed = body.external(problem.time), problem.start().x
-    displacement = _moved(problem, loads, prescribed)
+    displacement = max(expected_displacements(problem, loads, prescribed))
     if problem.since is not None:
         before = problem.start(problem.since).x
-        added = _moved(problem, loads - body.external(problem.since), prescribed - before)
-        displacement = max(added, LEAST_ADDED * displacement)
+        added = loads - body.external(problem.since), prescribed - before
+        displacement = max(*expected_displacements(problem, *added), LEAST_ADDED * displacement)
     slip = 1e-2 * displacement or 1e-6 * scales.size
     return Regularisation(1e-2 * scales.spacing / scales.young, slip)
-
-
-def _moved(problem: ContactProblem, loads: Array, prescribed: Array) -> float:
-    """Return how far loads, as a stress on Gamma_3, or prescribed values move a body."""
-    body, scales = problem.equilibrium, problem.scales
-    nodal = np.abs(body.nodal(loads)[:, : body.dim]).sum()
-    force = body.comm.allreduce(float(nodal), op=MPI.SUM) + np.abs(body.motion(loads)).sum()
-    given = np.abs(np.append(body.nodal(prescribed)[:, : body.dim], body.motion(prescribed)))
-    stress = force / scales.area
-    largest = body.comm.allreduce(float(given.max(initial=0.0)), op=MPI.MAX)
-    return max(stress / scales.young * scales.size, largest)
 
 
 @dataclass
