@@ -17,6 +17,22 @@ from contact.interface.links import Links
 from contact.typing import Array
 
 
+def projectors(direction: Array, free: NDArray[np.bool_]) -> Array:
+    """Return the projectors onto the free tangential directions, shape (n, d, d).
+
+    Parameters
+    ----------
+    direction
+        Unit vectors with nothing along components that are not free, shape (n, d).
+    free
+        Which components are, shape (n, d).
+    """
+    made = -direction[:, :, None] * direction[:, None, :]
+    diagonal = np.arange(direction.shape[1])
+    made[:, diagonal, diagonal] += free
+    return made
+
+
 @dataclass(frozen=True)
 class ContactNodes:
     """The contact nodes that this rank owns: the jump in front of a rigid foundation.

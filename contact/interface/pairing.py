@@ -13,7 +13,7 @@ from contact.errors import InputError
 from contact.interface.mortar.coupling import Coupling, couple
 from contact.interface.mortar.integration import NOTHING
 from contact.interface.mortar.surface import Surface, surface_of
-from contact.interface.nodes import ContactNodes
+from contact.interface.nodes import ContactNodes, projectors
 from contact.interface.obstacle import Obstacle
 from contact.mesh.entities import owned_among
 from contact.mesh.pieces import connected_pieces
@@ -92,15 +92,13 @@ def find_pair(
     admissible = normal * moves
     length = np.linalg.norm(admissible, axis=1)
     direction = admissible / length[:, None]
-    tangent = -direction[:, :, None] * direction[:, None, :]
-    tangent[:, np.arange(d), np.arange(d)] += moves
     nodes = ContactNodes(
         body.comm,
         local,
         points,
         coupling.weight[here],
         direction,
-        tangent,
+        projectors(direction, moves),
         (gap + added) / length,
         body.block_size,
         cut,

@@ -15,7 +15,7 @@ from contact.body.equilibrium import BodyEquilibrium
 from contact.errors import InputError
 from contact.interface.mortar.lumping import Lumping, Mixing
 from contact.interface.mortar.surface import surface_of
-from contact.interface.nodes import ContactNodes
+from contact.interface.nodes import ContactNodes, projectors
 from contact.interface.obstacle import Obstacle
 from contact.mesh.domain import Domain
 from contact.mesh.entities import owned_among
@@ -217,15 +217,13 @@ def find_nodes(
     held = (direction * ~body.free[found.nodes, :d])[keep] / length[keep, None]
     direction = admissible[keep] / length[keep, None]
     gap = gap / length[keep]
-    tangent = -direction[:, :, None] * direction[:, None, :]
-    tangent[:, np.arange(d), np.arange(d)] += free
     jump = ContactNodes(
         domain.comm,
         nodes,
         points,
         weight,
         direction,
-        tangent,
+        projectors(direction, free),
         gap,
         space.dofmap.index_map_bs,
         cut if cut > 1e-5 * domain.size else 0.0,
