@@ -213,8 +213,10 @@ def yielded_share(solution: Solution) -> float:
 
 def iterates(
     problem: ContactProblem, settings: Options, first: int = 1
-) -> tuple[list[State], Outcome]:
-    """Return the states that the outer iterations have left, and how they ended. Collective.
+) -> tuple[list[State], list[int], Outcome]:
+    """Return the states that the outer iterations have left, their solves, and how they ended.
+
+    Collective.
 
     Parameters
     ----------
@@ -224,14 +226,16 @@ def iterates(
         The first iteration that counts; the frictionless start is number 0.
     """
     found: list[State] = []
+    solves: list[int] = []
 
     def keep(record: Record) -> None:
         if record.iteration >= first:
             found.append(method.state)
+            solves.append(record.inner)
 
     method = METHODS[settings.method](problem, settings, keep)
     _, outcome = method.solve()
-    return found, outcome
+    return found, solves, outcome
 
 
 def observed_orders(parameter: Sequence[float], errors: Sequence[float]) -> list[float]:

@@ -64,7 +64,7 @@ def watched(iteration: Iteration, n: int) -> tuple[Array, float, float]:
     if iteration.mu == 0:
         case = case.model_copy(update={"friction": Friction()})
     problem = build_problem(case)
-    found, outcome = iterates(problem, _settings(iteration))
+    found, _, outcome = iterates(problem, _settings(iteration))
     if not outcome.converged:
         raise InputError(f"{iteration.label}: {outcome.reason}")
     body, last, kkt = problem.equilibrium, found[-1].x, outcome.kkt

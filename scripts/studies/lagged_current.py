@@ -52,7 +52,7 @@ def errors(
     settings = FixedPointOptions(
         tolerance=1e-9, inner_tolerance=1e-10, material_step="secant", max_outer=steps
     )
-    found, outcome = iterates(problem, settings)
+    found, _, outcome = iterates(problem, settings)
     if not exact:
         moves = [np.linalg.norm(norm(b.x - a.x)) for a, b in pairwise(found)]
         return np.array(moves), outcome.converged

@@ -132,7 +132,7 @@ def fixed_point_errors(
     lagged = ["contact.lagged=true", "solver.material_step=secant", *changes]
     case = case_of(name, cells, lagged)
     problem = build_problem(case)
-    found, outcome = iterates(problem, case.solver, first=0)
+    found, _, outcome = iterates(problem, case.solver, first=0)
     if not outcome.converged:
         raise InputError(f"{case.title}: {outcome.reason}")
     norm, exact = ProductNorm(problem), found[-1].x

@@ -36,13 +36,14 @@ not reached; dashed and dotted lines are bounds, limits and references.
 **What was re-read.** The printed numbers of chapter 8 in SI units (E = 58.7 GPa, loads of 10 to
 120 N/m^2, a gap of 0.5 m, phi_F = 32 V) cannot touch the foundation, nor yield. They are consistent
 in GPa, m, C/m^2 and GV: E = 58.7102, loads and phi_F as printed, permittivities times 1e9. All
-examples of chapter 8 are in these units, and their strains are then of the order of 1: up to 2, and
-det(I + grad u) is negative in some cells at corners. Small strain is a formal model there, and the
-program warns of it. The gap of Examples 8.3 and 8.4 is rho = 0.5; the thesis calls both the gap and
-the decay of (7.16) rho, and prints the latter for chapter 7 alone: here it is 1 in chapter 8, see
-*Sensitivity*. The thesis's delta "is small": here psi rises within 1/delta of a tenth of the body's
-height, which meshes resolve; earlier versions took a thousandth of its size, and what that did is
-shown beside. c_nu = 10, alpha_nu = 2 and n_nu = 0.1 are not printed either.
+examples of chapter 8 are in these units, and their strains are then of the order of 1, in cells at
+corners more, the finer the more, and det(I + grad u) is negative in some of these. Small strain is
+a formal model there, and the program warns of it. The gap of Examples 8.3 and 8.4 is rho = 0.5; the
+thesis calls both the gap and the decay of (7.16) rho, and prints the latter for chapter 7 alone:
+here it is 1 in chapter 8, see *Sensitivity*. The thesis's delta "is small": here psi rises within
+1/delta of a tenth of the body's height, which meshes resolve; earlier versions took a thousandth of
+its size, and what that did is shown beside. c_nu = 10, alpha_nu = 2 and n_nu = 0.1 are not printed
+either.
 
 Formulas too: (1.13) has g of |dev eps|^2, and (7.8) by the letter would yield where that is xi_0.
 Such a material softens beyond |dev eps|^2 = e xi_0, against (h1)(b), and in Example 7.2 next to
@@ -52,8 +53,12 @@ xi_0/t > 0; `argument = "square"` takes the letter. psi of (1.34) rises behind t
 (`shifted`), and (h~5)(d), psi = 0 for u_nu <= rho, does not hold. For the same reason p_nu(u_nu -
 rho) of (1.29) is never more than 0; it is drawn as printed, and with a layer of thickness 0.1
 before the rigid part. f_2 = 1600 of Example 7.1, a force per area in its text, is a line load in
-its formulas for p and b, and so it is here. R = identity, with which the thesis computes, is no R
-of (h3): existence is proved for smoothed pressures (*Non-local friction at work*).
+its formulas for p and b, and so it is here; its u_tau = 0 on the line of symmetry would hold the
+cylinder up, and is u_x = 0 here. sigma_zz, which Remark 7.1 has as 0, is
+(k_0 - 2 g/3) tr eps in plane strain, and part of von Mises stresses. Section 8.1 lays the axis of
+poling along X_1, its matrix (8.2) along X_3: so it is here. R = identity, with which the thesis
+computes, is no R of (h3): existence is proved for smoothed pressures (*Non-local friction at
+work*).
 
 **How iterations are ended.** (3.45), (3.46) and (4.38) are as printed. (5.38) and (6.40) add u and
 phi in L2(Omega); the program measures phi in its own unit, sqrt(mu_1/beta) of the body, in which

@@ -46,6 +46,8 @@ def run_bar(folder: Path) -> int:
 def test_links_lead_somewhere(page: Path) -> None:
     for target in re.findall(r"\]\(([^)#:\s]+)(?:#[^)]*)?\)", page.read_text()):
         assert (page.parent / target).exists(), target
+        if target.endswith(".png"):  # a whole one
+            assert (page.parent / target).read_bytes()[-8:-4] == b"IEND", target
 
 
 def test_the_index_has_all_pages() -> None:
