@@ -16,25 +16,19 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import ufl
 from cycler import cycler
-from dolfinx import fem
 from matplotlib import rcParams
 from matplotlib.figure import Figure
 from mpi4py import MPI
 from PIL import Image
 
 from contact import Case, InputError, Solution, solve, solve_problem
-from contact.body.constants import constant
-from contact.body.norms import volume
 from contact.methods.options import Options
 from contact.methods.report import Outcome, Record
 from contact.output.figures.figures import STYLE
 from contact.problem.problem import ContactProblem
 from contact.problem.state import State
 from contact.solving import METHODS
-from forms.hencky import Log
-from forms.kinematics import deviator_squared, strain
 
 #: Widths of figures of one column, 85 mm, and of two (inches).
 ONE_COLUMN, TWO_COLUMNS = 85 / 25.4, 175 / 25.4
@@ -192,23 +186,6 @@ def solved(case: Case, problem: ContactProblem | None = None) -> Solution:
     if not solution.converged:
         raise InputError(f"{case.title}: {solution.outcome.reason}")
     return solution
-
-
-def yielded_share(solution: Solution) -> float:
-    """Return the share of the body where |dev eps| is beyond the yield strain. Collective.
-
-    NaN for a law without one.
-    """
-    problem = solution.problem
-    law = problem.body.law
-    if not isinstance(law, Log):
-        return np.nan
-    body, domain = problem.equilibrium, problem.domain
-    u, _ = body.split(body.function(solution.state.x))
-    limit = constant(domain.mesh, law.yield_strain**2)
-    yielded = ufl.conditional(ufl.gt(deviator_squared(strain(u)), limit), 1.0, 0.0)
-    part = problem.comm.allreduce(fem.assemble_scalar(fem.form(yielded * domain.dx)))
-    return float(part / volume(domain, domain.dx))
 
 
 def iterates(

@@ -29,7 +29,6 @@ from scripts.reporting import (
     options,
     solved,
     subplots,
-    yielded_share,
 )
 
 #: Labels of axes and colours.
@@ -147,7 +146,7 @@ def example(
     solution = solution_of(name, cells, *changes)
     table = contact_table(solution)
     deformed = picture(solution, "potential", POTENTIAL)
-    share = yielded_share(solution)
+    share = solution.share_beyond_yield
     if table is None or deformed is None:
         return
     dotted, values = number.replace("-", "."), deformed.values
@@ -205,10 +204,12 @@ def remark(solution: Solution, table: Table) -> str:
     return f"{touching}, {counts['open']} are open; largest residual {residual:.1e}."
 
 
-def yielding(strain: float, share: float) -> str:
+def yielding(strain: float, share: float | None) -> str:
     """Return a sentence on the largest strain, and where the law has one, on the yielded share."""
     words = f" Largest |dev eps| {strain:.3g}"
-    return f"{words}, yielded: {100 * share:.2g} % of the body." if share >= 0 else f"{words}."
+    return (
+        f"{words}, yielded: {100 * share:.2g} % of the body." if share is not None else f"{words}."
+    )
 
 
 def series(report: Report, cells: tuple[int, int]) -> None:

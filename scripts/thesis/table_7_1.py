@@ -7,7 +7,7 @@ under mpirun. Writes CSV and Markdown.
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -92,10 +92,10 @@ def rows() -> list[tuple[float, float, int]]:
     ]
 
 
-def counts(report: Report, n: int) -> list[dict[str, Run]]:
-    """Make the table of outer iterations. Collective."""
-    found, lines = [], []
-    for load, rho, count in rows():
+def runs_of(n: int) -> list[dict[str, Run]]:
+    """Solve all rows in all ways. Collective."""
+    found = []
+    for load, rho, _ in rows():
         runs = {
             "thesis": run(n, load, rho, *STOPPING),
             "printed": run(n, load, rho, *STOPPING, PLAIN, f"solver.r={PER_MILLIMETRE}"),
@@ -106,7 +106,12 @@ def counts(report: Report, n: int) -> list[dict[str, Run]]:
             if not runs[name].converged:
                 raise RuntimeError(f"f2 = {load}, rho = {rho:g}: {name} has not converged")
         found.append(runs)
-        lines.append((load, rho, count))
+    return found
+
+
+def tables(report: Report, n: int, found: Sequence[Mapping[str, Run]]) -> None:
+    """Make the tables of outer iterations, of `runs_of`."""
+    lines = rows()
 
     def columns(**others: list[object]) -> dict[str, list[object]]:
         first: dict[str, list[object]] = {
@@ -194,7 +199,6 @@ def counts(report: Report, n: int) -> list[dict[str, Run]]:
         "more slowly, for later iterations take few inner ones. The ratios of times depend on "
         "what else the machine does; those of the solves do not.",
     )
-    return found
 
 
 def _ratios(values: list[object]) -> list[object]:
@@ -234,7 +238,8 @@ def main(arguments: Sequence[str] | None = None) -> list[dict[str, Run]]:
     chosen = options.parse_args(arguments)
     n = chosen.cells or (8 if chosen.coarse else 32)
     report = Report(chosen.out)
-    found = counts(report, n)
+    found = runs_of(n)
+    tables(report, n, found)
     if chosen.literal:
         literal(report, n, 200 if chosen.coarse else 20000)
     return found

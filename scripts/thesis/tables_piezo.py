@@ -16,7 +16,7 @@ from contact.output.balances import charge_balance, force_balance
 from contact.problem.kkt import residual_forces
 from contact.problem.problem import ContactProblem
 from scripts.cases import CASES
-from scripts.reporting import Report, options, yielded_share
+from scripts.reporting import Report, options
 from scripts.thesis.tables_compliance import difference, iterations, run
 
 PHI_F = (0, 1, 2, 4, 8, 16, 32)
@@ -125,7 +125,7 @@ def other_rho(report: Report, cells: tuple[int, int]) -> None:
             second = run(case_of(name, cells, friction, *SECANT, *BY_CHANGE))
             lagged.append(counted(first))
             implicit.append(counted(second))
-            shares.append(yielded_share(second))
+            shares.append(second.share_beyond_yield)
         columns |= {f"{number}: Alg. 4": lagged, f"{number}: implicit": implicit}
     columns["yielded share in 8.3"] = shares
     report.table(
@@ -188,7 +188,7 @@ def values(solution: Solution) -> tuple[object, ...]:
         max(problem.comm.allgather(float(np.abs(u).max()))),
         nodes.maximum(solution.pressure),
         solution.max_dev_strain,
-        yielded_share(solution),
+        solution.share_beyond_yield,
         charges.electrodes["left"],
         charges.foundation,
         charges.imbalance,
