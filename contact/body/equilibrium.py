@@ -23,7 +23,7 @@ from petsc4py import PETSc
 from ufl.core.expr import Expr
 
 from contact.body.description import Body
-from contact.body.known import LastAnswer
+from contact.body.known import LastAnswers
 from contact.body.loads import Loads, assembled
 from contact.body.masters import make_masters
 from contact.body.materials import cells_of
@@ -86,7 +86,8 @@ class BodyEquilibrium:
         # Where the forms are evaluated is written anew by each query.
         self._forms = WeakForms(domain, body, self.space, self.cells, degree)
         self._at = self._forms.at
-        self._last_forces = LastAnswer(domain.comm)
+        # At a state, and where its unknowns are moved to see what rounding does.
+        self._last_forces = LastAnswers(domain.comm, 2)
         test = self._forms.split(ufl.TestFunction(self.space))
         self._loads = Loads(domain, body, *test, self.owned)
 

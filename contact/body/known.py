@@ -1,7 +1,8 @@
-"""The last answer to a question that several ask, who do not know of each other."""
+"""The last answers to a question that several ask, who do not know of each other."""
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Callable
 
 import numpy as np
@@ -10,24 +11,30 @@ from mpi4py import MPI
 from contact.typing import Array
 
 
-class LastAnswer:
-    """Remembers one answer, and what it was an answer to.
+class LastAnswers:
+    """Remembers some answers, and what they were answers to.
 
     Parameters
     ----------
     comm
         Ranks that ask together.
+    count
+        How many.
     """
 
-    def __init__(self, comm: MPI.Intracomm) -> None:
+    def __init__(self, comm: MPI.Intracomm, count: int) -> None:
         self._comm = comm
-        self._asked: tuple[Array, ...] = ()
-        self._answer: Array = np.empty(0)
+        self._known: deque[tuple[tuple[Array, ...], Array]] = deque(maxlen=count)
 
     def __call__(self, asked: tuple[Array, ...], find: Callable[[], Array]) -> Array:
         """Return what `find` returns, without asking it about the same arrays twice. Collective."""
-        same = len(asked) == len(self._asked) and all(map(np.array_equal, asked, self._asked))
-        if not self._comm.allreduce(same, op=MPI.LAND):
-            self._answer = find()
-            self._asked = tuple(array.copy() for array in asked)
-        return self._answer.copy()
+        same = np.array([_equal(asked, before) for before, _ in self._known], dtype=bool)
+        self._comm.Allreduce(MPI.IN_PLACE, same, op=MPI.LAND)
+        if not same.any():
+            self._known.append((tuple(array.copy() for array in asked), find()))
+            return self._known[-1][1].copy()
+        return self._known[int(np.argmax(same))][1].copy()
+
+
+def _equal(one: tuple[Array, ...], other: tuple[Array, ...]) -> bool:
+    return len(one) == len(other) and all(map(np.array_equal, one, other))

@@ -107,7 +107,8 @@ def wait_until_writing(process: subprocess.Popen[bytes], folder: Path) -> None:
 
 def wait_for_step(process: subprocess.Popen[bytes], folder: Path, count: int) -> None:
     """Wait until a run has left some checkpoints."""
-    while process.poll() is None and not any(folder.glob(f"checkpoints/{count:05d}.npz")):
+    file = folder / "checkpoints" / f"{count:05d}.npz"
+    while process.poll() is None and count > 0 and not file.exists():
         time.sleep(0.001)
 
 
@@ -188,7 +189,7 @@ def killed(folder: Path, count: int, rng: np.random.Generator) -> dict[str, list
     whole = folder / "whole"
     begin = time.monotonic()
     subprocess.run(evolution(whole, 1), check=True, stdout=subprocess.DEVNULL)
-    seconds = time.monotonic() - begin
+    seconds, most = time.monotonic() - begin, len(table(whole / "steps.csv")["t"])
     rows: dict[str, list[Any]] = {
         name: [] for name in ("run", "ranks", "statuses", "steps left", "left", "difference")
     }
@@ -196,10 +197,10 @@ def killed(folder: Path, count: int, rng: np.random.Generator) -> dict[str, list
     for number, way in enumerate([*ways, [1, 2, 3, 1]]):
         run, statuses, steps, left = folder / f"evolution-{number}", [], [], 0
         for ranks in way[:-1]:
-            delay, wait = rng.uniform(0.2, 1.0) * seconds, None
-            if len(way) > 2:
-                count = sum(steps[-1:]) + 2
-                delay, wait = 0.0, partial(wait_for_step, folder=run, count=count)
+            # Loading the libraries takes most of the time: moments are drawn between steps.
+            before = int(rng.integers(most)) if len(way) == 2 else sum(steps[-1:]) + 2
+            wait = partial(wait_for_step, folder=run, count=before)
+            delay = rng.uniform(0.0, seconds if before == 0 else seconds / most)
             status, remain = disturbed(evolution(run, ranks), signal.SIGKILL, delay, wait)
             statuses, left = [*statuses, status], left + remain
             steps.append(len(list(run.glob("checkpoints/0*.npz"))))
