@@ -17,6 +17,7 @@ from scipy.sparse import csgraph
 from contact.linear.bordered import BorderedOperator, shell
 from contact.linear.layout import Layout
 from contact.linear.operator import Bulk, SparseOperator
+from contact.linear.products import quick_products
 from contact.mesh.entities import owned_among
 from contact.typing import Array
 
@@ -181,7 +182,8 @@ class ChangedBulk:
     def create_matrix(self) -> PETSc.Mat:
         """Return a matrix with the pattern of Q^T K Q. Collective."""
         self._bulk.assemble(self._plain, "secant", self._rest)
-        made = self._plain.ptap(self.matrix)
+        with quick_products(self._plain):
+            made = self._plain.ptap(self.matrix)
         made.setLGMap(*self._plain.getLGMap())
         return made
 

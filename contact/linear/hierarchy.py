@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from petsc4py import PETSc
 
 from contact.linear.faults import petsc_options
+from contact.linear.products import quick_products
 from contact.linear.stiff_nodes import StiffNodes
 from contact.typing import Array
 
@@ -68,7 +69,8 @@ class Hierarchy:
 
     def _set_up(self) -> None:
         self._ksp.setOperators(*self._ksp.getOperators())
-        with petsc_options(self._ksp.getOptionsPrefix()):
+        matrix = self._ksp.getOperators()[1]
+        with petsc_options(self._ksp.getOptionsPrefix()), quick_products(matrix):
             self._ksp.setUp()
 
     def solve(self, rhs: PETSc.Vec, solution: PETSc.Vec) -> tuple[int, bool]:

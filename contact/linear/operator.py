@@ -21,6 +21,7 @@ from contact.linear.faults import check_overflow, no_solution, petsc_options
 from contact.linear.hierarchy import Hierarchy
 from contact.linear.layout import Layout
 from contact.linear.nodal import insert_blocks, nodal_blocks
+from contact.linear.products import quick_products
 from contact.linear.rigid import held_motions
 from contact.linear.stiff_nodes import TOUCH
 from contact.typing import Array
@@ -205,7 +206,7 @@ class SparseOperator:
         self.matrix.setOption(PETSc.Mat.Option.SYMMETRIC, symmetric)
         split = self._split
         self.ksp.setOperators(self.system, split.matrix(self.matrix) if split else self.matrix)
-        with petsc_options(self._prefix):
+        with petsc_options(self._prefix), quick_products(self.matrix):
             self.ksp.setUp()
 
     def _masked(self, at: NDArray[np.int32], blocks: Array) -> Array:
