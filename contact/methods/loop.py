@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,6 +13,7 @@ from contact.methods.search import Search
 from contact.methods.stagnation import Stagnation
 from contact.methods.step import Iterate, Step
 from contact.problem.kkt import KKT, evaluate
+from contact.problem.state import State
 from contact.typing import Array
 
 #: What counts as progress of a step.
@@ -40,12 +42,15 @@ class NewtonLoop:
         solution the tangent is too soft, and overshoots.
     patience
         Steps without progress after which it is given up; that of the options by default.
+    hopeless
+        Asked after the first step from rest whether to give up at once; None to go on.
     """
 
     search: Search
     step: Step
     secant_until: float
     patience: int | None = None
+    hopeless: Callable[[State], bool] | None = None
 
     def run(
         self, iterate: Iterate, note: str = "", bound: Array | None = None, goal: float = 0.0
@@ -92,6 +97,8 @@ class NewtonLoop:
                 return iterate, self._end(residuals)
             if bound is not None and measured <= goal:
                 return iterate, self._end(residuals, UPDATE)
+            if self.hopeless is not None and kept.status is None and self.hopeless(iterate.state):
+                return iterate, self._end(residuals, "the body is far softer than a block")
             if not np.isfinite(measured):
                 return iterate, self._end(residuals, "Newton's method diverged")
             if not linear:

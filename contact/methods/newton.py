@@ -18,6 +18,7 @@ import logging
 from dataclasses import dataclass, field, replace
 
 import numpy as np
+from mpi4py import MPI
 
 from contact.interface.linearised import Moduli
 from contact.interface.multipliers import Multipliers
@@ -36,7 +37,7 @@ from contact.methods.step import Iterate, WholeStep
 from contact.methods.sure import INTERIOR_POINT, solve_convex
 from contact.problem.condensed import CondensedProblem
 from contact.problem.condensing import condensation, pays
-from contact.problem.kkt import evaluate
+from contact.problem.kkt import evaluate, residual_forces
 from contact.problem.problem import ContactProblem
 from contact.problem.protocols import Problem
 from contact.problem.scales import Scales
@@ -49,6 +50,10 @@ SLOWER = INTERIOR_POINT, FROZEN_FRICTION, BLOCK_RELAXATION
 
 #: Patience with the whole body where a surer road is left.
 SHORT = 4
+
+#: Forces that the moduli make of the first penetration, over the loads, from which on the body is
+#: far softer than the block that they are those of. Of a block they are some sqrt(H/h).
+SOFT = 1e3
 
 
 def moduli_of(scales: Scales, gamma: float) -> Moduli:
@@ -172,7 +177,8 @@ class Newton:
             logger.info("%s; going on with the whole body", outcome.ended)
         surer = None if self._pays else self._condensed
         loop = self.whole_loop(SHORT if surer is not None else None)
-        iterate, outcome = loop.run(iterate)
+        first = loop if surer is None else replace(loop, hopeless=self._bends)
+        iterate, outcome = first.run(iterate)
         if not outcome.converged and surer is not None:
             logger.info("%s; going on at the contact nodes", outcome.ended)
             # From rest: where Newton's method has failed, the body may have flown away.
@@ -187,6 +193,14 @@ class Newton:
         if not outcome.converged and search.left > 0 and self.options.load_steps:
             iterate, outcome = load_steps(loop)
         return iterate, outcome
+
+    def _bends(self, state: State) -> bool:
+        """Tell whether the moduli make far more of a penetration than any load. Collective."""
+        problem, interface = self.problem, self.problem.interface
+        opening = np.maximum(interface.opening(interface.jump.apply(state.x)), 0.0)
+        foreseen = self._moduli.status * interface.jump.sum(opening)
+        loads = np.abs(residual_forces(problem, problem.start()))[: problem.equilibrium.owned]
+        return foreseen > SOFT * float(interface.comm.allreduce(loads.sum(), op=MPI.SUM))
 
     def _at_contact(self, step: MaterialStep, iterate: Iterate) -> tuple[Iterate, Outcome]:
         """Iterate with the body condensed onto the contact nodes."""

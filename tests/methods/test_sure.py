@@ -55,6 +55,16 @@ def test_a_cantilever_that_touches_a_stop(case, force, nodes):
     assert solution.counters.factorizations <= 3
 
 
+def test_a_fine_mesh_of_a_long_beam_takes_two_solves_of_the_body():
+    """Sparse steps come first there, in vain: nine of them, and then all roads at its nodes."""
+    load = {"on": "top", "traction": [0.0, -1e-13]}
+    case = beam(1000.0, [400, 1], load, 0.1, 0.8, space={"degree": 2})
+    solution = solve(parse_case(case), comm=SELF)
+    assert solution.converged, solution.outcome.reason
+    assert solution.counters.linear_solves <= 2
+    assert {record.note for record in solution.history.records} == {"", "interior point"}
+
+
 def test_the_force_of_the_stop_is_that_of_a_beam():
     """Euler and Bernoulli: F - 3 E' I gap/L^3, but for shear, (h/L)^2 of the difference."""
     case = beam(100.0, [200, 2], TIP, 0.5, space={"degree": 2})
