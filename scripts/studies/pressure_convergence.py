@@ -39,9 +39,8 @@ NOTE = (
     "degree 1, and Hueeber, Mair and Wohlmuth (Appl. Numer. Math. 54 (2005) 555) treat degree 2. "
     "On quadratic triangles the functions are those of Popp, Wohlmuth, Gee and Wall (SIAM J. Sci. "
     "Comput. 34 (2012) B421), alpha = 1/5, so that vertices carry forces; see docs/theory.md. "
-    "Earlier versions constrained mid-edges alone: errors there were smaller (closed form 4 in "
-    "space, 4 and 8 cells: 0.0763 and 0.0306 in L2; ball, 4 cells: 0.0617), and vertices "
-    "penetrated."
+    "With constraints at mid-edges alone errors there are smaller (closed form 4 in space, 4 and "
+    "8 cells: 0.0763 and 0.0306 in L2; ball, 4 cells: 0.0617), and vertices penetrate."
 )
 
 #: Where the contact ends between two nodes, as a part of their distance.

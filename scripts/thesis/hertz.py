@@ -279,9 +279,9 @@ def spheres(report: Report, levels: Sequence[tuple[float, int]]) -> dict[str, li
         "displacement at that depth of the half space "
         f"({hertz.axial(hertz.radius):.5f}; of infinitely distant points {hertz.approach:.5f}). "
         "The load is scaled to the area of the polyhedral cut, so that the forces can balance. "
-        "At degree 2 all nodes carry pressures. Earlier versions constrained mid-edges alone: "
-        "a/a_H was 1 and 1.001, p_0/p_H 1.006 and 0.9972 by fit and 1.037 and 1.008 at a node; "
-        "how deep vertices penetrated is not in these.",
+        "At degree 2 all nodes carry pressures. With constraints at mid-edges alone a/a_H is 1 "
+        "and 1.001, p_0/p_H 1.006 and 0.9972 by fit and 1.037 and 1.008 at a node; how deep "
+        "vertices penetrate is not in these.",
     )
     return ratios
 
