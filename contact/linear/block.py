@@ -39,9 +39,6 @@ ELECTRIC = {
     "mg_levels_pc_type": "sor",
 }
 
-#: Relative tolerance of a linear solve, in the norm of the preconditioner.
-TOLERANCE = 1e-10
-
 
 class BlockPreconditioner:
     """The block-diagonal preconditioner of one linear operator.
@@ -61,10 +58,7 @@ class BlockPreconditioner:
         self._layout = layout
         self._matrix: PETSc.Mat | None = None
         self._signs: PETSc.Vec | None = None
-        ksp.setType("minres" if symmetric else "gmres")
-        if not symmetric:
-            ksp.setGMRESRestart(80)
-        ksp.setTolerances(rtol=TOLERANCE, max_it=500)
+        multigrid.iterate(ksp, "minres" if symmetric else "gmres")
         pc = ksp.getPC()
         pc.setType("fieldsplit")
         mechanical, electric = _fields(layout)
@@ -72,9 +66,10 @@ class BlockPreconditioner:
         pc.setFieldSplitIS(("u", mechanical), ("phi", electric))
         pc.setFieldSplitType(PETSc.PC.CompositeType.ADDITIVE)
         prefix = ksp.getOptionsPrefix() or ""
-        _default(f"{prefix}fieldsplit_u_", MECHANICAL)
+        multigrid.set_defaults(f"{prefix}fieldsplit_u_", MECHANICAL)
         hypre = PETSc.Sys.hasExternalPackage("hypre")
-        _default(f"{prefix}fieldsplit_phi_", {"pc_type": "hypre"} if hypre else ELECTRIC)
+        electric_options = {"pc_type": "hypre"} if hypre else ELECTRIC
+        multigrid.set_defaults(f"{prefix}fieldsplit_phi_", electric_options)
 
     def matrix(self, operator: PETSc.Mat) -> PETSc.Mat:
         """Return the matrix that preconditions an operator. Collective."""
@@ -89,13 +84,6 @@ class BlockPreconditioner:
             operator.copy(self._matrix, PETSc.Mat.Structure.SAME_NONZERO_PATTERN)
         self._matrix.diagonalScale(L=self._signs)
         return self._matrix
-
-
-def _default(prefix: str, values: dict[str, str]) -> None:
-    options = PETSc.Options(prefix)
-    for name, value in values.items():
-        if not options.hasName(name):
-            options[name] = value
 
 
 def _fields(layout: Layout) -> tuple[PETSc.IS, PETSc.IS]:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 from petsc4py import PETSc
 
 from contact._compat import keeps_inverted_blocks
@@ -18,6 +20,9 @@ SMOOTHER = (
     if keeps_inverted_blocks()
     else {"mg_levels_ksp_max_it": "3", "mg_levels_pc_type": "pbjacobi"}
 )
+
+#: Relative tolerance of a linear solve, in the norm of the preconditioner.
+TOLERANCE = 1e-10
 
 #: Options of GAMG where the user gives none.
 DEFAULTS = {
@@ -46,12 +51,22 @@ def configure(ksp: PETSc.KSP, symmetric: bool) -> None:
 
     Options given by the user under the solver's prefix come first.
     """
-    ksp.setType("cg" if symmetric else "gmres")
-    if not symmetric:
-        ksp.setGMRESRestart(80)
-    ksp.setTolerances(rtol=1e-10, max_it=500)
+    iterate(ksp, "cg" if symmetric else "gmres")
     ksp.getPC().setType("gamg")
-    options = PETSc.Options(ksp.getOptionsPrefix())
-    for name, value in DEFAULTS.items():
+    set_defaults(ksp.getOptionsPrefix() or "", DEFAULTS)
+
+
+def iterate(ksp: PETSc.KSP, method: str) -> None:
+    """Let a Krylov method solve, with the tolerance and the limit of all of them."""
+    ksp.setType(method)
+    if method == "gmres":
+        ksp.setGMRESRestart(80)
+    ksp.setTolerances(rtol=TOLERANCE, max_it=500)
+
+
+def set_defaults(prefix: str, values: Mapping[str, str]) -> None:
+    """Set options of PETSc under a prefix where the user gives none."""
+    options = PETSc.Options(prefix)
+    for name, value in values.items():
         if not options.hasName(name):
             options[name] = value
