@@ -17,6 +17,9 @@ from contact.output.units import Units
 from contact.output.vtu import VTU
 from contact.typing import Array
 
+#: Room for the numbers and the name of an axis, in widths of a letter.
+MARGIN = 5.8
+
 
 def draw_surface(
     surface: VTU, title: str = "", units: Units = UNNAMED, opposite: VTU | None = None
@@ -89,8 +92,8 @@ class _Sheet:
         width = float(matplotlib.rcParams["figure.figsize"][0])
         em = float(matplotlib.rcParams["font.size"]) / 72
         stacked = width < NARROW
-        wide = (width - em) / (1 if stacked else count) - 4.5 * em
-        tall = wide * float(np.clip(aspect, 0.25, 1.25))
+        wide = (width - em) / (1 if stacked else count) - MARGIN * em
+        tall = wide * float(np.clip(aspect, 0.25, 0.8 if stacked else 1.25))
         return cls(count, stacked, width, em, wide, tall, 3 * em if titled else 0.5 * em)
 
     @property
@@ -109,7 +112,7 @@ class _Sheet:
     def bar(self) -> tuple[float, float, float, float]:
         """Place of the colours, below the panels that they are of."""
         last = self.panel(0 if self.stacked else self.count - 2)
-        left = 4.5 * self.em / self.width
+        left = MARGIN * self.em / self.width
         below = (5.5 if self.stacked else 4.0) * self.em / self.size[1]
         return left, below, last[0] + last[2] - left, 0.7 * self.em / self.size[1]
 
@@ -123,7 +126,7 @@ class _Sheet:
         """Return the place of a panel, in shares of the figure."""
         row, column = (k, 0) if self.stacked else (0, k)
         width, height = self.size
-        left = 4.5 * self.em + column * (self.wide + 4.5 * self.em)
+        left = MARGIN * self.em + column * (self.wide + MARGIN * self.em)
         top = self.head + 2 * self.em + row * (self.tall + 6 * self.em)
         bottom = height - top - self.tall
         return left / width, bottom / height, self.wide / width, self.tall / height
