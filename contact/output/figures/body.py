@@ -11,7 +11,7 @@ from matplotlib.collections import LineCollection, PolyCollection
 from matplotlib.figure import Figure
 from mpl_toolkits.axes_grid1 import make_axes_locatable
 
-from contact.output.figures.contact import BLUE, UNNAMED, ends
+from contact.output.figures.contact import BLUE, UNNAMED, ends, fitted
 from contact.output.figures.picture import Picture
 from contact.output.table import Table, by_contact
 from contact.output.units import Units
@@ -178,4 +178,4 @@ def _foundation(ax: Axes, table: Table, scale: float, edges: Array, side: int) -
 def with_scale(title: str, scale: float) -> str:
     """Return a title that says by what displacements are multiplied."""
     times = rf"displacements $\times$ {scale:g}" if scale != 1 else "displacements to scale"
-    return f"{title} ({times})" if title else times
+    return fitted(f"{title} ({times})" if title else times)

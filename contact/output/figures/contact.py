@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import textwrap
 from collections.abc import Iterable, Iterator
 from typing import Any
 
@@ -28,6 +29,13 @@ ZONES = {
     "slip": ("#FBE3C8", "sliding"),
     "open": ("#F2F2F2", "open"),
 }
+
+
+def fitted(title: str) -> str:
+    """Return a title in lines that fit on a figure as wide as the settings say."""
+    letter = 0.6 * 1.2 * float(matplotlib.rcParams["font.size"]) / 72
+    width = float(matplotlib.rcParams["figure.figsize"][0])
+    return "\n".join(textwrap.wrap(title, int(width / letter)))
 
 
 def position(table: Table, axes: str = "xy") -> tuple[Array, str]:
@@ -124,7 +132,7 @@ def draw_line(
             ax.set_title(str(part["on"][0]), fontsize="medium")
         figure.legend(handles=_handles(grid.ravel()), ncols=3, loc="outside lower center")
     if title:
-        figure.suptitle(title, fontsize="large")
+        figure.suptitle(fitted(title), fontsize="large")
     return figure
 
 

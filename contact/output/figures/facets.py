@@ -11,7 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure
 
-from contact.output.figures.contact import BLUE, NARROW, ORANGE, UNNAMED, ZONES
+from contact.output.figures.contact import BLUE, NARROW, ORANGE, UNNAMED, ZONES, fitted
 from contact.output.surface import STATUS
 from contact.output.units import Units
 from contact.output.vtu import VTU
@@ -33,7 +33,8 @@ def draw_surface(
     if opposite is not None:
         panels.append((opposite, "on the other side"))
     low, high = _shown(surface, surface.grid.points @ view.T)
-    sheet = _Sheet.of(len(panels) + 1, float((high - low)[1] / (high - low)[0]), bool(title))
+    title = fitted(title)
+    sheet = _Sheet.of(len(panels) + 1, float((high - low)[1] / (high - low)[0]), title)
     figure = Figure(figsize=sheet.size)
     # Placed by hand: the automatic layouts leave no room below axes of equal scale.
     figure.set_layout_engine("none")
@@ -87,14 +88,15 @@ class _Sheet:
     head: float
 
     @classmethod
-    def of(cls, count: int, aspect: float, titled: bool) -> _Sheet:
+    def of(cls, count: int, aspect: float, title: str) -> _Sheet:
         """Return the sheet for panels of an aspect, as wide as figures are by their settings."""
+        head = 1.5 + 1.5 * len(title.splitlines()) if title else 0.5
         width = float(matplotlib.rcParams["figure.figsize"][0])
         em = float(matplotlib.rcParams["font.size"]) / 72
         stacked = width < NARROW
         wide = (width - em) / (1 if stacked else count) - MARGIN * em
         tall = wide * float(np.clip(aspect, 0.25, 0.8 if stacked else 1.25))
-        return cls(count, stacked, width, em, wide, tall, 3 * em if titled else 0.5 * em)
+        return cls(count, stacked, width, em, wide, tall, head * em)
 
     @property
     def size(self) -> tuple[float, float]:

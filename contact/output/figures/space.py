@@ -13,6 +13,7 @@ from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 
 from contact.output.figures.body import with_scale
+from contact.output.figures.contact import NARROW
 from contact.output.figures.picture import Picture
 
 logger = logging.getLogger("contact.plots")
@@ -35,9 +36,10 @@ def draw_space(picture: Picture, title: str = "") -> Figure | None:
     place = surface.cell_data if picture.values.ndim == 1 else surface.point_data
     place["values"] = picture.values.ravel()
     width = float(matplotlib.rcParams["figure.figsize"][0])
-    figure = Figure(figsize=(width, 0.52 * width))
+    shape, tall = ((2, 1), 1.6) if width < NARROW else ((1, 2), 0.52)
+    figure = Figure(figsize=(width, tall * width))
     norm = Normalize(*(picture.limits or (picture.values.min(), picture.values.max())))
-    axes = figure.subplots(1, 2)
+    axes = figure.subplots(*shape)
     for ax, name, height in zip(axes, ("from above", "from below"), (0.8, -0.8), strict=True):
         plotter = pyvista.Plotter(off_screen=True, window_size=(1000, 900))
         plotter.set_background("white")

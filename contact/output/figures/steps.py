@@ -11,7 +11,7 @@ from matplotlib.colors import ListedColormap
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
-from contact.output.figures.contact import UNNAMED, ZONES, position
+from contact.output.figures.contact import UNNAMED, ZONES, fitted, position
 from contact.output.table import Table
 from contact.output.units import Units
 from contact.typing import Array
@@ -65,7 +65,7 @@ class Course:
         if plane and len(self.rows) > 1 and "on" not in self.tables[0]:
             found[MAP] = self._zones(axes, units)
         for figure in found.values():
-            figure.suptitle(title, fontsize="large")
+            figure.suptitle(fitted(title), fontsize="large")
         return found
 
     def _loop(self, moves: str, words: tuple[str, str], plane: bool, units: Units) -> Figure:
