@@ -22,7 +22,10 @@ from contact.typing import Array
 
 
 def _farthest_first(
-    rows: NDArray[np.int64], columns: NDArray[np.int64], inside: NDArray[np.bool_]
+    rows: NDArray[np.int64],
+    columns: NDArray[np.int64],
+    inside: NDArray[np.bool_],
+    block_size: int,
 ) -> NDArray[np.int64]:
     """Return the unknowns inside, those first that are farthest from the others.
 
@@ -33,21 +36,27 @@ def _farthest_first(
     Parameters
     ----------
     rows, columns
-        Which unknowns of this rank know of each other.
+        Which unknowns know of each other; columns of other ranks do not count.
     inside
         Which of them are to be ordered, shape (unknowns,).
+    block_size
+        Unknowns of a node: the first ones stand for all.
     """
+    size = inside.size // block_size
+    outside = np.flatnonzero(~inside.reshape(size, block_size).all(axis=1))
+    own = (rows % block_size == 0) & (columns >= 0) & (columns < inside.size)
+    own &= columns % block_size == 0
     # From one more node, which leads to all that are not inside, breadth comes first.
-    size, outside = inside.size, np.flatnonzero(~inside)
-    rows = np.concatenate([rows, np.full(outside.size, size)])
-    columns = np.concatenate([columns, outside])
-    known = np.ones(rows.size, dtype=np.int8)
-    graph = csr_array((known, (rows, columns)), shape=(size + 1, size + 1))
+    begins = np.concatenate([rows[own] // block_size, np.full(outside.size, size)])
+    ends = np.concatenate([columns[own] // block_size, outside])
+    known = np.ones(begins.size, dtype=np.int8)
+    graph = csr_array((known, (begins, ends)), shape=(size + 1, size + 1))
     near = breadth_first_order(graph, size, return_predecessors=False)[1:]
-    near = near[inside[near]]
-    alone = inside.copy()
+    alone = np.ones(size, dtype=bool)
     alone[near] = False
-    return np.concatenate([np.flatnonzero(alone), near[::-1]])
+    nodes = np.concatenate([np.flatnonzero(alone), near[::-1]])
+    unknowns = (nodes[:, None] * block_size + np.arange(block_size)).ravel()
+    return unknowns[inside[unknowns]]
 
 
 class SchurComplement:
@@ -74,8 +83,7 @@ class SchurComplement:
         shared[kept] = False
         inside = np.ones(end - begin, dtype=bool)
         inside[kept] = inside[shared] = False
-        own = (columns >= begin) & (columns < end)
-        self._inside = _farthest_first(rows[own], columns[own] - begin, inside)
+        self._inside = _farthest_first(rows, columns - begin, inside, matrix.getBlockSize())
         # The kept ones first, then those between the ranks, each in rank order.
         self._kept, self._shared = kept, np.flatnonzero(shared)
         mine = [(part + begin).astype(PETSc.IntType) for part in (kept, self._shared)]

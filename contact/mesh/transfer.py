@@ -7,6 +7,9 @@ from dolfinx import fem
 from mpi4py import MPI
 from numpy.typing import NDArray
 
+#: How far outside of a mesh a node may lie, over the extent of the mesh, and over its largest cell.
+OUTSIDE, NEAR = 1e-3, 0.1
+
 #: Times that cells apart from each other are looked for: more find hardly any.
 ROUNDS = 3
 
@@ -30,9 +33,14 @@ def carry(coarse: fem.Function, space: fem.FunctionSpace) -> fem.Function:
     """
     made = fem.Function(space, name=coarse.name)
     cells = _covering(space)
-    padding = 1e-3 * float(np.ptp(space.mesh.geometry.x, axis=0).max(initial=0.0))
-    padding = space.mesh.comm.allreduce(padding, op=MPI.MAX)
     source = coarse.function_space
+    mesh = source.mesh
+    everywhere = np.arange(mesh.topology.index_map(mesh.topology.dim).size_local, dtype=np.int32)
+    largest = float(mesh.h(mesh.topology.dim, everywhere).max(initial=0.0))
+    extent = float(np.ptp(space.mesh.geometry.x, axis=0).max(initial=0.0))
+    largest, extent = (mesh.comm.allreduce(size, op=MPI.MAX) for size in (largest, extent))
+    # More cells would have to be looked at.
+    padding = min(OUTSIDE * extent, NEAR * largest)
     data = fem.create_interpolation_data(space, source, cells, padding=padding)
     made.interpolate_nonmatching(coarse, cells, interpolation_data=data)
     made.x.scatter_forward()

@@ -218,10 +218,10 @@ class Condensation:
                 self._stiffness = self._schur.factorise(self._matrix)
             if self._masters is not None:
                 self._stiffness = self._masters.eliminate(self._schur, self._stiffness)
-            self._kind = kind
+            self._kind, self._size = kind, self._matrix.norm()
             self.counters.factorizations += 1
         residual = body.internal_forces(state.x) - body.external(state.time)
-        check_overflow(body.layout, self._matrix.norm(), body.norm(residual))
+        check_overflow(body.layout, self._size, body.norm(residual))
         reactions = body.norm(body.reactions(residual))
         size = body.load_size(state.time) + reactions
         # Where the loads go on as before, the prediction of a step is in equilibrium but for that.
