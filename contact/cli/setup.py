@@ -18,6 +18,7 @@ from contact.mesh.entities import exterior_facets
 from contact.output.figures.figures import STYLE, axes_of, heading
 from contact.output.figures.setup import (
     ELECTRODE,
+    FOUNDATION,
     HELD,
     LOADED,
     TOUCHED,
@@ -44,9 +45,7 @@ def draw_setup(case: Case, problem: ContactProblem) -> Figure | None:
     # Of a body in space its boundary is seen.
     seen = (2, _owned(domain)) if domain.dim == 2 else (2, exterior_facets(domain.mesh))
     simplices = _corners(domain, *seen)
-    nodes = problem.nodes
-    near = np.isfinite(nodes.gap)
-    surface = nodes.gather((nodes.points + nodes.gap[:, None] * nodes.normal)[near])
+    surface = _foundation(problem)
     if domain.comm.rank > 0 or simplices is None or any(role is None for role in roles):
         return None
     given = [role for role in roles if role is not None]
@@ -55,6 +54,15 @@ def draw_setup(case: Case, problem: ContactProblem) -> Figure | None:
         figure = draw(simplices, given, surface, case.case.units, axes_of(domain.revolved))
         figure.suptitle(heading(case.title), fontsize="medium")
     return figure
+
+
+def _foundation(problem: ContactProblem) -> Array:
+    """Return where the contact nodes would meet rigid foundations, shape (m, d). Collective."""
+    found = [np.zeros((0, problem.dim))]
+    for nodes in (entry.nodes for entry in problem.entries if entry.coupling is None):
+        near = np.isfinite(nodes.gap)
+        found.append(nodes.gather((nodes.points + nodes.gap[:, None] * nodes.normal)[near]))
+    return np.concatenate(found)
 
 
 def save_setup(case: Case, problem: ContactProblem, folder: Path) -> list[Path]:
@@ -74,6 +82,8 @@ def _roles(case: Case, problem: ContactProblem) -> Iterable[Role | None]:
     domain = problem.domain
     for key, section in case.contacts:
         yield _role(domain, section.on, TOUCHED, _contact_words(case, key, section))
+        if section.against is not None:
+            yield _role(domain, section.against, FOUNDATION, f"opposite: {section.against}")
     for fixed in case.fixed:
         if fixed.displacement is not None:
             words = f"$u$ = ({_listed(fixed.displacement)}) on {fixed.on}"

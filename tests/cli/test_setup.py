@@ -46,6 +46,8 @@ def test_contacts_of_two_bodies_name_both_sides():
     (legend,) = draw_setup(case, build_problem(case)).legends
     words = [text.get_text() for text in legend.get_texts()]
     assert "contact: upper_bottom against lower_top, coulomb friction" in words
+    assert "opposite: lower_top" in words
+    assert "foundation" not in words
 
 
 def test_check_writes_it(tmp_path, monkeypatch, capsys):

@@ -60,7 +60,7 @@ def draw_plane(
     roles
         What is given, and where.
     surface
-        Points of the foundation, shape (m, 2).
+        Points of rigid foundations, shape (m, 2).
     units, axes
         Names of the units and of the coordinates.
     """
@@ -83,8 +83,9 @@ def draw_plane(
             _hatch(ax, role, middle, 0.02 * size)
         if role.force is not None:
             _arrows(ax, role, middle, 0.12 * size)
-    order = np.lexsort(surface.T[::-1])
-    ax.plot(*surface[order].T, ".", ms=2, color=FOUNDATION, label="foundation")
+    if surface.size:
+        order = np.lexsort(surface.T[::-1])
+        ax.plot(*surface[order].T, ".", ms=2, color=FOUNDATION, label="foundation")
     _dimensions(ax, low, high, units)
     ax.set_aspect("equal")
     ax.margins(0.03)
@@ -175,7 +176,8 @@ def draw_space(
             start = (centre - step)[chosen]
             ax.quiver(*start.T, *step[chosen].T, color=LOADED, lw=0.8)
             seen.append(start)
-    ax.plot(*surface.T, ".", ms=2, color=FOUNDATION, label="foundation")
+    if surface.size:
+        ax.plot(*surface.T, ".", ms=2, color=FOUNDATION, label="foundation")
     points = np.concatenate(seen)
     low, high = points.min(axis=0), points.max(axis=0)
     ax.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), zlim=(low[2], high[2]))
