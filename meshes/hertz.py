@@ -4,7 +4,7 @@ import math
 
 from contact.errors import InputError
 from meshes.grading import Sizes, finish
-from meshes.pieces import half, quarter
+from meshes.pieces import half, half_ball, quarter
 
 
 def quarter_disc(
@@ -108,33 +108,13 @@ def sphere(
     """
     import gmsh
 
-    geo = gmsh.model.geo
-    low, on_x, on_y, centre = (
-        geo.addPoint(*p)
-        for p in ((0, 0, 0), (radius, 0, radius), (0, radius, radius), (0, 0, radius))
-    )
-    arc_x = geo.addCircleArc(low, centre, on_x)
-    arc_top = geo.addCircleArc(on_x, centre, on_y)
-    arc_y = geo.addCircleArc(on_y, centre, low)
-    axis = geo.addLine(centre, low)
-    edge_x, edge_y = geo.addLine(on_x, centre), geo.addLine(centre, on_y)
-    contact = geo.addSurfaceFilling(
-        [geo.addCurveLoop([arc_x, arc_top, arc_y])], sphereCenterTag=centre
-    )
-    symmetry_y = geo.addPlaneSurface([geo.addCurveLoop([arc_x, edge_x, axis])])
-    symmetry_x = geo.addPlaneSurface([geo.addCurveLoop([arc_y, -axis, edge_y])])
-    top = geo.addPlaneSurface([geo.addCurveLoop([arc_top, -edge_y, -edge_x])])
-    body = geo.addVolume([geo.addSurfaceLoop([contact, symmetry_y, symmetry_x, top])])
-    finish(
-        gmsh,
-        3,
-        [body],
-        {
-            "symmetry_x": [symmetry_x],
-            "symmetry_y": [symmetry_y],
-            "top": [top],
-            "contact": [contact],
-        },
-        Sizes(size, contact_size, contact_width, growth),
-        points=[low],
-    )
+    made = half_ball(gmsh.model.geo, radius, radius, 1)
+    symmetry_y, symmetry_x = made.sides
+    parts = {
+        "symmetry_x": [symmetry_x],
+        "symmetry_y": [symmetry_y],
+        "top": made.cut,
+        "contact": made.round,
+    }
+    sizes = Sizes(size, contact_size, contact_width, growth)
+    finish(gmsh, 3, made.body, parts, sizes, points=[made.low])
