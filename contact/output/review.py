@@ -13,11 +13,11 @@ logger = logging.getLogger("contact.solve")
 
 
 def announce(solution: Solution) -> None:
-    """Review a solution, and log what there is to say about it. Collective."""
+    """Review a solution, and log what there is to beware of; what is good in detail. Collective."""
     review(solution)
     if solution.problem.comm.rank == 0:
         for note in solution.notes:
-            logger.info(note)
+            logger.debug(note)
         for warning in solution.warnings:
             logger.warning(warning)
 
