@@ -142,7 +142,11 @@ _NODE: dict[str, Item] = {
     "bound": Item("stress", "Friction bound: `tau` is no larger."),
     "status": Item("", "`open`, `stick` or `slip`."),
     "phi": Item("potential", "Potential; of piezoelectric bodies."),
-    "d_n": Item("charge/area", "Charge D·ν that leaves through the foundation; likewise."),
+    "d_n": Item(
+        "charge/area",
+        "Charge D·ν that leaves through the foundation; likewise. Nodes that supports hold "
+        "conduct too, and have no row: `charges` of the summary has all.",
+    ),
 }
 
 _HISTORY: dict[str, Item] = {
