@@ -11,7 +11,7 @@ from forms.hencky import Hencky
 
 @dataclass(frozen=True)
 class MonotonicityReport:
-    """Constants of assumption (h1) on strains up to ``t_max``.
+    """Constants of assumption (h1) on strains up to some |dev eps|.
 
     Attributes
     ----------
@@ -25,7 +25,6 @@ class MonotonicityReport:
         Upper bound of d(g t)/dt.
     """
 
-    t_max: float
     g_0: float
     largest: float
     ceiling: float
@@ -68,7 +67,6 @@ def check_monotonicity(
     g = np.asarray(law.secant_modulus(t**2)) * np.ones_like(t)
     slopes = np.diff(g * t) / np.diff(t)
     return MonotonicityReport(
-        float(t_max),
         float(g.min()),
         float(g.max()),
         dim / 2 * float(law.bulk),

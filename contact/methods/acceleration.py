@@ -23,6 +23,10 @@ BETWEEN = np.linspace(0, 1, 5)
 BEYOND = 2.0 ** np.arange(1, 21)
 
 
+#: Most Gauss-Newton steps in one search.
+SWEEPS = 20
+
+
 class ResidualMinimiser:
     """Nonlinear GMRES for lambda = P(z), z = lambda + r u, with u affine in lambda.
 
@@ -41,8 +45,6 @@ class ResidualMinimiser:
         Number of directions kept.
     anew
         Whether to begin anew when there are so many, instead of leaving out the oldest.
-    sweeps
-        Most Gauss-Newton steps in one search.
 
     References
     ----------
@@ -58,10 +60,9 @@ class ResidualMinimiser:
         derivative: Callable[[Array, Array], Array],
         depth: int,
         anew: bool = False,
-        sweeps: int = 20,
     ) -> None:
         self._inner, self._project, self._derivative = inner, project, derivative
-        self._sweeps, self._anew = sweeps, anew
+        self._anew = anew
         self._directions: deque[Array] = deque(maxlen=depth)
         self._best: Array | None = None
 
@@ -128,7 +129,7 @@ class ResidualMinimiser:
         if not self._directions:
             return point, size
         basis = np.stack(self._directions, axis=-1)
-        for _ in range(self._sweeps):
+        for _ in range(SWEEPS):
             slopes = basis[0] - self._derivative(point[1], basis[1])
             load = self._inner(slopes, self._defect(point)[:, None])[:, 0]
             step = -basis @ least_squares(self._inner(slopes, slopes), load)

@@ -15,6 +15,9 @@ from contact.typing import Array
 #: Cosine of the steepest angle at which a ray still leads to a surface.
 GRAZING = 1e-6
 
+#: Most steps along a ray.
+STEPS = 100
+
 
 class Obstacle(Protocol):
     """A rigid obstacle, seen from the contact nodes.
@@ -122,9 +125,7 @@ class Shape(ABC):
         return rays, self.ray(points, rays)
 
 
-def trace(
-    distance: Callable[[Array], tuple[Array, Array]], points: Array, rays: Array, steps: int = 100
-) -> Array:
+def trace(distance: Callable[[Array], tuple[Array, Array]], points: Array, rays: Array) -> Array:
     """Return where rays meet a surface, by Newton's method on the signed distance.
 
     Along a ray the distance to a convex body is convex: Newton's method goes up to the surface
@@ -137,14 +138,12 @@ def trace(
         As `Shape.distance`.
     points, rays
         Where the rays begin, and unit vectors along them, shape (n, d).
-    steps
-        Most steps.
     """
     found = np.full(len(points), np.inf)
     left = np.arange(len(points))
     at = np.zeros(len(points))
     reach = np.zeros(len(points))
-    for step in range(steps):
+    for step in range(STEPS):
         value, normal = distance(points[left] + at[left, None] * rays[left])
         slope = -np.einsum("ni,ni->n", normal, rays[left])
         if step == 0:

@@ -65,12 +65,11 @@ def coulomb(
     load: Array,
     bound: Callable[[Array, Array], Array],
     *,
-    first: Array | None = None,
     tolerance: float = 1e-8,
     inner: float = 1e-10,
     limit: int = 60,
 ) -> CoulombResult:
-    """Look for a bound that its own Tresca problem gives.
+    """Look for a bound that its own Tresca problem gives, from zero on.
 
     Nothing guarantees that there is one within reach if mu is large, nor that it is the only
     one: which of several is found depends on the first bound.
@@ -83,8 +82,6 @@ def coulomb(
         f, shape (n d,) (force).
     bound
         Maps pressures and lengths of slips, each of shape (n,), to friction bounds s >= 0.
-    first
-        The bound to begin with; zero by default.
     tolerance
         Relative change of the bound that ends the iteration.
     inner
@@ -93,7 +90,7 @@ def coulomb(
         Most Tresca problems.
     """
     root, body = np.sqrt(solver.weight), solver.body
-    s = np.zeros_like(root) if first is None else np.maximum(first, 0.0)
+    s: Array = np.zeros_like(root)
     history: deque[tuple[Array, Array]] = deque(maxlen=DEPTH)
     best: CoulombResult | None = None
     target, share, iterations, start = s, 1.0, 0, None

@@ -163,11 +163,6 @@ class Reduced:
         """Return vectors (r, d) at the nodes with friction from their components (r, d - 1)."""
         return np.einsum("nia,na->ni", self._basis[self.rubbing][:, :, 1:], values)
 
-    def components(self, vectors: Array) -> Array:
-        """Return the opposite: the tangential components of vectors (n, d), shape (r, d - 1)."""
-        basis = self._basis[self.rubbing][:, :, 1:]
-        return np.einsum("nia,ni->na", basis, vectors[self.rubbing])
-
     def _ordered(self, order: Array, size: Array, motions: Array | None = None) -> Array:
         """Return the turned matrix in an order, over sizes of its rows, plus free motions."""
         matrix = np.asfortranarray(self._turned[np.ix_(order, order)])
