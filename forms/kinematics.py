@@ -101,16 +101,12 @@ def embed(tensor: Expr, out_of_plane: Expr | float = 0.0) -> Expr:
     )
 
 
-def deviator(eps: Expr) -> Expr:
-    """Return dev eps = eps - (tr eps / 3) I as a 3 x 3 tensor, equations (1.10) and (7.12).
-
-    The factor is 1/3 in plane strain too: the body is three-dimensional with eps_zz = 0.
-    """
-    return ufl.dev(embed(eps))
-
-
 def deviator_squared(eps: Expr) -> Expr:
-    """Return |dev eps|^2 = eps : eps - (tr eps)^2 / 3, equation (7.12)."""
+    """Return |dev eps|^2 = eps : eps - (tr eps)^2 / 3, equation (7.12).
+
+    dev eps = eps - (tr eps / 3) I with 1/3 in plane strain too, where (1.10) has 1/d: the body is
+    three-dimensional with eps_zz = 0.
+    """
     return ufl.inner(eps, eps) - ufl.tr(eps) ** 2 / 3
 
 

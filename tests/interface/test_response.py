@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import ufl
@@ -12,7 +14,7 @@ from contact.interface.current import Conductor
 from contact.interface.layer import Layer
 from contact.interface.nodes import ContactNodes
 from contact.interface.response import FoundationResponse
-from forms.foundation import compliance
+from forms.foundation import compliance, electric_contact
 from forms.laws import (
     Compliance,
     PotentialFactor,
@@ -74,19 +76,25 @@ def test_block_is_the_symmetric_part_without_the_frozen_factors():
     assert np.allclose(block, response.jacobian(x, np.zeros(50)), rtol=1e-14)
 
 
-def test_the_form_j_1_is_the_nodal_force():
-    column = PIEZO_REGIMES["linear"]
+def test_the_forms_j_1_and_l_are_the_nodal_force_and_charge():
+    column = replace(PIEZO_REGIMES["linear"], delta=4.0)
     problem = column.problem()
     body, state = problem.equilibrium, solve(problem).state
     u, phi = body.split(body.function(state.x))
-    v, _ = body.split(ufl.TestFunction(body.space))
+    v, xi = body.split(ufl.TestFunction(body.space))
     nu = ufl.FacetNormal(problem.domain.mesh)
     ds = problem.domain.ds("bottom")(metadata={"quadrature_rule": "vertex", "quadrature_degree": 1})
-    form = compliance(u, v, nu, column.p_nu, column.h_nu, column.touch, phi - column.phi_f)
-    vector = fem.assemble_vector(fem.form(form * ds)).array
-    nodal = np.zeros_like(vector)
-    pressure = problem.interface.response.layer_pressure(problem.nodal(state))
-    nodes = problem.nodes
-    nodes.transpose((nodes.weight * pressure)[:, None] * nodes.normal, nodal)
-    assert np.abs(nodal).max() > 1.0
-    assert np.abs(vector - nodal).max() < 1e-12
+    j_1 = compliance(u, v, nu, column.p_nu, column.h_nu, column.touch, phi - column.phi_f)
+    psi, phi_l = ShiftedConductivity(column.k_e, column.delta), Truncation(np.inf)
+    current = electric_contact(u, phi, xi, nu, psi, phi_l, column.gap, column.phi_f)
+    nodes, response, nodal = problem.nodes, problem.interface.response, problem.nodal(state)
+    pressure = response.layer_pressure(nodal)
+    at_nodes = np.zeros((2, *nodal.shape))
+    at_nodes[0, :, :2] = pressure[:, None] * nodes.normal
+    at_nodes[1, :, 2] = body.phi_scale * response.charge(nodal, pressure)
+    for form, given in zip((j_1, current), at_nodes, strict=True):
+        vector = fem.assemble_vector(fem.form(form * ds)).array
+        expected = np.zeros_like(vector)
+        nodes.transpose(nodes.weight[:, None] * given, expected)
+        assert np.abs(expected).max() > 0.1
+        assert np.abs(vector - expected).max() < 1e-12

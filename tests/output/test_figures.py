@@ -13,11 +13,13 @@ from tests.problems.written import block, electric
 @pytest.mark.parametrize("dim", [2, 3])
 def test_figures(dim: int, shared_tmp_path: Path) -> None:
     """All figures are drawn."""
-    from contact.output.figures.figures import write_figures
+    from contact.output.figures.figures import collect
 
     if dim == 3:
         pytest.importorskip("pyvista")
-    files = write_figures(solve(electric(dim)), shared_tmp_path)
+    drawing = collect(solve(electric(dim)))
+    assert drawing is not None
+    files = drawing.draw(shared_tmp_path)
     assert [file.name for file in files] == [
         "figure-contact.png",
         "figure-deformed.png",

@@ -9,7 +9,6 @@ import pytest
 from mpi4py import MPI
 
 from contact.methods.options import with_method
-from contact.output.figures.figures import write_figures
 from contact.output.files import write_outputs
 from contact.output.options import OutputOptions
 from contact.output.table import contact_table, csv_columns, tangent_of
@@ -168,9 +167,8 @@ def test_ranks_without_cells_write_and_draw_too(method: str, shared_tmp_path: Pa
     case = block(2, mesh={"generator": "rectangle", "size": [1.0, 1.0], "cells": [1, 1]})
     solution = solve(case, with_method(case.solver, method))
     assert solution.converged
-    summary, rows = written(solution, shared_tmp_path)
+    summary, rows = written(solution, shared_tmp_path, figures=True)
     assert summary["cells"] == 2
     assert summary["contact_nodes"] == len(rows)
-    write_figures(solution, shared_tmp_path)
     if MPI.COMM_WORLD.rank == 0:
         assert len(list(shared_tmp_path.glob("figure-*.png"))) == 2

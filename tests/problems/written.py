@@ -41,9 +41,11 @@ def electric(dim: int) -> Case:
     )
 
 
-def written(solution: Solution, folder: Path) -> tuple[dict[str, object], list[dict[str, str]]]:
+def written(
+    solution: Solution, folder: Path, figures: bool = False
+) -> tuple[dict[str, object], list[dict[str, str]]]:
     """Write the outputs; return the summary and the rows of the contact table."""
-    write_outputs(solution, folder)
+    write_outputs(solution, folder, figures)
     summary = json.loads((folder / "summary.json").read_text())
     with (folder / "contact.csv").open() as file:
         return summary, list(csv.DictReader(file))

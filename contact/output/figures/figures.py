@@ -186,6 +186,11 @@ def sized(width: float) -> dict[str, Any]:
 def collect(solution: Solved, fields: Sequence[str] = ()) -> Drawing | None:
     """Gather on rank 0 what the figures of a solution show; None elsewhere. Collective.
 
+    In the plane the contact figure shows the stresses along Gamma_3 with the friction bound
+    and the zones of stick and slip, as Figure 7.4 of the thesis does, and the deformed body is
+    coloured by the von Mises stress, as in Figure 7.5. In space the contact nodes are seen
+    along the mean contact direction, and the deformed surface from the side.
+
     Parameters
     ----------
     solution
@@ -245,32 +250,6 @@ def heading(title: str) -> str:
     if len(line) > WIDTH:
         line = line[: WIDTH - 1] + "…"
     return line.replace("$", r"\$")
-
-
-def write_figures(solution: Solved, folder: str | Path) -> list[Path]:
-    """Draw the figures of a solution into a folder. Collective; rank 0 draws.
-
-    In the plane the contact figure shows the stresses along Gamma_3 with the friction bound
-    and the zones of stick and slip, as Figure 7.4 of the thesis does, and the deformed body is
-    coloured by the von Mises stress, as in Figure 7.5. In space the contact nodes are seen
-    along the mean contact direction, and the deformed surface from the side.
-
-    Parameters
-    ----------
-    solution
-        The solution.
-    folder
-        Where to; it is made if need be.
-
-    Returns
-    -------
-    The files, in the order in which they were drawn; none on ranks other than 0.
-    """
-    folder, drawing = Path(folder), collect(solution)
-    if drawing is None:
-        return []
-    folder.mkdir(parents=True, exist_ok=True)
-    return drawing.draw(folder)
 
 
 def _save(figure: Figure, path: Path) -> Path:
