@@ -1,4 +1,4 @@
-"""The last road of a static problem: its loads grow with time from 0 to 1."""
+"""The road in load steps of a static problem: its loads grow with time from 0 to 1."""
 
 from __future__ import annotations
 

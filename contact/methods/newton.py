@@ -3,8 +3,8 @@
 First the condensed body, where the contact nodes are few, then the whole one. Where Newton's loop
 cycles at the contact nodes of a condensed body, an interior-point method takes over. Where that
 fails, and for the whole body, friction is frozen and updated outside (Algorithm 1 with Newton
-inside); then the block relaxation takes over, and at last the load is applied in steps. The
-history says which.
+inside); then the load is applied in steps, and at last the block relaxation takes over. The history
+says which.
 
 References
 ----------
@@ -188,10 +188,10 @@ class Newton:
             iterate, outcome = self._convex(self.problem, iterate, outcome)
         if not outcome.converged and self.problem.interface.friction.acts and search.left > 0:
             iterate, outcome = frozen_friction(loop, iterate)
-        if not outcome.converged and search.left > 0:
-            iterate, outcome = block_relaxation(search, self.counters)
         if not outcome.converged and search.left > 0 and self.options.load_steps:
             iterate, outcome = load_steps(loop)
+        if not outcome.converged and search.left > 0:
+            iterate, outcome = block_relaxation(search, self.counters)
         return iterate, outcome
 
     def _bends(self, state: State) -> bool:

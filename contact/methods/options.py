@@ -173,7 +173,7 @@ class NewtonOptions(Options):
         Whether to keep the factorisation of a condensed body while that costs less than new ones:
         within a solve, which then does not depend on those before, or across solves too.
     load_steps
-        Whether to apply the load in steps where all else has failed.
+        Whether to apply the load in steps where surer roads have failed.
     """
 
     method: Literal["newton"] = "newton"

@@ -20,7 +20,7 @@ from contact.methods.convex.haslinger import coulomb
 from contact.methods.convex.reduced import NotConvexError, without_potential
 from contact.methods.convex.tresca import TrescaSolver
 from contact.problem.condensed import CondensedProblem
-from contact.problem.kkt import residual_forces
+from contact.problem.kkt import evaluate, residual_forces
 from contact.problem.state import State
 from contact.typing import Array
 
@@ -32,6 +32,9 @@ MOST_ANSWERS, SETTLED = 200, 1e-10
 
 #: Tolerance of a Tresca problem within Haslinger's loop.
 INNER = 1e-10
+
+#: Residual from which on Newton's loop, which follows what they answer, is surely better.
+NEAR = 0.02
 
 #: Least share of a step that is taken between two of these times.
 LEAST_SHARE = 1 / 64
@@ -80,15 +83,20 @@ def solve_convex(
         Relative change of the friction bound that is left.
     """
     steps, found, last, share = 0, None, np.inf, 1.0
-    for _ in range(MOST_ANSWERS if problem.interface.response.active else 1):
+    for _ in range(MOST_ANSWERS):
         found = _solve_linearised(
             problem, state, poll, friction and problem.interface.friction.acts, tolerance
         )
         if found is None:
             return None
         steps += found.steps
+        if not problem.interface.response.active:
+            break
         change = _largest(problem, found.state.x - state.x)
         if change <= SETTLED * _largest(problem, found.state.x):
+            break
+        kkt = evaluate(problem, found.state)
+        if max(kkt.equilibrium, kkt.contact) < NEAR:
             break
         # What the current answers may open a gap that closes it: go there more carefully.
         share = max(share / 2, LEAST_SHARE) if change > last else share
