@@ -58,7 +58,7 @@ def draw_setup(case: Case, problem: ContactProblem) -> Figure | None:
 
 def _foundation(problem: ContactProblem) -> Array:
     """Return where the contact nodes would meet rigid foundations, shape (m, d). Collective."""
-    found = [np.zeros((0, problem.dim))]
+    found: list[Array] = [np.zeros((0, problem.dim))]
     for nodes in (entry.nodes for entry in problem.entries if entry.coupling is None):
         near = np.isfinite(nodes.gap)
         found.append(nodes.gather((nodes.points + nodes.gap[:, None] * nodes.normal)[near]))
