@@ -117,9 +117,9 @@ def theorem_5_2(report: Report, coarse: bool) -> dict[str, float]:
     rates["threshold"] = low
     note = (
         f"The lagged charge stops converging between k_e = {low:.3g} and {high:.3g} "
-        f"({grid[0]} x {grid[1]} cells); its rate is proportional to k_e. Beyond, the iterates "
-        "end in a cycle. With phi implicit the rate is that of friction and does not grow with "
-        "k_e."
+        f"({grid[0]} x {grid[1]} cells); its rate is about proportional to k_e, where it is above "
+        "that of friction. Beyond, the iterates end in a cycle. At most 40 iterations are "
+        "shown. With phi implicit the rate is that of friction and does not grow with k_e."
     )
     caption = "Theorem 5.2: errors of Algorithm 4 per iteration, Example 8.1, phi_F = 32"
     report.table("theorem-5-2-rates", caption, columns, note)
