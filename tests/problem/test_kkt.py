@@ -244,6 +244,17 @@ def test_residuals_of_an_open_body():
     assert evaluate(problem, State(x, rest.forces)).contact > 0.5
 
 
+def test_a_node_without_numbers_far_from_all_others_is_no_equilibrium(solved):
+    """Neither supports nor contact nodes see it: the residual was said to be 0."""
+    body, x = solved.problem.equilibrium, solved.state.x.copy()
+    points = body.space.tabulate_dof_coordinates()
+    middle = np.argmin(np.linalg.norm(points - points.mean(axis=0), axis=1))
+    body.nodal(x)[middle, 0] = np.nan
+    found = evaluate(solved.problem, State(x, solved.forces))
+    assert np.isfinite(found.contact) and np.isfinite(found.friction)
+    assert found.largest == np.inf
+
+
 def test_what_is_no_number_has_not_converged():
     assert KKT(0.0, float("nan"), 0.0).largest == np.inf
     assert KKT(float("inf"), 0.0, 0.0).largest == np.inf
