@@ -35,7 +35,7 @@ from contact.methods.report import History, Monitor, Outcome
 from contact.methods.search import Search
 from contact.methods.step import Iterate, WholeStep
 from contact.methods.sure import INTERIOR_POINT, solve_convex
-from contact.problem.condensed import CondensedProblem
+from contact.problem.condensed import LARGEST, CondensedProblem
 from contact.problem.condensing import condensation, pays
 from contact.problem.kkt import evaluate, residual_forces
 from contact.problem.problem import ContactProblem
@@ -54,6 +54,12 @@ SHORT = 4
 #: Forces that the moduli make of the first penetration, over the loads, from which on the body is
 #: far softer than the block that they are those of. Of a block they are some sqrt(H/h).
 SOFT = 1e3
+
+#: What is said of bodies of which that is true where the surer road is closed.
+TOO_MANY = (
+    "the body is far softer than a block, and what is sure for such bodies needs a direct solver "
+    f"and at most {LARGEST} unknowns at the contact nodes: take coarser or quadratic elements there"
+)
 
 
 def moduli_of(scales: Scales, gamma: float) -> Moduli:
@@ -96,6 +102,7 @@ class Newton:
         self.history = History(self.monitor)
         self._moduli = self.moduli or moduli_of(problem.scales, options.gamma)
         self._begin()
+        self._soft = False
         self.whole = WholeStep(problem, options, self._moduli, self.counters)
         self._condensed: MaterialStep | None = None
         self._pays = False
@@ -165,6 +172,8 @@ class Newton:
         if not outcome.converged and search.best.found is not None:
             iterate = search.best.found
             outcome = replace(outcome, kkt=evaluate(self.problem, iterate.state))
+        if not outcome.converged and self._soft and self._condensed is None:
+            outcome = replace(outcome, ended=f"{outcome.ended}; {TOO_MANY}")
         search.at = iterate
         return iterate, outcome
 
@@ -177,7 +186,8 @@ class Newton:
             logger.info("%s; going on with the whole body", outcome.ended)
         surer = None if self._pays else self._condensed
         loop = self.whole_loop(SHORT if surer is not None else None)
-        first = loop if surer is None else replace(loop, hopeless=self._bends)
+        whole = isinstance(self.problem, ContactProblem) and not self._pays
+        first = replace(loop, hopeless=self._bends) if whole else loop
         iterate, outcome = first.run(iterate)
         if not outcome.converged and surer is not None:
             logger.info("%s; going on at the contact nodes", outcome.ended)
@@ -195,12 +205,17 @@ class Newton:
         return iterate, outcome
 
     def _bends(self, state: State) -> bool:
-        """Tell whether the moduli make far more of a penetration than any load. Collective."""
+        """Tell whether a surer road is to be taken at once. Collective.
+
+        It is where the moduli make far more of a penetration than any load.
+        """
         problem, interface = self.problem, self.problem.interface
         opening = np.maximum(interface.opening(interface.jump.apply(state.x)), 0.0)
         foreseen = self._moduli.status * interface.jump.sum(opening)
         loads = np.abs(residual_forces(problem, problem.start()))[: problem.equilibrium.owned]
-        return foreseen > SOFT * float(interface.comm.allreduce(loads.sum(), op=MPI.SUM))
+        most = SOFT * float(interface.comm.allreduce(loads.sum(), op=MPI.SUM))
+        self._soft = foreseen > most
+        return self._soft and self._condensed is not None
 
     def _at_contact(self, step: MaterialStep, iterate: Iterate) -> tuple[Iterate, Outcome]:
         """Iterate with the body condensed onto the contact nodes."""

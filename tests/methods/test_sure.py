@@ -65,6 +65,13 @@ def test_a_fine_mesh_of_a_long_beam_takes_two_solves_of_the_body():
     assert {record.note for record in solution.history.records} == {"", "interior point"}
 
 
+def test_a_soft_body_that_cannot_be_condensed_is_said_to_be_one():
+    case = beam(100.0, [200, 2], TIP, 0.5, solver={"linear": "iterative", "max_outer": 4})
+    solution = solve(parse_case(case), comm=SELF)
+    assert not solution.converged
+    assert "the body is far softer than a block" in solution.outcome.reason
+
+
 def test_the_force_of_the_stop_is_that_of_a_beam():
     """Euler and Bernoulli: F - 3 E' I gap/L^3, but for shear, (h/L)^2 of the difference."""
     case = beam(100.0, [200, 2], TIP, 0.5, space={"degree": 2})
