@@ -49,3 +49,30 @@ def test_figures_begin_at_the_edge_of_the_body() -> None:
     assert drawn is not None
     line = draw_plane(drawn, table).axes[0].lines[0].get_xdata()
     assert (np.min(line), np.max(line)) == pytest.approx((0.0, 2.0))
+
+
+@pytest.mark.parametrize("dim", [2, 3])
+@pytest.mark.parametrize("inches", [85 / 25.4, 6.3])
+def test_words_are_within_the_figure(dim: int, inches: float) -> None:
+    """One column of a paper is narrow, and a title may be long."""
+    from matplotlib import rc_context
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+
+    from contact.output.figures.figures import collect, style
+
+    solution = solve(electric(dim))
+    solution.title = "A body that a load of some size presses on what is conductive"
+    drawing = collect(solution)
+    assert drawing is not None
+    with rc_context(style(inches)):
+        for name, figure in drawing.figures(inches).items():
+            if dim == 3 and name != "contact":
+                continue
+            canvas = FigureCanvasAgg(figure)
+            canvas.draw()
+            box, tolerance = figure.get_tightbbox(canvas.get_renderer()), 0.02  # inches
+            width, height = figure.get_size_inches()
+            assert box.x0 > -tolerance, name
+            assert box.y0 > -tolerance, name
+            assert box.x1 < width + tolerance, name
+            assert box.y1 < height + tolerance, name
