@@ -120,28 +120,35 @@ def against_one_solve(bench: Bench) -> None:
                 rows.append({"dimension": dimension, "cells a unit": n, "start": name, **result})
                 if dimension == 3 and n > 40:  # once takes long enough
                     break
-    table = columns(rows)
     bench.report.table(
         "bench-ratio",
         "Nonlinear solve against one linear elasticity solve",
-        table,
+        columns(rows),
         "Example 7.2 with Hencky's law and friction, and a block in space, from zero. Cold: on the "
         "mesh itself alone; as it chooses: where that is faster from coarser meshes, whose time "
         "counts. `one` is assembly, set-up and solve of linear elasticity with the same solver.",
     )
-    figure, axes = subplots(1, 2, (6.6, 2.8))
-    for axis, dimension in zip(axes, sizes, strict=True):
+    draw_ratios(bench.report, rows)
+
+
+def draw_ratios(report: Report, rows: Sequence[Run]) -> None:
+    """Draw the ratios over the number of unknowns."""
+    figure, axes = subplots(1, 2, (6.6, 2.8), sharey=True)
+    for axis, dimension in zip(axes, (2, 3), strict=True):
         for name, marker in (("cold", "o"), ("as it chooses", "s")):
             chosen = [r for r in rows if r["dimension"] == dimension and r["start"] == name]
             ratio = [r["ratio"] for r in chosen]
             axis.semilogx([r["unknowns"] for r in chosen], ratio, marker + "-", label=name)
         axis.set_xlabel("unknowns")
         axis.set_title("plane" if dimension == 2 else "space")
-        axis.set_ylim(bottom=0)
+    axes[0].set_ylim(0, 1.1 * max(row["ratio"] for row in rows))
     axes[0].set_ylabel("solve / one linear solve")
     axes[0].legend()
-    bench.report.figure(
-        "bench-ratio-plot", "Cost in units of one linear elasticity solve", figure, table
+    report.figure(
+        "bench-ratio-plot",
+        "Cost in units of one linear elasticity solve",
+        figure,
+        columns(rows),
     )
 
 
@@ -162,18 +169,18 @@ def ranks(bench: Bench) -> None:
     bench.report.table("bench-ranks", "One rank against two, cold", columns(rows))
     held = []
     for dimension, n in ((2, 32), (3, 8)) if bench.coarse else ((2, 128), (3, 20)):
-        first = None
+        first = np.nan
         for count in (1, 2, 4):
             found = measured([*command("ranks"), str(dimension), str(n)], count)
             size = found["bytes an unknown"]
-            first = first or size
+            first = size if count == 1 else first
             held.append(
                 {
                     "dimension": dimension,
                     "unknowns": found["unknowns"],
                     "ranks": count,
                     "bytes an unknown": size,
-                    "over one rank": size / first,
+                    "over one rank": size / first if first > 0 else np.nan,
                 }
             )
     bench.report.table(
