@@ -7,7 +7,7 @@ from petsc4py import PETSc
 
 from contact.interface.friction import Friction
 from contact.linear.operator import Counters, SparseOperator
-from contact.linear.schur import SchurComplement
+from contact.linear.schur import SchurComplement, _farthest_first
 from contact.methods.newton import Newton
 from contact.methods.options import NewtonOptions
 from contact.problem import condensed, condensing
@@ -62,6 +62,38 @@ def test_few_unknowns_are_eliminated_beside_many_that_are_kept(few):
     inside = dense[np.ix_(eliminated, eliminated)]
     expected = dense[np.ix_(kept, kept)] - coupling.T @ np.linalg.solve(inside, coupling)
     assert np.allclose(found, expected, rtol=0, atol=1e-12)
+
+
+def test_what_is_farthest_from_the_kept_unknowns_is_eliminated_first():
+    """A chain of four nodes of two unknowns, kept at its end, and a node that stands alone."""
+    rows = np.repeat([0, 0, 1, 1, 1, 2, 2, 2, 3, 3, 4], 4) * 2 + np.tile([0, 0, 1, 1], 11)
+    columns = np.repeat([0, 1, 0, 1, 2, 1, 2, 3, 2, 3, 4], 4) * 2 + np.tile([0, 1, 0, 1], 11)
+    inside = np.ones(10, dtype=bool)
+    inside[6:8] = False
+    order = _farthest_first(rows, columns, inside, 2)
+    assert order.tolist() == [8, 9, 0, 1, 2, 3, 4, 5]
+    # Of a node that is kept in part the rest is eliminated last.
+    inside[7] = True
+    assert _farthest_first(rows, columns, inside, 2).tolist() == [8, 9, 0, 1, 2, 3, 4, 5, 7]
+
+
+@pytest.mark.parallel
+def test_the_first_rank_alone_holds_factors():
+    problem = bar(WORLD, law=Linear(1.0, 0.3))
+    left = condensed.Condensation(problem, Counters()).linearise("secant", problem.start())
+    assert left is not None
+    body = left.equilibrium
+    nodes = np.arange(body.free.shape[0], dtype=np.int32)
+    operator = body.operator(nodes, symmetric=False, counters=Counters(), kind="auto")
+    blocks = np.tile(np.eye(body.block_size), (nodes.size, 1, 1))
+    operator.update("secant", body.at, blocks)
+    assert (body.factors.lower_upper is not None) == (WORLD.rank == 0)
+    rhs = np.where(body.free.ravel(), 1.0, 0.0)
+    found = np.concatenate(WORLD.allgather(operator.solve(rhs)))
+    everywhere = body.stiffness @ found + np.where(
+        np.concatenate(WORLD.allgather(rhs)) > 0, found, 0
+    )
+    assert np.allclose(everywhere[body.own], rhs, rtol=0, atol=1e-9)
 
 
 @pytest.mark.parallel
