@@ -19,9 +19,9 @@ from contact.interface.multipliers import Multipliers
 from contact.interface.status import CLOSED, SLIDES, STICKS
 from contact.typing import Array
 
-#: Part of a node's own stiffness that a falling friction coefficient may take away, and how much
-#: more in each further step in which no node changes its status.
-SOFTENING, MORE_SOFTENING = 0.25, 0.05
+#: Part of a node's own stiffness that a falling friction coefficient may take away: with its
+#: neighbours, which slide along, a node is less stiff than alone.
+SOFTENING = 0.25
 
 
 @dataclass(frozen=True)

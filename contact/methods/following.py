@@ -27,12 +27,6 @@ class Following:
     near: float = np.inf
     _limit: float = np.inf
     _followed: bool = False
-    _frozen: bool = False
-
-    @property
-    def frozen(self) -> bool:
-        """Whether psi is frozen because following it has made things worse."""
-        return self._frozen
 
     def worsened(self, residual: float) -> bool:
         """Tell whether the last step has followed psi and made things worse: freeze it then.
@@ -46,7 +40,7 @@ class Following:
             return False
         # A step with psi frozen may well undo what this one has done: ask for more.
         self._limit *= 0.1
-        self._followed, self._frozen = False, True
+        self._followed = False
         return True
 
     def __call__(self, residual: float, allowed: bool = True) -> bool:
@@ -59,8 +53,7 @@ class Following:
         allowed
             Whether the solver would follow it.
         """
-        if not self.worsened(residual) and residual <= self._limit:
-            self._frozen = False
+        self.worsened(residual)
         self._followed = allowed and residual <= min(self.near, self._limit)
         if self._followed:
             self._limit = residual

@@ -22,10 +22,6 @@ PROGRESS = 0.5
 #: Why a loop with a frozen friction bound ends.
 UPDATE = "friction bound to be updated"
 
-#: How much more patience there is where psi is frozen from step to step: a node that opens along
-#: its ramp takes its time.
-FROZEN_RAMP = 3
-
 
 @dataclass
 class NewtonLoop:
@@ -105,8 +101,7 @@ class NewtonLoop:
                 falls = residuals.equilibrium < max(before.equilibrium, options.tolerance)
                 near = residuals.equilibrium < self.secant_until
                 tangent = near and (falls or not tangent)
-            more = FROZEN_RAMP if self.step.following.frozen else 1
-            if stagnation(measured, patience * more):
+            if stagnation(measured):
                 words_of_end = f"Newton's method stalled at {stagnation.best:.1e}"
                 return iterate, self._end(residuals, words_of_end)
         steps = len(search.history.records)

@@ -163,9 +163,9 @@ class NewtonOptions(Options):
     patience
         Steps without progress after which the stage is given up.
     softening
-        Part of a node's own stiffness that a falling friction coefficient may take away in the
-        first step. Infinity for the exact derivative: from nearby, it also leads to solutions
-        on the falling part of the law, which are unstable.
+        Part of a node's own stiffness that a falling friction coefficient may take away. Infinity
+        for the exact derivative: from nearby, it also leads to solutions on the falling part of
+        the law, which are unstable.
     condense
         Whether to condense the linearised body onto the contact nodes where that pays: one
         step then solves the whole contact problem for a linear body.

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from contact.errors import SingularError
 from contact.interface.interface import Interface
-from contact.interface.linearised import MORE_SOFTENING, LinearisedContact, Moduli, linearise
+from contact.interface.linearised import LinearisedContact, Moduli, linearise
 from contact.interface.multipliers import Multipliers
 from contact.linear.operator import Counters, Operator
 from contact.methods.following import Following
@@ -128,7 +128,6 @@ class WholeStep:
     def begin(self) -> None:
         """Forget the steps before."""
         self.following = Following()
-        self._calm = 0  # steps in which no node has changed its status
         self._kind = ""
 
     @property
@@ -154,11 +153,15 @@ class WholeStep:
         state, interface = iterate.state, self.problem.interface
         body, jump = self.problem.equilibrium, interface.jump
         nodal = jump.apply(state.x)
-        softening = self.options.softening + MORE_SOFTENING * self._calm
         contact = linearise(
-            interface, nodal, state.forces, self.moduli, iterate.status, bound, softening
+            interface,
+            nodal,
+            state.forces,
+            self.moduli,
+            iterate.status,
+            bound,
+            self.options.softening,
         )
-        self._calm = self._calm + 1 if contact.settled else 0
         layer, shift = linearised_layer(interface, nodal, iterate, self.moduli, contact.settled)
         blocks = contact.blocks + layer + self._current(nodal, contact, reached.largest)
         kind, last = "tangent" if tangent else "secant", self._kind

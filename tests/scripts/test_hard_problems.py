@@ -13,7 +13,7 @@ from scripts.studies.sweep import problems
 def test_what_a_bent_bimorph_takes(name, whole, dense):
     """-3: Newton's loop finishes what the convex problems have come close to, in 212 steps before.
 
-    -8: on a good conductor load steps lead to the end; block relaxation, 700 solves, does not.
+    -8: a good conductor, which block relaxation took 700 solves of the body for.
     """
     ((_, case),) = problems(False, name, True)
     solution = solve_problem(build_problem(case), NewtonOptions())
