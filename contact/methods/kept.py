@@ -118,11 +118,12 @@ class Kept:
         self._last, self._made = (end, move), True
         if not self._changes:
             return new
-        towards, changes = (np.stack(part, axis=1) for part in zip(*self._changes, strict=True))
-        gram = self._inner(changes, np.column_stack([changes, move]))
+        # Columns one after the other in memory, as the products take them.
+        towards, changes = (np.stack(part).T for part in zip(*self._changes, strict=True))
+        gram, load = self._inner(changes, changes), self._inner(changes, move[:, None])[:, 0]
         lengths = np.sqrt(np.diag(gram))
         lengths = np.where(lengths > 0, lengths, 1.0)
-        gram, load = gram[:, :-1] / np.outer(lengths, lengths), gram[:, -1] / lengths
+        gram, load = gram / np.outer(lengths, lengths), load / lengths
         return _with(new, end - towards @ (least_squares(gram, load) / lengths))
 
 
