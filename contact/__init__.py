@@ -21,7 +21,7 @@ Contact: `Contact` with a gap, or a `Plane`, `Sphere`, `Cylinder`, `Cone`, `Para
 `Conductor` with `ShiftedConductivity`, `RampConductivity`, `PerfectConductivity`.
 Solving: `Problem`, `solve`, `evolve`; `NewtonOptions`, `FixedPointOptions`, `PenaltyOptions`.
 Case files: `Case`, `load_case`, `parse_case`, `build_problem`.
-Results: `Solution`, `write_outputs`. Errors of the input: `InputError`.
+Results: `Solution`, `write_outputs`. Errors of the input: `InputError`; Ctrl-C: `SolveInterrupted`.
 
 Wherever a field is given - a displacement, a load, a gap, a coefficient of friction - a number, a
 function of x, UFL or a dolfinx Function will do.
@@ -65,7 +65,7 @@ if TYPE_CHECKING:
     from contact.output.solution import Solution
     from contact.problem.problem import Contact
     from contact.problem.problem import ContactProblem as Problem
-    from contact.solving import solve, solve_problem
+    from contact.solving import SolveInterrupted, solve, solve_problem
     from forms.hencky import Linear, Log, UserLaw
     from forms.laws import (
         Coulomb,
@@ -95,7 +95,7 @@ _HOMES = {
     "contact.output.files": "write_outputs",
     "contact.output.solution": "Solution",
     "contact.problem.problem": "Contact ContactProblem",
-    "contact.solving": "solve solve_problem",
+    "contact.solving": "SolveInterrupted solve solve_problem",
     "forms.hencky": "Linear Log UserLaw",
     "forms.laws": "Coulomb PerfectConductivity RampConductivity ShiftedConductivity "
     "SlipCoefficient",
@@ -141,6 +141,7 @@ __all__ = [
     "ShiftedConductivity",
     "SlipCoefficient",
     "Solution",
+    "SolveInterrupted",
     "Sphere",
     "Triangles",
     "UserLaw",

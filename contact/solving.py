@@ -32,6 +32,20 @@ from contact.problem.state import State
 GIVEN = "the state that was given"
 
 
+class SolveInterrupted(KeyboardInterrupt):
+    """A SIGINT (Ctrl-C) or SIGTERM has ended a solve, on all ranks after the same iteration.
+
+    Parameters
+    ----------
+    solution
+        What was reached; `solution.outcome.signal` is the number of the signal.
+    """
+
+    def __init__(self, solution: Solution) -> None:
+        super().__init__(solution.outcome.reason)
+        self.solution = solution
+
+
 def solve(
     case: Case | ContactProblem | str | Path,
     settings: Options | None = None,
@@ -68,7 +82,31 @@ def solve(
     InputError
         If the case does not fit its mesh, the body is not held, or something is given that would
         be ignored.
+    SolveInterrupted
+        After a SIGINT or SIGTERM, with what was reached; a second signal ends the program.
     """
+    return _uninterrupted(
+        _solve(case, settings, monitor, comm, folder, restart, start, **replacements)
+    )
+
+
+def _uninterrupted(solution: Solution) -> Solution:
+    if solution.outcome.signal:
+        raise SolveInterrupted(solution)
+    return solution
+
+
+def _solve(
+    case: Case | ContactProblem | str | Path,
+    settings: Options | None,
+    monitor: Monitor | None,
+    comm: MPI.Intracomm,
+    folder: Path | None,
+    restart: Path | None,
+    start: State | None,
+    **replacements: Any,
+) -> Solution:
+    """Solve as `solve` does; what a signal has ended is a solution like others."""
     begin = time.perf_counter()
     if not isinstance(settings, Options | None):
         raise InputError(
@@ -81,7 +119,7 @@ def solve(
         nested = isinstance(settings, NewtonOptions) and settings.nested
         _refuse({"nested": nested or None}, "a problem that is built already")
         check_held(case)
-        return solve_problem(case, settings or NewtonOptions(), monitor, start)
+        return _reached(case, settings or NewtonOptions(), monitor, start, GIVEN)
     case = case if isinstance(case, Case) else load_case(case, without=replaced_by(replacements))
     settings = settings or case.solver
     problem = build_problem(case, comm, **replacements)
@@ -96,7 +134,7 @@ def solve(
                 _refuse({"start": start}, "nested = true, which has a start of its own")
                 start = nested_start(case, problem, **replacements)
                 words = "the solution on a coarser mesh"
-            solution = solve_problem(problem, settings, monitor, start, words)
+            solution = _reached(problem, settings, monitor, start, words)
         else:
             _refuse({"start": start}, "[evolution]; evolve(problem, times, start=state) goes on")
             _refuse({"nested": nested or None}, "[evolution]")
@@ -139,15 +177,26 @@ def solve_problem(
     words
         What start that is, for what is said of the solution.
 
-    An interrupt (Ctrl-C, or SIGTERM from a batch system) ends the solve after the running
-    iteration and keeps what the last outer one left; a second one ends the program.
-
     Raises
     ------
     InputError
         If the linear system is singular, the potential is not determined, or the start is that of
         another problem.
+    SolveInterrupted
+        After a SIGINT or SIGTERM, with what the last outer iteration has left; a second signal
+        ends the program.
     """
+    return _uninterrupted(_reached(problem, settings, monitor, start, words))
+
+
+def _reached(
+    problem: ContactProblem,
+    settings: Options,
+    monitor: Monitor | None,
+    start: State | None,
+    words: str,
+) -> Solution:
+    """Solve as `solve_problem` does; what a signal has ended is a solution like others."""
     begin = time.perf_counter()
     if start is not None:
         start = _begun(problem, start)

@@ -76,13 +76,18 @@ def _solve(case: Case, options: argparse.Namespace, comm: MPI.Intracomm) -> int:
     from contact.cli.progress import progress
     from contact.output.files import write_outputs
     from contact.output.resume import discard
-    from contact.solving import solve
+    from contact.solving import SolveInterrupted, solve
 
     with result_folder(out, comm) as folder:
         if not options.overwrite:
             on_root(comm, lambda: check_rerun(folder.path, to_toml(case)))
         with progress(comm, options.quiet, options.log) as monitor:
-            solution = solve(case, monitor=monitor, comm=comm, folder=folder.path, restart=restart)
+            try:
+                solution = solve(
+                    case, monitor=monitor, comm=comm, folder=folder.path, restart=restart
+                )
+            except SolveInterrupted as interrupt:
+                solution = interrupt.solution
             logging.getLogger("contact").debug(solution.outcome.reason)
         outcome = solution.outcome
         earlier = on_root(comm, (folder.path / "summary.json").exists)

@@ -15,7 +15,7 @@ from contact.methods.newton import Newton
 from contact.methods.options import NewtonOptions
 from contact.methods.report import Record
 from contact.problem.kkt import evaluate
-from contact.solving import solve, solve_problem
+from contact.solving import SolveInterrupted, solve, solve_problem
 from tests.problems.written import block, written
 
 
@@ -28,7 +28,10 @@ def test_interrupted_solve_keeps_its_results(shared_tmp_path: Path) -> None:
         if record.iteration == 1 and MPI.COMM_WORLD.rank == 0:
             signal.raise_signal(signal.SIGINT)
 
-    solution = solve(block(2, solver={"method": "uzawa"}), monitor=press)
+    with pytest.raises(SolveInterrupted, match=r"interrupted \(SIGINT\)") as interrupt:
+        solve(block(2, solver={"method": "uzawa"}), monitor=press)
+    solution = interrupt.value.solution
+    assert solution.title == "Block"
     assert not solution.converged
     assert solution.history.records[-1].iteration == 1
     summary, rows = written(solution, shared_tmp_path)
@@ -50,7 +53,9 @@ def test_a_solve_stops_between_inner_iterations(
         return solve_once(operator, *args, **options)
 
     monkeypatch.setattr(SparseOperator, "solve", press)
-    solution = solve(block(2, solver={"method": "uzawa"}))
+    with pytest.raises(KeyboardInterrupt) as interrupt:
+        solve(block(2, solver={"method": "uzawa"}))
+    solution = interrupt.value.solution
     assert solution.counters.linear_solves == 6
     assert solution.outcome.signal == signal.SIGTERM
     summary, _ = written(solution, shared_tmp_path)
@@ -73,7 +78,9 @@ def test_an_interrupted_load_step_is_judged_by_the_full_load(
         signal.raise_signal(signal.SIGINT)
 
     monkeypatch.setattr(Newton, "_roads", stepped)
-    solution = solve_problem(problem, NewtonOptions(condense=False), press)
+    with pytest.raises(SolveInterrupted) as interrupt:
+        solve_problem(problem, NewtonOptions(condense=False), press)
+    solution = interrupt.value.solution
     assert solution.outcome.signal == signal.SIGINT
     assert [note.split()[:2] for note in notes] == [["load", "0.25"]]
     state = solution.state
