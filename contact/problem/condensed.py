@@ -218,6 +218,8 @@ class Condensation:
                 self._stiffness = self._schur.factorise(self._matrix)
             if self._masters is not None:
                 self._stiffness = self._masters.eliminate(self._schur, self._stiffness)
+            # By columns, as LAPACK wants the copies of which factors are made.
+            self._stiffness = np.asfortranarray(self._stiffness)
             self._kind, self._size = kind, self._matrix.norm()
             self.counters.factorizations += 1
         residual = body.internal_forces(state.x) - body.external(state.time)
