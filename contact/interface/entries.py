@@ -133,7 +133,7 @@ def joined_friction(entries: Sequence[Entry], nodes: ContactNodes) -> NodalFrict
         return NodalFriction.at(entries[0].nodes, entries[0].friction)
     bounds = _bounds(entries)
     smoothing = tuple(Smoothing(entry.nodes, entry.friction.radius) for entry in entries)
-    laws = [entry.friction.law_at(entry.nodes.points) for entry in entries]
+    laws = [entry.friction.law_at(entry.nodes) for entry in entries]
     law = None
     if any(laws):
         law = FrictionPieces(tuple(NO_FRICTION if own is None else own for own in laws), bounds)

@@ -71,13 +71,40 @@ class Friction:
         """Whether there is any."""
         return any(law is not None for law in self._laws)
 
-    def law_at(self, points: Array) -> FrictionLaw | None:
-        """Return the law at nodes of coordinates (n, d); None without friction. Collective."""
+    def law_at(self, nodes: ContactNodes) -> FrictionLaw | None:
+        """Return the law at contact nodes; None without friction. Collective.
+
+        Raises
+        ------
+        InputError
+            If a bound or coefficient is negative or no number at a node, or a coefficient of the
+            slip where nothing slips.
+        """
         if self.tresca is not None:
-            return Tresca(np.asarray(self.tresca.numpy(points), dtype=float))
+            return Tresca(_at("tresca", self.tresca, nodes))
         if self.mu is not None:
-            return Coulomb(ConstantCoefficient(np.asarray(self.mu.numpy(points))))
-        return self.law if self.coefficient is None else Coulomb(self.coefficient)
+            return Coulomb(ConstantCoefficient(_at("mu", self.mu, nodes)))
+        if self.coefficient is None:
+            return self.law
+        _check("coefficient without slip", np.asarray(self.coefficient(np.zeros(1))), nodes)
+        return Coulomb(self.coefficient)
+
+
+def _at(name: str, given: Given, nodes: ContactNodes) -> Array:
+    """Return what resists at contact nodes. Collective."""
+    values = np.asarray(given.numpy(nodes.points), dtype=float)
+    _check(name, values, nodes)
+    return values
+
+
+def _check(name: str, values: Array, nodes: ContactNodes) -> None:
+    """Refuse what does not resist, on all ranks together. Collective."""
+    bad = values[~((values >= 0) & np.isfinite(values))]
+    worst = np.concatenate(nodes.comm.allgather(bad[:1]))
+    if worst.size > 0:
+        raise InputError(
+            f"Friction: {name} is {worst[0]:g} at a node; accepted: finite values >= 0"
+        )
 
 
 @dataclass(frozen=True)
@@ -103,7 +130,7 @@ class NodalFriction:
     @staticmethod
     def at(nodes: ContactNodes, friction: Friction) -> NodalFriction:
         """Evaluate friction at contact nodes. Collective."""
-        law, smoothing = friction.law_at(nodes.points), Smoothing(nodes, friction.radius)
+        law, smoothing = friction.law_at(nodes), Smoothing(nodes, friction.radius)
         return NodalFriction(law, smoothing, SlipHistory.rest(nodes))
 
     @property

@@ -185,8 +185,8 @@ def find_nodes(
     Raises
     ------
     InputError
-        If no contact node is left on any rank, one has no contact direction, or the foundation
-        lies behind the contact part or cuts the body at rest.
+        If no contact node is left on any rank, one has no contact direction or a gap that is no
+        number, or the foundation lies behind the contact part or cuts the body at rest.
     """
     domain, space, d = body.domain, body.space, body.dim
     found = candidates(domain, space, part)
@@ -198,6 +198,8 @@ def find_nodes(
             "centre, on the axis of a cylinder, or where a formula has no value or no slope)"
         )
     cut = 0.0
+    if not obstacle.is_shape and domain.comm.allreduce(bool(np.isnan(gap).any()), op=MPI.LOR):
+        raise InputError(f"{key}: the gap is no number at a node; accepted: lengths, or inf")
     if obstacle.is_shape:
         with _naming(key):
             gap, cut = _place(domain, space, (part, obstacle), found, direction, gap, press)

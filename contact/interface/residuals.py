@@ -19,6 +19,7 @@ def interface_residuals(
     contact = forces.pressure - project_half_line(forces.pressure + c * opening)
     trial = forces.friction + c * interface.slip(nodal)
     friction = forces.friction - project_disc(trial, bound)
+    friction[np.isnan(bound)] = np.nan  # nothing is beyond what is no number
     # Where next to nothing presses, rounding is compared with the stress that closing would take.
     closing = c * jump.norm(np.minimum(np.abs(opening), interface.size))
     scale = max(jump.norm(interface.pressure(nodal, forces)), 1e-4 * closing) or 1.0

@@ -136,6 +136,10 @@ class ContactProblem:
             raise InputError(
                 f"given {contact!r} for a contact; accepted: Contact(part), or several"
             )
+        if not isinstance(friction, Friction | None):
+            raise InputError(
+                f"given {friction!r} for friction; accepted: Friction(mu=...), or None"
+            )
         self.contacts = tuple(
             replace(
                 contact,

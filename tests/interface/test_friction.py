@@ -1,0 +1,76 @@
+"""Friction that is given in Python: what resists is a number that is not negative."""
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+
+from contact import (
+    Body,
+    Contact,
+    Fixed,
+    Friction,
+    InputError,
+    Linear,
+    Problem,
+    SlipCoefficient,
+    solve,
+)
+from contact.mesh.grid import rectangle
+from contact.problem.kkt import evaluate
+from forms.laws import Coulomb
+
+
+def problem(contact, friction=None):
+    """Return a block that is pressed down and pulled aside."""
+    domain = rectangle(MPI.COMM_WORLD, (0.0, 0.0), (2.0, 1.0), (4, 2))
+    body = Body(Linear(10.0, 0.3), Fixed("top", [0.01, -0.01]))
+    return Problem(domain, body, contact, friction)
+
+
+@pytest.mark.parallel
+@pytest.mark.parametrize(
+    ("friction", "said"),
+    [
+        (Friction(mu=-1e-3), "mu is -0.001"),
+        (Friction(mu=np.nan), "mu is nan"),
+        (Friction(mu=lambda x: np.where(x[0] > 1.5, np.nan, 0.3)), "mu is nan"),
+        (Friction(tresca=lambda x: 1.0 - x[0]), "tresca is -"),
+        (Friction(tresca=np.inf), "tresca is inf"),
+        (Friction(SlipCoefficient(-0.3, 0.2, 1.0)), "coefficient without slip is -0.2"),
+    ],
+)
+def test_what_resists_is_not_negative(friction, said):
+    with pytest.raises(InputError, match=rf"Friction: {said}.* at a node; accepted: finite"):
+        problem(Contact("bottom", friction=friction))
+
+
+def test_a_number_is_no_friction():
+    with pytest.raises(InputError, match=r"given 0.3 for friction; accepted: Friction\(mu="):
+        problem(Contact("bottom"), 0.3)
+
+
+@pytest.mark.parallel
+def test_a_gap_is_a_number():
+    with pytest.raises(InputError, match="contact: the gap is no number at a node"):
+        problem(Contact("bottom", lambda x: np.where(x[0] > 1.5, np.nan, 0.0)))
+
+
+class Lost:
+    """A coefficient that is no number."""
+
+    maximum, lipschitz = 0.3, 0.0
+
+    def __call__(self, slip):
+        """Return mu."""
+        return np.full_like(slip, np.nan)
+
+    def derivative(self, slip):
+        """Return d mu / ds."""
+        return np.zeros_like(slip)
+
+
+def test_a_bound_without_numbers_is_not_met():
+    solution = solve(problem(Contact("bottom"), Friction(mu=1e6)))
+    assert solution.converged  # all of it sticks
+    lost = evaluate(problem(Contact("bottom"), Friction(law=Coulomb(Lost()))), solution.state)
+    assert lost.excess(solution.outcome.allowed)
