@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 from mpi4py import MPI
+from scipy import linalg
 
 from contact.errors import InputError
-from contact.problem.mobility import ROUNDING, Group, groups, null_space
+from contact.mesh.pieces import connected_pieces
+from contact.problem.mobility import ROUNDING, Group, groups, middle, null_space
 from contact.problem.problem import ContactProblem
 from contact.problem.state import State
 from contact.typing import Array
@@ -65,31 +67,50 @@ def _what_is_loose(problem: ContactProblem, group: Group, loose: Array) -> str:
 
 
 def check_potential(problem: ContactProblem, state: State) -> None:
-    """Check that the potential of a solution is more than known but for a constant. Collective.
+    """Check that the potential of a solution is more than known but for constants. Collective.
 
-    It is where it is prescribed, and where current flows, also through nodes that cannot move.
+    It is where it is prescribed, and where current flows, also through nodes that cannot move: to
+    a foundation, or to another piece whose potential is known. Electrodes join what they lie on.
 
     Raises
     ------
     InputError
         If no potential is prescribed and no current flows, as on a foundation that is conductive
-        but touched nowhere.
+        but touched nowhere, or on a body that touches another one and does not conduct.
     """
     if not problem.piezoelectric:
         return
-    interface, nodal, comm = problem.interface, problem.nodal(state), problem.comm
+    body, interface, nodal = problem.equilibrium, problem.interface, problem.nodal(state)
+    piece, count = connected_pieces(body.space)
+    # Constants by which the potential may be raised: of each piece, and of each electrode.
+    raised = np.zeros((*body.free.shape, count))
+    raised[np.arange(piece.size), -1, piece] = 1.0
+    electrodes = np.eye(body.masters.size)[:, ~body.masters.mechanical]
+    follows = (body.masters.ties @ electrodes)[body.block_size - 1 :: body.block_size]
+    rows = [np.hstack([raised[:, -1], -follows])[~body.free[:, -1]]]
+    columns = linalg.block_diag(raised.reshape(body.owned, count), electrodes)
+    locally = [body.local(column) for column in columns.T]
     pressure = interface.pressure(nodal, state.forces)
-    slopes = interface.response.jacobian(nodal, pressure)[:, -1, -1]
-    known = bool(np.any(slopes != 0)) or not np.all(problem.equilibrium.unsupported[:, -1])
+    flows = interface.response.jacobian(nodal, pressure)[:, -1, -1] != 0
+    rows.append(np.column_stack([problem.nodes.apply(x)[flows, -1] for x in locally]))
     if interface.held is not None:
-        through_held = interface.held.slope(state.x)
-        known = known or bool(np.any(through_held != 0))
-    if not comm.allreduce(known, op=MPI.LOR):
-        raise InputError(
-            "the potential is not determined: it is prescribed nowhere, and the foundation "
-            "conducts nowhere; accepted: a potential fixed on a part, or contact with a "
-            "conductive foundation"
-        )
+        flows, jump = interface.held.slope(state.x) != 0, interface.held.jump
+        rows.append(np.column_stack([jump.apply(x)[flows, -1] for x in locally]))
+    gram = sum(problem.comm.allreduce(part.T @ part, op=MPI.SUM) for part in rows)
+    floating = null_space(gram / max(np.trace(gram), 1.0))
+    if floating.shape[1] == 0:
+        return
+    where, known = "", "a conductive foundation"
+    if count > 1:
+        alone = np.flatnonzero(np.linalg.norm(floating[:count], axis=1) > 1e-6)
+        middles = (middle(problem, body.layout.points[piece == k])[0] for k in alone)
+        found = " and ".join(f"({', '.join(f'{x:.4g}' for x in c)})" for c in middles)
+        where = f" of the piece of the mesh about {found}"
+        known += ", or with a body that conducts and whose potential is known"
+    raise InputError(
+        f"the potential{where} is not determined: it is prescribed nowhere, and the foundation "
+        f"conducts nowhere; accepted: a potential fixed on a part, or contact with {known}"
+    )
 
 
 def _describe(motions: Array, names: list[str]) -> str:

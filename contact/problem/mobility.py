@@ -158,7 +158,7 @@ def _group(
     for k in pieces:
         inside, size = piece == k, problem.domain.size
         if count > 1:
-            centre, size = _middle(problem, points[inside])
+            centre, size = middle(problem, points[inside])
         rigid = rigid_motions((points[inside] - centre) / size, problem.domain.revolved)
         motions = np.zeros((*body.free.shape, rigid.shape[2]))
         motions[inside, :d] = rigid
@@ -194,7 +194,7 @@ def _centre(problem: ContactProblem) -> Array:
     return np.array([nodes.sum(x) for x in nodes.points.T]) / weight
 
 
-def _middle(problem: ContactProblem, points: Array) -> tuple[Array, float]:
+def middle(problem: ContactProblem, points: Array) -> tuple[Array, float]:
     """Return the middle of the box around points of all ranks, and its diagonal."""
     low, high = points.min(axis=0, initial=np.inf), points.max(axis=0, initial=-np.inf)
     problem.comm.Allreduce(MPI.IN_PLACE, low, op=MPI.MIN)

@@ -42,6 +42,52 @@ def test_held_nodes_that_conduct_determine_the_potential(
     assert status == CONVERGED, lines
 
 
+PIEZO_PAIR = """
+[mesh]
+generator = "two_blocks"
+lower_size = 0.5
+upper_size = 0.4
+[material]
+young = 1.0
+poisson = 0.3
+piezo = { e31 = -0.3, e33 = 0.8, e15 = 0.6, beta11 = 1.0, beta33 = 0.9 }
+[[fixed]]
+on = "lower_bottom"
+displacement = [0.0, 0.0]
+[[fixed]]
+on = "lower_left"
+potential = 0.0
+[[fixed]]
+on = "upper_top"
+displacement = [0.0, -0.01]
+[contact]
+on = "upper_bottom"
+against = "lower_top"
+"""
+CONDUCTS = '[electric]\nlaw = "perfect"\nk_e = 1.0\n'
+
+
+@pytest.mark.parallel
+@pytest.mark.parametrize("name", ["insulated", "apart", "electrode", "conducting"])
+def test_each_body_of_a_pair_needs_a_potential(
+    name: str, shared_tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    """A body that touches a grounded one and gives no charge to it may have any potential."""
+    text = PIEZO_PAIR
+    if name == "apart":
+        text = text.replace("-0.01", "0.01") + CONDUCTS
+    elif name == "electrode":
+        text += '[[electrode]]\non = "upper_top"\n'
+    elif name == "conducting":
+        text += CONDUCTS
+    case = write(shared_tmp_path, text)
+    if name == "conducting":
+        status, lines = run(case, capfd=capfd)
+        assert status == CONVERGED, lines
+    else:
+        refuse(case, ["potential of the piece of the mesh about", "0.5) is not determined"], capfd)
+
+
 @pytest.mark.parallel
 def test_not_converged_writes_outputs(
     shared_tmp_path: Path, capfd: pytest.CaptureFixture[str]
