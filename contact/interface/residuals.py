@@ -20,7 +20,10 @@ def interface_residuals(
     trial = forces.friction + c * interface.slip(nodal)
     friction = forces.friction - project_disc(trial, bound)
     friction[np.isnan(bound)] = np.nan  # nothing is beyond what is no number
-    # Where next to nothing presses, rounding is compared with the stress that closing would take.
-    closing = c * jump.norm(np.minimum(np.abs(opening), interface.size))
+    # Where next to nothing presses, rounding is compared with the stress that closing would take,
+    # but not of gaps far wider than nodes move: these say nothing of the loads.
+    before = np.linalg.norm(interface.friction.history.jump, axis=1)
+    way = np.maximum(np.linalg.norm(nodal[:, : interface.dim], axis=1), before)
+    closing = c * jump.norm(np.minimum(np.minimum(np.abs(opening), way), interface.size))
     scale = max(jump.norm(interface.pressure(nodal, forces)), 1e-4 * closing) or 1.0
     return jump.norm(contact) / scale, jump.norm(friction) / scale

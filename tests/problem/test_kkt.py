@@ -244,6 +244,26 @@ def test_residuals_of_an_open_body():
     assert evaluate(problem, State(x, rest.forces)).contact > 0.5
 
 
+@pytest.mark.parametrize("method", ["newton", "uzawa"])
+def test_a_gap_out_of_reach_does_not_excuse_small_loads(method):
+    """The problem is homogeneous: of small loads half the friction was missing, and converged."""
+    forces = []
+    for load in (1e-3, 1e-16):
+        section = {
+            "mesh": {"generator": "rectangle", "size": [4.0, 1.0], "cells": [16, 4]},
+            "material": {"young": 1.0, "poisson": 0.3},
+            "fixed": [{"on": "left", "displacement": [0.0, 0.0]}],
+            "load": [{"on": "top", "traction": [0.0, -load]}],
+            "contact": {"on": "bottom", "gap": "where(x < 3, 0, 1)"},
+            "friction": {"law": "coulomb", "mu": 0.3},
+            "solver": {"method": method},
+        }
+        solution = solve_case(parse_case(section), comm=MPI.COMM_SELF)
+        assert solution.converged
+        forces.append(solution.contact_force / load)
+    assert forces[1] == pytest.approx(forces[0], rel=1e-6)
+
+
 def test_a_node_without_numbers_far_from_all_others_is_no_equilibrium(solved):
     """Neither supports nor contact nodes see it: the residual was said to be 0."""
     body, x = solved.problem.equilibrium, solved.state.x.copy()
