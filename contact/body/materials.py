@@ -12,6 +12,7 @@ from contact.body.constants import law_with_constants, piezo_with_constants
 from contact.body.description import Material
 from contact.errors import InputError
 from contact.mesh.domain import Domain, Indices
+from contact.mesh.entities import cells_at
 from contact.mesh.measure import Measure
 from forms.hencky import Law
 from forms.piezo import Piezo
@@ -50,6 +51,26 @@ def cells_of(domain: Domain, materials: Sequence[Material]) -> list[Indices]:
         found.append(cells.astype(np.int32))
     _check_all(domain, owner)
     return found
+
+
+def young_behind(
+    domain: Domain, materials: Sequence[Material], cells: Sequence[Indices], on: str
+) -> float:
+    """Return the largest Young's modulus right behind a part. Collective.
+
+    Parameters
+    ----------
+    domain, materials
+        The mesh, and the materials of the body.
+    cells
+        The owned cells of each.
+    on
+        The part.
+    """
+    behind, _ = cells_at(domain.mesh, domain.facets(on))
+    every = zip(materials, cells, strict=True)
+    found = [float(material.law.young) for material, own in every if np.isin(behind, own).any()]
+    return domain.comm.allreduce(max(found, default=0.0), op=MPI.MAX)
 
 
 def _check_all(domain: Domain, owner: Indices) -> None:

@@ -36,7 +36,8 @@ class Interface:
     held
         The current through nodes that cannot move; None without.
     stiffness
-        c = E/size, which weighs displacements against stresses in residuals (stress/length).
+        c = E/size, which weighs displacements against stresses in residuals (stress/length); E
+        of what touches.
     size
         Largest extent of the body (length).
     """

@@ -83,7 +83,9 @@ def automatic_eps(problem: ContactProblem) -> Regularisation:
         added = loads - body.external(problem.since), prescribed - before
         displacement = max(*expected_displacements(problem, *added), LEAST_ADDED * displacement)
     slip = 1e-2 * displacement or 1e-6 * scales.size
-    return Regularisation(1e-2 * scales.spacing / scales.young, slip)
+    # Of what touches: slips of a stiff part are those of its own, whatever soft one holds it.
+    young = problem.interface.stiffness * scales.size
+    return Regularisation(1e-2 * scales.spacing / young, slip * min(1.0, scales.young / young))
 
 
 @dataclass

@@ -11,6 +11,7 @@ from mpi4py import MPI
 from contact.body.description import Body
 from contact.body.equilibrium import BodyEquilibrium
 from contact.body.fields import Given
+from contact.body.materials import young_behind
 from contact.body.norms import volume
 from contact.errors import InputError
 from contact.interface.current import Conductor, HeldCurrent, held_current
@@ -175,7 +176,6 @@ class ContactProblem:
 
     def _interface(self) -> Interface:
         size, one = self.domain.size, len(self.contacts) == 1
-        stiffness = float(self.body.law.young) / size
         self.entries = tuple(
             self._entry("contact" if one else f"contact.{i}", contact)
             for i, contact in enumerate(self.contacts)
@@ -183,10 +183,20 @@ class ContactProblem:
         body = self.equilibrium
         found = joined_nodes(self.entries, body.layout.index_map, body.free)
         layer, conductor = joined_layer(self.entries), joined_conductor(self.entries)
+        stiffness = self._young_of_contacts() / size
         response = FoundationResponse(found, layer, conductor, body.phi_scale, stiffness)
         friction = joined_friction(self.entries, found)
         held = joined_held(self.entries, body.layout.index_map.local_range[0], found.links)
         return Interface(response.constrained, response, friction, held, stiffness, size)
+
+    def _young_of_contacts(self) -> float:
+        """Return the modulus of what yields where bodies touch. Collective.
+
+        What is far from there may be softer by orders of magnitude.
+        """
+        where = self.domain, self.body.materials, self.equilibrium.cells
+        sides = [[c.on] if c.against is None else [c.on, c.against] for c in self.contacts]
+        return max(min(young_behind(*where, side) for side in both) for both in sides)
 
     def _entry(self, key: str, contact: Contact) -> Entry:
         if contact.layer is not None:

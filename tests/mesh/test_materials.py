@@ -112,6 +112,32 @@ def test_one_material_for_both_regions_is_one_material() -> None:
 
 
 @pytest.mark.parallel
+def test_a_soft_layer_far_from_the_contact_excuses_nothing() -> None:
+    """What touches is weighed by its own modulus: by the layer's, gaps and slips were too little.
+
+    The layer hands the traction on, whatever its modulus is. The penalty method said that the laws
+    hold, and had 4 % of the friction force.
+    """
+
+    def force(young: float, method: str):
+        soft = {"young": young, "poisson": 0.3}
+        given = case(
+            materials(second=soft),
+            fixed=[{"on": "right", "displacement": [0.0, 0.0]}],
+            load=[{"on": "top", "traction": [0.02, -0.1]}],
+            friction={"law": "coulomb", "mu": 0.3},
+            solver={"method": method},
+        )
+        solution = solve(given, domain=two_layers())
+        assert solution.converged
+        return solution.contact_force
+
+    found = force(1e-3 * LOWER, "newton")
+    assert force(1e-8 * LOWER, "newton") == pytest.approx(found, rel=5e-3)
+    assert force(1e-3 * LOWER, "penalty") == pytest.approx(found, rel=0.2)
+
+
+@pytest.mark.parallel
 def test_an_elastic_part_carries_no_field() -> None:
     """An elastic layer under a piezoelectric one: the potential ends where that one ends."""
     piezo = hexagonal(-1.0, 3.0, 2.0, 8.0, 7.0).in_plane()
