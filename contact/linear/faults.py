@@ -9,6 +9,7 @@ from petsc4py import PETSc
 
 from contact.errors import InputError, SingularError
 from contact.linear.layout import Layout
+from contact.linear.workspace import is_mumps
 from contact.tolerances import HUGE
 
 #: MUMPS's INFOG(1) where its workspace, its memory or what ICNTL(23) allows was too small.
@@ -72,5 +73,4 @@ def _out_of_memory(pc: PETSc.PC) -> bool:
     """Whether the factorisation had too little memory. PETSc knows of some cases only."""
     if pc.getFailedReason() == PETSc.PC.FailedReason.FACTOR_OUTMEMORY:
         return True
-    direct = pc.getType() in ("lu", "cholesky") and pc.getFactorSolverType() == "mumps"
-    return bool(direct and pc.getFactorMatrix().getMumpsInfog(1) in OUT_OF_MEMORY)
+    return is_mumps(pc) and bool(pc.getFactorMatrix().getMumpsInfog(1) in OUT_OF_MEMORY)

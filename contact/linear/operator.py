@@ -24,6 +24,7 @@ from contact.linear.nodal import insert_blocks, nodal_blocks
 from contact.linear.products import quick_products
 from contact.linear.rigid import held_motions
 from contact.linear.stiff_nodes import TOUCH
+from contact.linear.workspace import set_up_with_workspace
 from contact.typing import Array
 
 
@@ -207,7 +208,7 @@ class SparseOperator:
         split = self._split
         self.ksp.setOperators(self.system, split.matrix(self.matrix) if split else self.matrix)
         with petsc_options(self._prefix), quick_products(self.matrix):
-            self.ksp.setUp()
+            set_up_with_workspace(self.ksp)
 
     def _masked(self, at: NDArray[np.int32], blocks: Array) -> Array:
         """Return blocks at nodes, zero where an unknown is fixed."""
@@ -264,6 +265,9 @@ class SparseOperator:
             matrix.setUp()
         given.getDenseArray()[:] = np.column_stack([self.layout.mask(side) for side in sides.T])
         given.assemble()
+        if self.ksp.getPC().getFailedReason():
+            check_overflow(self.layout, self.matrix.norm(), given.norm())
+            raise no_solution(self.ksp.getPC(), self._prefix)
         self.ksp.matSolve(given, solution)
         self._solved(1, given.norm(), solution.norm())
         return np.column_stack([self.layout.mask(x) for x in solution.getDenseArray().T])

@@ -7,16 +7,11 @@ import ctypes
 import numpy as np
 from petsc4py import PETSc
 
+from contact.linear.workspace import MOST_WORKSPACE, TOO_SMALL, WORKSPACE
 from contact.typing import Array
 
 #: MUMPS's ICNTL(26): 0 solves with the eliminated unknowns, the kept ones being 0.
 INTERIOR_SOLVE = (26, 0)
-
-#: MUMPS's INFOG(1) where its workspace was too small: that of integers, and that of numbers.
-TOO_SMALL = (-8, -9)
-
-#: MUMPS's ICNTL(14): by how many percent its workspace exceeds the estimate, at most.
-MOST_WORKSPACE = 50_000
 
 # petsc4py has no Schur complements of factorisations.
 _petsc = ctypes.CDLL(PETSc.__file__)
@@ -98,7 +93,7 @@ class PartialFactorisation:
         """
         if self._factor is None:
             self._factor = self._analysed(matrix)
-        workspace = 10
+        workspace = WORKSPACE
         while True:
             self._factor.setOperators(matrix)
             self._factor.setUp()

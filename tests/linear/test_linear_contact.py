@@ -10,6 +10,7 @@ import pytest
 from mpi4py import MPI
 from petsc4py import PETSc
 
+from contact.errors import InputError
 from contact.linear.hierarchy import PRICE
 from contact.linear.operator import Counters, SparseOperator
 from contact.methods.newton import Newton
@@ -190,3 +191,34 @@ def test_fixed_unknowns_stay_exactly_where_they_are():
     found = operator.solve(1e6 * body.external(), rtol=1e-2)
     assert np.abs(found).max() > 1.0
     assert np.all(found[~body.free.ravel()] == 0.0)
+
+
+@pytest.mark.parallel
+@pytest.mark.parametrize("degree", [1, 2])
+def test_a_factorisation_takes_the_workspace_it_needs(degree: int) -> None:
+    """Where less is left to MUMPS than it has estimated, it is given more."""
+    problem = mechanics.bar(WORLD, 16, degree=degree)
+    kept, poor = operator_of(problem, "lu"), operator_of(problem, "lu")
+    poor.ksp.setOperators(poor.matrix)
+    pc = poor.ksp.getPC()
+    pc.setFactorSetUpSolverType()
+    pc.getFactorMatrix().setMumpsIcntl(14, -90)
+    sides = np.column_stack([problem.equilibrium.external(), np.ones(problem.equilibrium.owned)])
+    for operator in (kept, poor):
+        operator.update("secant", problem.equilibrium.rest(), sticking(problem))
+    known, found = (operator.solve_all(sides) for operator in (kept, poor))
+    np.testing.assert_allclose(found, known, rtol=1e-9, atol=1e-12)
+    assert pc.getFactorMatrix().getMumpsIcntl(14) > 0
+
+
+def test_a_failed_factorisation_solves_for_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Several right-hand sides are refused with the words of one."""
+    monkeypatch.setattr("contact.linear.workspace.MOST_WORKSPACE", 0)
+    problem = mechanics.bar(SELF, 16)
+    operator = operator_of(problem, "lu")
+    operator.ksp.setOperators(operator.matrix)
+    operator.ksp.getPC().setFactorSetUpSolverType()
+    operator.ksp.getPC().getFactorMatrix().setMumpsIcntl(14, -90)
+    operator.update("secant", problem.equilibrium.rest(), sticking(problem))
+    with pytest.raises(InputError, match="out of memory in the factorisation"):
+        operator.solve_all(np.ones((problem.equilibrium.owned, 2)))
