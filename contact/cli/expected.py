@@ -60,6 +60,9 @@ def _sizes(problem: ContactProblem) -> list[str]:
     """Say how far loads and prescribed values move the body, about, and how far it may go."""
     comm, scales, loads = problem.comm, problem.scales, problem.equilibrium.external(problem.time)
     pressed, moved = expected_displacements(problem, loads, problem.start().x)
+    # Beyond a small contact part, as deep as it is wide, forces spread over all of the body.
+    wide = scales.area if problem.dim == 2 and not problem.domain.revolved else scales.area**0.5
+    pressed *= min(1.0, wide / scales.size + scales.size / scales.height)
     expected = max(pressed, moved)
     gap = problem.nodes.gap
     gap = np.where(np.abs(gap) < 1e-12 * scales.size, 0.0, gap)  # rounding is no gap
@@ -69,7 +72,7 @@ def _sizes(problem: ContactProblem) -> list[str]:
         return ["# warning: nothing is loaded or moved: all results will be 0"]
     lines = [
         f"# expected: displacements of some {expected:.2g} (prescribed {moved:.2g}, by the loads "
-        f"{pressed:.2g} if they pressed a block of the body's size); gap {least:.3g} to "
+        f"{pressed:.2g} if they pressed a block of the body's size there); gap {least:.3g} to "
         f"{largest:.3g}"
     ]
     if expected > LARGE * scales.size:

@@ -20,6 +20,9 @@ Remark: TypeAlias = tuple[str, bool]
 #: Nodes across a contact zone from which on it is one.
 ACROSS = 5
 
+#: By how much of mu_1 a material of one's own may be off it without strain.
+OFF = 0.01
+
 #: Largest |eps| of which eps is a good measure: the square of the strain is then 1 % of it.
 SMALL = 0.1
 
@@ -32,6 +35,21 @@ def monotonicity(solution: Solution, strains: Sequence[float]) -> Iterator[Remar
         law = material.law
         if np.isfinite(strain) and not isinstance(law, Anisotropic):
             yield _monotonicity(law, material.on, strain, dim)
+            yield _at_rest(law, material.on)
+
+
+def _at_rest(law: Hencky, on: Sequence[str]) -> Remark:
+    """Compare g(0) of a law with mu_1, which stands for it wherever a size is asked for."""
+    modulus, shear = float(law.secant_modulus(np.zeros(1))[0]), float(law.shear)
+    if abs(modulus - shear) <= OFF * abs(shear):
+        return "", True
+    place = f" in {', '.join(on)}" if on else ""
+    text = (
+        f"the secant modulus{place} is {modulus:.4g} without strain, and Young's modulus and "
+        f"Poisson's ratio say mu_1 = {shear:.4g}: the deviator follows the first, and changes of "
+        "volume those two"
+    )
+    return text, False
 
 
 def _monotonicity(law: Hencky, on: Sequence[str], strain: float, dim: int) -> Remark:

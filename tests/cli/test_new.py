@@ -9,6 +9,7 @@ from contact.case.file import load_case
 from contact.cli.expected import mean_ratio
 from contact.cli.main import BAD_INPUT, CONVERGED, main
 from meshes import write
+from scripts.cases import CASES
 
 FIXTURES = Path(__file__).parents[2] / "meshes" / "fixtures"
 
@@ -108,3 +109,11 @@ def test_what_is_expected(
     printed = capsys.readouterr().out
     assert words in printed
     assert ("# warning" in printed) == bool(changes)
+
+
+def test_what_is_expected_of_a_small_contact_part(capsys: pytest.CaptureFixture) -> None:
+    """A ball of radius 4 goes a^2/R = 0.25 deep into a half space, without friction."""
+    assert main(["check", str(CASES / "indent-ball-force.toml")]) == CONVERGED
+    printed = capsys.readouterr().out
+    assert "displacements of some 0.2 (prescribed 0.00019" in printed
+    assert "# warning" not in printed

@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 
-from contact import Solution, load_case, solve
+from contact import Solution, UserLaw, load_case, solve
 from contact.case.file import parse_case
+from forms.ops import exp
 from scripts.cases import CASES
 from tests.problems.written import block
 
@@ -26,6 +27,14 @@ def test_an_auxetic_material_breaks_h1():
     assert "below 0.125" in warning
     good = reviewed("bar", "mesh.cells=[16, 4]")
     assert "g_0 = 0.3846" in said(good.notes, "(h1) holds")
+
+
+@pytest.mark.parametrize(("shear", "warns"), [(0.3846, False), (0.2, True)])
+def test_a_material_of_ones_own_fits_its_constants(shear, warns):
+    law = UserLaw(1.0, 0.3, modulus=lambda t: shear * exp(-t / 10))
+    solution = solve(block(2), law=law)
+    words = "the secant modulus is 0.2 without strain, and Young's modulus and Poisson's ratio say"
+    assert any(words in warning for warning in solution.warnings) == warns
 
 
 def test_each_problem_is_measured_by_its_own_theorem():
