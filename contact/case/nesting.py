@@ -7,6 +7,7 @@ import numpy as np
 from contact.case.file import Case
 from contact.case.mesh import Mesh
 from contact.errors import InputError
+from contact.mesh import grid
 
 #: Meshes with fewer cells along the shortest edge do not tell much of the solution.
 COARSEST = 4
@@ -18,8 +19,8 @@ SMALL = 500
 def coarser_cases(case: Case, levels: int | None = None) -> list[Case]:
     """Return the case on coarser and coarser meshes, the coarsest first, without itself.
 
-    A generated mesh has its cells halved as often as they are enough, a mesh that is refined has
-    one refinement less.
+    A generated mesh has its cells halved as often as they are enough, and its parts end at
+    positions of the grid; a mesh that is refined has one refinement less.
 
     Parameters
     ----------
@@ -43,7 +44,8 @@ def coarser_cases(case: Case, levels: int | None = None) -> list[Case]:
     if not found or (levels is not None and len(found) < levels - 1):
         raise InputError(
             f"{case.source}: solver.nested: there are {len(found) + 1} nested meshes only; "
-            f"accepted: at least {2 * COARSEST} cells along each edge, or mesh.refine > 0"
+            f"accepted: at least {2 * COARSEST} cells along each edge and parts that end at "
+            "positions of the grid of half as many, or mesh.refine > 0"
         )
     return found
 
@@ -59,8 +61,19 @@ def _coarser(mesh: Mesh) -> Mesh | None:
     if mesh.refine > 0:
         return mesh.model_copy(update={"refine": mesh.refine - 1})
     if cells is not None and min(cells) >= 2 * COARSEST:
-        return mesh.model_copy(update={"cells": tuple((n + 1) // 2 for n in cells)})
+        coarser = mesh.model_copy(update={"cells": tuple((n + 1) // 2 for n in cells)})
+        return coarser if _fits(coarser) else None
     return None
+
+
+def _fits(mesh: Mesh) -> bool:
+    """Tell whether the parts of a rectangle or box end at positions of its grid."""
+    assert mesh.generator and mesh.origin and mesh.size and mesh.cells
+    try:
+        grid.plan(mesh.generator, mesh.origin, mesh.size, mesh.cells, mesh.pieces)
+    except grid.GridError:
+        return False
+    return True
 
 
 def _nodes(mesh: Mesh) -> float:
