@@ -30,6 +30,7 @@ from contact.body.materials import cells_of
 from contact.body.operators import WholeOperator, make_operator
 from contact.body.supports import free_components, supports_of, without_field
 from contact.body.weak_forms import WeakForms
+from contact.errors import InputError
 from contact.linear.change import Change
 from contact.linear.layout import Layout
 from contact.linear.operator import Counters
@@ -53,11 +54,13 @@ class BodyEquilibrium:
     Raises
     ------
     InputError
-        If a part is missing, a vector has the wrong length, or the material is none.
+        If a part is missing, a vector has the wrong length, or the material or the degree is none.
     """
 
     def __init__(self, domain: Domain, body: Body, degree: int = 1) -> None:
         body.check(domain.dim)
+        if degree not in (1, 2):
+            raise InputError(f"degree: given {degree!r}; accepted: 1 or 2")
         self.domain, self.body, self.degree = domain, body, degree
         self.dim, self.phi_scale = domain.dim, body.phi_scale
         self.block_size = self.dim + (body.piezo is not None)

@@ -38,7 +38,7 @@ class Friction:
     Raises
     ------
     InputError
-        If several are given, or something else.
+        If several are given, or something else, or the radius is none.
     """
 
     coefficient: FrictionCoefficient | None = None
@@ -54,6 +54,8 @@ class Friction:
                 f"Friction({self.coefficient}): accepted: Friction(mu={self.coefficient}), a "
                 "coefficient, or Friction(tresca=...), a bound"
             )
+        if not 0 <= self.radius < np.inf:
+            raise InputError(f"Friction: the radius is {self.radius}; accepted: a length >= 0")
         if sum(law is not None for law in self._laws) > 1:
             raise InputError("Friction: accepted: one of coefficient, tresca, mu and law")
         if hasattr(self.mu, "lipschitz"):

@@ -12,6 +12,7 @@ from typing import Annotated, Any, Literal
 
 from annotated_types import Ge, Gt, Le, Lt
 
+from contact.errors import InputError
 from contact.problem.kkt import KKT
 from contact.settings import Accepted, Count, Internal, Positive, ReadWith, Switch, Tolerance
 from contact.tolerances import LAWS_HOLD
@@ -38,6 +39,11 @@ class Options:
     tolerance: Tolerance = 1e-8
     max_outer: Count = 200
     linear: Literal["auto", "lu", "iterative"] = "auto"
+
+    def __post_init__(self) -> None:
+        """Refuse a tolerance that nothing or anything meets."""
+        if not (isinstance(self.tolerance, float | int) and 0 < self.tolerance < 1):
+            raise InputError(f"tolerance: given {self.tolerance!r}; accepted: between 0 and 1")
 
     @property
     def allowed(self) -> KKT:

@@ -64,11 +64,21 @@ class SlipCoefficient:
         Limit for large slip, and twice the excess at rest (no unit).
     rho
         Decay rate (1/length), rho >= 0.
+
+    Raises
+    ------
+    ValueError
+        If mu is negative at rest or for large slip, or rho is.
     """
 
     a: float
     b: float
     rho: float
+
+    def __post_init__(self) -> None:
+        """Refuse what does not resist at every slip."""
+        if not (self.a >= 0 and self.a + self.b / 2 >= 0 and self.rho >= 0):
+            raise ValueError(f"a, a + b/2 and rho must be >= 0; given: {self}")
 
     @property
     def maximum(self) -> float:

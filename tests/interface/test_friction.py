@@ -11,13 +11,14 @@ from contact import (
     Friction,
     InputError,
     Linear,
+    NewtonOptions,
     Problem,
     SlipCoefficient,
     solve,
 )
 from contact.mesh.grid import rectangle
 from contact.problem.kkt import evaluate
-from forms.laws import Coulomb
+from forms.laws import ConstantCoefficient, Coulomb
 
 
 def problem(contact, friction=None):
@@ -25,6 +26,13 @@ def problem(contact, friction=None):
     domain = rectangle(MPI.COMM_WORLD, (0.0, 0.0), (2.0, 1.0), (4, 2))
     body = Body(Linear(10.0, 0.3), Fixed("top", [0.01, -0.01]))
     return Problem(domain, body, contact, friction)
+
+
+class Negative(ConstantCoefficient):
+    """A coefficient that pulls."""
+
+    def __init__(self):
+        super().__init__(-0.2)
 
 
 @pytest.mark.parallel
@@ -36,12 +44,30 @@ def problem(contact, friction=None):
         (Friction(mu=lambda x: np.where(x[0] > 1.5, np.nan, 0.3)), "mu is nan"),
         (Friction(tresca=lambda x: 1.0 - x[0]), "tresca is -"),
         (Friction(tresca=np.inf), "tresca is inf"),
-        (Friction(SlipCoefficient(-0.3, 0.2, 1.0)), "coefficient without slip is -0.2"),
+        (Friction(Negative()), "coefficient without slip is -0.2"),
     ],
 )
 def test_what_resists_is_not_negative(friction, said):
     with pytest.raises(InputError, match=rf"Friction: {said}.* at a node; accepted: finite"):
         problem(Contact("bottom", friction=friction))
+
+
+@pytest.mark.parametrize("given", [(-0.3, 0.8, 1.0), (0.1, -0.3, 1.0), (0.3, 0.2, -1.0)])
+def test_a_coefficient_of_the_slip_is_not_negative(given):
+    with pytest.raises(ValueError, match=r"a, a \+ b/2 and rho must be >= 0; given: Slip"):
+        SlipCoefficient(*given)
+
+
+@pytest.mark.parametrize("radius", [-1.0, np.nan, np.inf])
+def test_a_radius_is_a_length(radius):
+    with pytest.raises(InputError, match=f"the radius is {radius}; accepted: a length >= 0"):
+        Friction(mu=0.3, radius=radius)
+
+
+@pytest.mark.parametrize("tolerance", [0, -1.0, np.nan, 1.0, "1e-8"])
+def test_a_tolerance_can_be_met_and_missed(tolerance):
+    with pytest.raises(InputError, match=r"tolerance: given .*; accepted: between 0 and 1"):
+        NewtonOptions(tolerance=tolerance)
 
 
 def test_a_number_is_no_friction():
@@ -74,3 +100,9 @@ def test_a_bound_without_numbers_is_not_met():
     assert solution.converged  # all of it sticks
     lost = evaluate(problem(Contact("bottom"), Friction(law=Coulomb(Lost()))), solution.state)
     assert lost.excess(solution.outcome.allowed)
+
+
+def test_the_degree_is_one_or_two():
+    domain = rectangle(MPI.COMM_WORLD, (0.0, 0.0), (2.0, 1.0), (4, 2))
+    with pytest.raises(InputError, match="degree: given 3; accepted: 1 or 2"):
+        Problem(domain, Body(Linear(10.0, 0.3)), Contact("bottom"), degree=3)
