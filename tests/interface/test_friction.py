@@ -105,4 +105,4 @@ def test_a_bound_without_numbers_is_not_met():
 def test_the_degree_is_one_or_two():
     domain = rectangle(MPI.COMM_WORLD, (0.0, 0.0), (2.0, 1.0), (4, 2))
     with pytest.raises(InputError, match="degree: given 3; accepted: 1 or 2"):
-        Problem(domain, Body(Linear(10.0, 0.3)), Contact("bottom"), degree=3)
+        Problem(domain, Body(Linear(10.0, 0.3), []), Contact("bottom"), degree=3)
