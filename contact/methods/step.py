@@ -33,6 +33,10 @@ NEAR = 0.05
 #: residuals pass through more values between the first and the last.
 FORCING = 1e-2
 
+#: Steps in a row that come no nearer after which it leaves a hundredth of that: what two digits
+#: leave at contact nodes can make them change to and fro for ever. And the least that it leaves.
+VAIN, LEAST = 3, 1e-8
+
 #: Equilibrium residual over the largest one below which the material is left as it was linearised
 #: last: contact and friction are what is wrong.
 SMALL = 0.1
@@ -129,6 +133,15 @@ class WholeStep:
         """Forget the steps before."""
         self.following = Following()
         self._kind = ""
+        self._nearest, self._vain, self._forcing = np.inf, 0, FORCING
+
+    def _leaves(self, reached: float) -> float:
+        """Return what an iterative solver leaves of a step's residual, given where that starts."""
+        self._vain = 0 if reached < self._nearest else self._vain + 1
+        self._nearest = min(self._nearest, reached)
+        if self._vain >= VAIN:
+            self._vain, self._forcing = 0, max(self._forcing * FORCING, LEAST)
+        return self._forcing
 
     @property
     def operator(self) -> Operator:
@@ -173,7 +186,7 @@ class WholeStep:
         residual = residual_forces(self.problem, here)
         jump.transpose((jump.weight * shift)[:, None] * jump.normal, residual)
         try:
-            increment = self.operator.solve(-residual, FORCING)
+            increment = self.operator.solve(-residual, self._leaves(reached.largest))
         except SingularError:
             if body.linear or iterate.status is None:
                 raise
@@ -185,7 +198,9 @@ class WholeStep:
         forces = Multipliers(jump.normal_component(vectors), jump.tangential_component(vectors))
         pressed = jump.normal_component(np.einsum("nij,nj->ni", layer, moved))
         known = interface.response.layer_pressure(nodal) + shift + pressed
-        new = replace(state, x=body.moved(state.x, increment), forces=forces)
+        # What follows a rigid part that has flown far and comes back follows it but for rounding.
+        x = body.prescribe(body.moved(state.x, increment), state.time)
+        new = replace(state, x=x, forces=forces)
         return Taken(Iterate(new, contact.status, known))
 
     def _current(self, nodal: Array, contact: LinearisedContact, reached: float) -> Array | float:

@@ -1,5 +1,6 @@
 """Semismooth Newton: against the block relaxation, its rate, nested meshes."""
 
+import tomllib
 from dataclasses import dataclass
 
 import numpy as np
@@ -218,3 +219,47 @@ def test_ranks_agree():
         alone.nodes.norm(reference.state.forces.friction),
         rtol=1e-9,
     )
+
+
+@pytest.mark.parametrize("degree", [1, 2])
+def test_an_iterative_solver_is_asked_for_more_digits_where_two_lead_nowhere(degree: int) -> None:
+    """Two bodies that current and a plate join: with two digits contact nodes cycle."""
+    case = parse_case(
+        tomllib.loads(f"""
+[mesh]
+generator = "two_blocks"
+lower_size = 0.3
+upper_size = 0.22
+[space]
+degree = {degree}
+[material]
+young = 1.0
+poisson = 0.3
+piezo = {{ e31 = -0.3, e33 = 0.8, e15 = 0.6, beta11 = 1.0, beta33 = 0.9 }}
+[[fixed]]
+on = "lower_left"
+displacement = [0.0, "free"]
+[[rigid]]
+on = "upper_top"
+displacement = [0.002, "free"]
+force = [0.0, -0.02]
+[[electrode]]
+on = "upper_top"
+charge = 0.003
+[[contact]]
+on = "upper_bottom"
+against = "lower_top"
+friction = {{ law = "coulomb", mu = 0.3 }}
+electric = {{ k_e = 2.0, delta = 5.0 }}
+[[contact]]
+on = "lower_bottom"
+friction = {{ law = "coulomb", mu = 0.1 }}
+electric = {{ k_e = 1.0, delta = 5.0 }}
+""")
+    )
+    direct, iterative = (
+        solve(case, NewtonOptions(tolerance=1e-9, condense=False, linear=kind))
+        for kind in ("lu", "iterative")
+    )
+    assert iterative.converged and len(iterative.history.records) <= 40
+    np.testing.assert_allclose(iterative.contact_force, direct.contact_force, rtol=1e-7)
