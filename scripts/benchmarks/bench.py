@@ -12,27 +12,22 @@ rank; ratios are taken within one process. Absolute times are those of the machi
 
 from __future__ import annotations
 
-import json
-import os
 import subprocess
-import sys
 import tempfile
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from meshes import write
 from scripts.benchmarks.pages import write_page, write_readme
+from scripts.benchmarks.processes import Run, columns, command, measured, run, started
 from scripts.reporting import Report, parser, subplots
 
 #: Seconds after which a run of the peer is ended: it is then shown as one of infinite length.
 PATIENCE = 150.0
-
-Run = dict[str, Any]
 
 
 @dataclass(frozen=True)
@@ -59,45 +54,6 @@ class Bench:
         """Run a script that writes into the same folder."""
         extra = ["--coarse"] if self.coarse else []
         started([*command(name), "--out", str(self.report.out), *extra, *arguments])
-
-
-def command(script: str) -> list[str]:
-    """Return how a script of this folder is started."""
-    return [sys.executable, "-m", f"scripts.benchmarks.{script}"]
-
-
-def started(words: Sequence[str], ranks: int = 1, limit: float | None = None) -> str:
-    """Return what a process prints, within a limit (seconds).
-
-    Raises
-    ------
-    RuntimeError
-        If it fails.
-    """
-    environment = {**os.environ, "OMP_NUM_THREADS": "1", "OMPI_MCA_mpi_yield_when_idle": "1"}
-    parallel = ["mpirun", "-n", str(ranks), "--oversubscribe"] if ranks > 1 else []
-    done = subprocess.run(
-        [*parallel, *words], env=environment, capture_output=True, text=True, timeout=limit
-    )
-    if done.returncode != 0:
-        raise RuntimeError(f"{' '.join(words)} failed:\n{done.stderr[-2000:]}")
-    return done.stdout
-
-
-def measured(words: Sequence[str], ranks: int = 1, limit: float | None = None) -> Run:
-    """Return what a process prints as JSON in its last line."""
-    found: Run = json.loads(started(words, ranks, limit).strip().splitlines()[-1])
-    return found
-
-
-def run(*arguments: str, ranks: int = 1) -> Run:
-    """Run `bench_one` in a process of its own."""
-    return measured([*command("bench_one"), *arguments], ranks)
-
-
-def columns(rows: Sequence[Run]) -> dict[str, list[Any]]:
-    """Return rows as columns."""
-    return {key: [row.get(key) for row in rows] for key in rows[0]}
 
 
 def by_method(bench: Bench) -> None:
