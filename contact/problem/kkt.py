@@ -33,13 +33,14 @@ class KKT:
         |F(u) + contact forces| on free unknowns, less `rounding`, over the sum of the norms of
         loads, contact forces and reactions; mechanical and (scaled) electric unknowns together.
     contact
-        |p - max(0, p + c (u_nu - rho))| / |p| in L2(Gamma_3), c = E/length.
+        |p - max(0, p + c (u_nu - rho))| / |p| in L2(Gamma_3), c = E/length with
+        the modulus of what touches.
     friction
         |lambda_f - proj(lambda_f + c u_tau)| / |p| with the final bound s.
     rounding
         What has been subtracted from the first, over the same: `_rounding`, but not more than the
-        `most_rounding` of the body. None where no load acts and nothing touches: all forces are
-        rounding then.
+        `most_rounding` of the body. Zero where no load acts and nothing touches: all forces are
+        rounding then, and there is nothing to compare it with.
     """
 
     equilibrium: float
