@@ -257,10 +257,14 @@ def held(one: Compared, found: Solution) -> tuple[object, ...]:
 def main(arguments: Sequence[str] | None = None) -> list[Compared]:
     """Make the tables. Collective."""
     command = parser(__doc__, "agreement")
-    command.add_argument("--only", nargs="+", metavar="CASE", help="these case files alone")
+    known = examples()
+    names = sorted({example.name for example in known})
+    command.add_argument(
+        "--only", nargs="+", choices=names, metavar="CASE", help="these case files alone"
+    )
     chosen = command.parse_args(arguments)
     report = Report(chosen.out)
-    wanted = [e for e in examples() if chosen.only is None or e.name in chosen.only]
+    wanted = [e for e in known if chosen.only is None or e.name in chosen.only]
     compared = [compare(example, chosen.coarse) for example in wanted]
     agreement(report, compared)
     limits(report, compared)

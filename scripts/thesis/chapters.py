@@ -66,20 +66,27 @@ PARTS = (
 )
 
 
+def add_only(parser: argparse.ArgumentParser) -> None:
+    """Add the option --only, names of scripts."""
+    names = [part.script for part in PARTS]
+    parser.add_argument(
+        "--only", nargs="+", choices=names, metavar="SCRIPT", help="these scripts alone"
+    )
+
+
+def wanted(only: Sequence[str] | None, parts: Sequence[Part] = PARTS) -> list[Part]:
+    """Return the parts of the scripts named; all where none is."""
+    return [part for part in parts if not only or part.script in only]
+
+
 def run(parts: Sequence[Part], text: str, arguments: Sequence[str] | None = None) -> None:
     """Run scripts into folders side by side. Collective."""
     parser = argparse.ArgumentParser(description=text.splitlines()[0])
     parser.add_argument("--out", type=Path, default=Path("results"))
     parser.add_argument("--coarse", action="store_true", help="coarse meshes, for tests")
-    parser.add_argument("--only", nargs="+", metavar="SCRIPT", help="these scripts alone")
+    add_only(parser)
     chosen = parser.parse_args(arguments)
-    names = {part.script for part in PARTS}
-    for name in chosen.only or ():
-        if name not in names:
-            parser.error(f"--only: no script {name!r} (accepted: {', '.join(sorted(names))})")
-    for part in parts:
-        if chosen.only and part.script not in chosen.only:
-            continue
+    for part in wanted(chosen.only, parts):
         begin = time.perf_counter()
         flags = ["--out", str(chosen.out / part.script), *["--coarse"] * chosen.coarse]
         importlib.import_module(part.module).main(flags)

@@ -1,8 +1,9 @@
 """The results page: all tables and figures with captions and remarks, as docs/results.md.
 
 `python3 -m scripts.thesis.results_page [--page docs/results.md] [--out results] [--coarse]
-[--gather]`. With --gather nothing is computed: the page is put together from what earlier runs of
-`make tables` and `make figures` have left in the folder of results.
+[--gather] [--only SCRIPT...]`. With --gather nothing is computed: the page is put together from
+what earlier runs of `make tables` and `make figures` have left in the folder of results. Sections
+that are not among --only, or of which nothing is left there, stay as they are on the page.
 """
 
 from __future__ import annotations
@@ -16,7 +17,7 @@ from pathlib import Path
 from mpi4py import MPI
 
 from contact.output.environment import versions
-from scripts.thesis.chapters import PARTS, Part, run
+from scripts.thesis.chapters import PARTS, Part, add_only, run, wanted
 
 #: Longest table that is shown; longer ones are in their CSV file.
 MOST_ROWS = 45
@@ -119,25 +120,45 @@ def _table(path: Path, link: str) -> str:
     return "\n".join([f"**{path.stem}**\n", *lines]) + "\n"
 
 
-def gather(results: Path, page: Path) -> None:
-    """Write the page, and copy pictures and numbers beside it."""
+def sections(page: Path) -> dict[str, str]:
+    """Return heading -> section of a page, none if there is no page."""
+    if not page.is_file():
+        return {}
+    _, *texts = page.read_text().split("\n## ")
+    return {text.partition("\n")[0]: f"## {text}" for text in texts}
+
+
+def gather(results: Path, page: Path, only: Sequence[str] | None = None) -> None:
+    """Write the page, and copy pictures and numbers beside it.
+
+    Parameters
+    ----------
+    results
+        What scripts have written, a folder each.
+    page
+        The page; what it says of scripts that are not gathered stays.
+    only
+        Names of the scripts to gather; all by default.
+    """
     place = page.with_suffix("")
-    sections = [INTRODUCTION]
+    said, renewed = sections(page), wanted(only)
+    written = [INTRODUCTION]
     for part in PARTS:
         folder = results / part.script
-        if not folder.is_dir():
-            sections.append(f"## {part.heading}\n\nNot computed yet: `make {part.script}`.\n")
+        if part not in renewed or not folder.is_dir():
+            nothing = f"## {part.heading}\n\nNot computed yet: `make {part.script}`.\n"
+            written.append(said.get(part.heading, nothing))
             continue
-        sections.append(section(part, folder, place.name))
+        written.append(section(part, folder, place.name))
         target = place / part.script
         shutil.rmtree(target, ignore_errors=True)
         target.mkdir(parents=True)
         for path in (path for kind in ("png", "pdf", "csv") for path in folder.glob(f"*.{kind}")):
             shutil.copy(path, target)
     made = ", ".join(f"{name} {version}" for name, version in versions().items())
-    sections.append(f"## Versions\n\n{made}\n")
+    written.append(f"## Versions\n\n{made}\n")
     page.parent.mkdir(parents=True, exist_ok=True)
-    page.write_text("\n".join(sections))
+    page.write_text("\n".join(written))
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
@@ -146,11 +167,12 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument("--page", type=Path, default=Path("docs/results.md"))
     parser.add_argument("--out", type=Path, default=Path("results"))
     parser.add_argument("--gather", action="store_true", help="compute nothing")
+    add_only(parser)
     chosen, others = parser.parse_known_args(arguments)
     if not chosen.gather:
-        run(PARTS, __doc__, ["--out", str(chosen.out), *others])
+        run(wanted(chosen.only), __doc__, ["--out", str(chosen.out), *others])
     if MPI.COMM_WORLD.rank == 0:
-        gather(chosen.out, chosen.page)
+        gather(chosen.out, chosen.page, chosen.only)
 
 
 if __name__ == "__main__":

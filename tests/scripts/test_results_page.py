@@ -7,6 +7,7 @@ import importlib.util
 import pytest
 
 from scripts.reporting import Report, subplots, text
+from scripts.studies import agreement
 from scripts.thesis import chapters, hertz, results_page, tables
 
 
@@ -31,16 +32,33 @@ def test_page(tmp_path):
     assert "Not computed yet: `make table_7_2`" in words
 
 
+def test_one_section_is_renewed_and_the_others_stay(tmp_path):
+    page = tmp_path / "docs" / "page.md"
+    for words in ("before", "after"):
+        for script in ("hertz", "corner"):
+            Report(tmp_path / words / script).table("one", f"{script}, {words}", {"a": [1]})
+    results_page.gather(tmp_path / "before", page)
+    whole = page.read_text()
+    results_page.main(
+        ["--gather", "--only", "corner", "--page", str(page), "--out", str(tmp_path / "after")]
+    )
+    assert page.read_text() == whole.replace("corner, before", "corner, after")
+    results_page.gather(tmp_path / "nothing", page)
+    assert page.read_text() == whole.replace("corner, before", "corner, after")
+
+
 def test_values_in_tables():
     assert text(3) == "3"
     assert text(1e-9) == "1e-09"
     assert text(False) == "no"
 
 
-def test_unknown_script(capsys):
+@pytest.mark.parametrize("main", [tables.main, results_page.main, agreement.main])
+def test_unknown_script(main, capsys):
     with pytest.raises(SystemExit):
-        tables.main(["--only", "hurtz"])
-    assert "accepted: " in capsys.readouterr().err
+        main(["--only", "hurtz"])
+    said = capsys.readouterr().err
+    assert "'hurtz'" in said and "hertz" in said.partition("choose from")[2]
 
 
 @pytest.mark.parametrize("part", chapters.PARTS, ids=lambda part: part.script)
