@@ -108,7 +108,7 @@ def _contact_words(case: Case, key: str, section: Any) -> str:
         words.append(f"gap {_said(section.gap)}")
     friction, electric = case.friction_of(key, section)[1], case.electric_of(key, section)[1]
     if friction.law != "none":
-        words.append(f"{friction.law} friction")
+        words.append(f"{friction.law.capitalize()} friction")
     if electric is not None:
         words.append(rf"$k_e$ = {electric.k_e:g}, $\varphi_F$ = {_said(electric.phi_f)}")
     return ", ".join(words)

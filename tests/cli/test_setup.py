@@ -3,8 +3,10 @@
 import io
 
 import matplotlib
+import numpy as np
 import pytest
 from matplotlib.collections import LineCollection
+from matplotlib.quiver import Quiver
 
 from contact import build_problem, load_case
 from contact.cli.main import main
@@ -41,11 +43,23 @@ def test_every_case_has_a_picture(name):
         assert (min(ends), max(ends)) == (2.0, 4.0)
 
 
+def test_arrows_are_spread_over_the_pieces_of_a_part():
+    case = load_case(CASES / "compliance-8-4.toml", SMALL["compliance-8-4"])
+    (arrows,) = (
+        each
+        for each in draw_setup(case, build_problem(case)).axes[0].collections
+        if isinstance(each, Quiver)
+    )
+    below = arrows.XY[arrows.XY[:, 1] <= 0, 0]
+    assert np.count_nonzero(below < 2) == np.count_nonzero(below > 10) >= 2
+    assert len(arrows.XY) - len(below) >= 6
+
+
 def test_contacts_of_two_bodies_name_both_sides():
     case = load_case(CASES / "two-blocks.toml", ("mesh.lower_size=0.5", "mesh.upper_size=0.5"))
     (legend,) = draw_setup(case, build_problem(case)).legends
     words = [text.get_text() for text in legend.get_texts()]
-    assert "contact: upper_bottom against lower_top, coulomb friction" in words
+    assert "contact: upper_bottom against lower_top, Coulomb friction" in words
     assert "opposite: lower_top" in words
     assert "foundation" not in words
 

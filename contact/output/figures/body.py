@@ -68,7 +68,8 @@ def draw_plane(
     strip = 0.0 if lifted is None else STRIP
     figure = Figure(figsize=(inches, tall * inches + 1.4 + strip))
     ax = figure.subplots()
-    rest = {"colors": "black", "lw": 0.5, "ls": (0, (6, 4))}
+    # Dashes would be those of an edge each: none where edges are short.
+    rest = {"colors": "black", "lw": 0.5}
     for side in (-1, 1) if mirrored else (1,):
         shown = _body(ax, picture, side)
         shown.set_cmap("viridis")

@@ -11,6 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 from mpl_toolkits.mplot3d.art3d import Poly3DCollection  # type: ignore[import-untyped]
+from numpy.typing import NDArray
 
 from contact.output.units import Units
 from contact.typing import Array
@@ -120,8 +121,7 @@ def _arrows(ax: Axes, role: Role, middle: Array, reach: float) -> None:
     """Draw a load's arrows outside the body, the longest of a given length."""
     assert role.force is not None
     centre = role.facets.mean(axis=1)
-    order = np.lexsort(centre.T)
-    chosen = order[np.linspace(0, order.size - 1, min(ARROWS, order.size)).astype(int)]
+    chosen = _spread(role.facets)
     force = role.force[chosen]
     largest = float(np.linalg.norm(role.force, axis=1).max(initial=0.0))
     if largest == 0:
@@ -134,6 +134,19 @@ def _arrows(ax: Axes, role: Role, middle: Array, reach: float) -> None:
     ax.quiver(*start[seen].T, *step[seen].T, color=LOADED, **arrows)
     for ends in (start, start + step):  # for the limits of the axes
         ax.plot(*ends[seen].T, ls="", marker="")
+
+
+def _spread(facets: Array) -> NDArray[np.intp]:
+    """Return edges about as far from each other on each of the pieces of a part, some `ARROWS`."""
+    centre = facets.mean(axis=1)
+    centre = centre[order := np.lexsort(centre.T)]
+    apart = np.linalg.norm(facets[:, 1] - facets[:, 0], axis=1).sum() / ARROWS
+    chosen: list[np.intp] = []
+    left = np.ones(len(centre), dtype=bool)
+    while left.any():
+        chosen.append(np.argmax(left))
+        left &= np.linalg.norm(centre - centre[chosen[-1]], axis=1) >= (1 - 1e-9) * apart
+    return order[np.asarray(chosen, dtype=np.intp)]
 
 
 def _dimensions(ax: Axes, low: Array, high: Array, units: Units) -> None:
