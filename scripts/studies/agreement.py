@@ -238,9 +238,7 @@ def solutions(report: Report, compared: Sequence[Compared]) -> None:
             "where |sigma_tau| lies between 0.5 and 0.6 of the pressure may stick or slide. In "
             "Example 7.2 that is so for the node at the end of the bar and for those at the tip "
             "of the sliding zone, each on its own; between sticking and sliding there is a "
-            "solution on the falling part of the law, which both methods leave if disturbed. In "
-            "Example 8.4 it takes both much friction and much current, which opens most of the "
-            "contact: different sets of nodes can touch then.",
+            "solution on the falling part of the law, which both methods leave if disturbed.",
         )
 
 

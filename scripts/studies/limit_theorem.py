@@ -45,6 +45,13 @@ SYMBOLS = {
     "p = c [r]^+": r"$p = c\,[r]^+$",
 }
 
+#: The norms, and what the theorem asks beside.
+NORMS = "V: |eps(u)|, W: |grad(phi)| in L2(Omega), as differences; orders are those of both, in X."
+OF_6_3 = (
+    "The bound of the proof has the limit L of phi_L in it; here phi_L is the identity, as it is "
+    "with any L from the largest |phi - phi_F| on, 32."
+)
+
 #: Where the layer of the pure compliance law is touched, and its stiffnesses and thicknesses.
 TOUCH = 0.5
 STIFFNESS = tuple(10.0 ** np.arange(2, 8))
@@ -207,7 +214,7 @@ def draw_errors(curves: Mapping[str, Errors]) -> tuple[Figure, dict[str, Array]]
     for (label, errors), fill in zip(curves.items(), ("none", "full"), strict=False):
         data[f"{errors.name}, {label}"] = errors.parameter
         words = SYMBOLS.get(label, label)
-        for norms, space, line in zip(errors.norms.T, "VW", ("o-", "s--"), strict=True):
+        for norms, space, line in zip(errors.norms.T, "VW", ("o-", "s-"), strict=True):
             size = 7 if fill == "none" else 3
             axes.loglog(
                 errors.parameter, norms, line, label=f"{words}, in {space}", ms=size, fillstyle=fill
@@ -267,7 +274,13 @@ def main(arguments: Sequence[str] | None = None) -> None:
     for name, (label, errors) in zip(("layer", "printed"), limits.items(), strict=True):
         caption = f"Theorem 6.3: distance of x(mu, k_e) to x(0, 0), Example 8.4, {label}"
         order = errors.order(SMALLEST, 1e-2)
-        table(report, f"theorem-6-3-{name}", caption, errors, f"Order below 0.01: {order:.4f}")
+        table(
+            report,
+            f"theorem-6-3-{name}",
+            caption,
+            errors,
+            f"{NORMS} Order below 0.01: {order:.4f}. {OF_6_3}",
+        )
     caption = "Theorem 6.3: x(mu, k_e) tends to x(0, 0) like mu + k_e"
     report.figure("figure-theorem-6-3", caption, *draw_errors(limits))
 
@@ -280,7 +293,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
 
     stiff = stiffness_limit(cells)
     caption = "The normal compliance law (1.28) tends to Signorini's as c grows"
-    table(report, "compliance-stiffness", caption, stiff)
+    table(report, "compliance-stiffness", caption, stiff, NORMS)
     report.figure("figure-compliance-stiffness", caption, *draw_errors({"p = c [r]^+": stiff}))
 
     far, depth = distance_limit(cells)

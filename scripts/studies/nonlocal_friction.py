@@ -38,7 +38,7 @@ def study(report: Report, n: int, load: float) -> dict[str, Solution]:
     names = (
         "radius",
         "Newton steps",
-        "linear solves",
+        "factorizations",
         "Algorithm 1: outer",
         "inner",
         "max pressure",
@@ -69,7 +69,7 @@ def study(report: Report, n: int, load: float) -> dict[str, Solution]:
             columns,
             label,
             len(solution.history.records),
-            solution.counters.linear_solves,
+            solution.counters.factorizations,
             len(records),
             sum(r.inner for r in records),
             nodes.maximum(solution.pressure),
@@ -85,10 +85,11 @@ def study(report: Report, n: int, load: float) -> dict[str, Solution]:
     name = f"nonlocal-{abs(load):g}".replace(".", "_")
     where = f"Example 7.2, f2 = {load:g}, rho = {RHO:g}, {4 * n} x {n} cells"
     note = (
+        "Newton's method keeps a factorisation for further steps. "
         "R smooths the pressure in the friction bound s = mu |R sigma_nu| alone; the pressure "
         "changes only as far as friction changes it. Where it varies quickly, at the end of the "
         "bar and at the ends of the contact zones, the bound is spread over the radius. It is then "
-        "positive on open nodes too, where friction acts by the letter of (1.37): this is "
+        "positive on open nodes too, where friction acts by the letter of (3.6): this is "
         "the price of a law for which existence and uniqueness are proved. Radius 0 is what the "
         "thesis computes with, a positive radius what its theorems are about; a radius up to h "
         "is no smoothing on the mesh."
@@ -105,7 +106,7 @@ def _draw(report: Report, name: str, where: str, tables: dict[str, Table | None]
     for label, table in tables.items():
         assert table is not None
         # A radius up to h changes nothing: that curve lies on the one of radius 0.
-        look = {"0": {"lw": 2.6, "color": "0.75"}, "h": {"lw": 0.9, "ls": "--"}}.get(label, {})
+        look = {"0": {"lw": 2.6, "color": "0.75"}, "h": {"lw": 0.9}}.get(label, {})
         data.setdefault("x", table["x"])
         for row, key in zip(axes, ("pressure", "bound", "tau"), strict=True):
             for ax, near in zip(row, (table["x"] >= 0, table["x"] >= 3.6), strict=True):

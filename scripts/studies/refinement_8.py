@@ -1,8 +1,8 @@
 """Refinement of chapter 8: what Examples 8.1 to 8.4 come to on finer and finer meshes.
 
 `python3 -m scripts.studies.refinement_8 [--out DIR] [--coarse]`, also under mpirun. Beside the
-default ramp of psi, a tenth of the body's height wide, stands a steep one of 1/1000 of its size,
-which no mesh resolves.
+default ramp of psi, 0.4 wide in Examples 8.1 and 8.2 and 0.3 in 8.4, stands a steep one of 1/1000
+of the body's size, which no mesh resolves.
 """
 
 from __future__ import annotations
@@ -55,10 +55,11 @@ NOTES = {
     "8.2": ALL_CLOSED,
     "8.3": "Nothing is conducted.",
     "8.4": "Crossed diagonals, as symmetric as the bar. With the default ramp there is one patch, "
-    "and all settles; no node of Gamma_3 is held, and the force falls until what is left is the "
-    "place of the end of the contact between two nodes, 0.06 %; the largest pressure is "
-    "that of the middle once the mesh shows the narrow zone in which the bar sticks, between "
-    "slips to either side. With the steep ramp nothing settles.",
+    "and force and charge settle; no node of Gamma_3 is held, and what the force still moves by "
+    "is the place of the end of the contact between two nodes, 0.06 %. The largest pressure is "
+    "that of the middle, where the bar sticks between slips to either side, once the mesh shows "
+    "this zone, which is 0.06 wide: one node sticks on 192 cells, three on 384, and on 576 the "
+    "pressure is 11.45. With the steep ramp nothing settles.",
     "8.4, k_e = 0.6": "As before, with less current.",
 }
 
@@ -138,11 +139,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
     """Make the tables. Collective."""
     chosen = options(__doc__, "refinement_8", arguments)
     report = Report(chosen.out)
-    for example, (_, _, changes) in EXAMPLES.items():
-        # Crossed diagonals make four triangles of a cell.
-        finest = 192 if CROSSED[0] in changes else 384
-        levels = (12, 24) if chosen.coarse else [finest // k for k in (8, 4, 2, 1)]
-        refined(report, example, levels)
+    for example in EXAMPLES:
+        refined(report, example, (12, 24) if chosen.coarse else (48, 96, 192, 384))
 
 
 if __name__ == "__main__":

@@ -23,7 +23,9 @@ class Sweep:
     Attributes
     ----------
     words
-        What it is, for captions and the axis.
+        What it is, for the axis.
+    example
+        Of the thesis.
     case, key
         Case file, and the key that is changed.
     values
@@ -37,6 +39,7 @@ class Sweep:
     """
 
     words: str
+    example: str
     case: str
     key: str
     values: Sequence[float]
@@ -46,37 +49,45 @@ class Sweep:
     note: str = ""
 
 
-LAYER = "compliance-8-4-layer"
+LAYERED, LAYER = "8.4 with a layer of thickness 0.1", "compliance-8-4-layer"
 
 SWEEPS: Mapping[str, Sweep] = {
+    "rho-7": Sweep(
+        r"$\rho$ of (7.16)", "7.2, f2 = -0.005", "bar", "friction.mu.rho",
+        (1e0, 1e1, 1e2, 1e3, 1e4, 1e5, 1e6, 1e7, 6e7), (128, 32),
+        note="The thesis prints rho for its tables and for Figures 7.7 and 7.8; it decides 0.1 % "
+        "of the force and 0.2 % of the largest pressure. Of several solutions with a large rho "
+        "this is the one that Newton's method finds from rest (last section).",
+    ),
     "rho": Sweep(
-        r"$\rho$ of (7.16)", "piezo-8-2", "friction.mu.rho",
+        r"$\rho$ of (7.16)", "8.2", "piezo-8-2", "friction.mu.rho",
         (1e-3, 1e-2, 1e-1, 1.0, 1e1, 1e2, 1e3, 1e4, 1e5), (64, 32),
-        note="Example 8.2, where the thesis prints no rho; the case takes 1.",
+        note="The thesis prints no rho here; the case takes 1.",
     ),
     "delta": Sweep(
-        r"$\delta$ of $\psi$", "compliance-8-4", "electric.delta",
+        r"$\delta$ of $\psi$", "8.4", "compliance-8-4", "electric.delta",
         (0.5, 1.0, 2.0, 10 / 3, 5.0, 8.0, 12.0), (192, 32),
-        note="Example 8.4; by default delta = 10/3. The thesis says that delta is small. From "
-        "about 10 on patches come and go with the mesh, and the parameter has no meaning.",
+        note="By default delta = 10/3. The thesis says that delta is small. Beyond 8 the ramp is "
+        "narrower than two spacings of the nodes: patches come and go with the mesh, and the "
+        "parameter has no meaning.",
     ),
     "c_nu": Sweep(
-        r"$c_\nu$", LAYER, "contact.stiffness", (0.1, 1.0, 3.0, 10.0, 30.0, 100.0, 1000.0),
-        (96, 16), note="Example 8.4 with a layer of thickness 0.1; the case takes 10.",
+        r"$c_\nu$", LAYERED, LAYER, "contact.stiffness", (0.1, 1.0, 3.0, 10.0, 30.0, 100.0, 1000.0),
+        (96, 16), note="The case takes 10.",
     ),
     "alpha_nu": Sweep(
-        r"$\alpha_\nu$", LAYER, "contact.potential_factor", (1.0, 1.5, 2.0, 3.0, 5.0, 10.0),
-        (96, 16), log=False, note="The same; the case takes 2.",
+        r"$\alpha_\nu$", LAYERED, LAYER, "contact.potential_factor",
+        (1.0, 1.5, 2.0, 3.0, 5.0, 10.0), (96, 16), log=False, note="The case takes 2.",
     ),
     "n_nu": Sweep(
-        r"$n_\nu$", LAYER, "contact.limit", (0.01, 0.02, 0.05, 0.1, 0.2, 0.5), (96, 16),
-        note="The same; the case takes 0.1, the thickness of the layer, beyond which the limit "
+        r"$n_\nu$", LAYERED, LAYER, "contact.limit", (0.01, 0.02, 0.05, 0.1, 0.2, 0.5), (96, 16),
+        note="The case takes 0.1, the thickness of the layer, beyond which the limit "
         "has no effect, for the rigid part is reached.",
     ),
     "radius": Sweep(
-        r"radius of $R$", "compliance-8-4", "friction.radius", (0.0, 0.1, 0.2, 0.4, 0.8, 1.6),
-        (96, 16), log=False, note="Example 8.4; the case takes 0, R = identity, as the thesis "
-        "computes.",
+        r"radius of $R$", "8.4", "compliance-8-4", "friction.radius",
+        (0.0, 0.1, 0.2, 0.4, 0.8, 1.6), (96, 16), log=False,
+        note="The case takes 0, R = identity, as the thesis computes.",
     ),
 }  # fmt: skip
 
@@ -85,14 +96,17 @@ def run(sweep: Sweep, value: float, cells: tuple[int, int], domain: object) -> S
     """Solve with one value. Collective."""
     changes = (f"mesh.cells=[{cells[0]}, {cells[1]}]", f"{sweep.key}={value}", *sweep.changes)
     case = load_case(CASES / f"{sweep.case}.toml", ["solver.method=newton", *changes])
-    return solve_problem(build_problem(case, domain=domain), case.solver)  # type: ignore[arg-type]
+    solution = solve_problem(build_problem(case, domain=domain), case.solver)  # type: ignore[arg-type]
+    solution.units = case.case.units
+    return solution
 
 
 def study(report: Report, name: str, coarse: bool) -> None:
     """Draw contact force and largest pressure over one parameter. Collective."""
     sweep = SWEEPS[name]
     cells = (24, 24 // (sweep.cells[0] // sweep.cells[1])) if coarse else sweep.cells
-    names = (name, "contact force", "max p", "p in L2", "in contact", "converged", "residual")
+    parameter = name.partition("-")[0]
+    names = (parameter, "contact force", "max p", "p in L2", "in contact", "converged", "residual")
     columns: dict[str, list[object]] = {key: [] for key in names}
     domain = None
     for value in sweep.values:
@@ -109,16 +123,16 @@ def study(report: Report, name: str, coarse: bool) -> None:
         )
         for key, entry in zip(names, row, strict=True):
             columns[key].append(entry)
-    caption = f"Sensitivity: {name}, {cells[0]} x {cells[1]} cells"
+    caption = f"Sensitivity to {parameter}: Example {sweep.example}, {cells[0]} x {cells[1]} cells"
     report.table(f"sensitivity-{name}-table", caption, columns, sweep.note)
     if MPI.COMM_WORLD.rank > 0:
         return
     figure, (above, below) = subplots(2, 1, size=(ONE_COLUMN, 3.6), sharex=True)
     good = np.array(columns["converged"], dtype=bool)
-    x = np.array(sweep.values)
+    x, units = np.array(sweep.values), solution.units
     for ax, key, label in (
-        (above, "contact force", "contact force (GPa m)"),
-        (below, "max p", "largest pressure (GPa)"),
+        (above, "contact force", f"force ({units.stress} {units.length})"),
+        (below, "max p", units.label("largest pressure", "stress")),
     ):
         ax.plot(x[good], np.array(columns[key], dtype=float)[good], "o-", ms=3)
         ax.set_ylabel(label)

@@ -23,8 +23,9 @@ RHO = 1e4
 EPS = 1.05e-5
 PENALTY = ("solver.method=penalty", f"solver.eps_contact={EPS}")
 
-#: About what is seen at the free end of the bar.
-ZIGZAG = (
+#: What is not printed, and what is seen at the free end of the bar.
+OF_7_4 = (
+    "For Figures 7.4 to 7.6 the thesis prints no rho; taken is that of Figures 7.7 and 7.8. "
     "At the corner x = 4 the bar stands on its edge and the stresses are singular: the value at "
     "the last node grows as the mesh is refined (0.017, 0.021, 0.025 with 128, 256, 512 cells at "
     "f2 = -0.005). The step down of the tangential stress at the node before it belongs to the "
@@ -55,7 +56,7 @@ def draw(report: Report, number: str, case: Case, text: str, load: float) -> Tab
         f"Figure {dotted} (a): stresses on Gamma_3, {where}",
         draw_line(table, held=deformed.held, units=solution.units),
         csv_columns(table),
-        f"{_remark(solution, table)} {ZIGZAG}",
+        f"{_remark(solution, table)} {OF_7_4 if number == '7-4' else ''}".rstrip(),
     )
     values = deformed.values
     report.figure(
@@ -85,12 +86,13 @@ def compare(report: Report, tables: Mapping[str, Table | None]) -> None:
     figure, axes = subplots(2, 2, size=(TWO_COLUMNS, 5.0), sharex=True)
     data: dict[str, Sequence[float]] = {}
     for column, (exact, penalised) in enumerate((("7-4", "7-7"), ("7-5", "7-8"))):
-        for number, line, label in ((exact, "-", "multipliers"), (penalised, "--", "penalty")):
+        # The first is wider: both are seen where they coincide.
+        for number, width, label in ((exact, 2.4, "multipliers"), (penalised, 0.8, "penalty")):
             table = tables[number]
             assert table is not None
             data.setdefault("x", table["x"])
             for row, key in enumerate(("pressure", "tau")):
-                axes[row, column].plot(table["x"], table[key], line, lw=1.0, label=label)
+                axes[row, column].plot(table["x"], table[key], lw=width, label=label)
                 data[f"{key}, {label}, f2 = {FIGURES[number][0]:g}"] = table[key]
                 usual = 1.6 * float(np.quantile(np.abs(table[key]), 0.97))
                 axes[row, column].set_ylim(-usual if key == "tau" else 0.0, usual)

@@ -33,8 +33,8 @@ NOTES = {
     "8.2": "The thesis's 4 or 5 iterations are near those of an implicit charge. That is no "
     "evidence: rho of (7.16), which the thesis does not print for this chapter, was chosen so; "
     "other values below.",
-    "8.3": "The thesis's counts are 4 above those of its Table 8.2, and it lays that to "
-    "plasticity. No rho that was tried shows it (below): next to nothing of the body is beyond "
+    "8.3": "The thesis's counts are 4 above those of its Table 8.2, from which the material alone "
+    "differs. No rho that was tried shows it (below): next to nothing of the body is beyond "
     "xi_0, and the counts of both examples are the same up to 1. Not explained.",
 }
 
