@@ -63,7 +63,7 @@ if TYPE_CHECKING:
     from contact.methods.options import FixedPointOptions, NewtonOptions, PenaltyOptions
     from contact.output.files import write_outputs
     from contact.output.solution import Solution
-    from contact.problem.problem import Contact
+    from contact.problem.contact import Contact
     from contact.problem.problem import ContactProblem as Problem
     from contact.solving import SolveInterrupted, solve, solve_problem
     from forms.hencky import Linear, Log, UserLaw
@@ -94,7 +94,8 @@ _HOMES = {
     "contact.methods.options": "FixedPointOptions NewtonOptions PenaltyOptions",
     "contact.output.files": "write_outputs",
     "contact.output.solution": "Solution",
-    "contact.problem.problem": "Contact ContactProblem",
+    "contact.problem.contact": "Contact",
+    "contact.problem.problem": "ContactProblem",
     "contact.solving": "SolveInterrupted solve solve_problem",
     "forms.hencky": "Linear Log UserLaw",
     "forms.laws": "Coulomb PerfectConductivity RampConductivity ShiftedConductivity "

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import replace
-from itertools import product
 
 import numpy as np
 from mpi4py import MPI
@@ -24,11 +23,14 @@ from contact.interface.layer import Layer
 from contact.interface.obstacle import Obstacle
 from contact.mesh.domain import Domain
 from contact.mesh.revolution import revolved
-from contact.problem.held import check_held
+from contact.problem.consistent import check_problem
 from contact.problem.problem import ContactProblem
 from contact.tolerances import HUGE
 from forms.hencky import Law
 from forms.laws import FrictionCoefficient, FrictionLaw
+
+#: Arguments of `build_problem` that replace parts of a case.
+REPLACEMENTS = ("domain", "law", "coefficient", "friction", "foundation", "layer")
 
 
 def build_problem(
@@ -68,7 +70,6 @@ def build_problem(
             domain = revolved(domain)
         check_range("mesh", domain.size)
         case.check_mesh(domain.dim, domain.names)
-        _check_loads(case, domain)
         body = Body.piecewise(
             make_materials(case, domain, law),
             [_fixed(case, i, domain.comm) for i in range(len(case.fixed))],
@@ -95,20 +96,7 @@ def _check_step(problem: ContactProblem) -> None:
     largest = domain.comm.allreduce(largest, op=MPI.MAX)
     if largest > HUGE:
         check_range(to_blame(body.loads, domain, time), largest)
-    check_held(problem)
-
-
-def _check_loads(case: sections.Case, domain: Domain) -> None:
-    """Refuse loads on Gamma_3, where the foundation alone acts: Gamma_2 and Gamma_b exclude it."""
-    for (_, contact), (i, load) in product(case.contacts, enumerate(case.load)):
-        if load.on is None:
-            continue
-        shared = bool(np.isin(domain.facets(load.on), domain.facets(contact.on)).any())
-        if domain.comm.allreduce(shared, op=MPI.LOR):
-            raise InputError(
-                f"load.{i}.on: {load.on} shares facets with the contact part {contact.on}; "
-                "accepted: parts beside it, or body forces"
-            )
+    check_problem(problem)
 
 
 @contextmanager

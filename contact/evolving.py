@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import logging
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
 
 from contact.errors import InputError
+from contact.kinds import expect
 from contact.methods.every import METHODS
 from contact.methods.interrupt import stop_on_signal
 from contact.methods.method import Method
@@ -20,6 +21,7 @@ from contact.output.record import StepRecord
 from contact.output.review import announce
 from contact.output.solution import Solution
 from contact.output.steps import StepRecorder
+from contact.problem.consistent import check_problem
 from contact.problem.held import check_potential
 from contact.problem.kkt import evaluate
 from contact.problem.problem import ContactProblem
@@ -37,7 +39,7 @@ def evolve(
     times: Sequence[float],
     settings: Options | None = None,
     monitor: Monitor | None = None,
-    start: State | None = None,
+    start: State | Solution | None = None,
 ) -> Iterator[State]:
     """Load a problem in steps, and give the state at the end of each. Collective.
 
@@ -61,10 +63,18 @@ def evolve(
     Raises
     ------
     InputError
-        If times do not increase, or a linear system is singular.
+        If times do not increase, loads and supports contradict each other or leave the body
+        free, or a linear system is singular.
     NotConvergedError
         If a step fails; the states before have been given.
     """
+    check_options(settings, monitor)
+    if isinstance(start, Solution):
+        start = start.state
+    expect("start", start, "an earlier state, or solution", isinstance(start, State | None))
+    expect("evolve", problem, "a Problem", isinstance(problem, ContactProblem))
+    numbers = isinstance(times, Iterable) and not isinstance(times, str)
+    expect("times", times, "a list of times, the ends of the steps", numbers)
     begin = 0.0 if start is None else start.time
     ends = [float(time) for time in times]
     if not np.all(np.isfinite(ends)) or np.any(np.diff([begin, *ends]) <= 0):
@@ -72,6 +82,8 @@ def evolve(
             f"times: given {', '.join(f'{time:g}' for time in ends)}; accepted: numbers that "
             f"increase, the first above {begin:g}"
         )
+    for end in ends[-1:]:
+        check_problem(problem.at(end))
     settings = in_steps(settings or NewtonOptions())
     method = METHODS[settings.method](problem, settings, monitor)
     for step in Evolution(problem, method, start).run(ends, begin):
@@ -81,6 +93,20 @@ def evolve(
                 "remains"
             )
         yield step.state
+
+
+def check_options(settings: Options | None, monitor: Monitor | None) -> None:
+    """Refuse what are no options of a method, or no function.
+
+    Raises
+    ------
+    InputError
+        If they are not.
+    """
+    accepted = "NewtonOptions(), FixedPointOptions(), PenaltyOptions()"
+    expect("settings", settings, accepted, isinstance(settings, Options | None))
+    accepted = "a function of a record, called after each outer iteration"
+    expect("monitor", monitor, accepted, monitor is None or callable(monitor))
 
 
 def in_steps(settings: Options) -> Options:

@@ -9,12 +9,13 @@ from typing import Any
 
 from mpi4py import MPI
 
-from contact.build import build_problem, named
+from contact.build import REPLACEMENTS, build_problem, named
 from contact.case.file import Case, load_case
 from contact.case.replaced import replaced_by
 from contact.case.text import anchored, to_toml
 from contact.errors import InputError
-from contact.evolving import solve_steps
+from contact.evolving import check_options, solve_steps
+from contact.kinds import expect
 from contact.methods.every import METHODS
 from contact.methods.interrupt import stop_on_signal
 from contact.methods.options import NewtonOptions, Options
@@ -24,7 +25,8 @@ from contact.nesting import nested_start, pays
 from contact.output.resume import Checkpoints, read_steps
 from contact.output.review import announce
 from contact.output.solution import Solution
-from contact.problem.held import check_held, check_potential
+from contact.problem.consistent import check_problem
+from contact.problem.held import check_potential
 from contact.problem.problem import ContactProblem
 from contact.problem.state import State
 
@@ -53,7 +55,7 @@ def solve(
     comm: MPI.Intracomm = MPI.COMM_WORLD,
     folder: Path | None = None,
     restart: Path | None = None,
-    start: State | None = None,
+    start: State | Solution | None = None,
     **replacements: Any,
 ) -> Solution:
     """Build and solve a case, in steps if it says so. Collective.
@@ -73,7 +75,7 @@ def solve(
     restart
         A folder with checkpoints of the same case, to go on from.
     start
-        A state of the same mesh to start from, of an earlier solution; from rest by default.
+        An earlier solution on the same mesh to start from, or its state; from rest by default.
     replacements
         Objects that take the place of parts of the case; see `build.build_problem`.
 
@@ -103,22 +105,26 @@ def _solve(
     comm: MPI.Intracomm,
     folder: Path | None,
     restart: Path | None,
-    start: State | None,
+    start: State | Solution | None,
     **replacements: Any,
 ) -> Solution:
     """Solve as `solve` does; what a signal has ended is a solution like others."""
     begin = time.perf_counter()
-    if not isinstance(settings, Options | None):
-        raise InputError(
-            f"given {settings!r} for a method; accepted: NewtonOptions(), FixedPointOptions(), "
-            "PenaltyOptions()"
-        )
+    check_options(settings, monitor)
+    if isinstance(start, Solution):
+        start = start.state
+    fits = isinstance(start, State | None)
+    expect("start", start, "an earlier solution of the same problem, or its state", fits)
+    fits = isinstance(case, Case | ContactProblem | str | Path)
+    expect("solve", case, "a case, the name of a case file, or a Problem", fits)
+    for name in replacements.keys() - set(REPLACEMENTS):
+        raise InputError(f"{name}: unknown; accepted: {', '.join(REPLACEMENTS)}")
     if isinstance(case, ContactProblem):
         given = {"folder": folder, "restart": restart, **replacements}
         _refuse(given, "a problem that is built already")
         nested = isinstance(settings, NewtonOptions) and settings.nested
         _refuse({"nested": nested or None}, "a problem that is built already")
-        check_held(case)
+        check_problem(case)
         return _reached(case, settings or NewtonOptions(), monitor, start, GIVEN)
     case = case if isinstance(case, Case) else load_case(case, without=replaced_by(replacements))
     settings = settings or case.solver

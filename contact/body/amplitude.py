@@ -8,6 +8,7 @@ from typing import Any, Protocol, TypeAlias, runtime_checkable
 
 import numpy as np
 
+from contact.kinds import expect
 from contact.typing import Array
 
 #: A factor as a function of time.
@@ -58,6 +59,12 @@ class Moving(Protocol):
 def at_time(field: Any, time: Any) -> Any:
     """Return a given function of position at a time, whether it depends on that or not."""
     return field.at(time) if isinstance(field, Moving) else field
+
+
+def check_amplitude(what: str, given: Any) -> None:
+    """Refuse what is no function of time."""
+    fits = given is None or callable(given)
+    expect(f"{what}: amplitude", given, "a function of time, such as lambda t: 2 * t", fits)
 
 
 def amplitude_of(given: Amplitude | None, fields: list[Any]) -> Amplitude:

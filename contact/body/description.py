@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import InitVar, dataclass
 from dataclasses import field as default
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 from ufl.core.expr import Expr
 
-from contact.body.amplitude import Amplitude, Moving, amplitude_of
+from contact.body.amplitude import Amplitude, Moving, amplitude_of, check_amplitude
 from contact.body.fields import Given, field, vector
 from contact.body.rigid import Electrode, Rigid
 from contact.errors import InputError
+from contact.kinds import expect, names_arguments, several
 from contact.mesh.together import part
 from contact.typing import Array
 from forms.elasticity import Anisotropic
@@ -31,6 +32,7 @@ class Field(Protocol):
         """Return the values at points of shape (n, d)."""
 
 
+@names_arguments
 @dataclass(frozen=True)
 class Fixed:
     """Prescribed values on a part of the boundary.
@@ -62,8 +64,15 @@ class Fixed:
     def __post_init__(self) -> None:
         """Make fields of what is given."""
         object.__setattr__(self, "on", part(self.on))
-        object.__setattr__(self, "displacement", vector(self.displacement))
+        object.__setattr__(self, "displacement", vector(self.displacement, free=True))
         object.__setattr__(self, "potential", field(self.potential))
+        check_amplitude("Fixed", self.amplitude)
+        given = [*(self.displacement or ()), self.potential]
+        if all(value is None for value in given):
+            raise InputError(
+                f"Fixed on {self.on!r}: nothing is prescribed; accepted: a displacement with a "
+                "component that is not free, or a potential"
+            )
 
     @property
     def factor(self) -> Amplitude:
@@ -72,6 +81,7 @@ class Fixed:
         return amplitude_of(self.amplitude, fields)
 
 
+@names_arguments
 @dataclass(frozen=True)
 class Load:
     """Given forces and charges: on a part, or in the whole body where `on` is None.
@@ -79,7 +89,7 @@ class Load:
     Each value is a number, a function of x, UFL or a dolfinx Function, as `fields.field` takes
     it.
 
-    Attributes
+    Parameters
     ----------
     on
         Name of the part, or a list of names; None for the whole body.
@@ -91,20 +101,51 @@ class Load:
         Surface charge q_2 = D.nu on a part, body charge q_0 in the body.
     amplitude
         Function of time that multiplies all of them: see `amplitude.amplitude_of`.
+    traction, body_force, body_charge
+        The words of the case file for force and charge.
+
+    Raises
+    ------
+    InputError
+        If nothing is given, or what does not act there.
     """
 
-    on: Given
+    on: Given = None
     force: Given = None
     pressure: Given = None
     charge: Given = None
     amplitude: Amplitude | None = None
+    traction: InitVar[Given] = None
+    body_force: InitVar[Given] = None
+    body_charge: InitVar[Given] = None
 
-    def __post_init__(self) -> None:
+    def __post_init__(self, traction: Given, body_force: Given, body_charge: Given) -> None:
         """Make fields of what is given."""
         object.__setattr__(self, "on", None if self.on is None else part(self.on))
-        object.__setattr__(self, "force", vector(self.force))
+        inside = self.on is None
+        force = self._one(force=self.force, traction=traction, body_force=body_force)
+        charge = self._one(charge=self.charge, body_charge=body_charge)
+        for name, given, fits in (
+            ("traction", traction, not inside),
+            ("pressure", self.pressure, not inside),
+            ("body_force", body_force, inside),
+            ("body_charge", body_charge, inside),
+        ):
+            accepted = "it in the whole body, on=None" if not inside else "it on a part"
+            expect(f"Load: {name}", given, accepted, given is None or fits)
+        object.__setattr__(self, "force", vector(force))
         object.__setattr__(self, "pressure", field(self.pressure))
-        object.__setattr__(self, "charge", field(self.charge))
+        object.__setattr__(self, "charge", field(charge))
+        check_amplitude("Load", self.amplitude)
+        if not self.fields:
+            raise InputError("Load: nothing is given; accepted: force, pressure or charge")
+
+    @staticmethod
+    def _one(**given: Given) -> Given:
+        """Return which of several names for the same is given."""
+        names = [name for name, value in given.items() if value is not None]
+        expect("Load", names, f"one of {', '.join(given)}", len(names) < 2)
+        return given[names[0]] if names else None
 
     @property
     def fields(self) -> list[Field | Moving]:
@@ -118,6 +159,7 @@ class Load:
         return amplitude_of(self.amplitude, self.fields)
 
 
+@names_arguments
 @dataclass(frozen=True)
 class Material:
     """A material and where it is.
@@ -136,7 +178,26 @@ class Material:
     piezo: Piezo | None = None
     on: tuple[str, ...] = ()
 
+    def __post_init__(self) -> None:
+        """Refuse what is no material."""
+        expect("law", self.law, "Linear(young, poisson), Log, UserLaw, ...", is_law(self.law))
+        fits = isinstance(self.piezo, Piezo | None)
+        expect("piezo", self.piezo, "Piezo(...), or None", fits)
 
+
+#: Elastic constants that a law has; sizes and starts are taken from them.
+CONSTANTS = ("young", "poisson", "bulk", "shear")
+
+
+def is_law(given: Any) -> bool:
+    """Tell whether an object has the constants of a law of the stress."""
+    try:
+        return all(np.isfinite(float(getattr(given, name))) for name in CONSTANTS)
+    except (AttributeError, TypeError, ValueError):
+        return False
+
+
+@names_arguments
 @dataclass(frozen=True)
 class Body:
     """Material and supports.
@@ -165,10 +226,19 @@ class Body:
     electrodes: tuple[Electrode, ...] = ()
 
     def __post_init__(self) -> None:
-        """Accept one support or one load without a list."""
-        for name, kind in (("fixed", Fixed), ("loads", Load)):
-            if isinstance(getattr(self, name), kind):
-                object.__setattr__(self, name, (getattr(self, name),))
+        """Refuse what is none of a body; accept one support or one load without a list."""
+        Material(self.law, self.piezo)
+        for name, kind in (
+            ("fixed", Fixed),
+            ("loads", Load),
+            ("regions", Material),
+            ("rigid", Rigid),
+            ("electrodes", Electrode),
+        ):
+            words = f"{kind.__name__}(...), or a list of them"
+            object.__setattr__(self, name, several(name, getattr(self, name), kind, words))
+        fits = not self.electrodes or self.piezo is not None
+        expect("electrodes", self.electrodes, "electrodes of a piezoelectric material", fits)
 
     @staticmethod
     def piecewise(

@@ -51,13 +51,15 @@ def field(value: Given) -> Any:
     raise InputError(f"given {value!r} for a function of position; accepted: {ACCEPTED}")
 
 
-def vector(value: Given) -> tuple[Any, ...] | None:
-    """Return the components of a vector; None or "free" for a component leaves it free.
+def vector(value: Given, free: bool = False) -> tuple[Any, ...] | None:
+    """Return the components of a vector.
 
     Parameters
     ----------
     value
         A list with what `field` takes, or a UFL expression or Function of vectors.
+    free
+        Whether None or "free" leaves a component free.
     """
     if value is None:
         return None
@@ -68,7 +70,10 @@ def vector(value: Given) -> tuple[Any, ...] | None:
             f"given {value!r} for a vector; accepted: a list with an entry a component, such as "
             "[0.0, 0.0] in the plane, or UFL or a Function of vectors"
         )
-    return tuple(None if isinstance(v, str) and v == "free" else field(v) for v in value)
+    found = tuple(None if isinstance(v, str) and v == "free" else field(v) for v in value)
+    if not free and any(component is None for component in found):
+        raise InputError(f"given {value!r} for a vector; accepted: 0 where nothing acts")
+    return found
 
 
 @dataclass(frozen=True)

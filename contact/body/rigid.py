@@ -8,7 +8,8 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
-from contact.body.amplitude import Amplitude, ramp, steady
+from contact.body.amplitude import Amplitude, check_amplitude, ramp, steady
+from contact.kinds import expect, names_arguments
 from contact.mesh.together import part
 from contact.typing import Array
 
@@ -24,6 +25,7 @@ def _at(values: Sequence[Timed | None], given: Amplitude | None, time: float) ->
     return factor * np.array(numbers)
 
 
+@names_arguments
 @dataclass(frozen=True)
 class Motion:
     """The motion of a rigid body; a component that is None is free.
@@ -50,6 +52,7 @@ class Motion:
     amplitude: Amplitude | None = None
 
 
+@names_arguments
 @dataclass(frozen=True)
 class Rigid:
     """A part that moves as a rigid body, or a list of parts, or a foundation in front of it."""
@@ -61,6 +64,8 @@ class Rigid:
     def __post_init__(self) -> None:
         """Make one name of several."""
         object.__setattr__(self, "on", part(self.on))
+        expect("Rigid: motion", self.motion, "Motion(...)", isinstance(self.motion, Motion))
+        check_amplitude("Rigid", self.motion.amplitude)
 
     name = "rigid"
 
@@ -79,6 +84,7 @@ class Rigid:
         return _at(values, self.motion.amplitude, time)
 
 
+@names_arguments
 @dataclass(frozen=True)
 class Electrode:
     """A part, or a list of parts, with one unknown potential, and its charge."""
@@ -90,6 +96,7 @@ class Electrode:
     def __post_init__(self) -> None:
         """Make one name of several."""
         object.__setattr__(self, "on", part(self.on))
+        check_amplitude("Electrode", self.amplitude)
 
     name = "electrode"
     values = (None,)

@@ -16,7 +16,7 @@ from contact.interface.friction import Friction
 from contact.interface.layer import Layer
 from contact.interface.obstacle import GapFunction, Obstacle
 from contact.mesh.domain import Domain
-from contact.problem.problem import Contact
+from contact.problem.contact import Contact
 from forms.laws import (
     Compliance,
     Conductivity,
@@ -80,8 +80,7 @@ def _foundation(key: str, section: sections.Contact, domain: Domain) -> Obstacle
     if section.foundation is not None:
         return section.foundation.obstacle(section.direction, section.axis or ())
     assert section.gap is not None  # filled in by the section
-    rounding = -1e-12 * domain.size
-    return GapFunction(NodalField(f"{key}.gap", section.gap, domain.comm, rounding).numpy)
+    return GapFunction(NodalField(f"{key}.gap", section.gap, domain.comm).numpy)
 
 
 def _layer(section: sections.Contact) -> Layer | None:

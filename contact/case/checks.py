@@ -34,7 +34,6 @@ def check_sections(case: Case) -> None:
     given += [part.displacement or ("held",) for part in case.rigid]
     if not any(component != "free" for components in given for component in components):
         raise fault("fixed", Words("no displacement fixed"), "at least one component on a part")
-    _check_contradictions(case)
     _check_lagged(case)
     check_evolution(case)
     for path, formula in _formulas(case):
@@ -157,27 +156,6 @@ def _check_potential(case: Case) -> None:
             Words("no potential fixed"),
             "a potential on at least one part, or [electric] with k_e > 0",
         )
-
-
-def _check_contradictions(case: Case) -> None:
-    """Two tables may not prescribe different values for one quantity of a part."""
-    seen: dict[tuple[str, Any], tuple[int, Expression]] = {}
-    for i, fixed in enumerate(case.fixed):
-        given: list[tuple[Any, str, Any]] = [
-            (k, f"displacement.{k}", c) for k, c in enumerate(fixed.displacement or ())
-        ]
-        given.append(("potential", "potential", fixed.potential))
-        for quantity, path, value in given:
-            if value is None or value == "free":
-                continue
-            for part in members(fixed.on):
-                first, other = seen.setdefault((part, quantity), (i, value))
-                if other != value:
-                    raise fault(
-                        f"fixed.{i}.{path}",
-                        value.source,
-                        f"{other}, as fixed.{first} has on the same part {part}",
-                    )
 
 
 def _vectors(case: Case) -> Iterator[tuple[str, tuple[Any, ...] | None]]:

@@ -17,11 +17,13 @@ from numpy.typing import NDArray
 from contact.interface.nodes import ContactNodes
 from contact.interface.obstacle import Obstacle
 from contact.interface.placing import Candidates
+from contact.kinds import names_arguments
 from contact.typing import Array
 from forms.laws import Conductivity, PotentialLaw, Truncation
 from forms.ops import Value
 
 
+@names_arguments
 @dataclass(frozen=True)
 class Conductor:
     """A conductive foundation at the potential phi_f.

@@ -12,10 +12,16 @@ from contact.interface.history import SlipHistory
 from contact.interface.nodes import ContactNodes
 from contact.interface.piecewise import SmoothingPieces
 from contact.interface.smoothing import Smoothing
+from contact.kinds import expect, names_arguments
 from contact.typing import Array
 from forms.laws import ConstantCoefficient, Coulomb, FrictionCoefficient, FrictionLaw, Tresca
 
+#: What is asked of a coefficient, and of a law of friction.
+COEFFICIENT = ("maximum", "lipschitz", "__call__", "derivative")
+LAW = ("maximum", "lipschitz", "__call__", "by_slip", "by_pressure")
 
+
+@names_arguments
 @dataclass(frozen=True)
 class Friction:
     """Friction on the contact part: none, or what one of these says, and a radius.
@@ -54,13 +60,18 @@ class Friction:
                 f"Friction({self.coefficient}): accepted: Friction(mu={self.coefficient}), a "
                 "coefficient, or Friction(tresca=...), a bound"
             )
-        if not 0 <= self.radius < np.inf:
-            raise InputError(f"Friction: the radius is {self.radius}; accepted: a length >= 0")
+        size = isinstance(self.radius, int | float | np.number) and 0 <= self.radius < np.inf
+        expect("Friction: radius", self.radius, "a length >= 0", size)
         if sum(law is not None for law in self._laws) > 1:
             raise InputError("Friction: accepted: one of coefficient, tresca, mu and law")
         if hasattr(self.mu, "lipschitz"):
             object.__setattr__(self, "coefficient", self.mu)
             object.__setattr__(self, "mu", None)
+        for name, methods in (("coefficient", COEFFICIENT), ("law", LAW)):
+            given = getattr(self, name)
+            fits = given is None or all(hasattr(given, method) for method in methods)
+            words = f"an object with {', '.join(methods)}"
+            expect(f"Friction: {name}", given, words, fits)
         object.__setattr__(self, "tresca", field(self.tresca))
         object.__setattr__(self, "mu", field(self.mu))
 

@@ -10,12 +10,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from contact.errors import InputError
+from contact.kinds import names_arguments
 from contact.tolerances import EPS
 from contact.typing import Array
 from forms.laws import PenetrationLaw, StiffnessLaw
 from forms.ops import Value
 
 
+@names_arguments
 @dataclass(frozen=True)
 class Layer:
     """A compliant layer in front of the rigid part.

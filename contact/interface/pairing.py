@@ -15,6 +15,8 @@ from contact.interface.mortar.integration import NOTHING
 from contact.interface.mortar.surface import Surface, surface_of
 from contact.interface.nodes import ContactNodes, projectors
 from contact.interface.obstacle import Obstacle
+from contact.interface.placing import check_gap
+from contact.kinds import expect
 from contact.mesh.entities import owned_among
 from contact.mesh.pieces import connected_pieces
 from contact.typing import Array
@@ -87,7 +89,9 @@ def find_pair(
     gap, cut = coupling.gap[here], 0.0
     if not press:
         gap, cut = _apart(here, slave, body, coupling, what)
+    expect(f"{key}.foundation", distance, "a gap with against", not distance.is_shape)
     _, added = distance.measure(points, normal)
+    check_gap(body.domain, added, key, press)
     moves = body.free[local, :d]
     admissible = normal * moves
     length = np.linalg.norm(admissible, axis=1)

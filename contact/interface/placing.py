@@ -16,7 +16,7 @@ from contact.errors import InputError
 from contact.interface.mortar.lumping import Lumping, Mixing
 from contact.interface.mortar.surface import surface_of
 from contact.interface.nodes import ContactNodes, projectors
-from contact.interface.obstacle import Obstacle
+from contact.interface.obstacle import Obstacle, Shape
 from contact.mesh.domain import Domain
 from contact.mesh.entities import owned_among
 from contact.typing import Array
@@ -101,12 +101,12 @@ def _chord_depth(domain: Domain, part: str, obstacle: Obstacle, points: Array) -
 
 
 @contextmanager
-def _naming(key: str) -> Iterator[None]:
+def _naming(key: str, then: str = ".") -> Iterator[None]:
     """Let messages begin with the key of the contact that they are about."""
     try:
         yield
     except InputError as error:
-        raise InputError(f"{key}.{error}") from None
+        raise InputError(f"{key}{then}{error}") from None
 
 
 def _place(
@@ -159,6 +159,18 @@ def _place(
     return np.where(facing > 0, np.maximum(gap, 0.0), gap), float(cut)
 
 
+def check_gap(domain: Domain, gap: Array, key: str, press: bool) -> None:
+    """Refuse given gaps that are no numbers, or none as nothing is to be pressed. Collective."""
+    if domain.comm.allreduce(bool(np.isnan(gap).any()), op=MPI.LOR):
+        raise InputError(f"{key}: the gap is no number at a node; accepted: lengths, or inf")
+    least = domain.comm.allreduce(float(gap.min(initial=np.inf)), op=MPI.MIN)
+    if least < -1e-12 * domain.size and not press:
+        raise InputError(
+            f"{key}.gap: {least:g} at a node; accepted: values >= 0 (in Python also press=True, "
+            "by which the foundation presses the body out)"
+        )
+
+
 def find_nodes(
     body: BodyEquilibrium,
     part: str,
@@ -191,6 +203,9 @@ def find_nodes(
     domain, space, d = body.domain, body.space, body.dim
     found = candidates(domain, space, part)
     nodes, points, weight = found.nodes, found.points, found.weight
+    if isinstance(obstacle, Shape):
+        with _naming(key, ".foundation: "):
+            obstacle.check(d)
     direction, gap = found.measure(obstacle)
     if domain.comm.allreduce(bool(np.isnan(direction).any()), op=MPI.LOR):
         raise InputError(
@@ -198,11 +213,11 @@ def find_nodes(
             "centre, on the axis of a cylinder, or where a formula has no value or no slope)"
         )
     cut = 0.0
-    if not obstacle.is_shape and domain.comm.allreduce(bool(np.isnan(gap).any()), op=MPI.LOR):
-        raise InputError(f"{key}: the gap is no number at a node; accepted: lengths, or inf")
     if obstacle.is_shape:
         with _naming(key):
             gap, cut = _place(domain, space, (part, obstacle), found, direction, gap, press)
+    else:
+        check_gap(domain, gap, key, press)
     if domain.comm.allreduce(bool(body.masters.tied[nodes, :d].any()), op=MPI.LOR):
         raise InputError(
             f"{key}.on: part {part!r} shares nodes with a rigid part; accepted: parts apart"

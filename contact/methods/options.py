@@ -13,6 +13,7 @@ from typing import Annotated, Any, Literal
 from annotated_types import Ge, Gt, Le, Lt
 
 from contact.errors import InputError
+from contact.kinds import names_arguments
 from contact.problem.kkt import KKT
 from contact.settings import Accepted, Count, Internal, Positive, ReadWith, Switch, Tolerance
 from contact.tolerances import LAWS_HOLD
@@ -78,6 +79,7 @@ class LoopOptions(Options):
     material_step: Literal["secant", "tangent", "auto"] = "auto"
 
 
+@names_arguments
 @dataclass(frozen=True, kw_only=True)
 class FixedPointOptions(LoopOptions):
     """Algorithms 1, 2 and their kin: a fixed point over block relaxation.
@@ -123,6 +125,7 @@ class FixedPointOptions(LoopOptions):
     single_loop: Switch = False
 
 
+@names_arguments
 @dataclass(frozen=True, kw_only=True)
 class PenaltyOptions(LoopOptions):
     """Algorithm 3, the penalty method.
@@ -147,6 +150,7 @@ class PenaltyOptions(LoopOptions):
         return KKT(self.tolerance, LAWS_HOLD, LAWS_HOLD)
 
 
+@names_arguments
 @dataclass(frozen=True, kw_only=True)
 class NewtonOptions(Options):
     """Semismooth Newton.

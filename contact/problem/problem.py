@@ -4,13 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from copy import copy
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 from mpi4py import MPI
 
 from contact.body.description import Body
 from contact.body.equilibrium import BodyEquilibrium
-from contact.body.fields import Given
 from contact.body.materials import young_behind
 from contact.body.norms import volume
 from contact.errors import InputError
@@ -26,58 +25,18 @@ from contact.interface.entries import (
 from contact.interface.friction import Friction
 from contact.interface.history import SlipHistory
 from contact.interface.interface import Interface
-from contact.interface.layer import Layer
 from contact.interface.multipliers import Multipliers
 from contact.interface.nodes import ContactNodes
-from contact.interface.obstacle import GapFunction
 from contact.interface.pairing import find_pair
 from contact.interface.placing import candidates, find_nodes
 from contact.interface.response import FoundationResponse
+from contact.kinds import expect, several
 from contact.mesh.domain import Domain
-from contact.mesh.together import part
 from contact.problem.approach import approached
+from contact.problem.contact import Contact, check_laws
 from contact.problem.scales import Scales
 from contact.problem.state import State
 from contact.typing import Array
-
-
-@dataclass(frozen=True)
-class Contact:
-    """A part that may touch an obstacle, and what acts between them.
-
-    Attributes
-    ----------
-    on
-        The part, or a list of parts.
-    foundation
-        The obstacle; or a gap to a rigid foundation along the body's normal: a number, a function
-        of x, UFL or a dolfinx Function. By default the body lies on it.
-    layer
-        The compliant layer in front of it.
-    friction, conductor
-        Friction and electric contact; None for those that the problem is given for all.
-    press
-        Whether the obstacle may cut the body at rest, and presses it out.
-    against
-        The part of another body that it may touch, instead of a foundation, whose gap is then
-        added to that between the bodies; None for a rigid one.
-    """
-
-    on: Given
-    foundation: Given = 0.0
-    layer: Layer | None = None
-    friction: Friction | None = None
-    conductor: Conductor | None = None
-    press: bool = False
-    against: Given = None
-
-    def __post_init__(self) -> None:
-        """Make an obstacle of a gap."""
-        object.__setattr__(self, "on", part(self.on))
-        if self.against is not None:
-            object.__setattr__(self, "against", part(self.against))
-        if not hasattr(self.foundation, "measure"):
-            object.__setattr__(self, "foundation", GapFunction.of(self.foundation))
 
 
 class ContactProblem:
@@ -132,15 +91,11 @@ class ContactProblem:
         degree: int = 1,
     ) -> None:
         self.domain, self.body = domain, body
-        given = [contact] if isinstance(contact, Contact) else contact
-        if not all(isinstance(contact, Contact) for contact in given):
-            raise InputError(
-                f"given {contact!r} for a contact; accepted: Contact(part), or several"
-            )
-        if not isinstance(friction, Friction | None):
-            raise InputError(
-                f"given {friction!r} for friction; accepted: Friction(mu=...), or None"
-            )
+        expect("domain", domain, "Domain.from_mesh(...), from_msh(...)", isinstance(domain, Domain))
+        expect("body", body, "Body(...)", isinstance(body, Body))
+        given = several("contact", contact, Contact, "Contact(part), or several")
+        expect("contact", contact, "Contact(part), or several", given)
+        check_laws("Problem", friction, conductor)
         self.contacts = tuple(
             replace(
                 contact,

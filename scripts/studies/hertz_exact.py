@@ -14,7 +14,8 @@ from mpi4py import MPI
 
 from contact.body.description import Body, Fixed
 from contact.mesh.grid import box, rectangle
-from contact.problem.problem import Contact, ContactProblem
+from contact.problem.contact import Contact
+from contact.problem.problem import ContactProblem
 from contact.typing import Array
 from forms.hencky import Linear
 

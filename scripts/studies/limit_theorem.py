@@ -19,7 +19,8 @@ from matplotlib.figure import Figure
 from contact import Case, InputError, build_problem, load_case
 from contact.interface.layer import Layer
 from contact.interface.obstacle import GapFunction
-from contact.problem.problem import Contact, ContactProblem
+from contact.problem.contact import Contact
+from contact.problem.problem import ContactProblem
 from contact.typing import Array
 from forms.laws import Compliance, PotentialFactor
 from scripts.cases import CASES, TABLE_8_4

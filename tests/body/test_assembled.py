@@ -7,7 +7,8 @@ from mpi4py import MPI
 
 from contact.body.description import Body, Fixed
 from contact.linear.operator import SparseOperator
-from contact.problem.problem import Contact, ContactProblem
+from contact.problem.contact import Contact
+from contact.problem.problem import ContactProblem
 from forms.hencky import energy_density
 from forms.kinematics import strain
 from tests.problems.materials import LAWS, XI

@@ -109,7 +109,10 @@ def test_vectors() -> None:
         x, y = vector(given)
         np.testing.assert_allclose(x.numpy(points), points[:, 0], atol=1e-12)
         np.testing.assert_allclose(y.numpy(points), 2 * points[:, 1], atol=1e-12)
-    assert vector(["free", None]) == (None, None)
+    assert vector(["free", None], free=True) == (None, None)
+    for given in (["free", 1.0], [None, 1.0]):
+        with pytest.raises(InputError, match="accepted: 0 where nothing acts"):
+            vector(given)
 
 
 def made(law: Linear, contact: Any = None) -> Problem:
@@ -131,7 +134,7 @@ def made(law: Linear, contact: Any = None) -> Problem:
         (lambda: Friction(mu=0.3, tresca=1.0), "accepted: one of coefficient, tresca, mu and law"),
         (lambda: field(ufl.Identity(2)), "UFL of shape"),
         (lambda: field(lambda x: x[:2]).numpy(np.zeros((3, 2))), "accepted: a number, a function"),
-        (lambda: Sphere((0.0, -1.0), -1.0), "accepted: a radius > 0"),
+        (lambda: Sphere((0.0, -1.0), -1.0), "Sphere: radius: given -1.0; accepted: a length > 0"),
         (lambda: made(Linear(10.0, 0.6)), "Poisson's ratio 0.6; accepted"),
         (lambda: made(Linear(10.0, 0.3), "bottom"), r"accepted: Contact\(part"),
         (lambda: solve(made(Linear(10.0, 0.3)), "newton"), r"accepted: NewtonOptions\(\)"),

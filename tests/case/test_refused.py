@@ -82,10 +82,6 @@ BAD = {
     "components": ({"fixed__0__displacement": [0, 0, 0]}, "2 components in 2-D"),
     "components in space": ({"mesh": box, "load__0__on": "top"}, "3 components in 3-D"),
     "component": ({"fixed__0__displacement": [0, "fre"]}, "fixed.0.displacement.1: "),
-    "contradiction": (
-        {"fixed": [{"on": "left", "displacement": [0, v]} for v in (0, 1)]},
-        "fixed.1.displacement.1: given 1.0; accepted: 0.0, as fixed.0 has",
-    ),
     "load nowhere": ({"load__0__on": None}, "load.0.on: neither; accepted: one of on and"),
     "load of nothing": ({"load__0__traction": None}, "load.0.traction: missing; accepted: at"),
     "body force on a part": ({"load__0__body_force": [0, 1]}, "load.0.body_force"),

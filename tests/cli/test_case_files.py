@@ -68,7 +68,11 @@ WRONG = {
         ["fixed.0.displacement.1", "not finite"],
     ),
     "a negative gap": ("gap = 0.0", "gap = -0.1", ["contact.gap", "-0.1"]),
-    "a gap that is negative somewhere": ("gap = 0.0", 'gap = "x-1"', ["contact.gap", "x-1"]),
+    "a gap that is negative somewhere": (
+        "gap = 0.0",
+        'gap = "x-1"',
+        ["gap: -1 at a node"],
+    ),
     "a gap that is not finite": ("gap = 0.0", 'gap = "1/(x-1)"', ["contact.gap", "not finite"]),
     "a gap and a shape": (
         "gap = 0.0",

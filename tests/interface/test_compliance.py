@@ -16,7 +16,8 @@ from contact.mesh.grid import box, rectangle
 from contact.methods.fixed_point import FixedPoint
 from contact.methods.newton import Newton
 from contact.methods.options import NewtonOptions, PenaltyOptions
-from contact.problem.problem import Contact, ContactProblem
+from contact.problem.contact import Contact
+from contact.problem.problem import ContactProblem
 from forms.hencky import Linear
 from forms.laws import (
     Compliance,

@@ -137,7 +137,7 @@ def test_two_electrodes_under_one_body() -> None:
         (
             [{"on": "one"}, {"on": "two", "gap": "x - 3"}],
             {},
-            r'contact\.1\.gap: "x - 3" is -0\.5 at a node',
+            r"contact\.1\.gap: -0\.5 at a node",
         ),
         (
             [

@@ -12,7 +12,8 @@ from contact.interface.obstacle import GapFunction, Plane, Sphere
 from contact.interface.penalised import Lagged, Regularisation
 from contact.mesh.grid import box, rectangle
 from contact.methods.augmentation import augmentation
-from contact.problem.problem import Contact, ContactProblem
+from contact.problem.contact import Contact
+from contact.problem.problem import ContactProblem
 from forms import foundation as forms
 from forms.laws import ConstantCoefficient
 from tests.problems.mechanics import bar, flat, leaning_block
@@ -34,7 +35,7 @@ def turned(dim):
     held = type(body)(body.law, [type(body.fixed[0])("top", body.fixed[0].displacement)])
     friction = Friction(ConstantCoefficient(0.4))
     gap = GapFunction(lambda points: 0.02 * np.sin(5 * points[:, 0]))
-    return ContactProblem(domain, held, Contact("bottom", gap), friction)
+    return ContactProblem(domain, held, Contact("bottom", gap, press=True), friction)
 
 
 @pytest.fixture(scope="module", params=[2, 3], ids=["in the plane", "in space"])

@@ -60,7 +60,7 @@ def test_a_coefficient_of_the_slip_is_not_negative(given):
 
 @pytest.mark.parametrize("radius", [-1.0, np.nan, np.inf])
 def test_a_radius_is_a_length(radius):
-    with pytest.raises(InputError, match=f"the radius is {radius}; accepted: a length >= 0"):
+    with pytest.raises(InputError, match=f"radius: given {radius}; accepted: a length >= 0"):
         Friction(mu=0.3, radius=radius)
 
 
@@ -71,7 +71,7 @@ def test_a_tolerance_can_be_met_and_missed(tolerance):
 
 
 def test_a_number_is_no_friction():
-    with pytest.raises(InputError, match=r"given 0.3 for friction; accepted: Friction\(mu="):
+    with pytest.raises(InputError, match=r"friction: given 0.3; accepted: Friction\(mu="):
         problem(Contact("bottom"), 0.3)
 
 

@@ -10,7 +10,8 @@ from contact.body.description import Body, Fixed
 from contact.interface.friction import Friction
 from contact.interface.smoothing import Smoothing
 from contact.mesh.grid import rectangle
-from contact.problem.problem import Contact, ContactProblem
+from contact.problem.contact import Contact
+from contact.problem.problem import ContactProblem
 from forms.hencky import Linear
 from forms.laws import ConstantCoefficient
 from tests.problems.mechanics import (

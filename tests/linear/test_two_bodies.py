@@ -10,7 +10,8 @@ from contact.linear import multigrid
 from contact.linear.operator import Counters
 from contact.methods.newton import Newton
 from contact.methods.options import NewtonOptions
-from contact.problem.problem import Contact, ContactProblem
+from contact.problem.contact import Contact
+from contact.problem.problem import ContactProblem
 from forms.hencky import Linear
 from forms.laws import ConstantCoefficient
 from tests.problems.blocks import Blocks

@@ -18,7 +18,8 @@ from contact.mesh import grid as domain
 from contact.methods.fixed_point import FixedPoint
 from contact.methods.options import FixedPointOptions, PenaltyOptions
 from contact.methods.penalty import Penalty
-from contact.problem.problem import Contact, ContactProblem
+from contact.problem.contact import Contact
+from contact.problem.problem import ContactProblem
 from forms.hencky import Linear
 from forms.laws import ConstantCoefficient, SlipCoefficient
 from tests.problems import mechanics

@@ -19,9 +19,10 @@ from contact.methods.every import METHODS
 from contact.methods.options import FixedPointOptions, NewtonOptions, PenaltyOptions
 from contact.methods.report import Outcome
 from contact.methods.steps import Evolution, LoadStep
+from contact.problem.contact import Contact
 from contact.problem.energy import Moment, balance, moment
 from contact.problem.kkt import KKT, evaluate
-from contact.problem.problem import Contact, ContactProblem
+from contact.problem.problem import ContactProblem
 from contact.solving import solve
 from forms.hencky import Linear, Log
 from forms.laws import ConstantCoefficient, SlipCoefficient

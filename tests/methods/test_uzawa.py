@@ -13,7 +13,8 @@ from contact.methods.acceleration import ResidualMinimiser
 from contact.methods.augmentation import automatic_r
 from contact.methods.fixed_point import FixedPoint
 from contact.methods.options import FixedPointOptions
-from contact.problem.problem import Contact, ContactProblem
+from contact.problem.contact import Contact
+from contact.problem.problem import ContactProblem
 from contact.problem.state import State
 from forms.hencky import Linear, Log
 from forms.laws import ConstantCoefficient

@@ -19,7 +19,8 @@ from contact.output.figures.saved import read_drawing
 from contact.output.files import write_outputs
 from contact.output.opposite import opposite_surface
 from contact.output.vtu import read_vtu
-from contact.problem.problem import Contact, ContactProblem
+from contact.problem.contact import Contact
+from contact.problem.problem import ContactProblem
 from forms.hencky import Linear
 from tests.problems.blocks import Blocks
 from tests.problems.mechanics import constant

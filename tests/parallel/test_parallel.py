@@ -13,7 +13,8 @@ from contact.interface.friction import Friction
 from contact.interface.smoothing import Smoothing
 from contact.mesh.domain import from_mesh
 from contact.mesh.grid import Piece, rectangle
-from contact.problem.problem import Contact, ContactProblem
+from contact.problem.contact import Contact
+from contact.problem.problem import ContactProblem
 from forms.hencky import Log
 from forms.laws import SlipCoefficient
 from tests.problems.everywhere import displacements

@@ -9,8 +9,9 @@ from contact.interface.friction import Friction
 from contact.methods.newton import Newton
 from contact.methods.options import NewtonOptions
 from contact.output.balances import force_balance
+from contact.problem.contact import Contact
 from contact.problem.held import check_held
-from contact.problem.problem import Contact, ContactProblem
+from contact.problem.problem import ContactProblem
 from forms.hencky import Linear
 from forms.laws import ConstantCoefficient
 from tests.problems.blocks import Blocks

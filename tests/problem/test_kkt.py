@@ -11,8 +11,9 @@ from contact.case.file import parse_case
 from contact.interface.friction import Friction
 from contact.mesh.grid import rectangle
 from contact.problem import kkt
+from contact.problem.contact import Contact
 from contact.problem.kkt import KKT, evaluate, residual_forces
-from contact.problem.problem import Contact, ContactProblem
+from contact.problem.problem import ContactProblem
 from contact.problem.state import State
 from contact.solving import solve as solve_case
 from contact.tolerances import MOST_ROUNDING

@@ -10,7 +10,8 @@ from contact.build import build_problem
 from contact.errors import InputError
 from contact.interface.obstacle import GapFunction
 from contact.interface.pairing import find_pair
-from contact.problem.problem import Contact, ContactProblem
+from contact.problem.contact import Contact
+from contact.problem.problem import ContactProblem
 from forms.hencky import Linear
 from tests.problems.blocks import Blocks
 from tests.problems.mechanics import constant

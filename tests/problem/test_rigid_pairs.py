@@ -11,8 +11,9 @@ from contact.methods.fixed_point import FixedPoint
 from contact.methods.newton import Newton
 from contact.methods.options import FixedPointOptions, NewtonOptions
 from contact.output.motions import movements
+from contact.problem.contact import Contact
 from contact.problem.held import check_held
-from contact.problem.problem import Contact, ContactProblem
+from contact.problem.problem import ContactProblem
 from forms.hencky import Linear
 from forms.laws import ConstantCoefficient
 from tests.problems.blocks import Blocks

@@ -13,8 +13,9 @@ from contact.linear.operator import SparseOperator
 from contact.methods.options import OPTIONS
 from contact.output.balances import charge_balance
 from contact.output.table import contact_table
+from contact.problem.contact import Contact
 from contact.problem.held import check_held
-from contact.problem.problem import Contact, ContactProblem
+from contact.problem.problem import ContactProblem
 from contact.solving import METHODS
 from forms.hencky import Linear
 from forms.laws import ConstantCoefficient

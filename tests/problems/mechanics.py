@@ -17,7 +17,8 @@ from contact.methods.fixed_point import FixedPoint
 from contact.methods.newton import Newton
 from contact.methods.options import FixedPointOptions, NewtonOptions
 from contact.methods.report import Outcome
-from contact.problem.problem import Contact, ContactProblem
+from contact.problem.contact import Contact
+from contact.problem.problem import ContactProblem
 from contact.typing import Array
 from forms.hencky import Hencky, Linear, Log
 from forms.laws import FrictionCoefficient, SlipCoefficient

@@ -10,7 +10,8 @@ from contact.body.description import Body, Fixed, Load
 from contact.interface.current import Conductor
 from contact.interface.friction import Friction
 from contact.mesh.grid import box, rectangle
-from contact.problem.problem import Contact, ContactProblem
+from contact.problem.contact import Contact
+from contact.problem.problem import ContactProblem
 from contact.problem.state import State
 from contact.typing import Array
 from forms.hencky import Hencky, Linear, Log

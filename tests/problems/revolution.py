@@ -15,7 +15,8 @@ from contact.interface.obstacle import GapFunction
 from contact.mesh.domain import Domain
 from contact.mesh.grid import rectangle
 from contact.mesh.revolution import revolved
-from contact.problem.problem import Contact, ContactProblem
+from contact.problem.contact import Contact
+from contact.problem.problem import ContactProblem
 from forms.hencky import Hencky, Linear, Log
 from forms.laws import ConstantCoefficient
 from forms.piezo import Piezo

@@ -10,7 +10,8 @@ from contact.interface.obstacle import Plane
 from contact.library.reading import find
 from contact.mesh.grid import box, rectangle
 from contact.methods.options import NewtonOptions
-from contact.problem.problem import Contact, ContactProblem
+from contact.problem.contact import Contact
+from contact.problem.problem import ContactProblem
 from contact.solving import solve_problem
 from forms.crystal import PLANE, about_z
 from forms.elasticity import Anisotropic, isotropic

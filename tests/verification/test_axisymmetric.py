@@ -23,8 +23,9 @@ from contact.output.balances import charge_balance, force_balance
 from contact.output.fields import DerivedFields
 from contact.output.figures.body import draw_plane
 from contact.output.figures.figures import collect
+from contact.problem.contact import Contact
 from contact.problem.held import check_held
-from contact.problem.problem import Contact, ContactProblem
+from contact.problem.problem import ContactProblem
 from contact.solving import solve_problem
 from forms.hencky import Linear
 from tests.problems.mechanics import Affine, constant, flat

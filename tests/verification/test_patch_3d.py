@@ -6,7 +6,8 @@ from mpi4py import MPI
 
 from contact.body.description import Body, Fixed
 from contact.mesh.grid import rectangle
-from contact.problem.problem import Contact, ContactProblem
+from contact.problem.contact import Contact
+from contact.problem.problem import ContactProblem
 from forms.hencky import Linear
 from forms.laws import ConstantCoefficient
 from tests.problems.mechanics import SlidingBlock, contact_data, flat, pressed_block, solve

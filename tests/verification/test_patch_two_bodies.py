@@ -17,7 +17,8 @@ from contact.methods.newton import Newton
 from contact.methods.options import NewtonOptions
 from contact.output.balances import force_balance
 from contact.output.fields import DerivedFields
-from contact.problem.problem import Contact, ContactProblem
+from contact.problem.contact import Contact
+from contact.problem.problem import ContactProblem
 from contact.typing import Array
 from forms.hencky import Linear
 from forms.laws import ConstantCoefficient

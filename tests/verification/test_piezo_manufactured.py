@@ -14,7 +14,8 @@ from contact.body.description import Body, Fixed, Load
 from contact.mesh.grid import box, rectangle
 from contact.methods.fixed_point import FixedPoint
 from contact.methods.options import FixedPointOptions
-from contact.problem.problem import Contact, ContactProblem
+from contact.problem.contact import Contact
+from contact.problem.problem import ContactProblem
 from forms.hencky import Hencky, Log, stress
 from forms.kinematics import strain
 from forms.ops import cos, sin

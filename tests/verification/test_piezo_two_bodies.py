@@ -12,7 +12,8 @@ from contact.methods.newton import Newton
 from contact.methods.options import FixedPointOptions, NewtonOptions
 from contact.output.balances import charge_balance
 from contact.output.motions import movements
-from contact.problem.problem import Contact, ContactProblem
+from contact.problem.contact import Contact
+from contact.problem.problem import ContactProblem
 from forms.hencky import Linear
 from forms.laws import PerfectConductivity, ShiftedConductivity, Truncation
 from forms.piezo import from_voigt

@@ -16,7 +16,8 @@ from contact.mesh.grid import rectangle
 from contact.methods.newton import Newton
 from contact.methods.options import NewtonOptions
 from contact.output.motions import movements
-from contact.problem.problem import Contact, ContactProblem
+from contact.problem.contact import Contact
+from contact.problem.problem import ContactProblem
 from contact.solving import build_problem
 from forms.hencky import Linear
 from scripts.cases import CASES

@@ -11,7 +11,8 @@ from contact.interface.obstacle import Sphere
 from contact.mesh.grid import box
 from contact.methods.options import FixedPointOptions, NewtonOptions, PenaltyOptions
 from contact.output.table import contact_table
-from contact.problem.problem import Contact, ContactProblem
+from contact.problem.contact import Contact
+from contact.problem.problem import ContactProblem
 from contact.solving import solve_problem
 from forms.hencky import Linear
 from tests.problems.mechanics import constant, leaning_block

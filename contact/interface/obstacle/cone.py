@@ -7,9 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from contact.interface.obstacle.protocol import Shape, split
+from contact.kinds import expect, names_arguments
 from contact.typing import Array
 
 
+@names_arguments
 @dataclass(frozen=True)
 class Cone(Shape):
     """A rigid cone without end; in 2-D a wedge.
@@ -22,9 +24,17 @@ class Cone(Shape):
         Between the axis and the side (degrees), above 0 and below 90.
     """
 
+    vectors = ("apex", "axis")
+
     apex: tuple[float, ...]
     axis: tuple[float, ...]
     half_angle: float
+
+    def __post_init__(self) -> None:
+        """Refuse an angle that is none of a cone."""
+        super().__post_init__()
+        angle = self.half_angle
+        expect("Cone: half_angle", angle, "degrees between 0 and 90", 0 < angle < 90)
 
     def distance(self, points: Array) -> tuple[Array, Array]:
         """Return distances and normals; those of the tip where it is nearest."""

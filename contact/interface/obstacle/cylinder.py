@@ -7,9 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from contact.interface.obstacle.protocol import Shape, sagitta, split
+from contact.kinds import names_arguments
 from contact.typing import Array
 
 
+@names_arguments
 @dataclass(frozen=True)
 class Cylinder(Shape):
     """A rigid cylinder without ends (`inside` false), or the bore that holds the body (true).
@@ -22,6 +24,8 @@ class Cylinder(Shape):
     inside
         Whether the body lies inside.
     """
+
+    vectors = ("point", "axis")
 
     point: tuple[float, ...]
     axis: tuple[float, ...]

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from contact.interface.obstacle.protocol import Shape
+from contact.kinds import expect
 from contact.typing import Array
 
 #: Step of the central differences, over the size of the coordinates: the third root of rounding.
@@ -27,15 +28,27 @@ class Level(Shape):
 
     function: Callable[[Array], Array]
 
+    def __post_init__(self) -> None:
+        """Refuse what is no function."""
+        super().__post_init__()
+        words = "a function of points of shape (n, d)"
+        expect("Level: function", self.function, words, callable(self.function))
+
     def distance(self, points: Array) -> tuple[Array, Array]:
         """Return distances and normals; NaN where the function has no slope."""
         h = STEP * np.maximum(np.abs(points).max(axis=1, initial=0.0), 1e-3)[:, None]
         slope = np.column_stack(
             [
-                (self.function(points + h * e) - self.function(points - h * e)) / (2 * h[:, 0])
+                (self._values(points + h * e) - self._values(points - h * e)) / (2 * h[:, 0])
                 for e in np.eye(points.shape[1])
             ]
         )
         size = np.linalg.norm(slope, axis=1)
         known = np.where(size > 0, size, np.nan)
-        return self.function(points) / known, slope / known[:, None]
+        return self._values(points) / known, slope / known[:, None]
+
+    def _values(self, points: Array) -> Array:
+        values = np.asarray(self.function(points))
+        words = f"one number for each of the points, shape {points.shape[:1]} of {points.shape}"
+        expect("Level: shape of the values", values.shape, words, values.shape == points.shape[:1])
+        return values

@@ -7,9 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from contact.interface.obstacle.protocol import Shape, sagitta, split
+from contact.kinds import names_arguments
 from contact.typing import Array
 
 
+@names_arguments
 @dataclass(frozen=True)
 class Paraboloid(Shape):
     """A rigid paraboloid, h >= r^2/(2 R) at the height h and the distance r; in 2-D a parabola.
@@ -21,6 +23,8 @@ class Paraboloid(Shape):
     radius
         Radius of curvature R > 0 at the tip.
     """
+
+    vectors = ("apex", "axis")
 
     apex: tuple[float, ...]
     axis: tuple[float, ...]

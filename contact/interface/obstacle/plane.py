@@ -7,9 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from contact.interface.obstacle.protocol import GRAZING, Shape
+from contact.kinds import names_arguments
 from contact.typing import Array
 
 
+@names_arguments
 @dataclass(frozen=True)
 class Plane(Shape):
     """A half space: the foundation lies below the plane through `point`.
@@ -19,6 +21,8 @@ class Plane(Shape):
     point, normal
         A point of the plane and its normal towards the body, length d.
     """
+
+    vectors = ("point", "normal")
 
     point: tuple[float, ...]
     normal: tuple[float, ...]

@@ -5,11 +5,11 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Protocol
+from typing import ClassVar, Protocol
 
 import numpy as np
 
-from contact.errors import InputError
+from contact.kinds import expect
 from contact.typing import Array
 
 #: Cosine of the steepest angle at which a ray still leads to a surface.
@@ -77,10 +77,40 @@ class Shape(ABC):
 
     is_shape = True
 
+    #: Names of the attributes that are points or directions; dimension of space, if only one.
+    vectors: ClassVar[tuple[str, ...]] = ()
+    only: ClassVar[int | None] = None
+
     def __post_init__(self) -> None:
-        """Refuse a radius that is none."""
-        if not getattr(self, "radius", 1.0) > 0:
-            raise InputError(f"{self!r}: accepted: a radius > 0")
+        """Refuse a radius that is none, and directions that are not known."""
+        name, radius = type(self).__name__, getattr(self, "radius", 1.0)
+        number = isinstance(radius, int | float | np.number)
+        expect(f"{name}: radius", radius, "a length > 0", number and radius > 0)
+        directions = ("foundation", "body", "axis")
+        accepted = ", ".join(f'"{direction}"' for direction in directions)
+        expect(f"{name}: direction", self.direction, accepted, self.direction in directions)
+
+    def check(self, dim: int) -> None:
+        """Refuse a shape of another dimension than space, and directions without length.
+
+        Raises
+        ------
+        InputError
+            If it is one.
+        """
+        name = type(self).__name__
+        expect(f"{name}: dimension", dim, f"{self.only}", self.only in (None, dim))
+        along = ("along",) if self.direction == "axis" else ()
+        for key in (*self.vectors, *along):
+            given = getattr(self, key)
+            try:
+                vector = np.asarray(given, dtype=float)
+                fits = vector.shape == (dim,) and bool(np.isfinite(vector).all())
+            except (TypeError, ValueError):
+                fits = False
+            expect(f"{name}: {key}", given, f"{dim} numbers in {dim}-D", fits)
+            direction = key in ("normal", "axis", "along")
+            expect(f"{name}: {key}", given, "a direction, not 0", not direction or vector.any())
 
     @abstractmethod
     def distance(self, points: Array) -> tuple[Array, Array]:

@@ -7,9 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from contact.interface.obstacle.protocol import Shape, sagitta, split
+from contact.kinds import expect, names_arguments
 from contact.typing import Array
 
 
+@names_arguments
 @dataclass(frozen=True)
 class Punch(Shape):
     """A rigid cylinder with a flat face; in 2-D a rectangle.
@@ -24,10 +26,18 @@ class Punch(Shape):
         By which its edge is rounded, at most the radius; 0: sharp.
     """
 
+    vectors = ("centre", "axis")
+
     centre: tuple[float, ...]
     axis: tuple[float, ...]
     radius: float
     edge_radius: float = 0.0
+
+    def __post_init__(self) -> None:
+        """Refuse an edge that is rounder than the punch."""
+        super().__post_init__()
+        fits = 0 <= self.edge_radius <= self.radius
+        expect("Punch: edge_radius", self.edge_radius, "a length from 0 to the radius", fits)
 
     def distance(self, points: Array) -> tuple[Array, Array]:
         """Return distances and normals: those of a smaller punch, less the edge radius."""

@@ -7,9 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from contact.interface.obstacle.protocol import Shape, sagitta
+from contact.kinds import names_arguments
 from contact.typing import Array
 
 
+@names_arguments
 @dataclass(frozen=True)
 class Sphere(Shape):
     """A rigid ball (`inside` false), or the outside of a ball that holds the body (true).
@@ -21,6 +23,8 @@ class Sphere(Shape):
     inside
         Whether the body lies inside the sphere.
     """
+
+    vectors = ("centre",)
 
     centre: tuple[float, ...]
     radius: float

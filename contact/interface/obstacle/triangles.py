@@ -29,6 +29,8 @@ class Triangles(Shape):
         Shape (m, 3, 3). None is degenerate.
     """
 
+    only = 3
+
     corners: Array
 
     @cached_property

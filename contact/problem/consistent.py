@@ -1,0 +1,91 @@
+"""Checks that what is given does not contradict itself, before anything is solved.
+
+Cases and problems that are put together in Python are checked here alike.
+"""
+
+from __future__ import annotations
+
+from itertools import combinations, product
+from typing import Any
+
+import numpy as np
+from dolfinx import fem
+from mpi4py import MPI
+from numpy.typing import NDArray
+
+from contact.body.amplitude import values_at
+from contact.body.description import Fixed
+from contact.errors import InputError
+from contact.problem.held import check_held
+from contact.problem.problem import ContactProblem
+
+#: Share of values up to which they are the same.
+ROUNDING = 1e-9
+
+
+def check_problem(problem: ContactProblem) -> None:
+    """Check loads, supports and what holds the body, at the time of a problem. Collective.
+
+    Raises
+    ------
+    InputError
+        If a load acts on a contact part, two supports contradict each other, or `check_held`
+        finds that the body can move.
+    """
+    _check_loads(problem)
+    _check_supports(problem)
+    check_held(problem)
+
+
+def _shared(problem: ContactProblem, one: str, other: str) -> tuple[NDArray[np.int32], bool]:
+    """Return the facets of this rank that two parts share, and whether any rank has some."""
+    domain = problem.domain
+    shared = np.intersect1d(domain.facets(one), domain.facets(other))
+    return shared, domain.comm.allreduce(shared.size > 0, op=MPI.LOR)
+
+
+def _check_loads(problem: ContactProblem) -> None:
+    """Refuse loads on Gamma_3, where the foundation alone acts: Gamma_2 and Gamma_b exclude it."""
+    for contact, (i, load) in product(problem.contacts, enumerate(problem.body.loads)):
+        if load.on is not None and _shared(problem, load.on, contact.on)[1]:
+            raise InputError(
+                f"load.{i}.on: {load.on} shares facets with the contact part {contact.on}; "
+                "accepted: parts beside it, or body forces"
+            )
+
+
+def _check_supports(problem: ContactProblem) -> None:
+    """Refuse different values for one component of what is part of two supports.
+
+    Where parts meet at an edge values may differ: there the last one counts.
+    """
+    d, space, time = problem.dim, problem.equilibrium.space, problem.time
+    for (i, first), (j, last) in combinations(enumerate(problem.body.fixed), 2):
+        one, other = _prescribed(first), _prescribed(last)
+        names = one.keys() & other.keys()
+        facets, shared = _shared(problem, first.on, last.on)
+        if not shared:
+            continue
+        nodes = fem.locate_dofs_topological(space, d - 1, facets)
+        points = space.tabulate_dof_coordinates()[nodes, :d]
+        for name in sorted(names):
+            values = np.column_stack(
+                [
+                    fixed.factor(time) * values_at(given[name], points, time)
+                    for fixed, given in ((first, one), (last, other))
+                ]
+            )
+            differ = np.ptp(values, axis=1) > ROUNDING * np.abs(values).max(axis=1)
+            found = np.concatenate(problem.comm.allgather(values[differ][:1])) + 0.0  # no -0
+            if found.size > 0:
+                raise InputError(
+                    f"fixed.{j}.{name}: {found[0, 1]:g} on {last.on}; accepted: {found[0, 0]:g}, "
+                    f"as fixed.{i} has there"
+                )
+
+
+def _prescribed(fixed: Fixed) -> dict[str, Any]:
+    """Return the fields of a support by their keys."""
+    given = {f"displacement.{k}": field for k, field in enumerate(fixed.displacement or ())}
+    given["potential"] = fixed.potential
+    return {name: field for name, field in given.items() if field is not None}

@@ -1,0 +1,78 @@
+"""What may touch what, and what acts between them."""
+
+from __future__ import annotations
+
+from dataclasses import InitVar, dataclass
+from typing import Any
+
+from contact.body.fields import Given
+from contact.interface.current import Conductor
+from contact.interface.friction import Friction
+from contact.interface.layer import Layer
+from contact.interface.obstacle import GapFunction
+from contact.kinds import expect, names_arguments
+from contact.mesh.together import part
+
+
+@names_arguments
+@dataclass(frozen=True)
+class Contact:
+    """A part that may touch an obstacle, and what acts between them.
+
+    Parameters
+    ----------
+    on
+        The part, or a list of parts.
+    foundation
+        The obstacle; or a gap to a rigid foundation along the body's normal: a number, a function
+        of x, UFL or a dolfinx Function. By default the body lies on it.
+    layer
+        The compliant layer in front of it.
+    friction, conductor
+        Friction and electric contact; None for those that the problem is given for all.
+    press
+        Whether the obstacle may cut the body at rest, and presses it out.
+    against
+        The part of another body that it may touch, instead of a foundation, whose gap is then
+        added to that between the bodies; None for a rigid one.
+    gap
+        The case file's word for a foundation that is a gap.
+
+    Raises
+    ------
+    InputError
+        If something else is given.
+    """
+
+    on: Given
+    foundation: Given = 0.0
+    layer: Layer | None = None
+    friction: Friction | None = None
+    conductor: Conductor | None = None
+    press: bool = False
+    against: Given = None
+    gap: InitVar[Given] = None
+
+    def __post_init__(self, gap: Given) -> None:
+        """Make an obstacle of a gap."""
+        object.__setattr__(self, "on", part(self.on))
+        if self.against is not None:
+            object.__setattr__(self, "against", part(self.against))
+        if gap is not None:
+            alone = isinstance(self.foundation, float) and self.foundation == 0.0
+            expect("Contact: foundation", self.foundation, "this, or a gap", alone)
+            object.__setattr__(self, "foundation", gap)
+        if not hasattr(self.foundation, "measure"):
+            object.__setattr__(self, "foundation", GapFunction.of(self.foundation))
+        layer, press = self.layer, self.press
+        expect("Contact: layer", layer, "Layer(...), or None", isinstance(layer, Layer | None))
+        expect("Contact: press", press, "True or False", isinstance(press, bool))
+        check_laws("Contact", self.friction, self.conductor)
+
+
+def check_laws(what: str, friction: Any, conductor: Any) -> None:
+    """Refuse what is no friction, or no electric contact."""
+    fits = isinstance(friction, Friction | None)
+    expect(f"{what}: friction", friction, "Friction(mu=...), or None", fits)
+    fits = isinstance(conductor, Conductor | None)
+    expect(f"{what}: conductor", conductor, "Conductor(...), or None", fits)

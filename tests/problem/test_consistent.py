@@ -1,0 +1,189 @@
+"""What is put together in Python is refused as a case is, in one message that names the place."""
+
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+from mpi4py import MPI
+
+from contact import (
+    Body,
+    Cone,
+    Contact,
+    Cylinder,
+    Domain,
+    Electrode,
+    Fixed,
+    Friction,
+    InputError,
+    Layer,
+    Level,
+    Linear,
+    Load,
+    Material,
+    NewtonOptions,
+    Plane,
+    Problem,
+    Punch,
+    Rigid,
+    Sphere,
+    build_problem,
+    evolve,
+    parse_case,
+    solve,
+)
+from contact.mesh.grid import rectangle
+
+LAW = Linear(10.0, 0.3)
+TOP = Fixed("top", [0.0, -0.005])
+
+
+def block() -> Domain:
+    return rectangle(MPI.COMM_WORLD, (0.0, 0.0), (2.0, 1.0), (8, 4))
+
+
+def problem(*fixed: Any, loads: Any = (), contact: Any = None, **more: Any) -> Problem:
+    # Bound to a name: mpi4py hangs where a mesh goes while an error is on its way.
+    domain, contact = block(), Contact("bottom") if contact is None else contact
+    return Problem(domain, Body(LAW, fixed or (TOP,), loads, **more), contact)
+
+
+def on(*shape: Any, **more: Any) -> Callable[[], Problem]:
+    return lambda: problem(contact=Contact("bottom", *shape, **more))
+
+
+def solved(*fixed: Any, **more: Any) -> Callable[[], object]:
+    return lambda: solve(problem(*fixed, **more))
+
+
+WRONG = {
+    "two supports": (
+        solved(TOP, Fixed("top", [0.0, -0.001])),
+        r"fixed\.1\.displacement\.1: -0\.001 on top; accepted: -0\.005, as fixed\.0 has there",
+    ),
+    "two supports on a list": (
+        solved(TOP, Fixed(["left", "top"], [lambda x: 0.1 * x[1], None])),
+        r"fixed\.1\.displacement\.0: 0\.1 on left, top; accepted: 0",
+    ),
+    "two supports in steps": (
+        lambda: next(
+            evolve(problem(TOP, Fixed("top", [0, -0.005], amplitude=lambda t: t**2)), [0.5])
+        ),
+        r"fixed\.1\.displacement\.1: -0\.00125 on top; accepted: -0\.0025",
+    ),
+    "a load on the contact part": (
+        solved(loads=Load(["right", "bottom"], [0, 1e-3])),
+        r"load\.0\.on: right, bottom shares facets with the contact part bottom",
+    ),
+    "a load in free directions": (lambda: Load("right", ["free", 1.0]), "0 where nothing acts"),
+    "a load of nothing": (lambda: Load("right"), "Load: nothing is given"),
+    "a pressure in the body": (lambda: Load(pressure=1.0), "Load: pressure: .*it on a part"),
+    "a traction in the body": (lambda: Load(traction=[0, 1]), "Load: traction: .*it on a part"),
+    "a body force on a part": (lambda: Load("top", body_force=[0, 1]), "Load: body_force: "),
+    "two names for a force": (lambda: Load("top", [0, 1], traction=[0, 1]), "Load: .*one of force"),
+    "an unknown argument": (
+        lambda: Load("top", forces=[0, 1]),  # type: ignore[call-arg]
+        "Load: got an unexpected keyword argument 'forces'; accepted: on, force, pressure, charge",
+    ),
+    "a missing argument": (
+        lambda: Rigid("top"),  # type: ignore[call-arg]
+        "Rigid: missing a required argument: 'motion'; accepted: on, motion, foundation",
+    ),
+    "a support of nothing": (lambda: Fixed("top", ["free", None]), "nothing is prescribed"),
+    "an amplitude": (lambda: Fixed("top", [0, 0], amplitude=2), "Fixed: amplitude: given 2"),
+    "a negative gap": (on(-0.001), r"contact\.gap: -0\.001 at a node"),
+    "a gap and a shape": (on(Plane((0, 0), (0, 1)), gap=0.1), "Contact: foundation: "),
+    "a point in space": (on(Plane((0, 0, 0), (0, 1))), r"foundation: Plane: point: .*2 numbers"),
+    "a normal in space": (on(Plane((0, 0), (0, 0, 1))), "Plane: normal: .*2 numbers in 2-D"),
+    "a centre in space": (on(Sphere((0, 0, -5), 5.0)), r"Sphere: centre: given \(0, 0, -5\)"),
+    "an axis in space": (on(Cylinder((0, -5), (0, 0, 1), 5.0)), "Cylinder: axis: "),
+    "no normal": (on(Plane((0, 0), (0, 0))), "Plane: normal: .*a direction, not 0"),
+    "no direction": (on(Plane((0, 0), (0, 1), direction="axis")), "Plane: along: "),
+    "a direction": (lambda: Plane((0, 0), (0, 1), direction="up"), '"foundation", "body", "axis"'),
+    "a radius": (lambda: Sphere((0, 0), "1"), "Sphere: radius: given '1'"),  # type: ignore[arg-type]
+    "an angle": (lambda: Cone((0, 0), (0, 1), 90.0), "Cone: half_angle: "),
+    "an edge": (lambda: Punch((0, 0), (0, 1), 1.0, 2.0), "Punch: edge_radius: "),
+    "a distance": (on(Level(lambda x: x[1])), "Level: shape of the values: "),
+    "a number as distance": (lambda: Level(1.0), "Level: function: "),  # type: ignore[arg-type]
+    "a layer": (on(layer=3), "Contact: layer: given 3"),
+    "half a layer": (on(layer=lambda: Layer(0.1)), "Contact: layer: "),
+    "friction": (on(friction=0.3), r"Contact: friction: given 0\.3; accepted: Friction\(mu="),
+    "a law of friction": (lambda: Friction(law=3), "Friction: law: given 3"),  # type: ignore[arg-type]
+    "a conductor": (on(conductor=3), "Contact: conductor: given 3"),
+    "press": (on(press="press"), "Contact: press: given 'press'; accepted: True or False"),
+    "no contact": (lambda: problem(contact=[]), r"contact: given \[\]"),
+    "a law": (lambda: Body(3, TOP), "law: given 3"),  # type: ignore[arg-type]
+    "a material as law": (lambda: Body(Material(LAW), TOP), "law: given Material"),  # type: ignore[arg-type]
+    "a load as support": (lambda: Body(LAW, [Load("top", [0, 1])]), r"fixed: given Load\("),  # type: ignore[list-item]
+    "an electrode": (lambda: problem(electrodes=Electrode("left")), "a piezoelectric material"),
+    "a mesh": (lambda: Problem(block().mesh, Body(LAW, TOP), Contact("bottom")), "domain: "),
+    "a start": (lambda: solve(problem(), start=3), "start: given 3; accepted: an earlier sol"),  # type: ignore[arg-type]
+    "no problem": (lambda: solve(block()), "solve: given <Domain"),  # type: ignore[arg-type]
+    "a replacement": (lambda: solve(problem(), domian=3), "domian: unknown; accepted: domain"),
+    "a monitor": (lambda: solve(problem(), monitor=3), "monitor: given 3"),  # type: ignore[arg-type]
+    "times": (lambda: next(evolve(problem(), 1.0)), r"times: given 1\.0; accepted: a list"),  # type: ignore[arg-type]
+    "an option": (lambda: NewtonOptions(tol=1e-9), "NewtonOptions: .*'tol'; accepted: .*tolerance"),  # type: ignore[call-arg]
+}
+
+
+@pytest.mark.parallel
+@pytest.mark.parametrize("name", WRONG)
+def test_what_is_refused(name: str) -> None:
+    make, words = WRONG[name]
+    with pytest.raises(InputError, match=words) as error:
+        make()
+    assert "\n" not in str(error.value)
+
+
+CASE = {
+    "mesh": {"generator": "rectangle", "size": [2.0, 1.0], "cells": [8, 4]},
+    "material": {"young": 10.0, "poisson": 0.3},
+    "fixed": [{"on": "top", "displacement": [0, -0.005]}],
+    "contact": {"on": "bottom"},
+}
+
+
+def test_a_case_is_refused_in_the_same_words() -> None:
+    supports = [*CASE["fixed"], {"on": "top", "displacement": ["free", "-0.001*x"]}]
+    case = parse_case({**CASE, "fixed": supports}, source="bar.toml")
+    with pytest.raises(InputError, match=r"^bar\.toml: fixed\.1\.displacement\.1: .*as fixed\.0"):
+        build_problem(case)
+    table = {"time": [0.0, 1.0, 2.0], "value": [0.0, 1.0, 0.0]}
+    later = {
+        "evolution": {"times": [0.0, 1.0, 2.0], "steps": [1, 1], "amplitudes": {"back": table}}
+    }
+    given = [{**CASE["fixed"][0], "amplitude": "back"}, CASE["fixed"][0]]
+    with pytest.raises(InputError, match=r"fixed\.1\.displacement\.1: -0\.005 on top"):
+        build_problem(parse_case({**CASE, **later, "fixed": given}))
+
+
+@pytest.mark.parallel
+def test_what_agrees_is_accepted() -> None:
+    plain = solve(problem())
+    # The same value by another formula; parts that meet at a corner alone.
+    again = problem(
+        TOP,
+        Fixed("top", [lambda x: 0.0 * x[0], lambda x: -0.005 + 0.0 * x[0]]),
+        Fixed("right", [None, lambda x: -0.005 * x[1]]),
+    )
+    assert solve(again).converged
+    start = solve(problem(), start=plain)
+    assert len(start.history.records) <= len(plain.history.records)
+    assert start.contact_force == pytest.approx(plain.contact_force)
+
+
+def test_the_words_of_the_case_file() -> None:
+    given = {"traction": [0.0, 0.001]}
+    assert Load("right", **given) == Load("right", force=[0.0, 0.001])
+    assert Load(body_force=[0.0, 0.001]) == Load(None, [0.0, 0.001])
+    assert Load(None, body_charge=2.0) == Load(None, charge=2.0)
+    x = problem(contact=Contact("bottom", gap=0.002)).nodes.gap
+    assert x == pytest.approx(0.002)
+
+
+def test_an_interference_by_a_gap() -> None:
+    pressed = solve(
+        problem(Fixed("top", [0.0, 0.0]), contact=Contact("bottom", -0.001, press=True))
+    )
+    moved = solve(problem(Fixed("top", [0.0, -0.001])))
+    assert pressed.contact_force == pytest.approx(moved.contact_force, rel=1e-6)
