@@ -23,6 +23,7 @@ from petsc4py import PETSc
 from ufl.core.expr import Expr
 
 from contact.body.description import Body
+from contact.body.field_norms import field_norms
 from contact.body.known import LastAnswers
 from contact.body.loads import Loads, assembled
 from contact.body.masters import make_masters
@@ -57,6 +58,8 @@ class BodyEquilibrium:
         If a part is missing, a vector has the wrong length, or the material or the degree is none.
     """
 
+    most_rounding = MOST_ROUNDING
+
     def __init__(self, domain: Domain, body: Body, degree: int = 1) -> None:
         body.check(domain.dim)
         if degree not in (1, 2):
@@ -89,8 +92,8 @@ class BodyEquilibrium:
         # Where the forms are evaluated is written anew by each query.
         self._forms = WeakForms(domain, body, self.space, self.cells, degree)
         self._at = self._forms.at
-        # At a state, and where its unknowns are moved to see what rounding does.
-        self._last_forces = LastAnswers(domain.comm, 2)
+        # At a state, of its potential alone, and moved to see what rounding does.
+        self._last_forces = LastAnswers(domain.comm, 3)
         test = self._forms.split(ufl.TestFunction(self.space))
         self._loads = Loads(domain, body, *test, self.owned)
 
@@ -116,11 +119,6 @@ class BodyEquilibrium:
     def linear(self) -> bool:
         """Whether the operator is the same at all states."""
         return self.body.linear
-
-    @property
-    def most_rounding(self) -> float:
-        """Most that counts as rounding, over loads, contact forces and reactions."""
-        return MOST_ROUNDING
 
     @property
     def piezoelectric(self) -> bool:
@@ -282,6 +280,20 @@ class BodyEquilibrium:
         own = self.comm.allreduce(ones[:n].T @ others[:n], op=MPI.SUM)
         return np.asarray(own + ones[behind:].T @ others[behind:])
 
-    def load_size(self, time: float = 1.0) -> float:
-        """Return the Euclidean norm of the nodal loads at a time. Collective."""
-        return self.norm(self.external(time))
+    def sizes(self, values: Array) -> Array:
+        """Return the norms of forces and, with a potential, of charges apart. Collective."""
+        return field_norms(self, values)
+
+    def load_sizes(self, time: float = 1.0) -> Array:
+        """Return the `sizes` of the nodal loads at a time. Collective."""
+        return self.sizes(self.external(time))
+
+    def exchanged(self, x: Array) -> Array:
+        """Return the `sizes` of the potential's forces and the strain's charges. Collective."""
+        if not self.piezoelectric:
+            return np.zeros(1)
+        alone = x.copy()
+        self.nodal(alone)[:, : self.dim] = 0.0
+        of_potential = self.internal_forces(alone)
+        of_strain = self.internal_forces(x) - of_potential
+        return self.sizes(np.where(self.mechanical, of_potential, of_strain))

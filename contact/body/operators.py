@@ -50,4 +50,4 @@ def make_operator(
             dofs = nodes[: motion.shape[0], None] * size + np.arange(size)
             motions = masters.with_foundations(dofs, motion)
         inner = BorderedOperator(BorderedBulk(bulk, motions, masters.free), nodes, **options)
-    return inner if changed is None else ChangedOperator(changed, inner, masters.size)
+    return inner if changed is None else ChangedOperator(changed, inner)

@@ -55,7 +55,7 @@ class BlockPreconditioner:
     """
 
     def __init__(self, ksp: PETSc.KSP, layout: Layout, symmetric: bool) -> None:
-        self._layout = layout
+        self._layout, self._ksp = layout, ksp
         self._matrix: PETSc.Mat | None = None
         self._signs: PETSc.Vec | None = None
         multigrid.iterate(ksp, "minres" if symmetric else "gmres")
@@ -70,6 +70,20 @@ class BlockPreconditioner:
         hypre = PETSc.Sys.hasExternalPackage("hypre")
         electric_options = {"pc_type": "hypre"} if hypre else ELECTRIC
         multigrid.set_defaults(f"{prefix}fieldsplit_phi_", electric_options)
+
+    def set_goal(self, rhs: PETSc.Vec | None) -> None:
+        """Let MINRES end where its residual is as small as from zero, for a right-hand side.
+
+        None where it begins at zero. Collective.
+        """
+        if self._ksp.getType() != "minres":
+            return
+        size = 0.0
+        if rhs is not None:
+            solved = rhs.duplicate()
+            self._ksp.getPC().apply(rhs, solved)
+            size = np.sqrt(max(rhs.dot(solved), 0.0))
+        self._ksp.setTolerances(atol=self._ksp.rtol * size)
 
     def matrix(self, operator: PETSc.Mat) -> PETSc.Mat:
         """Return the matrix that preconditions an operator. Collective."""

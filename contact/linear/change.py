@@ -14,7 +14,7 @@ from petsc4py import PETSc
 from scipy import sparse
 from scipy.sparse import csgraph
 
-from contact.linear.bordered import BorderedOperator, shell
+from contact.linear.bordered import BorderedOperator
 from contact.linear.layout import Layout
 from contact.linear.operator import Bulk, SparseOperator
 from contact.linear.products import quick_products
@@ -216,14 +216,10 @@ class ChangedOperator:
         The body in these unknowns.
     inner
         Its operator.
-    others
-        Number of global unknowns behind the owned ones, which remain what they are.
     """
 
-    def __init__(
-        self, bulk: ChangedBulk, inner: SparseOperator | BorderedOperator, others: int
-    ) -> None:
-        self._bulk, self._inner, self._others = bulk, inner, others
+    def __init__(self, bulk: ChangedBulk, inner: SparseOperator | BorderedOperator) -> None:
+        self._bulk, self._inner = bulk, inner
 
     @property
     def symmetric(self) -> bool:
@@ -246,9 +242,3 @@ class ChangedOperator:
         bulk = self._bulk
         forces = self._inner.multiply(bulk.times(bulk.inverse, values))
         return bulk.times(bulk.inverse, forces, transposed=True)
-
-    @property
-    def jacobian(self) -> PETSc.Mat:
-        """The matrix by its products."""
-        layout = self._bulk.layout
-        return shell(self, layout.comm, layout.free.size, self._others)

@@ -24,6 +24,10 @@ SMOOTHER = (
 #: Relative tolerance of a linear solve, in the norm of the preconditioner.
 TOLERANCE = 1e-10
 
+#: Options of MINRES. PETSc's own radius is a size, at which it ends as if it had converged; and the
+#: norm of a right-hand side, to which it compares its residual, is in other units than that.
+MINRES = {"ksp_minres_radius": "1e300", "ksp_converged_use_initial_residual_norm": "true"}
+
 #: Options of GAMG where the user gives none.
 DEFAULTS = {
     "pc_gamg_type": "agg",
@@ -61,6 +65,8 @@ def iterate(ksp: PETSc.KSP, method: str) -> None:
     ksp.setType(method)
     if method == "gmres":
         ksp.setGMRESRestart(80)
+    if method == "minres":
+        set_defaults(ksp.getOptionsPrefix() or "", MINRES)
     ksp.setTolerances(rtol=TOLERANCE, max_it=500)
 
 

@@ -136,11 +136,6 @@ class SparseOperator:
         with petsc_options(prefix):
             self.ksp.setFromOptions()
 
-    @property
-    def jacobian(self) -> PETSc.Mat:
-        """The matrix itself."""
-        return self.matrix
-
     def multiply(self, values: Array) -> Array:
         """Return the matrix times owned values. Collective."""
         vector, image = self.matrix.createVecs()
@@ -237,6 +232,8 @@ class SparseOperator:
             self.ksp.setTolerances(rtol=rtol)
         if self.iterative:
             self.ksp.setInitialGuessNonzero(guess is not None)
+            if self._split is not None:
+                self._split.set_goal(None if guess is None else self._rhs)
             if guess is not None:
                 self._solution.array[:] = guess
         if self._hierarchy is None:

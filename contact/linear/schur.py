@@ -177,7 +177,7 @@ class SchurComplement:
         """Solve with the unknowns between the ranks; what is no number remains none."""
         return np.asarray(lu_solve(self._lu, values, check_finite=False))
 
-    def condense(self, rhs: Array, rounding: float = 0.0) -> Array:
+    def condense(self, rhs: Array, rounding: Array | None = None) -> Array:
         """Return what an owned right-hand side becomes on the kept unknowns, on all ranks.
 
         It is remembered for `expand`. Collective.
@@ -187,13 +187,14 @@ class SchurComplement:
         rhs
             The right-hand side.
         rounding
-            What counts as nothing at the eliminated unknowns: no solve is needed to see what is
-            left of it elsewhere.
+            What counts as nothing at the eliminated unknowns, of the owned ones: no solve is needed
+            to see what is left of it elsewhere. Zero by default.
         """
         self._rhs = rhs
         total = np.zeros(self.dense_size)
         total[self._rows] = rhs[np.concatenate([self._kept, self._shared])]
-        if np.abs(rhs[self._inside]).max(initial=0.0) > rounding:
+        nothing = 0.0 if rounding is None else rounding[self._inside]
+        if np.any(np.abs(rhs[self._inside]) > nothing):
             inside = self._inner.solve(rhs[self._inside])
             total[self._met] -= self._inner.to_last(inside)
         self.comm.Allreduce(MPI.IN_PLACE, total, op=MPI.SUM)

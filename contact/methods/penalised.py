@@ -8,11 +8,12 @@ from typing import Any
 import numpy as np
 from petsc4py import PETSc
 
+from contact.body.field_norms import of_fields
 from contact.errors import InputError, SingularError
 from contact.interface.penalised import NodalLaw, Regularisation, outer
-from contact.linear.bordered import Packing
 from contact.linear.faults import petsc_options
 from contact.linear.operator import Counters
+from contact.linear.packing import Packing, shell
 from contact.methods.options import PenaltyOptions
 from contact.problem.kkt import residual_forces
 from contact.problem.problem import ContactProblem
@@ -25,8 +26,9 @@ logger = logging.getLogger("contact.inner")
 class PenalisedProblem:
     """The nonlinear problem of an outer iteration, in the owned unknowns.
 
-    SNES asks `SparseOperator` for its linear solves, through a shell preconditioner. Its
-    options have the prefix ``penalty_``, for instance ``-penalty_snes_monitor``.
+    SNES asks `SparseOperator` for its linear solves, through a shell preconditioner. Its residual
+    are forces, and charges, over the sizes of those that act. Its options have the prefix
+    ``penalty_``, for instance ``-penalty_snes_monitor``.
     """
 
     def __init__(
@@ -50,7 +52,7 @@ class PenalisedProblem:
             kind=options.linear,
         )
         self._packing = Packing(problem.comm, self._body.masters.size)
-        matrix = self.operator.jacobian
+        matrix = shell(self, problem.comm, self._body.owned, self._body.masters.size)
         self._iterate, self._residual = matrix.createVecs()
         self.snes = PETSc.SNES().create(problem.comm)
         self.snes.setOptionsPrefix("penalty_")
@@ -87,12 +89,16 @@ class PenalisedProblem:
     def apply(self, _: Any, rhs: PETSc.Vec, solution: PETSc.Vec) -> None:
         """Solve with the operator: the preconditioner of SNES's KSP."""
         try:
-            found = self.operator.solve(self._packing.unpacked(rhs.array_r))
+            found = self.operator.solve(self._units * self._packing.unpacked(rhs.array_r))
             solution.array[:] = self._packing.packed(found)
         except InputError as error:
             # Not through PETSc, which would wrap it; SNES stops at a solution without numbers.
             self._error = error
             solution.array[:] = np.nan
+
+    def multiply(self, values: Array) -> Array:
+        """Return the derivative of the residual times owned values. Collective."""
+        return self.operator.multiply(values) / self._units
 
     def solve(self, law: NodalLaw, state: State, implicit: bool) -> tuple[Array, int, str]:
         """Solve from a state; return the unknowns, the iterations and what went wrong.
@@ -116,15 +122,17 @@ class PenalisedProblem:
         if self._layer is not None:
             # Like the unilateral [.]^+ it is that of the new iterate, but for h_nu.
             self._response[:, : body.dim] = 0.0
-        scale = body.load_size(state.time) + body.norm(residual_forces(self._problem, state))
-        vectors = interface.jump.weight[:, None] * state.forces.vectors(interface.jump)
-        scale += body.norm(vectors.ravel())
-        self._scale = scale or 1.0
+        residual = residual_forces(self._problem, state)
+        on_contact = np.zeros_like(residual)
+        interface.add_forces(on_contact, state.x, state.forces)
+        sizes = body.load_sizes(state.time) + body.sizes(residual)
+        sizes = sizes + body.sizes(on_contact) + body.exchanged(state.x)
+        self._units = of_fields(body, np.where(sizes > 0, sizes, 1.0))
         self.snes.setTolerances(
             rtol=1e-14,
             # Rounding is magnified by 1/eps: the residual may stay above any tolerance.
             stol=1e-14,
-            atol=self._options.tolerance / 10 * scale,
+            atol=self._options.tolerance / 10,
             max_it=min(self._options.max_inner, 20) if implicit else self._options.max_inner,
         )
         self._error = None
@@ -163,7 +171,7 @@ class PenalisedProblem:
         return self._body.local(self._packing.unpacked(iterate.array_r))
 
     def _tell(self, _: PETSc.SNES, iteration: int, norm: float) -> None:
-        logger.debug("inner iteration %d: residual %.2e", iteration, norm / self._scale)
+        logger.debug("inner iteration %d: residual %.2e", iteration, norm)
 
     def _function(self, _: PETSc.SNES, iterate: PETSc.Vec, residual: PETSc.Vec) -> None:
         body, jump, x = self._body, self._interface.jump, self._unknowns(iterate)
@@ -176,7 +184,7 @@ class PenalisedProblem:
             u_n = np.minimum(jump.normal_component(nodal), jump.gap)
             change[:, : jump.dim] += self._layer.layer(u_n)[:, None] * jump.normal
         jump.transpose(jump.weight[:, None] * (self._response + change), values)
-        residual.array[:] = self._packing.packed(body.unbalanced(values))
+        residual.array[:] = self._packing.packed(body.unbalanced(values) / self._units)
 
     def _jacobian(
         self, _: PETSc.SNES, iterate: PETSc.Vec, matrix: PETSc.Mat, __: PETSc.Mat

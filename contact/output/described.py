@@ -39,13 +39,15 @@ SUMMARY: Mapping[str, Item] = {
     "contact_solves": Item("", "Dense solves at the contact nodes alone."),
     "kkt": Item(
         "",
-        "What is left of the equations, each relative to its own size: `equilibrium` (forces), "
-        "`contact` (no penetration, no tension, one of them zero), `friction` (stick or slip).",
+        "What is left of the equations, each relative to its own size: `equilibrium` (forces; of "
+        "piezoelectric bodies charges, where these are farther from balance), `contact` (no "
+        "penetration, no tension, one of them zero), `friction` (stick or slip).",
     ),
     "rounding": Item(
         "",
-        "Forces out of balance that are no more than rounding, over all forces: `equilibrium` is "
-        "without them. More than the tolerance in slender bodies alone, with a warning then.",
+        "Forces out of balance, or charges, that are no more than rounding, over all of them: "
+        "`equilibrium` is without them. More than the tolerance in slender bodies alone, with a "
+        "warning then.",
     ),
     "max_pressure": Item("stress", "Largest contact pressure, -σ_ν >= 0."),
     "contact_area": Item(

@@ -13,6 +13,7 @@ import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
 
+from contact.body.field_norms import field_norms, of_fields
 from contact.interface.interface import Interface
 from contact.interface.multipliers import Multipliers
 from contact.linear.balance import balance
@@ -31,7 +32,7 @@ from contact.typing import Array
 #: Unknowns that are kept at most: the dense matrix then takes 130 MB.
 LARGEST = 4200
 
-#: What is left of equilibrium inside the body that counts as nothing, over its loads.
+#: What is left of equilibrium inside the body that counts as nothing, over what acts on it.
 ROUNDING = 1e-13
 
 #: Most that counts as rounding at the contact nodes, over the loads. Not as little as for the whole
@@ -59,8 +60,8 @@ class CondensedBody:
         Condensed internal forces minus loads where the body was linearised, all ranks.
     at, own
         The owned kept unknowns there, and where these are among those of all ranks.
-    size
-        Norm of the loads and reactions of the whole body.
+    acting
+        `sizes` of what acts on the whole body: loads, reactions, and one field on the other.
     """
 
     comm: MPI.Intracomm
@@ -71,7 +72,7 @@ class CondensedBody:
     residual: Array
     at: Array
     own: slice
-    size: float
+    acting: Array
 
     linear, most_rounding = True, MOST_ROUNDING
 
@@ -118,9 +119,22 @@ class CondensedBody:
         """Return what of forces acts on fixed unknowns."""
         return np.where(self.free.ravel(), 0.0, forces)
 
-    def load_size(self, time: float = 1.0) -> float:
-        """Return the norm of the loads and reactions of the whole body."""
-        return self.size
+    @property
+    def mechanical(self) -> NDArray[np.bool_]:
+        """Which of the owned values are displacements or forces."""
+        return np.tile(np.arange(self.block_size) < self.dim, self.free.shape[0])
+
+    def sizes(self, values: Array) -> Array:
+        """Return the norms of forces and, with a potential, of charges apart. Collective."""
+        return field_norms(self, values)
+
+    def load_sizes(self, time: float = 1.0) -> Array:
+        """Return the `sizes` of what acts on the whole body."""
+        return self.acting
+
+    def exchanged(self, x: Array) -> Array:
+        """Return zero: that is part of what acts on the whole body."""
+        return np.zeros_like(self.acting)
 
     def operator(
         self,
@@ -224,11 +238,12 @@ class Condensation:
             self.counters.factorizations += 1
         residual = body.internal_forces(state.x) - body.external(state.time)
         check_overflow(body.layout, self._size, body.norm(residual))
-        reactions = body.norm(body.reactions(residual))
-        size = body.load_size(state.time) + reactions
+        reactions = body.sizes(body.reactions(residual))
+        acting = body.load_sizes(state.time) + reactions + body.exchanged(state.x)
         # Where the loads go on as before, the prediction of a step is in equilibrium but for that.
         inside = body.layout.mask(-residual[: body.owned])
-        forces = -self._schur.condense(inside, ROUNDING * size)
+        nothing = ROUNDING * of_fields(body, acting)[: body.owned]
+        forces = -self._schur.condense(inside, nothing)
         if self._masters is not None:
             forces = self._masters.forces(forces, residual)
         if not (np.isfinite(self._stiffness).all() and np.isfinite(forces).all()):
@@ -243,7 +258,7 @@ class Condensation:
             forces,
             at,
             slice(begin, begin + at.size),
-            size,
+            acting,
         )
         return CondensedProblem(condensed, self._interface, self.full.scales, state.time)
 

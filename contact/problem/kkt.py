@@ -31,16 +31,19 @@ class KKT:
     ----------
     equilibrium
         |F(u) + contact forces| on free unknowns, less `rounding`, over the sum of the norms of
-        loads, contact forces and reactions; mechanical and (scaled) electric unknowns together.
+        loads, contact forces and reactions. Of a piezoelectric body the larger one of forces and of
+        charges, each over those of its own kind: to these belong what the potential exerts on the
+        body at rest, and the charges of the strain.
     contact
         |p - max(0, p + c (u_nu - rho))| / |p| in L2(Gamma_3), c = E/length with
         the modulus of what touches.
     friction
         |lambda_f - proj(lambda_f + c u_tau)| / |p| with the final bound s.
     rounding
-        What has been subtracted from the first, over the same: `_rounding`, but not more than the
-        `most_rounding` of the body. Zero where no load acts and nothing touches: all forces are
-        rounding then, and there is nothing to compare it with.
+        What has been subtracted from the first, over the same, the larger one: `_rounding`, but not
+        more than the `most_rounding` of the body. Zero where no load acts, nothing touches and the
+        other field exerts nothing: all forces are rounding then, and there is nothing to compare
+        it with.
     """
 
     equilibrium: float
@@ -87,8 +90,8 @@ def residual_forces(problem: Problem, state: State, secant_at: Array | None = No
     return residual
 
 
-def _rounding(problem: Problem, state: State) -> float:
-    """Return what rounding may leave of the forces. Collective.
+def _rounding(problem: Problem, state: State) -> Array:
+    """Return what rounding may leave of the forces, and of the charges. Collective.
 
     Unknowns are known to `EPS` of their size. The stresses around a node of a slender body, or of
     one that is moved far, cancel but for far smaller forces, and what they owe to the rounding of
@@ -100,28 +103,29 @@ def _rounding(problem: Problem, state: State) -> float:
     step = np.full(own.size, SHAKE)
     step[: body.owned] *= np.random.default_rng(0).choice((-1.0, 1.0), body.owned)
     change = body.internal_forces(body.moved(state.x, step * own)) - body.internal_forces(state.x)
-    return MARGIN * EPS / SHAKE * body.norm(body.unbalanced(change))
+    return MARGIN * EPS / SHAKE * body.sizes(body.unbalanced(change))
 
 
 def evaluate(problem: Problem, state: State) -> KKT:
     """Return the residuals of a state. Collective; nothing is changed by it."""
     body, interface = problem.equilibrium, problem.interface
     residual = residual_forces(problem, state)
-    jump, nodal = interface.jump, interface.jump.apply(state.x)
-    contact_forces = np.zeros_like(residual)
-    stress = interface.stress(nodal, state.forces)
-    jump.transpose(jump.weight[:, None] * stress, contact_forces)
-    loads, pushes = body.load_size(state.time), body.norm(contact_forces)
-    scale = loads + pushes + body.norm(body.reactions(residual))
-    unbalanced = body.norm(body.unbalanced(residual))
-    rounding, most, acted = 0.0, body.most_rounding * scale, loads > 0
-    if not acted or unbalanced <= most:
-        rounding = _rounding(problem, state)
-        acted = acted or pushes > rounding
+    on_contact = np.zeros_like(residual)
+    interface.add_forces(on_contact, state.x, state.forces)
+    loads = body.load_sizes(state.time)
+    answers = body.sizes(on_contact) + body.exchanged(state.x)
+    scale = loads + answers + body.sizes(body.reactions(residual))
+    unbalanced = body.sizes(body.unbalanced(residual))
+    most, acted = body.most_rounding * scale, loads > 0
+    asked = ~acted | (unbalanced <= most)
+    rounding = np.zeros_like(scale)
+    if asked.any():
+        rounding = np.where(asked, _rounding(problem, state), 0.0)
+        acted |= answers > rounding
         # Of a body that flies away all forces are rounding.
-        rounding = min(rounding, most) if acted else rounding
-    rounding = min(rounding, unbalanced)
-    equilibrium = (unbalanced - rounding) / (scale or 1.0)
-    bound = interface.bound(nodal, state.forces)
-    laws = interface_residuals(interface, nodal, state.forces, bound)
-    return KKT(equilibrium, *laws, rounding / scale if acted else 0.0)
+        rounding = np.minimum(np.where(acted, np.minimum(rounding, most), rounding), unbalanced)
+    size = np.where(scale > 0, scale, 1.0)
+    equilibrium = float(np.max((unbalanced - rounding) / size))
+    nodal = interface.jump.apply(state.x)
+    laws = interface_residuals(interface, nodal, state.forces, interface.bound(nodal, state.forces))
+    return KKT(equilibrium, *laws, float(np.max(np.where(acted, rounding / size, 0.0))))

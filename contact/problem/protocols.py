@@ -52,7 +52,7 @@ class Equilibrium(Protocol):
 
     @property
     def most_rounding(self) -> float:
-        """Most that counts as rounding, over loads, contact forces and reactions."""
+        """Most that counts as rounding, over all forces of a field."""
 
     def rest(self) -> Array:
         """Return the local unknowns of the body at rest."""
@@ -78,8 +78,14 @@ class Equilibrium(Protocol):
     def reactions(self, forces: Array) -> Array:
         """Return what of forces the supports bear."""
 
-    def load_size(self, time: float = 1.0) -> float:
-        """Return the norm of the loads at a time. Collective."""
+    def sizes(self, values: Array) -> Array:
+        """Return the norms of owned forces and, with a potential, of charges apart. Collective."""
+
+    def load_sizes(self, time: float = 1.0) -> Array:
+        """Return the `sizes` of the loads at a time. Collective."""
+
+    def exchanged(self, x: Array) -> Array:
+        """Return the `sizes` of what each field exerts on the other. Collective."""
 
     def operator(
         self,

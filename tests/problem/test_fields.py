@@ -1,0 +1,93 @@
+"""Forces and charges are in balance each among their own, however large the others are."""
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+
+from contact.case.file import parse_case
+from contact.problem.kkt import evaluate
+from contact.problem.state import State
+from contact.solving import solve
+from scripts.studies.raw_balance import imbalance
+
+TOLERANCE = 1e-8
+
+
+def section(method: str, linear: str = "auto", coupling=1e-9, top=1e6, unit=1.0, volt=1.0, **law):
+    """Return a bar with a potential on top, drawn down at the right; stresses in a unit."""
+    shared = {"e31": -0.54, "e33": 1.58, "e15": 1.23}
+    crystal = {name: coupling * unit * volt * value for name, value in shared.items()}
+    crystal |= {name: 0.8 * unit * volt**2 for name in ("beta11", "beta33")}
+    clamp = {"on": "left", "displacement": [0.0, 0.0], "potential": 0.0}
+    return {
+        "mesh": {"generator": "rectangle", "size": [4.0, 1.0], "cells": [8, 2]},
+        "material": {"young": unit, "poisson": 0.3, "piezo": crystal, **law},
+        "fixed": [clamp, {"on": "top", "potential": top / volt}],
+        "load": [{"on": "right", "traction": [0.0, -0.005 * unit]}],
+        "contact": {"on": "bottom"},
+        "friction": {"law": "coulomb", "mu": 0.3},
+        "solver": {"method": method, "linear": linear, "tolerance": TOLERANCE},
+    }
+
+
+def solved(*arguments, **options):
+    return solve(parse_case(section(*arguments, **options)), comm=MPI.COMM_SELF)
+
+
+@pytest.mark.parametrize("linear", ["lu", "iterative"])
+@pytest.mark.parametrize("method", ["newton", "uzawa", "penalty"])
+@pytest.mark.parametrize("law", [{}, {"law": "log", "yield_strain": 0.005}])
+def test_small_forces_beside_large_charges(method, linear, law):
+    """Half of the forces of the penalty method were out of balance, and it had converged."""
+    found = solved(method, linear, **law)
+    assert found.converged, found.outcome.reason
+    raw = imbalance(found)
+    assert raw.electrified > 1e7 * raw.applied
+    assert raw.force < 2 * TOLERANCE * raw.applied
+    assert raw.charge < 2 * TOLERANCE * raw.electrified
+
+
+@pytest.mark.parametrize("top", [0.0, 1e6])
+def test_each_field_is_out_of_balance_by_itself(top):
+    """Without a given potential the strain alone charges the body, by a part in 1e9."""
+    found = solved("newton", top=top)
+    problem, state = found.problem, found.state
+    body = problem.equilibrium
+    free = np.concatenate([body.free.ravel(), np.zeros(body.masters.size, dtype=bool)])
+    shake = np.random.default_rng(0).choice((-1.0, 1.0), free.size) * free
+    for field in (body.mechanical, ~body.mechanical):
+        spoilt = state.x + 1e-4 * np.where(field, shake * np.abs(state.x[field]).max(), 0.0)
+        assert evaluate(problem, State(spoilt, state.forces)).equilibrium > 1e-5
+    assert evaluate(problem, state).equilibrium < TOLERANCE
+
+
+def test_what_a_potential_exerts_is_what_acts():
+    """No load, nothing touched: the forces of the potential alone bend the body."""
+    apart = {"contact": {"on": "bottom", "gap": 10.0}, "load": []}
+    found = solve(parse_case({**section("newton"), **apart}), comm=MPI.COMM_SELF)
+    assert found.converged, found.outcome.reason
+    raw = imbalance(found)
+    assert 0 < found.outcome.kkt.rounding < TOLERANCE
+    assert raw.force < TOLERANCE * raw.applied
+
+
+@pytest.mark.parametrize("method", ["newton", "uzawa", "penalty"])
+@pytest.mark.parametrize("linear", ["lu", "iterative"])
+def test_counts_and_residuals_in_any_units(method, linear):
+    """MINRES ended at a size of the solution, and compared residuals in two units."""
+    found = [
+        solved(method, linear, 1.0, 1.0, unit, volt)
+        for unit, volt in ((1.0, 1.0), (1e12, 1e-4), (1e-9, 1e8))
+    ]
+    counts = [
+        (one.counters.linear_solves, one.counters.factorizations, len(one.history.records))
+        for one in found
+    ]
+    assert all(one.converged for one in found)
+    assert len(set(counts)) == 1, counts
+    iterations = [one.counters.linear_iterations for one in found]
+    assert max(iterations) <= 1.02 * min(iterations)
+    forces = [
+        np.array(one.contact_force) / unit for one, unit in zip(found, (1, 1e12, 1e-9), strict=True)
+    ]
+    assert np.allclose(forces, forces[0], rtol=1e-9, atol=0)
