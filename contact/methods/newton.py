@@ -1,10 +1,10 @@
 """Newton's method, and the roads that are taken where it fails.
 
 First the condensed body, where the contact nodes are few, then the whole one. Where Newton's loop
-cycles at the contact nodes of a condensed body, an interior-point method takes over. Where that
-fails, and for the whole body, friction is frozen and updated outside (Algorithm 1 with Newton
-inside); then the load is applied in steps, and at last the block relaxation takes over. The history
-says which.
+cycles, an interior-point method takes over, a dense one at the contact nodes of a condensed body,
+for others a sparse one. Where that fails, friction is frozen and updated outside (Algorithm 1 with
+Newton inside); then the load is applied in steps, and at last the block relaxation takes over. The
+history says which.
 
 References
 ----------
@@ -25,6 +25,7 @@ from contact.interface.multipliers import Multipliers
 from contact.interface.status import touching
 from contact.linear.operator import Counters
 from contact.methods.augmentation import automatic_r
+from contact.methods.barrier import interior_point
 from contact.methods.frozen_friction import FROZEN_FRICTION, frozen_friction
 from contact.methods.load_steps import load_steps
 from contact.methods.loop import NewtonLoop
@@ -35,7 +36,7 @@ from contact.methods.report import History, Monitor, Outcome
 from contact.methods.search import Search
 from contact.methods.step import Iterate, WholeStep
 from contact.methods.sure import INTERIOR_POINT, solve_convex
-from contact.problem.condensed import LARGEST, CondensedProblem
+from contact.problem.condensed import CondensedProblem
 from contact.problem.condensing import condensation, pays
 from contact.problem.kkt import evaluate, residual_forces
 from contact.problem.problem import ContactProblem
@@ -54,12 +55,6 @@ SHORT = 4
 #: Forces that the moduli make of the first penetration, over the loads, from which on the body is
 #: far softer than the block that they are those of. Of a block they are some sqrt(H/h).
 SOFT = 1e3
-
-#: What is said of bodies of which that is true where the surer road is closed.
-TOO_MANY = (
-    "the body is far softer than a block, and what is sure for such bodies needs a direct solver "
-    f"and at most {LARGEST} unknowns at the contact nodes: take coarser or quadratic elements there"
-)
 
 
 def moduli_of(scales: Scales, gamma: float) -> Moduli:
@@ -102,7 +97,6 @@ class Newton:
         self.history = History(self.monitor)
         self._moduli = self.moduli or moduli_of(problem.scales, options.gamma)
         self._begin()
-        self._soft = False
         self.whole = WholeStep(problem, options, self._moduli, self.counters)
         self._condensed: MaterialStep | None = None
         self._pays = False
@@ -172,8 +166,6 @@ class Newton:
         if not outcome.converged and search.best.found is not None:
             iterate = search.best.found
             outcome = replace(outcome, kkt=evaluate(self.problem, iterate.state))
-        if not outcome.converged and self._soft and self._condensed is None:
-            outcome = replace(outcome, ended=f"{outcome.ended}; {TOO_MANY}")
         search.at = iterate
         return iterate, outcome
 
@@ -196,6 +188,9 @@ class Newton:
             iterate, outcome = self._at_contact(surer, start)
         if not outcome.converged and isinstance(self.problem, CondensedProblem):
             iterate, outcome = self._convex(self.problem, iterate, outcome)
+        elif not outcome.converged and search.left > 0:
+            logger.info("%s; going on with an interior point", outcome.ended)
+            iterate, outcome = interior_point(search, self.whole.operator, self._finished)
         if not outcome.converged and self.problem.interface.friction.acts and search.left > 0:
             iterate, outcome = frozen_friction(loop, iterate)
         if not outcome.converged and search.left > 0 and self.options.load_steps:
@@ -214,8 +209,7 @@ class Newton:
         foreseen = self._moduli.status * interface.jump.sum(opening)
         loads = np.abs(residual_forces(problem, problem.start()))[: problem.equilibrium.owned]
         most = SOFT * float(interface.comm.allreduce(loads.sum(), op=MPI.SUM))
-        self._soft = foreseen > most
-        return self._soft and self._condensed is not None
+        return foreseen > most
 
     def _at_contact(self, step: MaterialStep, iterate: Iterate) -> tuple[Iterate, Outcome]:
         """Iterate with the body condensed onto the contact nodes."""
@@ -247,6 +241,10 @@ class Newton:
             if outcome.converged:
                 break
         return iterate, outcome
+
+    def _finished(self, state: State) -> tuple[Iterate, Outcome]:
+        """Go on from what an interior point has left."""
+        return self.whole_loop(SHORT).run(self._started(state), INTERIOR_POINT)
 
     def whole_loop(self, patience: int | None = None) -> NewtonLoop:
         """Return Newton's loop on the problem's own body."""

@@ -6,6 +6,7 @@ from mpi4py import MPI
 from contact.build import build_problem
 from contact.case.file import Case, parse_case
 from contact.interface.friction import Friction
+from contact.methods import barrier
 from contact.methods.load_steps import load_steps
 from contact.methods.newton import Newton
 from contact.methods.options import NewtonOptions
@@ -25,14 +26,22 @@ def bar_case(n: int, *changes: str) -> Case:
     return bar(n, -0.05, 1.0, "friction.mu=0.5", "solver.tolerance=1e-10", *changes)
 
 
+COULOMB = Friction(ConstantCoefficient(0.5))
+
+
+@pytest.mark.parametrize("friction", [COULOMB, Friction()])
+def test_an_interior_point_takes_over_where_newton_gives_up(friction):
+    problem = mechanics.bar(SELF, 8, -0.05, friction=friction)
+    method = newton(problem, max_iterations=2, condense=False)
+    assert any(record.note.startswith("interior point") for record in method.history.records)
+    assert method.history.records[-1].kkt.largest <= 1e-8
+
+
 @pytest.mark.parametrize(
-    ("friction", "note"),
-    [
-        (Friction(ConstantCoefficient(0.5)), "frozen friction"),
-        (Friction(), "block relaxation"),
-    ],
+    ("friction", "note"), [(COULOMB, "frozen friction"), (Friction(), "block relaxation")]
 )
-def test_slower_methods_take_over_where_newton_gives_up(friction, note):
+def test_slower_methods_take_over_where_that_fails(friction, note, monkeypatch):
+    monkeypatch.setattr(barrier, "LIMIT", 1)
     problem = mechanics.bar(SELF, 8, -0.05, friction=friction)
     method = newton(problem, max_iterations=2, condense=False)
     assert any(record.note.startswith(note) for record in method.history.records)
@@ -101,6 +110,6 @@ def test_the_best_iterate_is_what_is_left_of_a_failure():
     method = Newton(problem, limits)
     state, outcome = method.solve()
     assert not outcome.converged
-    assert "frozen friction" in method.history.records[-1].note
+    assert "interior point" in method.history.records[-1].note
     assert outcome.kkt == evaluate(problem, state)
     assert outcome.kkt.largest == min(record.kkt.largest for record in method.history.records)

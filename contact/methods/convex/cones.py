@@ -20,6 +20,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from mpi4py import MPI
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
@@ -74,7 +75,7 @@ class Step:
 
 
 class Cones:
-    """A point strictly inside all cones.
+    """A point strictly inside all cones, those of this rank; what is told of all is collective.
 
     Parameters
     ----------
@@ -84,11 +85,21 @@ class Cones:
         t and a of the discs, shapes (k,) and (k, t), t > |a|.
     bound, friction
         h and -q, shapes (k,) and (k, t), h > |q|.
+    comm
+        The ranks that have a part of the cones each.
     """
 
     def __init__(
-        self, slack: Array, force: Array, length: Array, slip: Array, bound: Array, friction: Array
+        self,
+        slack: Array,
+        force: Array,
+        length: Array,
+        slip: Array,
+        bound: Array,
+        friction: Array,
+        comm: MPI.Intracomm = MPI.COMM_SELF,
     ) -> None:
+        self._comm = comm
         self.slack, self.force = slack, force
         self.length, self.slip, self.bound, self.friction = length, slip, bound, friction
         self._dets = [_determinant(length, slip), _determinant(bound, friction)]
@@ -96,12 +107,12 @@ class Cones:
     @property
     def degree(self) -> int:
         """Number of cones."""
-        return int(self.slack.size + self.length.size)
+        return int(self._comm.allreduce(self.slack.size + self.length.size))
 
     def work(self) -> float:
         """Return the sum of slacks times multipliers."""
         discs = float(self.length @ self.bound + np.sum(self.slip * self.friction))
-        return float(self.slack @ self.force + max(discs, 0.0))
+        return float(self._comm.allreduce(self.slack @ self.force + max(discs, 0.0)))
 
     def work_after(self, step: Step, part: float) -> float:
         """Return the same after part of a step."""
@@ -109,7 +120,7 @@ class Cones:
         relative = [self._lambda + part * move for move in self._scaled(step)]
         discs = (relative[0][:, :2] * relative[1][:, :2]).sum() / 2
         discs += (relative[0][:, 2:] * relative[1][:, 2:]).sum()
-        return float(slack @ force + discs)
+        return float(self._comm.allreduce(slack @ force + discs))
 
     def scale(self) -> None:
         """Compute the scaling W with W friction = W^-1 slip = lambda, and its frame."""
@@ -201,6 +212,7 @@ class Cones:
         for lead, size in self._relative(step):
             rates.append(size - lead)
         fastest = float(np.max(np.concatenate(rates), initial=0.0))
+        fastest = self._comm.allreduce(fastest, op=MPI.MAX)
         return 1 / fastest if fastest > 0 else np.inf
 
     def move(self, step: Step, part: float) -> None:

@@ -8,11 +8,9 @@ import numpy as np
 from scipy.linalg.lapack import dpotrs
 
 from contact.methods.convex.cones import Array, Cones, Step, dot
+from contact.methods.convex.path import central
 from contact.methods.convex.reduced import Reduced, cholesky
 from contact.tolerances import EPS
-
-#: Shares of the way to the rim of a cone that a step takes.
-SHORTEST, LONGEST = 0.9, 0.999
 
 #: Work at the start, over that of closing each gap alone; a body that nothing but contact
 #: holds comes from further away.
@@ -189,7 +187,6 @@ class Interior:
     def step(self) -> bool:
         """Take a step; False if rounding lets no more be taken."""
         cones, body = self.cones, self.program.body
-        degree = max(cones.degree, 1)
         residual = self.program.residual(self.point)
         slack = self.program.gap - self.x[body.normals] - cones.slack
         slip = np.append(self.x, 0.0)[self.tangents] - cones.slip
@@ -215,14 +212,7 @@ class Interior:
                 constants, slack - dx[body.normals], moved[self.tangents] + slip
             )
 
-        now = cones.work()
-        _, affine = solve(cones.affine_target())
-        length = min(1.0, cones.longest(affine))
-        centre = (cones.work_after(affine, length) / now) ** 3 if now > 0 else 0.0
-        centre = max(0.0, centre)
-        dx, step = solve(cones.target(affine, centre * now / degree))
-        share = min(LONGEST, max(SHORTEST, 1 - centre))
-        length = min(1.0, share * cones.longest(step))
+        dx, step, length = central(cones, solve)
         if not (np.isfinite(dx).all() and length > 1e-12):
             return False
         self.x = self.x + length * dx

@@ -1,0 +1,235 @@
+"""The sure road of a body that is not condensed: an interior point on all its unknowns.
+
+Frictionless contact and Tresca's friction are convex, and what the interior-point method needs of
+the body is what Newton's step needs too: its operator plus a block at each contact node, force
+over slack in place of gamma. So it takes sparse factorisations, or multigrid, of any size, on any
+number of ranks. Where it ends the contact zone is known, and Newton's method does the rest.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+from mpi4py import MPI
+
+from contact.interface.multipliers import Multipliers
+from contact.linear.operator import Operator
+from contact.methods.convex.cones import Array, Cones, Step
+from contact.methods.convex.path import central
+from contact.methods.report import Outcome
+from contact.methods.search import Search
+from contact.methods.step import Iterate
+from contact.methods.sure import INTERIOR_POINT
+from contact.problem.kkt import evaluate, residual_forces
+from contact.problem.mobility import groups, null_space
+from contact.problem.problem import ContactProblem
+from contact.problem.state import State
+from contact.tolerances import EPS
+
+#: Steps of one convex problem at most, and convex problems with one friction bound after the other.
+LIMIT, UPDATES = 60, 8
+
+#: Work of slacks and forces, beside all that is done, below which the contact zone is known.
+CLOSED = 1e-10
+
+#: Forces out of balance then.
+BALANCED = 1e-6
+
+#: What an iterative solver leaves of the forces out of balance: the next step sees what is left.
+FORCING = 1e-6
+
+#: Work at the start, over that of the loads in the way that the foundation bars.
+SHARE = 1e-2
+
+#: The same for a body that nothing but contact holds, over what the loads do in the mean gap.
+LOOSE = 0.1
+
+#: Friction bound over all loads where friction alone holds the body: it is first taken for stuck.
+STUCK = 10.0
+
+
+def interior_point(
+    search: Search, operator: Operator, finish: Callable[[State], tuple[Iterate, Outcome]]
+) -> tuple[Iterate, Outcome]:
+    """Solve convex problems for sure, and let Newton's loop finish what they leave. Collective.
+
+    Without friction first: where the body touches, Newton's method mostly finds the rest. Then
+    with the friction bound of the problem before, which is Haslinger's iteration.
+
+    Parameters
+    ----------
+    search
+        What is solved, a whole body.
+    operator
+        Of the body, with blocks at its contact nodes.
+    finish
+        Newton's loop, from a state on.
+    """
+    problem, interface = search.problem, search.problem.interface
+    assert isinstance(problem, ContactProblem)
+    apart = tuple(groups(problem))
+    held = not any(null_space(group.supports).shape[1] for group in apart)
+    bound: Array = np.zeros(interface.jump.weight.size)
+    if not held and any(null_space(group.held(False)).shape[1] for group in apart):
+        bound = np.full_like(bound, STUCK * _loads(problem)) / interface.jump.weight
+    for _ in range(UPDATES):
+        method = Barrier(problem, operator, bound, held)
+        outcome, state = method.run(search), method.state
+        iterate = Iterate(state)
+        if not outcome.converged and search.left > 0:
+            iterate, outcome = finish(state)
+        if outcome.converged or search.left <= 0 or not interface.friction.acts:
+            break
+        bound = interface.bound(interface.jump.apply(state.x), state.forces)
+    return iterate, outcome
+
+
+def _loads(problem: ContactProblem) -> float:
+    """Return the sum of all forces that act at rest, without regard to sign. Collective."""
+    body = problem.equilibrium
+    forces = np.abs(body.unbalanced(residual_forces(problem, problem.start())))
+    own = float(problem.comm.allreduce(forces[: body.owned].sum(), op=MPI.SUM))
+    return own + float(forces[body.owned :].sum())
+
+
+class Barrier:
+    """The interior-point method on a body with its contact nodes, for one friction bound.
+
+    Layer and current are linearised anew in each step, like the material.
+
+    Parameters
+    ----------
+    problem
+        The contact problem.
+    operator
+        Of the body, with blocks at its contact nodes.
+    bound
+        Friction bound, shape (n,) (stress).
+    held
+        Whether supports hold the body: where it would go without contact then says much.
+    """
+
+    def __init__(
+        self, problem: ContactProblem, operator: Operator, bound: Array, held: bool
+    ) -> None:
+        self.problem, self.operator = problem, operator
+        interface = problem.interface
+        jump, self._state = interface.jump, problem.start()
+        self._near = np.isfinite(jump.gap)
+        total, limit = _loads(problem), jump.weight * bound
+        count = max(jump.size, 1)
+        self._rubbing = self._near & (limit > EPS * max(jump.maximum(limit), total / count))
+        nodal = jump.apply(self._state.x)
+        moved = np.zeros_like(nodal)
+        if held:
+            self._update(np.zeros((*nodal.shape, jump.block_size)))
+            moved = jump.apply(operator.solve(-residual_forces(problem, self._state), FORCING))
+        opening = -interface.opening(nodal + moved)[self._near]
+        gap = jump.gap[self._near]
+        if held:
+            least = np.sqrt(SHARE) * jump.maximum(-opening)
+            way = jump.maximum(np.abs(moved).max(axis=1, initial=0.0))
+            work = total * least**2 / (way or 1.0)
+        else:
+            give = problem.scales.height / (problem.scales.plane_modulus * problem.scales.area)
+            least = self._sum(float(np.maximum(gap, 0.0).sum())) / count + total * give
+            work = LOOSE * total * least / count
+        # Where the body would lift off, the slack is that from the beginning.
+        slack = np.maximum(np.maximum(gap, opening), least)
+        slips, limit = interface.slip_length(nodal + moved)[self._rubbing], limit[self._rubbing]
+        zeros = np.zeros((limit.size, jump.dim))
+        length = np.maximum(work / limit, slips)
+        self.cones = Cones(slack, work / slack, length, zeros, limit, zeros, jump.comm)
+
+    def run(self, search: Search) -> Outcome:
+        """Go towards the solution. Collective."""
+        kkt, ended = evaluate(self.problem, self.state), "the interior point was given no step"
+        for steps in range(1, min(LIMIT, search.left) + 1):
+            taken = self.step()
+            kkt = evaluate(self.problem, self.state)
+            search.see(Iterate(self.state), kkt)
+            search.history.record(kkt, INTERIOR_POINT, 2)
+            ended = f"the interior point has not converged in {steps} steps"
+            if not taken:
+                ended = f"rounding ends the interior point after {steps} steps"
+                break
+            if self.gap() <= CLOSED and kkt.equilibrium <= BALANCED:
+                ended = f"duality gap closed after {steps} steps"
+                break
+        return Outcome(kkt, search.options.allowed, ended)
+
+    def _sum(self, value: float) -> float:
+        """Return the sum of the values of all ranks. Collective."""
+        return float(self.problem.comm.allreduce(value, op=MPI.SUM))
+
+    @property
+    def state(self) -> State:
+        """Where the method is."""
+        cones, jump = self.cones, self.problem.interface.jump
+        pressure, friction = np.zeros(jump.weight.size), np.zeros(jump.normal.shape)
+        pressure[self._near] = cones.force / jump.weight[self._near]
+        friction[self._rubbing] = -cones.friction / jump.weight[self._rubbing, None]
+        return replace(self._state, forces=Multipliers(pressure, friction))
+
+    def gap(self) -> float:
+        """Return what slacks times forces are beside the work of loads and contact. Collective."""
+        body, interface, x = self.problem.equilibrium, self.problem.interface, self._state.x
+        jump, cones, nodal = interface.jump, self.cones, interface.jump.apply(x)
+        ways = np.abs(jump.gap) + np.abs(jump.normal_component(nodal))
+        slips = interface.slip_length(nodal)[self._rubbing]
+        contact = self._sum(float(cones.force @ ways[self._near] + cones.bound @ slips))
+        own = body.owned_part(x)[: body.owned]
+        forces = body.internal_forces(x), body.external(self._state.time)
+        works = [abs(self._sum(float(own @ force[: body.owned]))) for force in forces]
+        return cones.work() / ((contact + sum(works)) or 1.0)
+
+    def _update(self, blocks: Array) -> None:
+        """Assemble the operator with given blocks, and those of layer and current. Collective."""
+        interface, body, x = self.problem.interface, self.problem.equilibrium, self._state.x
+        if interface.response.active:
+            nodal = interface.jump.apply(x)
+            pressure = interface.pressure(nodal, self._state.forces)
+            blocks = blocks + interface.response.block(nodal, pressure)
+        weighted = interface.weighted(blocks, x)
+        self.operator.update("secant", x, weighted, constant=body.linear)
+
+    def step(self) -> bool:
+        """Take a step; False if rounding lets no more be taken. Collective."""
+        cones, interface, state = self.cones, self.problem.interface, self.state
+        jump, near, rubbing = interface.jump, self._near, self._rubbing
+        body, d = self.problem.equilibrium, jump.dim
+        nodal = jump.apply(state.x)
+        residual = -residual_forces(self.problem, state)
+        slack = -interface.opening(nodal)[near] - cones.slack
+        slip = interface.slip(nodal)[rubbing] - cones.slip
+        cones.scale()
+        stiff, across = cones.stiffness()
+        blocks = np.zeros((jump.nodes.size, jump.block_size, jump.block_size))
+        normal, tangent = jump.normal[near], jump.tangent[rubbing]
+        blocks[near, :d, :d] = (stiff[:, None] * normal)[:, :, None] * normal[:, None, :]
+        blocks[rubbing, :d, :d] += tangent @ across @ tangent
+        self._update(blocks / jump.weight[:, None, None])
+
+        def solve(constants: tuple[Array, Array]) -> tuple[Array, Step]:
+            force, friction = cones.reduced(constants)
+            at_nodes = np.zeros((jump.nodes.size, d))
+            at_nodes[near] = -(force - stiff * slack)[:, None] * normal
+            at_nodes[rubbing] += friction - np.einsum("kij,kj->ki", across, slip)
+            rhs = residual.copy()
+            jump.transpose(at_nodes, rhs)
+            dx = self.operator.solve(rhs, FORCING)
+            moved = jump.apply(dx)
+            closed = slack - jump.normal_component(moved)[near]
+            return dx, cones.complete(
+                constants, closed, jump.tangential_component(moved)[rubbing] + slip
+            )
+
+        dx, step, length = central(cones, solve)
+        if not (np.isfinite(length) and length > 1e-12):
+            return False
+        x = body.prescribe(body.moved(state.x, length * dx), state.time)
+        self._state = replace(state, x=x)
+        cones.move(step, length)
+        return True
