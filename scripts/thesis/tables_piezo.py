@@ -104,7 +104,8 @@ def table_8(report: Report, number: str, cells: tuple[int, int]) -> None:
         columns,
         "Alg. 4: charge lagged and Kacanov's steps, with inner solves to 1e-9; counted to a "
         "relative change (3.46) of the friction bound of 1e-5, and to residuals of 1e-8. "
-        "Literal: r = 0.25 E and the thesis's rules in both loops. Implicit: phi of the charge "
+        "Literal: r = 0.25 E and the thesis's rules in both loops, — where they do not end them in "
+        "60 iterations. Implicit: phi of the charge "
         "in the operator; to (3.46) with Kacanov's steps, to 1e-8 with tangent ones near the "
         "solution. The lagged charge contracts slowly at k_e = 1 (see Theorem 5.2). "
         f"{NOTES[number]} Newton: linear solves of the whole body; at "
