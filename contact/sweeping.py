@@ -21,7 +21,8 @@ from mpi4py import MPI
 
 from contact.build import build_problem, named
 from contact.case.file import Case, load_case
-from contact.case.text import to_toml
+from contact.case.overrides import read_value
+from contact.case.text import literal, to_toml
 from contact.errors import InputError
 from contact.evolving import solve_steps
 from contact.mesh.domain import Domain
@@ -67,12 +68,18 @@ class Axis:
             If it is not that.
         """
         key, equals, given = text.partition("=")
-        values = tuple(value.strip() for value in _split(given))
-        if not equals or not key.strip() or not all(values):
+        texts = [value.strip() for value in _split(given)]
+        if not equals or not key.strip() or not all(texts):
             raise InputError(f"--over {text}: accepted: path.to.key=value,value,...")
-        if len(set(values)) < len(values):
+        values = [read_value(key.strip(), value, "--over") for value in texts]
+        if any(one == other for one, other in itertools.combinations(values, 2)):
             raise InputError(f"--over {text}: a value stands there twice; accepted: each once")
-        return Axis(key.strip(), values)
+        # Numbers in one way: a row is found again by its texts.
+        texts = [
+            literal(value) if isinstance(value, int | float) else text
+            for value, text in zip(values, texts, strict=True)
+        ]
+        return Axis(key.strip(), tuple(texts))
 
 
 def _split(text: str) -> Iterator[str]:

@@ -40,7 +40,7 @@ def override(
     else:
         pairs = [_split(text, source) for text in overrides]
     for path, text in pairs:
-        _assign(data, path.strip(), _value(path, text.strip(), source), source)
+        _assign(data, path.strip(), read_value(path, text.strip(), source), source)
 
 
 def _refusal(source: str, path: str, words: str) -> InputError:
@@ -54,8 +54,16 @@ def _split(text: str, source: str) -> tuple[str, str]:
     return path, value
 
 
-def _value(path: str, text: str, source: str) -> Any:
-    """Read a TOML value; what is none and does not look like one is a text."""
+def read_value(path: str, text: str, source: str) -> Any:
+    """Read a TOML value; what is none and does not look like one is a text.
+
+    Parameters
+    ----------
+    path, text
+        The key and what is given for it.
+    source
+        What messages call the case.
+    """
     try:
         table = tomllib.loads(f"value = {text}")
     except (tomllib.TOMLDecodeError, RecursionError) as error:

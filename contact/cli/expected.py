@@ -7,6 +7,7 @@ from mpi4py import MPI
 
 from contact import _compat
 from contact.output.assumptions import fitting
+from contact.output.bodies import passing
 from contact.problem.expected import expected_displacements
 from contact.problem.problem import ContactProblem
 from contact.typing import Array
@@ -19,8 +20,8 @@ LARGE = 0.05
 
 def expectations(problem: ContactProblem) -> list[str]:
     """Return lines on the mesh and on what the loads will do. Collective."""
-    text, _ = fitting(problem)
-    return [*_quality(problem), *_sizes(problem), *([f"# warning: {text}"] if text else [])]
+    warnings = [f"# warning: {text}" for text, _ in (fitting(problem), passing(problem)) if text]
+    return [*_quality(problem), *_sizes(problem), *warnings]
 
 
 def mean_ratio(corners: Array) -> Array:

@@ -88,9 +88,8 @@ def regions(solution: Solution) -> tuple[str, bool]:
     return f"the regions {which} have one material; [[material]] with `on` gives each its own", True
 
 
-def passing(solution: Solution) -> tuple[str, bool]:
+def passing(problem: ContactProblem) -> tuple[str, bool]:
     """Warn where pieces of the mesh are in no contact with another: nothing keeps them apart."""
-    problem = solution.problem
     piece, count = connected_pieces(problem.equilibrium.space)
     if count == 1:
         return "", True

@@ -47,7 +47,7 @@ def review(solution: Solution) -> None:
         *uniqueness.conductivity(solution),
         uniqueness.ramp(solution),
         *bodies.choices(solution),
-        bodies.passing(solution),
+        bodies.passing(solution.problem),
         bodies.regions(solution),
     ):
         if text:

@@ -57,6 +57,11 @@ def test_rows_of_other_values_remain(sweep):
     assert more[1:] == rows
 
 
+def test_numbers_are_those_of_their_values():
+    assert Axis.of("friction.mu=0.20,4e-1").values == ("0.2", "0.4")
+    assert Axis.of("mesh.cells=[8, 4],[8,2]").values == ("[8, 4]", "[8,2]")
+
+
 def test_rows_that_come_later_remain_where_the_sweep_is_ended(sweep, monkeypatch):
     _, rows = sweep("--over", "friction.mu=0.2,0.4")
 
@@ -96,6 +101,7 @@ def test_an_evolution_is_swept(sweep, tmp_path):
         ((), "--over: missing"),
         (("--over", "friction.mu"), "--over friction.mu: accepted: path.to.key=value,value"),
         (("--over", "friction.mu=0.1,0.1"), "a value stands there twice"),
+        (("--over", "friction.mu=0.1,0.10"), "a value stands there twice"),
         (("--over", "friction.nu=0.1"), "friction.nu: unknown key"),
         (("--over", "friction.mu=0.1,-1.0"), "friction.mu"),
     ],
