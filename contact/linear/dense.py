@@ -66,11 +66,11 @@ class DenseBulk(Protocol):
 
     @property
     def stiffness(self) -> Array:
-        """The dense matrix, on all ranks in rank order."""
+        """The dense matrix, in rank order: on the first rank alone."""
 
     @property
     def factors(self) -> Factors:
-        """Its factors, where some have been made: on the first rank alone."""
+        """Its factors, where some have been made: there too."""
 
     @property
     def own(self) -> slice:

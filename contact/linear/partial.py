@@ -13,6 +13,9 @@ from contact.typing import Array
 #: MUMPS's ICNTL(26): 0 solves with the eliminated unknowns, the kept ones being 0.
 INTERIOR_SOLVE = (26, 0)
 
+#: Columns that are copied at a time.
+COLUMNS = 128
+
 # petsc4py has no Schur complements of factorisations.
 _petsc = ctypes.CDLL(PETSc.__file__)
 
@@ -27,22 +30,28 @@ def _set_kept(factor: PETSc.Mat, kept: PETSc.IS) -> None:
 
 
 def _complement(factor: PETSc.Mat, size: int) -> Array:
-    """Return a copy of the Schur complement that a factorisation holds."""
+    """Return a copy of the Schur complement that a factorisation holds, stored by columns."""
     if size == 0:
         return np.zeros((0, 0))
-    handle, values = ctypes.c_void_p(), ctypes.c_void_p()
-    _check(
-        _petsc.MatFactorCreateSchurComplement(
-            ctypes.c_void_p(factor.handle), ctypes.byref(handle), None
-        )
-    )
+    handle, values, status = ctypes.c_void_p(), ctypes.c_void_p(), ctypes.c_int()
+    held = ctypes.c_void_p(factor.handle), ctypes.byref(handle)
+    _check(_petsc.MatFactorGetSchurComplement(*held, ctypes.byref(status)))
     _check(_petsc.MatDenseGetArrayRead(handle, ctypes.byref(values)))
     pointer = ctypes.cast(values, ctypes.POINTER(ctypes.c_double))
-    # PETSc stores it by columns.
-    matrix = np.ctypeslib.as_array(pointer, (size, size)).T.copy()
+    matrix = np.ctypeslib.as_array(pointer, (size, size)).copy().T
     _check(_petsc.MatDenseRestoreArrayRead(handle, ctypes.byref(values)))
-    _check(_petsc.MatDestroy(ctypes.byref(handle)))
+    _check(_petsc.MatFactorRestoreSchurComplement(*held, status))
+    _mirror(matrix)
     return matrix
+
+
+def _mirror(matrix: Array) -> None:
+    """Copy what is below the diagonal, all that MUMPS writes, above it."""
+    for begin in range(0, len(matrix), COLUMNS):
+        end = begin + COLUMNS
+        matrix[begin:end, end:] = matrix[end:, begin:end].T
+        corner = np.tril(matrix[begin:end, begin:end])
+        matrix[begin:end, begin:end] = corner + np.tril(corner, -1).T
 
 
 def _range(begin: int, end: int) -> PETSc.IS:
@@ -53,7 +62,7 @@ def _range(begin: int, end: int) -> PETSc.IS:
 def _dense(matrix: PETSc.Mat) -> Array:
     """Return a small local matrix as an array."""
     dense = matrix.convert("dense", out=PETSc.Mat())
-    return np.array(dense.getDenseArray(), order="C")
+    return np.array(dense.getDenseArray(), order="F")
 
 
 class PartialFactorisation:

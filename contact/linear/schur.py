@@ -12,11 +12,11 @@ import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
 from petsc4py import PETSc
-from scipy.linalg import lu_factor, lu_solve
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import breadth_first_order
 
 from contact.linear.first_rank import from_first
+from contact.linear.leftover import Leftover, send_to_first
 from contact.linear.partial import PartialFactorisation
 from contact.typing import Array
 
@@ -131,22 +131,13 @@ class SchurComplement:
         total = self._inner.factorise(self._part)
         if self.comm.size == 1:
             return total
-        added = self._added(matrix, total)
+        self._leftover = self._added(matrix, total)
         del total
         k = self.size
-        return from_first(self.comm, lambda: self._without_between(added), k, k)
+        # Both are stored by columns, and sent as what they are by rows.
+        return from_first(self.comm, lambda: self._leftover.eliminate().T, k, k).T
 
-    def _without_between(self, total: Array) -> Array:
-        """Eliminate the unknowns between the ranks from what is left, on the first one."""
-        k = self.size
-        if self._between == 0:
-            return total
-        self._coupling = total[:k, k:].copy()
-        self._lu = lu_factor(total[k:, k:], check_finite=False)
-        through = self._coupling @ self._solve_between(total[k:, :k])
-        return np.subtract(total[:k, :k], through, out=through)
-
-    def _added(self, matrix: PETSc.Mat, own: Array) -> Array:
+    def _added(self, matrix: PETSc.Mat, own: Array) -> Leftover:
         """Add up what the ranks have eliminated, and what they have left, on the first one.
 
         The others have nothing of it. Collective.
@@ -162,20 +153,14 @@ class SchurComplement:
         both = (row >= 0) & (column >= 0)
         own[row[both], column[both]] -= values[both]
         if self._mets is None:
-            self.comm.Send(own, 0)
-            return own[:0]
-        total = np.zeros((self.dense_size, self.dense_size))
-        total[rows, columns] = values
-        total[np.ix_(self._met, self._met)] += own
+            send_to_first(self.comm, own)
+            return Leftover(0, 0)
+        leftover = Leftover(self.size, self._between)
+        leftover.set(rows, columns, values)
+        leftover.add(self._met, own)
         for rank, met in enumerate(self._mets[1:], 1):
-            share = np.empty((met.size, met.size))
-            self.comm.Recv(share, rank)
-            total[np.ix_(met, met)] += share
-        return total
-
-    def _solve_between(self, values: Array) -> Array:
-        """Solve with the unknowns between the ranks; what is no number remains none."""
-        return np.asarray(lu_solve(self._lu, values, check_finite=False))
+            leftover.receive(self.comm, rank, met)
+        return leftover
 
     def condense(self, rhs: Array, rounding: Array | None = None) -> Array:
         """Return what an owned right-hand side becomes on the kept unknowns, on all ranks.
@@ -201,9 +186,10 @@ class SchurComplement:
         if self._between == 0:
             return total
         kept, self._rhs_between = np.split(total, [self.size])
+        leftover = self._leftover
         return from_first(
             self.comm,
-            lambda: kept - self._coupling @ self._solve_between(self._rhs_between),
+            lambda: kept - leftover.to_kept(leftover.solve(self._rhs_between)),
             self.size,
         )
 
@@ -211,9 +197,10 @@ class SchurComplement:
         """Return the owned solution that goes with values of the kept unknowns on all ranks."""
         left = kept
         if self._between > 0:
+            leftover = self._leftover
             between = from_first(
                 self.comm,
-                lambda: self._solve_between(self._rhs_between - self._coupling.T @ kept),
+                lambda: leftover.solve(self._rhs_between - leftover.to_others(kept)),
                 self._between,
             )
             left = np.concatenate([kept, between])

@@ -29,6 +29,7 @@ def local_problem(problem: CondensedProblem) -> LocalProblem:
     if interface.response.active:
         raise InputError("a layer or a current answers; accepted: rigid, insulated foundations")
     of = Gathered.of(problem, problem.start())
+    assert of is not None
     n, d = of.normal.shape
     stiffness, load = of.stiffness, of.load
     if of.free.shape[1] > d:

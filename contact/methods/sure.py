@@ -139,7 +139,7 @@ def _solve_linearised(
         return np.concatenate(gathered_bound)
 
     answer = None
-    if comm.rank == 0:
+    if gathered is not None:
         try:
             answer = gathered.solve(bound, friction, tolerance)
         except NotConvexError:
@@ -172,8 +172,11 @@ class Gathered:
     weight: Array
 
     @staticmethod
-    def of(problem: CondensedProblem, state: State) -> Gathered:
-        """Gather a problem with layer and current linearised at a state. Collective."""
+    def of(problem: CondensedProblem, state: State) -> Gathered | None:
+        """Gather a problem with layer and current linearised at a state. Collective.
+
+        The first rank has it, the others None.
+        """
         body, interface = problem.equilibrium, problem.interface
         response, jump = interface.response, interface.jump
         nodal = jump.apply(state.x)
@@ -189,6 +192,8 @@ class Gathered:
         moved, base, origin, free, weighted, normal, tangent, gap, weight = (
             np.concatenate(body.comm.allgather(part)) for part in local
         )
+        if body.comm.rank > 0:
+            return None
         total = body.stiffness.copy()
         n, size = free.shape
         rows = np.arange(n * size).reshape(n, size)

@@ -52,10 +52,10 @@ class CondensedBody:
         As those of the body.
     free
         Which unknowns of the owned kept nodes are not fixed, shape (nodes, block size).
-    stiffness
-        The Schur complement, on all ranks.
-    factors
-        Its factors, where some have been made: on the first rank alone.
+    rows
+        The owned rows of the Schur complement.
+    stiffness, factors
+        All of it, and its factors where some have been made: on the first rank alone.
     residual
         Condensed internal forces minus loads where the body was linearised, all ranks.
     at, own
@@ -67,6 +67,7 @@ class CondensedBody:
     comm: MPI.Intracomm
     dim: int
     free: NDArray[np.bool_]
+    rows: Array
     stiffness: Array
     factors: Factors
     residual: Array
@@ -105,7 +106,7 @@ class CondensedBody:
     def internal_forces(self, x: Array, secant_at: Array | None = None) -> Array:
         """Return the owned forces of the linear body, loads taken off. Collective."""
         moved = np.concatenate(self.comm.allgather(x - self.at))
-        return np.asarray(self.stiffness[self.own] @ moved + self.residual[self.own])
+        return np.asarray(self.rows @ moved + self.residual[self.own])
 
     def external(self, time: float = 1.0) -> Array:
         """Return zero: the loads are part of the forces."""
@@ -188,9 +189,12 @@ class Condensation:
         self._kept = KeptUnknowns(body, full.interface)
         self._masters = CondensedMasters.of(body, full.interface, self._kept)
         self._bulk: Bulk = body if self._masters is None else self._masters.bulk
+        begin = self._kept.offset
+        self._own = slice(begin, begin + self.nodes.size * body.block_size)
         self._matrix = full.equilibrium.create_matrix()
         self._kind = ""
         self._schur: SchurComplement | None = None
+        self._rows: Array = np.zeros((0, 0))
         self._stiffness: Array = np.zeros((0, 0))
 
     def turn_to(self, full: ContactProblem) -> None:
@@ -221,7 +225,8 @@ class Condensation:
         body = self.full.equilibrium
         same = keep or (body.linear and kind == self._kind)
         if self._schur is None or not same:
-            self._stiffness, self._factors = np.zeros((0, 0)), Factors()  # room for new ones
+            self._rows = self._stiffness = np.zeros((0, 0))  # room for new ones
+            self._factors = Factors()
             self._bulk.assemble(self._matrix, kind, state.x)
             balance(self._matrix, body.layout)
             if self._schur is None:
@@ -234,6 +239,10 @@ class Condensation:
                 self._stiffness = self._masters.eliminate(self._schur, self._stiffness)
             # By columns, as LAPACK wants the copies of which factors are made.
             self._stiffness = np.asfortranarray(self._stiffness)
+            self._regular = bool(np.isfinite(self._stiffness).all())
+            self._rows = self._stiffness[self._own]
+            if body.comm.rank > 0:  # the others keep no more than that
+                self._rows, self._stiffness = self._rows.copy(), np.zeros((0, 0))
             self._kind, self._size = kind, self._matrix.norm()
             self.counters.factorizations += 1
         residual = body.internal_forces(state.x) - body.external(state.time)
@@ -246,18 +255,18 @@ class Condensation:
         forces = -self._schur.condense(inside, nothing)
         if self._masters is not None:
             forces = self._masters.forces(forces, residual)
-        if not (np.isfinite(self._stiffness).all() and np.isfinite(forces).all()):
+        if not (self._regular and np.isfinite(forces).all()):
             return None
-        at, begin = self._at(state.x), self._kept.offset
         condensed = CondensedBody(
             body.comm,
             body.dim,
             body.free[self.nodes],
+            self._rows,
             self._stiffness,
             self._factors,
             forces,
-            at,
-            slice(begin, begin + at.size),
+            self._at(state.x),
+            self._own,
             acting,
         )
         return CondensedProblem(condensed, self._interface, self.full.scales, state.time)

@@ -126,6 +126,7 @@ def problems(coarse: bool) -> Iterator[Case]:
 def interior_point(problem: CondensedProblem) -> tuple[Result, Gathered]:
     """Solve by the interior point alone."""
     of = Gathered.of(problem, problem.start())
+    assert of is not None  # on one rank
     slip = np.zeros(of.gap.size)
     bound = problem.interface.friction.bound(slip, slip)
     rubbing = (bound > 0) & (of.weight > 0)
