@@ -10,6 +10,7 @@ from petsc4py import PETSc
 
 from contact.linear.faults import petsc_options
 from contact.linear.products import quick_products
+from contact.linear.refinement import refine
 from contact.linear.stiff_nodes import StiffNodes
 from contact.typing import Array
 
@@ -42,6 +43,7 @@ class Hierarchy:
         self._most = ksp.getTolerances()[3]
         self._lost = np.inf
         self._rate: float | None = None
+        self._taken, self._renewals = 0, 0
 
     def follow(self, own: Array, blocks: Array) -> bool:
         """Follow the operator, and tell whether its coarse levels are renewed. Collective.
@@ -66,6 +68,7 @@ class Hierarchy:
         self._ksp.getPC().setReusePreconditioner(False)
         self._set_up()
         self._lost, self._rate = 0.0, None
+        self._renewals += 1
 
     def _set_up(self) -> None:
         self._ksp.setOperators(*self._ksp.getOperators())
@@ -80,29 +83,40 @@ class Hierarchy:
         -------
         The number of iterations, and whether the coarse levels have been renewed on the way.
         """
+        self._taken, self._renewals = 0, 0
+        self._solve(rhs.copy(), solution)
+        refine(self._ksp, rhs, solution, self._correct)
+        return self._taken, self._renewals > 0
+
+    def _correct(self, rhs: PETSc.Vec, correction: PETSc.Vec) -> None:
+        """Solve for what a solution has left, which old coarse levels may not see."""
+        if self._renewals == 0:
+            self._renew()
+        if self._taken < self._most:
+            self._solve(rhs, correction)
+
+    def _solve(self, rhs: PETSc.Vec, solution: PETSc.Vec) -> None:
         jump = self._stiff.jump(rhs)
         rhs.axpy(-1.0, self._ksp.getOperators()[0] * jump)
         solution.axpy(-1.0, jump)
-        taken, renewed = self._iterate(rhs, solution, self._most)
+        self._taken += self._iterate(rhs, solution, self._most - self._taken)
         solution.axpy(1.0, jump)
-        return taken, renewed
 
-    def _iterate(self, rhs: PETSc.Vec, solution: PETSc.Vec, most: int) -> tuple[int, bool]:
+    def _iterate(self, rhs: PETSc.Vec, solution: PETSc.Vec, most: int) -> int:
         ksp, digits = self._ksp, -log10(self._ksp.getTolerances()[0])
         if self._rate is None:
             ksp.setTolerances(max_it=most)
             ksp.solve(rhs, solution)
             self._rate = ksp.getIterationNumber() / digits
-            return ksp.getIterationNumber(), False
+            return ksp.getIterationNumber()
         fresh = self._rate * digits
         ksp.setTolerances(max_it=min(ceil(fresh) + PRICE, most))
         ksp.solve(rhs, solution)
         taken = ksp.getIterationNumber()
         if ksp.getConvergedReason() > 0 or taken >= most:
             self._lost += max(taken - fresh, 0.0)
-            return taken, False
+            return taken
         begun = ksp.getConvergedReason() == PETSc.KSP.ConvergedReason.DIVERGED_MAX_IT
         self._renew()
         ksp.setInitialGuessNonzero(begun)
-        again, _ = self._iterate(rhs, solution, most - taken)
-        return taken + again, True
+        return taken + self._iterate(rhs, solution, most - taken)

@@ -22,6 +22,7 @@ from contact.linear.hierarchy import Hierarchy
 from contact.linear.layout import Layout
 from contact.linear.nodal import insert_blocks, nodal_blocks
 from contact.linear.products import quick_products
+from contact.linear.refinement import refine
 from contact.linear.rigid import held_motions
 from contact.linear.stiff_nodes import TOUCH
 from contact.linear.workspace import set_up_with_workspace
@@ -239,12 +240,26 @@ class SparseOperator:
         if self._hierarchy is None:
             self.ksp.solve(self._rhs, self._solution)
             iterations = self.ksp.getIterationNumber()
+            if self.iterative:
+                iterations += self._refine()
         else:
             iterations, renewed = self._hierarchy.solve(self._rhs, self._solution)
             self.counters.factorizations += renewed
         self._solved(iterations, self._rhs.norm(), self._solution.norm())
         # An iterative solver leaves fixed unknowns to its tolerance.
         return self.layout.mask(self._solution.array)
+
+    def _refine(self) -> int:
+        """Correct a solution that leaves too much; return the iterations that took. Collective."""
+        taken = 0
+
+        def solve(rhs: PETSc.Vec, correction: PETSc.Vec) -> None:
+            nonlocal taken
+            self.ksp.solve(rhs, correction)
+            taken += self.ksp.getIterationNumber()
+
+        refine(self.ksp, self._rhs, self._solution, solve)
+        return taken
 
     def solve_all(self, sides: Array) -> Array:
         """Solve with the owned parts of right-hand sides at once, shape (owned, k). Collective.

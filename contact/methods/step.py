@@ -37,6 +37,9 @@ FORCING = 1e-2
 #: leave at contact nodes can make them change to and fro for ever. And the least that it leaves.
 VAIN, LEAST = 3, 1e-8
 
+#: Stiffness of the springs that help to hold loose bodies, over a node's own and the residual.
+SPRINGS = 1e-2
+
 #: Equilibrium residual over the largest one below which the material is left as it was linearised
 #: last: contact and friction are what is wrong.
 SMALL = 0.1
@@ -117,13 +120,24 @@ class WholeStep:
         The problem, and what is chosen for it.
     counters
         Where factorisations and solves are counted.
+    loose
+        Whether contact alone holds a body. It touches at a single node at first, and rolls or
+        slides off by any length until it touches at more. As Levenberg and Marquardt have it, soft
+        springs at all contact nodes keep it from that while nodes change their status; what they
+        bear is left to the next step, and they become softer as the residual falls.
     """
 
     fault = "nothing holds the body that far from rest"
 
     def __init__(
-        self, problem: Problem, options: NewtonOptions, moduli: Moduli, counters: Counters
+        self,
+        problem: Problem,
+        options: NewtonOptions,
+        moduli: Moduli,
+        counters: Counters,
+        loose: bool = False,
     ) -> None:
+        self._loose = loose
         self.problem, self.options, self.moduli = problem, options, moduli
         self.counters = counters
         self._operator: Operator | None = None
@@ -179,6 +193,10 @@ class WholeStep:
         blocks = contact.blocks + layer + self._current(nodal, contact, reached.largest)
         kind, last = "tangent" if tangent else "secant", self._kind
         remains = kind == last and reached.equilibrium < SMALL * reached.largest
+        if self._loose and not contact.settled:
+            stiffness = SPRINGS * min(reached.largest, 1.0) * self.moduli.nodal
+            along = jump.normal[:, :, None] * jump.normal[:, None, :]
+            blocks[:, : body.dim, : body.dim] += stiffness * (along + jump.tangent)
         blocks = interface.weighted(blocks, state.x)
         self.operator.update(kind, state.x, blocks, constant=body.linear or remains)
         self._kind = kind

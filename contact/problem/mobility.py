@@ -106,6 +106,11 @@ def held_by_friction(problem: ContactProblem) -> bool:
     return any([null_space(group.held(friction=False)).size > 0 for group in groups(problem)])
 
 
+def held_by_supports(problem: ContactProblem) -> bool:
+    """Tell whether no rigid motion were free without contact. Collective."""
+    return all([null_space(group.supports).size == 0 for group in groups(problem)])
+
+
 def _free_motions(problem: ContactProblem) -> dict[int, str]:
     """Return the global unknowns that are motions and not given, with their names."""
     return {

@@ -4,10 +4,11 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
+from contact import build_problem, parse_case, solve_problem
 from contact.body.description import Body, Fixed, Load
 from contact.interface.friction import Friction
 from contact.linear import multigrid
-from contact.linear.operator import Counters
+from contact.linear.operator import Counters, SparseOperator
 from contact.methods.newton import Newton
 from contact.methods.options import NewtonOptions
 from contact.problem.contact import Contact
@@ -58,3 +59,48 @@ def test_it_converges_as_fast_as_for_one_body(held, monkeypatch):
     assert exact.converged
     scale = np.abs(direct.x).max()
     assert np.allclose(state.x, direct.x, rtol=0, atol=1e-6 * scale)
+
+
+@pytest.mark.parametrize(("mu", "push"), [(0.0, 0.0), (0.3, 0.0), (0.3, 0.5)])
+def test_a_ball_that_only_another_ball_holds(mu, push, monkeypatch):
+    """It touches it at one node at first; the preconditioner's norm saw nothing but its rolling."""
+    options = {**multigrid.DEFAULTS, "pc_gamg_coarse_eq_limit": "200"}
+    monkeypatch.setattr(multigrid, "DEFAULTS", options)
+    left = []
+
+    def solve(self, rhs, rtol=None, guess=None, solve=SparseOperator.solve):
+        x = solve(self, rhs, rtol, guess)
+        if self.iterative:
+            size = np.linalg.norm(self.layout.mask(rhs))
+            rest = self.layout.mask(rhs - self.multiply(x))
+            left.append(np.linalg.norm(rest) / size / np.sqrt(rtol or multigrid.TOLERANCE))
+        return x
+
+    monkeypatch.setattr(SparseOperator, "solve", solve)
+    section = {
+        "mesh": {
+            "generator": "two_spheres",
+            "quarters": 2,
+            "size": 20.0,
+            "contact_size": 1.6,
+            "contact_width": 5.0,
+        },
+        "material": {"young": 20e3, "poisson": 0.3},
+        "fixed": [
+            {"on": "symmetry_y", "displacement": ["free", 0.0, "free"]},
+            {"on": "lower_cut", "displacement": [0.0, 0.0, 0.0]},
+        ],
+        "load": [{"on": "upper_cut", "traction": [push, 0.0, -8.0]}],
+        "contact": {"on": "upper_round", "against": "lower_round"},
+        "friction": {"law": "coulomb", "mu": mu} if mu else {"law": "none"},
+    }
+    found = {}
+    for linear in ("iterative", "lu"):
+        case = parse_case(section | {"solver": {"linear": linear, "tolerance": 1e-8}})
+        problem = build_problem(case, SELF)
+        found[linear] = solve_problem(problem, case.solver)
+        assert found[linear].converged
+    assert found["iterative"].counters.linear_solves <= 16
+    assert max(left) <= 1
+    direct = found["lu"].state.forces.pressure
+    assert np.abs(found["iterative"].state.forces.pressure - direct).max() < 1e-5 * direct.max()
