@@ -7,7 +7,7 @@ contact problem solves this one too, in small dense steps.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from mpi4py import MPI
@@ -23,7 +23,7 @@ from contact.linear.faults import check_overflow, petsc_options
 from contact.linear.operator import Bulk, Counters
 from contact.linear.schur import SchurComplement
 from contact.problem.condensed_masters import CondensedMasters
-from contact.problem.kept_unknowns import KeptUnknowns
+from contact.problem.kept_unknowns import KeptUnknowns, at_kept_nodes
 from contact.problem.problem import ContactProblem
 from contact.problem.scales import Scales
 from contact.problem.state import State
@@ -200,7 +200,7 @@ class Condensation:
     def turn_to(self, full: ContactProblem) -> None:
         """Go on with another step of the same problem; what is factorised remains."""
         self.full = full
-        self._interface = _at_kept_nodes(full.interface)
+        self._interface = at_kept_nodes(full.interface)
 
     def linearise(self, kind: str, state: State, keep: bool = False) -> CondensedProblem | None:
         """Condense the body, linearised at a state of the full problem. Collective.
@@ -293,17 +293,3 @@ class Condensation:
         everywhere = np.concatenate(self.full.comm.allgather(moved))
         masters, schur = self._masters, self._schur
         return masters.expand(schur, everywhere) if masters else schur.expand(everywhere)
-
-
-def _at_kept_nodes(interface: Interface) -> Interface:
-    """Return an interface whose nodes are numbered among the kept ones."""
-    count = interface.jump.nodes.size
-    positions = np.arange(interface.coupled.size, dtype=np.int32)
-    held = interface.held
-    if held is not None:
-        held = replace(held, jump=replace(held.jump, nodes=positions[count:], links=None))
-    return replace(
-        interface,
-        jump=replace(interface.jump, nodes=positions[:count], motion=None, links=None),
-        held=held,
-    )

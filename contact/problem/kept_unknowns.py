@@ -8,6 +8,8 @@ body's contact nodes.
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
@@ -85,3 +87,17 @@ def _among(change: Change, numbers: NDArray[np.int64], size: int) -> sparse.csr_
     where = [np.concatenate([rows[part], rest]) for part in (entries.row, entries.col)]
     shape = (numbers.size * size, numbers.size * size)
     return sparse.csr_array((values, (where[0], where[1])), shape=shape)
+
+
+def at_kept_nodes(interface: Interface) -> Interface:
+    """Return an interface whose nodes are numbered among the kept ones."""
+    count = interface.jump.nodes.size
+    positions = np.arange(interface.coupled.size, dtype=np.int32)
+    held = interface.held
+    if held is not None:
+        held = replace(held, jump=replace(held.jump, nodes=positions[count:], links=None))
+    return replace(
+        interface,
+        jump=replace(interface.jump, nodes=positions[:count], motion=None, links=None),
+        held=held,
+    )
