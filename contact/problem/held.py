@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 from mpi4py import MPI
+from numpy.typing import NDArray
 from scipy import linalg
 
 from contact.errors import InputError
+from contact.interface.current import Conductor
 from contact.mesh.pieces import connected_pieces
 from contact.problem.mobility import ROUNDING, Group, groups, middle, null_space
 from contact.problem.problem import ContactProblem
@@ -17,17 +19,18 @@ from contact.typing import Array
 def check_held(problem: ContactProblem) -> None:
     """Check that no rigid motion is free, before anything is factorised. Collective.
 
-    Two things are asked for: supports and contact (in the tangential directions too if there
-    is friction) leave no rigid motion at all, and the loads do not pull the body off the
-    foundation where that alone holds it.
+    Three things are asked for: supports and contact (in the tangential directions too if there
+    is friction) leave no rigid motion at all, the loads do not pull the body off the foundation
+    where that alone holds it, and its potential is known or could be if it conducted everywhere.
 
     Raises
     ------
     InputError
-        If the body can move freely or is pulled off.
+        If the body can move freely or is pulled off, or its potential cannot be determined.
     """
     for group in groups(problem):
         _check_group(problem, group)
+    check_potential(problem)
 
 
 def _check_group(problem: ContactProblem, group: Group) -> None:
@@ -66,9 +69,18 @@ def _what_is_loose(problem: ContactProblem, group: Group, loose: Array) -> str:
     )
 
 
-def check_potential(problem: ContactProblem, state: State) -> None:
-    """Check that the potential of a solution is more than known but for constants. Collective.
+def check_potential(problem: ContactProblem, state: State | None = None) -> None:
+    """Check that the potential is more than known but for constants. Collective.
 
+    Parameters
+    ----------
+    problem
+        The problem.
+    state
+        A solution; before there is one, contact may be anywhere and conduct there.
+
+    Notes
+    -----
     It is where it is prescribed, and where current flows, also through nodes that cannot move: to
     a foundation, or to another piece whose potential is known. Electrodes join what they lie on.
 
@@ -80,7 +92,7 @@ def check_potential(problem: ContactProblem, state: State) -> None:
     """
     if not problem.piezoelectric:
         return
-    body, interface, nodal = problem.equilibrium, problem.interface, problem.nodal(state)
+    body, interface = problem.equilibrium, problem.interface
     piece, count = connected_pieces(body.space)
     # Constants by which the potential may be raised: of each piece, and of each electrode.
     raised = np.zeros((*body.free.shape, count))
@@ -90,12 +102,11 @@ def check_potential(problem: ContactProblem, state: State) -> None:
     rows = [np.hstack([raised[:, -1], -follows])[~body.free[:, -1]]]
     columns = linalg.block_diag(raised.reshape(body.owned, count), electrodes)
     locally = [body.local(column) for column in columns.T]
-    pressure = interface.pressure(nodal, state.forces)
-    flows = interface.response.jacobian(nodal, pressure)[:, -1, -1] != 0
+    flows, among_held = _flows(problem, state)
     rows.append(np.column_stack([problem.nodes.apply(x)[flows, -1] for x in locally]))
     if interface.held is not None:
-        flows, jump = interface.held.slope(state.x) != 0, interface.held.jump
-        rows.append(np.column_stack([jump.apply(x)[flows, -1] for x in locally]))
+        jump = interface.held.jump
+        rows.append(np.column_stack([jump.apply(x)[among_held, -1] for x in locally]))
     gram = sum(problem.comm.allreduce(part.T @ part, op=MPI.SUM) for part in rows)
     floating = null_space(gram / max(np.trace(gram), 1.0))
     if floating.shape[1] == 0:
@@ -111,6 +122,35 @@ def check_potential(problem: ContactProblem, state: State) -> None:
         f"the potential{where} is not determined: it is prescribed nowhere, and the foundation "
         f"conducts nowhere; accepted: a potential fixed on a part, or contact with {known}"
     )
+
+
+def _flows(
+    problem: ContactProblem, state: State | None
+) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+    """Tell through which contact nodes current flows, or could, and through which held ones."""
+    interface = problem.interface
+    response, held = interface.response, interface.held
+    if state is None:
+        conductors = response.conductor, None if held is None else held.conductor
+        sizes = interface.jump.nodes.size, 0 if held is None else held.jump.nodes.size
+        at_contact, among_held = (
+            np.zeros(size, dtype=bool)
+            if conductor is None
+            else _conducts(conductor, size, interface.size)
+            for conductor, size in zip(conductors, sizes, strict=True)
+        )
+        return at_contact, among_held
+    nodal = problem.nodal(state)
+    pressure = interface.pressure(nodal, state.forces)
+    slope = np.zeros(0) if held is None else held.slope(state.x)
+    return response.jacobian(nodal, pressure)[:, -1, -1] != 0, slope != 0
+
+
+def _conducts(conductor: Conductor, count: int, deep: float) -> NDArray[np.bool_]:
+    """Tell which nodes conduct where they are pressed, and far into what is in front of them."""
+    closed = np.ones(count, dtype=bool)
+    psi = conductor.psi.at(np.full(count, deep), ~closed, closed)
+    return np.broadcast_to(psi, (count,)) > 0
 
 
 def _describe(motions: Array, names: list[str]) -> str:

@@ -3,6 +3,7 @@
 import pytest
 from mpi4py import MPI
 
+from contact import build_problem, parse_case
 from contact.body.description import Body, Fixed, Load
 from contact.errors import InputError
 from contact.interface.friction import Friction
@@ -16,6 +17,7 @@ from forms.hencky import Linear
 from forms.laws import ConstantCoefficient
 from tests.problems.blocks import Blocks
 from tests.problems.mechanics import constant, flat
+from tests.problems.pairs import case
 
 SELF = MPI.COMM_SELF
 
@@ -54,3 +56,22 @@ def test_a_body_that_lies_on_another_is_held_by_friction(condense):
 def test_pairs_that_fly_away_are_refused(held, traction, mu, words):
     with pytest.raises(InputError, match=words):
         check_held(blocks(held, traction, mu))
+
+
+@pytest.mark.parametrize(
+    ("electric", "refused"),
+    [({"law": "none"}, True), ({"law": "perfect", "k_e": 0.0}, True), ({"k_e": 1.0}, False)],
+)
+def test_a_potential_that_no_contact_could_determine_is_refused_before_anything_is_solved(
+    electric, refused
+):
+    piezo = {"e31": -0.3, "e33": 0.8, "e15": 0.6, "beta11": 1.0, "beta33": 0.9}
+    given = case(material={"young": 1.0, "poisson": 0.3, "piezo": piezo})
+    given["fixed"][0]["potential"] = 0.0
+    if electric.get("law") != "none":
+        given["electric"] = electric
+    if refused:
+        with pytest.raises(InputError, match="potential of the piece of the mesh about"):
+            build_problem(parse_case(given), SELF)
+    else:
+        build_problem(parse_case(given), SELF)

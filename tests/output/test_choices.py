@@ -1,0 +1,29 @@
+"""What is said of the sides of two bodies."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+
+from contact import parse_case, solve
+from contact.interface.multipliers import Multipliers
+from contact.output.bodies import choices
+from tests.problems.pairs import case
+
+
+@pytest.mark.parametrize(("share", "warned"), [(0.1, True), (1e-5, False)])
+def test_what_a_method_leaves_at_partly_covered_nodes_is_no_pressure(share, warned):
+    """An open node's is zero by Newton's method, rounding by others."""
+    sizes = {"lower_width": 1.5, "lower_size": 0.3, "upper_size": 0.3}
+    given = case(mesh={"generator": "two_blocks", **sizes}, friction={"law": "none"})
+    given["fixed"].append({"on": "upper_left", "displacement": [0.0, "free"]})
+    solution = solve(parse_case(given), comm=MPI.COMM_SELF)
+    assert solution.converged
+    covered = solution.problem.entries[0].coupling.covered
+    assert (covered < 0.5).any()
+    pressure = np.where(covered < 0.5, share, 1.0) * solution.state.forces.pressure.max()
+    forces = Multipliers(pressure, solution.state.forces.friction)
+    changed = replace(solution, state=replace(solution.state, forces=forces))
+    words = [text for text, _ in choices(changed) if "less than half" in text]
+    assert bool(words) == warned
