@@ -138,17 +138,21 @@ def _solve_linearised(
         assert gathered_bound is not None
         return np.concatenate(gathered_bound)
 
-    answer = None
+    answer: tuple[Array, Array, Array, int, str] | Exception | None = None
     if gathered is not None:
         try:
             answer = gathered.solve(bound, friction, tolerance)
         except NotConvexError:
             answer = None
+        except (ValueError, ArithmeticError, MemoryError) as fault:
+            answer = fault  # the others are waiting, and are to end as this one does
         comm.bcast(None)
     else:
         while (asked := comm.bcast(None)) is not None:
             comm.gather(own_bound(*asked))
     answer = comm.bcast(answer)
+    if isinstance(answer, Exception):
+        raise answer
     if answer is None:
         return None
     x, pressure, tangential, steps, words = answer
