@@ -23,7 +23,7 @@ from contact.methods.search import Search
 from contact.methods.step import Iterate
 from contact.methods.sure import INTERIOR_POINT
 from contact.problem.kkt import evaluate, residual_forces
-from contact.problem.mobility import groups, null_space
+from contact.problem.mobility import groups, held_by_supports, null_space
 from contact.problem.problem import ContactProblem
 from contact.problem.state import State
 from contact.tolerances import EPS
@@ -69,10 +69,9 @@ def interior_point(
     """
     problem, interface = search.problem, search.problem.interface
     assert isinstance(problem, ContactProblem)
-    apart = tuple(groups(problem))
-    held = not any(null_space(group.supports).shape[1] for group in apart)
+    held = held_by_supports(problem)
     bound: Array = np.zeros(interface.jump.weight.size)
-    if not held and any(null_space(group.held(False)).shape[1] for group in apart):
+    if not all([null_space(group.held(False)).size == 0 for group in groups(problem)]):
         bound = np.full_like(bound, STUCK * _loads(problem)) / interface.jump.weight
     for _ in range(UPDATES):
         method = Barrier(problem, operator, bound, held)

@@ -7,6 +7,7 @@ from contact.build import build_problem
 from contact.case.file import Case, parse_case
 from contact.interface.friction import Friction
 from contact.methods import barrier
+from contact.methods.barrier import interior_point
 from contact.methods.load_steps import load_steps
 from contact.methods.newton import Newton
 from contact.methods.options import NewtonOptions
@@ -35,6 +36,25 @@ def test_an_interior_point_takes_over_where_newton_gives_up(friction):
     method = newton(problem, max_iterations=2, condense=False)
     assert any(record.note.startswith("interior point") for record in method.history.records)
     assert method.history.records[-1].kkt.largest <= 1e-8
+
+
+def test_an_interior_point_on_a_body_that_friction_alone_keeps_from_sliding():
+    """Without friction it would slide away: its nodes are first taken for stuck."""
+    case = {
+        "mesh": {"generator": "rectangle", "size": [4.0, 1.0], "cells": [16, 4]},
+        "material": {"young": 1.0, "poisson": 0.3},
+        "fixed": [{"on": "top", "displacement": ["free", -0.01]}],
+        "load": [{"on": "right", "traction": [-2e-3, 0.0]}],
+        "contact": {"on": "bottom"},
+        "friction": {"law": "coulomb", "mu": 0.5},
+    }
+    problem = build_problem(parse_case(case), SELF)
+    state, outcome = Newton(problem, NewtonOptions()).solve()
+    assert outcome.converged
+    method = Newton(problem, NewtonOptions(condense=False))
+    found, outcome = interior_point(method.search, method.whole.operator, method._finished)
+    assert outcome.converged, outcome.reason
+    assert found.state.near(state, rtol=1e-6, atol=1e-9)
 
 
 @pytest.mark.parametrize(
