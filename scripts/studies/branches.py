@@ -153,13 +153,14 @@ class Branches:
         problem, body = self.problem, self.problem.equilibrium
         points = body.space.tabulate_dof_coordinates() / problem.domain.size
         wave = 1 + DISTURBANCE * np.cos(points @ [70.0, 30.0, 50.0])
-        x = (self._nodal(found.state.x) * wave[:, None]).ravel()
+        x = found.state.x.copy()
+        self._nodal(x)[:] *= wave[:, None]  # what is global, behind the nodes, stays
         factor, forces = wave[problem.nodes.nodes], found.forces
         disturbed = Multipliers(forces.pressure * factor, forces.friction / factor[:, None])
         return State(body.prescribe(x), disturbed)
 
     def _nodal(self, x: Array) -> Array:
-        return x.reshape(-1, self.problem.equilibrium.block_size)
+        return self.problem.equilibrium.nodal(x)
 
     def _largest(self, values: Array) -> float:
         largest = float(np.abs(values).max(initial=0.0))

@@ -21,7 +21,7 @@ class ProductNorm:
     """
 
     def __init__(self, problem: ContactProblem) -> None:
-        body = problem.equilibrium
+        body = self._body = problem.equilibrium
         self._x = fem.Function(body.space)
         u, phi = body.split(self._x)
         parts = [ufl.inner(strain(u), strain(u))]
@@ -32,6 +32,6 @@ class ProductNorm:
 
     def __call__(self, x: Array) -> tuple[float, ...]:
         """Return the norms in V and, with a potential, W of local unknowns. Collective."""
-        self._x.x.array[:] = x
+        self._x.x.array[:] = self._body.nodal(x).ravel()
         squares = [self._comm.allreduce(fem.assemble_scalar(form)) for form in self._forms]
         return tuple(float(np.sqrt(square)) for square in squares)
