@@ -19,7 +19,7 @@ exclude_patterns = ["results/**"]
 html_theme = "alabaster"
 html_theme_options = {
     "description": "Frictional contact in FEniCSx",
-    "page_width": "1240px",
+    "page_width": "min(1240px, 96%)",  # narrow windows cut nothing off
     "sidebar_width": "250px",
     "body_max_width": "none",  # lines of code have 100 characters
     "code_font_size": "0.8em",
