@@ -1,9 +1,10 @@
 """Half spaces for indentation: cylinders, their half planes and halves of them in space."""
 
-from itertools import pairwise
+import math
 
 from contact.errors import InputError
 from meshes.grading import Sizes, finish
+from meshes.turning import turn
 
 
 def half_space(
@@ -52,60 +53,27 @@ def half_cylinder(
     extent: float = 6.0,
     size: float = 1.5,
     contact_size: float = 0.25,
-    edge_size: float = 0.15,
+    edge_size: float = 0.05,
+    arc_size: float = 0.25,
     growth: float = 0.4,
 ) -> None:
     """Half y > 0 of a cylinder -extent < z < 0 about the axis z, indented at the origin.
 
     Parts: ``contact`` (the top up to ``radius``), ``free`` (the rest of the top), ``symmetry``
-    (y = 0), ``side``, ``bottom``. Sizes as in `half_space`.
+    (y = 0), ``side``, ``bottom``. Sizes as in `half_space`, whose mesh is turned about the axis;
+    along the edge of the contact part the elements have the size ``arc_size``.
     """
     import gmsh
 
-    _check(radius, extent)
-    geo = gmsh.model.geo
-    low, top = geo.addPoint(0, 0, -extent), geo.addPoint(0, 0, 0)
-
-    def half_circle(centre: int, r: float, z: float) -> tuple[list[int], list[int]]:
-        """Return the points and the arcs from x = r by y = r to x = -r."""
-        points = [geo.addPoint(*p, z) for p in ((r, 0), (0, r), (-r, 0))]
-        return points, [geo.addCircleArc(a, centre, b) for a, b in pairwise(points)]
-
-    (right, _, left), edge = half_circle(top, radius, 0.0)
-    rim_points, rim = half_circle(top, extent, 0.0)
-    floor_points, floor = half_circle(low, extent, -extent)
-    across = geo.addLine(left, right)
-    ledges = geo.addLine(right, rim_points[0]), geo.addLine(rim_points[2], left)
-    walls = [geo.addLine(a, b) for a, b in zip(rim_points, floor_points, strict=True)]
-    base = geo.addLine(floor_points[2], floor_points[0])
-    contact = geo.addPlaneSurface([geo.addCurveLoop([*edge, across])])
-    free = geo.addPlaneSurface(
-        [geo.addCurveLoop([ledges[0], *rim, ledges[1], *(-e for e in edge[::-1])])]
-    )
-    bottom = geo.addPlaneSurface([geo.addCurveLoop([*floor, base])])
-    outline = [across, ledges[0], walls[0], -base, -walls[2], ledges[1]]
-    symmetry = geo.addPlaneSurface([geo.addCurveLoop(outline)])
-    side = [
-        geo.addSurfaceFilling([geo.addCurveLoop([walls[k], floor[k], -walls[k + 1], -rim[k]])])
-        for k in range(2)
-    ]
-    body = geo.addVolume([geo.addSurfaceLoop([contact, free, bottom, symmetry, *side])])
-    finish(
-        gmsh,
-        3,
-        [body],
-        {
-            "contact": [contact],
-            "free": [free],
-            "symmetry": [symmetry],
-            "side": side,
-            "bottom": [bottom],
-        },
-        Sizes(size, contact_size, 0.5 * radius, growth),
-        surfaces=[contact],
-        edges=edge,
+    half_space(
+        radius=radius,
+        extent=extent,
+        size=size,
+        contact_size=contact_size,
         edge_size=edge_size,
+        growth=growth,
     )
+    turn(gmsh, math.ceil(math.pi * radius / arc_size))
 
 
 def _check(radius: float, extent: float) -> None:

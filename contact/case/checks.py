@@ -33,7 +33,8 @@ def check_sections(case: Case) -> None:
     given = [fixed.displacement or () for fixed in case.fixed]
     given += [part.displacement or ("held",) for part in case.rigid]
     if not any(component != "free" for components in given for component in components):
-        raise fault("fixed", Words("no displacement fixed"), "at least one component on a part")
+        accepted = "at least one component on a part, in [[fixed]] or [[rigid]]"
+        raise fault("fixed", Words("no displacement fixed"), accepted)
     _check_lagged(case)
     check_evolution(case)
     for path, formula in _formulas(case):

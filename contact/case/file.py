@@ -88,12 +88,11 @@ class Case(Section):
     material: Materials = Field(
         description="The material: `[material]`; several: `[[material]]`, each with its regions."
     )
-    fixed: Annotated[
-        tuple[Fixed, ...],
-        Field(min_length=1),
-        as_tuple,
-        Accepted("one or more tables [[fixed]]"),
-    ] = Field(description="Supports and electrodes: one or more `[[fixed]]`.")
+    fixed: Annotated[tuple[Fixed, ...], as_tuple, Accepted("tables [[fixed]]")] = Field(
+        default=(),
+        description="Supports and electrodes: `[[fixed]]`. Required but where `[[rigid]]` holds "
+        "the body.",
+    )
     load: Annotated[tuple[Load, ...], as_tuple, Accepted("tables [[load]]")] = Field(
         default=(), description="Forces and charges: any number of `[[load]]`."
     )

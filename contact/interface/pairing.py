@@ -131,7 +131,6 @@ def _coupled(
         )
     reach = REACH * body.domain.size
     coupling = couple(slave, master, reach, body.comm)
-    _check_apart(body, coupling, what)
     stuck = _stuck(body, coupling)
     if rough is not None:
         one_sided = _one_sided(body, coupling)
@@ -145,17 +144,19 @@ def _coupled(
             f"{what} have no facets that face each other within {reach:.3g}, or their nodes are "
             "held there; accepted: sides of two bodies that look at each other"
         )
+    _check_apart(body, coupling, what)
     return coupling
 
 
 def _check_apart(body: BodyEquilibrium, coupling: Coupling, what: str) -> None:
-    """Refuse nodes that follow something rigid or an electrode. Collective."""
-    taking = np.concatenate([coupling.slaves, coupling.masters])
+    """Refuse jumps of nodes that follow something rigid or an electrode. Collective."""
+    sides = (coupling.slaves, coupling.own), (coupling.masters, coupling.other)
+    taking = np.concatenate([every[abs(part).sum(axis=0) > 0] for every, part in sides])
     _, local = owned_among(body.layout.index_map, taking)
     if body.comm.allreduce(bool(body.masters.tied[local].any()), op=MPI.LOR):
         raise InputError(
             f"{what}: their nodes follow a rigid part or an electrode of unknown potential; "
-            "accepted: parts apart from these"
+            "accepted: parts that end before these"
         )
 
 

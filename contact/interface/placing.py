@@ -180,9 +180,9 @@ def find_nodes(
 ) -> tuple[ContactNodes, Mixing | None]:
     """Collect the contact nodes of a boundary part, and the jumps there. Collective.
 
-    A node whose contact direction is fixed by a Dirichlet condition is left out; a fixed
-    tangential component is removed from its tangent projector. On a symmetry line the
-    direction is turned into the free components, and what the fixed ones contribute to
+    A node whose contact direction is fixed by a Dirichlet condition, or that follows a rigid part,
+    is left out; a fixed tangential component is removed from its tangent projector. On a symmetry
+    line the direction is turned into the free components, and what the fixed ones contribute to
     u_nu is taken off the gap. So it is with a foundation that moves.
 
     Parameters
@@ -197,8 +197,9 @@ def find_nodes(
     Raises
     ------
     InputError
-        If no contact node is left on any rank, one has no contact direction or a gap that is no
-        number, or the foundation lies behind the contact part or cuts the body at rest.
+        If no contact node is left on any rank, none sees the foundation, one has no contact
+        direction or a gap that is no number, a part of quadratic triangles shares nodes with a
+        rigid part, or the foundation lies behind the contact part or cuts the body at rest.
     """
     domain, space, d = body.domain, body.space, body.dim
     found = candidates(domain, space, part)
@@ -218,17 +219,25 @@ def find_nodes(
             gap, cut = _place(domain, space, (part, obstacle), found, direction, gap, press)
     else:
         check_gap(domain, gap, key, press)
-    if domain.comm.allreduce(bool(body.masters.tied[nodes, :d].any()), op=MPI.LOR):
+    shared = found.mixing is not None and bool(body.masters.tied[nodes, :d].any())
+    if domain.comm.allreduce(shared, op=MPI.LOR):
         raise InputError(
-            f"{key}.on: part {part!r} shares nodes with a rigid part; accepted: parts apart"
+            f"{key}.on: part {part!r} shares nodes with a rigid part; accepted with quadratic "
+            "triangles, whose jumps are sums over nodes: parts apart, or space.degree = 1"
         )
     free = body.free[nodes, :d]
     fixed = found.jumps(body.nodal(body.prescribe(body.rest()))[nodes, :d])
     gap = found.gaps(direction, gap) - np.einsum("ni,ni->n", direction, ~free * fixed)
     admissible = direction * free
     length = np.linalg.norm(admissible, axis=1)
-    # A gap is infinite where the body's normal does not lead to the foundation.
-    keep = (length > 0.5) & np.isfinite(gap)
+    # A gap is infinite where the contact direction does not lead to the foundation.
+    meets = np.isfinite(gap)
+    if not domain.comm.allreduce(bool(meets.any()), op=MPI.LOR):
+        raise InputError(
+            f"{key}: from no node of the part {part!r} does the contact direction meet the "
+            "foundation; accepted: a shape in front of the part; an axis from the body towards it"
+        )
+    keep = (length > 0.5) & meets
     nodes, points, weight = nodes[keep], points[keep], weight[keep]
     gap, free = gap[keep], free[keep]
     held = (direction * ~body.free[found.nodes, :d])[keep] / length[keep, None]

@@ -202,6 +202,25 @@ def resolution(solution: Solution) -> Remark:
     )
 
 
+def untouched(solution: Solution) -> Remark:
+    """Say that no node is in contact: a load step may end like that, a static problem is not one.
+
+    What has a tip may also reach into the body between the nodes.
+    """
+    problem = solution.problem
+    closed = bool(np.any(solution.status != "open"))
+    if problem.since is not None or problem.comm.allreduce(closed, op=MPI.LOR):
+        return "", True
+    text = (
+        "nothing touches: no contact node has met the foundation; it is too far away, or narrower "
+        "than the elements there"
+    )
+    masters = problem.equilibrium.masters
+    if np.any(masters.free & masters.mechanical):
+        text += "; what is rigid and free may be anywhere that it touches nothing"
+    return text, False
+
+
 def rounding(solution: Solution) -> Remark:
     """Say where forces balance to their rounding alone, which is more than the tolerance."""
     granted, asked = solution.outcome.kkt.rounding, solution.outcome.allowed.equilibrium

@@ -40,6 +40,7 @@ def review(solution: Solution) -> None:
         assumptions.fitting(solution.problem),
         assumptions.preload(solution),
         assumptions.falling(solution),
+        assumptions.untouched(solution),
         assumptions.resolution(solution),
         assumptions.rounding(solution),
         uniqueness.theorem(solution),

@@ -206,7 +206,8 @@ def _check_loads(
         motion = linprog(-work, cone, np.zeros(len(cone)), bounds=[(-1, 1)] * free.shape[1])
         pulled = motion.status == 0 and -motion.fun > 1e-6 * scale
     if comm.bcast(pulled):
+        moving = ", or force and moment what is rigid off the body" if group.moving else ""
         raise InputError(
-            "the loads pull the body off the foundation, and no support holds it there; accepted: "
-            "loads that press it on, or more displacement components fixed"
+            f"the loads pull the body off the foundation{moving}, and no support holds it there; "
+            "accepted: loads that press it on, or more displacement components fixed"
         )

@@ -7,6 +7,7 @@ from contact import Solution, UserLaw, load_case, solve
 from contact.case.file import parse_case
 from forms.ops import exp
 from scripts.cases import CASES
+from tests.problems.rigid import indented
 from tests.problems.written import block
 
 
@@ -96,6 +97,18 @@ def test_contact_that_is_too_coarse_is_warned_of(kinematics):
     # What few nodes say of the width is only about right.
     fine = solve(parse_case({**data, "mesh": {**mesh, "contact_size": size / 2}}))
     assert not [text for text in fine.warnings if words in text]
+
+
+@pytest.mark.parametrize(
+    ("motion", "warned", "anywhere"),
+    [([0.0, 0.01], True, False), ([0.0, "free"], True, True), ([0.0, -0.01], False, False)],
+)
+def test_a_foundation_that_nothing_touches_is_warned_of(motion, warned, anywhere):
+    """Also one without a force: it does not know where to be."""
+    solution = solve(indented(n=4, displacement=motion))
+    found = [text for text in solution.warnings if "nothing touches" in text]
+    assert len(found) == warned
+    assert any("may be anywhere" in text for text in found) == anywhere
 
 
 def test_large_strains_are_warned_of():

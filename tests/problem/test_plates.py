@@ -38,6 +38,63 @@ def test_columns_under_a_plate_shorten_as_hooke_says():
     assert solution.pressure == pytest.approx(0.01, rel=1e-10)
 
 
+def beside_the_contact_part(degree, *, rigid=(), fixed=()):
+    """Return a block that is pressed on its foundation, and whose right side does not bend."""
+    data = plate().model_dump(exclude_unset=True)
+    data["space"] = {"degree": degree}
+    data["load"] = [{"on": "top", "traction": [0.0, -0.05]}]
+    data["friction"] = {"law": "coulomb", "mu": 0.3}
+    return parse_case({**data, "rigid": rigid, "fixed": [*data["fixed"], *fixed]})
+
+
+@pytest.mark.parametrize("degree", [1, 2])
+def test_a_plate_that_meets_the_contact_part_holds_the_nodes_there_as_a_support_does(degree):
+    """At the corner; where the plate is free, force and moment balance on every road."""
+    moves = {"on": "right", "displacement": [-0.01, 0.002]}
+    one, two = (
+        solved(beside_the_contact_part(degree, **{key: [moves]}), SELF)[0]
+        for key in ("rigid", "fixed")
+    )
+    assert two.pressure.max() > 0.05
+    assert one.pressure == pytest.approx(two.pressure, abs=1e-12)
+    pushed = {"on": "right", "displacement": ["free", "free"], "force": [-0.01, 0.0]}
+    case = beside_the_contact_part(degree, rigid=[pushed])
+    first = solved(case, SELF)[0]
+    for condense in (True, False):
+        solution, moved = solved(case, SELF, NewtonOptions(tolerance=1e-10, condense=condense))
+        assert moved["rigid_parts"]["right"]["force"] == pytest.approx([-0.01, 0.0], abs=1e-12)
+        assert solution.pressure == pytest.approx(first.pressure, abs=1e-9)
+
+
+def test_balls_whose_cuts_are_plates():
+    """The rims of both cuts belong to the contact parts too, far from where these touch."""
+    mesh = {"radius": 1.0, "size": 0.3, "contact_size": 0.1, "contact_width": 0.3}
+    found = [
+        solved(
+            parse_case(
+                {
+                    "mesh": {"generator": "two_half_cylinders", **mesh},
+                    "material": {"young": 1.0, "poisson": 0.3},
+                    "rigid": [
+                        {"on": "lower_cut"},
+                        {
+                            "on": "upper_cut",
+                            "displacement": [0.0, "free"],
+                            "force": [0.0, -0.02],
+                        },
+                    ],
+                    "contact": {"on": f"{slave}_arc", "against": f"{master}_arc"},
+                }
+            ),
+            SELF,
+        )[1]["rigid_parts"]["upper_cut"]
+        for slave, master in (("lower", "upper"), ("upper", "lower"))
+    ]
+    for part in found:
+        assert part["force"][1] == pytest.approx(-0.02, rel=1e-9)
+        assert part["displacement"][1] == pytest.approx(found[0]["displacement"][1], rel=1e-3)
+
+
 @pytest.mark.parametrize("charge", [0.0, 2e-3])
 @pytest.mark.parametrize(
     "solver",

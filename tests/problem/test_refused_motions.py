@@ -22,7 +22,10 @@ SELF = MPI.COMM_SELF
         ({"displacement": [0.0, "-0.01*t"]}, r"a formula in t with \[evolution\] only"),
         ({"displacement": [0.0, "x"]}, "displacement.1: .* depends on the place"),
         ({"amplitude": "press"}, r"an amplitude with \[evolution\] only"),
-        ({"displacement": [0.0, "free"], "force": [0.0, 0.01]}, "pull the body off"),
+        (
+            {"displacement": [0.0, "free"], "force": [0.0, 0.01]},
+            "pull the body off the foundation, or force and moment what is rigid off the body",
+        ),
         ({"rotation": "free"}, r"can move as a rigid body \(rotation of what is rigid\)"),
     ],
 )
@@ -51,7 +54,6 @@ def test_nothing_leaves_the_axis_of_revolution(changes):
         ([{"on": "bottom"}], "rigid.0.on.*beside the contact part"),
         ([{"on": "top"}, {"on": "top"}], "rigid.1.on"),
         ([{"on": "top"}, {"on": "right"}], "shares nodes with another"),
-        ([{"on": "right"}], "contact.on.*shares nodes with a rigid part"),
         ([{"on": "top", "displacement": ["free", 0.0]}], "a support fixes a component"),
         ([{"on": "roof"}], "rigid.0.on.*a part of the mesh"),
     ],
@@ -59,6 +61,23 @@ def test_nothing_leaves_the_axis_of_revolution(changes):
 def test_bad_rigid_parts_are_refused(rigid, words):
     with pytest.raises(InputError, match=words):
         build_problem(plate(rigid=rigid), SELF)
+
+
+def test_sums_over_quadratic_triangles_take_no_nodes_of_a_plate():
+    data = indented(3, n=2).model_dump(exclude_unset=True)
+    data["space"] = {"degree": 2}
+    data["rigid"] = [{"on": "right"}]
+    with pytest.raises(InputError, match="shares nodes with a rigid part; accepted with quadratic"):
+        build_problem(parse_case(data), SELF)
+
+
+@pytest.mark.parametrize("axis", [[0.0, -1.0], [1.0, 0.0]])
+def test_an_axis_that_leads_away_is_no_contact_direction(axis):
+    data = indented().model_dump(exclude_unset=True)
+    shape = {"shape": "paraboloid", "apex": [1.0, 1.0], "axis": [0.0, 1.0], "radius": 1.0}
+    data["contact"] |= {"direction": "axis", "axis": axis, "foundation": shape}
+    with pytest.raises(InputError, match="from no node of the part 'top' does the contact direct"):
+        build_problem(parse_case(data), SELF)
 
 
 def test_bad_electrodes_are_refused():
