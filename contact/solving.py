@@ -17,7 +17,7 @@ from contact.errors import InputError
 from contact.evolving import check_options, solve_steps
 from contact.kinds import expect
 from contact.methods.every import METHODS
-from contact.methods.interrupt import stop_on_signal
+from contact.methods.interrupt import SIGNALLED, stop_on_signal
 from contact.methods.options import NewtonOptions, Options
 from contact.methods.report import Monitor
 from contact.methods.steps import solve_step
@@ -34,8 +34,11 @@ from contact.problem.state import State
 GIVEN = "the state that was given"
 
 
-class SolveInterrupted(KeyboardInterrupt):
+class SolveInterrupted(KeyboardInterrupt, SystemExit):
     """A SIGINT (Ctrl-C) or SIGTERM has ended a solve, on all ranks after the same iteration.
+
+    A program that does not catch it ends with the status 130 or 143: that is what a SystemExit is
+    for, as Python does not give it to those who inherit from KeyboardInterrupt alone.
 
     Parameters
     ----------
@@ -46,6 +49,7 @@ class SolveInterrupted(KeyboardInterrupt):
     def __init__(self, solution: Solution) -> None:
         super().__init__(solution.outcome.reason)
         self.solution = solution
+        self.code = SIGNALLED + solution.outcome.signal
 
 
 def solve(

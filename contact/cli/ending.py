@@ -16,8 +16,6 @@ from mpi4py import MPI
 CONVERGED, NOT_CONVERGED, BAD_INPUT = 0, 1, 2
 #: EX_SOFTWARE: a fault of the program.
 CRASH = 70
-#: Added to the number of the signal that ended a run.
-SIGNALLED = 128
 
 #: Open MPI's programs that start ranks.
 _LAUNCHERS = ("mpirun", "mpiexec", "prterun", "prted", "orterun", "orted")

@@ -27,7 +27,6 @@ from contact.cli.ending import (
     BAD_INPUT,
     CONVERGED,
     NOT_CONVERGED,
-    SIGNALLED,
     end,
     end_by_crash,
     end_in_words,
@@ -35,7 +34,13 @@ from contact.cli.ending import (
 )
 from contact.cli.loading import load
 from contact.errors import InputError
-from contact.methods.interrupt import Interrupted, Terminated, ending_on_signal, signals_held
+from contact.methods.interrupt import (
+    SIGNALLED,
+    Interrupted,
+    Terminated,
+    ending_on_signal,
+    signals_held,
+)
 from contact.output.folder import on_root, refused, result_folder
 from contact.output.rerun import check_rerun
 

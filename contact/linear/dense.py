@@ -1,8 +1,9 @@
 """A dense operator at kept nodes, the same on all ranks, plus a small block at each node.
 
 The first rank factorises it, and solves for all: factors are as large as the operator. From one
-step of a contact problem to the next few nodes change what they do. The factors are kept until many
-have, and corrected for those few: Sherman, Morrison and Woodbury.
+step of a contact problem to the next some nodes change what they do, mostly the same ones: those
+that slip. The factors are kept until most have, and corrected for the others (Sherman, Morrison and
+Woodbury), with columns of the inverse that are kept as well.
 """
 
 from __future__ import annotations
@@ -14,14 +15,15 @@ import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
 from scipy.linalg.lapack import dgetrf, dgetrs
+from scipy.sparse import csr_array
 
 from contact.linear.first_rank import from_first
 from contact.linear.operator import Counters
 from contact.typing import Array
 
-#: Part of the unknowns whose blocks may differ from those that were factorised: corrections then
-#: take half the operations of new factors.
-FEW = 1 / 8
+#: Part of the unknowns whose blocks may differ from those that were factorised. So many columns of
+#: the inverse cost 1.5 times what new factors do, and what follows with the same ones an eighth.
+MOST = 1 / 2
 
 
 @dataclass
@@ -34,11 +36,16 @@ class Factors:
         As LAPACK leaves them; None before the first factorisation.
     blocks
         The nodal blocks that are in them, shape (nodes, block size, block size).
+    known, columns
+        Numbers of the columns of the inverse that have been asked for, and these, one below the
+        other.
     """
 
     lower_upper: Array | None = None
     pivots: NDArray[np.int32] = field(default_factory=lambda: np.zeros(0, dtype=np.int32))
     blocks: Array = field(default_factory=lambda: np.zeros((0, 0, 0)))
+    known: NDArray[np.int64] = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
+    columns: Array = field(default_factory=lambda: np.zeros((0, 0)))
 
     def make(self, matrix: Array, blocks: Array) -> None:
         """Factorise a matrix plus blocks."""
@@ -47,6 +54,15 @@ class Factors:
         total[rows[:, :, None], rows[:, None, :]] += blocks
         self.lower_upper, self.pivots, _ = dgetrf(total, overwrite_a=True)
         self.blocks = blocks
+        self.known, self.columns = np.zeros(0, dtype=np.int64), np.zeros((0, matrix.shape[0]))
+
+    def know(self, numbers: NDArray[np.int64]) -> None:
+        """Have these columns of the inverse among those that are known."""
+        new = np.setdiff1d(numbers, self.known)
+        unit = np.zeros((self.columns.shape[1], new.size), order="F")
+        unit[new, np.arange(new.size)] = 1.0
+        self.known = np.concatenate([self.known, new])
+        self.columns = np.concatenate([self.columns, self.solve(unit).T])
 
     def solve(self, rhs: Array) -> Array:
         """Solve for one or several columns."""
@@ -92,7 +108,7 @@ class DenseOperator:
 
     def __init__(self, bulk: DenseBulk, counters: Counters) -> None:
         self.bulk, self.counters = bulk, counters
-        self._changed: NDArray[np.int64] = np.zeros(0, dtype=np.int64)
+        self._changes = False
 
     def update(self, kind: str, x: Array, blocks: Array, *, constant: bool = False) -> bool:
         """Add up and factorise. Collective; see `operator.SparseOperator.update`."""
@@ -106,30 +122,37 @@ class DenseOperator:
     def _factorise(self) -> None:
         """Factorise, or correct the factors that there are."""
         factors, stiffness = self.bulk.factors, self.bulk.stiffness
-        if factors.lower_upper is not None:
-            change = self._blocks - factors.blocks
-            differs = change != 0
-            self._changed = np.flatnonzero((differs.any(axis=2) | differs.any(axis=1)).ravel())
-        few = factors.lower_upper is not None and self._changed.size <= FEW * stiffness.shape[0]
-        if not few or (self._changed.size > 0 and not self._correct(change)):
+        if factors.lower_upper is None or not self._correct():
             factors.make(stiffness, self._blocks)
-            self._changed = np.zeros(0, dtype=np.int64)
+            self._changes = False
 
-    def _correct(self, change: Array) -> bool:
-        """Correct the factors for blocks that differ by a change, at the unknowns that it meets.
+    def _correct(self) -> bool:
+        """Correct the factors for blocks that differ from those that are in them.
 
         Returns
         -------
-        Whether they can be corrected: not where they, or what they would become, are singular.
+        Whether they can be corrected: not where too many differ, nor where they, or what they would
+        become, are singular.
         """
-        changed, size = self._changed, change.shape[1]
-        unit = np.zeros((self.bulk.stiffness.shape[0], changed.size), order="F")
-        unit[changed, np.arange(changed.size)] = 1.0
-        self._columns = self.bulk.factors.solve(unit)
-        node, component = np.divmod(changed, size)
-        among = change[node[:, None], component[:, None], component]
-        self._change = np.where(node[:, None] == node, among, 0.0)
-        inner = np.eye(changed.size) + self._change @ self._columns[changed]
+        factors = self.bulk.factors
+        change = self._blocks - factors.blocks
+        differs = change != 0
+        changed = np.flatnonzero((differs.any(axis=2) | differs.any(axis=1)).ravel())
+        self._changes = changed.size > 0
+        if not self._changes:
+            return True
+        missing = np.setdiff1d(changed, factors.known).size
+        if factors.known.size + missing > MOST * self.bulk.stiffness.shape[0]:
+            return False
+        factors.know(changed)
+        known = factors.known
+        place = np.full(self.bulk.stiffness.shape[0], -1)
+        place[known] = np.arange(known.size)
+        node, row, column = np.nonzero(differs)
+        size = change.shape[1]
+        among = place[node * size + row], place[node * size + column]
+        self._change = csr_array((change[differs], among), shape=(known.size, known.size))
+        inner = np.eye(known.size) + self._change @ factors.columns[:, known].T
         self._inner, self._pivots, info = dgetrf(inner)
         return bool(info == 0 and np.isfinite(self._inner).all())
 
@@ -141,15 +164,16 @@ class DenseOperator:
 
     def _refined(self, rhs: Array) -> Array:
         solution = self._solve(rhs)
-        if self._changed.size > 0:  # stiff blocks that were taken away have left their rounding
+        if self._changes:  # stiff blocks that were taken away have left their rounding
             solution += self._solve(rhs - self._times(solution))
         return solution
 
     def _solve(self, rhs: Array) -> Array:
-        solution = self.bulk.factors.solve(rhs)
-        if self._changed.size > 0:
-            known = self._change @ solution[self._changed]
-            solution -= self._columns @ dgetrs(self._inner, self._pivots, known)[0]
+        factors = self.bulk.factors
+        solution = factors.solve(rhs)
+        if self._changes:
+            values = self._change @ solution[factors.known]
+            solution -= dgetrs(self._inner, self._pivots, values)[0] @ factors.columns
         return solution
 
     def _times(self, values: Array) -> Array:

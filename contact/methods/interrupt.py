@@ -20,6 +20,9 @@ if TYPE_CHECKING:  # it loads dolfinx, which PETSc's options have to precede
 #: Seconds in which a second signal is taken for an echo of the first.
 REPEAT = 2.0
 
+#: Added to the number of the signal that ended a run: its exit status.
+SIGNALLED = 128
+
 
 class Interrupted(Exception):
     """A signal asked for the end of the solve.
@@ -51,11 +54,14 @@ class Stop:
         Told of every outer iteration first.
     caught
         The first signal on this rank, or nothing.
+    told
+        Whether `Interrupted` has been raised for it.
     """
 
     comm: MPI.Intracomm
     monitor: Monitor | None
     caught: list[int] = field(default_factory=list)
+    told: bool = False
 
     def __call__(self, record: Record) -> None:
         """Pass an outer iteration on, and look for signals. Collective."""
@@ -65,9 +71,19 @@ class Stop:
 
     def poll(self) -> None:
         """Look for signals, once an inner iteration. Collective."""
-        number = self.comm.allreduce(self.caught[0] if self.caught else 0, op=MPI.MAX)
+        number = self._first()
         if number:
+            self.told = True
             raise Interrupted(number)
+
+    def agree(self) -> None:
+        """Take a signal on any rank for one on all of them. Collective."""
+        number = self._first()
+        if number and not self.caught:
+            self.caught.append(number)
+
+    def _first(self) -> int:
+        return self.comm.allreduce(self.caught[0] if self.caught else 0, op=MPI.MAX)
 
 
 @contextmanager
@@ -84,7 +100,8 @@ def stop_on_signal(comm: MPI.Intracomm, monitor: Monitor | None) -> Iterator[Sto
     Notes
     -----
     The first signal is noted; one that comes more than `REPEAT` seconds later has its usual
-    effect (a launcher and its process group may both deliver the same one). Signals can be
+    effect (a launcher and its process group may both deliver the same one). So has one for which
+    nothing was raised, after the last iteration, in the end and on all ranks. Signals can be
     caught in the main thread alone; in others nothing is changed.
     """
     stop = Stop(comm, monitor)
@@ -110,11 +127,14 @@ def stop_on_signal(comm: MPI.Intracomm, monitor: Monitor | None) -> Iterator[Sto
                 if isinstance(handler, Ending) and handler.caught and not stop.caught:
                     note(handler.caught[0], None)
         yield stop
+        stop.agree()
     finally:
         for number, handler in before.items():
-            if isinstance(handler, Ending) and stop.caught:
+            if isinstance(handler, Ending) and stop.told and since:
                 handler.deaf_until = since[0] + REPEAT
             signal.signal(number, handler)
+        if stop.caught and not stop.told:
+            signal.raise_signal(stop.caught[0])
 
 
 @dataclass

@@ -6,6 +6,7 @@ They alone decide whether a run has converged, whatever the method.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 
@@ -90,7 +91,13 @@ def residual_forces(problem: Problem, state: State, secant_at: Array | None = No
     return residual
 
 
-def _rounding(problem: Problem, state: State) -> Array:
+@lru_cache(maxsize=2)  # of the body, and of its contact nodes
+def _shakes(size: int) -> Array:
+    """Return by how much unknowns are moved, over their size, up and down at random."""
+    return SHAKE * np.random.default_rng(0).choice((-1.0, 1.0), size)
+
+
+def _rounding(problem: Problem, state: State, internal: Array) -> Array:
     """Return what rounding may leave of the forces, and of the charges. Collective.
 
     Unknowns are known to `EPS` of their size. The stresses around a node of a slender body, or of
@@ -101,17 +108,18 @@ def _rounding(problem: Problem, state: State) -> Array:
     body, own = problem.equilibrium, problem.equilibrium.owned_part(state.x)
     # All ranks hold the global unknowns behind those of the nodes.
     step = np.full(own.size, SHAKE)
-    step[: body.owned] *= np.random.default_rng(0).choice((-1.0, 1.0), body.owned)
-    change = body.internal_forces(body.moved(state.x, step * own)) - body.internal_forces(state.x)
+    step[: body.owned] = _shakes(body.owned)
+    change = body.internal_forces(body.moved(state.x, step * own)) - internal
     return MARGIN * EPS / SHAKE * body.sizes(body.unbalanced(change))
 
 
 def evaluate(problem: Problem, state: State) -> KKT:
     """Return the residuals of a state. Collective; nothing is changed by it."""
     body, interface = problem.equilibrium, problem.interface
-    residual = residual_forces(problem, state)
-    on_contact = np.zeros_like(residual)
+    internal = body.internal_forces(state.x)
+    on_contact = np.zeros_like(internal)
     interface.add_forces(on_contact, state.x, state.forces)
+    residual = internal - body.external(state.time) + on_contact
     loads = body.load_sizes(state.time)
     answers = body.sizes(on_contact) + body.exchanged(state.x)
     scale = loads + answers + body.sizes(body.reactions(residual))
@@ -120,7 +128,7 @@ def evaluate(problem: Problem, state: State) -> KKT:
     asked = ~acted | (unbalanced <= most)
     rounding = np.zeros_like(scale)
     if asked.any():
-        rounding = np.where(asked, _rounding(problem, state), 0.0)
+        rounding = np.where(asked, _rounding(problem, state, internal), 0.0)
         acted |= answers > rounding
         # Of a body that flies away all forces are rounding.
         rounding = np.minimum(np.where(acted, np.minimum(rounding, most), rounding), unbalanced)

@@ -1,8 +1,8 @@
 """Damaged case files: each has to end with status 0, 1 or 2, in one line, within its time.
 
-`python3 -m scripts.studies.mutations [--out DIR] [--coarse] [--count N] [--seed S]`. The shipped
-cases, on small meshes, are damaged by one to three random mutations each, and solved. Every run
-is a process of its own, forked from one that has the libraries loaded.
+`python3 -m scripts.studies.mutations [--out DIR] [--coarse] [--count N] [--seed S] [--first K]`.
+The shipped cases, on small meshes, are damaged by one to three random mutations each, and solved.
+Every run is a process of its own, forked from one that has the libraries loaded.
 """
 
 from __future__ import annotations
@@ -234,6 +234,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     command = parser(__doc__, "mutations")
     command.add_argument("--count", type=int, help="number of damaged cases")
     command.add_argument("--seed", type=int, default=SEED)
+    command.add_argument("--first", type=int, default=0, help="number of the first case")
     given = command.parse_args(arguments)
     count = given.count or (COARSE_COUNT if given.coarse else COUNT)
     given.out.mkdir(parents=True, exist_ok=True)
@@ -241,7 +242,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     rows: dict[str, list[Any]] = {name: [] for name in columns}
     ends = Counter[str]()
     with tempfile.TemporaryDirectory() as scratch:
-        for number in range(count):
+        for number in range(given.first, count):
             name, text = damaged(number, given.seed)
             file, folder = Path(scratch, "case.toml"), Path(scratch, str(number))
             file.write_text(text, encoding="utf-8", errors="replace")
@@ -254,7 +255,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
                 print(*row, flush=True)
                 append(rows, *row)
     print("endings:", dict(sorted(ends.items())))
-    Report(given.out).table("mutations", f"Faults among {count} damaged cases", rows)
+    Report(given.out).table("mutations", f"Faults among {count - given.first} damaged cases", rows)
     return 1 if rows["number"] else 0
 
 

@@ -37,7 +37,7 @@ class Bulk:
         return total
 
 
-@pytest.mark.parametrize("changed", [[], [3], [3, 5, 7, 20], list(range(30))])
+@pytest.mark.parametrize("changed", [[], [3], [3, 5, 7, 20], list(range(12)), list(range(30))])
 def test_solves_are_those_of_the_whole_matrix_however_many_blocks_change(changed):
     random, bulk = np.random.default_rng(5), Bulk()
     operator = DenseOperator(bulk, Counters())
@@ -48,10 +48,25 @@ def test_solves_are_those_of_the_whole_matrix_however_many_blocks_change(changed
     blocks[changed] = random.standard_normal((len(changed), SIZE, SIZE)) ** 2
     other = DenseOperator(bulk, Counters())
     other.update("secant", np.zeros(0), blocks)
-    assert (bulk.factors.lower_upper is kept) == (len(changed) < 10)
+    assert (bulk.factors.lower_upper is kept) == (len(changed) < 20)
     rhs = np.where(bulk.free.ravel(), random.standard_normal(NODES * SIZE), 0.0)
     expected = np.linalg.solve(bulk.total(blocks), rhs)
     assert np.allclose(other.solve(rhs), expected, rtol=0, atol=1e-12 * np.abs(expected).max())
+
+
+def test_columns_of_the_inverse_are_asked_for_once():
+    random, bulk = np.random.default_rng(8), Bulk()
+    operator = DenseOperator(bulk, Counters())
+    blocks = random.standard_normal((NODES, SIZE, SIZE)) ** 2
+    asked = []
+    for changed in ([], [1, 2, 3], [2, 3, 9], [1, 9], [], range(20, 30), range(30, 38)):
+        blocks[changed] = random.standard_normal((len(changed), SIZE, SIZE)) ** 2
+        operator.update("secant", np.zeros(0), blocks)
+        asked.append(bulk.factors.known.size)
+        rhs = np.where(bulk.free.ravel(), random.standard_normal(NODES * SIZE), 0.0)
+        expected = np.linalg.solve(bulk.total(blocks), rhs)
+        assert np.allclose(operator.solve(rhs), expected, rtol=0, atol=1e-12)
+    assert asked == [0, 6, 8, 8, 8, 28, 0]
 
 
 def test_blocks_that_alone_hold_a_node_are_taken_away():

@@ -1,6 +1,8 @@
 """What a solve that is interrupted leaves."""
 
 import signal
+import subprocess
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -8,6 +10,7 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
+import contact.solving
 from contact.build import build_problem
 from contact.linear.operator import SparseOperator
 from contact.methods.load_steps import load_steps
@@ -17,6 +20,8 @@ from contact.methods.report import Record
 from contact.problem.kkt import evaluate
 from contact.solving import SolveInterrupted, solve, solve_problem
 from tests.problems.written import block, written
+
+ROOT = Path(__file__).parents[2]
 
 
 @pytest.mark.parallel
@@ -41,6 +46,37 @@ def test_interrupted_solve_keeps_its_results(shared_tmp_path: Path) -> None:
 
 
 @pytest.mark.parallel
+def test_a_signal_after_the_last_iteration_is_not_lost(monkeypatch: pytest.MonkeyPatch) -> None:
+    """It has its usual effect then, on all ranks: the solve has ended by itself."""
+    step = contact.solving.solve_step
+
+    def press(*args: Any) -> Any:
+        reached = step(*args)
+        if MPI.COMM_WORLD.rank == 0:
+            signal.raise_signal(signal.SIGINT)
+        return reached
+
+    monkeypatch.setattr(contact.solving, "solve_step", press)
+    with pytest.raises(KeyboardInterrupt) as interrupt:
+        solve(block(2))
+    assert not isinstance(interrupt.value, SolveInterrupted)
+
+
+@pytest.mark.parametrize(("number", "status"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
+def test_a_script_that_catches_nothing_ends_with_the_status_of_the_signal(
+    number: signal.Signals, status: int
+) -> None:
+    script = (
+        "import signal\n"
+        "from contact import solve\n"
+        "from tests.problems.written import block\n"
+        f"solve(block(2), monitor=lambda record: signal.raise_signal({int(number)}))\n"
+    )
+    ended = subprocess.run([sys.executable, "-c", script], cwd=ROOT, check=False)
+    assert ended.returncode == status
+
+
+@pytest.mark.parallel
 def test_a_solve_stops_between_inner_iterations(
     shared_tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -53,7 +89,7 @@ def test_a_solve_stops_between_inner_iterations(
         return solve_once(operator, *args, **options)
 
     monkeypatch.setattr(SparseOperator, "solve", press)
-    with pytest.raises(KeyboardInterrupt) as interrupt:
+    with pytest.raises(SolveInterrupted) as interrupt:
         solve(block(2, solver={"method": "uzawa"}))
     solution = interrupt.value.solution
     assert solution.counters.linear_solves == 6

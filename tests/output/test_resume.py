@@ -1,5 +1,6 @@
 """An evolution that is ended at any step goes on from its checkpoints to the same numbers."""
 
+import csv
 import json
 import signal
 
@@ -146,26 +147,35 @@ def test_missing_arguments(capfd, tmp_path):
     assert "CASE.toml: missing; accepted: a case file, or --restart DIR" in capfd.readouterr().err
 
 
-def test_a_signal_keeps_the_complete_steps(tmp_path, monkeypatch):
-    """They are written, and checkpoints remain to go on from."""
+def rows_of(out):
+    with (out / "steps.csv").open() as file:
+        return list(csv.DictReader(file))
+
+
+@pytest.mark.parametrize(("number", "status"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
+def test_a_signal_keeps_the_complete_steps(tmp_path, monkeypatch, number, status):
+    """They are written, and checkpoints remain to go on from, to the numbers of a whole run."""
     keep, out, case = Checkpoints.keep, tmp_path / "out", tmp_path / "case.toml"
     case.write_text(to_toml(hencky()))
+    assert on_the_line("solve", case, "--out", tmp_path / "whole") == 0
 
     def interrupted(self, record):
         keep(self, record)
         if self._count == 2:
-            signal.raise_signal(signal.SIGTERM)
+            signal.raise_signal(number)
 
     with monkeypatch.context() as context:
         context.setattr(Checkpoints, "keep", interrupted)
-        assert on_the_line("solve", case, "--out", out) == 143
-    assert len((out / "steps.csv").read_text().splitlines()) == 3
+        assert on_the_line("solve", case, "--out", out) == status
+    assert len(rows_of(out)) == 2
     summary = json.loads((out / "summary.json").read_text())
     assert not summary["converged"]
-    assert "interrupted (SIGTERM)" in summary["reason"]
+    assert f"interrupted ({number.name})" in summary["reason"]
     assert len(list((out / "checkpoints").glob("0*.npz"))) == 2
     assert on_the_line("solve", "--restart", out) == 0
-    assert len((out / "steps.csv").read_text().splitlines()) == 6
+    for one, two in zip(rows_of(tmp_path / "whole"), rows_of(out), strict=True):
+        for name in one.keys() - {"linear_solves", "factorizations", "kkt"}:
+            assert float(two[name]) == pytest.approx(float(one[name]), rel=1e-9, abs=1e-12)
 
 
 def test_a_signal_before_the_first_iteration_leaves_what_is_there(tmp_path, monkeypatch):
