@@ -29,7 +29,7 @@ def two_blocks(
         ("lower", lower_width, -lower_height, 0.0, lower_size),
         ("upper", upper_width, 0.0, upper_height, upper_size),
     ):
-        check_cells(math.log10(width / size) + math.log10((high - low) / size))
+        check_cells(math.log10(width / size) + math.log10((high - low) / size), 2)
         half = width / 2
         corners = [(-half, low), (half, low), (half, high), (-half, high)]
         bodies[name], sides = polygon(gmsh.model.geo, corners, size)
@@ -62,7 +62,7 @@ def two_boxes(
         ("lower", lower_width, -lower_height, lower_height, lower_size),
         ("upper", upper_width, 0.0, upper_height, upper_size),
     ):
-        check_cells(2 * math.log10(width / size) + math.log10(height / size))
+        check_cells(2 * math.log10(width / size) + math.log10(height / size), 3)
         body = model.occ.addBox(-width / 2, -width / 2, low, width, width, height)
         model.occ.synchronize()
         model.mesh.setSize(model.getBoundary([(3, body)], recursive=True), size)

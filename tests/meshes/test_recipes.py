@@ -1,5 +1,7 @@
 """Recipes of meshes: what they make and what they refuse."""
 
+import re
+
 import gmsh
 import numpy as np
 import pytest
@@ -236,6 +238,16 @@ def test_a_long_meshing_says_so_first(monkeypatch, caplog):
     monkeypatch.setattr(grading, "LONG", 1e-3)
     from_recipe(COMM, "bar")
     assert "take Gmsh" in caplog.text
+
+
+@pytest.mark.parametrize("name", RECIPES)
+def test_the_cells_that_are_foreseen_are_too_few_but_not_by_far(name, monkeypatch, caplog):
+    """Sizes are refused by that number, and no mesh that fits may be."""
+    monkeypatch.setattr(grading, "LONG", 0.0)
+    domain = from_recipe(COMM, name)
+    foreseen = max(float(count) for count in re.findall(r"ask for some (\S+) cells", caplog.text))
+    cells = domain.mesh.topology.index_map(domain.dim).size_global
+    assert foreseen < cells < 10 * foreseen
 
 
 @pytest.mark.parametrize("version", ["2.2", "4.1"])
