@@ -39,7 +39,7 @@ from contact.methods.sure import INTERIOR_POINT, solve_convex
 from contact.problem.condensed import CondensedProblem
 from contact.problem.condensing import condensation, pays
 from contact.problem.kkt import evaluate, residual_forces
-from contact.problem.mobility import held_by_supports
+from contact.problem.mobility import held_at_rest
 from contact.problem.problem import ContactProblem
 from contact.problem.protocols import Problem
 from contact.problem.scales import Scales
@@ -98,7 +98,7 @@ class Newton:
         self.history = History(self.monitor)
         self._moduli = self.moduli or moduli_of(problem.scales, options.gamma)
         self._begin()
-        loose = isinstance(problem, ContactProblem) and not held_by_supports(problem)
+        loose = isinstance(problem, ContactProblem) and not held_at_rest(problem)
         self.whole = WholeStep(problem, options, self._moduli, self.counters, loose)
         self._condensed: MaterialStep | None = None
         self._pays = False

@@ -121,10 +121,11 @@ class WholeStep:
     counters
         Where factorisations and solves are counted.
     loose
-        Whether contact alone holds a body. It touches at a single node at first, and rolls or
-        slides off by any length until it touches at more. As Levenberg and Marquardt have it, soft
-        springs at all contact nodes keep it from that while nodes change their status; what they
-        bear is left to the next step, and they become softer as the residual falls.
+        Whether contact alone holds a body, and not where it touches at rest. There it touches at
+        a single node, say, and rolls or slides off by any length until it touches at more. As
+        Levenberg and Marquardt have it, soft springs at all contact nodes keep it from that while
+        nodes change their status; what they bear is left to the next step, and they become softer
+        as the residual falls.
     """
 
     fault = "nothing holds the body that far from rest"

@@ -75,16 +75,18 @@ class Group:
         """The others, shape (n, d, m). Collective."""
         return np.einsum("nij,njm->nim", self.problem.nodes.tangent, self._at_contact)
 
-    def held(self, friction: bool) -> Array:
+    def held(self, friction: bool, at: NDArray[np.bool_] | slice = slice(None)) -> Array:
         """Return the Gram matrix where supports and contact hold the body, (m, m). Collective.
 
         Parameters
         ----------
         friction
             Whether contact holds it in the tangential directions too.
+        at
+            At which contact nodes contact holds it; at all of them by default.
         """
-        held = self.supports + _gram(self.problem, self.normal[:, None, :])
-        return held + _gram(self.problem, self.tangential) if friction else held
+        held = self.supports + _gram(self.problem, self.normal[at][:, None, :])
+        return held + _gram(self.problem, self.tangential[at]) if friction else held
 
 
 def groups(problem: ContactProblem) -> Iterator[Group]:
@@ -106,9 +108,16 @@ def held_by_friction(problem: ContactProblem) -> bool:
     return any([null_space(group.held(friction=False)).size > 0 for group in groups(problem)])
 
 
-def held_by_supports(problem: ContactProblem) -> bool:
-    """Tell whether no rigid motion were free without contact. Collective."""
-    return all([null_space(group.supports).size == 0 for group in groups(problem)])
+def held_at_rest(problem: ContactProblem) -> bool:
+    """Tell whether supports, and contact where it touches at rest, hold all bodies. Collective."""
+    interface, rest = problem.interface, problem.start()
+    touching = interface.opening(interface.jump.apply(rest.x)) >= -1e-12 * interface.size
+    return all(
+        [
+            null_space(group.held(problem.frictional, touching)).size == 0
+            for group in groups(problem)
+        ]
+    )
 
 
 def _free_motions(problem: ContactProblem) -> dict[int, str]:
