@@ -108,6 +108,11 @@ def held_by_friction(problem: ContactProblem) -> bool:
     return any([null_space(group.held(friction=False)).size > 0 for group in groups(problem)])
 
 
+def held_by_supports(problem: ContactProblem) -> bool:
+    """Tell whether no rigid motion were free without contact. Collective."""
+    return all([null_space(group.supports).size == 0 for group in groups(problem)])
+
+
 def held_at_rest(problem: ContactProblem) -> bool:
     """Tell whether supports, and contact where it touches at rest, hold all bodies. Collective."""
     interface, rest = problem.interface, problem.start()
