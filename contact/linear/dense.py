@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from scipy.linalg.lapack import dgetrf, dgetrs
 from scipy.sparse import csr_array
 
-from contact.linear.first_rank import from_first
+from contact.linear.first_rank import from_first, together
 from contact.linear.operator import Counters
 from contact.typing import Array
 
@@ -114,8 +114,7 @@ class DenseOperator:
         """Add up and factorise. Collective; see `operator.SparseOperator.update`."""
         bulk, free = self.bulk, self.bulk.free.astype(float)
         self._blocks = _gather(bulk, blocks * free[:, :, None] * free[:, None, :])
-        if bulk.comm.rank == 0:
-            self._factorise()
+        together(bulk.comm, self._factorise if bulk.comm.rank == 0 else lambda: None)
         self.counters.factorizations += 1
         return True
 

@@ -9,6 +9,7 @@ import numpy as np
 from mpi4py import MPI
 
 from contact.output.solution import Solution
+from contact.problem.kkt import residual_forces
 from contact.problem.problem import ContactProblem
 from forms.elasticity import Anisotropic
 from forms.hencky import Hencky
@@ -22,6 +23,10 @@ ACROSS = 5
 
 #: By how much of mu_1 a material of one's own may be off it without strain.
 OFF = 0.01
+
+#: Most of loads and contact forces that may be left out of balance: displacements that only they
+#: cause are about as far off.
+LEFT = 1e-6
 
 #: Largest |eps| of which eps is a good measure: the square of the strain is then 1 % of it.
 SMALL = 0.1
@@ -223,12 +228,39 @@ def untouched(solution: Solution) -> Remark:
 
 def rounding(solution: Solution) -> Remark:
     """Say where forces balance to their rounding alone, which is more than the tolerance."""
-    granted, asked = solution.outcome.kkt.rounding, solution.outcome.allowed.equilibrium
+    granted, asked = solution.rounding, solution.outcome.allowed.equilibrium
     if granted <= asked:
         return "", True
     return (
         f"rounding decides how well the forces balance: {granted:.1e} of them is no more than what "
         f"that of the displacements makes of the stresses, and does not count, though the "
         f"tolerance is {asked:g}; a mesh with fewer cells along a slender body has less of it",
+        False,
+    )
+
+
+def beside_loads(solution: Solution) -> Remark:
+    """Say where little beside the reactions is much beside what the body answers to.
+
+    Clamps of a slender beam bear moments of a thousand times the loads. Where supports move the
+    body, what they bear is among its loads.
+    """
+    problem, state = solution.problem, solution.state
+    body = problem.equilibrium
+    moved = problem.comm.allreduce(bool(np.any(problem.start().x)), op=MPI.LOR)
+    residual = residual_forces(problem, state)
+    on_contact = np.zeros_like(residual)
+    problem.interface.add_forces(on_contact, state.x, state.forces)
+    acting = (body.load_sizes(state.time) + body.sizes(on_contact))[0]
+    left = body.sizes(body.unbalanced(residual))[0]
+    borne = body.sizes(body.reactions(residual))[0]
+    most = max(LEFT, solution.outcome.allowed.equilibrium)
+    if moved or not solution.converged or not acting > 0 or left <= most * acting:
+        return "", True
+    return (
+        f"{left / acting:.1e} of loads and contact forces are out of balance, and displacements "
+        f"about as far off: the supports bear {borne / acting:.3g} times as much, beside which it "
+        "is nothing; fewer cells along a slender body, linear elements, or a smaller tolerance "
+        "where rounding allows it, bring them nearer",
         False,
     )

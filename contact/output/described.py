@@ -46,8 +46,8 @@ SUMMARY: Mapping[str, Item] = {
     "rounding": Item(
         "",
         "Forces out of balance, or charges, that are no more than rounding, over all of them: "
-        "`equilibrium` is without them. More than the tolerance in slender bodies alone, with a "
-        "warning then.",
+        "`equilibrium` is without them. Of an evolution the most in a step. More than the "
+        "tolerance in slender bodies alone, with a warning then.",
     ),
     "max_pressure": Item("stress", "Largest contact pressure, -σ_ν >= 0."),
     "contact_area": Item(

@@ -27,6 +27,8 @@ class StepRecord:
         What the energy balance of the next step begins with, see `problem.energy.Moment`.
     unloaded
         Largest share of the body that has unloaded from beyond yield in a step so far.
+    rounding
+        Largest `rounding` of the residuals of a step so far, see `problem.kkt.KKT`.
     """
 
     state: State
@@ -34,3 +36,4 @@ class StepRecord:
     table: Mapping[str, NDArray[Any]] | None
     enthalpy: float
     unloaded: float = 0.0
+    rounding: float = 0.0

@@ -122,6 +122,7 @@ class Checkpoints:
         x = np.empty_like(joined["x"])
         x[joined["where"]] = joined["x"]
         said = {"t": record.state.time, "enthalpy": record.enthalpy, "unloaded": record.unloaded}
+        said["rounding"] = record.rounding
         arrays = {
             "x": x,
             "motion": self._problem.equilibrium.motion(record.state.x),
@@ -186,7 +187,7 @@ def _read(problem: ContactProblem, path: Path, where: NDArray[np.intp]) -> StepR
         SlipHistory(jump.copy(), accumulated[:, 0].copy()),
     )
     row = json.loads(str(arrays["row"]))
-    return StepRecord(state, row, table, said["enthalpy"], said["unloaded"])
+    return StepRecord(state, row, table, said["enthalpy"], said["unloaded"], said["rounding"])
 
 
 def case_of(folder: Path) -> Path:

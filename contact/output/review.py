@@ -43,6 +43,7 @@ def review(solution: Solution) -> None:
         assumptions.untouched(solution),
         assumptions.resolution(solution),
         assumptions.rounding(solution),
+        assumptions.beside_loads(solution),
         uniqueness.theorem(solution),
         uniqueness.sliding(solution),
         *uniqueness.conductivity(solution),

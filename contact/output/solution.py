@@ -114,6 +114,11 @@ class Solution:
         """Whether all residuals are below the tolerance."""
         return self.outcome.converged
 
+    @property
+    def rounding(self) -> float:
+        """Forces out of balance that count as rounding; of an evolution the most in a step."""
+        return max([self.outcome.kkt.rounding, *(step.rounding for step in self.steps[-1:])])
+
     @cached_property
     def contact(self) -> ContactResult:
         """The contact nodes of all ranks as arrays, and as functions. Collective."""

@@ -42,6 +42,7 @@ class StepRecorder:
             self._before = replace(self._before, enthalpy=last.enthalpy)
         self._unloading = Unloading(problem, self._before.x)
         self._unloading.share = 0.0 if last is None else last.unloaded
+        self._rounding = 0.0 if last is None else last.rounding
         self._driven = driven_part(problem)
         self._nodes = None if self._driven is None else _nodes_of(problem, self._driven)
 
@@ -60,7 +61,8 @@ class StepRecorder:
         solution = solution_of(step)
         table = contact_table(solution)
         row = self._row(step, solution, table, energies, now)
-        return StepRecord(state, row, table, now.enthalpy, self._unloading.share)
+        self._rounding = max(self._rounding, step.outcome.kkt.rounding)
+        return StepRecord(state, row, table, now.enthalpy, self._unloading.share, self._rounding)
 
     def _row(
         self,

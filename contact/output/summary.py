@@ -48,7 +48,7 @@ def summarise(solution: Solution, table: Table | None) -> dict[str, Any]:
         "factorizations": counters.factorizations,
         "contact_solves": counters.contact_solves,
         "kkt": {"equilibrium": kkt.equilibrium, "contact": kkt.contact, "friction": kkt.friction},
-        "rounding": kkt.rounding,
+        "rounding": solution.rounding,
         "max_pressure": problem.nodes.maximum(solution.pressure),
         "contact_area": solution.contact_area,
         "contact_force": solution.contact_force.tolist(),

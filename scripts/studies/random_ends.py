@@ -1,7 +1,8 @@
 """Whether `converged` can be believed: random cases, methods and limits of iterations.
 
-`python3 -m scripts.studies.random_ends [--out DIR] [--coarse] [--count N]`. Cases of both sweeps
-are solved by a random method with a random `max_outer`. What `summary.json` then says is held
+`python3 -m scripts.studies.random_ends [--out DIR] [--coarse] [--count N]`. Cases of both sweeps,
+and charged bodies with weak and strong couplings under potentials of all sizes, are solved by a
+random method and linear solver with a random `max_outer`. What `summary.json` then says is held
 against the residuals of the state in a problem that was built anew, at the whole load, and against
 the forces and charges that its numbers leave out of balance (`raw_balance`).
 """
@@ -20,18 +21,35 @@ from typing import Any
 import numpy as np
 
 from contact import build_problem, solve_problem
+from contact.case.file import parse_case
 from contact.methods.options import with_method
 from contact.output.files import write_outputs
 from contact.output.options import OutputOptions
 from contact.problem.kkt import evaluate
 from scripts.reporting import Report, append, parser
 from scripts.studies.raw_balance import imbalance
-from scripts.studies.sweep import problems
+from scripts.studies.sweep import piezo, problems
 
-COUNT, COARSE_COUNT, SEED = 500, 10, 21
-METHODS = "newton", "uzawa", "penalty"
+COUNT, COARSE_COUNT, CHARGED, SEED = 500, 10, 300, 22
+METHODS, SOLVERS = ("newton", "uzawa", "penalty"), ("auto", "auto", "iterative")
 #: Rounding of a residual that is computed once more, and of rounding that is seen by other means.
 ROUNDING, OTHER = 1.01, 2.0
+
+
+def charged(rng: np.random.Generator) -> dict[str, Any]:
+    """Draw a piezoelectric bar with an electrode, its coupling down to 1e-12 of that of PZT-5A."""
+    case = piezo(rng)
+    coupling = float(rng.choice([1e-12, 1e-9, 1e-6, 1e-3, 1.0]))
+    for name in ("e31", "e33", "e15"):
+        case["material"]["piezo"][name] *= coupling
+    strain = float(rng.choice([1e-6, 1e-2, 1.0]))
+    # Up to what strains the body as much as the loads do, and to any size.
+    potential = float(rng.choice([0.0, 1e-3, 1.0, 1e3, 1e6, 1e9, strain * 4.0 / coupling]))
+    where = str(rng.choice(["right", "top"]))
+    case["fixed"].append({"on": where, "potential": potential})
+    share = float(rng.choice([1.0, 1e-3, 0.0]))
+    case["load"] = [{"on": "top", "traction": [0.0, f"{-15 * share}*x"]}] if share else []
+    return case
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -42,6 +60,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     count = given.count or (COARSE_COUNT if given.coarse else COUNT)
     rng = np.random.default_rng(SEED)
     drawn = [case for hard in (False, True) for _, case in problems(False, hard=hard)]
+    drawn += [parse_case(charged(rng), source=f"charged-{k}") for k in range(CHARGED)]
     ends = Counter[str]()
     columns = ("case", "method", "max_outer", "rounding", "residuals", "raw", "allowed")
     rows: dict[str, list[Any]] = {name: [] for name in columns}
@@ -49,7 +68,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         for number in rng.integers(len(drawn), size=count):
             case, method = drawn[number], str(rng.choice(METHODS))
             limit = int(rng.choice([1, 2, 3, 5, 8, 20]))
-            settings = replace(with_method(case.solver, method), max_outer=limit)
+            linear = str(rng.choice(SOLVERS))
+            settings = replace(with_method(case.solver, method), max_outer=limit, linear=linear)
             solution = solve_problem(build_problem(case), settings)
             solution.output = OutputOptions(fields="none")
             write_outputs(solution, folder)

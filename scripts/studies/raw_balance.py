@@ -29,11 +29,11 @@ class Imbalance:
     Attributes
     ----------
     force, applied
-        Euclidean norms over the nodes: of the forces left; of loads, contact forces and
-        reactions, added up (force).
+        Euclidean norms over the nodes: of the forces left; of loads, contact forces, reactions
+        and what the potential exerts on the body at rest, added up (force).
     charge, electrified
-        The same of charges, but for what flows through nodes that a support holds; 0 without a
-        potential (charge).
+        The same of charges, those of the strain among them, but for what flows through nodes that a
+        support holds; 0 without a potential (charge).
     """
 
     force: float
@@ -64,8 +64,10 @@ def imbalance(solution: Solution) -> Imbalance:
         nodes = fem.locate_dofs_topological(body.space, d - 1, facets)
         loose[np.setdiff1d(nodes, problem.nodes.nodes)] = False
     norm = np.linalg.norm
-    applied = norm(loads) + norm(touch) + norm(left[~free])
-    electrified = norm(flux) + norm(charge[~loose])
+    of_field, _ = _internal(solution, np.zeros_like(inner), phi)
+    _, of_strain = _internal(solution, nodal[:, :d], np.zeros_like(phi))
+    applied = norm(loads) + norm(touch) + norm(left[~free]) + norm(of_field)
+    electrified = norm(flux) + norm(charge[~loose]) + norm(of_strain)
     return Imbalance(
         float(norm(left[free])), float(applied), float(norm(charge[loose])), float(electrified)
     )

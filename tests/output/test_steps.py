@@ -158,3 +158,27 @@ def test_figures(tmp_path):
     (line,) = figure.axes[0].lines
     way = [0.0, *(record.row["driven_x"] for record in solution.steps)]
     np.testing.assert_allclose(line.get_xdata(), way)
+
+
+def test_the_summary_has_the_most_that_rounding_was_granted(tmp_path):
+    """A slender beam that is let go at the end: the last step has nothing to be rounded."""
+    press = {"time": [0.0, 1.0, 2.0], "value": [0.0, 1.0, 0.0]}
+    case = parse_case(
+        {
+            "mesh": {"generator": "rectangle", "size": [200.0, 1.0], "cells": [200, 1]},
+            "material": {"young": 1.0, "poisson": 0.3},
+            "fixed": [{"on": "left", "displacement": [0.0, 0.0]}],
+            "load": [{"on": "right", "traction": [0.0, -1e-9], "amplitude": "press"}],
+            "contact": {"on": "bottom", "gap": 1.0},
+            "evolution": {
+                "times": [0.0, 1.0, 2.0],
+                "steps": [1, 1],
+                "amplitudes": {"press": press},
+            },
+        }
+    )
+    solution = solve(case, comm=SELF)
+    write_outputs(solution, tmp_path)
+    summary = json.loads((tmp_path / "summary.json").read_text())
+    assert solution.outcome.kkt.rounding == 0
+    assert summary["rounding"] == solution.steps[0].rounding > 1e-13

@@ -1,0 +1,46 @@
+"""What fails on one rank alone is raised on all: they would wait for it for ever."""
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+
+from contact.linear.dense import DenseOperator, Factors
+from contact.linear.first_rank import from_first, together
+from contact.linear.operator import Counters
+
+COMM = MPI.COMM_WORLD
+
+
+def fails():
+    raise MemoryError("no room")
+
+
+@pytest.mark.parallel
+def test_what_the_first_rank_raises():
+    with pytest.raises(MemoryError, match="no room"):
+        from_first(COMM, fails, 3)
+    assert np.array_equal(from_first(COMM, lambda: np.arange(3.0), 3), np.arange(3.0))
+
+
+@pytest.mark.parallel
+def test_what_the_last_rank_raises():
+    last = COMM.rank == COMM.size - 1
+    with pytest.raises(MemoryError, match="no room"):
+        together(COMM, fails if last else lambda: None)
+    assert together(COMM, lambda: COMM.rank) == COMM.rank
+
+
+@pytest.mark.parallel
+def test_a_dense_factorisation_without_room(monkeypatch):
+    """The others went on to the next solve, and waited there."""
+
+    class Bulk:
+        comm, factors = COMM, Factors()
+        free = np.ones((1, 2), dtype=bool)
+        stiffness = np.eye(2 * COMM.size)
+        own = slice(2 * COMM.rank, 2 * COMM.rank + 2)
+
+    operator = DenseOperator(Bulk(), Counters())
+    monkeypatch.setattr(Factors, "make", lambda *_: fails())
+    with pytest.raises(MemoryError, match="no room"):
+        operator.update("tangent", np.zeros(2), np.ones((1, 2, 2)))
