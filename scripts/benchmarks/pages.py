@@ -1,4 +1,4 @@
-"""The page of the benchmarks, and the table of the README, from the files of a run."""
+"""The page of the benchmarks, and the tables of other pages, from the files of a run."""
 
 from __future__ import annotations
 
@@ -13,6 +13,9 @@ from contact.output.environment import versions
 
 #: The table of the README: its header, and the lines below.
 README_TABLE = re.compile(r"^\| \| unknowns \|.*\n(?:\|.*\n)+", re.MULTILINE)
+
+#: The table of what ranks hold, likewise.
+MEMORY_TABLE = re.compile(r"^\| \| unknowns \| ranks \|.*\n(?:\|.*\n)+", re.MULTILINE)
 
 INTRODUCTION = """\
 # Benchmarks
@@ -62,9 +65,33 @@ def readme_table(rows: Sequence[Mapping[str, str]]) -> str:
 
 
 def write_readme(folder: Path, readme: Path) -> None:
-    """Put the ratios on the largest meshes into the README."""
-    with (folder / "bench-ratio.csv").open() as stream:
-        rows = [row for row in csv.DictReader(stream) if row["start"] != "cold"]
+    """Put the ratios on the largest meshes into the README, where they have been measured."""
+    rows = [row for row in _rows(folder / "bench-ratio.csv") if row["start"] != "cold"]
+    if not rows:
+        return
     plane, space = ([row for row in rows if row["dimension"] == d] for d in "23")
     table = readme_table([*plane[-3:], *space[-2:]])
     readme.write_text(README_TABLE.sub(lambda _: table, readme.read_text()))
+
+
+def write_memory(folder: Path, page: Path) -> None:
+    """Put what ranks hold into the page on many ranks, where it has been measured."""
+    rows = _rows(folder / "bench-memory.csv")
+    if not rows:
+        return
+    lines = ["| | unknowns | ranks | bytes an unknown | over one rank |", "|---|---|---|---|---|"]
+    for row in rows:
+        place = "plane" if row["dimension"] == "2" else "space"
+        size, over = float(row["bytes an unknown"]), float(row["over one rank"])
+        count = f"{int(row['unknowns']):,}"
+        lines.append(f"| {place} | {count} | {row['ranks']} | {size:.0f} | {over:.2f} |")
+    table = "\n".join(lines) + "\n"
+    page.write_text(MEMORY_TABLE.sub(lambda _: table, page.read_text()))
+
+
+def _rows(path: Path) -> list[dict[str, str]]:
+    """Return the rows of a file of numbers; none where there is none."""
+    if not path.is_file():
+        return []
+    with path.open() as stream:
+        return list(csv.DictReader(stream))
