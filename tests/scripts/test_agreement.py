@@ -5,9 +5,12 @@ from pathlib import Path
 
 import pytest
 
+from contact import build_problem
+from contact.methods.options import NewtonOptions
 from scripts.cases import CASES
 from scripts.studies import agreement
-from scripts.studies.branches import AGREE
+from scripts.studies.agreement_examples import Example
+from scripts.studies.branches import AGREE, Branches
 
 
 def rows(path: Path) -> list[dict[str, str]]:
@@ -55,6 +58,20 @@ def test_both_methods_stay_at_each_other_s_solutions(folder):
         assert float(row["residual"]) <= 1e-9
         assert max(float(row["newton from it"]), float(row["uzawa from it"])) <= AGREE
         assert row["newton, disturbed"] == row["uzawa, disturbed"] == row["solution"]
+
+
+def test_a_foundation_that_moves_has_unknowns_of_its_own():
+    """Two displacements and a rotation, behind the unknowns of nodes, which alone are compared."""
+    coarse = ("mesh.extent=8.0", "mesh.size=4.0", "mesh.contact_size=0.5", "mesh.edge_size=0.2")
+    example = Example("ball", "indent-ball", coarse)
+    problem = build_problem(example.case(coarse=True))
+    branches, newton = Branches(problem), NewtonOptions(tolerance=1e-10)
+    found = branches.run(newton)
+    assert branches.letter(found) == "A"
+    again = branches.run(newton, branches.disturbed(found))
+    assert problem.equilibrium.motion(found.state.x).size == 3
+    assert branches.letter(again) == "A"
+    assert branches.difference(again, found).largest <= AGREE
 
 
 def test_the_penalty_method_tends_to_a_solution(folder):
