@@ -204,14 +204,16 @@ class Newton:
     def _bends(self, state: State) -> bool:
         """Tell whether a surer road is to be taken at once. Collective.
 
-        It is where the moduli make far more of a penetration than any load.
+        It is where the moduli make far more of a penetration than any load, also of what is rigid.
+        Where nothing but a given motion of the foundation acts, there is no load to tell by.
         """
         problem, interface = self.problem, self.problem.interface
         opening = np.maximum(interface.opening(interface.jump.apply(state.x)), 0.0)
         foreseen = self._moduli.status * interface.jump.sum(opening)
-        loads = np.abs(residual_forces(problem, problem.start()))[: problem.equilibrium.owned]
-        most = SOFT * float(interface.comm.allreduce(loads.sum(), op=MPI.SUM))
-        return foreseen > most
+        forces = np.abs(residual_forces(problem, problem.start()))
+        on_nodes, on_masters = np.split(forces, [problem.equilibrium.owned])
+        loads = interface.comm.allreduce(float(on_nodes.sum()), op=MPI.SUM) + on_masters.sum()
+        return bool(foreseen > SOFT * loads > 0)
 
     def _at_contact(self, step: MaterialStep, iterate: Iterate) -> tuple[Iterate, Outcome]:
         """Iterate with the body condensed onto the contact nodes."""
