@@ -38,7 +38,7 @@ CLOSED = 1e-10
 BALANCED = 1e-6
 
 #: What an iterative solver leaves of the forces out of balance: the next step sees what is left. A
-#: thousandth of that takes as many steps, and half as many iterations more.
+#: hundredth of that takes as many steps, and a third to a half more iterations.
 FORCING = 1e-4
 
 #: Work at the start, over that of the loads in the way that the foundation bars.
