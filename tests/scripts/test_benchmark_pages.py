@@ -1,0 +1,47 @@
+"""Pages of the benchmarks, from the files of a run that has measured a part."""
+
+from pathlib import Path
+
+import pytest
+
+from scripts.benchmarks import bench
+from scripts.benchmarks.pages import write_memory, write_readme
+from scripts.reporting import Report
+
+SCALING = Path(__file__).parents[2] / "docs" / "scaling.md"
+
+
+def test_the_table_of_ranks_is_replaced_where_memory_has_been_measured(tmp_path):
+    page = tmp_path / "scaling.md"
+    page.write_text(SCALING.read_text())
+    write_memory(tmp_path, page)
+    write_readme(tmp_path, tmp_path / "none.md")
+    assert page.read_text() == SCALING.read_text()
+    row = {"dimension": 3, "unknowns": 1234567, "ranks": 2, "bytes an unknown": 99.6}
+    Report(tmp_path).table(
+        "bench-memory", "", {key: [value] for key, value in {**row, "over one rank": 1.234}.items()}
+    )
+    write_memory(tmp_path, page)
+    text = page.read_text()
+    assert "| space | 1,234,567 | 2 | 100 | 1.23 |\n\n" in text
+    assert text.count("| plane |") == 0
+    assert text.endswith(SCALING.read_text()[-500:])
+
+
+def test_the_other_parts_are_measured_where_one_fails(tmp_path, monkeypatch, capsys):
+    def fails(_: bench.Bench) -> None:
+        raise RuntimeError("no such peer")
+
+    def works(made: bench.Bench) -> None:
+        made.report.table("peer-plain", "Plain", {"value": [1]})
+
+    parts = {"d": (fails, ("bench-getfem",)), "e": (works, ("peer-plain",))}
+    monkeypatch.setattr(bench, "PARTS", parts)
+    monkeypatch.setattr(bench, "ORDER", "de")
+    pages = [tmp_path / name for name in ("page.md", "readme.md", "scaling.md")]
+    where = zip(("--page", "--readme", "--scaling"), map(str, pages), strict=True)
+    given = ["--out", str(tmp_path / "out"), *(word for pair in where for word in pair)]
+    with pytest.raises(SystemExit, match="not measured: d"):
+        bench.main([*given, "--parts", "d", "e"])
+    assert "no such peer" in capsys.readouterr().err
+    assert "**Plain**" in pages[0].read_text()
