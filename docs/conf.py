@@ -25,7 +25,7 @@ html_theme_options = {
     "code_font_size": "0.8em",
     "fixed_sidebar": True,
 }
-html_static_path = []
+html_static_path = ["_static"]  # custom.css, which the theme looks for
 html_show_copyright = False
 autodoc_typehints = "none"
 autodoc_member_order = "bysource"
