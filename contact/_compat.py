@@ -1,4 +1,4 @@
-"""Differences between dolfinx 0.9, 0.10 and 0.11, and between their PETSc."""
+"""Differences between dolfinx 0.9, 0.10 and 0.11, between their PETSc, and faults around them."""
 
 import inspect
 
@@ -6,6 +6,7 @@ import numpy as np
 import numpy.typing as npt
 from dolfinx import fem
 from dolfinx.mesh import Mesh
+from mpi4py import MPI
 from petsc4py import PETSc
 
 
@@ -65,3 +66,15 @@ def keeps_inverted_blocks() -> bool:
     them.
     """
     return bool(PETSc.Sys.getVersion() >= (3, 25))
+
+
+def lasting(comm: MPI.Intracomm) -> MPI.Intracomm:
+    """Return a communicator of the same ranks that lives as long as the program, if there is one.
+
+    mpi4py 4.0 keeps a lock with each communicator that it has sent Python objects by. Where a
+    mesh's own is freed while an exception is on its way, the lock remains taken, and the program
+    does not end.
+    """
+    same = MPI.IDENT, MPI.CONGRUENT
+    whole = (MPI.COMM_WORLD, MPI.COMM_SELF)
+    return next((known for known in whole if MPI.Comm.Compare(comm, known) in same), comm)

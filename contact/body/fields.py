@@ -165,7 +165,7 @@ class Ufl:
         found = geometry.compute_collisions_points(tree, x)
         cells = geometry.compute_colliding_cells(mesh, found, x)
         first, count = cells.offsets[:-1], np.diff(cells.offsets)
-        if mesh.comm.allreduce(bool(np.any(count == 0)), op=MPI.LOR):
+        if _compat.lasting(mesh.comm).allreduce(bool(np.any(count == 0)), op=MPI.LOR):
             raise InputError("a given Function is not defined everywhere on its part")
         if not len(x):
             return np.zeros(0)

@@ -15,6 +15,7 @@ from petsc4py import PETSc
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import breadth_first_order
 
+from contact._compat import lasting
 from contact.linear.first_rank import from_first
 from contact.linear.leftover import Leftover, send_to_first
 from contact.linear.partial import PartialFactorisation
@@ -73,7 +74,7 @@ class SchurComplement:
     """
 
     def __init__(self, matrix: PETSc.Mat, kept: NDArray[np.int32], prefix: str) -> None:
-        self.comm = matrix.getComm().tompi4py()
+        self.comm = lasting(matrix.getComm().tompi4py())
         begin, end = matrix.getOwnershipRange()
         starts, columns, _ = matrix.getValuesCSR()
         shared = np.zeros(end - begin, dtype=bool)

@@ -107,8 +107,8 @@ class Domain:
 
     @property
     def comm(self) -> MPI.Intracomm:
-        """Communicator of the mesh."""
-        return self.mesh.comm
+        """Communicator of the ranks of the mesh."""
+        return _compat.lasting(self.mesh.comm)
 
     @property
     def dim(self) -> int:
@@ -243,7 +243,7 @@ def from_mesh(
     chosen = {name: _owned(mesh, tdim - 1, given) for name, given in parts.items()}
     for name, facets in chosen.items():
         inside = int(np.count_nonzero(~np.isin(facets, boundary)))
-        if mesh.comm.allreduce(inside) > 0:
+        if _compat.lasting(mesh.comm).allreduce(inside) > 0:
             raise InputError(f"the part {name!r} contains interior facets of the mesh")
     cells = {name: _owned(mesh, tdim, given) for name, given in (regions or {}).items()}
     return with_names(mesh, chosen, cells, size)
@@ -290,8 +290,9 @@ def with_names(
         count = mesh.topology.index_map(mesh.topology.dim).size_local
         regions = {BODY: np.arange(count, dtype=np.int32)}
     wholes = ("part", "facet of the mesh's boundary", parts), ("region", "cell", regions)
+    comm = _compat.lasting(mesh.comm)
     for what, of_it, sets in wholes:
-        counts = mesh.comm.allreduce(np.array([s.size for s in sets.values()], dtype=np.int64))
+        counts = comm.allreduce(np.array([s.size for s in sets.values()], dtype=np.int64))
         empty = [name for name, count in zip(sets, counts, strict=True) if count == 0]
         if empty:
             raise InputError(f"the {what} {empty[0]!r} contains no {of_it}")

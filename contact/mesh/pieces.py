@@ -9,6 +9,8 @@ from numpy.typing import NDArray
 from scipy import sparse
 from scipy.sparse.csgraph import connected_components
 
+from contact._compat import lasting
+
 
 def connected_pieces(space: fem.FunctionSpace) -> tuple[NDArray[np.int32], int]:
     """Return the piece of each owned node, shape (n,), and the number of pieces. Collective.
@@ -16,7 +18,7 @@ def connected_pieces(space: fem.FunctionSpace) -> tuple[NDArray[np.int32], int]:
     Nodes of one cell are in one piece. Meshes made of several regions fall apart where these do
     not share their nodes.
     """
-    comm, index_map, cells = space.mesh.comm, space.dofmap.index_map, space.dofmap.list
+    comm, index_map, cells = lasting(space.mesh.comm), space.dofmap.index_map, space.dofmap.list
     owned = index_map.size_local
     first = np.repeat(cells[:, 0], cells.shape[1] - 1)
     count, here = _components(first, cells[:, 1:].ravel(), owned + index_map.num_ghosts)

@@ -7,6 +7,8 @@ from dolfinx import fem
 from mpi4py import MPI
 from numpy.typing import NDArray
 
+from contact._compat import lasting
+
 #: How far outside of a mesh a node may lie, over the extent of the mesh, and over its largest cell.
 OUTSIDE, NEAR = 1e-3, 0.1
 
@@ -35,10 +37,11 @@ def carry(coarse: fem.Function, space: fem.FunctionSpace) -> fem.Function:
     cells = _covering(space)
     source = coarse.function_space
     mesh = source.mesh
+    comm = lasting(mesh.comm)
     everywhere = np.arange(mesh.topology.index_map(mesh.topology.dim).size_local, dtype=np.int32)
     largest = float(mesh.h(mesh.topology.dim, everywhere).max(initial=0.0))
     extent = float(np.ptp(space.mesh.geometry.x, axis=0).max(initial=0.0))
-    largest, extent = (mesh.comm.allreduce(size, op=MPI.MAX) for size in (largest, extent))
+    largest, extent = (comm.allreduce(size, op=MPI.MAX) for size in (largest, extent))
     # More cells would have to be looked at.
     padding = min(OUTSIDE * extent, NEAR * largest)
     data = fem.create_interpolation_data(space, source, cells, padding=padding)
