@@ -23,7 +23,7 @@ from contact.interface.layer import Layer
 from contact.interface.obstacle import Obstacle
 from contact.mesh.domain import Domain
 from contact.mesh.revolution import revolved
-from contact.problem.consistent import check_problem
+from contact.problem.consistent import check_problem, check_supports
 from contact.problem.problem import ContactProblem
 from contact.tolerances import HUGE
 from forms.hencky import Law
@@ -81,6 +81,8 @@ def build_problem(
         problem = ContactProblem(domain, body, contacts, degree=case.space.degree)
         for time in (1.0,) if case.evolution is None else case.evolution.times[1:]:
             _check_step(problem.at(time))
+        for time in () if case.evolution is None else case.evolution.ends:
+            check_supports(problem.at(time))
     return problem
 
 

@@ -21,7 +21,7 @@ from contact.output.record import StepRecord
 from contact.output.review import announce
 from contact.output.solution import Solution
 from contact.output.steps import StepRecorder
-from contact.problem.consistent import check_problem
+from contact.problem.consistent import check_problem, check_supports
 from contact.problem.held import check_potential
 from contact.problem.kkt import evaluate
 from contact.problem.problem import ContactProblem
@@ -82,6 +82,8 @@ def evolve(
             f"times: given {', '.join(f'{time:g}' for time in ends)}; accepted: numbers that "
             f"increase, the first above {begin:g}"
         )
+    for end in ends:
+        check_supports(problem.at(end))
     for end in ends[-1:]:
         check_problem(problem.at(end))
     settings = in_steps(settings or NewtonOptions())

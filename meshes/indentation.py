@@ -61,10 +61,12 @@ def half_cylinder(
 
     Parts: ``contact`` (the top up to ``radius``), ``free`` (the rest of the top), ``symmetry``
     (y = 0), ``side``, ``bottom``. Sizes as in `half_space`, whose mesh is turned about the axis;
-    along the edge of the contact part the elements have the size ``arc_size``.
+    along the edge of the contact part the elements have the size ``arc_size``, at most ``radius``.
     """
     import gmsh
 
+    if arc_size > radius:  # a few chords make no circle
+        raise InputError(f"arc_size must be at most the radius, {radius:g}; given: {arc_size:g}")
     half_space(
         radius=radius,
         extent=extent,

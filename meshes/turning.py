@@ -57,7 +57,7 @@ def turn(gmsh: Any, sectors: int) -> None:
     solids = {name: _entity(gmsh, 3, name) for name in bodies}
     gmsh.model.mesh.addNodes(3, next(iter(solids.values())), used + 1, points[used].ravel())
     for name, rows in bodies.items():
-        _fill(gmsh, 3, solids[name], _swept(rows, numbers))
+        _fill(gmsh, 3, solids[name], _oriented(_swept(rows, numbers), points))
     for name, rows in parts.items():
         if len(rows):
             _fill(gmsh, 2, _entity(gmsh, 2, name), rows)
@@ -94,6 +94,14 @@ def _swept(simplices: Ints, numbers: Ints) -> Ints:
     made = np.concatenate(cut)
     ordered = np.sort(made, axis=1)
     return made[np.all(ordered[:, 1:] > ordered[:, :-1], axis=1)]
+
+
+def _oriented(tetrahedra: Ints, points: npt.NDArray[np.float64]) -> Ints:
+    """Return tetrahedra of positive volume, as Gmsh's own are."""
+    corners = points[tetrahedra]
+    inverted = np.linalg.det(corners[:, 1:] - corners[:, :1]) < 0
+    tetrahedra[inverted, :2] = tetrahedra[inverted, 1::-1]
+    return tetrahedra
 
 
 def _entity(gmsh: Any, dim: int, name: str) -> int:

@@ -38,12 +38,16 @@ def field(value: Given) -> Any:
     """
     if value is None or isinstance(value, Moving):
         return value
+    if isinstance(value, np.ndarray) and value.shape == ():
+        value = value[()]
     if isinstance(value, int | float | np.number) and not isinstance(value, bool):
         return Number(float(value))
     if isinstance(value, Expr):
         if value.ufl_shape != ():
             raise InputError(f"given UFL of shape {value.ufl_shape}; accepted: {ACCEPTED}")
-        return Ufl(value)
+        # UFL makes numbers of 0 * x[0] and of components of vectors.
+        everywhere = not ufl.domain.extract_domains(value)
+        return Number(float(value)) if everywhere else Ufl(value)
     if hasattr(value, "ufl") and hasattr(value, "numpy"):
         return value
     if callable(value):
@@ -64,7 +68,7 @@ def vector(value: Given, free: bool = False) -> tuple[Any, ...] | None:
     if value is None:
         return None
     if isinstance(value, Expr) and len(value.ufl_shape) == 1:
-        return tuple(Ufl(value[i]) for i in range(value.ufl_shape[0]))
+        return tuple(field(value[i]) for i in range(value.ufl_shape[0]))
     if not isinstance(value, Sequence | np.ndarray) or isinstance(value, str):
         raise InputError(
             f"given {value!r} for a vector; accepted: a list with an entry a component, such as "

@@ -22,6 +22,9 @@ from contact.problem.problem import ContactProblem
 #: Share of values up to which they are the same.
 ROUNDING = 1e-9
 
+#: Of numbers of the size of the body, or of the potential at strains of 1.
+EPS = float(np.finfo(float).eps)
+
 
 def check_problem(problem: ContactProblem) -> None:
     """Check loads, supports and what holds the body, at the time of a problem. Collective.
@@ -33,7 +36,7 @@ def check_problem(problem: ContactProblem) -> None:
         finds that the body can move.
     """
     _check_loads(problem)
-    _check_supports(problem)
+    check_supports(problem)
     check_held(problem)
 
 
@@ -54,10 +57,15 @@ def _check_loads(problem: ContactProblem) -> None:
             )
 
 
-def _check_supports(problem: ContactProblem) -> None:
-    """Refuse different values for one component of what is part of two supports.
+def check_supports(problem: ContactProblem) -> None:
+    """Refuse different values for one component of what is part of two supports. Collective.
 
     Where parts meet at an edge values may differ: there the last one counts.
+
+    Raises
+    ------
+    InputError
+        If they differ at the time of the problem by more than rounding.
     """
     d, space, time = problem.dim, problem.equilibrium.space, problem.time
     for (i, first), (j, last) in combinations(enumerate(problem.body.fixed), 2):
@@ -75,12 +83,18 @@ def _check_supports(problem: ContactProblem) -> None:
                     for fixed, given in ((first, one), (last, other))
                 ]
             )
-            differ = np.ptp(values, axis=1) > ROUNDING * np.abs(values).max(axis=1)
+            size = float(np.abs(values).max(initial=0.0))
+            size = problem.comm.allreduce(size, op=MPI.MAX)
+            # Rounding of what could be, such as sin(pi), is no value.
+            unit = problem.equilibrium.phi_scale if name == "potential" else 1.0
+            allowed = ROUNDING * size + EPS * unit * problem.domain.size
+            differ = np.ptp(values, axis=1) > allowed
             found = np.concatenate(problem.comm.allgather(values[differ][:1])) + 0.0  # no -0
             if found.size > 0:
+                when = "" if time == 1.0 else f" at t = {time:g}"
                 raise InputError(
                     f"fixed.{j}.{name}: {found[0, 1]:g} on {last.on}; accepted: {found[0, 0]:g}, "
-                    f"as fixed.{i} has there"
+                    f"as fixed.{i} has there{when}"
                 )
 
 

@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import InitVar, dataclass
 from typing import Any
 
+import numpy as np
+
 from contact.body.fields import Given
 from contact.interface.current import Conductor
 from contact.interface.friction import Friction
@@ -66,7 +68,7 @@ class Contact:
             object.__setattr__(self, "foundation", GapFunction.of(self.foundation))
         layer, press = self.layer, self.press
         expect("Contact: layer", layer, "Layer(...), or None", isinstance(layer, Layer | None))
-        expect("Contact: press", press, "True or False", isinstance(press, bool))
+        expect("Contact: press", press, "True or False", isinstance(press, bool | np.bool_))
         check_laws("Contact", self.friction, self.conductor)
 
 

@@ -67,6 +67,17 @@ def test_values_and_forms(way: str) -> None:
     assert integral == pytest.approx(2 * (0.3 * 2 - 0.1 * 2) + 0.3 + 0.1, rel=1e-12)
 
 
+def test_numbers_by_other_names() -> None:
+    """Arrays without a dimension, and what UFL makes a number of."""
+    x = ufl.SpatialCoordinate(square()[0])
+    inside = np.zeros((3, 2))
+    for given in (np.array(0.3), ufl.as_ufl(0.3), 0.3 + 0 * x[0], np.float32(0.25) + 0.05):
+        np.testing.assert_allclose(field(given).numpy(inside), 0.3, rtol=1e-7)
+    moved = vector(ufl.as_vector([0.1 * x[0], -0.3]))
+    assert moved is not None
+    assert np.all(moved[1].numpy(inside) == -0.3)
+
+
 def problem(mesh: dmesh.Mesh, tags: dmesh.MeshTags, given: Any) -> Problem:
     """Return a block with the field everywhere: pressure, displacement, gap and friction."""
     domain = Domain.from_mesh(mesh, tags, {"bottom": 3, "top": 7})

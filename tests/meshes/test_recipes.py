@@ -174,6 +174,15 @@ def test_faces_of_a_block_have_the_right_names():
         assert found == pytest.approx(normal, abs=1e-12)
 
 
+@pytest.mark.parametrize("name", ["half_cylinder", "half_space", "sphere"])
+def test_cells_have_positive_volumes(name):
+    """As other programs ask for, which read the files that are written."""
+    mesh = from_recipe(COMM, name).mesh
+    dim = mesh.topology.dim
+    corners = mesh.geometry.x[mesh.geometry.dofmap][..., :dim]
+    assert np.linalg.det(corners[:, 1:] - corners[:, :1]).min() > 0
+
+
 @pytest.mark.parametrize("name", ["quarter_disc", "half_disc", "disc", "sphere"])
 def test_nodes_of_round_parts_lie_on_the_circle(name):
     radius = 5.0
@@ -227,6 +236,11 @@ def test_smaller_sizes_give_more_nodes(name):
         ("bar", {"loaded_from": 4.0}, "loaded_from must be less than the length"),
         ("bar_on_ends", {"end": 6.0}, "end must be less than half the length"),
         ("disc", {"top_angle": 91.0}, "top_angle must be at most 90"),
+        (
+            "half_cylinder",
+            {"radius": 0.05},
+            "arc_size must be at most the radius, 0.05; given: 0.25",
+        ),
     ],
 )
 def test_wrong_recipes_are_refused(name, given, message):

@@ -3,6 +3,7 @@
 from collections.abc import Callable
 from typing import Any
 
+import numpy as np
 import pytest
 from mpi4py import MPI
 
@@ -70,6 +71,12 @@ WRONG = {
             evolve(problem(TOP, Fixed("top", [0, -0.005], amplitude=lambda t: t**2)), [0.5])
         ),
         r"fixed\.1\.displacement\.1: -0\.00125 on top; accepted: -0\.0025",
+    ),
+    "two supports on the way": (
+        lambda: next(
+            evolve(problem(TOP, Fixed("top", [0, -0.005], amplitude=lambda t: t**2)), [0.5, 1])
+        ),
+        r"-0\.00125 on top; accepted: -0\.0025, as fixed\.0 has there at t = 0\.5",
     ),
     "a load on the contact part": (
         solved(loads=Load(["right", "bottom"], [0, 1e-3])),
@@ -155,6 +162,13 @@ def test_a_case_is_refused_in_the_same_words() -> None:
     given = [{**CASE["fixed"][0], "amplitude": "back"}, CASE["fixed"][0]]
     with pytest.raises(InputError, match=r"fixed\.1\.displacement\.1: -0\.005 on top"):
         build_problem(parse_case({**CASE, **later, "fixed": given}))
+    # At the ends of all stages both are 0, but for rounding.
+    waves = [{"on": "top", "displacement": [f, -0.005]} for f in ("0.01*sin(pi*t)", 0)]
+    steps = {"evolution": {"times": [0.0, 1.0, 2.0], "steps": [1, 2]}}
+    with pytest.raises(InputError, match=r"displacement\.0: 0 on top; .* -0\.01, .* at t = 1\.5"):
+        build_problem(parse_case({**CASE, **steps, "fixed": waves}))
+    steps["evolution"]["steps"] = [1, 1]
+    build_problem(parse_case({**CASE, **steps, "fixed": waves}))
 
 
 @pytest.mark.parallel
@@ -165,6 +179,9 @@ def test_what_agrees_is_accepted() -> None:
         TOP,
         Fixed("top", [lambda x: 0.0 * x[0], lambda x: -0.005 + 0.0 * x[0]]),
         Fixed("right", [None, lambda x: -0.005 * x[1]]),
+        # 0 at the ends but for rounding
+        Fixed("left", [lambda x: 1e-3 * np.sin(np.pi * x[1]), None]),
+        Fixed("left", [lambda x: 1e-3 * np.sin(np.pi * (1 - x[1])), None]),
     )
     assert solve(again).converged
     start = solve(problem(), start=plain)
