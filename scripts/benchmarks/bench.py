@@ -2,7 +2,8 @@
 
 (a) the thesis's tables by each method; (b) the nonlinear solve against one linear elasticity solve
 on the same mesh; (c) one rank against two; (d) GetFEM on the same meshes; (e) plain dolfinx with a
-penalty; (f) where the time goes; (g) bodies that touch each other; (h) memory on several ranks.
+penalty; (f) where the time goes; (g) bodies that touch each other; (h) memory on several ranks;
+(i) load steps beside one static solve.
 
 All of it takes half an hour on two cores and 4 GB, and writes docs/benchmarks.md, the table of
 docs/scaling.md and that of the README after each part: after an interruption --parts goes on with
@@ -234,6 +235,11 @@ def two_bodies(bench: Bench) -> None:
     bench.script("pair_space")
 
 
+def load_steps(bench: Bench) -> None:
+    """Part (i): load steps beside one static solve."""
+    bench.script("steps")
+
+
 #: Part -> what runs it, and the tables and figures that it writes.
 PARTS: dict[str, tuple[Callable[[Bench], None], tuple[str, ...]]] = {
     "a": (by_method, ("bench-tables",)),
@@ -244,10 +250,11 @@ PARTS: dict[str, tuple[Callable[[Bench], None], tuple[str, ...]]] = {
     "f": (phases, ("bench-phases-2d", "bench-phases-3d")),
     "g": (two_bodies, ("pair-space",)),
     "h": (memory, ("bench-memory",)),
+    "i": (load_steps, ("bench-steps",)),
 }
 
 #: In which order the page has them.
-ORDER = "bfchdega"
+ORDER = "bfichdega"
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
