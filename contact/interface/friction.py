@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from mpi4py import MPI
 
 from contact.body.fields import Given, field
 from contact.errors import InputError
@@ -85,7 +86,7 @@ class Friction:
         return any(law is not None for law in self._laws)
 
     def law_at(self, nodes: ContactNodes) -> FrictionLaw | None:
-        """Return the law at contact nodes; None without friction. Collective.
+        """Return the law at contact nodes; None where no bound is ever above 0. Collective.
 
         Raises
         ------
@@ -94,13 +95,16 @@ class Friction:
             slip where nothing slips.
         """
         if self.tresca is not None:
-            return Tresca(_at("tresca", self.tresca, nodes))
+            bound = _at("tresca", self.tresca, nodes)
+            return Tresca(bound) if nodes.maximum(bound) > 0 else None
         if self.mu is not None:
-            return Coulomb(ConstantCoefficient(_at("mu", self.mu, nodes)))
+            mu = _at("mu", self.mu, nodes)
+            return Coulomb(ConstantCoefficient(mu)) if nodes.maximum(mu) > 0 else None
         if self.coefficient is None:
             return self.law
         _check("coefficient without slip", np.asarray(self.coefficient(np.zeros(1))), nodes)
-        return Coulomb(self.coefficient)
+        most = nodes.comm.allreduce(self.coefficient.maximum, op=MPI.MAX)
+        return Coulomb(self.coefficient) if most > 0 else None
 
 
 def _at(name: str, given: Given, nodes: ContactNodes) -> Array:

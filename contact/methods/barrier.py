@@ -14,13 +14,13 @@ from dataclasses import replace
 import numpy as np
 from mpi4py import MPI
 
+from contact.errors import InputError
 from contact.interface.multipliers import Multipliers
-from contact.linear.operator import Operator
 from contact.methods.convex.cones import Array, Cones, Step
 from contact.methods.convex.path import central
 from contact.methods.report import Outcome
 from contact.methods.search import Search
-from contact.methods.step import Iterate
+from contact.methods.step import Iterate, WholeStep
 from contact.methods.sure import INTERIOR_POINT
 from contact.problem.kkt import evaluate, residual_forces
 from contact.problem.mobility import groups, held_by_supports, null_space
@@ -34,7 +34,8 @@ LIMIT, UPDATES = 60, 8
 #: Work of slacks and forces, beside all that is done, below which the contact zone is known.
 CLOSED = 1e-10
 
-#: Forces out of balance then.
+#: Forces out of balance then. Where an iterative solver leaves more, the slacks vanish beneath what
+#: it can tell long before: Newton's method, whose right-hand sides are what is left, does better.
 BALANCED = 1e-6
 
 #: What an iterative solver leaves of the forces out of balance: the next step sees what is left. A
@@ -52,7 +53,7 @@ STUCK = 10.0
 
 
 def interior_point(
-    search: Search, operator: Operator, finish: Callable[[State], tuple[Iterate, Outcome]]
+    search: Search, whole: WholeStep, finish: Callable[[State], tuple[Iterate, Outcome]]
 ) -> tuple[Iterate, Outcome]:
     """Solve convex problems for sure, and let Newton's loop finish what they leave. Collective.
 
@@ -63,8 +64,8 @@ def interior_point(
     ----------
     search
         What is solved, a whole body.
-    operator
-        Of the body, with blocks at its contact nodes.
+    whole
+        Has the operator of the body, with blocks at its contact nodes.
     finish
         Newton's loop, from a state on.
     """
@@ -75,7 +76,7 @@ def interior_point(
     if not all([null_space(group.held(False)).size == 0 for group in groups(problem)]):
         bound = np.full_like(bound, STUCK * _loads(problem)) / interface.jump.weight
     for _ in range(UPDATES):
-        method = Barrier(problem, operator, bound, held)
+        method = Barrier(problem, whole, bound, held)
         outcome, state = method.run(search), method.state
         iterate = Iterate(state)
         if not outcome.converged and search.left > 0:
@@ -89,7 +90,7 @@ def interior_point(
 def _loads(problem: ContactProblem) -> float:
     """Return the sum of all forces that act at rest, without regard to sign. Collective."""
     body = problem.equilibrium
-    forces = np.abs(body.unbalanced(residual_forces(problem, problem.start())))
+    forces = np.abs(body.unbalanced(residual_forces(problem, problem.start()))) * body.mechanical
     own = float(problem.comm.allreduce(forces[: body.owned].sum(), op=MPI.SUM))
     return own + float(forces[body.owned :].sum())
 
@@ -103,18 +104,16 @@ class Barrier:
     ----------
     problem
         The contact problem.
-    operator
-        Of the body, with blocks at its contact nodes.
+    whole
+        Has the operator of the body, with blocks at its contact nodes.
     bound
         Friction bound, shape (n,) (stress).
     held
         Whether supports hold the body: where it would go without contact then says much.
     """
 
-    def __init__(
-        self, problem: ContactProblem, operator: Operator, bound: Array, held: bool
-    ) -> None:
-        self.problem, self.operator = problem, operator
+    def __init__(self, problem: ContactProblem, whole: WholeStep, bound: Array, held: bool) -> None:
+        self.problem, self._whole = problem, whole
         interface = problem.interface
         jump, self._state = interface.jump, problem.start()
         self._near = np.isfinite(jump.gap)
@@ -125,16 +124,23 @@ class Barrier:
         moved = np.zeros_like(nodal)
         if held:
             self._update(np.zeros((*nodal.shape, jump.block_size)))
-            moved = jump.apply(operator.solve(-residual_forces(problem, self._state), FORCING))
+            moved = jump.apply(
+                whole.operator.solve(-residual_forces(problem, self._state), FORCING)
+            )
         opening = -interface.opening(nodal + moved)[self._near]
         gap = jump.gap[self._near]
+        scales = problem.scales
+        block = scales.plane_modulus * scales.area / scales.height
         if held:
-            least = np.sqrt(SHARE) * jump.maximum(-opening)
-            way = jump.maximum(np.abs(moved).max(axis=1, initial=0.0))
-            work = total * least**2 / (way or 1.0)
+            way = jump.maximum(np.abs(moved[:, : jump.dim]).max(axis=1, initial=0.0))
+            # Where no load moves it the body is taken for a block, and where it touches nothing
+            # by that, any work will do.
+            far = jump.maximum(-opening) or SHARE * (way or interface.size)
+            least = np.sqrt(SHARE) * far
+            work = (total / way if total > 0 and way > 0 else block) * least**2
         else:
-            give = problem.scales.height / (problem.scales.plane_modulus * problem.scales.area)
-            least = self._sum(float(np.maximum(gap, 0.0).sum())) / count + total * give
+            total = total or block * jump.maximum(np.abs(opening))
+            least = self._sum(float(np.maximum(gap, 0.0).sum())) / count + total / block
             work = LOOSE * total * least / count
         # Where the body would lift off, the slack is that from the beginning.
         slack = np.maximum(np.maximum(gap, opening), least)
@@ -147,7 +153,11 @@ class Barrier:
         """Go towards the solution. Collective."""
         kkt, ended = evaluate(self.problem, self.state), "the interior point was given no step"
         for steps in range(1, min(LIMIT, search.left) + 1):
-            taken = self.step()
+            try:
+                taken = self.step()
+            except InputError:
+                self._whole.renew()
+                taken = False
             kkt = evaluate(self.problem, self.state)
             search.see(Iterate(self.state), kkt)
             search.history.record(kkt, INTERIOR_POINT, 2)
@@ -155,7 +165,8 @@ class Barrier:
             if not taken:
                 ended = f"rounding ends the interior point after {steps} steps"
                 break
-            if self.gap() <= CLOSED and kkt.equilibrium <= BALANCED:
+            gap = self.gap()
+            if gap <= CLOSED and (kkt.equilibrium <= BALANCED or gap <= CLOSED**2):
                 ended = f"duality gap closed after {steps} steps"
                 break
         return Outcome(kkt, search.options.allowed, ended)
@@ -193,7 +204,7 @@ class Barrier:
             pressure = interface.pressure(nodal, self._state.forces)
             blocks = blocks + interface.response.block(nodal, pressure)
         weighted = interface.weighted(blocks, x)
-        self.operator.update("secant", x, weighted, constant=body.linear)
+        self._whole.operator.update("secant", x, weighted, constant=body.linear)
 
     def step(self) -> bool:
         """Take a step; False if rounding lets no more be taken. Collective."""
@@ -219,7 +230,7 @@ class Barrier:
             at_nodes[rubbing] += friction - np.einsum("kij,kj->ki", across, slip)
             rhs = residual.copy()
             jump.transpose(at_nodes, rhs)
-            dx = self.operator.solve(rhs, FORCING)
+            dx = self._whole.operator.solve(rhs, FORCING)
             moved = jump.apply(dx)
             closed = slack - jump.normal_component(moved)[near]
             return dx, cones.complete(

@@ -192,7 +192,7 @@ class Newton:
             iterate, outcome = self._convex(self.problem, iterate, outcome)
         elif not outcome.converged and search.left > 0:
             logger.info("%s; going on with an interior point", outcome.ended)
-            iterate, outcome = interior_point(search, self.whole.operator, self._finished)
+            iterate, outcome = interior_point(search, self.whole, self._finished)
         if not outcome.converged and self.problem.interface.friction.acts and search.left > 0:
             iterate, outcome = frozen_friction(loop, iterate)
         if not outcome.converged and search.left > 0 and self.options.load_steps:

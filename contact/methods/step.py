@@ -150,6 +150,10 @@ class WholeStep:
         self._kind = ""
         self._nearest, self._vain, self._forcing = np.inf, 0, FORCING
 
+    def renew(self) -> None:
+        """Forget the operator after a solve that failed: MUMPS does not begin anew after that."""
+        self._kind, self._operator = "", None
+
     def _leaves(self, reached: float) -> float:
         """Return what an iterative solver leaves of a step's residual, given where that starts."""
         self._vain = 0 if reached < self._nearest else self._vain + 1
@@ -209,7 +213,7 @@ class WholeStep:
         except SingularError:
             if body.linear or iterate.status is None:
                 raise
-            self._kind, self._operator = "", None  # MUMPS does not begin anew after that
+            self.renew()
             return None  # at rest something has held it: it has been moved too far
         moved = jump.apply(increment)
         change = np.einsum("nij,nj->ni", contact.blocks, moved)

@@ -136,7 +136,7 @@ def test_penalty_on_columns(column):
     # Full steps would cycle between the open and the saturated layer.
     eps = 1e-7
     solution = solve_case(
-        column.problem(), PenaltyOptions(eps_contact=eps, tolerance=1e-10, max_inner=50)
+        column.problem(), PenaltyOptions(eps_contact=eps, tolerance=1e-11, max_inner=50)
     )
     assert solution.converged, solution.outcome
     u_n, _, layer, rest, _ = column.solution()

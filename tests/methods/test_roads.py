@@ -1,5 +1,7 @@
 """What Newton's method falls back on, and what is left where nothing helps."""
 
+from typing import Any, Literal
+
 import pytest
 from mpi4py import MPI
 
@@ -18,6 +20,7 @@ from forms.laws import ConstantCoefficient
 from scripts.cases import bar
 from tests.problems import mechanics
 from tests.problems.mechanics import newton
+from tests.problems.rigid import PIEZO
 
 SELF = MPI.COMM_SELF
 
@@ -52,9 +55,70 @@ def test_an_interior_point_on_a_body_that_friction_alone_keeps_from_sliding():
     state, outcome = Newton(problem, NewtonOptions()).solve()
     assert outcome.converged
     method = Newton(problem, NewtonOptions(condense=False))
-    found, outcome = interior_point(method.search, method.whole.operator, method._finished)
+    found, outcome = interior_point(method.search, method.whole, method._finished)
     assert outcome.converged, outcome.reason
     assert found.state.near(state, rtol=1e-6, atol=1e-9)
+
+
+def interior(case: dict[str, Any], linear: Literal["lu", "iterative"]) -> tuple[Outcome, bool]:
+    """Solve by the interior point; tell also whether Newton's method finds the same."""
+    problem = build_problem(parse_case(case), SELF)
+    state, _ = Newton(problem, NewtonOptions()).solve()
+    method = Newton(problem, NewtonOptions(condense=False, linear=linear))
+    found, outcome = interior_point(method.search, method.whole, method._finished)
+    return outcome, found.state.near(state, rtol=1e-6, atol=1e-9)
+
+
+@pytest.mark.parametrize("linear", ["lu", "iterative"])
+def test_an_interior_point_where_nothing_acts_but_a_foundation_that_moves(linear):
+    """Without loads there was no work to begin with: it stood still, or its numbers were none."""
+    case = {
+        "mesh": {"generator": "rectangle", "size": [4.0, 1.0], "cells": [32, 8]},
+        "material": {"young": 1.0, "poisson": 0.3},
+        "fixed": [{"on": "left", "displacement": [0.0, 0.0]}],
+        "contact": {"on": "bottom", "rigid": {"displacement": [0.01, 0.05]}},
+        "friction": {"law": "coulomb", "mu": 0.3},
+    }
+    outcome, same = interior(case, linear)
+    assert outcome.converged, outcome.reason
+    assert same
+
+
+def test_an_interior_point_ends_where_an_iterative_solver_balances_no_further():
+    """It went on until its slacks were 1e-35, and ended with "the body can move freely"."""
+    case = {
+        "mesh": {"generator": "rectangle", "size": [8.0, 4.0], "cells": [16, 8]},
+        "material": {"young": 58.7, "poisson": 0.39, "piezo": PIEZO},
+        "fixed": [{"on": "left", "displacement": [0.0, 0.0], "potential": 0.0}],
+        "load": [{"on": "top", "traction": [0.0, "-x"]}],
+        "contact": {"on": "bottom"},
+        "friction": {"law": "coulomb", "mu": 0.2},
+        "electric": {"k_e": 0.1, "phi_f": 32.0},
+    }
+    outcome, same = interior(case, "iterative")
+    assert outcome.converged, outcome.reason
+    assert same
+
+
+@pytest.mark.parametrize("law", [{"law": "coulomb", "mu": 0.0}, {"law": "tresca", "bound": "0*x"}])
+def test_no_friction_is_solved_like_none(law):
+    """It took 44 solves instead of 7: half a ball was taken to be held by friction."""
+    case = {
+        "mesh": {"generator": "two_half_cylinders", "contact_size": 0.1, "size": 2.0},
+        "material": {"young": 1000.0, "poisson": 0.3},
+        "fixed": [{"on": "lower_cut", "displacement": [0.0, 0.0]}],
+        "load": [{"on": "upper_cut", "traction": [0.0, -1.0]}],
+        "contact": {"on": "upper_arc", "against": "lower_arc"},
+    }
+    linear = NewtonOptions(linear="iterative")
+    method, other = (
+        Newton(build_problem(parse_case(case | given), SELF), linear)
+        for given in ({"friction": law}, {})
+    )
+    (state, outcome), (found, _) = method.solve(), other.solve()
+    assert outcome.converged, outcome.reason
+    assert len(method.history.records) == len(other.history.records)
+    assert state.near(found, rtol=1e-12, atol=1e-15)
 
 
 @pytest.mark.parametrize(
