@@ -13,6 +13,7 @@ from contact.interface.multipliers import Multipliers
 from contact.methods.method import Method
 from contact.methods.newton import Newton
 from contact.methods.options import NewtonOptions, Options
+from contact.methods.report import Outcome, Record
 from contact.nesting import nested_start
 from contact.output.review import review
 from contact.problem.kkt import KKT, evaluate
@@ -27,6 +28,35 @@ AGREE = 1e-7
 
 #: Part of the unknowns and forces by which a disturbed start differs from a solution.
 DISTURBANCE = 1e-4
+
+#: Linear solves after which block relaxation is given up: the slowest example takes 830.
+SOLVES = 3000
+
+
+class TooManyError(Exception):
+    """A block relaxation has taken all of its solves."""
+
+
+@dataclass
+class Limit:
+    """A monitor that ends block relaxation after so many linear solves.
+
+    Attributes
+    ----------
+    left
+        How many there still are.
+    """
+
+    left: int
+
+    def __call__(self, record: Record) -> None:
+        """Take no note of outer iterations."""
+
+    def poll(self) -> None:
+        """Count an inner iteration, on all ranks."""
+        if self.left == 0:
+            raise TooManyError
+        self.left -= 1
 
 
 @dataclass(frozen=True)
@@ -75,8 +105,9 @@ class Branches:
         self._norm = ProductNorm(problem)
 
     def run(self, settings: Options, start: State | None = None) -> Solution:
-        """Solve from zero displacement, or from elsewhere. Collective."""
-        return self._ended(METHODS[settings.method](self.problem, settings, None), start)
+        """Solve from zero displacement, or from elsewhere, in up to `SOLVES`. Collective."""
+        limit = Limit(SOLVES) if settings.method == "uzawa" else None
+        return self._ended(METHODS[settings.method](self.problem, settings, limit), start)
 
     def next_to(self, start: State, tolerance: float) -> Solution:
         """Solve by Newton's method with all of friction's derivative. Collective.
@@ -88,7 +119,11 @@ class Branches:
         return self._ended(Newton(self.problem, options), start)
 
     def _ended(self, method: Method, start: State | None) -> Solution:
-        state, outcome = method.solve(start)
+        try:
+            state, outcome = method.solve(start)
+        except TooManyError:
+            state, allowed = method.state, method.options.allowed
+            outcome = Outcome(evaluate(self.problem, state), allowed, f"given up: {SOLVES} solves")
         return Solution(self.problem, state, outcome, method.history, method.counters, "", {})
 
     def residuals(self, found: Solution) -> KKT:

@@ -8,7 +8,7 @@ import pytest
 from contact import build_problem
 from contact.methods.options import NewtonOptions
 from scripts.cases import CASES
-from scripts.studies import agreement
+from scripts.studies import agreement, branches
 from scripts.studies.agreement_examples import Example
 from scripts.studies.branches import AGREE, Branches
 
@@ -31,6 +31,18 @@ def test_every_case_file_is_compared_but_those_in_steps():
     left_out = names - {example.name for example in agreement.examples()}
     assert "bar" not in left_out and "fretting" in left_out
     assert all("[evolution]" in (CASES / f"{name}.toml").read_text() for name in left_out)
+
+
+def test_block_relaxation_is_given_up_after_its_solves(monkeypatch, tmp_path):
+    monkeypatch.setattr(branches, "SOLVES", 20)
+    (compared,) = agreement.main(["--coarse", "--out", str(tmp_path), "--only", "hertz-sphere"])
+    run = compared.runs["uzawa"]
+    assert run.counters.linear_solves == 20
+    assert not run.converged
+    assert run.outcome.reason.startswith("given up: 20 solves")
+    (row,) = rows(tmp_path / "agreement.csv")
+    assert row["verdict"] == "not converged"
+    assert row["uzawa's"] == "20"
 
 
 def test_newton_and_block_relaxation_agree_or_find_different_solutions(folder):
