@@ -61,7 +61,7 @@ def test_it_converges_as_fast_as_for_one_body(held, monkeypatch):
     assert np.allclose(state.x, direct.x, rtol=0, atol=1e-6 * scale)
 
 
-@pytest.mark.parametrize(("mu", "push"), [(0.0, 0.0), (0.3, 0.0), (0.3, 0.5)])
+@pytest.mark.parametrize(("mu", "push"), [(0.0, 0.0), (0.3, 0.5)])
 def test_a_ball_that_only_another_ball_holds(mu, push, monkeypatch):
     """It touches it at one node at first; the preconditioner's norm saw nothing but its rolling."""
     options = {**multigrid.DEFAULTS, "pc_gamg_coarse_eq_limit": "200"}
@@ -81,8 +81,8 @@ def test_a_ball_that_only_another_ball_holds(mu, push, monkeypatch):
         "mesh": {
             "generator": "two_spheres",
             "quarters": 2,
-            "size": 20.0,
-            "contact_size": 1.6,
+            "size": 25.0,
+            "contact_size": 2.5,
             "contact_width": 5.0,
         },
         "material": {"young": 20e3, "poisson": 0.3},
