@@ -120,6 +120,10 @@ WRONG = {
     "press": (on(press="press"), "Contact: press: given 'press'; accepted: True or False"),
     "no contact": (lambda: problem(contact=[]), r"contact: given \[\]"),
     "a law": (lambda: Body(3, TOP), "law: given 3"),  # type: ignore[arg-type]
+    "no compressible law": (
+        lambda: Problem(block(), Body(Linear(10.0, 0.5), TOP), Contact("bottom")),
+        "Poisson's ratio 0.5; accepted: a modulus > 0, a ratio between -1 and 0.5",
+    ),
     "a material as law": (lambda: Body(Material(LAW), TOP), "law: given Material"),  # type: ignore[arg-type]
     "a load as support": (lambda: Body(LAW, [Load("top", [0, 1])]), r"fixed: given Load\("),  # type: ignore[list-item]
     "an electrode": (lambda: problem(electrodes=Electrode("left")), "a piezoelectric material"),
