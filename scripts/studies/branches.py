@@ -23,13 +23,15 @@ from contact.solving import METHODS
 from contact.typing import Array
 from scripts.studies.product_norm import ProductNorm
 
-#: Relative difference up to which two solutions are the same.
-AGREE = 1e-7
+#: Relative difference up to which two solutions are the same. Pressures beneath indenters, whose
+#: elements differ by a factor of 4000, are known to 4e-7 at residuals of 1e-11; other solutions
+#: are 1e-4 away or more.
+AGREE = 1e-6
 
 #: Part of the unknowns and forces by which a disturbed start differs from a solution.
 DISTURBANCE = 1e-4
 
-#: Linear solves after which block relaxation is given up: the slowest example takes 830.
+#: Linear solves after which block relaxation is given up: the slowest example takes 950.
 SOLVES = 3000
 
 
