@@ -64,8 +64,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
         "Load steps beside one static solve",
         {key: [row[key] for row in rows] for key in rows[0]},
         "Example 7.2 and a block in space, linear material, friction. `static` is one step to the "
-        f"full load, the mean of {REPEATED} before the steps and {REPEATED} after them; seconds of the "
-        "processor, of one process.",
+        f"full load, the mean of {REPEATED} before the steps and {REPEATED} after them; seconds of "
+        "the processor, of one process.",
     )
 
 
