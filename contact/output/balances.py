@@ -78,18 +78,24 @@ class ForceBalance:
         Reactions of the prescribed displacements, and of rigid parts.
     contact
         What the foundations exert on the body; between bodies it cancels.
+    passed
+        What passes through all contacts, as the sides `on` feel it.
     """
 
     applied: Array
     supports: Array
     contact: Array
+    passed: Array
 
     @property
     def imbalance(self) -> float:
-        """The norm of the sum over the sum of the norms."""
-        parts = (self.applied, self.supports, self.contact)
-        scale = sum(float(np.linalg.norm(part)) for part in parts)
-        return float(np.linalg.norm(sum(parts))) / scale if scale > 0 else 0.0
+        """The norm of the sum over the sum of the norms, of contact's that of what passes.
+
+        Two bodies that are both held have no other resultant than what passes between them.
+        """
+        scale = sum(float(np.linalg.norm(p)) for p in (self.applied, self.supports, self.passed))
+        total = self.applied + self.supports + self.contact
+        return float(np.linalg.norm(total)) / scale if scale > 0 else 0.0
 
 
 @dataclass(frozen=True)
@@ -180,12 +186,12 @@ def force_balance(problem: ContactProblem, state: State) -> ForceBalance:
     stress = problem.interface.stress(problem.nodal(state), state.forces)
     given = body.nodal(body.external(state.time))[:, :d].sum(axis=0)
     pushes = np.zeros_like(body.external(state.time))
-    problem.nodes.transpose(-problem.nodes.weight[:, None] * stress, pushes)
+    forces = -problem.nodes.weight[:, None] * stress
+    problem.nodes.transpose(forces, pushes)
     contact = body.nodal(pushes)[:, :d].sum(axis=0)
-    local = np.stack([given, supports, contact])
+    local = np.stack([given, supports, contact, forces.sum(axis=0)])
     total = problem.comm.allreduce(local, op=MPI.SUM)
-    applied, supports, contact = problem.domain.resultant(total)
-    return ForceBalance(applied, supports, contact)
+    return ForceBalance(*problem.domain.resultant(total))
 
 
 def mean_potential(problem: ContactProblem, state: State, part: str) -> float:

@@ -49,22 +49,43 @@ def choices(solution: Solution) -> Iterator[tuple[str, bool]]:
         partly = entry.coupling.covered < HALF
         if partly.any():
             yield _partly(solution, entry.coupling.nodes[partly], sides)
+        yield _slides(solution, entry.coupling.nodes, max(size, other_size), sides)
 
 
 def _partly(solution: Solution, nodes: NDArray[np.int64], sides: str) -> tuple[str, bool]:
     """Warn of nodes that carry pressure though less than half of their area faces anything."""
     problem = solution.problem
-    _, local = owned_among(problem.equilibrium.layout.index_map, nodes)
-    # What a method leaves at open nodes is none; what is a thousandth of the rest decides nothing.
-    pressed = solution.pressure > PRESSED * problem.nodes.maximum(solution.pressure)
-    pressed &= np.isin(problem.nodes.nodes, local)
-    count = problem.comm.allreduce(int(pressed.sum()), op=MPI.SUM)
+    count = problem.comm.allreduce(int(_pressed(solution, nodes).sum()), op=MPI.SUM)
     if count == 0:
         return "", True
     return (
         f"{sides}: {count} nodes in contact face the other side with less than half of their "
         "area: the pressure there is a mean over the rest; facets that end where the other side "
         "does avoid that"
+    ), False
+
+
+def _pressed(solution: Solution, nodes: NDArray[np.int64]) -> NDArray[np.bool_]:
+    """Return which of the owned contact nodes are among `nodes` and carry pressure."""
+    contact = solution.problem.nodes
+    _, local = owned_among(solution.problem.equilibrium.layout.index_map, nodes)
+    # What a method leaves at open nodes is none; what is a thousandth of the rest decides nothing.
+    pressed = solution.pressure > PRESSED * contact.maximum(solution.pressure)
+    return np.asarray(pressed & np.isin(contact.nodes, local))
+
+
+def _slides(
+    solution: Solution, nodes: NDArray[np.int64], size: float, sides: str
+) -> tuple[str, bool]:
+    """Warn of points in contact that end further along the surface than a facet is long."""
+    slip = np.where(_pressed(solution, nodes), np.linalg.norm(solution.slip, axis=1), 0.0)
+    largest = solution.problem.nodes.maximum(slip)
+    if largest <= size:
+        return "", True
+    return (
+        f"{sides}: points in contact are {largest:.3g} along the surface from what they faced, "
+        f"and facets are {size:.3g} long: in linear kinematics each stays opposite what it faced "
+        "at rest; where surfaces are curved, or end, the result is of another contact"
     ), False
 
 

@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
+from contact import parse_case
+from contact import solve as solve_case
 from contact.body.description import Load
 from contact.errors import InputError
 from contact.interface.friction import Friction
@@ -14,6 +16,7 @@ from contact.methods.options import FixedPointOptions
 from contact.output.balances import charge_balance, force_balance, mean_potential, sensor
 from contact.problem.problem import ContactProblem
 from tests.problems.mechanics import solve
+from tests.problems.pairs import case
 from tests.problems.piezo import (
     example,
     hencky,
@@ -77,3 +80,14 @@ def test_charges_need_a_potential():
     solver = FixedPoint(problem, FixedPointOptions(max_outer=0))
     with pytest.raises(InputError, match="piezoelectric"):
         charge_balance(problem, solver.state)
+
+
+def test_the_balance_of_two_bodies_that_are_both_held():
+    """No resultant is left but what passes between them: the rest is rounding, not all of it."""
+    given = case(mesh={"generator": "two_blocks", "lower_size": 0.5, "upper_size": 0.5})
+    given["fixed"].append({"on": "upper_top", "displacement": [0.0, -0.01]})
+    del given["load"]
+    solution = solve_case(parse_case(given), comm=MPI.COMM_SELF)
+    balance = force_balance(solution.problem, solution.state)
+    assert abs(balance.passed[1]) > 1e-3
+    assert balance.imbalance < 1e-12

@@ -27,3 +27,15 @@ def test_what_a_method_leaves_at_partly_covered_nodes_is_no_pressure(share, warn
     changed = replace(solution, state=replace(solution.state, forces=forces))
     words = [text for text, _ in choices(changed) if "less than half" in text]
     assert bool(words) == warned
+
+
+@pytest.mark.parametrize(("way", "warned"), [(0.05, False), (0.9, True)])
+def test_what_slides_further_than_a_facet_faces_something_else(way, warned):
+    sizes = {"lower_size": 0.3, "upper_size": 0.3}
+    given = case(mesh={"generator": "two_blocks", **sizes}, friction={"law": "none"})
+    given["fixed"].append({"on": "upper_top", "displacement": [way, -0.01]})
+    del given["load"]
+    solution = solve(parse_case(given), comm=MPI.COMM_SELF)
+    assert solution.converged
+    words = [text for text, _ in choices(solution) if "along the surface" in text]
+    assert bool(words) == warned
