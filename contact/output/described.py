@@ -70,7 +70,10 @@ SUMMARY: Mapping[str, Item] = {
     "reaction_moments": Item("force · length", "Moments of these, as `contact_moment`."),
     "max_displacement": Item("length", "Largest Euclidean norm of the displacement at a node."),
     "max_dev_strain": Item("", "Largest |dev ε| over the cells (at degree 2 their nodes)."),
-    "max_strain": Item("", "Largest Frobenius norm of ε; linear kinematics is for small ones."),
+    "max_strain": Item(
+        "",
+        "Largest Frobenius norm of ε in the middle of a cell; linear kinematics is for small ones.",
+    ),
     "volume_ratio": Item("", "Least and largest volume of a cell over that at rest."),
     "max_von_mises": Item(
         "stress",
