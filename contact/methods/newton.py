@@ -192,7 +192,8 @@ class Newton:
             iterate, outcome = self._convex(self.problem, iterate, outcome)
         elif not outcome.converged and search.left > 0:
             logger.info("%s; going on with an interior point", outcome.ended)
-            iterate, outcome = interior_point(search, self.whole, self._finished)
+            found = self._resting()
+            iterate, outcome = found or interior_point(search, self.whole, self._finished)
         if not outcome.converged and self.problem.interface.friction.acts and search.left > 0:
             iterate, outcome = frozen_friction(loop, iterate)
         if not outcome.converged and search.left > 0 and self.options.load_steps:
@@ -214,6 +215,20 @@ class Newton:
         on_nodes, on_masters = np.split(forces, [problem.equilibrium.owned])
         loads = interface.comm.allreduce(float(on_nodes.sum()), op=MPI.SUM) + on_masters.sum()
         return bool(foreseen > SOFT * loads > 0)
+
+    def _resting(self) -> tuple[Iterate, Outcome] | None:
+        """Return the body at rest where nothing is left that acts on it. Collective.
+
+        Beside forces that vanish no residual is small, and only those that are 0 have none.
+        """
+        iterate = Iterate(self.problem.start())
+        residuals = evaluate(self.problem, iterate.state)
+        outcome = Outcome(residuals, self.options.allowed, "nothing acts")
+        if not outcome.converged:
+            return None
+        self.search.see(iterate, residuals)
+        self.history.record(residuals, "at rest")
+        return iterate, outcome
 
     def _at_contact(self, step: MaterialStep, iterate: Iterate) -> tuple[Iterate, Outcome]:
         """Iterate with the body condensed onto the contact nodes."""

@@ -7,6 +7,7 @@ from mpi4py import MPI
 
 from contact.build import build_problem
 from contact.case.file import Case, parse_case
+from contact.cli.main import main
 from contact.interface.friction import Friction
 from contact.methods import barrier
 from contact.methods.barrier import interior_point
@@ -98,6 +99,26 @@ def test_an_interior_point_ends_where_an_iterative_solver_balances_no_further():
     outcome, same = interior(case, "iterative")
     assert outcome.converged, outcome.reason
     assert same
+
+
+def test_what_is_unloaded_to_nothing_rests(tmp_path):
+    """Beside forces that vanish no residual was small: the interior point went on to the limit."""
+    case = tmp_path / "case.toml"
+    case.write_text("""
+mesh = { generator = "rectangle", size = [8.0, 4.0], cells = [12, 6] }
+material = { young = 58.7102, poisson = 0.3912 }
+fixed = [{ on = "left", displacement = [0.0, 0.0] }]
+load = [{ on = "top", traction = [0.0, "-x"], amplitude = "m" }]
+contact = { on = "bottom" }
+friction = { law = "coulomb", mu = 0.2 }
+solver = { linear = "iterative" }
+output = { fields = "none" }
+[evolution]
+times = [0.0, 1.0, 2.0]
+steps = [1, 1]
+amplitudes = { m = { time = [0.0, 1.0, 2.0], value = [0.0, 1.0, 0.0] } }
+""")
+    assert main(["solve", str(case), "--out", str(tmp_path / "out")]) == 0
 
 
 @pytest.mark.parametrize("law", [{"law": "coulomb", "mu": 0.0}, {"law": "tresca", "bound": "0*x"}])
