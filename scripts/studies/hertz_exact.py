@@ -74,7 +74,7 @@ class Line:
         given = [_component(self.displacement, i) for i in range(2)]
         fixed = [Fixed("left", [0.0, None]), *(Fixed(side, given) for side in ("right", "top"))]
         return ContactProblem(
-            domain, Body(self.law, fixed), Contact("bottom", self.gap), degree=degree
+            domain, Body(self.law, fixed), Contact("bottom", self.gap, press=True), degree=degree
         )
 
 
@@ -135,7 +135,7 @@ class Point:
         fixed = [Fixed("left", [0.0, None, None]), Fixed("front", [None, 0.0, None])]
         fixed += [Fixed(side, given) for side in ("right", "back", "top")]
         return ContactProblem(
-            domain, Body(self.law, fixed), Contact("bottom", self.gap), degree=degree
+            domain, Body(self.law, fixed), Contact("bottom", self.gap, press=True), degree=degree
         )
 
 
