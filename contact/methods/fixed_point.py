@@ -238,8 +238,8 @@ class FixedPoint:
         )
         poll = self.poll or self.history.poll
         result = uzawa.block_relaxation(interface, step, z, self._relaxation, self._norm, poll)
-        self._stalled = result.stalled
-        self._far = result.stalled and result.residual > FAR * self._relaxation.tolerance
+        self._stalled = result.stalled and not self._following.followed  # freezing is left then
+        self._far = self._stalled and result.residual > FAR * self._relaxation.tolerance
         x = body.moved(state.x, result.increment)
         self.state = replace(state, x=x, forces=result.forces)
         return result.iterations, result.z

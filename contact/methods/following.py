@@ -28,6 +28,11 @@ class Following:
     _limit: float = np.inf
     _followed: bool = False
 
+    @property
+    def followed(self) -> bool:
+        """Whether the last step has followed psi."""
+        return self._followed
+
     def worsened(self, residual: float) -> bool:
         """Tell whether the last step has followed psi and made things worse: freeze it then.
 
