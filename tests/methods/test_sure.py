@@ -7,8 +7,6 @@ from mpi4py import MPI
 from contact import build_problem
 from contact.case.file import parse_case
 from contact.linear.operator import Counters
-from contact.mesh.domain import Domain, from_mesh
-from contact.mesh.grid import rectangle
 from contact.methods.fixed_point import FixedPoint
 from contact.methods.options import FixedPointOptions
 from contact.methods.softness import softer
@@ -98,41 +96,6 @@ def test_a_plate_over_a_gap_is_solved_without_its_dense_matrix(mu):
     assert np.count_nonzero(dense.status != "open") > 3
     size = np.abs(dense.contact_force).max()
     assert np.allclose(sparse.contact_force, dense.contact_force, rtol=0, atol=1e-7 * size)
-
-
-def curved(thickness: float, begin: float, end: float, cells: list[int]) -> Domain:
-    """Return a piece of a ring with the radius 10; left and right are its ends."""
-    made = rectangle(SELF, [0.0, 0.0], [1.0, 1.0], cells)
-    x = made.mesh.geometry.x
-    angle, radius = begin + (end - begin) * x[:, 0], 10.0 + thickness * (x[:, 1] - 0.5)
-    x[:, 0], x[:, 1] = radius * np.cos(angle), radius * np.sin(angle)
-    return from_mesh(made.mesh, {name: made.facets(name) for name in made.names})
-
-
-@pytest.mark.parametrize("mu", [0.0, 0.3])
-@pytest.mark.parametrize("thickness", [0.1, 1.0])
-@pytest.mark.parametrize("kind", ["ring", "arch"])
-def test_rings_and_arches_pressed_flat(kind, thickness, mu):
-    """Half a ring whose top goes down by 8 of 20, and an arch of 60 degrees with its feet held."""
-    case = beam(1.0, [200, 2], TIP, 0.0, mu)
-    if kind == "ring":
-        domain = curved(thickness, -np.pi / 2, np.pi / 2, [200, 2])
-        held, part, level = [[0.0, "free"], [0.0, -8.0]], "top", -10.0 - thickness / 2
-        case["load"] = []
-    else:
-        domain = curved(thickness, np.pi / 3, 2 * np.pi / 3, [200, 2])
-        held, part, level = [[0.0, 0.0]] * 2, "bottom", 10.0 * np.sin(np.pi / 3) - thickness
-        pressed = 0.6 * thickness * max(thickness, 0.1)
-        case["load"] = [{"on": "top", "traction": [0.0, -pressed]}]
-    ends = zip(("left", "right"), held, strict=True)
-    case["fixed"] = [{"on": side, "displacement": given} for side, given in ends]
-    plane = {"shape": "plane", "point": [0.0, level], "normal": [0.0, 1.0]}
-    case["contact"] = {"on": part, "foundation": plane}
-    solution = solve(parse_case(case), domain=domain)
-    assert solution.converged, solution.outcome.reason
-    assert solution.counters.linear_solves <= 2
-    touching = np.count_nonzero(solution.status != "open")
-    assert touching >= 2 if kind == "ring" else touching > 100
 
 
 def test_the_force_of_the_stop_is_that_of_a_beam():
