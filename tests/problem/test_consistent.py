@@ -44,7 +44,6 @@ def block() -> Domain:
 
 
 def problem(*fixed: Any, loads: Any = (), contact: Any = None, **more: Any) -> Problem:
-    # Bound to a name: mpi4py hangs where a mesh goes while an error is on its way.
     domain, contact = block(), Contact("bottom") if contact is None else contact
     return Problem(domain, Body(LAW, fixed or (TOP,), loads, **more), contact)
 
