@@ -24,8 +24,8 @@ from ufl.core.expr import Expr
 
 from contact.body.description import Body
 from contact.body.field_norms import field_norms
-from contact.body.known import LastAnswers
-from contact.body.loads import Loads, assembled
+from contact.body.internal import InternalForces
+from contact.body.loads import Loads
 from contact.body.masters import make_masters
 from contact.body.materials import cells_of
 from contact.body.operators import WholeOperator, make_operator
@@ -34,6 +34,7 @@ from contact.body.weak_forms import WeakForms
 from contact.errors import InputError
 from contact.linear.change import Change
 from contact.linear.layout import Layout
+from contact.linear.multigrid import is_large
 from contact.linear.operator import Counters
 from contact.mesh.domain import Domain
 from contact.tolerances import MOST_ROUNDING
@@ -92,8 +93,8 @@ class BodyEquilibrium:
         # Where the forms are evaluated is written anew by each query.
         self._forms = WeakForms(domain, body, self.space, self.cells, degree)
         self._at = self._forms.at
-        # At a state, of its potential alone, and moved to see what rounding does.
-        self._last_forces = LastAnswers(domain.comm, 3)
+        keep = body.linear and not is_large(self.layout)
+        self._internal = InternalForces(domain.comm, self._forms, self.owned, keep)
         test = self._forms.split(ufl.TestFunction(self.space))
         self._loads = Loads(domain, body, *test, self.owned)
 
@@ -194,15 +195,8 @@ class BodyEquilibrium:
             Where the secant modulus is taken; at `x` by default: the material law itself.
         """
         given = [x] if secant_at is None or self.linear else [x, secant_at]
-        asked = tuple(self.nodal(values).ravel() for values in given)
-        return self._last_forces(asked, lambda: self._forces(*asked))
-
-    def _forces(self, at: Array, about: Array | None = None) -> Array:
-        self._at.x.array[:] = at
-        if about is not None:
-            self._forms.secant_at.x.array[:] = about
-        form = self._forms.law_forces if about is None else self._forms.secant_forces
-        return np.concatenate([assembled(form, self.owned), np.zeros(self.masters.size)])
+        forces = self._internal(*(self.nodal(values).ravel() for values in given))
+        return np.concatenate([forces, np.zeros(self.masters.size)])
 
     def external(self, time: float = 1.0) -> Array:
         """Return the owned nodal loads at a time. Collective."""

@@ -41,7 +41,7 @@ def field_norms(fields: Fields, values: Array) -> Array:
     -------
     Shape (1,) or (2,): of the mechanical field, and of the electric one.
     """
-    chosen = [fields.mechanical]
-    if fields.block_size > fields.dim:
-        chosen.append(~chosen[0])
-    return np.array([fields.norm(np.where(part, values, 0.0)) for part in chosen])
+    if fields.block_size == fields.dim:
+        return np.array([fields.norm(values)])
+    chosen = fields.mechanical
+    return np.array([fields.norm(np.where(part, values, 0.0)) for part in (chosen, ~chosen)])

@@ -62,6 +62,7 @@ class Loads:
         self._owned = owned
         self._time = constant(domain.mesh, 0.0)
         self._shares: list[_Share] = []
+        self._last: tuple[float, Array] | None = None
         for load in body.loads:
             for work, moving in _works(domain, load, v, xi, self._time):
                 self._add(load.factor, moving, work)
@@ -75,6 +76,8 @@ class Loads:
 
     def at(self, time: float) -> Array:
         """Return the owned nodal loads at a time. Collective where loads know the time."""
+        if self._last is not None and self._last[0] == time:
+            return self._last[1]
         total = np.zeros(self._owned)
         for share in self._shares:
             if share.form is None or (share.moving and share.time != time):
@@ -82,6 +85,7 @@ class Loads:
                 share.form = share.form or fem.form(share.work)
                 share.vector, share.time = assembled(share.form, self._owned), time
             total += share.amplitude(time) * share.vector
+        self._last = time, total
         return total
 
 

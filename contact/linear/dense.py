@@ -2,8 +2,8 @@
 
 The first rank factorises it, and solves for all: factors are as large as the operator. From one
 step of a contact problem to the next some nodes change what they do, mostly the same ones: those
-that slip. The factors are kept until most have, and corrected for the others (Sherman, Morrison and
-Woodbury), with columns of the inverse that are kept as well.
+that slip, in their tangential rows. The factors are kept until most have, and corrected for the
+others (Sherman, Morrison and Woodbury), with columns of the inverse that are kept as well.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from contact.linear.first_rank import from_first, together
 from contact.linear.operator import Counters
 from contact.typing import Array
 
-#: Part of the unknowns whose blocks may differ from those that were factorised. So many columns of
+#: Part of the rows that may differ from those that were factorised. So many columns of
 #: the inverse cost 1.5 times what new factors do, and what follows with the same ones an eighth.
 MOST = 1 / 2
 
@@ -135,23 +135,23 @@ class DenseOperator:
         """
         factors = self.bulk.factors
         change = self._blocks - factors.blocks
-        differs = change != 0
-        changed = np.flatnonzero((differs.any(axis=2) | differs.any(axis=1)).ravel())
+        count, size = self.bulk.stiffness.shape[0], change.shape[1]
+        node, row, column = np.nonzero(change)
+        rows = node * size + row
+        changed = np.unique(rows)
         self._changes = changed.size > 0
         if not self._changes:
             return True
         missing = np.setdiff1d(changed, factors.known).size
-        if factors.known.size + missing > MOST * self.bulk.stiffness.shape[0]:
+        if factors.known.size + missing > MOST * count:
             return False
         factors.know(changed)
         known = factors.known
-        place = np.full(self.bulk.stiffness.shape[0], -1)
+        place = np.full(count, -1)
         place[known] = np.arange(known.size)
-        node, row, column = np.nonzero(differs)
-        size = change.shape[1]
-        among = place[node * size + row], place[node * size + column]
-        self._change = csr_array((change[differs], among), shape=(known.size, known.size))
-        inner = np.eye(known.size) + self._change @ factors.columns[:, known].T
+        among = place[rows], node * size + column
+        self._change = csr_array((change[node, row, column], among), shape=(known.size, count))
+        inner = np.eye(known.size) + self._change @ factors.columns.T
         self._inner, self._pivots, info = dgetrf(inner)
         return bool(info == 0 and np.isfinite(self._inner).all())
 
@@ -171,7 +171,7 @@ class DenseOperator:
         factors = self.bulk.factors
         solution = factors.solve(rhs)
         if self._changes:
-            values = self._change @ solution[factors.known]
+            values = self._change @ solution
             solution -= dgetrs(self._inner, self._pivots, values)[0] @ factors.columns
         return solution
 

@@ -69,6 +69,21 @@ def test_columns_of_the_inverse_are_asked_for_once():
     assert asked == [0, 6, 8, 8, 8, 28, 0]
 
 
+def test_nodes_that_slip_along_an_axis_ask_for_the_columns_of_their_tangential_rows():
+    random, bulk = np.random.default_rng(2), Bulk()
+    operator = DenseOperator(bulk, Counters())
+    blocks = random.standard_normal((NODES, SIZE, SIZE)) ** 2
+    operator.update("secant", np.zeros(0), blocks)
+    kept = bulk.factors.lower_upper
+    blocks[10:40, 0] = random.standard_normal((30, SIZE))
+    operator.update("secant", np.zeros(0), blocks)
+    assert bulk.factors.lower_upper is kept
+    assert np.array_equal(bulk.factors.known, range(20, 80, 2))
+    rhs = np.where(bulk.free.ravel(), random.standard_normal(NODES * SIZE), 0.0)
+    expected = np.linalg.solve(bulk.total(blocks), rhs)
+    assert np.allclose(operator.solve(rhs), expected, rtol=0, atol=1e-12)
+
+
 def test_blocks_that_alone_hold_a_node_are_taken_away():
     """The whole matrix is singular then: a solution without numbers, not an error."""
     bulk = Bulk()

@@ -1,0 +1,73 @@
+"""The nodal forces of the stresses in a body: assembled, or by the matrix of a linear one."""
+
+from __future__ import annotations
+
+import numpy as np
+from dolfinx.fem.petsc import assemble_matrix, create_matrix
+from mpi4py import MPI
+from petsc4py import PETSc
+
+from contact.body.known import LastAnswers
+from contact.body.loads import assembled
+from contact.body.weak_forms import WeakForms
+from contact.typing import Array
+
+#: What the matrix of a linear body costs, over the assembly of its forces: from so many questions
+#: on, those of load steps, it has paid.
+WORTH = 10
+
+
+class InternalForces:
+    """The forces of the stresses at given unknowns, supports and contact apart.
+
+    Parameters
+    ----------
+    comm
+        Ranks that ask together.
+    forms
+        The weak forms of the body.
+    owned
+        Number of unknowns of the nodes that this rank owns.
+    keep
+        Whether the body has one matrix for all unknowns, that there is room to keep.
+    """
+
+    def __init__(self, comm: MPI.Intracomm, forms: WeakForms, owned: int, keep: bool) -> None:
+        self._forms, self._owned = forms, owned
+        # At a state, of its potential alone, and moved to see what rounding does.
+        self._last = LastAnswers(comm, 3)
+        self._asked, self._keep = 0, keep
+        self._matrix: PETSc.Mat | None = None
+
+    def __call__(self, at: Array, secant_at: Array | None = None) -> Array:
+        """Return the owned forces at local unknowns of the nodes, shape (owned,). Collective.
+
+        Parameters
+        ----------
+        at
+            The unknowns.
+        secant_at
+            Where the secant modulus is taken; there too by default: the material law itself.
+        """
+        asked = (at,) if secant_at is None else (at, secant_at)
+        return self._last(asked, lambda: self._found(*asked))
+
+    def _found(self, at: Array, about: Array | None = None) -> Array:
+        self._asked += 1
+        if self._keep and self._asked > WORTH:
+            return self._product(at)
+        self._forms.at.x.array[:] = at
+        if about is not None:
+            self._forms.secant_at.x.array[:] = about
+        form = self._forms.law_forces if about is None else self._forms.secant_forces
+        return assembled(form, self._owned)
+
+    def _product(self, at: Array) -> Array:
+        if self._matrix is None:
+            self._matrix = create_matrix(self._forms.secant)
+            assemble_matrix(self._matrix, self._forms.secant)
+            self._matrix.assemble()
+        vector, image = self._matrix.createVecs()
+        vector.array[:] = at[: self._owned]
+        self._matrix.mult(vector, image)
+        return np.asarray(image.array)
