@@ -10,7 +10,6 @@ import numpy as np
 from mpi4py import MPI
 
 from contact.body.description import Body, Fixed, Load
-from contact.building.blame import to_blame
 from contact.building.contacts import make_contacts
 from contact.building.given import amplitude, check_range, loading_field
 from contact.building.materials import make_materials
@@ -23,7 +22,8 @@ from contact.interface.layer import Layer
 from contact.interface.obstacle import Obstacle
 from contact.mesh.domain import Domain
 from contact.mesh.revolution import revolved
-from contact.problem.consistent import check_problem, check_supports
+from contact.problem.blame import to_blame
+from contact.problem.consistent import check_finite, check_problem, check_supports
 from contact.problem.problem import ContactProblem
 from contact.tolerances import HUGE
 from forms.hencky import Law
@@ -87,17 +87,12 @@ def build_problem(
 
 
 def _check_step(problem: ContactProblem) -> None:
-    """Refuse loads that are no numbers, or that nothing holds."""
-    body, domain, time = problem.body, problem.domain, problem.time
-    loads = problem.equilibrium.external(time)
-    finite = bool(np.isfinite(loads).all())
-    if not domain.comm.allreduce(finite, op=MPI.LAND):
-        key = to_blame(body.loads, domain, time)
-        raise InputError(f"{key}: a formula is not finite everywhere on its part")
-    largest = float(np.abs(loads).max(initial=0.0))
-    largest = domain.comm.allreduce(largest, op=MPI.MAX)
+    """Refuse loads that are no numbers or too large, or that nothing holds."""
+    check_finite(problem)
+    largest = float(np.abs(problem.equilibrium.external(problem.time)).max(initial=0.0))
+    largest = problem.comm.allreduce(largest, op=MPI.MAX)
     if largest > HUGE:
-        check_range(to_blame(body.loads, domain, time), largest)
+        check_range(to_blame(problem), largest)
     check_problem(problem)
 
 

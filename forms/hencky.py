@@ -187,7 +187,7 @@ class UserLaw(Isotropic):
     Raises
     ------
     ValueError
-        If the function is none, or takes no UFL.
+        If the function is none, takes no UFL, or has no value without strain.
 
     Notes
     -----
@@ -201,11 +201,15 @@ class UserLaw(Isotropic):
         """Refuse what UFL cannot take, before it stands in a form."""
         try:
             self.modulus(ufl.variable(ufl.as_ufl(1e-3)))
+            with np.errstate(all="ignore"):
+                start = float(np.mean(self.secant_modulus(np.zeros(1))))
         except (TypeError, ValueError, AttributeError) as error:
             raise ValueError(
                 f"modulus: {error}; accepted: a function of t = |dev eps| by arithmetic and the "
                 "functions of forms.ops, for UFL and NumPy alike"
             ) from error
+        if not np.isfinite(start):
+            raise ValueError(f"modulus: {start} without strain; accepted: finite values")
 
     def secant_modulus(self, q: Value) -> Value:
         """Return g(sqrt(q)), kept away from the kink of the square root at q = 0."""

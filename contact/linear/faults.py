@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import contextmanager
 
+import numpy as np
 from petsc4py import PETSc
 
 from contact.errors import InputError, SingularError
@@ -39,8 +40,10 @@ def check_overflow(layout: Layout, operator: float, rhs: float) -> None:
     """
     young = layout.stiffness
     if not (operator < HUGE and rhs < HUGE and rhs < HUGE * young):
+        lost = np.isnan(operator) or np.isnan(rhs)
+        law = ", or a law that is given has no value at these strains and jumps" if lost else ""
         raise InputError(
-            f"numbers overflow: Young's modulus is {young:.3g}, the linear operator of the "
+            f"numbers overflow{law}: Young's modulus is {young:.3g}, the linear operator of the "
             f"size {operator:.3g}, its right-hand side {rhs:.3g}; accepted: constants, loads "
             "and prescribed values in units that bring them nearer to 1"
         )

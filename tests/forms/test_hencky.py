@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.integrate import quad
 
-from forms.hencky import Log, energy_density, secant_stress, stress
+from forms.hencky import Log, UserLaw, energy_density, secant_stress, stress
 from forms.kinematics import deviator_squared, von_mises
 from tests.problems.materials import LAWS, XI
 
@@ -162,3 +162,8 @@ def test_the_secant_stress_takes_the_modulus_from_the_frozen_strain():
     g = modulus("norm", np.sqrt(32) * XI)
     expected = (law.bulk - 2 * g / 3) * XI / 10 + 2 * g * XI / 10
     assert number(sigma[0, 0]) == pytest.approx(expected, rel=1e-12)
+
+
+def test_a_law_without_a_value_is_refused():
+    with pytest.raises(ValueError, match="modulus: nan without strain; accepted: finite values"):
+        UserLaw(1.0, 0.3, modulus=lambda t: (t - 1.0) ** 0.5)

@@ -28,6 +28,7 @@ from contact import (
     Punch,
     Rigid,
     Sphere,
+    UserLaw,
     build_problem,
     evolve,
     parse_case,
@@ -43,9 +44,16 @@ def block() -> Domain:
     return rectangle(MPI.COMM_WORLD, (0.0, 0.0), (2.0, 1.0), (8, 4))
 
 
-def problem(*fixed: Any, loads: Any = (), contact: Any = None, **more: Any) -> Problem:
+def problem(
+    *fixed: Any, loads: Any = (), contact: Any = None, law: Any = LAW, **more: Any
+) -> Problem:
     domain, contact = block(), Contact("bottom") if contact is None else contact
-    return Problem(domain, Body(LAW, fixed or (TOP,), loads, **more), contact)
+    return Problem(domain, Body(law, fixed or (TOP,), loads, **more), contact)
+
+
+def hole(x: Any) -> Any:
+    """Return 1e-3, and no number on the right."""
+    return np.where(x[0] > 1.5, np.nan, 1e-3)
 
 
 def on(*shape: Any, **more: Any) -> Callable[[], Problem]:
@@ -76,6 +84,32 @@ WRONG = {
             evolve(problem(TOP, Fixed("top", [0, -0.005], amplitude=lambda t: t**2)), [0.5, 1])
         ),
         r"-0\.00125 on top; accepted: -0\.0025, as fixed\.0 has there at t = 0\.5",
+    ),
+    "a traction without a value": (
+        solved(loads=Load("right", traction=[0, hole])),
+        r"load\.0\.traction\.1: a formula is not finite everywhere on its part",
+    ),
+    "a body force without a value": (
+        solved(loads=[Load("right", [0, 1e-3]), Load(body_force=[hole, 0])]),
+        r"load\.1\.body_force\.0: a formula is not finite",
+    ),
+    "a displacement without a value": (
+        solved(Fixed("left", [0, 0]), Fixed("top", [None, hole])),
+        r"fixed\.1\.displacement\.1: not finite at \(\d\.?\d*, 1\)",
+    ),
+    "a support without an amplitude": (
+        solved(Fixed("top", [0, -0.005], amplitude=lambda t: np.nan)),
+        r"fixed\.0\.amplitude: nan at t = 1; accepted: ",
+    ),
+    "a load without an amplitude": (
+        solved(loads=Load("right", [0, 1e-3], amplitude=lambda t: np.inf)),
+        r"load\.0\.amplitude: inf at t = 1",
+    ),
+    "a law without a value": (
+        solved(
+            Fixed("top", [0, -0.05]), law=UserLaw(10.0, 0.3, modulus=lambda t: (1e-3 - t) ** 0.5)
+        ),
+        "numbers overflow, or a law that is given has no value at these strains",
     ),
     "a load on the contact part": (
         solved(loads=Load(["right", "bottom"], [0, 1e-3])),
