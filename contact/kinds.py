@@ -6,9 +6,15 @@ import functools
 import inspect
 from typing import Any, TypeVar
 
+import numpy as np
+
 from contact.errors import InputError
+from contact.tolerances import HUGE
 
 T = TypeVar("T")
+
+#: Elastic constants that a law has; sizes and starts are taken from them.
+CONSTANTS = ("young", "poisson", "bulk", "shear")
 
 #: Most letters of what was given that a message repeats.
 LONGEST = 80
@@ -32,9 +38,22 @@ def expect(what: str, given: Any, accepted: str, fits: object) -> None:
         If it does not.
     """
     if not fits:
-        shown = repr(given)
-        shown = shown if len(shown) <= LONGEST else f"{shown[:LONGEST]}..."
-        raise InputError(f"{what}: given {shown}; accepted: {accepted}")
+        raise InputError(f"{what}: given {shorten(repr(given))}; accepted: {accepted}")
+
+
+def check_range(key: str, value: float, least: float = 1 / HUGE) -> None:
+    """Refuse a size whose square is no number any more, or nothing."""
+    if not least <= value <= HUGE:
+        raise InputError(
+            f"{key}: a size of {value:.3g} leads to numbers that overflow; accepted: units that "
+            f"keep sizes between {1 / HUGE:g} and {HUGE:g}"
+        )
+
+
+def shorten(text: str) -> str:
+    """Return a text in one line, as far as messages repeat it."""
+    line = " ".join(text.split())
+    return line if len(line) <= LONGEST else f"{line[:LONGEST]}..."
 
 
 def several(what: str, given: Any, kind: type[T], accepted: str) -> tuple[T, ...]:
@@ -49,6 +68,16 @@ def several(what: str, given: Any, kind: type[T], accepted: str) -> tuple[T, ...
     for one in every:
         expect(what, one, accepted, isinstance(one, kind))
     return every
+
+
+def is_law(given: Any) -> bool:
+    """Tell whether an object has the constants of a law of the stress."""
+    try:
+        return all(np.isfinite(float(getattr(given, name))) for name in CONSTANTS)
+    except ZeroDivisionError:  # a law with constants that are none: `Body.check` names them
+        return True
+    except (AttributeError, TypeError, ValueError):
+        return False
 
 
 def names_arguments(cls: type[T]) -> type[T]:

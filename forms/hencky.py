@@ -19,7 +19,7 @@ from ufl.core.expr import Expr
 
 from forms.elasticity import Anisotropic
 from forms.kinematics import CARTESIAN, Kinematics, deviator_squared, embed, strain
-from forms.ops import Value, log, maximum, sqrt
+from forms.ops import Value, is_symbolic, log, maximum, sqrt
 
 
 class Hencky(Protocol):
@@ -199,17 +199,27 @@ class UserLaw(Isotropic):
 
     def __post_init__(self) -> None:
         """Refuse what UFL cannot take, before it stands in a form."""
+        accepted = (
+            "accepted: a function of t = |dev eps| by arithmetic and the functions of forms.ops, "
+            "for UFL and NumPy alike"
+        )
+        small = ufl.variable(ufl.as_ufl(1e-3))
         try:
-            self.modulus(ufl.variable(ufl.as_ufl(1e-3)))
+            found = self.modulus(small)
             with np.errstate(all="ignore"):
-                start = float(np.mean(self.secant_modulus(np.zeros(1))))
-        except (TypeError, ValueError, AttributeError) as error:
+                start = self.secant_modulus(np.zeros(1))
+        except Exception as error:
             raise ValueError(
-                f"modulus: {error}; accepted: a function of t = |dev eps| by arithmetic and the "
-                "functions of forms.ops, for UFL and NumPy alike"
+                f"UserLaw: modulus: the function raises {type(error).__name__}: {error}; {accepted}"
             ) from error
-        if not np.isfinite(start):
-            raise ValueError(f"modulus: {start} without strain; accepted: finite values")
+        kinds = int | float | np.number
+        scalar = isinstance(found, kinds) or getattr(found, "ufl_shape", None) == ()
+        given = is_symbolic(start) or np.asarray(start).dtype.kind in "iuf"
+        if not (scalar and given and np.shape(start) in ((), (1,))):
+            raise ValueError(f"UserLaw: modulus: the function returns {found!r}; {accepted}")
+        if not (is_symbolic(start) or np.isfinite(start).all()):
+            start = float(np.mean(start))
+            raise ValueError(f"UserLaw: modulus: {start} without strain; accepted: finite values")
 
     def secant_modulus(self, q: Value) -> Value:
         """Return g(sqrt(q)), kept away from the kink of the square root at q = 0."""

@@ -7,7 +7,9 @@ from dataclasses import dataclass
 from typing import Any, Protocol, TypeAlias, runtime_checkable
 
 import numpy as np
+from mpi4py import MPI
 
+from contact.calling import OfTime, check_finite, naming, on_all_ranks, real
 from contact.kinds import expect
 from contact.typing import Array
 
@@ -61,10 +63,11 @@ def at_time(field: Any, time: Any) -> Any:
     return field.at(time) if isinstance(field, Moving) else field
 
 
-def check_amplitude(what: str, given: Any) -> None:
-    """Refuse what is no function of time."""
+def own_amplitude(what: str, given: Any) -> OfTime | None:
+    """Return a given function of time so that it says whose amplitude it is where it fails."""
     fits = given is None or callable(given)
     expect(f"{what}: amplitude", given, "a function of time, such as lambda t: 2 * t", fits)
+    return given if given is None else OfTime(given, f"{what}: amplitude")
 
 
 def amplitude_of(given: Amplitude | None, fields: list[Any]) -> Amplitude:
@@ -77,6 +80,16 @@ def amplitude_of(given: Amplitude | None, fields: list[Any]) -> Amplitude:
     return steady if any(isinstance(field, Moving) for field in fields) else ramp
 
 
-def values_at(field: Any, points: Array, time: float) -> Array:
-    """Return the values of a field at points of shape (n, d) and a time, shape (n,)."""
-    return np.asarray(at_time(field, time).numpy(points))
+def values_at(field: Any, points: Array, time: float, what: str, comm: MPI.Intracomm) -> Array:
+    """Return the values of a field at points of shape (n, d) and a time, shape (n,). Collective.
+
+    Raises
+    ------
+    InputError
+        On all ranks, with the name of the field, if they are no finite numbers on one.
+    """
+    with on_all_ranks(comm), naming(what):
+        values = at_time(field, time).numpy(points)
+        found = real(values, points.shape[:1], "one number for each of the points")
+        check_finite(found, lambda i: f"at ({', '.join(f'{x:g}' for x in points[i] + 0.0)})")
+    return found

@@ -5,16 +5,16 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import InitVar, dataclass
 from dataclasses import field as default
-from typing import Any, Protocol
+from typing import Protocol
 
 import numpy as np
 from ufl.core.expr import Expr
 
-from contact.body.amplitude import Amplitude, Moving, amplitude_of, check_amplitude
+from contact.body.amplitude import Amplitude, Moving, amplitude_of, own_amplitude
 from contact.body.fields import Given, field, vector
 from contact.body.rigid import Electrode, Rigid
 from contact.errors import InputError
-from contact.kinds import expect, names_arguments, several
+from contact.kinds import expect, is_law, names_arguments, several
 from contact.mesh.together import part
 from contact.typing import Array
 from forms.elasticity import Anisotropic
@@ -66,7 +66,8 @@ class Fixed:
         object.__setattr__(self, "on", part(self.on))
         object.__setattr__(self, "displacement", vector(self.displacement, free=True))
         object.__setattr__(self, "potential", field(self.potential))
-        check_amplitude("Fixed", self.amplitude)
+        amplitude = own_amplitude(f"Fixed on {self.on!r}", self.amplitude)
+        object.__setattr__(self, "amplitude", amplitude)
         given = [*(self.displacement or ()), self.potential]
         if all(value is None for value in given):
             raise InputError(
@@ -136,8 +137,10 @@ class Load:
         object.__setattr__(self, "force", vector(force))
         object.__setattr__(self, "pressure", field(self.pressure))
         object.__setattr__(self, "charge", field(charge))
-        check_amplitude("Load", self.amplitude)
-        if not self.fields:
+        object.__setattr__(
+            self, "amplitude", own_amplitude(f"Load on {self.on or 'the body'!r}", self.amplitude)
+        )
+        if not self.named:
             raise InputError("Load: nothing is given; accepted: force, pressure or charge")
 
     @staticmethod
@@ -148,15 +151,18 @@ class Load:
         return given[names[0]] if names else None
 
     @property
-    def fields(self) -> list[Field | Moving]:
-        """All that is given."""
-        given = [*(self.force or ()), self.pressure, self.charge]
-        return [field for field in given if field is not None]
+    def named(self) -> dict[str, Field | Moving]:
+        """All that is given, by the keys that the case file has for it."""
+        inside = self.on is None
+        force, charge = ("body_force", "body_charge") if inside else ("traction", "charge")
+        given = {f"{force}.{i}": component for i, component in enumerate(self.force or ())}
+        given |= {"pressure": self.pressure, charge: self.charge}
+        return {name: field for name, field in given.items() if field is not None}
 
     @property
     def factor(self) -> Amplitude:
         """The amplitude, also where none is given."""
-        return amplitude_of(self.amplitude, self.fields)
+        return amplitude_of(self.amplitude, [*self.named.values()])
 
 
 @names_arguments
@@ -183,20 +189,6 @@ class Material:
         expect("law", self.law, "Linear(young, poisson), Log, UserLaw, ...", is_law(self.law))
         fits = isinstance(self.piezo, Piezo | None)
         expect("piezo", self.piezo, "Piezo(...), or None", fits)
-
-
-#: Elastic constants that a law has; sizes and starts are taken from them.
-CONSTANTS = ("young", "poisson", "bulk", "shear")
-
-
-def is_law(given: Any) -> bool:
-    """Tell whether an object has the constants of a law of the stress."""
-    try:
-        return all(np.isfinite(float(getattr(given, name))) for name in CONSTANTS)
-    except ZeroDivisionError:  # a law with constants that are none: `Body.check` names them
-        return True
-    except (AttributeError, TypeError, ValueError):
-        return False
 
 
 @names_arguments

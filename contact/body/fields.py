@@ -16,6 +16,7 @@ from ufl.core.expr import Expr
 
 from contact import _compat
 from contact.body.amplitude import Moving
+from contact.calling import real
 from contact.errors import InputError
 from contact.typing import Array
 
@@ -126,11 +127,7 @@ class Callback:
         return self._values(x)
 
     def _values(self, x: Array) -> Array:
-        try:
-            values = np.asarray(self.function(x), dtype=float)
-            return np.broadcast_to(values, x.shape[1:]).astype(float)
-        except (TypeError, ValueError) as error:
-            raise InputError(f"given {self.function!r}: {error}; accepted: {ACCEPTED}") from error
+        return real(self.function(x), x.shape[1:], "a number for each x[0], x[1], ...")
 
 
 @dataclass(frozen=True, eq=False)

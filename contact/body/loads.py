@@ -2,20 +2,27 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from collections.abc import Sequence
+from dataclasses import dataclass
+from dataclasses import field as default
 from typing import Any
 
 import numpy as np
 import ufl
 from dolfinx import fem
 from dolfinx.la import InsertMode
+from mpi4py import MPI
+from ufl.constantvalue import ScalarValue
 from ufl.core.expr import Expr
+from ufl.corealg.traversal import traverse_unique_terminals
 
 from contact.body.amplitude import Amplitude, Moving, at_time
 from contact.body.constants import constant
 from contact.body.description import Body, Field, Load
+from contact.calling import check_finite, naming, on_all_ranks, real
 from contact.errors import InputError
 from contact.mesh.domain import Domain
+from contact.tolerances import HUGE
 from contact.typing import Array
 from forms.piezo import electric_load
 
@@ -28,7 +35,7 @@ class _Share:
     moving: bool
     work: ufl.Form
     form: fem.Form | None = None
-    vector: Array = field(default_factory=lambda: np.zeros(0))
+    vector: Array = default(default_factory=lambda: np.zeros(0))
     time: float = np.nan
 
 
@@ -63,8 +70,8 @@ class Loads:
         self._time = constant(domain.mesh, 0.0)
         self._shares: list[_Share] = []
         self._last: tuple[float, Array] | None = None
-        for load in body.loads:
-            for work, moving in _works(domain, load, v, xi, self._time):
+        for number, load in enumerate(body.loads):
+            for work, moving in _works(domain, load, f"load.{number}", v, xi, self._time):
                 self._add(load.factor, moving, work)
 
     def _add(self, amplitude: Amplitude, moving: bool, work: ufl.Form) -> None:
@@ -97,37 +104,68 @@ def assembled(form: fem.Form, owned: int) -> Array:
 
 
 def _works(
-    domain: Domain, load: Load, v: Expr, xi: Expr | None, time: fem.Constant
+    domain: Domain, load: Load, key: str, v: Expr, xi: Expr | None, time: fem.Constant
 ) -> list[tuple[ufl.Form, bool]]:
     """Return the work of each part of a load, and whether it knows the time."""
     x = ufl.SpatialCoordinate(domain.mesh)
     measure = domain.dx if load.on is None else domain.ds(load.on)
     place = repr(load.on) if load.on is not None else "'the body'"
-    terms: list[tuple[Expr, Field | Moving]] = []
-    if load.force is not None:
-        if len(load.force) != domain.dim:
-            raise InputError(
-                f"load on {place}: the force has {len(load.force)} components, the body has "
-                f"{domain.dim}"
-            )
-        for i, force in enumerate(load.force):
-            terms.append((expression(domain, force, x, time) * v[i], force))
-    if load.pressure is not None:
-        nu = ufl.FacetNormal(domain.mesh)
-        pressure = expression(domain, load.pressure, x, time)
-        terms.append((-pressure * ufl.dot(nu, v), load.pressure))
-    if load.charge is not None:
-        if xi is None:
-            raise InputError(f"load on {place}: a charge needs a piezoelectric material")
-        charge = expression(domain, load.charge, x, time)
-        given = {"body": charge} if load.on is None else {"surface": charge}
-        terms.append((electric_load(xi, **given), load.charge))
-    return [(term * measure, isinstance(field, Moving)) for term, field in terms]
+    if load.force is not None and len(load.force) != domain.dim:
+        raise InputError(
+            f"load on {place}: the force has {len(load.force)} components, the body has "
+            f"{domain.dim}"
+        )
+    if load.charge is not None and xi is None:
+        raise InputError(f"load on {place}: a charge needs a piezoelectric material")
+    works = []
+    for name, field in load.named.items():
+        given = expression(domain, field, x, time, f"{key}.{name}")
+        if name == "pressure":
+            work = -given * ufl.dot(ufl.FacetNormal(domain.mesh), v)
+        elif name.endswith("charge"):
+            work = electric_load(xi, **{"body" if load.on is None else "surface": given})
+        else:
+            work = given * v[int(name[-1])]
+        works.append((work * measure, isinstance(field, Moving)))
+    return works
 
 
-def expression(domain: Domain, value: Field | Moving, x: Expr, time: Any) -> Expr:
-    """Return a given function at a time as UFL; a number becomes a form constant."""
-    found = at_time(value, time).ufl(x)
-    if isinstance(found, int | float | ufl.constantvalue.ScalarValue | ufl.classes.Zero):
-        return constant(domain.mesh, float(found))
-    return found
+def expression(domain: Domain, value: Field | Moving, x: Expr, time: Any, key: str) -> Expr:
+    """Return a given function at a time as UFL; a number becomes a form constant. Collective.
+
+    Raises
+    ------
+    InputError
+        On all ranks, with the key, if it is none on one.
+    """
+    with on_all_ranks(domain.comm), naming(key):
+        found = at_time(value, time).ufl(x)
+        if not isinstance(found, Expr):
+            number = real(found, (), "a number, or UFL of one")
+            check_finite(number.reshape(1), lambda _: "everywhere")
+            return constant(domain.mesh, float(number))
+        real(np.zeros(found.ufl_shape), (), "UFL of a number")
+        for part in traverse_unique_terminals(found):
+            if isinstance(part, ScalarValue):
+                number = real(part.value(), (), "real UFL")
+                check_finite(number.reshape(1), lambda _: "everywhere")
+        if isinstance(found, ScalarValue | ufl.classes.Zero):
+            return constant(domain.mesh, float(found))
+        return found
+
+
+def to_blame(loads: Sequence[Load], domain: Domain, time: float = 1.0) -> str:
+    """Return the key of the first load whose integral is not finite, or too large. Collective.
+
+    Where none is, for the quadrature meets other points with the test functions, the answer is
+    ``load``.
+    """
+    x = ufl.SpatialCoordinate(domain.mesh)
+    for i, load in enumerate(loads):
+        measure = domain.dx if load.on is None else domain.ds(load.on)
+        for name, field in load.named.items():
+            form = fem.form(expression(domain, field, x, time, f"load.{i}.{name}") * measure)
+            value = domain.comm.allreduce(float(fem.assemble_scalar(form)), op=MPI.SUM)
+            if not abs(value) <= HUGE:
+                return f"load.{i}.{name}"
+    return "load"

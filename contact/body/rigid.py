@@ -8,13 +8,19 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
-from contact.body.amplitude import Amplitude, check_amplitude, ramp, steady
+from contact.body.amplitude import Amplitude, own_amplitude, ramp, steady
+from contact.calling import OfTime
 from contact.kinds import expect, names_arguments
 from contact.mesh.together import part
 from contact.typing import Array
 
 #: A number, which grows with an amplitude, or a function of time.
 Timed: TypeAlias = float | Amplitude
+
+
+def _timed(what: str, value: Timed | None) -> Timed | None:
+    """Return a value that says what it is, where it is a function of time and fails."""
+    return OfTime(value, what) if callable(value) else value
 
 
 def _at(values: Sequence[Timed | None], given: Amplitude | None, time: float) -> Array:
@@ -51,6 +57,13 @@ class Motion:
     centre: Sequence[float]
     amplitude: Amplitude | None = None
 
+    def __post_init__(self) -> None:
+        """Let functions of time say what they are where they fail."""
+        for name in ("displacement", "rotation", "force", "moment"):
+            values = [_timed(f"Motion: {name}.{i}", v) for i, v in enumerate(getattr(self, name))]
+            object.__setattr__(self, name, tuple(values))
+        object.__setattr__(self, "amplitude", own_amplitude("Motion", self.amplitude))
+
 
 @names_arguments
 @dataclass(frozen=True)
@@ -65,7 +78,6 @@ class Rigid:
         """Make one name of several."""
         object.__setattr__(self, "on", part(self.on))
         expect("Rigid: motion", self.motion, "Motion(...)", isinstance(self.motion, Motion))
-        check_amplitude("Rigid", self.motion.amplitude)
 
     name = "rigid"
 
@@ -96,7 +108,8 @@ class Electrode:
     def __post_init__(self) -> None:
         """Make one name of several."""
         object.__setattr__(self, "on", part(self.on))
-        check_amplitude("Electrode", self.amplitude)
+        object.__setattr__(self, "charge", _timed("Electrode: charge", self.charge))
+        object.__setattr__(self, "amplitude", own_amplitude("Electrode", self.amplitude))
 
     name = "electrode"
     values = (None,)

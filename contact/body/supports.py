@@ -38,6 +38,8 @@ class Support:
         Which of these, shape (n,), and their coordinates, shape (n, d).
     scale
         Unit of the component in the unknowns.
+    name, comm
+        What messages call it, and the ranks that ask together.
     check
         What refuses values that cannot be prescribed, on all ranks together; None for any.
     """
@@ -49,13 +51,15 @@ class Support:
     dofs: NDArray[np.int32]
     points: Array
     scale: float
+    name: str
+    comm: MPI.Intracomm
     check: Callable[[Array], None] | None = None
 
     def evaluate(self, time: float) -> None:
         """Give the condition its values at a time. Collective where the field is."""
         if self.field is None:
             return
-        given = values_at(self.field, self.points, time)
+        given = values_at(self.field, self.points, time, self.name, self.comm)
         if self.check is not None:
             self.check(given)
         self.values.x.array[self.dofs] = given / self.scale
@@ -80,7 +84,7 @@ def supports_of(domain: Domain, space: fem.FunctionSpace, body: Body) -> list[Su
     """
     supports, dim = [], domain.dim
     domain.mesh.topology.create_connectivity(dim - 1, dim)
-    for fixed in body.fixed:
+    for number, fixed in enumerate(body.fixed):
         given: list[Field | Moving | None] = [None] * dim
         if fixed.displacement is not None:
             if len(fixed.displacement) != dim:
@@ -98,8 +102,10 @@ def supports_of(domain: Domain, space: fem.FunctionSpace, body: Body) -> list[Su
         for component, value in enumerate(given):
             if value is not None:
                 scale = body.phi_scale if component == dim else 1.0
+                key = "potential" if component == dim else f"displacement.{component}"
+                name = f"fixed.{number}.{key}"
                 supports.append(
-                    _support(domain, space, component, fixed.on, value, scale, fixed.factor)
+                    _support(domain, space, component, fixed.on, value, scale, fixed.factor, name)
                 )
     if domain.revolved:
         supports.append(_axis(domain, space))
@@ -119,7 +125,8 @@ def _nothing(
 ) -> Support:
     """Return the condition that a component is 0 at some of its dofs."""
     condition = fem.dirichletbc(zero, dofs, subspace)
-    return Support(condition, steady, None, zero, dofs[1], np.zeros((dofs[1].size, 0)), 1.0)
+    none, comm = np.zeros((dofs[1].size, 0)), subspace.mesh.comm
+    return Support(condition, steady, None, zero, dofs[1], none, 1.0, "", comm)
 
 
 def _off_axis(domain: Domain, part: str, points: Array) -> Callable[[Array], None]:
@@ -147,6 +154,7 @@ def _support(
     value: Field | Moving,
     scale: float,
     amplitude: Amplitude,
+    name: str,
 ) -> Support:
     dim, facets = domain.dim, domain.facets(part)
     subspace = space.sub(component)
@@ -157,7 +165,9 @@ def _support(
     points = scalar.tabulate_dof_coordinates()[dofs[1], :dim]
     condition = fem.dirichletbc(data, dofs, subspace)
     check = _off_axis(domain, part, points) if domain.revolved and component == 0 else None
-    made = Support(condition, amplitude, value, data, dofs[1], points, scale, check)
+    made = Support(
+        condition, amplitude, value, data, dofs[1], points, scale, name, domain.comm, check
+    )
     made.evaluate(0.0)
     return made
 

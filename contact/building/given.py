@@ -1,4 +1,4 @@
-"""Given functions of position, and sizes that numbers can hold."""
+"""Formulas of the case file as functions of position."""
 
 from __future__ import annotations
 
@@ -13,17 +13,8 @@ from contact.body.amplitude import Amplitude, steady
 from contact.case import file as sections
 from contact.case.formula import Expression
 from contact.errors import InputError
-from contact.tolerances import HUGE
+from contact.kinds import check_range
 from contact.typing import Array
-
-
-def check_range(key: str, value: float, least: float = 1 / HUGE) -> None:
-    """Refuse a size whose square is no number any more, or nothing."""
-    if not least <= value <= HUGE:
-        raise InputError(
-            f"{key}: a size of {value:.3g} leads to numbers that overflow; accepted: units that "
-            f"keep sizes between {1 / HUGE:g} and {HUGE:g}"
-        )
 
 
 @dataclass(frozen=True)

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from contact.body.description import Material
-from contact.building.given import check_range
 from contact.case import file as sections
 from contact.errors import InputError
+from contact.kinds import check_range
 from contact.mesh.domain import Domain
 from contact.typing import Array
 from forms.crystal import in_plane, isotropic_about_x3, stiffness_tensor, to_axis

@@ -7,7 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 from mpi4py import MPI
 
+from contact.body.amplitude import values_at
 from contact.body.fields import Given, field
+from contact.calling import check_finite, naming, on_all_ranks, real
 from contact.errors import InputError
 from contact.interface.history import SlipHistory
 from contact.interface.nodes import ContactNodes
@@ -102,14 +104,21 @@ class Friction:
             return Coulomb(ConstantCoefficient(mu)) if nodes.maximum(mu) > 0 else None
         if self.coefficient is None:
             return self.law
-        _check("coefficient without slip", np.asarray(self.coefficient(np.zeros(1))), nodes)
+        # Ranks without nodes ask too: what is wrong is found by all.
+        rest, words = np.zeros(3), "one number for each slip"
+        with on_all_ranks(nodes.comm), naming("Friction: mu"):
+            resists = real(self.coefficient(rest), rest.shape, words)
+        with on_all_ranks(nodes.comm), naming("Friction: mu: derivative"):
+            slope = real(self.coefficient.derivative(rest), rest.shape, words)
+            check_finite(slope, lambda _: "without slip")
+        _check("coefficient without slip", resists, nodes)
         most = nodes.comm.allreduce(self.coefficient.maximum, op=MPI.MAX)
         return Coulomb(self.coefficient) if most > 0 else None
 
 
 def _at(name: str, given: Given, nodes: ContactNodes) -> Array:
     """Return what resists at contact nodes. Collective."""
-    values = np.asarray(given.numpy(nodes.points), dtype=float)
+    values = values_at(given, nodes.points, 1.0, f"Friction: {name}", nodes.comm)
     _check(name, values, nodes)
     return values
 

@@ -15,6 +15,7 @@ from contact.interface.mortar.integration import NOTHING
 from contact.interface.mortar.surface import Surface, surface_of
 from contact.interface.nodes import ContactNodes, projectors
 from contact.interface.obstacle import Obstacle
+from contact.interface.obstacle.measuring import measured
 from contact.interface.placing import check_gap
 from contact.kinds import expect
 from contact.mesh.entities import owned_among
@@ -90,7 +91,7 @@ def find_pair(
     if not press:
         gap, cut = _apart(here, slave, body, coupling, what)
     expect(f"{key}.foundation", distance, "a gap with against", not distance.is_shape)
-    _, added = distance.measure(points, normal)
+    _, added = measured(distance, points, normal, body.comm, key)
     check_gap(body.domain, added, key, press)
     moves = body.free[local, :d]
     admissible = normal * moves

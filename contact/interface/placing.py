@@ -12,11 +12,13 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 
 from contact.body.equilibrium import BodyEquilibrium
+from contact.calling import naming, on_all_ranks
 from contact.errors import InputError
 from contact.interface.mortar.lumping import Lumping, Mixing
 from contact.interface.mortar.surface import surface_of
 from contact.interface.nodes import ContactNodes, projectors
-from contact.interface.obstacle import Obstacle, Shape
+from contact.interface.obstacle import Obstacle
+from contact.interface.obstacle.measuring import measured
 from contact.mesh.domain import Domain
 from contact.mesh.entities import owned_among
 from contact.typing import Array
@@ -96,17 +98,18 @@ def _chord_depth(domain: Domain, part: str, obstacle: Obstacle, points: Array) -
     longest = np.max(domain.mesh.h(domain.dim - 1, facets), initial=0.0) if facets.size else 0.0
     length = 2**domain.levels * float(domain.comm.allreduce(longest, op=MPI.MAX))
     # The contact direction may be the body's, a little aside.
-    deepest = domain.comm.allreduce(obstacle.chord_depth(length, points), op=MPI.MAX)
-    return 1.1 * float(deepest)
+    with on_all_ranks(domain.comm), naming("foundation"):
+        depth = obstacle.chord_depth(length, points)
+    return 1.1 * float(domain.comm.allreduce(depth, op=MPI.MAX))
 
 
 @contextmanager
-def _naming(key: str, then: str = ".") -> Iterator[None]:
+def _naming(key: str) -> Iterator[None]:
     """Let messages begin with the key of the contact that they are about."""
     try:
         yield
     except InputError as error:
-        raise InputError(f"{key}{then}{error}") from None
+        raise InputError(f"{key}.{error}") from None
 
 
 def _place(
@@ -204,10 +207,7 @@ def find_nodes(
     domain, space, d = body.domain, body.space, body.dim
     found = candidates(domain, space, part)
     nodes, points, weight = found.nodes, found.points, found.weight
-    if isinstance(obstacle, Shape):
-        with _naming(key, ".foundation: "):
-            obstacle.check(d)
-    direction, gap = found.measure(obstacle)
+    direction, gap = measured(obstacle, points, found.normal, domain.comm, key)
     if domain.comm.allreduce(bool(np.isnan(direction).any()), op=MPI.LOR):
         raise InputError(
             f"{key}.foundation: a contact node has no contact direction (it is the sphere's "

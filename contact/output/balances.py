@@ -146,11 +146,12 @@ def charge_balance(problem: ContactProblem, state: State) -> ChargeBalance:
     given: dict[str, float] = {}
     body = 0.0
     x, test = ufl.SpatialCoordinate(problem.domain.mesh), ufl.TestFunction(equilibrium.space)
-    for load in problem.body.loads:
+    for i, load in enumerate(problem.body.loads):
         if load.charge is None:
             continue
         measure = problem.domain.dx if load.on is None else problem.domain.ds(load.on)
-        density = expression(problem.domain, load.charge, x, constant(problem.domain.mesh, time))
+        now = constant(problem.domain.mesh, time)
+        density = expression(problem.domain, load.charge, x, now, f"load.{i}.charge")
         vector = fem.assemble_vector(fem.form(density * test[d] * measure))
         vector.scatter_reverse(InsertMode.add)
         nodal = load.factor(time) * vector.array[: equilibrium.owned].reshape(-1, bs)[:, d]

@@ -15,11 +15,12 @@ from numpy.typing import NDArray
 
 from contact.body.amplitude import values_at
 from contact.body.description import Fixed
+from contact.body.loads import to_blame
 from contact.errors import InputError
-from contact.problem.blame import to_blame
+from contact.kinds import check_range
 from contact.problem.held import check_held
 from contact.problem.problem import ContactProblem
-from contact.typing import Array
+from contact.tolerances import HUGE
 
 #: Share of values up to which they are the same.
 ROUNDING = 1e-9
@@ -34,61 +35,12 @@ def check_problem(problem: ContactProblem) -> None:
     Raises
     ------
     InputError
-        If a load or a prescribed value is no number, a load acts on a contact part, two supports
-        contradict each other, or `check_held` finds that the body can move.
+        If a load acts on a contact part or is no finite number, two supports contradict each
+        other, or `check_held` finds that the body can move.
     """
-    check_finite(problem)
     _check_loads(problem)
     check_supports(problem)
     check_held(problem)
-
-
-def check_finite(problem: ContactProblem) -> None:
-    """Refuse loads and prescribed values that are no numbers at the time of a problem. Collective.
-
-    Raises
-    ------
-    InputError
-        If some are; it names the first one, and of prescribed values a point.
-    """
-    body, time = problem.body, problem.time
-    factors = {f"load.{i}": load.factor(time) for i, load in enumerate(body.loads)}
-    factors |= {f"fixed.{i}": fixed.factor(time) for i, fixed in enumerate(body.fixed)}
-    for name, factor in factors.items():
-        if not np.isfinite(factor):
-            raise InputError(
-                f"{name}.amplitude: {factor:g} at t = {time:g}; accepted: a function of time "
-                "whose values are finite"
-            )
-    loads = problem.equilibrium.external(time)
-    if not problem.comm.allreduce(bool(np.isfinite(loads).all()), op=MPI.LAND):
-        raise InputError(
-            f"{to_blame(problem)}: a formula is not finite everywhere on its part; accepted: a "
-            "formula, or a function, that is"
-        )
-    for i, fixed in enumerate(body.fixed):
-        points = _points(problem, problem.domain.facets(fixed.on))
-        for name, given in _prescribed(fixed).items():
-            wrong = ~np.isfinite(_values(problem, fixed, given, points))
-            found = np.concatenate(problem.comm.allgather(points[wrong][:1]))
-            if found.size > 0:
-                place = ", ".join(f"{x:g}" for x in found[0] + 0.0)  # no -0
-                raise InputError(
-                    f"fixed.{i}.{name}: not finite at ({place}); accepted: a number, formula or "
-                    "function that is"
-                )
-
-
-def _points(problem: ContactProblem, facets: NDArray[np.int32]) -> Array:
-    """Return the nodes of facets, shape (n, d)."""
-    space = problem.equilibrium.space
-    nodes = fem.locate_dofs_topological(space, problem.dim - 1, facets)
-    return space.tabulate_dof_coordinates()[nodes, : problem.dim]
-
-
-def _values(problem: ContactProblem, fixed: Fixed, given: Any, points: Array) -> Array:
-    """Return prescribed values at points and the time of the problem. Collective."""
-    return fixed.factor(problem.time) * values_at(given, points, problem.time)
 
 
 def _shared(problem: ContactProblem, one: str, other: str) -> tuple[NDArray[np.int32], bool]:
@@ -106,6 +58,22 @@ def _check_loads(problem: ContactProblem) -> None:
                 f"load.{i}.on: {load.on} shares facets with the contact part {contact.on}; "
                 "accepted: parts beside it, or body forces"
             )
+    _check_sizes(problem)
+
+
+def _check_sizes(problem: ContactProblem) -> None:
+    """Refuse loads that are no numbers, or too large for them. Collective."""
+    given, domain, time = problem.body.loads, problem.domain, problem.time
+    loads = problem.equilibrium.external(time)
+    if not domain.comm.allreduce(bool(np.isfinite(loads).all()), op=MPI.LAND):
+        key = to_blame(given, domain, time)
+        raise InputError(
+            f"{key}: a formula is not finite everywhere on its part; accepted: a formula, or a "
+            "function, that is"
+        )
+    largest = domain.comm.allreduce(float(np.abs(loads).max(initial=0.0)), op=MPI.MAX)
+    if largest > HUGE:
+        check_range(to_blame(given, domain, time), largest)
 
 
 def check_supports(problem: ContactProblem) -> None:
@@ -118,18 +86,22 @@ def check_supports(problem: ContactProblem) -> None:
     InputError
         If they differ at the time of the problem by more than rounding.
     """
-    time = problem.time
+    d, space, time = problem.dim, problem.equilibrium.space, problem.time
     for (i, first), (j, last) in combinations(enumerate(problem.body.fixed), 2):
         one, other = _prescribed(first), _prescribed(last)
         names = one.keys() & other.keys()
         facets, shared = _shared(problem, first.on, last.on)
         if not shared:
             continue
-        points = _points(problem, facets)
+        nodes = fem.locate_dofs_topological(space, d - 1, facets)
+        points = space.tabulate_dof_coordinates()[nodes, :d]
         for name in sorted(names):
-            pair = (first, one), (last, other)
             values = np.column_stack(
-                [_values(problem, fixed, given[name], points) for fixed, given in pair]
+                [
+                    fixed.factor(time)
+                    * values_at(given[name], points, time, f"fixed.{n}.{name}", problem.comm)
+                    for n, fixed, given in ((i, first, one), (j, last, other))
+                ]
             )
             size = float(np.abs(values).max(initial=0.0))
             size = problem.comm.allreduce(size, op=MPI.MAX)

@@ -144,7 +144,10 @@ def made(law: Linear, contact: Any = None) -> Problem:
         (lambda: Friction(0.3), r"accepted: Friction\(mu=0.3\)"),
         (lambda: Friction(mu=0.3, tresca=1.0), "accepted: one of coefficient, tresca, mu and law"),
         (lambda: field(ufl.Identity(2)), "UFL of shape"),
-        (lambda: field(lambda x: x[:2]).numpy(np.zeros((3, 2))), "accepted: a number, a function"),
+        (
+            lambda: made(Linear(10.0, 0.3), Contact("bottom", lambda x: x[:2])),
+            "a number for each x",
+        ),
         (lambda: Sphere((0.0, -1.0), -1.0), "Sphere: radius: given -1.0; accepted: a length > 0"),
         (lambda: made(Linear(10.0, 0.6)), "Poisson's ratio 0.6; accepted"),
         (lambda: made(Linear(10.0, 0.3), "bottom"), r"accepted: Contact\(part"),

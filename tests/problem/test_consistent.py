@@ -99,11 +99,11 @@ WRONG = {
     ),
     "a support without an amplitude": (
         solved(Fixed("top", [0, -0.005], amplitude=lambda t: np.nan)),
-        r"fixed\.0\.amplitude: nan at t = 1; accepted: ",
+        "Fixed on 'top': amplitude: not finite at t = 1; accepted: ",
     ),
     "a load without an amplitude": (
         solved(loads=Load("right", [0, 1e-3], amplitude=lambda t: np.inf)),
-        r"load\.0\.amplitude: inf at t = 1",
+        "Load on 'right': amplitude: not finite at t = 1",
     ),
     "a law without a value": (
         solved(
@@ -130,7 +130,10 @@ WRONG = {
         "Rigid: missing a required argument: 'motion'; accepted: on, motion, foundation",
     ),
     "a support of nothing": (lambda: Fixed("top", ["free", None]), "nothing is prescribed"),
-    "an amplitude": (lambda: Fixed("top", [0, 0], amplitude=2), "Fixed: amplitude: given 2"),
+    "an amplitude": (
+        lambda: Fixed("top", [0, 0], amplitude=2),
+        "Fixed on 'top': amplitude: given 2",
+    ),
     "a negative gap": (on(-0.001), r"contact\.gap: -0\.001 at a node"),
     "a gap and a shape": (on(Plane((0, 0), (0, 1)), gap=0.1), "Contact: foundation: "),
     "a point in space": (on(Plane((0, 0, 0), (0, 1))), r"foundation: Plane: point: .*2 numbers"),
@@ -143,7 +146,10 @@ WRONG = {
     "a radius": (lambda: Sphere((0, 0), "1"), "Sphere: radius: given '1'"),  # type: ignore[arg-type]
     "an angle": (lambda: Cone((0, 0), (0, 1), 90.0), "Cone: half_angle: "),
     "an edge": (lambda: Punch((0, 0), (0, 1), 1.0, 2.0), "Punch: edge_radius: "),
-    "a distance": (on(Level(lambda x: x[1])), "Level: shape of the values: "),
+    "a distance": (
+        on(Level(lambda x: x[1])),
+        r"contact\.foundation: .* of shape \(2,\); accepted: one number",
+    ),
     "a number as distance": (lambda: Level(1.0), "Level: function: "),  # type: ignore[arg-type]
     "a layer": (on(layer=3), "Contact: layer: given 3"),
     "half a layer": (on(layer=lambda: Layer(0.1)), "Contact: layer: "),

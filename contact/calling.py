@@ -1,0 +1,118 @@
+"""Functions that a user has given: what they raise and return, in words that name the argument."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from mpi4py import MPI
+
+from contact._compat import lasting
+from contact.errors import InputError
+from contact.kinds import shorten
+from contact.typing import Array
+
+
+class _Returned(ValueError):
+    """What a function has returned, and what it may."""
+
+
+def real(values: Any, shape: tuple[int, ...], each: str) -> Array:
+    """Return what a function has returned as numbers, inside `naming`.
+
+    Parameters
+    ----------
+    values
+        What has been returned; a number stands for itself everywhere.
+    shape
+        What it is broadcast to.
+    each
+        What is accepted: "one number ...".
+    """
+    try:
+        array = np.asarray(values)
+    except ValueError:  # lists of different lengths
+        array = np.asarray(None)
+    if array.dtype.kind not in "biuf":
+        raise _Returned(f"the function returns {shorten(repr(values))}; accepted: {each}")
+    try:
+        array = np.broadcast_to(array, shape)
+    except ValueError:
+        raise _Returned(
+            f"the function returns values of shape {array.shape}; accepted: {each}"
+        ) from None
+    return array.astype(float)
+
+
+def check_finite(values: Array, where: Callable[[int], str]) -> None:
+    """Refuse infinity and what is no number, inside `naming`.
+
+    Parameters
+    ----------
+    values
+        Of a function, shape (n,).
+    where
+        What says where the i-th of them is.
+    """
+    bad = np.flatnonzero(~np.isfinite(values))
+    if bad.size > 0:
+        raise _Returned(
+            f"not finite {where(bad[0])}; accepted: a number, formula or function that is"
+        )
+
+
+@contextmanager
+def naming(what: str) -> Iterator[None]:
+    """Let what fails in a user's function say which argument that is."""
+    try:
+        yield
+    except InputError:
+        raise
+    except _Returned as error:
+        raise InputError(f"{what}: {error}") from None
+    except Exception as error:
+        raise InputError(
+            f"{what}: the function raises {type(error).__name__}: {shorten(str(error))}"
+        ) from error
+
+
+@contextmanager
+def on_all_ranks(comm: MPI.Intracomm) -> Iterator[None]:
+    """Raise on all ranks what one of them refuses, which alone may know. Collective."""
+    failure = None
+    try:
+        yield
+    except InputError as error:
+        failure = error
+    messages = lasting(comm).allgather(None if failure is None else str(failure))
+    if failure is not None:
+        raise failure
+    for message in messages:
+        if message is not None:
+            raise InputError(message)
+
+
+@dataclass(frozen=True)
+class OfTime:
+    """A user's function of time.
+
+    Attributes
+    ----------
+    function
+        The function.
+    what
+        What messages call it.
+    """
+
+    function: Callable[[float], Any]
+    what: str = field(compare=False)
+
+    def __call__(self, time: float) -> float:
+        """Return its value at a time."""
+        with naming(self.what):
+            value = real(self.function(time), (), "a number")
+            check_finite(value.reshape(1), lambda _: f"at t = {time:g}")
+            return float(value)
