@@ -12,6 +12,7 @@ from contact.mesh.entities import cells_at, owned_among
 from contact.mesh.pieces import connected_pieces
 from contact.output.solution import Solution
 from contact.problem.problem import ContactProblem
+from contact.problem.state import State
 
 #: How many times finer or softer the other side may be before there is a warning.
 FINER, SOFTER = 2.0, 5.0
@@ -55,7 +56,7 @@ def choices(solution: Solution) -> Iterator[tuple[str, bool]]:
 def _partly(solution: Solution, nodes: NDArray[np.int64], sides: str) -> tuple[str, bool]:
     """Warn of nodes that carry pressure though less than half of their area faces anything."""
     problem = solution.problem
-    count = problem.comm.allreduce(int(_pressed(solution, nodes).sum()), op=MPI.SUM)
+    count = problem.comm.allreduce(int(_pressed(problem, solution.state, nodes).sum()), op=MPI.SUM)
     if count == 0:
         return "", True
     return (
@@ -65,28 +66,37 @@ def _partly(solution: Solution, nodes: NDArray[np.int64], sides: str) -> tuple[s
     ), False
 
 
-def _pressed(solution: Solution, nodes: NDArray[np.int64]) -> NDArray[np.bool_]:
-    """Return which of the owned contact nodes are among `nodes` and carry pressure."""
-    contact = solution.problem.nodes
-    _, local = owned_among(solution.problem.equilibrium.layout.index_map, nodes)
+def _pressed(problem: ContactProblem, state: State, nodes: NDArray[np.int64]) -> NDArray[np.bool_]:
+    """Return which of the owned contact nodes are among `nodes` and carry pressure. Collective."""
+    contact = problem.nodes
+    _, local = owned_among(problem.equilibrium.layout.index_map, nodes)
+    pressure = problem.interface.pressure(problem.nodal(state), state.forces)
     # What a method leaves at open nodes is none; what is a thousandth of the rest decides nothing.
-    pressed = solution.pressure > PRESSED * contact.maximum(solution.pressure)
+    pressed = pressure > PRESSED * contact.maximum(pressure)
     return np.asarray(pressed & np.isin(contact.nodes, local))
 
 
 def _slides(
     solution: Solution, nodes: NDArray[np.int64], size: float, sides: str
 ) -> tuple[str, bool]:
-    """Warn of points in contact that end further along the surface than a facet is long."""
-    slip = np.where(_pressed(solution, nodes), np.linalg.norm(solution.slip, axis=1), 0.0)
-    largest = solution.problem.nodes.maximum(slip)
+    """Warn of points in contact that are in some step further along than a facet is long."""
+    states = [record.state for record in solution.steps] or [solution.state]
+    slips = [_slip(solution.problem, state, nodes) for state in states]
+    largest = max(slips)
     if largest <= size:
         return "", True
+    when = f" at t = {states[slips.index(largest)].time:g}" if solution.steps else ""
     return (
-        f"{sides}: points in contact are {largest:.3g} along the surface from what they faced, "
-        f"and facets are {size:.3g} long: in linear kinematics each stays opposite what it faced "
-        "at rest; where surfaces are curved, or end, the result is of another contact"
+        f"{sides}: points in contact are {largest:.3g} along the surface from what they faced"
+        f"{when}, and facets are {size:.3g} long: in linear kinematics each stays opposite what it "
+        "faced at rest; where surfaces are curved, or end, the result is of another contact"
     ), False
+
+
+def _slip(problem: ContactProblem, state: State, nodes: NDArray[np.int64]) -> float:
+    """Return how far points in contact are along the surface from what they faced. Collective."""
+    along = np.linalg.norm(problem.nodes.tangential_component(problem.nodal(state)), axis=1)
+    return problem.nodes.maximum(np.where(_pressed(problem, state, nodes), along, 0.0))
 
 
 def _side(problem: ContactProblem, part: str) -> tuple[float, float]:

@@ -7,6 +7,7 @@ import logging
 from contact.output import assumptions, bodies, uniqueness
 from contact.output.deformation import deformation
 from contact.output.fields import DerivedFields
+from contact.output.looseness import looseness
 from contact.output.solution import Solution
 
 logger = logging.getLogger("contact.solve")
@@ -51,6 +52,7 @@ def review(solution: Solution) -> None:
         *bodies.choices(solution),
         bodies.passing(solution.problem),
         bodies.regions(solution),
+        looseness(solution),
     ):
         if text:
             (solution.notes if good else solution.warnings).append(text)

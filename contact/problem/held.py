@@ -10,7 +10,7 @@ from scipy import linalg
 from contact.errors import InputError
 from contact.interface.current import Conductor
 from contact.mesh.pieces import connected_pieces
-from contact.problem.mobility import ROUNDING, Group, groups, middle, null_space
+from contact.problem.mobility import ROUNDING, Group, described, groups, middle, null_space
 from contact.problem.problem import ContactProblem
 from contact.problem.state import State
 from contact.typing import Array
@@ -63,7 +63,7 @@ def _what_is_loose(problem: ContactProblem, group: Group, loose: Array) -> str:
         which = "the one" if np.count_nonzero(moves) == 1 else "what is"
         whole = f"the mesh has {count} pieces that share no nodes, and {which} about {where}"
     return (
-        f"{whole} is not held: it can move as a rigid body ({_describe(loose, group.names)}); "
+        f"{whole} is not held: it can move as a rigid body ({described(loose, group.names)}); "
         "accepted: displacement components fixed so that it cannot"
         + (", or regions that share the nodes between them" if count > 1 else "")
     )
@@ -151,20 +151,6 @@ def _conducts(conductor: Conductor, count: int, deep: float) -> NDArray[np.bool_
     closed = np.ones(count, dtype=bool)
     psi = conductor.psi.at(np.full(count, deep), ~closed, closed)
     return np.broadcast_to(psi, (count,)) > 0
-
-
-def _describe(motions: Array, names: list[str]) -> str:
-    """Name the axis motions that a space of rigid motions contains, or count it."""
-    contained = np.linalg.norm(motions, axis=1) > 1 - 1e-6
-    found = [name for name, inside in zip(names, contained, strict=True) if inside]
-    for axis in "xyz":
-        # Of several together.
-        all_along = np.array([f"translation along {axis}" in name for name in names], dtype=float)
-        along = all_along * (np.linalg.norm(motions, axis=1) > 1e-6)
-        size = float(np.linalg.norm(along))
-        if size > 1 and np.linalg.norm(motions.T @ along) > (1 - 1e-6) * size:
-            found.append(f"translation along {axis}, together")
-    return ", ".join(found) or "translation and rotation combined"
 
 
 def _check_loads(

@@ -39,3 +39,15 @@ def test_what_slides_further_than_a_facet_faces_something_else(way, warned):
     assert solution.converged
     words = [text for text, _ in choices(solution) if "along the surface" in text]
     assert bool(words) == warned
+
+
+def test_what_slides_there_and_back_faced_something_else_in_between():
+    sizes = {"lower_size": 0.3, "upper_size": 0.3}
+    given = case(mesh={"generator": "two_blocks", **sizes}, friction={"law": "none"})
+    given["fixed"].append({"on": "upper_top", "displacement": ["0.9*(1 - abs(t - 1))", -0.01]})
+    del given["load"]
+    given["evolution"] = {"times": [0.0, 2.0], "steps": [2]}
+    solution = solve(parse_case(given), comm=MPI.COMM_SELF)
+    assert solution.converged and np.abs(solution.slip).max() < 0.1
+    (words,) = [text for text, _ in choices(solution) if "along the surface" in text]
+    assert "at t = 1," in words

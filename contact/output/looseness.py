@@ -1,0 +1,88 @@
+"""Whether contact holds a body so well that its place means anything."""
+
+from __future__ import annotations
+
+import numpy as np
+from mpi4py import MPI
+from numpy.typing import NDArray
+from scipy import linalg
+
+from contact.output.assumptions import Remark
+from contact.output.solution import Solution
+from contact.output.summary import largest_displacement
+from contact.problem.kkt import residual_forces
+from contact.problem.mobility import Group, described, groups, null_space
+from contact.typing import Array
+
+#: Share of the largest displacement by which what is left of the forces may move a body.
+MOVED = 1e-3
+
+#: Share of a motion's square from which on contact holds it: normals of a mesh are off by more than
+#: the root of it, and hold what the true surface does not.
+HELD = 1e-8
+
+
+def looseness(solution: Solution) -> Remark:
+    """Say where nearly nothing resists a motion of a body that contact alone holds. Collective.
+
+    A cylinder without friction rolls in its place against next to nothing, and wherever it has
+    rolled to, its forces are in balance. Contact is taken to resist with c = E/length times areas,
+    as in the residuals: along the normal where bodies touch, along the surface where they stick.
+    """
+    problem, body = solution.problem, solution.problem.equilibrium
+    touches, sticks = solution.status != "open", solution.status == "stick"
+    if not problem.comm.allreduce(bool(touches.any()), op=MPI.LOR):
+        return "", True
+    left = float(body.sizes(body.unbalanced(residual_forces(problem, solution.state)))[0])
+    whole = problem.interface.stiffness * problem.nodes.sum(np.ones_like(problem.nodes.weight))
+    largest, kkt = largest_displacement(solution), solution.outcome.kkt
+    for group in groups(problem):
+        free = null_space(group.supports)
+        if free.shape[1] == 0:
+            continue
+        share, motion = _least_held(group, free, touches, sticks)
+        moved = left * _reach(group, motion) / max(whole * share, np.finfo(float).tiny)
+        if share < HELD or moved > MOVED * largest:
+            words = described(motion[:, None] / np.linalg.norm(motion), group.names)
+            return (
+                f"contact resists a rigid motion ({words}) by next to nothing: the mesh decides "
+                f"how far it goes, and {kkt.equilibrium + kkt.rounding:.1e} of the forces, which "
+                f"are left, may move what is there by up to {moved:.2g}, where displacements reach "
+                f"{largest:.2g}; friction, or a support against that motion, hold it",
+                False,
+            )
+    return "", True
+
+
+def _least_held(
+    group: Group, free: Array, touches: NDArray[np.bool_], sticks: NDArray[np.bool_]
+) -> tuple[float, Array]:
+    """Return the free motion that contact holds least. Collective.
+
+    Returns
+    -------
+    Which share of its square at all contact nodes is where it is held, and the motion, with a
+    mean square of 1 there, shape (m,).
+    """
+    nodes = group.problem.nodes
+    normal, tangential = group.normal @ free, group.tangential @ free
+    products = np.einsum("n,nk,nl->nkl", nodes.weight, normal, normal)
+    along = np.einsum("n,nik,nil->nkl", nodes.weight, tangential, tangential)
+    sums = np.array(
+        [
+            products[touches].sum(axis=0) + along[sticks].sum(axis=0),
+            products.sum(axis=0) + along.sum(axis=0),
+        ]
+    )
+    held, moved = nodes.comm.allreduce(sums, op=MPI.SUM)
+    area = nodes.sum(np.ones_like(nodes.weight))
+    values, motions = linalg.eigh(held / area, moved / area)
+    return max(float(values[0]), 0.0), free @ motions[:, 0]
+
+
+def _reach(group: Group, motion: Array) -> float:
+    """Return how far a motion moves a node at most. Collective."""
+    body = group.problem.equilibrium
+    moved = body.nodal(group.moved @ motion)[:, : body.dim]
+    here = float(np.linalg.norm(moved, axis=1).max(initial=0.0))
+    return float(group.problem.comm.allreduce(here, op=MPI.MAX))

@@ -1,0 +1,39 @@
+"""What is said of bodies that contact resists by next to nothing."""
+
+import pytest
+from mpi4py import MPI
+
+from contact import parse_case, solve
+from tests.problems.pairs import case
+
+CYLINDERS = {
+    "mesh": {"generator": "two_half_cylinders", "contact_size": 0.1, "contact_width": 0.7},
+    "material": {"young": 1000.0, "poisson": 0.3},
+    "fixed": [{"on": "lower_cut", "displacement": [0.0, 0.0]}],
+    "load": [{"on": "upper_cut", "traction": [0.0, -1.0]}],
+    "contact": {"on": "upper_arc", "against": "lower_arc"},
+}
+UPRIGHT = {"on": "upper_cut", "displacement": [0.0, "free"]}
+
+
+@pytest.mark.parametrize(
+    ("friction", "held", "warned"),
+    [
+        ({"law": "none"}, [], True),
+        ({"law": "none"}, [UPRIGHT], False),
+        ({"law": "coulomb", "mu": 0.3}, [], False),
+    ],
+)
+def test_a_cylinder_that_can_roll_in_its_place(friction, held, warned):
+    """Without friction it does so against what the mesh makes of the circle."""
+    given = case(**CYLINDERS, friction=friction)
+    given["fixed"] = given["fixed"] + held
+    solution = solve(parse_case(given), comm=MPI.COMM_SELF)
+    assert solution.converged
+    assert any("by next to nothing" in warning for warning in solution.warnings) == warned
+
+
+def test_a_block_that_lies_on_another_is_held_by_friction():
+    solution = solve(parse_case(case()), comm=MPI.COMM_SELF)
+    assert solution.converged
+    assert not any("by next to nothing" in warning for warning in solution.warnings)
