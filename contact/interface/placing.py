@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
 
 import numpy as np
 from dolfinx import fem
@@ -14,72 +13,13 @@ from numpy.typing import NDArray
 from contact.body.equilibrium import BodyEquilibrium
 from contact.calling import naming, on_all_ranks
 from contact.errors import InputError
-from contact.interface.mortar.lumping import Lumping, Mixing
-from contact.interface.mortar.surface import surface_of
+from contact.interface.candidates import Candidates, candidates
+from contact.interface.mortar.lumping import Mixing
 from contact.interface.nodes import ContactNodes, projectors
-from contact.interface.obstacle import Obstacle
+from contact.interface.obstacle import Obstacle, Shape
 from contact.interface.obstacle.measuring import measured
 from contact.mesh.domain import Domain
-from contact.mesh.entities import owned_among
 from contact.typing import Array
-
-
-@dataclass(frozen=True)
-class Candidates:
-    """The owned nodes of a boundary part, with their areas and the body's normals.
-
-    Attributes
-    ----------
-    comm
-        Communicator.
-    nodes, points, weight, normal
-        As in `ContactNodes`, whatever is fixed there.
-    numbers
-        Global numbers of the nodes, shape (n,).
-    mixing
-        The jumps, where these are no nodal values.
-    """
-
-    comm: MPI.Intracomm
-    nodes: NDArray[np.int32]
-    points: Array
-    weight: Array
-    normal: Array
-    numbers: NDArray[np.int64]
-    mixing: Mixing | None
-
-    def jumps(self, values: Array) -> Array:
-        """Return the jumps of values at these nodes, shape (n, m). Collective."""
-        if self.mixing is None:
-            return values
-        return self.mixing.apply(self.comm, self.numbers, values)
-
-    def measure(self, obstacle: Obstacle) -> tuple[Array, Array]:
-        """Return the contact directions and the gaps of nodes, before anything is mixed."""
-        return obstacle.measure(self.points, self.normal)
-
-    def gaps(self, direction: Array, gap: Array) -> Array:
-        """Return the gaps of the jumps, (n,); next to infinite ones no numbers. Collective."""
-        if self.mixing is None:
-            return gap
-        with np.errstate(invalid="ignore"):
-            mixed = self.jumps(gap[:, None] * direction)
-            return np.asarray(np.einsum("nd,nd->n", direction, mixed))
-
-
-def candidates(domain: Domain, space: fem.FunctionSpace, part: str) -> Candidates:
-    """Collect the nodes of a boundary part whose area is not zero. Collective."""
-    lumped = Lumping.of(surface_of(domain, space, part).gathered(domain.comm))
-    # Nodes whose function has no mean on Gamma_3 carry none: P2 vertices of edges where they meet
-    # the axis of a body of revolution.
-    heavy = lumped.weight > 1e-9 * lumped.weight.sum() / max(lumped.weight.size, 1)
-    here, nodes = owned_among(space.dofmap.index_map, lumped.nodes)
-    here, nodes = here[heavy[here]], nodes[heavy[here]]
-    numbers, normal = lumped.nodes[here], lumped.normal[here]
-    points = space.tabulate_dof_coordinates()[nodes, : domain.dim]
-    normal = normal / np.linalg.norm(normal, axis=1)[:, None]
-    weight = lumped.weight[here]
-    return Candidates(domain.comm, nodes, points, weight, normal, numbers, lumped.mixing)
 
 
 def _corners(space: fem.FunctionSpace) -> NDArray[np.int32]:
@@ -121,7 +61,7 @@ def _place(
     gap: Array,
     press: bool,
 ) -> tuple[Array, float]:
-    """Refuse a foundation behind the contact part, or one that the body cuts at rest.
+    """Refuse a foundation behind or around the contact part, or one that the body cuts at rest.
 
     Nodes that face away are not looked at: all of a disc may be the contact part. Nodes on
     straight facets of a curved part may lie in a ball that the facets' corners touch: they
@@ -142,9 +82,10 @@ def _place(
             "into the body at every node; accepted: a normal towards the body, a shape in front "
             "of it, or inside = true for a body within"
         )
+    rounding = 1e-5 * domain.size  # that of mesh files
+    _refuse_within(domain, contact[1], found.points[facing > 0], gap[facing > 0], rounding)
     if press:
         return gap, 0.0
-    rounding = 1e-5 * domain.size  # that of mesh files
     tolerance = np.full_like(gap, rounding)
     depth = np.where(facing > 0, -gap, 0.0)
     chord = max(rounding, _chord_depth(domain, *contact, found.points[depth > rounding]))
@@ -160,6 +101,26 @@ def _place(
             'or overlap = "press"'
         )
     return np.where(facing > 0, np.maximum(gap, 0.0), gap), float(cut)
+
+
+def _refuse_within(
+    domain: Domain, obstacle: Obstacle, points: Array, gap: Array, rounding: float
+) -> None:
+    """Refuse nodes in a shape from which the contact direction leads on through it. Collective.
+
+    It then meets a far side, or nothing, and what touches would seem to be free.
+    """
+    if not isinstance(obstacle, Shape):
+        return
+    with on_all_ranks(domain.comm), naming("foundation"):
+        within = (obstacle.distance(points)[0] < -rounding) & (gap > rounding)
+    count = domain.comm.allreduce(np.count_nonzero(within))
+    if count > 0:
+        raise InputError(
+            f"foundation: {count} contact nodes lie within it, and the contact direction does not "
+            "lead back to its surface; accepted: a distance that is positive, or triangles whose "
+            "normals point, towards the body, and overlaps less deep than the shape"
+        )
 
 
 def check_gap(domain: Domain, gap: Array, key: str, press: bool) -> None:

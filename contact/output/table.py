@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scipy import sparse
 from scipy.sparse import csgraph
 
-from contact.interface.placing import candidates
+from contact.interface.candidates import candidates
 from contact.mesh.entities import cells_at
 from contact.output.solved import Solved
 from contact.problem.problem import ContactProblem

@@ -13,6 +13,7 @@ from contact.body.equilibrium import BodyEquilibrium
 from contact.body.materials import young_behind
 from contact.body.norms import volume
 from contact.errors import InputError
+from contact.interface.candidates import candidates
 from contact.interface.current import Conductor, HeldCurrent, held_current
 from contact.interface.entries import (
     Entry,
@@ -28,7 +29,7 @@ from contact.interface.interface import Interface
 from contact.interface.multipliers import Multipliers
 from contact.interface.nodes import ContactNodes
 from contact.interface.pairing import find_pair
-from contact.interface.placing import candidates, find_nodes
+from contact.interface.placing import find_nodes
 from contact.interface.response import FoundationResponse
 from contact.kinds import expect, several
 from contact.mesh.domain import Domain

@@ -3,10 +3,14 @@
 from __future__ import annotations
 
 import time
+from functools import partial
 
 import numpy as np
 import pytest
+from dolfinx import mesh
+from mpi4py import MPI
 
+from contact.body.description import Body, Fixed
 from contact.errors import InputError
 from contact.interface.obstacle import (
     Level,
@@ -14,6 +18,11 @@ from contact.interface.obstacle import (
     Triangles,
 )
 from contact.interface.obstacle.stl import read_stl
+from contact.mesh.domain import from_mesh
+from contact.problem.contact import Contact
+from contact.problem.problem import ContactProblem
+from forms.hencky import Linear
+from tests.problems.mechanics import constant
 
 POINTS = np.random.default_rng(0).normal(size=(1000, 3))
 
@@ -73,6 +82,67 @@ def test_signs_at_edges_and_corners():
     out = np.maximum(np.abs(points) - 1, 0)
     exact = np.linalg.norm(out, axis=1) + np.minimum(np.abs(points).max(axis=1) - 1, 0)
     assert np.abs(distance - exact).max() < 1e-12
+
+
+def above(shape, direction, press=False):
+    """Return the contact nodes of the top of a block, its middle beneath a ball."""
+    block = from_mesh(
+        mesh.create_box(MPI.COMM_SELF, [[-0.5, -0.5, -1.0], [0.5, 0.5, 0.0]], [4, 4, 2]),
+        {"top": lambda x: np.isclose(x[2], 0.0), "bottom": lambda x: np.isclose(x[2], -1.0)},
+    )
+    body = Body(Linear(1.0, 0.3), [Fixed("bottom", (constant(0.0, 3),) * 3)])
+    rigid = shape(direction=direction, along=(0.0, 0.0, 1.0))
+    return ContactProblem(block, body, Contact("top", rigid, press=press)).nodes
+
+
+def lifted(inward):
+    made = ball(12) + np.array([0.0, 0.0, 1.0])
+    return partial(Triangles, made[:, ::-1] if inward else made)
+
+
+def test_a_surface_that_is_inside_out_is_refused():
+    """Its far side is not what a ray from the body meets."""
+    nodes = above(lifted(False), "axis")
+    r = np.linalg.norm(nodes.points[:, :2], axis=1)
+    assert nodes.gap == pytest.approx(1 - np.sqrt(1 - r**2), abs=0.01)
+    for direction in ("axis", "body"):
+        for press in (False, True):
+            with pytest.raises(InputError, match="24 contact nodes lie within it"):
+                above(lifted(True), direction, press)
+    with pytest.raises(InputError, match="behind the contact part"):
+        above(lifted(True), "foundation")
+
+
+def test_a_formula_of_the_wrong_sign_is_refused():
+    def distance(x):
+        return np.linalg.norm(x - [0.0, 0.0, 1.0], axis=1) - 1
+
+    assert above(partial(Level, distance), "axis").gap.max() < 0.3
+    with pytest.raises(InputError, match="lie within it"):
+        above(partial(Level, lambda x: -distance(x)), "axis")
+
+
+def test_an_overlap_is_less_deep_than_the_shape():
+    """A plate across the body leads the nodes out of its far side from half of its depth on."""
+
+    def plate(thick, x):
+        return np.abs(x[:, 2] - thick / 2 + 0.1) - thick / 2
+
+    deep = above(partial(Level, partial(plate, 1.0)), "axis", press=True)
+    assert deep.gap == pytest.approx(np.full(25, -0.1))
+    with pytest.raises(InputError, match="lie within it"):
+        above(partial(Level, partial(plate, 0.15)), "axis", press=True)
+
+
+def test_triangles_against_each_other_are_refused():
+    made = ball(4)
+    Triangles(made).check(3)
+    # The rim of an open surface has no neighbours; two bodies may share an edge.
+    Triangles(made[:10]).check(3)
+    Triangles(np.concatenate([made, made + np.array([2.0, 0.0, 0.0])])).check(3)
+    made[3] = made[3, ::-1]
+    with pytest.raises(InputError, match="both sides of the surface"):
+        Triangles(made).check(3)
 
 
 def test_a_hundred_thousand_triangles_in_a_second():

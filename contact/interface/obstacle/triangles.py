@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
+from contact.errors import InputError
 from contact.interface.obstacle.protocol import Shape
 from contact.typing import Array
 
@@ -32,6 +33,25 @@ class Triangles(Shape):
     only = 3
 
     corners: Array
+
+    def check(self, dim: int) -> None:
+        """Refuse neighbours whose normals point to different sides, too.
+
+        Each of their edges is then run along twice in one direction, and never in the other.
+        """
+        super().check(dim)
+        vertex = _numbered(_vertices(self.corners))
+        ends = np.stack([vertex, np.roll(vertex, -1, axis=1)], axis=2).reshape(-1, 2)
+        edge = _numbered(ends.min(axis=1) * (vertex.max() + 1) + ends.max(axis=1))
+        turns = np.bincount(edge, np.where(ends[:, 0] < ends[:, 1], 1.0, -1.0))
+        wrong = np.flatnonzero(np.abs(turns)[edge] > 1)
+        if wrong.size:
+            x, y, z = self.corners.reshape(-1, 3)[wrong[0]]
+            raise InputError(
+                f"normals point to both sides of the surface, at ({x:g}, {y:g}, {z:g}) for "
+                "instance; accepted: triangles that all have their corners counter-clockwise, "
+                "seen from the body"
+            )
 
     @cached_property
     def _tree(self) -> cKDTree:
