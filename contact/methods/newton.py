@@ -105,7 +105,7 @@ class Newton:
         if options.condense and isinstance(problem, ContactProblem):
             body = condensation(problem, self.counters, options.linear)
             if body is not None:
-                self._pays = pays(problem)
+                self._pays = pays(problem, options.linear)
                 # Where the whole body comes first, its loop has found out already.
                 inner = options if self._pays else replace(options, patience=SHORT)
                 self._condensed = MaterialStep(

@@ -20,8 +20,10 @@ ALWAYS = 1000
 DENSE_IS_FASTER = 50.0
 
 
-def pays(problem: ContactProblem) -> bool:
+def pays(problem: ContactProblem, kind: str) -> bool:
     """Tell whether dense steps at the contact nodes cost less than sparse ones of the body.
+
+    Large bodies in space are left to multigrid, unless a direct solver is asked for by `kind`.
 
     A dense factorisation costs k^3 operations with k kept unknowns. A sparse one costs n b^2 with
     n unknowns and fronts of b: in the plane the body's depth, n/k nodes, in
@@ -29,7 +31,7 @@ def pays(problem: ContactProblem) -> bool:
     Of a slender body the contact nodes are too large a part.
     """
     layout = problem.equilibrium.layout
-    if multigrid.is_large(layout):
+    if kind == "auto" and multigrid.is_large(layout):
         return False
     kept, unknowns = problem.nodes.size * layout.block_size, layout.unknowns
     front = unknowns / kept * layout.block_size if layout.dim == 2 else unknowns**0.5

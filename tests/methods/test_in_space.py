@@ -49,3 +49,15 @@ def test_a_block_costs_few_set_ups_and_iterations(
     assert counters.linear_solves <= 9
     assert counters.factorizations <= 2
     assert counters.linear_iterations <= iterations * counters.linear_solves
+
+
+@pytest.mark.usefixtures("small_is_large")
+def test_a_direct_solver_factorises_a_large_body_once():
+    """It is condensed then, as where bodies are small: multigrid alone has each step anew."""
+    law = {"young": 1.0, "poisson": 0.3}
+    solution, other = (solve(block(6, law, linear=linear)) for linear in ("lu", "auto"))
+    assert solution.converged
+    assert other.converged
+    assert largest(solution) == pytest.approx(largest(other), rel=1e-7)
+    assert solution.counters.linear_solves == solution.counters.factorizations == 1
+    assert other.counters.linear_solves > 1
