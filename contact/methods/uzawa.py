@@ -22,6 +22,7 @@ from contact.interface.multipliers import Multipliers
 from contact.interface.nodes import ContactNodes
 from contact.interface.projections import disc_derivative, project_disc
 from contact.interface.residuals import interface_residuals
+from contact.linear.multigrid import TOLERANCE
 from contact.linear.operator import Operator
 from contact.methods.acceleration import ResidualMinimiser
 from contact.methods.augmentation import split
@@ -34,6 +35,11 @@ logger = logging.getLogger("contact.inner")
 #: Iterations without progress, that is 1 %, after which the relaxation is given up: accelerated,
 #: and plain. With r far from r* the plain one creeps by 1e-4 an iteration, and still gets there.
 PATIENCE, PATIENCE_PLAIN, PROGRESS = 100, 500, 0.99
+
+#: What an iterative solver leaves at most, over the tolerance of the relaxation: where it leaves as
+#: much, it hands back what it began with, and rounding decides when it does. And the least that
+#: it leaves.
+SHARE, LEAST = 0.1, 1e-13
 
 
 @dataclass(frozen=True)
@@ -249,6 +255,7 @@ def block_relaxation(
     project = _Projection(jump, r, step.bound, law)
     accelerator = project.accelerator(parameters.depth, parameters.anew)
     changes = None if domain_norm is None else _Changes(project, step.x, domain_norm)
+    rtol = max(SHARE * parameters.tolerance, LEAST)
     residual, forces = np.inf, Multipliers.zero(jump)
     increment: Array = np.zeros(step.x.size)
     start = split(interface, step.nodal, step.friction)
@@ -260,7 +267,7 @@ def block_relaxation(
         q = 2 * multiplier - z
         rhs = -step.residual
         jump.transpose(-jump.weight[:, None] * _vectors(jump, q + r * start), rhs)
-        increment = step.operator.solve(rhs, guess=increment)
+        increment = step.operator.solve(rhs, rtol if rtol < TOLERANCE else None, increment)
         nodal = step.nodal + jump.apply(increment)
         u = split(interface, nodal, step.friction)
         # q + r u is the force that the foundation exerted in this very solve.

@@ -2,7 +2,7 @@
 
 import pytest
 
-from scripts.studies import mutations, random_ends
+from scripts.studies import mutations, random_ends, units
 
 
 def test_damaged_cases_end_in_order(tmp_path):
@@ -32,3 +32,7 @@ def test_disorderly_ends_are_seen(status, said, found):
 def test_random_ends_hold(tmp_path, capsys):
     assert random_ends.main(["--count", "2", "--out", str(tmp_path)]) == 0
     assert "endings:" in capsys.readouterr().out
+
+
+def test_units_agree(tmp_path):
+    assert units.main(["--coarse", "--methods", "newton", "--out", str(tmp_path)]) == 0
