@@ -11,9 +11,17 @@ from contact.typing import Array
 
 
 def interface_residuals(
-    interface: Interface, nodal: Array, forces: Multipliers, bound: Array
+    interface: Interface, nodal: Array, forces: Multipliers, bound: Array, rounding: float = 0.0
 ) -> tuple[float, float]:
-    """Return the relative contact and friction residuals at nodal unknowns. Collective."""
+    """Return the relative contact and friction residuals at nodal unknowns. Collective.
+
+    Parameters
+    ----------
+    interface, nodal, forces, bound
+        The laws, unknowns and contact forces at the nodes, and the friction bound, shape (n,).
+    rounding
+        Norm of pressures in L2(Gamma_3) that nothing can tell from zero: both are less it.
+    """
     jump, c = interface.jump, interface.stiffness
     opening = interface.opening(nodal)
     contact = forces.pressure - project_half_line(forces.pressure + c * opening)
@@ -26,4 +34,6 @@ def interface_residuals(
     way = np.maximum(np.linalg.norm(nodal[:, : interface.dim], axis=1), before)
     closing = c * jump.norm(np.minimum(np.minimum(np.abs(opening), way), interface.size))
     scale = max(jump.norm(interface.pressure(nodal, forces)), 1e-4 * closing) or 1.0
-    return jump.norm(contact) / scale, jump.norm(friction) / scale
+    norms = np.array([jump.norm(contact), jump.norm(friction)])
+    contact_left, friction_left = (norms - np.minimum(norms, rounding)) / scale
+    return float(contact_left), float(friction_left)

@@ -239,11 +239,14 @@ class Newton:
     ) -> tuple[Iterate, Outcome]:
         """Solve convex problems for sure, and let Newton's loop finish what they leave.
 
-        Without friction first: where the body touches, Newton's method mostly finds the rest.
+        Without friction first: where the body touches, Newton's method mostly finds the rest. What
+        is linear is so from anywhere, and least rounded from rest: Newton's loop may have let a
+        loose body fly away.
         """
+        answers = problem.interface.response.active
         for friction in (False, True) if problem.interface.friction.acts else (False,):
             best = self.search.best.found
-            start = problem.start() if best is None else best.state
+            start = best.state if answers and best is not None else problem.start()
             poll, goal = self.history.poll, self.options.tolerance
             found = solve_convex(problem, start, poll, friction, goal)
             if found is None:

@@ -39,7 +39,9 @@ class KKT:
         |p - max(0, p + c (u_nu - rho))| / |p| in L2(Gamma_3), c = E/length with
         the modulus of what touches.
     friction
-        |lambda_f - proj(lambda_f + c u_tau)| / |p| with the final bound s.
+        |lambda_f - proj(lambda_f + c u_tau)| / |p| with the final bound s. Both are less what the
+        forces that `rounding` stands for are as pressures: no contact force is known better than
+        equilibrium knows it, and where the loads ask for none at all, all of them are that.
     rounding
         What has been subtracted from the first, over the same, the larger one: `_rounding`, but not
         more than the `most_rounding` of the body. Zero where no load acts, nothing touches and the
@@ -113,6 +115,13 @@ def _rounding(problem: Problem, state: State, internal: Array) -> Array:
     return MARGIN * EPS / SHAKE * body.sizes(body.unbalanced(change))
 
 
+def _as_pressures(problem: Problem, forces: float) -> float:
+    """Return the norm in L2(Gamma_3) of pressures with forces of a given norm. Collective."""
+    jump = problem.interface.jump
+    area = jump.sum(np.ones_like(jump.weight))
+    return forces * float(np.sqrt(jump.size / area)) if area > 0 else 0.0
+
+
 def evaluate(problem: Problem, state: State) -> KKT:
     """Return the residuals of a state. Collective; nothing is changed by it."""
     body, interface = problem.equilibrium, problem.interface
@@ -126,14 +135,16 @@ def evaluate(problem: Problem, state: State) -> KKT:
     unbalanced = body.sizes(body.unbalanced(residual))
     most, acted = body.most_rounding * scale, loads > 0
     asked = ~acted | (unbalanced <= most)
-    rounding = np.zeros_like(scale)
+    rounding, unknown = np.zeros_like(scale), 0.0
     if asked.any():
         rounding = np.where(asked, _rounding(problem, state, internal), 0.0)
+        unknown = float(np.minimum(rounding, most)[0])
         acted |= answers > rounding
         # Of a body that flies away all forces are rounding.
         rounding = np.minimum(np.where(acted, np.minimum(rounding, most), rounding), unbalanced)
     size = np.where(scale > 0, scale, 1.0)
     equilibrium = float(np.max((unbalanced - rounding) / size))
     nodal = interface.jump.apply(state.x)
-    laws = interface_residuals(interface, nodal, state.forces, interface.bound(nodal, state.forces))
+    bound, pressures = interface.bound(nodal, state.forces), _as_pressures(problem, unknown)
+    laws = interface_residuals(interface, nodal, state.forces, bound, pressures)
     return KKT(equilibrium, *laws, float(np.max(np.where(acted, rounding / size, 0.0))))
