@@ -30,11 +30,6 @@ def check_sections(case: Case) -> None:
     else:
         _check_mechanical(case)
     _check_regions(case)
-    given = [fixed.displacement or () for fixed in case.fixed]
-    given += [part.displacement or ("held",) for part in case.rigid]
-    if not any(component != "free" for components in given for component in components):
-        accepted = "at least one component on a part, in [[fixed]] or [[rigid]]"
-        raise fault("fixed", Words("no displacement fixed"), accepted)
     _check_lagged(case)
     check_evolution(case)
     for path, formula in _formulas(case):

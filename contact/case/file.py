@@ -90,8 +90,8 @@ class Case(Section):
     )
     fixed: Annotated[tuple[Fixed, ...], as_tuple, Accepted("tables [[fixed]]")] = Field(
         default=(),
-        description="Supports and electrodes: `[[fixed]]`. Required but where `[[rigid]]` holds "
-        "the body.",
+        description="Supports and electrodes: `[[fixed]]`. None where contact, with friction that "
+        "is enough, or `[[rigid]]` holds the body.",
     )
     load: Annotated[tuple[Load, ...], as_tuple, Accepted("tables [[load]]")] = Field(
         default=(), description="Forces and charges: any number of `[[load]]`."

@@ -12,6 +12,7 @@ from contact.output.solution import Solution
 from contact.output.summary import largest_displacement
 from contact.problem.kkt import residual_forces
 from contact.problem.mobility import Group, described, groups, null_space
+from contact.tolerances import EPS
 from contact.typing import Array
 
 #: Share of the largest displacement by which what is left of the forces may move a body.
@@ -31,7 +32,7 @@ def looseness(solution: Solution) -> Remark:
     """
     problem, body = solution.problem, solution.problem.equilibrium
     touches, sticks = solution.status != "open", solution.status == "stick"
-    if not problem.comm.allreduce(bool(touches.any()), op=MPI.LOR):
+    if not (solution.converged and problem.comm.allreduce(bool(touches.any()), op=MPI.LOR)):
         return "", True
     left = float(body.sizes(body.unbalanced(residual_forces(problem, solution.state)))[0])
     whole = problem.interface.stiffness * problem.nodes.sum(np.ones_like(problem.nodes.weight))
@@ -41,7 +42,7 @@ def looseness(solution: Solution) -> Remark:
         if free.shape[1] == 0:
             continue
         share, motion = _least_held(group, free, touches, sticks)
-        moved = left * _reach(group, motion) / max(whole * share, np.finfo(float).tiny)
+        moved = left * _reach(group, motion) / (whole * max(share, EPS))
         if share < HELD or moved > MOVED * largest:
             words = described(motion[:, None] / np.linalg.norm(motion), group.names)
             return (

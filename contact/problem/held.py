@@ -179,10 +179,12 @@ def _check_loads(
     if not np.isfinite(mu) or not friction.local:
         return
     comm, work = problem.comm, work @ free
-    # |m_tau| <= sqrt(d) times its largest component: a cone of planes inside the cone.
-    across = [
-        np.sqrt(problem.dim) * mu * part @ free for part in np.moveaxis(group.tangential, 1, 0)
-    ]
+    if problem.dim == 2:
+        along = problem.nodes.normal[:, ::-1] * [-1.0, 1.0]
+        across = [mu * np.einsum("ni,nim->nm", along, group.tangential) @ free]
+    else:
+        # |m_tau| <= sqrt(d) times its largest component: a cone of planes inside the cone.
+        across = [np.sqrt(3) * mu * part @ free for part in np.moveaxis(group.tangential, 1, 0)]
     rows = [group.normal @ free + sign * part for part in across for sign in (-1, 1)]
     cone = np.concatenate([problem.nodes.gather(row) for row in rows])
     pulled = False

@@ -25,8 +25,6 @@ BAD = {
     "no mesh": ({"mesh": None}, "mesh: missing; accepted: a table"),
     "no material": ({"material": None}, "material: missing"),
     "no contact": ({"contact": None}, "contact: missing"),
-    "no supports": ({"fixed": None}, "fixed: no displacement fixed; accepted: at least one"),
-    "empty supports": ({"fixed": []}, "fixed: no displacement fixed"),
     "table for a list": ({"load": {"on": "top"}}, "load: given a table; accepted: tables [[load]]"),
     "number for a table": ({"solver": 3}, "solver: given 3; accepted: a table"),
     "missing key": ({"material__young": None}, "material.young: missing; accepted: a number > 0"),
@@ -74,10 +72,6 @@ BAD = {
     "nothing fixed": (
         {"fixed": [{"on": "left", "displacement": ["free", "free"]}]},
         "fixed.0.displacement: given",
-    ),
-    "only a potential fixed": (
-        {"fixed": [{"on": "left", "potential": 0}], "material__piezo": PIEZO},
-        "fixed: no displacement fixed",
     ),
     "components": ({"fixed__0__displacement": [0, 0, 0]}, "2 components in 2-D"),
     "components in space": ({"mesh": box, "load__0__on": "top"}, "3 components in 3-D"),

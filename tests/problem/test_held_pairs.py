@@ -75,3 +75,35 @@ def test_a_potential_that_no_contact_could_determine_is_refused_before_anything_
             build_problem(parse_case(given), SELF)
     else:
         build_problem(parse_case(given), SELF)
+
+
+def stack(push, mu=0.3, method="newton"):
+    """Return a block on a block on a table, with nothing fixed."""
+    table = {"shape": "plane", "point": [0, -1], "normal": [0, 1]}
+    contacts = [
+        {"on": "upper_bottom", "against": "lower_top"},
+        {"on": "lower_bottom", "foundation": table},
+    ]
+    loads = [{"on": "upper_top", "traction": [push, -1.0]}]
+    friction = {"law": "coulomb", "mu": mu} if mu else {"law": "none"}
+    given = case(fixed=[], load=loads, contact=contacts, friction=friction)
+    return build_problem(parse_case({**given, "solver": {"method": method}}), SELF)
+
+
+@pytest.mark.parametrize("linear", ["lu", "iterative"])
+def test_a_stack_that_nothing_but_contact_holds(linear):
+    problem = stack(0.2)
+    options = NewtonOptions(linear=linear, condense=linear == "lu")
+    state, outcome = Newton(problem, options).solve()
+    assert outcome.converged, outcome.reason
+    balance = force_balance(problem, state)
+    assert balance.applied == pytest.approx([0.4, -2.0], rel=1e-10)
+    assert balance.contact == pytest.approx([-0.4, 2.0], rel=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("push", "mu", "words"), [(0.0, 0.0, "is not held"), (0.31, 0.3, "pull the body off")]
+)
+def test_a_stack_that_slides_off_is_refused(push, mu, words):
+    with pytest.raises(InputError, match=words):
+        stack(push, mu)
