@@ -12,6 +12,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from mpi4py import MPI
 
 from contact import Case, Solution, load_case
 from contact.library.reading import find
@@ -245,11 +246,49 @@ def table(report: Report, fineness: float, materials: Sequence[str] = MATERIALS)
     report.table("closed-forms", "Indentation, computed over closed form", columns, note)
 
 
+def units_and_poling(report: Report, fineness: float) -> None:
+    """Tabulate what a ball on PZT-4 knows of its poling, and of the units. Collective."""
+    names = ("indenter", "given", "P", "Q or phi", "largest difference of p", "of phi")
+    columns: dict[str, list[object]] = {name: [] for name in names}
+    for potential in (None, 0.0):
+        kind = "insulating" if potential is None else "grounded"
+        first: tuple[float, float, Array, Array] | None = None
+        for given, poling, units in (
+            ("GPa", -90.0, "GPa"),
+            ("SI", -90.0, "SI"),
+            ("poling reversed", 90.0, "GPa"),
+        ):
+            setting = Setting("PZT-4", "ball", potential, fineness, poling, units)
+            solution, unit = solved(setting.case(20.0)), 1e9 if units == "SI" else 1.0
+            problem, sign = solution.problem, -np.sign(poling)
+            force = float(solution.contact_force[1]) / unit
+            phi = sign * solution.nodal[:, -1] * problem.equilibrium.phi_scale / unit
+            other = sign * charge_balance(problem, solution.state).foundation
+            if potential is None:
+                # Beneath the tip it is largest.
+                other = problem.comm.allreduce(np.abs(phi).max(initial=0.0), op=MPI.MAX)
+            found = (force, float(other), solution.pressure / unit, phi)
+            first = found if first is None else first
+            off = [
+                problem.comm.allreduce(np.abs(now - then).max(initial=0.0), op=MPI.MAX)
+                / problem.comm.allreduce(np.abs(then).max(initial=0.0), op=MPI.MAX)
+                for now, then in zip(found[2:], first[2:], strict=True)
+            ]
+            append(columns, kind, given, *found[:2], *off)
+    note = (
+        "In a box of 20 contact radii, in GPa, GV and C; phi and Q of the body poled the other way "
+        "with the sign turned. Differences to the first row of three, over the largest."
+    )
+    report.table("units-and-poling", "A ball on PZT-4: units and poling", columns, note)
+
+
 def main(arguments: Sequence[str] | None = None) -> None:
-    """Make the table."""
+    """Make the tables."""
     chosen = options(__doc__, "indentation", arguments)
     fineness = 6.0 if chosen.coarse else 12.0
-    table(Report(chosen.out), fineness, MATERIALS[:1] if chosen.coarse else MATERIALS)
+    report = Report(chosen.out)
+    units_and_poling(report, fineness)
+    table(report, fineness, MATERIALS[:1] if chosen.coarse else MATERIALS)
 
 
 if __name__ == "__main__":

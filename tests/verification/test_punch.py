@@ -8,7 +8,6 @@ from mpi4py import MPI
 
 from contact.body.description import Body, Fixed
 from contact.body.rigid import Motion, Rigid
-from contact.case.file import load_case
 from contact.errors import InputError
 from contact.interface.obstacle import Plane
 from contact.mesh.domain import Domain, from_mesh
@@ -18,9 +17,9 @@ from contact.methods.options import NewtonOptions
 from contact.output.motions import movements
 from contact.problem.contact import Contact
 from contact.problem.problem import ContactProblem
-from contact.solving import build_problem
+from contact.solving import solve
 from forms.hencky import Linear
-from scripts.cases import CASES
+from scripts.studies.indentation_in_space import punch, rotation
 from tests.problems.mechanics import constant
 
 SELF = MPI.COMM_SELF
@@ -107,29 +106,24 @@ def test_a_circular_punch_sinks_by_its_force():
     assert 2 * stiffness[1] - stiffness[0] == pytest.approx(1.0, rel=5e-3)
 
 
-def rotation(n: float, extent: float = 10.0) -> float:
-    """Return the rotation of a circular punch in space over (4/3) E* a^3 theta = M."""
-    sizes = {"contact_size": 0.4 / n, "edge_size": 0.02 / n**2, "growth": 0.8 / n}
-    changes = [f"mesh.{key}={value}" for key, value in sizes.items()]
-    changes += [f"mesh.extent={extent}", f"mesh.size={extent / 3}"]
-    problem = build_problem(load_case(CASES / "indent-punch-tilted.toml", changes))
-    method = Newton(problem, NewtonOptions())
-    state, outcome = method.solve()
-    assert outcome.converged
-    weight, x = problem.nodes.weight, problem.nodes.points[:, 0]
-    pressure = state.forces.pressure
+def tilted(n: float) -> float:
+    """Return the rotation of a circular punch in space over the closed form's."""
+    solution = solve(punch(n))
+    assert solution.converged
+    weight, x = solution.problem.nodes.weight, solution.problem.nodes.points[:, 0]
+    pressure = solution.pressure
     assert np.all(pressure > 0)
     assert weight @ pressure == pytest.approx(0.005, rel=1e-12)
     # About y an upward force at x turns by -x.
     assert weight @ (x * pressure) == pytest.approx(0.0005, rel=1e-12)
-    turned = movements(problem, state)["rigid"]["rotation"]
+    turned = movements(solution.problem, solution.state)["rigid"]["rotation"]
     assert turned[0] == turned[2] == 0
-    return float(np.deg2rad(turned[1]) * 4 / 3 / (1 - NU**2) / 1e-3)
+    return rotation(solution)
 
 
 def test_a_moment_tilts_a_circular_punch_in_space():
     """Graded towards the edge, order 2: finer meshes stand in docs/indentation.md."""
     pytest.importorskip("gmsh")
-    coarse, fine = (1 - rotation(n) for n in (0.5, 1))
+    coarse, fine = (1 - tilted(n) for n in (0.5, 1))
     assert 0 < fine < 0.021
     assert coarse / fine > 2.5
