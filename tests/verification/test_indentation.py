@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import csv
+
 import numpy as np
 import pytest
 
@@ -11,8 +13,9 @@ from contact.errors import InputError
 from contact.library.reading import find
 from forms.elasticity import hexagonal
 from scripts.cases import CASES
+from scripts.reporting import Report
 from scripts.studies import half_space
-from scripts.studies.indentation import CURVATURE, Setting, extrapolated
+from scripts.studies.indentation import CURVATURE, Setting, extrapolated, units_and_poling
 from scripts.studies.indentation_figures import BALL, TIME, charges
 
 #: Material -> E* insulating and conducting (GPa), |Q/P| of a grounded indenter (pC/N): published
@@ -66,21 +69,19 @@ def test_pzt4(shape, potential):
         assert boxes[0].force > boxes[1].force > 1.005
 
 
-def test_poling_reversed_and_si_units():
-    given = Setting("PZT-4", "ball", 0.0, 4.0)
-    (one, two, si) = (
-        solve(setting.case(20.0))
-        for setting in (
-            given,
-            Setting("PZT-4", "ball", 0.0, 4.0, poling=90.0),
-            Setting("PZT-4", "ball", 0.0, 4.0, units="SI"),
-        )
-    )
-    assert np.allclose(two.pressure, one.pressure, rtol=0, atol=1e-6 * one.pressure.max())
-    phi, other = (s.potential.x.array for s in (one, two))
-    assert np.abs(phi + other).max() < 1e-6 * np.abs(phi).max()
-    assert np.allclose(si.pressure, 1e9 * one.pressure, rtol=0, atol=1e3 * one.pressure.max())
-    assert si.converged and one.converged and two.converged
+def test_poling_reversed_and_si_units(tmp_path):
+    """Pressure is the same, potential and charge turn with the poling."""
+    units_and_poling(Report(tmp_path), 4.0)
+    with (tmp_path / "units-and-poling.csv").open() as stream:
+        found = list(csv.DictReader(stream))
+    assert len(found) == 6
+    for row in found:
+        first = next(other for other in found if other["indenter"] == row["indenter"])
+        for name in ("P", "Q or phi"):
+            assert float(row[name]) == pytest.approx(float(first[name]), rel=1e-9)
+            assert float(row[name]) > 0.01
+        assert float(row["largest difference of p"]) < 1e-9
+        assert float(row["of phi"]) < 1e-8
 
 
 def test_hertz_ball_with_few_unknowns():

@@ -1,10 +1,13 @@
 """The same ball as a body of revolution and as a quarter in space."""
 
+import csv
+
 import numpy as np
 import pytest
 
 pytest.importorskip("gmsh")
 from contact import solve
+from scripts.studies import indentation_in_space
 from scripts.studies.indentation_in_space import ball, measured
 
 
@@ -31,3 +34,19 @@ def test_a_piezoelectric_quarter_in_space_tends_to_the_body_of_revolution(conduc
         assert np.all(errors[-1] < 0.02)
         order = -np.polyfit(np.log(sizes), np.log(errors), 1)[0]
         assert np.all(order > 1.6), (space, errors)
+
+
+def test_the_tables(tmp_path):
+    indentation_in_space.main(["--coarse", "--out", str(tmp_path)])
+    with (tmp_path / "in-space.csv").open() as stream:
+        rows = list(csv.DictReader(stream))
+    assert [row["mesh"] for row in rows] == 3 * ["half plane"] + 3 * ["space"]
+    orders = [float(row[name]) for row in rows[2::3] for name in list(row)[2:]]
+    assert min(orders) > 1.4
+    with (tmp_path / "tilted-punch.csv").open() as stream:
+        rows = list(csv.DictReader(stream))
+    coarse, fine, far = (float(row["theta"]) for row in rows)
+    assert coarse < fine < 1
+    assert far == pytest.approx(fine, abs=0.005)
+    # Linear bodies are solved once, also under force and moment.
+    assert all(row["solves"] == row["solves, lu"] == "1" for row in rows)
