@@ -134,6 +134,13 @@ class Interface:
         if self.held is not None:
             self.held.add_force(residual, x)
 
+    def add_current(self, residual: Array, x: Array, change: Array, forces: Multipliers) -> None:
+        """Add what a change of local unknowns does to the current, psi frozen, to owned values."""
+        jump, nodal = self.jump, self.jump.apply(x)
+        block = self.response.current_block(nodal, self.pressure(nodal, forces))
+        answer = np.einsum("nij,nj->ni", block, jump.apply(change))
+        jump.transpose(jump.weight[:, None] * answer, residual)
+
     @property
     def change(self) -> Change | None:
         """The change of unknowns that makes the jumps unknowns; None where they are."""

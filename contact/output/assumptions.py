@@ -233,8 +233,9 @@ def rounding(solution: Solution) -> Remark:
         return "", True
     return (
         f"rounding decides how well the forces balance: {granted:.1e} of them is no more than what "
-        f"that of the displacements makes of the stresses, and does not count, though the "
-        f"tolerance is {asked:g}; a mesh with fewer cells along a slender body has less of it",
+        f"that of displacements and potentials makes of stresses and currents, and does not count, "
+        f"though the tolerance is {asked:g}; a mesh with fewer cells along a slender body, or less "
+        "of electric.k_e, has less of it",
         False,
     )
 

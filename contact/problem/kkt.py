@@ -103,15 +103,18 @@ def _rounding(problem: Problem, state: State, internal: Array) -> Array:
     """Return what rounding may leave of the forces, and of the charges. Collective.
 
     Unknowns are known to `EPS` of their size. The stresses around a node of a slender body, or of
-    one that is moved far, cancel but for far smaller forces, and what they owe to the rounding of
-    each unknown remains: seen by moving all of them, up and down at random. No backward stable
-    method leaves less (Rigal and Gaches, J. ACM 14 (1967) 543).
+    one that is moved far, cancel but for far smaller forces, and so do potentials on both sides of
+    a contact that conducts far better than the bodies. What they owe to the rounding of each
+    unknown remains: seen by moving all of them, up and down at random. No backward stable method
+    leaves less (Rigal and Gaches, J. ACM 14 (1967) 543).
     """
     body, own = problem.equilibrium, problem.equilibrium.owned_part(state.x)
     # All ranks hold the global unknowns behind those of the nodes.
     step = np.full(own.size, SHAKE)
     step[: body.owned] = _shakes(body.owned)
-    change = body.internal_forces(body.moved(state.x, step * own)) - internal
+    moved = body.moved(state.x, step * own)
+    change = body.internal_forces(moved) - internal
+    problem.interface.add_current(change, state.x, moved - state.x, state.forces)
     return MARGIN * EPS / SHAKE * body.sizes(body.unbalanced(change))
 
 

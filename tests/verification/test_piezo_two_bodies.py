@@ -13,6 +13,7 @@ from contact.methods.options import FixedPointOptions, NewtonOptions
 from contact.output.balances import charge_balance
 from contact.output.motions import movements
 from contact.problem.contact import Contact
+from contact.problem.kkt import evaluate
 from contact.problem.problem import ContactProblem
 from forms.hencky import Linear
 from forms.laws import PerfectConductivity, ShiftedConductivity, Truncation
@@ -24,13 +25,15 @@ SELF = MPI.COMM_SELF
 VOLTS, CONDUCTANCE, UPPER, LOWER = 3.0, 2.0, 0.5, 4.0
 
 
-def columns(electrode: float | None = None) -> ContactProblem:
+def columns(electrode: float | None = None, conductance: float = CONDUCTANCE) -> ContactProblem:
     """Return two blocks of height and width 1 without coupling, pressed onto each other.
 
     Parameters
     ----------
     electrode
         Charge of the upper electrode; None where that is held at `VOLTS`.
+    conductance
+        Of what is between them.
     """
     still = [constant(0.0, 2), constant(0.0, 2)]
     down = [constant(0.0, 2), constant(-0.01, 2)]
@@ -46,8 +49,8 @@ def columns(electrode: float | None = None) -> ContactProblem:
             body.law, fixed, (), body.piezo, body.regions, (), (Electrode("top", electrode),)
         )
     # Without a fixed potential what touches has to conduct before it is pressed.
-    law = PerfectConductivity(CONDUCTANCE)
-    conducts = law if electrode is None else ShiftedConductivity(CONDUCTANCE, 1e3)
+    law = PerfectConductivity(conductance)
+    conducts = law if electrode is None else ShiftedConductivity(conductance, 1e3)
     conductor = Conductor(conducts, 0.0, Truncation(np.inf))
     contact = Contact("under", flat(), conductor=conductor, against="over")
     return ContactProblem(Blocks(jitter=0.1).domain(SELF), body, contact)
@@ -90,3 +93,15 @@ def test_an_electrode_of_given_charge_on_a_column_in_series(condense):
     assert abs(potential) == pytest.approx(0.25 * resistance, rel=1e-10)
     assert charges.electrodes["top"] == pytest.approx(0.25, rel=1e-10)
     assert charges.electrodes["bottom"] == pytest.approx(-0.25, rel=1e-10)
+
+
+@pytest.mark.parametrize("method", [Newton, FixedPoint])
+@pytest.mark.parametrize("conductance", [1e-9, 1e3, 1e9, 1e12])
+def test_what_hardly_conducts_and_what_bonds_the_bodies(conductance, method):
+    """What potentials owe to rounding, times the conductance, is no charge out of balance."""
+    problem = columns(conductance=conductance)
+    made = NewtonOptions() if method is Newton else FixedPointOptions()
+    state, charges = solved(problem, method(problem, made))
+    current = VOLTS / (1 / UPPER + 1 / conductance + 1 / LOWER)
+    assert abs(charges.electrodes["top"]) == pytest.approx(current, rel=1e-7)
+    assert evaluate(problem, state).rounding < 1e-5
