@@ -13,6 +13,9 @@ from contact.linear.layout import Layout
 #: (seen in `make bench`).
 LARGE = {(2, False): 2_500_000, (2, True): 2_500_000, (3, False): 10_000, (3, True): 60_000}
 
+#: Unknowns up to which a direct solver is thought of in space: it then takes some gigabytes.
+DIRECT = 150_000
+
 #: A node in contact couples its components through the large gamma of the constraint: the smoother
 #: has to invert the nodal blocks. SOR does so too, but takes longer.
 SMOOTHER = (
@@ -48,6 +51,16 @@ DEFAULTS = {
 def is_large(layout: Layout) -> bool:
     """Tell whether an iterative solver pays for a system of this size."""
     return layout.unknowns >= LARGE[layout.dim, layout.coupled]
+
+
+def is_chosen(kind: str, layout: Layout) -> bool:
+    """Tell whether to solve by iterations; `kind` as of `operator.SparseOperator`.
+
+    A factorisation is worth hundreds of solves by multigrid, but costs more than a few of them.
+    """
+    if kind == "many":
+        return is_large(layout) and layout.unknowns > DIRECT
+    return kind == "iterative" or (kind == "auto" and is_large(layout))
 
 
 def configure(ksp: PETSc.KSP, symmetric: bool) -> None:

@@ -96,7 +96,8 @@ class SparseOperator:
     counters
         Where factorisations and solves are counted.
     kind
-        "lu", "iterative", or "auto": iterative for large problems.
+        "lu", "iterative", or "auto": iterative for large problems. "many": where hundreds of
+        solves with one matrix are to come, iterative for those alone that are too large for LU.
     """
 
     def __init__(
@@ -120,7 +121,7 @@ class SparseOperator:
         self._rhs, self._solution = self.matrix.createVecs()
         self.ksp = PETSc.KSP().create(self.layout.comm)
         self.ksp.setOptionsPrefix(prefix)
-        self.iterative = kind == "iterative" or (kind == "auto" and multigrid.is_large(self.layout))
+        self.iterative = multigrid.is_chosen(kind, self.layout)
         self._split: BlockPreconditioner | None = None
         self._hierarchy: Hierarchy | None = None
         self._prefix = prefix

@@ -122,7 +122,7 @@ class FixedPoint:
             self.problem.interface.change,
             symmetric=symmetric,
             counters=self.counters,
-            kind=self.options.linear,
+            kind="many" if self.options.linear == "auto" else self.options.linear,
         )
 
     def solve(self, start: State | None = None) -> tuple[State, Outcome]:

@@ -33,7 +33,8 @@ class Options:
     max_outer
         Most outer iterations; of `newton`, most steps in all its stages together.
     linear
-        Linear solver: `auto` chooses by size.
+        Linear solver: `auto` chooses by size, and for `uzawa`, which solves with one matrix
+        hundreds of times, `lu` as long as there is memory for it.
     """
 
     method: str

@@ -9,9 +9,6 @@ from contact.linear.operator import Counters
 from contact.problem.condensed import LARGEST, PREFIX, Condensation
 from contact.problem.problem import ContactProblem
 
-#: Unknowns up to which a direct solver is thought of in space: it then takes some gigabytes.
-DIRECT = 150_000
-
 #: Unknowns up to which dense steps take no time to speak of.
 ALWAYS = 1000
 
@@ -48,7 +45,7 @@ def condensation(problem: ContactProblem, counters: Counters, kind: str) -> Cond
     names = ("ksp_type", "pc_type", "pc_factor_mat_solver_type")
     chosen = any(options.hasName(name) for name in names)
     layout = problem.equilibrium.layout
-    large = kind == "auto" and layout.dim == 3 and layout.unknowns > DIRECT
+    large = kind == "auto" and layout.dim == 3 and layout.unknowns > multigrid.DIRECT
     many = problem.nodes.size * layout.block_size > LARGEST
     if chosen or kind == "iterative" or large or many:
         return None

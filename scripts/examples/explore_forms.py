@@ -119,6 +119,7 @@ axes.semilogy(frozen, "o", ms=3, label="secant")
 axes.semilogy(plastic, "s", ms=3, label="tangent")
 axes.set(xlabel="mode", ylabel="eigenvalue")
 axes.legend()
+plt.show()
 
 # %% [markdown]
 # ## Piezoelectric bodies
@@ -166,6 +167,7 @@ for law, label in ((linear, "linear"), (hencky, "norm"), (square_law, "square"))
 left.set(xlabel="|dev eps|", ylabel="g")
 right.set(xlabel="|dev eps|", ylabel="|dev sigma|")
 right.legend()
+plt.show()
 
 # %% [markdown]
 # Friction coefficient (7.16), conductivities (1.34), and the compliant layer of section 8.1.2.

@@ -3,7 +3,7 @@
 Solutions (A J1, B J0, C J0) exp(-lambda k z) of the equations, z into the body, give the transforms
 of depth and potential under a normal load without shear, [u_z, phi] = M [p, D_z]/k. All that
 follows is that of isotropic elasticity with other constants: Giannakopoulos and Suresh, Acta
-Mater. 47 (1999) 2153; Karapetian, Kachanov and Kalinin, Phil. Mag. 85 (2005) 1017.
+Mater. 47 (1999) 2153; Karapetian, Kachanov and Kalinin, Phil. Mag., 2005.
 """
 
 from __future__ import annotations

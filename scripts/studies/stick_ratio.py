@@ -1,7 +1,7 @@
 """How much of a growing contact sticks: a cylinder on a rigid plane, a rigid ball on a half space.
 
 The contact grows as the load does, and friction fixes each part of it where it first touches.
-Spence (J. Elasticity 5 (1975) 297) showed that the stick zone then has a fixed share k = c/a of the
+Spence (J. Elasticity, 1975) showed that the stick zone then has a fixed share k = c/a of the
 contact, whatever the load. Where the shear's effect on the pressure is left out, with
 gamma = (1 - 2 nu)/(2 (1 - nu)), K'(k)/K(k) = gamma/mu of the cylinder, and of the ball
 ln((1 + k)/(1 - k))/(2 k) = (mu/gamma) K'(k). A static law knows one step only, and finds far less.

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import gc
 import weakref
+from types import SimpleNamespace
+from typing import cast
 
 import numpy as np
 import pytest
@@ -11,7 +13,9 @@ from mpi4py import MPI
 from petsc4py import PETSc
 
 from contact.errors import InputError
+from contact.linear import multigrid
 from contact.linear.hierarchy import PRICE
+from contact.linear.layout import Layout
 from contact.linear.operator import Counters, SparseOperator
 from contact.methods.newton import Newton
 from contact.methods.options import NewtonOptions
@@ -222,3 +226,14 @@ def test_a_failed_factorisation_solves_for_nothing(monkeypatch: pytest.MonkeyPat
     operator.update("secant", problem.equilibrium.rest(), sticking(problem))
     with pytest.raises(InputError, match="out of memory in the factorisation"):
         operator.solve_all(np.ones((problem.equilibrium.owned, 2)))
+
+
+@pytest.mark.parametrize(
+    ("unknowns", "iterative"),
+    [(5_000, ()), (19_000, ("auto",)), (149_000, ("auto",)), (1_000_000, ("auto", "many"))],
+)
+def test_many_solves_ask_for_a_factorisation(unknowns: int, iterative: tuple[str, ...]) -> None:
+    layout = SimpleNamespace(dim=3, coupled=False, unknowns=unknowns)
+    for kind in ("auto", "many", "lu", "iterative"):
+        expected = kind == "iterative" or kind in iterative
+        assert multigrid.is_chosen(kind, cast(Layout, layout)) == expected

@@ -6,7 +6,7 @@ mu(slip) R p. Haslinger's iteration repeats that, accelerated by Anderson's meth
 References
 ----------
 Haslinger, Approximation of the Signorini problem with friction, obeying the Coulomb law, Math.
-Methods Appl. Sci. 5 (1983); Walker and Ni, Anderson acceleration for fixed-point iterations,
+Methods Appl. Sci. (1983); Walker and Ni, Anderson acceleration for fixed-point iterations,
 SIAM J. Numer. Anal. 49 (2011).
 """
 
