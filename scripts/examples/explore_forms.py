@@ -118,8 +118,7 @@ figure, axes = plt.subplots()
 axes.semilogy(frozen, "o", ms=3, label="secant")
 axes.semilogy(plastic, "s", ms=3, label="tangent")
 axes.set(xlabel="mode", ylabel="eigenvalue")
-axes.legend()
-plt.show()
+_ = axes.legend()
 
 # %% [markdown]
 # ## Piezoelectric bodies
@@ -166,8 +165,7 @@ for law, label in ((linear, "linear"), (hencky, "norm"), (square_law, "square"))
     print(label, check_monotonicity(law, 0.6))
 left.set(xlabel="|dev eps|", ylabel="g")
 right.set(xlabel="|dev eps|", ylabel="|dev sigma|")
-right.legend()
-plt.show()
+_ = right.legend()
 
 # %% [markdown]
 # Friction coefficient (7.16), conductivities (1.34), and the compliant layer of section 8.1.2.
