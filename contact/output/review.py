@@ -8,6 +8,7 @@ from contact.output import assumptions, bodies, uniqueness
 from contact.output.deformation import deformation
 from contact.output.fields import DerivedFields
 from contact.output.looseness import looseness
+from contact.output.penalties import giving_way
 from contact.output.solution import Solution
 
 logger = logging.getLogger("contact.solve")
@@ -53,6 +54,7 @@ def review(solution: Solution) -> None:
         bodies.passing(solution.problem),
         bodies.regions(solution),
         looseness(solution),
+        giving_way(solution),
     ):
         if text:
             (solution.notes if good else solution.warnings).append(text)

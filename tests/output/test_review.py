@@ -5,6 +5,7 @@ import pytest
 
 from contact import Solution, UserLaw, load_case, solve
 from contact.case.file import parse_case
+from contact.output.summary import largest_displacement
 from forms.ops import exp
 from scripts.cases import CASES
 from tests.problems.rigid import indented
@@ -166,3 +167,23 @@ def test_a_gap_that_was_forgotten() -> None:
     plane = {"shape": "plane", "point": [0.0, 0.0], "normal": [0.0, 1.0]}
     for other in (block(2), block(2, contact={"on": "contact", "foundation": plane}, **disc)):
         assert not any("curved and its gap" in text for text in solve(other).warnings)
+
+
+@pytest.mark.parallel
+@pytest.mark.parametrize(("height", "warned"), [(0.04, True), (1.0, False)])
+def test_penalties_that_move_a_body_more_than_its_loads_are_warned_of(
+    height: float, warned: bool
+) -> None:
+    """A flat block, stuck to its foundation, is stiffer than its slip length takes it for."""
+    flat = {
+        "mesh": {"generator": "rectangle", "size": [4.0, height], "cells": [20, 4]},
+        "fixed": [{"on": "left", "displacement": [0.0, 0.0]}],
+        "load": [{"on": "top", "traction": [0.002, -0.01]}],
+        "friction": {"law": "coulomb", "mu": 0.5},
+    }
+    exact = solve(block(2, **flat, solver={"method": "newton"}))
+    penalised = solve(block(2, **flat, solver={"method": "penalty"}))
+    assert penalised.converged
+    assert (largest_displacement(penalised) > 2 * largest_displacement(exact)) == warned
+    assert any(w.startswith("the penalties give way") for w in penalised.warnings) == warned
+    assert not any("give way" in w for w in exact.warnings)

@@ -1,0 +1,46 @@
+"""Whether what penalties give way by is small beside what a body does."""
+
+from __future__ import annotations
+
+import numpy as np
+from mpi4py import MPI
+
+from contact.output.assumptions import Remark
+from contact.output.solution import Solution
+from contact.output.summary import largest_displacement
+from contact.tolerances import LAWS_HOLD
+
+#: Share of its bound below which friction lets nothing slip: the penalised one nears it slowly.
+BELOW = 0.9
+
+
+def giving_way(solution: Solution) -> Remark:
+    """Say where penalties move contact nodes by much of the largest displacement. Collective.
+
+    The residuals weigh penetrations and slips by c = E/length. A flat body is stiffer by far: its
+    displacements are those of the penalties where these are as small as the residuals ask for.
+    Later steps are not looked at: what has slipped before stays.
+    """
+    problem = solution.problem
+    if solution.method != "penalty" or problem.since is not None:
+        return "", True
+    size = np.linalg.norm(solution.friction, axis=1)
+    held = size < BELOW * solution.friction_bound
+    slip = np.linalg.norm(solution.slip[held], axis=1)
+    depth = (solution.normal_displacement - problem.nodes.gap)[solution.pressure > 0]
+    if problem.interface.response.layer is not None:
+        depth = depth[:0]  # it gives way by itself
+    deep, far = (
+        problem.comm.allreduce(float(values.max(initial=0.0)), op=MPI.MAX)
+        for values in (depth, slip)
+    )
+    largest = largest_displacement(solution)
+    if max(deep, far) <= LAWS_HOLD * largest:
+        return "", True
+    what, key = ("penetrate", "eps_contact") if deep > far else ("slip", "eps_slip")
+    return (
+        f"the penalties give way: nodes that should not {what} by as much as {max(deep, far):.2g}, "
+        f"where displacements reach {largest:.2g}; a smaller solver.{key}, or another method, is "
+        "needed for these",
+        False,
+    )
