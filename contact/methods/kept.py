@@ -21,6 +21,7 @@ import numpy as np
 
 from contact.interface.multipliers import Multipliers
 from contact.methods.acceleration import least_squares
+from contact.methods.lengthening import FAR
 from contact.methods.step import Iterate
 from contact.problem.state import State
 from contact.typing import Array
@@ -96,7 +97,7 @@ class Kept:
             self._slow += self._keeps and rate > FAST
             # What other loads have taken tells what the next ones will.
             tired = self._first and self._slow > self._worth / 2
-            keep = bool(left <= self._worth) and not tired
+            keep = bool(left <= self._worth and reached <= FAR) and not tired
         self._first = before is None
         if not keep:
             self._changes.clear()

@@ -100,7 +100,8 @@ class NewtonLoop:
             if not linear:
                 falls = residuals.equilibrium < max(before.equilibrium, options.tolerance)
                 near = residuals.equilibrium < self.secant_until
-                tangent = near and (falls or not tangent)
+                # The energy falls along a step that is lengthened, where residuals may rise.
+                tangent = taken.lengthened or (near and (falls or not tangent))
             if stagnation(measured):
                 words_of_end = f"Newton's method stalled at {stagnation.best:.1e}"
                 return iterate, self._end(residuals, words_of_end)

@@ -15,12 +15,14 @@ from contact.interface.linearised import Moduli
 from contact.linear.operator import Counters
 from contact.methods.following import Following
 from contact.methods.kept import WORTH, Kept
+from contact.methods.lengthening import FAR, lengthened
 from contact.methods.options import NewtonOptions
 from contact.methods.report import History, Outcome
 from contact.methods.step import NEAR, Iterate, Taken
 from contact.problem.condensed import Condensation, CondensedProblem
-from contact.problem.kkt import KKT
+from contact.problem.kkt import KKT, residual_forces
 from contact.problem.problem import ContactProblem
+from contact.problem.state import State
 from contact.typing import Array
 
 #: How much more accurately than the material is linearised the contact problem is solved.
@@ -120,9 +122,26 @@ class MaterialStep:
             return None
         increment = self.condensation.expand(condensed, end.state.x)
         new = replace(state, x=body.moved(state.x, increment), forces=end.state.forces)
-        if not body.linear:
+        far = reached.largest > FAR and not keep
+        length = self._length(new, state, increment) if far else 1.0
+        if length > 1:
+            new = replace(new, x=body.moved(state.x, length * increment))
+            self._kept.forget()
+        elif not body.linear:
             new = self._kept.mixed(state, new)
         notes = [record.note for record in history.records]
         slower = [word for word in self._slower if any(word in note for note in notes)]
-        note = ", ".join([*["kept"] * int(keep), *slower])
-        return Taken(replace(end, state=new), note, solves)
+        note = ", ".join([*["kept"] * keep, *["lengthened"] * (length > 1), *slower])
+        return Taken(replace(end, state=new), note, solves, length > 1)
+
+    def _length(self, new: State, state: State, increment: Array) -> float:
+        """Return how far to go along a step that leads from one state to another. Collective."""
+        problem, body = self.condensation.full, self.condensation.full.equilibrium
+        if body.linear or body.block_size > body.dim:  # a potential's energy is no minimum
+            return 1.0
+
+        def slope(length: float) -> float:
+            at = replace(new, x=body.moved(state.x, length * increment))
+            return body.product(increment, residual_forces(problem, at))
+
+        return lengthened(slope)

@@ -76,11 +76,14 @@ class Taken:
         What was special about it.
     solves
         Dense solves at the contact nodes that it took.
+    lengthened
+        Whether it has gone on to where the energy is least along it.
     """
 
     iterate: Iterate
     note: str = ""
     solves: int = 0
+    lengthened: bool = False
 
 
 class Step(Protocol):

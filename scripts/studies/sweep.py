@@ -229,8 +229,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
             settings = with_method(case.solver, method)
             solution = solve_problem(problem, settings)
             notes = {r.note for r in solution.history.records}
-            for word in ("tangent", "taken back"):  # steps of the method itself
-                notes = {note.replace(word, "").strip() for note in notes}
+            for word in ("kept", "lengthened", "tangent", "taken back"):  # of the method itself
+                notes = {note.replace(word, "").strip(" ,") for note in notes}
             fallback = ", ".join(sorted(notes - {""}))
             row = (
                 case.source,
