@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -51,13 +51,24 @@ def _levels(case: Case, problem: ContactProblem) -> int | None:
     return 2 if one else newton.nested_levels
 
 
+def _linear(case: Case, problem: ContactProblem) -> Literal["auto", "lu", "iterative"]:
+    """Return how the systems of the coarser meshes are solved: by multigrid where the finest are.
+
+    In space that takes a quarter of the time of a factorisation from 2,000 unknowns on. Where it
+    fails a start is lost, and no solution.
+    """
+    layout, linear = problem.equilibrium.layout, case.solver.linear
+    quick = layout.dim == 3 and not layout.coupled and multigrid.is_large(layout)
+    return "iterative" if linear == "auto" and quick else linear
+
+
 def nested_start(case: Case, problem: ContactProblem, **replacements: Any) -> State:
     """Solve on all coarser meshes, each from the one before, and carry that to a problem's.
 
     Collective.
     """
     options = NewtonOptions(
-        tolerance=max(COARSE_TOLERANCE, case.solver.tolerance), linear=case.solver.linear
+        tolerance=max(COARSE_TOLERANCE, case.solver.tolerance), linear=_linear(case, problem)
     )
     last: tuple[ContactProblem, State] | None = None
     for level in coarser_cases(case, _levels(case, problem)):
