@@ -63,11 +63,11 @@ def at_time(field: Any, time: Any) -> Any:
     return field.at(time) if isinstance(field, Moving) else field
 
 
-def own_amplitude(what: str, given: Any) -> OfTime | None:
+def own_amplitude(what: str, given: Any) -> Amplitude | None:
     """Return a given function of time so that it says whose amplitude it is where it fails."""
     fits = given is None or callable(given)
     expect(f"{what}: amplitude", given, "a function of time, such as lambda t: 2 * t", fits)
-    return given if given is None else OfTime(given, f"{what}: amplitude")
+    return given if given in (None, steady) else OfTime(given, f"{what}: amplitude")
 
 
 def amplitude_of(given: Amplitude | None, fields: list[Any]) -> Amplitude:

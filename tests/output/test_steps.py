@@ -160,6 +160,14 @@ def test_figures(tmp_path):
     np.testing.assert_allclose(line.get_xdata(), way)
 
 
+def test_what_is_driven_is_what_moves_not_what_is_held_before_it():
+    """The load is no way either; the amplitude ends at a fifth."""
+    held = {"on": "left", "displacement": [0.0, 0.0]}
+    moved = {"on": "right", "displacement": ["free", -1e-4], "amplitude": "press"}
+    last = solve(case_of(fixed=[held, moved]), comm=SELF).steps[-1].row
+    assert last["driven_y"] == pytest.approx(-2e-5)
+
+
 def test_the_summary_has_the_most_that_rounding_was_granted(tmp_path):
     """A slender beam that is let go at the end: the last step has nothing to be rounded."""
     press = {"time": [0.0, 1.0, 2.0], "value": [0.0, 1.0, 0.0]}
