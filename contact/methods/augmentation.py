@@ -36,7 +36,12 @@ def split(interface: Interface, nodal: Array, friction: bool) -> Array:
 
     Without friction the slips are no unknowns of the relaxation, and 0 here.
     """
-    slip = interface.slip(nodal)
-    if not friction:
-        slip = np.zeros_like(slip)
-    return np.column_stack([interface.jump.normal_component(nodal), slip])
+    parts = components(interface.jump, nodal, friction)
+    parts[:, 1:] -= friction * interface.friction.history.jump
+    return parts
+
+
+def components(jump: Jump, nodal: Array, friction: bool) -> Array:
+    """Return normal and tangential displacements side by side, shape (n, 1 + d); as `split`."""
+    tangential = friction * jump.tangential_component(nodal)
+    return np.column_stack([jump.normal_component(nodal), tangential])

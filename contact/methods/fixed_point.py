@@ -28,11 +28,13 @@ from contact.methods import uzawa
 from contact.methods.augmentation import augmentation, automatic_r, split
 from contact.methods.best import Best
 from contact.methods.following import Following
+from contact.methods.frozen import linearised
 from contact.methods.options import FixedPointOptions
 from contact.methods.report import History, Monitor, Outcome, Record
+from contact.methods.resting import resting
 from contact.methods.softness import Softer, softer, spectrum
 from contact.methods.stagnation import Stagnation
-from contact.problem.kkt import KKT, evaluate, residual_forces
+from contact.problem.kkt import KKT, evaluate
 from contact.problem.protocols import Problem
 from contact.problem.state import State
 from contact.tolerances import PRECISION
@@ -138,19 +140,23 @@ class FixedPoint:
         jump, frictional = interface.jump, interface.friction.acts
         if start is None:
             self.state = problem.start()
-            z: Array = np.zeros((jump.gap.size, 1 + jump.normal.shape[1]))
             # Iteration 0 is the pure contact problem that the thesis starts from. A bound that is
             # updated in the block relaxation needs none.
             first = 0 if frictional and not self.options.single_loop else 1
             # The secant at rest: prescribed values strain the elements beside them alone.
-            return self._solve(z, np.zeros(jump.gap.size), first, problem.equilibrium.rest())
+            z, bound = self._about(0.0, frictional and first > 0), np.zeros(jump.gap.size)
+            return self._solve(z, bound, first, problem.equilibrium.rest())
         self.state, nodal = start, jump.apply(start.x)
         pressure = start.forces.pressure
         if interface.response.normal_law(nodal) is not None:
             pressure = interface.pressure(nodal, start.forces)
         z = np.column_stack([pressure, start.forces.friction])
-        z = z + self.r * split(interface, nodal, frictional)
         return self._solve(z, interface.bound(nodal, start.forces), 1, start.x)
+
+    def _about(self, z: Array | float, friction: bool) -> Array:
+        """Return a state of the relaxation lambda + r u as it is about the iterate: less r u_0."""
+        nodal = self.problem.interface.jump.apply(self.state.x)
+        return z - self.r * split(self.problem.interface, nodal, friction)
 
     def _solve(self, z: Array, bound: Array, first: int, secant_at: Array) -> tuple[State, Outcome]:
         """Iterate from a state of the relaxation, a friction bound and a secant modulus."""
@@ -163,11 +169,11 @@ class FixedPoint:
             friction = frictional and iteration > 0
             if friction and first == 0 and iteration == 1:
                 # The slip without friction is a bad guess, and so is the contact that goes with it.
-                z = np.zeros_like(z)
+                z = self._about(0.0, friction)
             if self._far and (start := self._soften(friction)) is not None:
                 # What was found with an r that does not fit is worse than nothing.
                 self.state, secant_at = problem.start(), body.rest()
-                z, bound = start, np.zeros_like(bound)
+                z, bound = self._about(start, friction), np.zeros_like(bound)
                 stagnation, best = Stagnation(PATIENCE, PROGRESS), Best()
             previous = self.state
             # Newton's tangent of a zero strain is the secant, and cheaper.
@@ -201,6 +207,8 @@ class FixedPoint:
         else:
             ended = f"not converged in {options.max_outer} outer iterations"
         if best.found is not None and options.stopping == "residual":
+            if rest := resting(problem):
+                best.found, ended = rest, ""
             self.state, residuals = best.found
         return self._end(residuals, ended)
 
@@ -227,15 +235,7 @@ class FixedPoint:
             blocks = blocks + self._current_block(nodal, pressure)
         about = secant_at if kind == "secant" else state.x
         self.operator.update(kind, about, interface.weighted(blocks, state.x), constant=body.linear)
-        step = uzawa.Linearised(
-            self.operator,
-            self._base_residual(nodal, secant_at),
-            body.owned_part(state.x),
-            nodal,
-            bound,
-            interface.response.normal_law(nodal),
-            friction,
-        )
+        step = linearised(problem, state, self.operator, bound, friction, secant_at)
         poll = self.poll or self.history.poll
         result = uzawa.block_relaxation(interface, step, z, self._relaxation, self._norm, poll)
         self._stalled = result.stalled and not self._following.followed  # freezing is left then
@@ -255,20 +255,6 @@ class FixedPoint:
         if self.operator.symmetric:
             self.operator = self._new_operator(symmetric=False)
         return response.current_jacobian(nodal, pressure)
-
-    def _base_residual(self, nodal: Array, secant_at: Array) -> Array:
-        """Return the residual without multipliers: they are the unknowns of the relaxation.
-
-        So is the layer's pressure, unless it is lagged. The contact flag of the perfect
-        conductor still looks at the last pressure.
-        """
-        interface, jump = self.problem.interface, self.problem.interface.jump
-        residual = residual_forces(self.problem, self.state, secant_at)
-        unknown = self.state.forces.vectors(jump)
-        if interface.response.normal_law(nodal) is not None:
-            unknown += interface.response.layer_pressure(nodal)[:, None] * jump.normal
-        jump.transpose(-jump.weight[:, None] * unknown, residual)
-        return residual
 
     def _update_bound(self, old: Array, start: bool) -> tuple[float, Array]:
         """Return the relative change (3.46) and the new friction bound.

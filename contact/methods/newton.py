@@ -33,6 +33,7 @@ from contact.methods.material import SECANT_UNTIL, MaterialStep
 from contact.methods.options import NewtonOptions
 from contact.methods.relaxed import BLOCK_RELAXATION, block_relaxation
 from contact.methods.report import History, Monitor, Outcome
+from contact.methods.resting import resting
 from contact.methods.search import Search
 from contact.methods.step import Iterate, WholeStep
 from contact.methods.sure import INTERIOR_POINT, solve_convex
@@ -188,12 +189,13 @@ class Newton:
             # From rest: where Newton's method has failed, the body may have flown away.
             start = Iterate(self.problem.start())
             iterate, outcome = self._at_contact(surer, start)
+        if not outcome.converged:
+            iterate, outcome = self._resting() or (iterate, outcome)
         if not outcome.converged and isinstance(self.problem, CondensedProblem):
             iterate, outcome = self._convex(self.problem, iterate, outcome)
         elif not outcome.converged and search.left > 0:
             logger.info("%s; going on with an interior point", outcome.ended)
-            found = self._resting()
-            iterate, outcome = found or interior_point(search, self.whole, self._finished)
+            iterate, outcome = interior_point(search, self.whole, self._finished)
         if not outcome.converged and self.problem.interface.friction.acts and search.left > 0:
             iterate, outcome = frozen_friction(loop, iterate)
         if not outcome.converged and search.left > 0 and self.options.load_steps:
@@ -217,18 +219,14 @@ class Newton:
         return bool(foreseen > SOFT * loads > 0)
 
     def _resting(self) -> tuple[Iterate, Outcome] | None:
-        """Return the body at rest where nothing is left that acts on it. Collective.
-
-        Beside forces that vanish no residual is small, and only those that are 0 have none.
-        """
-        iterate = Iterate(self.problem.start())
-        residuals = evaluate(self.problem, iterate.state)
-        outcome = Outcome(residuals, self.options.allowed, "nothing acts")
-        if not outcome.converged:
+        """Return the body at rest where nothing is left that acts on it. Collective."""
+        found = resting(self.problem)
+        if found is None:
             return None
+        iterate, residuals = Iterate(found[0]), found[1]
         self.search.see(iterate, residuals)
         self.history.record(residuals, "at rest")
-        return iterate, outcome
+        return iterate, Outcome(residuals, self.options.allowed, "nothing acts")
 
     def _at_contact(self, step: MaterialStep, iterate: Iterate) -> tuple[Iterate, Outcome]:
         """Iterate with the body condensed onto the contact nodes."""

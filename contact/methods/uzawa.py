@@ -1,9 +1,10 @@
 """Uzawa block relaxation for one linearised problem: Algorithms 2, 5, 7 and 9.
 
 One step solves for u, projects the auxiliary variables phi and updates the multipliers
-lambda, (3.34)-(3.36). Everything that it hands on is z = lambda + r u: the next multiplier is
-the projection of z, and r phi = z - lambda. The step is therefore a fixed-point map of z,
-which `acceleration` speeds up.
+lambda, (3.34)-(3.36). Everything that it hands on is lambda + r u: the next multiplier is its
+projection, and r phi what that takes away. The step is therefore a fixed-point map, which
+`acceleration` speeds up. What is held is z = lambda + r (u - u_0), with the iterate's u_0: beside
+slips of the whole load nothing would be left of a lambda that is unloaded to 1e-12 of it.
 """
 
 from __future__ import annotations
@@ -23,9 +24,9 @@ from contact.interface.nodes import ContactNodes
 from contact.interface.projections import disc_derivative, project_disc
 from contact.interface.residuals import interface_residuals
 from contact.linear.multigrid import TOLERANCE
-from contact.linear.operator import Operator
 from contact.methods.acceleration import ResidualMinimiser
-from contact.methods.augmentation import split
+from contact.methods.augmentation import components, split
+from contact.methods.frozen import Linearised
 from contact.methods.stagnation import Stagnation
 from contact.typing import Array
 from forms.foundation import contact_multiplier
@@ -76,38 +77,6 @@ class Relaxation:
     anew: bool = False
 
 
-@dataclass(frozen=True)
-class Linearised:
-    """The linearised problem about an iterate: A dx = -residual - contact forces.
-
-    Attributes
-    ----------
-    operator
-        Factorised operator, augmented by r at the contact nodes.
-    residual
-        Owned residual without multipliers at the iterate.
-    x
-        The iterate's owned unknowns.
-    nodal
-        The iterate at the contact nodes, shape (n, block size).
-    bound
-        Friction bound s_n, shape (n,).
-    law
-        The compliant layer in front of the rigid part, to be solved with the constraint; None
-        without one. The multipliers are then those of the total pressure -sigma_nu.
-    friction
-        Whether tangential forces act; the operator is augmented tangentially only then.
-    """
-
-    operator: Operator
-    residual: Array
-    x: Array
-    nodal: Array
-    bound: Array
-    law: NormalLaw | None = None
-    friction: bool = False
-
-
 @dataclass
 class RelaxationResult:
     """Outcome of a block relaxation.
@@ -119,7 +88,7 @@ class RelaxationResult:
     forces
         Multipliers in equilibrium with the iterate.
     z
-        State to start the next relaxation from, shape (n, 1 + d).
+        State to start the next relaxation from, about what this one has found, shape (n, 1 + d).
     iterations
         Number of linear solves.
     residual
@@ -140,6 +109,8 @@ class RelaxationResult:
 class _Projection:
     """Steps 2 and 3, from z of shape (n, 1 + d) to the new multipliers: (3.43) and the disc.
 
+    All that is given is about `origin`.
+
     Attributes
     ----------
     jump
@@ -148,15 +119,19 @@ class _Projection:
         Augmentation parameter.
     bound, law
         Friction bound and layer, as in `Linearised`.
+    origin
+        r u_0 of the iterate, shape (n, 1 + d).
     """
 
     jump: ContactNodes
     r: float
     bound: Array
     law: NormalLaw | None
+    origin: Array
 
     def __call__(self, z: Array) -> Array:
         """Return the new multipliers."""
+        z = z + self.origin
         if self.law is None:
             pressure = contact_multiplier(z[:, 0], self.r, 0.0, self.jump.gap)
         else:
@@ -165,6 +140,7 @@ class _Projection:
 
     def derivative(self, z: Array, directions: Array) -> Array:
         """Return their derivatives along directions of shape (n, 1 + d, k)."""
+        z = z + self.origin
         if self.law is None:
             slope = np.where(z[:, 0] > self.r * self.jump.gap, 1.0, 0.0)
         else:
@@ -213,7 +189,8 @@ class _Changes:
     def squares(self, increment: Array, image: Array) -> tuple[float, float] | None:
         """Return the squares of the change and of the size; None after the first iteration."""
         jump, norm, last = self._project.jump, self._norm, self._last
-        phi = (image - self._project(image)) * (1 / self._project.r)
+        project = self._project
+        phi = (image + project.origin - project(image)) * (1 / project.r)
         self._last = increment, phi
         if last is None:
             return None
@@ -243,7 +220,7 @@ def block_relaxation(
     step
         The linearised problem; its operator holds `augmentation(jump, r, friction)`.
     z
-        lambda + r u to start from, shape (n, 1 + d).
+        lambda + r (u - u_0) to start from, shape (n, 1 + d); u_0 is that of the iterate.
     parameters
         Of the method.
     domain_norm
@@ -252,13 +229,14 @@ def block_relaxation(
         Called before every iteration, on all ranks; what it raises ends the relaxation.
     """
     jump, r, law = interface.jump, parameters.r, step.law
-    project = _Projection(jump, r, step.bound, law)
+    origin = r * split(interface, step.nodal, step.friction)
+    project = _Projection(jump, r, step.bound, law, origin)
     accelerator = project.accelerator(parameters.depth, parameters.anew)
     changes = None if domain_norm is None else _Changes(project, step.x, domain_norm)
     rtol = max(SHARE * parameters.tolerance, LEAST)
     residual, forces = np.inf, Multipliers.zero(jump)
     increment: Array = np.zeros(step.x.size)
-    start = split(interface, step.nodal, step.friction)
+    way: Array = np.zeros_like(z)
     stagnation = Stagnation(PATIENCE_PLAIN if accelerator is None else PATIENCE, PROGRESS)
     for iteration in range(1, parameters.max_iterations + 1):
         if poll is not None:
@@ -266,23 +244,24 @@ def block_relaxation(
         multiplier = project(z)
         q = 2 * multiplier - z
         rhs = -step.residual
-        jump.transpose(-jump.weight[:, None] * _vectors(jump, q + r * start), rhs)
+        jump.transpose(-jump.weight[:, None] * _vectors(jump, q), rhs)
         increment = step.operator.solve(rhs, rtol if rtol < TOLERANCE else None, increment)
-        nodal = step.nodal + jump.apply(increment)
-        u = split(interface, nodal, step.friction)
-        # q + r u is the force that the foundation exerted in this very solve.
-        total = q + r * u
-        layer = 0.0 if law is None else law.layer(u[:, 0])
+        moved = jump.apply(increment)
+        nodal = step.nodal + moved
+        way = r * components(jump, moved, step.friction)
+        # q + r (u - u_0) is the force that the foundation exerted in this very solve.
+        total = q + way
+        layer = 0.0 if law is None else law.layer(jump.normal_component(nodal))
         forces = Multipliers(total[:, 0] - layer, total[:, 1:])
         if parameters.single_loop and step.friction:
             project.bound = interface.bound(nodal, forces)
         residual = max(interface_residuals(interface, nodal, forces, project.bound))
         logger.debug("inner iteration %d: residual %.2e", iteration, residual)
-        phi = (z - multiplier) * (1 / r)
-        image = multiplier + r * (phi + parameters.over_relaxation * (u - phi))
+        relaxed = (1 - parameters.over_relaxation) * (z - multiplier)
+        image = multiplier + relaxed + parameters.over_relaxation * way
         done = residual <= parameters.tolerance or not np.isfinite(residual)
         # Not the residual: where nothing touches yet it is small, beside the stress of closing.
-        measured = jump.norm(total - project(total + r * u))
+        measured = jump.norm(total - project(total + way))
         if parameters.thesis_tolerance is not None:
             assert changes is not None
             squares, done = changes.squares(increment, image), False
@@ -292,9 +271,9 @@ def block_relaxation(
                 measured = float(np.sqrt(change / size)) if size > 0 else 0.0
         stalled = not done and stagnation(measured)
         if done or stalled:
-            return RelaxationResult(increment, forces, image, iteration, residual, stalled)
+            return RelaxationResult(increment, forces, image - way, iteration, residual, stalled)
         z = image
         if accelerator is not None:
-            newest = (total + r * u).ravel()
+            newest = (total + way).ravel()
             z = accelerator.next(total.ravel(), newest, image.ravel()).reshape(z.shape)
-    return RelaxationResult(increment, forces, z, parameters.max_iterations, residual)
+    return RelaxationResult(increment, forces, z - way, parameters.max_iterations, residual)

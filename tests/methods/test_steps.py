@@ -8,7 +8,7 @@ from mpi4py import MPI
 
 from contact import build_problem, evolve, load_case
 from contact.body.amplitude import Tabulated
-from contact.body.description import Body, Fixed
+from contact.body.description import Body, Fixed, Load
 from contact.case.file import parse_case
 from contact.errors import InputError
 from contact.evolving import NotConvergedError
@@ -33,6 +33,7 @@ from tests.problems.stepped import SteppedBlock, to_and_fro
 
 SELF = MPI.COMM_SELF
 TIGHT = {"newton": NewtonOptions(tolerance=1e-12), "uzawa": FixedPointOptions(tolerance=1e-12)}
+AT_EASE = {"newton": NewtonOptions(tolerance=1e-8), "uzawa": FixedPointOptions(tolerance=1e-8)}
 
 #: The stress p mu is that of the shear 0.0175: with pushes of 0.00875 no step both sticks and
 #: slides.
@@ -181,6 +182,30 @@ def test_penalty_comes_near():
     exact, near = (steps_of(shaken(), times(4), told) for told in (TIGHT["newton"], options))
     for one, two in zip(exact, near, strict=True):
         assert np.abs(one.state.x - two.state.x).max() < 1e-4
+
+
+@pytest.mark.parametrize("left", [1e-8, 1e-12, 1e-16, 0.0])
+def test_what_is_unloaded_to_next_to_nothing_is_as_accurate(left):
+    """Beside slips of the whole load the relaxation lost what it looked for."""
+    amplitude = Tabulated((0.0, 1.0, 2.0), (0.0, 1.0, left))
+    loads = [
+        Load("top", [constant(0.0, 2), constant(-0.01, 2)], amplitude=amplitude),
+        Load("right", [constant(0.002, 2), constant(0.0, 2)], amplitude=amplitude),
+    ]
+    problem = ContactProblem(
+        rectangle(SELF, [0.0, 0.0], [2.0, 1.0], [8, 4]),
+        Body(Linear(1.0, 0.3), [Fixed("left", [constant(0.0, 2)] * 2)], loads),
+        Contact("bottom"),
+        Friction(mu=0.3),
+    )
+    loaded = steps_of(problem, [0.5, 1.0, 1.5])[-1].state
+    newton, uzawa = (steps_of(problem, [2.0], told, loaded) for told in AT_EASE.values())
+    assert len(newton) == len(uzawa) == 1  # none was halved
+    one, two = newton[0].state, uzawa[0].state
+    size = 0.02 * left + 1e-100
+    assert np.abs(one.x - two.x).max() < 1e-6 * size
+    assert np.abs(one.forces.friction - two.forces.friction).max() < 1e-6 * size
+    assert 0.5 * left <= np.abs(one.forces.pressure).max() / 0.01 < 100 * size
 
 
 def test_unloaded_in_one_step_or_two_is_not_the_same():
