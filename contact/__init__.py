@@ -13,15 +13,16 @@ and a problem that is put together in Python by
 >>> problem = Problem(domain, body, Contact("bottom"), Friction(mu=0.3))  # doctest: +SKIP
 >>> solution = solve(problem)  # doctest: +SKIP
 
-Geometry: `from_msh` reads a Gmsh file, `Domain.from_mesh` takes dolfinx's mesh and tags.
-Body: `Body`, `Material`, `Fixed`, `Load`; `Linear`, `Log`, `UserLaw`, `Piezo`; `Rigid` with its
-`Motion`, and `Electrode`.
-Contact: `Contact` with a gap, or a `Plane`, `Sphere`, `Cylinder`, `Cone`, `Paraboloid`, `Punch`,
-`Level`, `Triangles`, a `Shape` of your own; `Layer`; `Friction`, `SlipCoefficient`, `Coulomb`;
-`Conductor` with `ShiftedConductivity`, `RampConductivity`, `PerfectConductivity`.
-Solving: `Problem`, `solve`, `evolve`; `NewtonOptions`, `FixedPointOptions`, `PenaltyOptions`.
-Case files: `Case`, `load_case`, `parse_case`, `build_problem`.
-Results: `Solution`, `write_outputs`. Errors of the input: `InputError`; Ctrl-C: `SolveInterrupted`.
+- Geometry: `from_msh` reads a Gmsh file, `Domain.from_mesh` takes dolfinx's mesh and tags.
+- Body: `Body`, `Fixed`, `Load`; `Linear`, `Log`, `UserLaw`, `Piezo`; several by `Material`, and
+  crystals by `make_material`; `Rigid` with its `Motion`, and `Electrode`.
+- Contact: `Contact` with a gap, or a `Plane`, `Sphere`, `Cylinder`, `Cone`, `Paraboloid`, `Punch`,
+  `Level`, `Triangles`, a `Shape` of your own; `Layer`; `Friction`, `SlipCoefficient`, `Coulomb`;
+  `Conductor` with `ShiftedConductivity`, `RampConductivity`, `PerfectConductivity`.
+- Solving: `Problem`, `solve`, `evolve`; `NewtonOptions`, `FixedPointOptions`, `PenaltyOptions`.
+- Case files: `Case`, `load_case`, `parse_case`, `build_problem`.
+- Results: `Solution`, `write_outputs`. Errors of the input: `InputError`; Ctrl-C:
+  `SolveInterrupted`.
 
 Wherever a field is given - a displacement, a load, a gap, a coefficient of friction - a number, a
 function of x, UFL or a dolfinx Function will do.
@@ -40,6 +41,7 @@ if TYPE_CHECKING:
     from contact.body.description import Body, Fixed, Load, Material
     from contact.body.rigid import Electrode, Motion, Rigid
     from contact.build import build_problem
+    from contact.building.materials import make_material
     from contact.case.file import Case, load_case, parse_case
     from contact.errors import InputError
     from contact.evolving import evolve
@@ -81,6 +83,7 @@ _HOMES = {
     "contact.body.description": "Body Fixed Load Material",
     "contact.body.rigid": "Electrode Motion Rigid",
     "contact.build": "build_problem",
+    "contact.building.materials": "make_material",
     "contact.case.file": "Case load_case parse_case",
     "contact.errors": "InputError",
     "contact.evolving": "evolve",
@@ -151,6 +154,7 @@ __all__ = [
     "evolve",
     "from_msh",
     "load_case",
+    "make_material",
     "parse_case",
     "solve",
     "solve_problem",

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import replace
 
 from mpi4py import MPI
 
@@ -68,13 +67,13 @@ def build_problem(
             domain = revolved(domain)
         check_range("mesh", domain.size)
         case.check_mesh(domain.dim, domain.names)
-        body = Body.piecewise(
+        body = Body(
             make_materials(case, domain, law),
             [_fixed(case, i, domain.comm) for i in range(len(case.fixed))],
             [_load(case, i, domain.comm) for i in range(len(case.load))],
+            rigid=make_rigid(case, domain.dim),
+            electrodes=make_electrodes(case),
         )
-        rigid, electrodes = make_rigid(case, domain.dim), make_electrodes(case)
-        body = replace(body, rigid=rigid, electrodes=electrodes)
         contacts = make_contacts(case, domain, coefficient, friction, foundation, layer)
         problem = ContactProblem(domain, body, contacts, degree=case.space.degree)
         for time in (1.0,) if case.evolution is None else case.evolution.times[1:]:

@@ -73,9 +73,31 @@ def evolve(
         start = start.state
     expect("start", start, "an earlier state, or solution", isinstance(start, State | None))
     expect("evolve", problem, "a Problem", isinstance(problem, ContactProblem))
+    begin = 0.0 if start is None else start.time
+    ends = check_times(problem, times, begin)
+    settings = in_steps(settings or NewtonOptions())
+    method = METHODS[settings.method](problem, settings, monitor)
+    for step in Evolution(problem, method, start).run(ends, begin):
+        if not step.outcome.converged:
+            raise NotConvergedError(
+                f"no step to {step.problem.time:g}: {step.outcome.reason}; what was given before "
+                "remains"
+            )
+        yield step.state
+
+
+def check_times(problem: ContactProblem, times: Sequence[float], begin: float) -> list[float]:
+    """Return the ends of steps, and refuse what is none, or loads that contradict each other there.
+
+    Collective.
+
+    Raises
+    ------
+    InputError
+        As of `evolve`.
+    """
     numbers = isinstance(times, Iterable) and not isinstance(times, str)
     expect("times", times, "a list of times, the ends of the steps", numbers)
-    begin = 0.0 if start is None else start.time
     ends = [float(time) for time in times]
     if not np.all(np.isfinite(ends)) or np.any(np.diff([begin, *ends]) <= 0):
         raise InputError(
@@ -86,15 +108,7 @@ def evolve(
         check_supports(problem.at(end))
     for end in ends[-1:]:
         check_problem(problem.at(end))
-    settings = in_steps(settings or NewtonOptions())
-    method = METHODS[settings.method](problem, settings, monitor)
-    for step in Evolution(problem, method, start).run(ends, begin):
-        if not step.outcome.converged:
-            raise NotConvergedError(
-                f"no step to {step.problem.time:g}: {step.outcome.reason}; what was given before "
-                "remains"
-            )
-        yield step.state
+    return ends
 
 
 def check_options(settings: Options | None, monitor: Monitor | None) -> None:

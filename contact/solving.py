@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +14,7 @@ from contact.case.file import Case, load_case
 from contact.case.replaced import replaced_by
 from contact.case.text import anchored, to_toml
 from contact.errors import InputError
-from contact.evolving import check_options, solve_steps
+from contact.evolving import check_options, check_times, solve_steps
 from contact.kinds import expect
 from contact.methods.every import METHODS
 from contact.methods.interrupt import SIGNALLED, stop_on_signal
@@ -60,6 +60,7 @@ def solve(
     folder: Path | None = None,
     restart: Path | None = None,
     start: State | Solution | None = None,
+    times: Sequence[float] | None = None,
     **replacements: Any,
 ) -> Solution:
     """Build and solve a case, in steps if it says so. Collective.
@@ -80,6 +81,9 @@ def solve(
         A folder with checkpoints of the same case, to go on from.
     start
         An earlier solution on the same mesh to start from, or its state; from rest by default.
+    times
+        Of a problem that is built already: the ends of load steps, as of `evolve`. The solution's
+        `steps` then say what each has come to.
     replacements
         Objects that take the place of parts of the case; see `build.build_problem`.
 
@@ -92,7 +96,7 @@ def solve(
         After a SIGINT or SIGTERM, with what was reached; a second signal ends the program.
     """
     return _uninterrupted(
-        _solve(case, settings, monitor, comm, folder, restart, start, **replacements)
+        _solve(case, settings, monitor, comm, folder, restart, start, times, **replacements)
     )
 
 
@@ -110,6 +114,7 @@ def _solve(
     folder: Path | None,
     restart: Path | None,
     start: State | Solution | None,
+    times: Sequence[float] | None = None,
     **replacements: Any,
 ) -> Solution:
     """Solve as `solve` does; what a signal has ended is a solution like others."""
@@ -128,8 +133,13 @@ def _solve(
         _refuse(given, "a problem that is built already")
         nested = isinstance(settings, NewtonOptions) and settings.nested
         _refuse({"nested": nested or None}, "a problem that is built already")
+        if times is not None:
+            _refuse({"start": start}, "times; evolve(problem, times, start=state) goes on")
+            ends = check_times(case, times, 0.0)
+            return solve_steps(case, ends, settings or NewtonOptions(), monitor)
         check_problem(case)
         return _reached(case, settings or NewtonOptions(), monitor, start, GIVEN)
+    _refuse({"times": times}, "a case, whose [evolution] says them")
     case = case if isinstance(case, Case) else load_case(case, without=replaced_by(replacements))
     settings = settings or case.solver
     problem = build_problem(case, comm, **replacements)

@@ -177,15 +177,17 @@ class Material:
     piezo
         Piezoelectric tensors in the body's axes, or None.
     on
-        Names of the regions that consist of it; none for the whole mesh.
+        Name of the region that consists of it, or several; none for the whole mesh.
     """
 
     law: Law
     piezo: Piezo | None = None
-    on: tuple[str, ...] = ()
+    on: Given = ()
 
     def __post_init__(self) -> None:
         """Refuse what is no material."""
+        names = several("on", self.on, str, "the name of a region, or a list of names")
+        object.__setattr__(self, "on", names)
         expect("law", self.law, "Linear(young, poisson), Log, UserLaw, ...", is_law(self.law))
         fits = isinstance(self.piezo, Piezo | None)
         expect("piezo", self.piezo, "Piezo(...), or None", fits)
@@ -199,19 +201,21 @@ class Body:
     Attributes
     ----------
     law
-        Law of the stress.
+        Law of the stress; or a `Material`, or several of them with their regions. It then becomes
+        the law of the softest one, which gives its constants to the scales: where a stiff and a
+        soft part press on each other, that one yields.
     fixed, loads
         Supports and loads, one or several.
     piezo
-        Piezoelectric tensors in the body's axes, or None.
+        Piezoelectric tensors in the body's axes, or None; of several materials those of the first
+        that has some, which give the permittivity to the unit of the potential.
     regions
-        Several materials, by region; none where `law` and `piezo` are those of the whole mesh.
-        With them `law` and `piezo` stand for all where a size is asked for: see `piecewise`.
+        The materials, where they are given; none where `law` and `piezo` are all there is.
     rigid, electrodes
         What moves as a rigid body, foundations included, and parts of one unknown potential.
     """
 
-    law: Law
+    law: Given
     fixed: Sequence[Fixed]
     loads: Sequence[Load] = default(default_factory=tuple)
     piezo: Piezo | None = None
@@ -221,6 +225,14 @@ class Body:
 
     def __post_init__(self) -> None:
         """Refuse what is none of a body; accept one support or one load without a list."""
+        if isinstance(self.law, Material | list | tuple):
+            accepted = "a law, Material(...), or a list of materials"
+            given = several("law", self.law, Material, accepted)
+            expect("law", self.law, accepted, given and self.piezo is None and not self.regions)
+            softest = min((material.law for material in given), key=lambda law: law.young)
+            piezo = next((m.piezo for m in given if m.piezo is not None), None)
+            for name, value in (("law", softest), ("piezo", piezo), ("regions", given)):
+                object.__setattr__(self, name, value)
         Material(self.law, self.piezo)
         for name, kind in (
             ("fixed", Fixed),
@@ -233,20 +245,6 @@ class Body:
             object.__setattr__(self, name, several(name, getattr(self, name), kind, words))
         fits = not self.electrodes or self.piezo is not None
         expect("electrodes", self.electrodes, "electrodes of a piezoelectric material", fits)
-
-    @staticmethod
-    def piecewise(
-        materials: Sequence[Material], fixed: Sequence[Fixed], loads: Sequence[Load] = ()
-    ) -> Body:
-        """Return a body of several materials.
-
-        The softest one gives its elastic constants to the scales: where a stiff and a soft part
-        press on each other, that one yields. The first piezoelectric one gives the permittivity
-        to the unit of the potential.
-        """
-        softest = min((material.law for material in materials), key=lambda law: law.young)
-        piezo = next((m.piezo for m in materials if m.piezo is not None), None)
-        return Body(softest, fixed, loads, piezo, tuple(materials))
 
     @property
     def materials(self) -> tuple[Material, ...]:

@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from typing import Any
+
 import numpy as np
+from pydantic import ValidationError
 
 from contact.body.description import Material
 from contact.case import file as sections
+from contact.case.messages import describe
 from contact.errors import InputError
-from contact.kinds import check_range
+from contact.kinds import check_range, expect
 from contact.mesh.domain import Domain
 from contact.typing import Array
 from forms.crystal import in_plane, isotropic_about_x3, stiffness_tensor, to_axis
@@ -42,11 +47,40 @@ def make_materials(case: sections.Case, domain: Domain, law: Law | None) -> list
     for key, section in case.materials:
         if domain.revolved:
             _check_round(key, section)
-        turn = rotation(section.axis[1], domain.dim)
-        this = material_law(section, turn) if law is None else law
-        check_range(f"{key}.young", float(this.young))
-        made.append(Material(this, piezo(section, turn), section.on or ()))
+        given = _made(section, domain.dim)
+        this = given if law is None else replace(given, law=law)
+        check_range(f"{key}.young", float(this.law.young))
+        made.append(this)
     return made
+
+
+def make_material(dim: int, **keys: Any) -> Material:
+    """Return what `[material]` of a case file with some keys stands for.
+
+    Parameters
+    ----------
+    dim
+        Dimension of the body, whose axes crystals are turned into: 2 or 3.
+    keys
+        Keys of the section: ``name="PZT-4"`` with ``poling``, or ``young``, ``poisson`` and
+        ``piezo={"e31": ..., ...}``; ``on``, a region or a list of regions.
+
+    Raises
+    ------
+    InputError
+        As for a case file.
+    """
+    expect("make_material: dim", dim, "2 or 3", dim in (2, 3))
+    try:
+        section = sections.Material.model_validate(keys)
+    except ValidationError as error:
+        raise InputError(describe(error, sections.Material, "make_material")) from None
+    return _made(section, dim)
+
+
+def _made(section: sections.Material, dim: int) -> Material:
+    turn = rotation(section.axis[1], dim)
+    return Material(material_law(section, turn), piezo(section, turn), section.on or ())
 
 
 def rotation(axis: float | tuple[float, ...] | None, dim: int) -> Array:

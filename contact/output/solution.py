@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from dolfinx import fem
@@ -16,9 +16,11 @@ from contact.interface.multipliers import Multipliers
 from contact.interface.status import CLOSED, STICKS
 from contact.linear.operator import Counters
 from contact.methods.report import History, Outcome
+from contact.output.balances import ChargeBalance, charge_balance
 from contact.output.contact_result import ContactResult, contact_result
 from contact.output.deformation import Deformation
 from contact.output.fields import DerivedFields, unknowns
+from contact.output.motions import movements
 from contact.output.options import OutputOptions
 from contact.output.record import StepRecord
 from contact.output.supports import Support, moment, supports
@@ -250,6 +252,21 @@ class Solution:
                 f"{', '.join(self.supports) or 'none, for nothing is held'}"
             )
         return self.supports[part].force
+
+    @property
+    def movements(self) -> Mapping[str, Any]:
+        """What is rigid, and electrodes of unknown potential, as in summary.json. Collective.
+
+        Its keys are `rigid`, `rigid_parts` and `electrodes`, as far as there are any.
+        """
+        return movements(self.problem, self.state)
+
+    @property
+    def charges(self) -> ChargeBalance | None:
+        """The free charges; None for a body without a potential. Collective."""
+        if not self.problem.piezoelectric:
+            return None
+        return charge_balance(self.problem, self.state)
 
     @property
     def status(self) -> Array:

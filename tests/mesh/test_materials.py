@@ -87,7 +87,7 @@ def test_layers_in_series(law: str, degree: int) -> None:
 def test_the_energy_norm_knows_the_materials() -> None:
     laws = Linear(LOWER, 0.3), Linear(UPPER, 0.1)
     zero = constant(0.0, 2)
-    body = Body.piecewise(
+    body = Body(
         [Material(laws[0], on=("lower",)), Material(laws[1], on=("upper",))],
         [Fixed("bottom", [zero, zero])],
         [Load("top", pressure=constant(0.1, 2))],
@@ -143,7 +143,7 @@ def test_an_elastic_part_carries_no_field() -> None:
     piezo = hexagonal(-1.0, 3.0, 2.0, 8.0, 7.0).in_plane()
     zero, one = constant(0.0, 2), constant(1.0, 2)
     law = Linear(10.0, 0.3)
-    body = Body.piecewise(
+    body = Body(
         [Material(law, on=("lower",)), Material(law, piezo, ("upper",))],
         [Fixed("bottom", [zero, zero]), Fixed("top", None, one)],
     )

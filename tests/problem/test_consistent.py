@@ -31,6 +31,7 @@ from contact import (
     UserLaw,
     build_problem,
     evolve,
+    make_material,
     parse_case,
     solve,
 )
@@ -163,7 +164,14 @@ WRONG = {
         lambda: Problem(block(), Body(Linear(10.0, 0.5), TOP), Contact("bottom")),
         "Poisson's ratio 0.5; accepted: a modulus > 0, a ratio between -1 and 0.5",
     ),
-    "a material as law": (lambda: Body(Material(LAW), TOP), "law: given Material"),  # type: ignore[arg-type]
+    "a law among materials": (lambda: Body([Material(LAW), LAW], TOP), r"law: given Linear\("),
+    "no material": (lambda: Body([], TOP), r"law: given \[\]; accepted: a law, Material"),
+    "regions": (lambda: Material(LAW, on=3), "on: given 3; accepted: the name of a region"),
+    "a crystal": (
+        lambda: make_material(2, young=1.0, poisson=0.3, piezo={"e31": 1.0}),
+        r"^make_material: piezo\.e33: only e31; accepted: either all of e31,",
+    ),
+    "a dimension": (lambda: make_material(1, name="PZT-4"), "make_material: dim: given 1"),
     "a load as support": (lambda: Body(LAW, [Load("top", [0, 1])]), r"fixed: given Load\("),  # type: ignore[list-item]
     "an electrode": (lambda: problem(electrodes=Electrode("left")), "a piezoelectric material"),
     "a mesh": (lambda: Problem(block().mesh, Body(LAW, TOP), Contact("bottom")), "domain: "),
@@ -172,6 +180,15 @@ WRONG = {
     "a replacement": (lambda: solve(problem(), domian=3), "domian: unknown; accepted: domain"),
     "a monitor": (lambda: solve(problem(), monitor=3), "monitor: given 3"),  # type: ignore[arg-type]
     "times": (lambda: next(evolve(problem(), 1.0)), r"times: given 1\.0; accepted: a list"),  # type: ignore[arg-type]
+    "no times": (lambda: solve(problem(), times=[0.5, 0.5]), "times: given 0.5, 0.5; accepted: "),
+    "times of a case": (
+        lambda: solve(parse_case(CASE), times=[1.0]),
+        "times: given together with a case",
+    ),
+    "times and a start": (
+        lambda: solve(problem(), times=[1.0], start=problem().start()),
+        r"start: given together with times; evolve",
+    ),
     "an option": (lambda: NewtonOptions(tol=1e-9), "NewtonOptions: .*'tol'; accepted: .*tolerance"),  # type: ignore[call-arg]
 }
 
@@ -247,3 +264,34 @@ def test_an_interference_by_a_gap() -> None:
     )
     moved = solve(problem(Fixed("top", [0.0, -0.001])))
     assert pressed.contact_force == pytest.approx(moved.contact_force, rel=1e-6)
+
+
+def test_steps_of_a_problem() -> None:
+    """They are those that `evolve` gives, and their rows say what they have come to."""
+    made = problem(Fixed("top", [lambda x: 1e-3 * x[0], -0.005]))
+    friction = Problem(made.domain, made.body, Contact("bottom"), Friction(mu=0.2))
+    times = [0.5, 1.0]
+    states = list(evolve(friction, times))
+    solution = solve(friction, times=times)
+    assert [step.row["t"] for step in solution.steps] == times
+    assert solution.state.near(states[-1], atol=1e-9)
+    force = solution.steps[-1].row["contact_force_y"]
+    assert force == pytest.approx(solution.contact_force[1])
+    assert solution.movements == {}
+    assert solution.charges is None
+
+
+def test_materials_of_keys() -> None:
+    """They are those of a case with the same keys; a list of them makes a body."""
+    keys = {"name": "PZT-4", "units": "GPa", "poling": 30.0}
+    given = make_material(2, **keys)
+    potential = {"on": "bottom", "potential": 0.0}
+    mesh = {"generator": "rectangle", "size": [2.0, 1.0], "cells": [8, 4]}
+    fixed = [{"on": "top", "displacement": [0, -0.005], "potential": 0.01}, potential]
+    case = {"mesh": mesh, "material": keys, "fixed": fixed, "contact": {"on": "bottom"}}
+    plain = solve(parse_case(case))
+    body = Body([given], [Fixed("top", [0, -0.005], 0.01), Fixed("bottom", potential=0.0)])
+    same = solve(Problem(block(), body, Contact("bottom")))
+    assert same.contact_force == pytest.approx(plain.contact_force, rel=1e-10)
+    assert same.charges is not None
+    assert same.charges.electrodes == pytest.approx(plain.charges.electrodes, rel=1e-8)

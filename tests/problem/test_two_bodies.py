@@ -34,7 +34,7 @@ def pushed(comm, degree=1, dim=2, mu=0.3, supports=(), gap=0.0, **given):
     zero = constant(0.0, dim)
     force = [constant(c, dim) for c in (0.001, *[0.0] * (dim - 2), -0.01)]
     moduli = {"upper": 1.0, "lower": 3.0}
-    body = Body.piecewise(
+    body = Body(
         [Material(Linear(young, 0.3), on=(name,)) for name, young in moduli.items()],
         [Fixed("bottom", [zero] * dim), *supports],
         [Load("top", force)],

@@ -84,7 +84,7 @@ def test_constant_pressure(dim: int, degree: int, pair: Sequence[str], condense:
     laws = {"upper": Linear(1.0, 0.3), "lower": Linear(100.0, 0.2)}
     materials = [Material(law, on=(name,)) for name, law in laws.items()]
     load = Load("top", pressure=constant(0.01, dim))
-    body = Body.piecewise(materials, fixed, [load])
+    body = Body(materials, fixed, [load])
     problem = ContactProblem(domain, body, contact(*pair), degree=degree)
     state = solve(problem, condense=condense)
     np.testing.assert_allclose(state.forces.pressure, 0.01, rtol=1e-12)
@@ -104,7 +104,7 @@ def test_constant_pressure_on_discs(degree: int, pair: Sequence[str]) -> None:
     laws = {"upper": Linear(1.0, 0.3), "lower": Linear(7.0, 0.2)}
     materials = [Material(law, on=(name,)) for name, law in laws.items()]
     fixed, load = [Fixed("bottom", [None, zero])], Load("top", pressure=constant(0.01, 2))
-    body = Body.piecewise(materials, fixed, [load])
+    body = Body(materials, fixed, [load])
     problem = ContactProblem(domain, body, contact(*pair), degree=degree)
     state = solve(problem)
     np.testing.assert_allclose(state.forces.pressure, 0.01, rtol=1e-11)
@@ -221,7 +221,7 @@ def test_a_chain_of_bodies(degree: int, condense: bool) -> None:
     laws = [Linear(young, 0.3) for young in (2.0, 1.0, 5.0)]
     materials = [Material(law, on=(f"body{k}",)) for k, law in enumerate(laws)]
     fixed = [Fixed("bottom0", [None, zero]), *(Fixed(f"left{k}", [zero, None]) for k in range(3))]
-    body = Body.piecewise(materials, fixed, [Load("top2", pressure=constant(0.01, 2))])
+    body = Body(materials, fixed, [Load("top2", pressure=constant(0.01, 2))])
     pairs = [contact("bottom1", "top0"), contact("bottom2", "top1")]
     state = solve(ContactProblem(domain, body, pairs, degree=degree), condense=condense)
     np.testing.assert_allclose(state.forces.pressure, 0.01, rtol=1e-12)

@@ -43,7 +43,7 @@ def columns(electrode: float | None = None, conductance: float = CONDUCTANCE) ->
         Material(Linear(1.0, 0.3), from_voigt(np.zeros((3, 6)), beta * np.eye(3)), (name,))
         for name, beta in (("upper", UPPER), ("lower", LOWER))
     ]
-    body = Body.piecewise(materials, fixed)
+    body = Body(materials, fixed)
     if electrode is not None:
         body = Body(
             body.law, fixed, (), body.piezo, body.regions, (), (Electrode("top", electrode),)
