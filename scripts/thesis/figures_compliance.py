@@ -197,7 +197,8 @@ def solution_of(
 def remark(solution: Solution, table: Table) -> str:
     """Return how many nodes stick, slide and are open, and the residual."""
     counts = {kind: np.count_nonzero(table["status"] == kind) for kind in ("stick", "slip", "open")}
-    touching = f"{counts['stick']} nodes stick, {counts['slip']} slide"
+    stick = "1 node sticks" if counts["stick"] == 1 else f"{counts['stick']} nodes stick"
+    touching = f"{stick}, {counts['slip']} slide"
     if not solution.problem.frictional:
         touching = f"{counts['slip']} nodes are in contact"
     residual = solution.outcome.kkt.largest
