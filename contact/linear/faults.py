@@ -16,6 +16,9 @@ from contact.tolerances import HUGE
 #: MUMPS's INFOG(1) where its workspace, its memory or what ICNTL(23) allows was too small.
 OUT_OF_MEMORY = (-8, -9, -11, -12, -13, -17, -19, -20)
 
+#: Stiffness of a function, over the largest one, that is rounding.
+VANISHES = 1e-14
+
 
 @contextmanager
 def petsc_options(prefix: str) -> Iterator[None]:
@@ -66,10 +69,28 @@ def no_solution(pc: PETSc.PC, prefix: str) -> InputError:
             f"rank), a larger -{prefix}mat_mumps_icntl_14 (percent of workspace beyond "
             'the estimate), or linear = "iterative" in [solver]'
         )
+    if _functions_vanish(pc):
+        return InputError(
+            "multigrid fails: some of its aggregates of nodes are too small to tell rigid motions "
+            f"apart; accepted: options of PETSc with the prefix -{prefix}pc_gamg_ that make "
+            'larger ones, none of these options, or linear = "lu" in [solver]'
+        )
     return SingularError(
         "the linear system is singular: the body can move freely; fix enough "
         "displacement components (or, for a piezoelectric body, a potential)"
     )
+
+
+def _functions_vanish(pc: PETSc.PC) -> bool:
+    """Whether functions on coarse levels are zero, as no motion of a body is. Collective."""
+    if pc.getType() != "gamg":
+        return False
+    for level in range(pc.getMGLevels() - 1):
+        diagonal = pc.getMGSmoother(level).getOperators()[0].getDiagonal()
+        diagonal.abs()
+        if diagonal.min()[1] <= VANISHES * diagonal.max()[1]:
+            return True
+    return False
 
 
 def _out_of_memory(pc: PETSc.PC) -> bool:

@@ -109,6 +109,21 @@ def test_no_solve_takes_more_iterations_than_are_allowed() -> None:
         options.delValue("contact_ksp_max_it")
 
 
+@pytest.mark.parallel
+def test_aggregates_that_are_too_small_are_no_fault_of_the_body() -> None:
+    """It was called free to move."""
+    problem = mechanics.leaning_block(WORLD, 12)
+    options = PETSc.Options()
+    options["contact_pc_gamg_aggressive_coarsening"] = 0
+    try:
+        operator = operator_of(problem, "iterative")
+        operator.update("secant", problem.start().x, sticking(problem))
+        with pytest.raises(InputError, match=r"multigrid fails: .* -contact_pc_gamg_"):
+            operator.solve(problem.equilibrium.external(), 1e-6)
+    finally:
+        options.delValue("contact_pc_gamg_aggressive_coarsening")
+
+
 def test_an_operator_is_freed_at_once() -> None:
     """It holds most of the memory, and ranks would collect a cycle at different times."""
     problem = mechanics.leaning_block(SELF, 4)
