@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -14,6 +15,7 @@ from contact.interface.penalised import NodalLaw, Regularisation, outer
 from contact.linear.faults import petsc_options
 from contact.linear.operator import Counters
 from contact.linear.packing import Packing, shell
+from contact.methods.interrupt import Interrupted
 from contact.methods.options import PenaltyOptions
 from contact.problem.kkt import residual_forces
 from contact.problem.problem import ContactProblem
@@ -40,7 +42,7 @@ class PenalisedProblem:
         symmetric: bool,
     ) -> None:
         self._options, self._eps = options, eps
-        self._error: InputError | None = None
+        self._error: InputError | Interrupted | None = None
         self._problem = problem
         self._body, self._interface = problem.equilibrium, problem.interface
         self.operator = self._body.operator(
@@ -89,9 +91,10 @@ class PenalisedProblem:
     def apply(self, _: Any, rhs: PETSc.Vec, solution: PETSc.Vec) -> None:
         """Solve with the operator: the preconditioner of SNES's KSP."""
         try:
+            self._poll()
             found = self.operator.solve(self._units * self._packing.unpacked(rhs.array_r))
             solution.array[:] = self._packing.packed(found)
-        except InputError as error:
+        except (InputError, Interrupted) as error:
             # Not through PETSc, which would wrap it; SNES stops at a solution without numbers.
             self._error = error
             solution.array[:] = np.nan
@@ -100,11 +103,17 @@ class PenalisedProblem:
         """Return the derivative of the residual times owned values. Collective."""
         return self.operator.multiply(values) / self._units
 
-    def solve(self, law: NodalLaw, state: State, implicit: bool) -> tuple[Array, int, str]:
+    def solve(
+        self, law: NodalLaw, state: State, implicit: bool, poll: Callable[[], None]
+    ) -> tuple[Array, int, str]:
         """Solve from a state; return the unknowns, the iterations and what went wrong.
+
+        Before each of them `poll` is called, on all ranks.
 
         Raises
         ------
+        Interrupted
+            If `poll` raises it.
         SingularError
             If nothing holds the body at an iterate.
         InputError
@@ -135,10 +144,11 @@ class PenalisedProblem:
             atol=self._options.tolerance / 10,
             max_it=min(self._options.max_inner, 20) if implicit else self._options.max_inner,
         )
-        self._error = None
+        self._error, self._poll = None, poll
         self._iterate.array[:] = self._packing.packed(body.owned_part(state.x) + self._touch())
         self.snes.solve(None, self._iterate)
-        if isinstance(self._error, SingularError) or (self._error and not implicit):
+        lasting = isinstance(self._error, SingularError | Interrupted)
+        if self._error is not None and (lasting or not implicit):
             raise self._error
         reason = self.snes.getConvergedReason()
         note = "" if reason > 0 else f"SNES stopped with reason {reason}"

@@ -205,7 +205,7 @@ class Penalty:
             )
         solver = self._solvers[symmetric]
         try:
-            return solver.solve(law, self.state, implicit)
+            return solver.solve(law, self.state, implicit, self.history.poll)
         except SingularError:
             taken = solver.snes.getIterationNumber()
             if taken == 0 and not self.history.records:

@@ -77,22 +77,23 @@ def test_a_script_that_catches_nothing_ends_with_the_status_of_the_signal(
 
 
 @pytest.mark.parallel
+@pytest.mark.parametrize(("method", "solves"), [("uzawa", 5), ("penalty", 8)])
 def test_a_solve_stops_between_inner_iterations(
-    shared_tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    method: str, solves: int, shared_tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """A signal in a long inner loop is not left waiting for its end."""
     solve_once = SparseOperator.solve
 
     def press(operator: SparseOperator, *args: Any, **options: Any) -> Any:
-        if operator.counters.linear_solves == 5 and MPI.COMM_WORLD.rank == 0:
+        if operator.counters.linear_solves == solves and MPI.COMM_WORLD.rank == 0:
             signal.raise_signal(signal.SIGTERM)
         return solve_once(operator, *args, **options)
 
     monkeypatch.setattr(SparseOperator, "solve", press)
     with pytest.raises(SolveInterrupted) as interrupt:
-        solve(block(2, solver={"method": "uzawa"}))
+        solve(block(2, solver={"method": method}))
     solution = interrupt.value.solution
-    assert solution.counters.linear_solves == 6
+    assert solution.counters.linear_solves == solves + 1
     assert solution.outcome.signal == signal.SIGTERM
     summary, _ = written(solution, shared_tmp_path)
     assert summary["reason"] == "interrupted (SIGTERM)"
