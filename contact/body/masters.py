@@ -246,6 +246,11 @@ def _tie(
     # What a support holds cannot follow.
     moves = np.abs(motion[:, :, member.free]).max(axis=2, initial=0.0) > ROUNDING
     if _anywhere(domain, moves & follows & ~free[nodes]):
+        if isinstance(member.what, Electrode):
+            raise InputError(
+                f"{key}: it shares nodes with a part whose potential is fixed; accepted: parts "
+                "that share no nodes"
+            )
         raise InputError(
             f"{key}: a support fixes a component of one of its nodes that is free to move with it; "
             "accepted: that component given there, or parts that share no nodes"

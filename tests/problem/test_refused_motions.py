@@ -91,3 +91,5 @@ def test_bad_electrodes_are_refused():
                 {"on": "left", "displacement": [0.0, "free"], "potential": 0.0}]),
             SELF,
         )  # fmt: skip
+    with pytest.raises(InputError, match="a part whose potential is fixed"):
+        build_problem(column(electrode=[{"on": "right"}]), SELF)
