@@ -28,10 +28,11 @@ def looseness(solution: Solution) -> Remark:
 
     A cylinder without friction rolls in its place against next to nothing, and wherever it has
     rolled to, its forces are in balance. Contact is taken to resist with c = E/length times areas,
-    as in the residuals: along the normal where bodies touch, along the surface where they stick.
+    as in the residuals: along the normal where bodies touch, along the surface where they stick,
+    and across the friction where they slip.
     """
     problem, body = solution.problem, solution.problem.equilibrium
-    touches, sticks = solution.status != "open", solution.status == "stick"
+    touches = solution.status != "open"
     if not (solution.converged and problem.comm.allreduce(bool(touches.any()), op=MPI.LOR)):
         return "", True
     left = float(body.sizes(body.unbalanced(residual_forces(problem, solution.state)))[0])
@@ -41,7 +42,7 @@ def looseness(solution: Solution) -> Remark:
         free = null_space(group.supports)
         if free.shape[1] == 0:
             continue
-        share, motion = _least_held(group, free, touches, sticks)
+        share, motion = _least_held(solution, group, free, touches)
         moved = left * _reach(group, motion) / (whole * max(share, EPS))
         if share < HELD or moved > MOVED * largest:
             words = described(motion[:, None] / np.linalg.norm(motion), group.names)
@@ -56,7 +57,7 @@ def looseness(solution: Solution) -> Remark:
 
 
 def _least_held(
-    group: Group, free: Array, touches: NDArray[np.bool_], sticks: NDArray[np.bool_]
+    solution: Solution, group: Group, free: Array, touches: NDArray[np.bool_]
 ) -> tuple[float, Array]:
     """Return the free motion that contact holds least. Collective.
 
@@ -67,18 +68,24 @@ def _least_held(
     """
     nodes = group.problem.nodes
     normal, tangential = group.normal @ free, group.tangential @ free
-    products = np.einsum("n,nk,nl->nkl", nodes.weight, normal, normal)
-    along = np.einsum("n,nik,nil->nkl", nodes.weight, tangential, tangential)
-    sums = np.array(
-        [
-            products[touches].sum(axis=0) + along[sticks].sum(axis=0),
-            products.sum(axis=0) + along.sum(axis=0),
-        ]
-    )
+    resisted = tangential.copy()
+    slips = touches & (solution.status == "slip")
+    size = np.linalg.norm(solution.friction, axis=1)
+    unit = solution.friction / np.where(size > 0, size, 1.0)[:, None]
+    resisted[slips] -= np.einsum("ni,nj,njk->nik", unit, unit, tangential)[slips]
+    resisted[~touches | (solution.friction_bound <= 0)] = 0.0
+    whole = np.concatenate([normal[:, None, :], tangential], axis=1)
+    resisting = np.concatenate([(normal * touches[:, None])[:, None, :], resisted], axis=1)
+    sums = np.array([_products(nodes.weight, part) for part in (resisting, whole)])
     held, moved = nodes.comm.allreduce(sums, op=MPI.SUM)
     area = nodes.sum(np.ones_like(nodes.weight))
     values, motions = linalg.eigh(held / area, moved / area)
     return max(float(values[0]), 0.0), free @ motions[:, 0]
+
+
+def _products(weight: Array, motions: Array) -> Array:
+    """Return the weighted sums of products of motions at nodes, (n, d + 1, m), shape (m, m)."""
+    return np.asarray(np.einsum("n,nik,nil->kl", weight, motions, motions))
 
 
 def _reach(group: Group, motion: Array) -> float:

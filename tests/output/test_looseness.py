@@ -37,3 +37,17 @@ def test_a_block_that_lies_on_another_is_held_by_friction():
     solution = solve(parse_case(case()), comm=MPI.COMM_SELF)
     assert solution.converged
     assert not any("by next to nothing" in warning for warning in solution.warnings)
+
+
+def test_a_box_that_slips_all_around_is_held_across_the_friction():
+    """In space it slips in all directions, and nothing moves it as a whole."""
+    boxes = {"generator": "two_boxes", "lower_width": 1.5, "lower_size": 0.4, "upper_size": 0.35}
+    table = {"shape": "plane", "point": [0, 0, -1], "normal": [0, 0, 1]}
+    contacts = [
+        {"on": "upper_bottom", "against": "lower_top"},
+        {"on": "lower_bottom", "foundation": table},
+    ]
+    loads = [{"on": "upper_top", "traction": [0.1, 0.05, -1.0]}]
+    given = case(mesh=boxes, fixed=[], load=loads, contact=contacts)
+    solution = solve(parse_case(given), comm=MPI.COMM_SELF)
+    assert solution.converged and not solution.warnings
