@@ -143,6 +143,23 @@ def test_what_the_system_refuses_is_said_in_words(what: str, ranks: int, tmp_pat
 
 
 @RANKS
+def test_a_mesh_from_elsewhere_executes_nothing(ranks: int, tmp_path: Path) -> None:
+    """Gmsh would take it for a script, where a case is but looked at."""
+    mark, mesh = tmp_path / "executed", tmp_path / "body.msh"
+    mesh.write_text(f'// $MeshFormat 2.2\nSystemCall "touch {mark}";\n')
+    lines = BAR.read_text().splitlines()
+    start, end = lines.index("[mesh]"), lines.index("[material]")
+    lines[start:end] = ["[mesh]", f'file = "{mesh}"']
+    (tmp_path / "case.toml").write_text("\n".join(lines))
+    started = command("check", str(tmp_path / "case.toml"), ranks=ranks)
+    done = subprocess.run(started, env=environment(), capture_output=True, text=True, timeout=120)
+    assert done.returncode == 2
+    (message,) = messages(done.stderr)
+    assert "no Gmsh .msh file" in message
+    assert not mark.exists()
+
+
+@RANKS
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", [signal.SIGINT, signal.SIGTERM, signal.SIGKILL])
 def test_signals_while_writing_leave_one_of_the_runs_whole(
