@@ -68,7 +68,7 @@ class ChargeBalance:
 
 @dataclass(frozen=True)
 class ForceBalance:
-    """Resultants of the forces on a body, each of shape (d,); of one of revolution along its axis.
+    """Resultants of the forces on a body, of shape (d,); of one of revolution along its axis.
 
     Attributes
     ----------
@@ -79,7 +79,7 @@ class ForceBalance:
     contact
         What the foundations exert on the body; between bodies it cancels.
     passed
-        What passes through all contacts, as the sides `on` feel it.
+        What passes through each of the contacts, as the side `on` feels it, shape (contacts, d).
     """
 
     applied: Array
@@ -93,7 +93,8 @@ class ForceBalance:
 
         Two bodies that are both held have no other resultant than what passes between them.
         """
-        scale = sum(float(np.linalg.norm(p)) for p in (self.applied, self.supports, self.passed))
+        parts = self.applied, self.supports, *self.passed
+        scale = sum(float(np.linalg.norm(part)) for part in parts)
         total = self.applied + self.supports + self.contact
         return float(np.linalg.norm(total)) / scale if scale > 0 else 0.0
 
@@ -190,9 +191,11 @@ def force_balance(problem: ContactProblem, state: State) -> ForceBalance:
     forces = -problem.nodes.weight[:, None] * stress
     problem.nodes.transpose(forces, pushes)
     contact = body.nodal(pushes)[:, :d].sum(axis=0)
-    local = np.stack([given, supports, contact, forces.sum(axis=0)])
-    total = problem.comm.allreduce(local, op=MPI.SUM)
-    return ForceBalance(*problem.domain.resultant(total))
+    ends = np.cumsum([entry.nodes.nodes.size for entry in problem.entries])[:-1]
+    passed = [part.sum(axis=0) for part in np.split(forces, ends)]
+    local = np.stack([given, supports, contact, *passed])
+    total = problem.domain.resultant(problem.comm.allreduce(local, op=MPI.SUM))
+    return ForceBalance(*total[:3], total[3:])
 
 
 def mean_potential(problem: ContactProblem, state: State, part: str) -> float:
