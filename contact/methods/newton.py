@@ -181,8 +181,8 @@ class Newton:
             logger.info("%s; going on with the whole body", outcome.ended)
         surer = None if self._pays else self._condensed
         loop = self.whole_loop(SHORT if surer is not None else None)
-        whole = isinstance(self.problem, ContactProblem) and not self._pays
-        first = replace(loop, hopeless=self._bends) if whole else loop
+        # Where the condensed body has come first, its loop has found out already.
+        first = loop if self._pays else replace(loop, hopeless=self._bends)
         iterate, outcome = first.run(iterate)
         if not outcome.converged and surer is not None:
             logger.info("%s; going on at the contact nodes", outcome.ended)
