@@ -37,10 +37,10 @@ def giving_way(solution: Solution) -> Remark:
     largest = largest_displacement(solution)
     if max(deep, far) <= LAWS_HOLD * largest:
         return "", True
-    what, key = ("penetrate", "eps_contact") if deep > far else ("slip", "eps_slip")
+    what, key = ("touch penetrate", "contact") if deep > far else ("should stick slip", "slip")
     return (
-        f"the penalties give way: nodes that should not {what} by as much as {max(deep, far):.2g}, "
-        f"where displacements reach {largest:.2g}; a smaller solver.{key}, or another method, is "
-        "needed for these",
+        f"the penalties give way: nodes that {what} by up to {max(deep, far):.2g}, where "
+        f"displacements reach {largest:.2g}; a smaller solver.eps_{key}, or another method, brings "
+        "these nearer to what they are",
         False,
     )
