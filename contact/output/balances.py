@@ -195,7 +195,7 @@ def force_balance(problem: ContactProblem, state: State) -> ForceBalance:
     passed = [part.sum(axis=0) for part in np.split(forces, ends)]
     local = np.stack([given, supports, contact, *passed])
     total = problem.domain.resultant(problem.comm.allreduce(local, op=MPI.SUM))
-    return ForceBalance(*total[:3], total[3:])
+    return ForceBalance(total[0], total[1], total[2], total[3:])
 
 
 def mean_potential(problem: ContactProblem, state: State, part: str) -> float:
