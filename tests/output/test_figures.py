@@ -5,6 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from contact.output.figures.picture import widened
 from contact.output.table import contact_table, held_points
 from contact.solving import solve
 from tests.problems.written import block, electric
@@ -76,3 +77,11 @@ def test_words_are_within_the_figure(dim: int, inches: float) -> None:
             assert box.y0 > -tolerance, name
             assert box.x1 < width + tolerance, name
             assert box.y1 < height + tolerance, name
+
+
+def test_rounding_has_no_colours() -> None:
+    """What is the same everywhere has one colour, and a scale with short numbers."""
+    low, high = widened(77.83342606819, 77.83342606821)
+    assert high - low > 5
+    assert widened(0.0, 1.0) == (0.0, 1.0)
+    assert widened(-3.0, 2.0) == (-3.0, 2.0)

@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 from mpl_toolkits.axes_grid1 import make_axes_locatable
 
 from contact.output.figures.contact import BLUE, UNNAMED, ends, fitted
-from contact.output.figures.picture import Picture
+from contact.output.figures.picture import Picture, widened
 from contact.output.table import Table, by_contact
 from contact.output.units import Units
 from contact.typing import Array
@@ -131,7 +131,7 @@ def _ranged(shown: Any, picture: Picture) -> str:
     if low - ends[0] > 0.2 * (high - low) > 0:
         range_[0] = low
         peaks.insert(0, f"least {ends[0]:.3g}")
-    shown.set_clim(*range_)
+    shown.set_clim(*widened(*range_))
     return ", ".join([picture.label, *peaks])
 
 

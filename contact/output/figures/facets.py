@@ -174,7 +174,9 @@ def _arrows(ax: Axes, surface: VTU, flat: Array, view: Array, reach: float) -> N
     along = traction - np.einsum("ni,ni->n", traction, normal)[:, None] * normal
     friction = np.nan_to_num(along @ view.T)
     size = np.linalg.norm(friction, axis=1)
-    acting = np.flatnonzero(size > 1e-6 * size.max(initial=0.0))
+    # Rounding of the pressures is no friction.
+    rounding = 1e-9 * np.nan_to_num(np.linalg.norm(traction, axis=1)).max(initial=0.0)
+    acting = np.flatnonzero(size > max(1e-6 * size.max(initial=0.0), rounding))
     if not acting.size:
         return
     chosen = acting[_thinned(flat[acting], 16)]

@@ -203,3 +203,9 @@ def _boundary(corners: Indices) -> Indices:
     """Return the edges on the boundary of triangles, by their ends."""
     edges = _faces(corners)
     return edges[_single(edges)]
+
+
+def widened(low: float, high: float) -> tuple[float, float]:
+    """Return the ends of the colours: rounding of what is the same everywhere has none."""
+    least = 1e-6 * max(abs(low), abs(high))
+    return (low, high) if high - low > least else (low - 0.05 * abs(low), high + 0.05 * abs(high))

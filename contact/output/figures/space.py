@@ -14,7 +14,7 @@ from matplotlib.figure import Figure
 
 from contact.output.figures.body import with_scale
 from contact.output.figures.contact import NARROW
-from contact.output.figures.picture import Picture
+from contact.output.figures.picture import Picture, widened
 
 logger = logging.getLogger("contact.plots")
 
@@ -38,7 +38,8 @@ def draw_space(picture: Picture, title: str = "") -> Figure | None:
     width = float(matplotlib.rcParams["figure.figsize"][0])
     shape, tall = ((2, 1), 1.6) if width < NARROW else ((1, 2), 0.52)
     figure = Figure(figsize=(width, tall * width))
-    norm = Normalize(*(picture.limits or (picture.values.min(), picture.values.max())))
+    ends = float(picture.values.min()), float(picture.values.max())
+    norm = Normalize(*(picture.limits or widened(*ends)))
     axes = figure.subplots(*shape)
     for ax, name, height in zip(axes, ("from above", "from below"), (0.8, -0.8), strict=True):
         plotter = pyvista.Plotter(off_screen=True, window_size=(1000, 900))
