@@ -10,11 +10,9 @@ Section 1.3.3: with the rigid part far enough away, (1.29) is (1.27).
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
 
 import numpy as np
-from matplotlib.figure import Figure
 
 from contact import Case, InputError, build_problem, load_case
 from contact.interface.layer import Layer
@@ -24,27 +22,13 @@ from contact.problem.problem import ContactProblem
 from contact.typing import Array
 from forms.laws import Compliance, PotentialFactor
 from scripts.cases import CASES, TABLE_8_4
-from scripts.reporting import (
-    TWO_COLUMNS,
-    Report,
-    iterates,
-    observed_orders,
-    options,
-    solved,
-    subplots,
-)
+from scripts.reporting import Report, iterates, observed_orders, options, solved
+from scripts.studies.limits import Errors, draw_errors, draw_iterations
 from scripts.studies.product_norm import ProductNorm
 
 #: mu = k_e of the limit: those of the table and some between them.
 SMALLEST = TABLE_8_4[-1]
 VALUES = tuple(sorted({*TABLE_8_4, 2e-2, 1.5e-3, 2e-4, 6e-5, 4e-6}, reverse=True))
-
-#: How names of parameters and curves are drawn.
-SYMBOLS = {
-    "mu = k_e": r"$\mu = k_e$",
-    "1/c": r"$1/c$ (m/GPa)",
-    "p = c [r]^+": r"$p = c\,[r]^+$",
-}
 
 #: The norms, and what the theorem asks beside.
 NORMS = "V: |eps(u)|, W: |grad(phi)| in L2(Omega), as differences; orders are those of both, in X."
@@ -64,36 +48,6 @@ def case_of(name: str, cells: Sequence[int], changes: Sequence[str] = ()) -> Cas
     grid = f"mesh.cells=[{cells[0]}, {cells[1]}]"
     exact = ("solver.tolerance=1e-11", "solver.inner_tolerance=2e-12")
     return load_case(CASES / f"{name}.toml", [grid, *exact, *changes])
-
-
-@dataclass(frozen=True)
-class Errors:
-    """Distances to a limit over a parameter.
-
-    Attributes
-    ----------
-    name
-        What was varied.
-    parameter
-        Its values, shape (k,).
-    norms
-        Distances in V (and W), shape (k, 1 or 2).
-    """
-
-    name: str
-    parameter: Array
-    norms: Array
-
-    @property
-    def total(self) -> Array:
-        """Distances in X, shape (k,)."""
-        return np.linalg.norm(self.norms, axis=1)
-
-    def order(self, low: float, high: float) -> float:
-        """Return the least-squares order over a range of the parameter."""
-        inside = (self.parameter >= low) & (self.parameter <= high)
-        x, y = np.log(self.parameter[inside]), np.log(self.total[inside])
-        return float(np.polyfit(x, y, 1)[0])
 
 
 def theorem_6_3(
@@ -206,42 +160,6 @@ def table(report: Report, name: str, caption: str, errors: Errors, note: str = "
     columns = {errors.name: errors.parameter, "in V": errors.norms[:, 0]}
     columns |= {"in W": errors.norms[:, 1], "order": orders}
     report.table(name, caption, columns, note)
-
-
-def draw_errors(curves: Mapping[str, Errors]) -> tuple[Figure, dict[str, Array]]:
-    """Draw distances in V and W over the parameter, with a line of slope 1."""
-    figure, axes = subplots(size=(TWO_COLUMNS, 3.8))
-    data: dict[str, Array] = {}
-    for (label, errors), fill in zip(curves.items(), ("none", "full"), strict=False):
-        data[f"{errors.name}, {label}"] = errors.parameter
-        words = SYMBOLS.get(label, label)
-        for norms, space, line in zip(errors.norms.T, "VW", ("o-", "s-"), strict=True):
-            size = 7 if fill == "none" else 3
-            axes.loglog(
-                errors.parameter, norms, line, label=f"{words}, in {space}", ms=size, fillstyle=fill
-            )
-            data[f"in {space}, {label}"] = norms
-    slope = 2 * errors.total[-1] / errors.parameter[-1]
-    axes.loglog(errors.parameter, slope * errors.parameter, "k:", label="slope 1")
-    axes.set(xlabel=SYMBOLS[errors.name], ylabel="distance to the limit (V: m, W: GV)")
-    axes.legend()
-    return figure, data
-
-
-def draw_iterations(curves: Mapping[str, Array]) -> Figure:
-    """Draw errors over the iterations of the fixed point."""
-    figure, axes = subplots(size=(TWO_COLUMNS, 3.8))
-    for label, errors in curves.items():
-        axes.semilogy(
-            np.arange(1, errors.size + 1),
-            errors,
-            "o-",
-            label=label.replace("mu = k_e = 0.02", r"$\mu = k_e = 0.02$"),
-            ms=4,
-        )
-    axes.set(xlabel=r"iteration $n$", ylabel=r"$|x_n - x|$ in $X$")
-    axes.legend()
-    return figure
 
 
 #: Lagged fixed points whose errors are shown: label -> case file and overrides.
