@@ -132,11 +132,14 @@ def memory(bench: Bench) -> None:
     """Part (h): what ranks hold."""
     held = []
     for dimension, n in ((2, 32), (3, 8)) if bench.coarse else ((2, 128), (3, 20)):
-        first = np.nan
+        first, least = np.nan, np.nan
         for count in (1, 2, 4):
-            found = measured([*command("ranks"), str(dimension), str(n)], count)
-            size = found["bytes an unknown"]
-            first = size if count == 1 else first
+            found, alone = (
+                measured([*command(name), str(dimension), str(n)], count)
+                for name in ("ranks", "library")
+            )
+            size, of_library = found["bytes an unknown"], alone["bytes an unknown"]
+            first, least = (size, of_library) if count == 1 else (first, least)
             held.append(
                 {
                     "dimension": dimension,
@@ -144,13 +147,16 @@ def memory(bench: Bench) -> None:
                     "ranks": count,
                     "bytes an unknown": size,
                     "over one rank": size / first if first > 0 else np.nan,
+                    "linear solve": of_library,
+                    "its over one rank": of_library / least if least > 0 else np.nan,
                 }
             )
     bench.report.table(
         "bench-memory",
         "Memory of all ranks together",
         columns(held),
-        "Peaks of the whole run, beyond what the libraries take once they are loaded.",
+        "Peaks of the whole run, beyond what the libraries take once they are loaded; and those of "
+        "one linear solve by dolfinx and PETSc alone.",
     )
 
 

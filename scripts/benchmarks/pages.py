@@ -77,14 +77,17 @@ def write_readme(folder: Path, readme: Path) -> None:
 def write_memory(folder: Path, page: Path) -> None:
     """Put what ranks hold into the page on many ranks, where it has been measured."""
     rows = _rows(folder / "bench-memory.csv")
-    if not rows:
+    names = ("bytes an unknown", "over one rank", "linear solve", "its over one rank")
+    if not rows or not rows[0].keys() >= set(names):  # or one that was written earlier
         return
-    lines = ["| | unknowns | ranks | bytes an unknown | over one rank |", "|---|---|---|---|---|"]
+    head = ["", "unknowns", "ranks", *names]
+    lines = ["| " + " | ".join(head).strip() + " |", "|" + "---|" * len(head)]
     for row in rows:
         place = "plane" if row["dimension"] == "2" else "space"
-        size, over = float(row["bytes an unknown"]), float(row["over one rank"])
-        count = f"{int(row['unknowns']):,}"
-        lines.append(f"| {place} | {count} | {row['ranks']} | {size:.0f} | {over:.2f} |")
+        values = [float(row[name]) for name in names]
+        sizes = [f"{values[0]:.0f}", f"{values[1]:.2f}", f"{values[2]:.0f}", f"{values[3]:.2f}"]
+        cells = [place, f"{int(row['unknowns']):,}", row["ranks"], *sizes]
+        lines.append("| " + " | ".join(cells) + " |")
     table = "\n".join(lines) + "\n"
     page.write_text(MEMORY_TABLE.sub(lambda _: table, page.read_text()))
 
