@@ -1,12 +1,9 @@
-"""Sphinx: `make docs`, or ``python3 -m sphinx -W docs build/docs``."""
+"""Sphinx: `make docs`, or ``python3 -m sphinx -W docs build/docs`` from the top folder."""
 
 import re
 import shutil
-import sys
 from pathlib import Path
 from typing import Any
-
-sys.path.insert(0, str(Path(__file__).parents[1]))
 
 import contact
 
