@@ -4,8 +4,10 @@ from pathlib import Path
 
 import pytest
 
+import contact
 from scripts.benchmarks import bench
 from scripts.benchmarks.pages import write_memory, write_readme
+from scripts.benchmarks.phases import PHASES
 from scripts.reporting import Report
 
 SCALING = Path(__file__).parents[2] / "docs" / "scaling.md"
@@ -25,6 +27,12 @@ def test_the_table_of_ranks_is_replaced_where_memory_has_been_measured(tmp_path)
     assert "| space | 1,234,567 | 2 | 100 | 1.23 | 50 | 1.12 |\n\n" in text
     assert text.count("| plane |") == 0
     assert text.endswith(SCALING.read_text()[-500:])
+
+
+@pytest.mark.parametrize(("place", "name"), [where for where in PHASES.values() if where[0] != "~"])
+def test_what_a_phase_is_measured_by_is_there(place, name):
+    """A function that has moved would be a phase of no seconds."""
+    assert f"def {name}(" in (Path(contact.__file__).parent / place).read_text()
 
 
 def test_the_other_parts_are_measured_where_one_fails(tmp_path, monkeypatch, capsys):
