@@ -60,7 +60,7 @@ def check_finite(values: Array, where: Callable[[int], str]) -> None:
     bad = np.flatnonzero(~np.isfinite(values))
     if bad.size > 0:
         raise _Returned(
-            f"not finite {where(bad[0])}; accepted: a number, formula or function that is"
+            f"not finite {where(bad[0])}; accepted: a finite number, formula or function"
         )
 
 

@@ -39,16 +39,16 @@ class Negative(ConstantCoefficient):
 @pytest.mark.parametrize(
     ("friction", "said"),
     [
-        (Friction(mu=-1e-3), "mu is -0.001"),
-        (Friction(mu=np.nan), "mu is nan"),
-        (Friction(mu=lambda x: np.where(x[0] > 1.5, np.nan, 0.3)), "mu is nan"),
-        (Friction(tresca=lambda x: 1.0 - x[0]), "tresca is -"),
-        (Friction(tresca=np.inf), "tresca is inf"),
-        (Friction(Negative()), "coefficient without slip is -0.2"),
+        (Friction(mu=-1e-3), "mu is -0.001 at a node"),
+        (Friction(mu=np.nan), "mu: not finite at "),
+        (Friction(mu=lambda x: np.where(x[0] > 1.5, np.nan, 0.3)), "mu: not finite at "),
+        (Friction(tresca=lambda x: 1.0 - x[0]), "tresca is -.* at a node"),
+        (Friction(tresca=np.inf), "tresca: not finite at "),
+        (Friction(Negative()), "coefficient without slip is -0.2 at a node"),
     ],
 )
 def test_what_resists_is_not_negative(friction, said):
-    with pytest.raises(InputError, match=rf"Friction: {said}.* at a node; accepted: finite"):
+    with pytest.raises(InputError, match=rf"Friction: {said}.*; accepted: .*finite"):
         problem(Contact("bottom", friction=friction))
 
 
