@@ -36,6 +36,7 @@ from contact.methods.best import Best
 from contact.methods.options import PenaltyOptions
 from contact.methods.penalised import PenalisedProblem
 from contact.methods.report import History, Monitor, Outcome, Record
+from contact.methods.resting import resting
 from contact.methods.stagnation import Stagnation
 from contact.problem.expected import expected_displacements
 from contact.problem.kkt import KKT, evaluate
@@ -190,6 +191,8 @@ class Penalty:
         else:
             ended = f"not converged in {options.max_outer} outer iterations; {HARDER}"
         if best.found is not None and options.stopping == "residual":
+            if rest := resting(problem):
+                best.found, ended = rest, ""
             self.state, residuals = best.found
         return self._outcome(residuals, ended)
 

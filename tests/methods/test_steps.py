@@ -208,6 +208,22 @@ def test_what_is_unloaded_to_next_to_nothing_is_as_accurate(left):
     assert 0.5 * left <= np.abs(one.forces.pressure).max() / 0.01 < 100 * size
 
 
+def test_a_penalised_body_that_is_unloaded_to_nothing_rests():
+    """The last step was halved again and again, and the evolution ended before."""
+    amplitude = Tabulated((0.0, 1.0, 2.0), (0.0, 1.0, 0.0))
+    pressed = Fixed("top", [constant(0.001, 2), constant(-0.002, 2)], amplitude=amplitude)
+    problem = ContactProblem(
+        rectangle(SELF, [0.0, 0.0], [1.0, 1.0], [4, 4]),
+        Body(Linear(10.0, 0.3), [pressed]),
+        Contact("bottom"),
+        Friction(mu=0.3),
+    )
+    steps = steps_of(problem, [1.0, 2.0], PenaltyOptions())
+    assert [step.state.time for step in steps] == [1.0, 2.0]
+    assert np.abs(steps[0].state.x).max() > 1e-3
+    assert np.abs(steps[-1].state.x).max() == 0
+
+
 def test_unloaded_in_one_step_or_two_is_not_the_same():
     """Friction remembers: where the load has been matters, not only where it is."""
     there = steps_of(shaken(), [1.0, 2.0, 2.5])[-1].state
