@@ -101,12 +101,19 @@ def _least_poisson(dim: int) -> float:
 
 
 def small_strain(solution: Solution) -> Remark:
-    """Say where strains are no small ones, or the deformed body turns inside out."""
+    """Say where strains or rotations are no small ones, or the deformed body turns inside out.
+
+    To turn by an angle a makes the determinant 1 + a^2, and strains at most 1 + sqrt(3) |eps|.
+    """
     made = solution.deformation
-    if made is None or made.largest_strain <= SMALL:
+    if made is None:
         return "", True
+    turned = made.largest_volume - 1 - np.sqrt(3) * made.largest_strain
+    if max(made.largest_strain, turned) <= SMALL:
+        return "", True
+    what = "strains" if made.largest_strain > SMALL else "rotations"
     text = (
-        f"strains are not small: |eps| reaches {made.largest_strain:.3g}, and det(I + grad u) lies "
+        f"{what} are not small: |eps| reaches {made.largest_strain:.3g}, and det(I + grad u) lies "
         f"between {made.least_volume:.3g} and {made.largest_volume:.3g}"
     )
     if made.least_volume <= 0:
@@ -256,7 +263,8 @@ def beside_loads(solution: Solution) -> Remark:
     left = body.sizes(body.unbalanced(residual))[0]
     borne = body.sizes(body.reactions(residual))[0]
     most = max(LEFT, solution.outcome.allowed.equilibrium)
-    if moved or not solution.converged or not acting > 0 or left <= most * acting:
+    little = left <= most * acting or borne <= acting  # then what is left is rounding
+    if moved or not solution.converged or not acting > 0 or little:
         return "", True
     return (
         f"{left / acting:.1e} of loads and contact forces are out of balance, and displacements "

@@ -139,6 +139,33 @@ def test_large_strains_are_warned_of():
     assert "pass through itself" in said(large.warnings, "strains are not small")
 
 
+@pytest.mark.parametrize(("slope", "warned"), [(0.2, False), (0.5, True)])
+def test_large_rotations_are_warned_of(slope: float, warned: bool) -> None:
+    """A block that nothing else holds comes to lie on a slope, without strain."""
+    case = block(
+        2,
+        fixed=[],
+        load=[{"on": "top", "traction": [0.0, -1e-4]}],
+        contact={"on": "bottom", "gap": f"{slope}*x"},
+        solver={"method": "newton"},
+    )
+    solution = solve(case)
+    assert solution.converged and solution.deformation.largest_strain < 0.01
+    assert any("rotations are not small" in text for text in solution.warnings) == warned
+
+
+def test_forces_that_are_rounding_are_not_out_of_balance() -> None:
+    """A free block is unloaded: what was left was said to be beside what supports bear: none."""
+    top = {"on": "top", "traction": [0.0, -0.01], "amplitude": "pulse"}
+    pulse = {"time": [0.0, 1.0, 2.0], "value": [0.0, 1.0, 0.0]}
+    evolution = {"times": [0.0, 1.0, 2.0], "steps": [1, 1], "amplitudes": {"pulse": pulse}}
+    solution = solve(
+        block(2, fixed=[], load=[top], evolution=evolution, solver={"method": "uzawa"})
+    )
+    assert solution.converged
+    assert not [text for text in solution.warnings if "out of balance" in text]
+
+
 @pytest.mark.parametrize("nested", [False, True])
 def test_the_warning_says_where_the_iteration_started(nested: bool) -> None:
     """Several solutions may exist: which one is found depends on the start."""
