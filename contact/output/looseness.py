@@ -11,7 +11,7 @@ from contact.output.assumptions import Remark
 from contact.output.solution import Solution
 from contact.output.summary import largest_displacement
 from contact.problem.kkt import residual_forces
-from contact.problem.mobility import Group, described, groups, null_space
+from contact.problem.mobility import Group, described, groups, held_by_supports, null_space
 from contact.tolerances import EPS
 from contact.typing import Array
 
@@ -21,6 +21,9 @@ MOVED = 1e-3
 #: Share of a motion's square from which on contact holds it: normals of a mesh are off by more than
 #: the root of it, and hold what the true surface does not.
 HELD = 1e-8
+
+#: Largest pressure at the end of a step, over that of all steps, that is rounding of none.
+NOTHING = 1e-13
 
 
 def looseness(solution: Solution) -> Remark:
@@ -54,6 +57,22 @@ def looseness(solution: Solution) -> Remark:
                 False,
             )
     return "", True
+
+
+def adrift(solution: Solution) -> Remark:
+    """Say that nothing held a body any more before the last step. Collective."""
+    pressures = np.array([record.row["max_pressure"] for record in solution.steps])
+    pressed = pressures > NOTHING * pressures.max(initial=0.0)
+    # Before it has been pressed it is at rest.
+    loose = np.flatnonzero(~pressed[:-1] & np.logical_or.accumulate(pressed)[:-1])
+    if loose.size == 0 or held_by_supports(solution.problem):
+        return "", True
+    return (
+        f"at t = {solution.steps[loose[0]].row['t']:g} nothing presses any more, and no support "
+        "holds the body: where it is then is one of many places, and so is what comes after; a "
+        "load that goes on pressing it, or a support, holds it",
+        False,
+    )
 
 
 def _least_held(

@@ -7,7 +7,7 @@ import logging
 from contact.output import assumptions, bodies, uniqueness
 from contact.output.deformation import deformation
 from contact.output.fields import DerivedFields
-from contact.output.looseness import looseness
+from contact.output.looseness import adrift, looseness
 from contact.output.penalties import giving_way
 from contact.output.solution import Solution
 
@@ -54,6 +54,7 @@ def review(solution: Solution) -> None:
         bodies.passing(solution.problem),
         bodies.regions(solution),
         looseness(solution),
+        adrift(solution),
         giving_way(solution),
     ):
         if text:
