@@ -45,6 +45,7 @@ def review(solution: Solution) -> None:
         assumptions.untouched(solution),
         assumptions.resolution(solution),
         assumptions.rounding(solution),
+        assumptions.unknown_pressures(solution),
         assumptions.beside_loads(solution),
         uniqueness.theorem(solution),
         uniqueness.sliding(solution),

@@ -47,12 +47,16 @@ class KKT:
         more than the `most_rounding` of the body. Zero where no load acts, nothing touches and the
         other field exerts nothing: all forces are rounding then, and there is nothing to compare
         it with.
+    unknown
+        What it is as pressures, and has been subtracted from the other two at most, over |p|:
+        contact forces are known to that. Zero where nothing presses.
     """
 
     equilibrium: float
     contact: float
     friction: float
     rounding: float = 0.0
+    unknown: float = 0.0
 
     @property
     def largest(self) -> float:
@@ -150,4 +154,6 @@ def evaluate(problem: Problem, state: State) -> KKT:
     nodal = interface.jump.apply(state.x)
     bound, pressures = interface.bound(nodal, state.forces), _as_pressures(problem, unknown)
     laws = interface_residuals(interface, nodal, state.forces, bound, pressures)
-    return KKT(equilibrium, *laws, float(np.max(np.where(acted, rounding / size, 0.0))))
+    pressed = interface.jump.norm(interface.pressure(nodal, state.forces))
+    granted = float(np.max(np.where(acted, rounding / size, 0.0)))
+    return KKT(equilibrium, *laws, granted, pressures / pressed if pressed > 0 else 0.0)

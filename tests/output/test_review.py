@@ -154,6 +154,26 @@ def test_large_rotations_are_warned_of(slope: float, warned: bool) -> None:
     assert any("rotations are not small" in text for text in solution.warnings) == warned
 
 
+@pytest.mark.parametrize(("depth", "warned"), [(1e-9, False), (1e-12, True)])
+def test_pressures_that_are_lost_in_rounding_are_warned_of(depth: float, warned: bool) -> None:
+    """A bar of twice its length is pressed uniformly, by next to nothing beside that."""
+    case = block(
+        2,
+        material={"young": 10.0, "poisson": 0.0},
+        fixed=[
+            {"on": "left", "displacement": [0.0, "free"]},
+            {"on": "right", "displacement": [2.0, "free"]},
+            {"on": "top", "displacement": ["free", -depth]},
+        ],
+        friction={"law": "none"},
+    )
+    solution = solve(case)
+    off = np.abs(solution.pressure / (10.0 * depth) - 1.0).max()
+    assert solution.converged and 0 < off < solution.outcome.kkt.unknown
+    assert (off > 1e-4) == warned
+    assert any("contact forces are known to" in text for text in solution.warnings) == warned
+
+
 def test_forces_that_are_rounding_are_not_out_of_balance() -> None:
     """A free block is unloaded: what was left was said to be beside what supports bear: none."""
     top = {"on": "top", "traction": [0.0, -0.01], "amplitude": "pulse"}
