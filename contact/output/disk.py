@@ -19,6 +19,7 @@ from typing import Any
 from mpi4py import MPI
 
 from contact.output.folder import on_root
+from contact.output.transaction import ROOM
 
 #: Bytes that each rank adds to a file besides the numbers: names, offsets, extremes.
 OVERHEAD = 16384
@@ -45,7 +46,7 @@ def claim_room(comm: MPI.Intracomm, folder: Path, own: int) -> None:
 
     def ask() -> None:
         # Quotas do not show in what a file system says that it has left.
-        path = folder / "room"
+        path = folder / ROOM
         try:
             with path.open("wb") as file:
                 os.posix_fallocate(file.fileno(), 0, needed)

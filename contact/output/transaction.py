@@ -31,6 +31,8 @@ from contact.errors import InputError
 
 STAGE = ".contact-new"
 SUMMARY = "summary.json"
+#: What asks for room on the disk before a member is written; a run that is killed then leaves it.
+ROOM = "room"
 #: Key of the summary under which the names of the members stand.
 MANIFEST = "files"
 
@@ -197,7 +199,7 @@ def _is_stage(path: Path) -> bool:
         return _kind(path) == "a file"
     if path.name not in ("new", "old") or _kind(path) != "a folder":
         return False
-    return all(_MEMBER.fullmatch(member.name) for member in path.iterdir())
+    return all(name == ROOM or _MEMBER.fullmatch(name) for name in os.listdir(path))
 
 
 def _members(summary: Path) -> list[str]:

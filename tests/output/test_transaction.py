@@ -9,8 +9,10 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+from mpi4py import MPI
 
 from contact.errors import InputError
+from contact.output.disk import claim_room
 from contact.output.folder import LOCK, result_folder, settle
 from contact.output.transaction import STAGE, begin, complete, recover, swap
 from tests.problems.processes import BAR, CLONE, SMALL
@@ -125,6 +127,20 @@ def test_killed_at_any_step_one_of_the_runs_is_whole(
         if finished and last > 40:
             break
     assert True in outcomes and False in outcomes
+
+
+def test_a_run_that_is_killed_while_it_asks_for_room_is_recovered_from(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    earlier, _ = two_runs(tmp_path)
+    folder = tmp_path / "earlier"
+    new = begin(folder)
+    with monkeypatch.context() as patched:
+        patched.setattr(Path, "unlink", lambda *_, **__: None)  # SIGKILL leaves it to nobody
+        claim_room(MPI.COMM_SELF, new, 1000)
+    assert [*new.iterdir()]
+    recover(folder)
+    assert held(folder) == earlier
 
 
 def test_refused_at_any_step_the_earlier_run_stays(
