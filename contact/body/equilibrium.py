@@ -93,8 +93,7 @@ class BodyEquilibrium:
         # Where the forms are evaluated is written anew by each query.
         self._forms = WeakForms(domain, body, self.space, self.cells, degree)
         self._at = self._forms.at
-        keep = body.linear and not is_large(self.layout)
-        self._internal = InternalForces(domain.comm, self._forms, self.owned, keep)
+        self._internal = InternalForces(domain.comm, self._forms, self.owned)
         test = self._forms.split(ufl.TestFunction(self.space))
         self._loads = Loads(domain, body, *test, self.owned)
 
@@ -197,6 +196,14 @@ class BodyEquilibrium:
         given = [x] if secant_at is None or self.linear else [x, secant_at]
         forces = self._internal(*(self.nodal(values).ravel() for values in given))
         return np.concatenate([forces, np.zeros(self.masters.size)])
+
+    def expect_many(self) -> None:
+        """Prepare for forces that are asked for often, those of load steps. Collective.
+
+        Of a linear body a matrix is kept, where a direct solver has room for its factors.
+        """
+        if self.linear and not is_large(self.layout):
+            self._internal.assemble()
 
     def external(self, time: float = 1.0) -> Array:
         """Return the owned nodal loads at a time. Collective."""

@@ -1,4 +1,9 @@
-"""The nodal forces of the stresses in a body: assembled, or by the matrix of a linear one."""
+"""The nodal forces of the stresses in a body: assembled, or by the matrix of a linear one.
+
+The matrix costs as much as a dozen assemblies of forces, which load steps need and static problems
+mostly do not. Only who is told of many takes it: the forces of one problem are the same numbers,
+however often they are asked for.
+"""
 
 from __future__ import annotations
 
@@ -12,10 +17,6 @@ from contact.body.loads import assembled
 from contact.body.weak_forms import WeakForms
 from contact.typing import Array
 
-#: Forces that are assembled before the matrix of a linear body is, which costs as much as a dozen:
-#: those of load steps, and more than most static problems ask for.
-WORTH = 20
-
 
 class InternalForces:
     """The forces of the stresses at given unknowns, supports and contact apart.
@@ -28,15 +29,12 @@ class InternalForces:
         The weak forms of the body.
     owned
         Number of unknowns of the nodes that this rank owns.
-    keep
-        Whether the body has one matrix for all unknowns, that there is room to keep.
     """
 
-    def __init__(self, comm: MPI.Intracomm, forms: WeakForms, owned: int, keep: bool) -> None:
+    def __init__(self, comm: MPI.Intracomm, forms: WeakForms, owned: int) -> None:
         self._forms, self._owned = forms, owned
         # At a state, of its potential alone, and moved to see what rounding does.
         self._last = LastAnswers(comm, 3)
-        self._asked, self._keep = 0, keep
         self._matrix: PETSc.Mat | None = None
 
     def __call__(self, at: Array, secant_at: Array | None = None) -> Array:
@@ -52,22 +50,24 @@ class InternalForces:
         asked = (at,) if secant_at is None else (at, secant_at)
         return self._last(asked, lambda: self._found(*asked))
 
+    def assemble(self) -> None:
+        """Keep the matrix of a linear body, by which forces are found from now on. Collective."""
+        if self._matrix is None:
+            self._matrix = create_matrix(self._forms.secant)
+            assemble_matrix(self._matrix, self._forms.secant)
+            self._matrix.assemble()
+
     def _found(self, at: Array, about: Array | None = None) -> Array:
-        self._asked += 1
-        if self._keep and self._asked > WORTH:
-            return self._product(at)
+        if self._matrix is not None:
+            return self._product(self._matrix, at)
         self._forms.at.x.array[:] = at
         if about is not None:
             self._forms.secant_at.x.array[:] = about
         form = self._forms.law_forces if about is None else self._forms.secant_forces
         return assembled(form, self._owned)
 
-    def _product(self, at: Array) -> Array:
-        if self._matrix is None:
-            self._matrix = create_matrix(self._forms.secant)
-            assemble_matrix(self._matrix, self._forms.secant)
-            self._matrix.assemble()
-        vector, image = self._matrix.createVecs()
+    def _product(self, matrix: PETSc.Mat, at: Array) -> Array:
+        vector, image = matrix.createVecs()
         vector.array[:] = at[: self._owned]
-        self._matrix.mult(vector, image)
+        matrix.mult(vector, image)
         return np.asarray(image.array)
