@@ -15,6 +15,9 @@ from contact.problem.problem import ContactProblem
 from contact.problem.state import State
 from contact.typing import Array
 
+#: Directions in space, of half a turn, in which friction is asked for what it can hold.
+DIRECTIONS = 8
+
 
 def check_held(problem: ContactProblem) -> None:
     """Check that no rigid motion is free, before anything is factorised. Collective.
@@ -179,12 +182,10 @@ def _check_loads(
     if not np.isfinite(mu) or not friction.local:
         return
     comm, work = problem.comm, work @ free
-    if problem.dim == 2:
-        along = problem.nodes.normal[:, ::-1] * [-1.0, 1.0]
-        across = [mu * np.einsum("ni,nim->nm", along, group.tangential) @ free]
-    else:
-        # |m_tau| <= sqrt(d) times its largest component: a cone of planes inside the cone.
-        across = [np.sqrt(3) * mu * part @ free for part in np.moveaxis(group.tangential, 1, 0)]
+    across = [
+        mu * np.einsum("ni,nim->nm", along, group.tangential) @ free
+        for along in _sideways(problem.nodes.normal)
+    ]
     rows = [group.normal @ free + sign * part for part in across for sign in (-1, 1)]
     cone = np.concatenate([problem.nodes.gather(row) for row in rows])
     pulled = False
@@ -199,3 +200,20 @@ def _check_loads(
             f"the loads pull the body off the foundation{moving}, and no support holds it there; "
             "accepted: loads that press it on, or more displacement components fixed"
         )
+
+
+def _sideways(normal: Array) -> list[Array]:
+    """Return tangential vectors t, shape (n, d) each, with |m_tau| <= max |m.t| for every m.
+
+    In the plane that is the unit tangent. In space they are spread over half a turn, and as long as
+    it takes: planes around the cone of friction, 2 % wider at most.
+    """
+    if normal.shape[1] == 2:
+        return [normal[:, ::-1] * [-1.0, 1.0]]
+    beside = np.eye(3)[np.argmin(np.abs(normal), axis=1)]
+    first = np.cross(normal, beside)
+    first /= np.linalg.norm(first, axis=1)[:, None]
+    second = np.cross(normal, first)
+    longer = 1 / np.cos(np.pi / (2 * DIRECTIONS))
+    angles = np.pi / DIRECTIONS * np.arange(DIRECTIONS)
+    return [longer * (np.cos(angle) * first + np.sin(angle) * second) for angle in angles]
