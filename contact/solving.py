@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import signal
 import time
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -34,11 +35,11 @@ from contact.problem.state import State
 GIVEN = "the state that was given"
 
 
-class SolveInterrupted(KeyboardInterrupt, SystemExit):
+class SolveInterrupted(SystemExit):
     """A SIGINT (Ctrl-C) or SIGTERM has ended a solve, on all ranks after the same iteration.
 
     A program that does not catch it ends with the status 130 or 143: that is what a SystemExit is
-    for, as Python does not give it to those who inherit from KeyboardInterrupt alone.
+    for. That of Ctrl-C is a KeyboardInterrupt too; of that of SIGTERM Python would make 130.
 
     Parameters
     ----------
@@ -50,6 +51,10 @@ class SolveInterrupted(KeyboardInterrupt, SystemExit):
         super().__init__(solution.outcome.reason)
         self.solution = solution
         self.code = SIGNALLED + solution.outcome.signal
+
+
+class _Pressed(SolveInterrupted, KeyboardInterrupt):
+    """Ctrl-C."""
 
 
 def solve(
@@ -102,7 +107,8 @@ def solve(
 
 def _uninterrupted(solution: Solution) -> Solution:
     if solution.outcome.signal:
-        raise SolveInterrupted(solution)
+        ended = _Pressed if solution.outcome.signal == signal.SIGINT else SolveInterrupted
+        raise ended(solution)
     return solution
 
 
