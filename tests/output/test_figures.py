@@ -79,6 +79,27 @@ def test_words_are_within_the_figure(dim: int, inches: float) -> None:
             assert box.y1 < height + tolerance, name
 
 
+@pytest.mark.parametrize("height", [0.25, 0.5, 1.0, 2.0])
+def test_the_lines_of_a_title_are_above_the_body(height: float) -> None:
+    from matplotlib import rc_context
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+
+    from contact.output.figures.body import draw_plane
+    from contact.output.figures.figures import style
+    from contact.output.figures.picture import picture
+
+    solution = solve(
+        block(2, mesh={"generator": "rectangle", "size": [2, height], "cells": [8, 4]})
+    )
+    table, drawn = contact_table(solution), picture(solution, "von_mises", "stress")
+    assert table is not None and drawn is not None
+    with rc_context(style(6.3)):
+        figure = draw_plane(drawn, table, "A body that a load of some size presses " * 3)
+        FigureCanvasAgg(figure).draw()
+    assert figure.axes[0].get_title().count("\n") >= 2
+    assert figure.axes[0].title.get_window_extent().y1 < figure.bbox.height
+
+
 def test_rounding_has_no_colours() -> None:
     """What is the same everywhere has one colour, and a scale with short numbers."""
     low, high = widened(77.83342606819, 77.83342606821)

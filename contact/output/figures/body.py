@@ -66,7 +66,9 @@ def draw_plane(
     tall = float(np.clip(0.92 * height / width, 0.19, 0.87))
     lifted = None if mirrored else _lift_off(picture, table)
     strip = 0.0 if lifted is None else STRIP
-    figure = Figure(figsize=(inches, tall * inches + 1.4 + strip))
+    head = with_scale(title, picture.scale)
+    more = 0.02 * float(matplotlib.rcParams["font.size"]) * head.count("\n")
+    figure = Figure(figsize=(inches, tall * inches + 1.4 + strip + more))
     ax = figure.subplots()
     # Dashes would be those of an edge each: none where edges are short.
     rest = {"colors": "black", "lw": 0.5}
@@ -85,7 +87,7 @@ def draw_plane(
     ax.autoscale_view()
     ax.set_xlabel(units.label(f"${axes[0]}$", "length"))
     ax.set_ylabel(units.label(f"${axes[1]}$", "length"))
-    ax.set_title(with_scale(title, picture.scale), fontsize="medium")
+    ax.set_title(head, fontsize="medium")
     if lifted is not None:
         _strip(ax, *lifted, units)
     return figure
