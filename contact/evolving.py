@@ -6,6 +6,7 @@ import logging
 import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace
+from numbers import Real
 
 import numpy as np
 
@@ -96,9 +97,10 @@ def check_times(problem: ContactProblem, times: Sequence[float], begin: float) -
     InputError
         As of `evolve`.
     """
-    numbers = isinstance(times, Iterable) and not isinstance(times, str)
+    given = [*times] if isinstance(times, Iterable) and not isinstance(times, str) else []
+    numbers = len(given) > 0 and all(isinstance(time, Real) for time in given)
     expect("times", times, "a list of times, the ends of the steps", numbers)
-    ends = [float(time) for time in times]
+    ends = [float(time) for time in given]
     if not np.all(np.isfinite(ends)) or np.any(np.diff([begin, *ends]) <= 0):
         raise InputError(
             f"times: given {', '.join(f'{time:g}' for time in ends)}; accepted: numbers that "

@@ -71,10 +71,14 @@ def make_material(dim: int, **keys: Any) -> Material:
         As for a case file.
     """
     expect("make_material: dim", dim, "2 or 3", dim in (2, 3))
+    plain = {k: v.tolist() if isinstance(v, np.ndarray) else v for k, v in keys.items()}
     try:
-        section = sections.Material.model_validate(keys)
+        section = sections.Material.model_validate(plain)
     except ValidationError as error:
         raise InputError(describe(error, sections.Material, "make_material")) from None
+    key, axis = section.axis
+    accepted = "an angle from x in degrees" if dim == 2 else f"a vector of {dim} numbers"
+    expect(f"make_material: {key}", axis, accepted, axis is None or np.ndim(axis) == dim - 2)
     return _made(section, dim)
 
 

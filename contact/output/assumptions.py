@@ -114,9 +114,10 @@ def small_strain(solution: Solution) -> Remark:
     turned = made.largest_volume - 1 - np.sqrt(3) * made.largest_strain
     if max(made.largest_strain, turned) <= SMALL:
         return "", True
-    what = "strains" if made.largest_strain > SMALL else "rotations"
-    text = (
-        f"{what} are not small: |eps| reaches {made.largest_strain:.3g}, and det(I + grad u) lies "
+    strained = made.largest_strain > SMALL
+    text = "strains are not small" if strained else "rotations are not small"
+    text += (
+        f": |eps| reaches {made.largest_strain:.3g}, and det(I + grad u) lies "
         f"between {made.least_volume:.3g} and {made.largest_volume:.3g}"
     )
     if made.least_volume <= 0:

@@ -180,6 +180,17 @@ WRONG = {
     "a replacement": (lambda: solve(problem(), domian=3), "domian: unknown; accepted: domain"),
     "a monitor": (lambda: solve(problem(), monitor=3), "monitor: given 3"),  # type: ignore[arg-type]
     "times": (lambda: next(evolve(problem(), 1.0)), r"times: given 1\.0; accepted: a list"),  # type: ignore[arg-type]
+    "times none": (lambda: solve(problem(), times=[]), "times: given \\[\\]; accepted: a list"),
+    "times in words": (lambda: solve(problem(), times=["a"]), "times: given \\['a'\\]; accepted: "),
+    "times in rows": (lambda: solve(problem(), times=np.ones((2, 2))), "times: given array"),
+    "an angle in space": (
+        lambda: make_material(3, name="PZT-4", poling=90),
+        "make_material: poling: given 90.*; accepted: a vector of 3 numbers",
+    ),
+    "an axis in the plane": (
+        lambda: make_material(2, name="PZT-4", poling=np.array([0.0, 0.0, 1.0])),
+        "make_material: poling: given .*; accepted: an angle from x in degrees",
+    ),
     "no times": (lambda: solve(problem(), times=[0.5, 0.5]), "times: given 0.5, 0.5; accepted: "),
     "times of a case": (
         lambda: solve(parse_case(CASE), times=[1.0]),
