@@ -34,8 +34,7 @@ from forms.foundation import contact_multiplier
 logger = logging.getLogger("contact.inner")
 
 #: Iterations without progress, that is 1 %, after which the relaxation is given up: accelerated,
-#: and plain, or accelerated anew again and again. With r far from r* the plain one creeps by 1e-4
-#: an iteration, and still gets there; so does a beam with an r between stiffnesses 1e12 apart.
+#: and plain. With r far from r* the plain one creeps by 1e-4 an iteration, and still gets there.
 PATIENCE, PATIENCE_PLAIN, PROGRESS = 100, 500, 0.99
 
 #: What an iterative solver leaves at most, over the tolerance of the relaxation: where it leaves as
@@ -238,8 +237,7 @@ def block_relaxation(
     residual, forces = np.inf, Multipliers.zero(jump)
     increment: Array = np.zeros(step.x.size)
     way: Array = np.zeros_like(z)
-    creeps = accelerator is None or parameters.anew
-    stagnation = Stagnation(PATIENCE_PLAIN if creeps else PATIENCE, PROGRESS)
+    stagnation = Stagnation(PATIENCE_PLAIN if accelerator is None else PATIENCE, PROGRESS)
     for iteration in range(1, parameters.max_iterations + 1):
         if poll is not None:
             poll()

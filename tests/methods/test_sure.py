@@ -207,8 +207,7 @@ def test_the_block_relaxation_solves_beams_a_thousand_times_as_long_as_thick(
     case = parse_case(beam(1000.0, cells, load, gap, **space))
     solution = solve(case, FixedPointOptions(), comm=SELF)
     assert solution.converged, solution.outcome.reason
-    # The moment's nothing touches in the end: patience with beams that need it costs 1000 there.
-    assert solution.counters.linear_solves <= 1700
+    assert solution.counters.linear_solves <= 700
     other = solve(case, comm=SELF)
     u, v = solution.displacement.x.array, other.displacement.x.array
     # 1e-8 in the forces and rounding: the softest mode is 1e11 times softer than an element.
