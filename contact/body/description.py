@@ -193,6 +193,12 @@ class Material:
         expect("piezo", self.piezo, "Piezo(...), or None", fits)
 
 
+def _leading(materials: Sequence[Material]) -> tuple[Law, Piezo | None]:
+    """Return the softest law, and the first of the piezoelectric tensors, of which scales are."""
+    softest = min((material.law for material in materials), key=lambda law: law.young)
+    return softest, next((m.piezo for m in materials if m.piezo is not None), None)
+
+
 @names_arguments
 @dataclass(frozen=True)
 class Body:
@@ -210,7 +216,7 @@ class Body:
         Piezoelectric tensors in the body's axes, or None; of several materials those of the first
         that has some, which give the permittivity to the unit of the potential.
     regions
-        The materials, where they are given; none where `law` and `piezo` are all there is.
+        The materials, where `law` was given as such; else none.
     rigid, electrodes
         What moves as a rigid body, foundations included, and parts of one unknown potential.
     """
@@ -229,9 +235,8 @@ class Body:
             accepted = "a law, Material(...), or a list of materials"
             given = several("law", self.law, Material, accepted)
             expect("law", self.law, accepted, given and self.piezo is None and not self.regions)
-            softest = min((material.law for material in given), key=lambda law: law.young)
-            piezo = next((m.piezo for m in given if m.piezo is not None), None)
-            for name, value in (("law", softest), ("piezo", piezo), ("regions", given)):
+            law, piezo = _leading(given)
+            for name, value in (("law", law), ("piezo", piezo), ("regions", given)):
                 object.__setattr__(self, name, value)
         Material(self.law, self.piezo)
         for name, kind in (
@@ -243,6 +248,11 @@ class Body:
         ):
             words = f"{kind.__name__}(...), or a list of them"
             object.__setattr__(self, name, several(name, getattr(self, name), kind, words))
+        if self.regions:  # as `dataclasses.replace` hands them on
+            law, piezo = _leading(self.regions)
+            accepted = "all materials as the law, Body([Material(...), Material(...)], ...)"
+            fits = self.law is law and self.piezo is piezo
+            expect("regions beside a law", self.regions, accepted, fits)
         fits = not self.electrodes or self.piezo is not None
         expect("electrodes", self.electrodes, "electrodes of a piezoelectric material", fits)
 

@@ -129,14 +129,14 @@ def _side_by_side(pieces: Sequence[ContactNodes]) -> ContactNodes:
 
 def joined_friction(entries: Sequence[Entry], nodes: ContactNodes) -> NodalFriction:
     """Return friction at the nodes of all entries, joined before. Collective."""
-    if len(entries) == 1:
-        return NodalFriction.at(entries[0].nodes, entries[0].friction)
     bounds = _bounds(entries)
     smoothing = tuple(Smoothing(entry.nodes, entry.friction.radius) for entry in entries)
     laws = [entry.friction.law_at(entry.nodes) for entry in entries]
     law = None
     if any(laws):
-        law = FrictionPieces(tuple(NO_FRICTION if own is None else own for own in laws), bounds)
+        every = tuple(NO_FRICTION if own is None else own for own in laws)
+        own = any(entry.friction.law is not None for entry in entries)
+        law = FrictionPieces(every, bounds, "Friction: law" if own else "Friction: mu")
     return NodalFriction(law, SmoothingPieces(smoothing, bounds), SlipHistory.rest(nodes))
 
 
@@ -149,13 +149,13 @@ def joined_layer(entries: Sequence[Entry]) -> Layer | None:
         If some are lagged and others not.
     """
     given = [entry.layer for entry in entries]
-    if len(given) == 1 or not any(given):
-        return given[0]
+    if not any(given):
+        return None
     layers, bounds = [layer or NO_LAYER for layer in given], _bounds(entries)
     return Layer(
         np.repeat([layer.thickness for layer in layers], np.diff(bounds)),
-        PointwisePieces(tuple(layer.p_nu for layer in layers), bounds),
-        PointwisePieces(tuple(layer.h_nu for layer in layers), bounds),
+        PointwisePieces(tuple(layer.p_nu for layer in layers), bounds, "layer: p_nu"),
+        PointwisePieces(tuple(layer.h_nu for layer in layers), bounds, "layer: h_nu"),
         _alike([layer.lagged for layer in given if layer is not None]),
     )
 
@@ -180,9 +180,13 @@ def _joined_conductors(
 
     moving = any(conductor.phi_f_at is not None for conductor in conductors)
     return Conductor(
-        ConductivityPieces(tuple(conductor.psi for conductor in conductors), bounds),
+        ConductivityPieces(
+            tuple(conductor.psi for conductor in conductors), bounds, "Conductor: psi"
+        ),
         np.repeat([conductor.phi_f for conductor in conductors], np.diff(bounds)),
-        PointwisePieces(tuple(conductor.phi_l for conductor in conductors), bounds),
+        PointwisePieces(
+            tuple(conductor.phi_l for conductor in conductors), bounds, "Conductor: phi_l"
+        ),
         _alike([conductor.lagged for conductor in given if conductor is not None]),
         phi_f if moving else None,
     )

@@ -153,12 +153,6 @@ class NodalFriction:
     smoothing: Smoothing | SmoothingPieces
     history: SlipHistory
 
-    @staticmethod
-    def at(nodes: ContactNodes, friction: Friction) -> NodalFriction:
-        """Evaluate friction at contact nodes. Collective."""
-        law, smoothing = friction.law_at(nodes), Smoothing(nodes, friction.radius)
-        return NodalFriction(law, smoothing, SlipHistory.rest(nodes))
-
     @property
     def acts(self) -> bool:
         """Whether a tangential force can act."""

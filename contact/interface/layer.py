@@ -9,12 +9,16 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from contact.calling import naming, real
 from contact.errors import InputError
 from contact.kinds import names_arguments
 from contact.tolerances import EPS
 from contact.typing import Array
 from forms.laws import PenetrationLaw, StiffnessLaw
 from forms.ops import Value
+
+#: What a law of a layer returns.
+EACH = "one number for each penetration or difference"
 
 
 @names_arguments
@@ -65,8 +69,10 @@ class Layer:
             if not callable(getattr(law, "derivative", None)):
                 raise InputError(f"layer: {name} has no method `derivative`")
             with np.errstate(all="ignore"):
-                values = np.broadcast_to(law(samples), samples.shape)
-                slopes = np.broadcast_to(law.derivative(samples), samples.shape)
+                with naming(f"layer: {name}"):
+                    values = real(law(samples), samples.shape, EACH)
+                with naming(f"layer: {name}: derivative"):
+                    slopes = real(law.derivative(samples), samples.shape, EACH)
             if not (np.isfinite(values).all() and np.isfinite(slopes).all()):
                 bad = samples[~(np.isfinite(values) & np.isfinite(slopes))][0]
                 raise InputError(f"layer: {name} or its derivative is no number at {bad:g}")

@@ -7,12 +7,14 @@ one array, in which those of one obstacle follow each other.
 from __future__ import annotations
 
 from collections.abc import Iterable
+from contextlib import nullcontext
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any
 
 import numpy as np
 
+from contact.calling import naming, real
 from contact.interface.smoothing import Smoothing
 from contact.typing import Array
 
@@ -27,10 +29,13 @@ class Pieces:
         The law of each group.
     bounds
         Where the groups begin on this rank, and the number of all nodes.
+    what
+        What messages call a law that may be the user's own, and fail or return no numbers.
     """
 
     laws: tuple[Any, ...]
     bounds: tuple[int, ...]
+    what: str = ""
 
     @staticmethod
     def bounds_of(sizes: Iterable[int]) -> tuple[int, ...]:
@@ -39,11 +44,14 @@ class Pieces:
 
     def _each(self, name: str, *arguments: Array) -> Array:
         """Return a method of each law at its own nodes."""
-        parts = []
+        parts, what = [], self.what
+        if what and name != "__call__":
+            what = f"{what}: {name}"
         for law, (begin, end) in zip(self.laws, pairwise(self.bounds), strict=True):
             here = [argument[begin:end] for argument in arguments]
-            values = np.asarray(getattr(law, name)(*here), dtype=float)
-            parts.append(np.broadcast_to(values, (end - begin,)))
+            with naming(what) if what else nullcontext():
+                values = getattr(law, name)(*here)
+                parts.append(real(values, (end - begin,), "one number for each node"))
         return np.concatenate(parts)
 
 

@@ -22,7 +22,7 @@ from contact.body.constants import constant
 from contact.body.loads import expression
 from contact.errors import InputError
 from contact.mesh.together import members
-from contact.problem.kkt import residual_forces
+from contact.problem.kkt import force_rounding, residual_forces
 from contact.problem.problem import ContactProblem
 from contact.problem.state import State
 from contact.typing import Array
@@ -80,23 +80,27 @@ class ForceBalance:
         What the foundations exert on the body; between bodies it cancels.
     passed
         What passes through each of the contacts, as the side `on` feels it, shape (contacts, d).
+    rounding
+        What is no force: see `kkt.force_rounding`.
     """
 
     applied: Array
     supports: Array
     contact: Array
     passed: Array
+    rounding: float
 
     @property
     def imbalance(self) -> float:
         """The norm of the sum over the sum of the norms, of contact's that of what passes.
 
-        Two bodies that are both held have no other resultant than what passes between them.
+        Two bodies that are both held have no other resultant than what passes between them, and
+        none at all apart: 0 where all is rounding.
         """
         parts = self.applied, self.supports, *self.passed
         scale = sum(float(np.linalg.norm(part)) for part in parts)
         total = self.applied + self.supports + self.contact
-        return float(np.linalg.norm(total)) / scale if scale > 0 else 0.0
+        return float(np.linalg.norm(total)) / scale if scale > self.rounding else 0.0
 
 
 @dataclass(frozen=True)
@@ -195,7 +199,8 @@ def force_balance(problem: ContactProblem, state: State) -> ForceBalance:
     passed = [part.sum(axis=0) for part in np.split(forces, ends)]
     local = np.stack([given, supports, contact, *passed])
     total = problem.domain.resultant(problem.comm.allreduce(local, op=MPI.SUM))
-    return ForceBalance(total[0], total[1], total[2], total[3:])
+    rounding = force_rounding(problem, state, body.internal_forces(state.x))[0]
+    return ForceBalance(total[0], total[1], total[2], total[3:], float(rounding))
 
 
 def mean_potential(problem: ContactProblem, state: State, part: str) -> float:

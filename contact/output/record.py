@@ -10,8 +10,11 @@ from numpy.typing import NDArray
 
 from contact.problem.state import State
 
+#: Columns of ``steps.csv`` that a look at a step shows.
+SHOWN = ("t", "max_pressure", "contact_nodes", "max_displacement", "kkt")
 
-@dataclass(frozen=True)
+
+@dataclass(frozen=True, repr=False)
 class StepRecord:
     """What is kept of a step.
 
@@ -37,3 +40,8 @@ class StepRecord:
     enthalpy: float
     unloaded: float = 0.0
     rounding: float = 0.0
+
+    def __repr__(self) -> str:
+        """Return what a look at it should show; `row` has all."""
+        shown = {name: self.row[name] for name in SHOWN if name in self.row}
+        return f"<StepRecord: {', '.join(f'{name} = {v:.4g}' for name, v in shown.items())}>"

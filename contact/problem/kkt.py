@@ -43,10 +43,10 @@ class KKT:
         forces that `rounding` stands for are as pressures: no contact force is known better than
         equilibrium knows it, and where the loads ask for none at all, all of them are that.
     rounding
-        What has been subtracted from the first, over the same, the larger one: `_rounding`, but not
-        more than the `most_rounding` of the body. Zero where no load acts, nothing touches and the
-        other field exerts nothing: all forces are rounding then, and there is nothing to compare
-        it with.
+        What has been subtracted from the first, over the same, the larger one: `force_rounding`,
+        but not more than the `most_rounding` of the body. Zero where no load acts, nothing touches
+        and the other field exerts nothing: all forces are rounding then, and there is nothing to
+        compare it with.
     unknown
         What it is as pressures, and has been subtracted from the other two at most, over |p|:
         contact forces are known to that. Zero where nothing presses.
@@ -103,7 +103,7 @@ def _shakes(size: int) -> Array:
     return SHAKE * np.random.default_rng(0).choice((-1.0, 1.0), size)
 
 
-def _rounding(problem: Problem, state: State, internal: Array) -> Array:
+def force_rounding(problem: Problem, state: State, internal: Array) -> Array:
     """Return what rounding may leave of the forces, and of the charges. Collective.
 
     Unknowns are known to `EPS` of their size. The stresses around a node of a slender body, or of
@@ -144,7 +144,7 @@ def evaluate(problem: Problem, state: State) -> KKT:
     asked = ~acted | (unbalanced <= most)
     rounding, unknown = np.zeros_like(scale), 0.0
     if asked.any():
-        rounding = np.where(asked, _rounding(problem, state, internal), 0.0)
+        rounding = np.where(asked, force_rounding(problem, state, internal), 0.0)
         unknown = float(np.minimum(rounding, most)[0])
         acted |= answers > rounding
         # Of a body that flies away all forces are rounding.

@@ -1,6 +1,7 @@
 """Whatever a field is given as, it is the same field: numbers, functions, UFL, Functions."""
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -19,6 +20,7 @@ from contact import (
     InputError,
     Linear,
     Load,
+    Material,
     Problem,
     SlipCoefficient,
     Sphere,
@@ -126,12 +128,22 @@ def test_vectors() -> None:
             vector(given)
 
 
+TOP = Fixed("top", [0.0, -0.01])
+LAYERS = Body([Material(Linear(2.0, 0.3), on="a"), Material(Linear(1.0, 0.3), on="b")], TOP)
+
+
+def test_a_body_of_several_materials_can_be_changed() -> None:
+    """It is what its materials say, whatever else of it is replaced."""
+    free = replace(LAYERS, fixed=())
+    assert free.materials == LAYERS.materials and free.law == Linear(1.0, 0.3)
+
+
 def made(law: Linear, contact: Any = None) -> Problem:
     """Return a problem whose one support is no list."""
     mesh, tags = square()
     domain = Domain.from_mesh(mesh, tags, {"bottom": 3, "top": 7})
     assert repr(domain) == "<Domain: 64 cells; parts bottom, top; regions body>"
-    return Problem(domain, Body(law, Fixed("top", [0.0, -0.01])), contact or Contact("bottom"))
+    return Problem(domain, Body(law, TOP), contact or Contact("bottom"))
 
 
 @pytest.mark.parametrize(
@@ -152,6 +164,11 @@ def made(law: Linear, contact: Any = None) -> Problem:
         (lambda: made(Linear(10.0, 0.6)), "Poisson's ratio 0.6; accepted"),
         (lambda: made(Linear(10.0, 0.3), "bottom"), r"accepted: Contact\(part"),
         (lambda: solve(made(Linear(10.0, 0.3)), "newton"), r"accepted: NewtonOptions\(\)"),
+        (
+            lambda: Body(Linear(1.0, 0.3), TOP, regions=(Material(Linear(2.0, 0.3)),)),
+            "regions beside a law: .*; accepted: all materials as the law",
+        ),
+        (lambda: replace(LAYERS, law=Linear(7.0, 0.3)), "regions beside a law"),
     ],
 )
 def test_what_is_none(make: Callable[[], object], words: str) -> None:

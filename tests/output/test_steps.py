@@ -80,6 +80,8 @@ def test_formulas_in_t_say_what_amplitudes_do():
     )
     for one, two in zip(by_name.steps, by_formula.steps, strict=True):
         assert np.abs(one.state.x - two.state.x).max() < 1e-12
+    assert repr(by_name.steps[0]).startswith("<StepRecord: t = 0.5, max_pressure = ")
+    assert len(repr(by_name.steps)) < 200 * len(by_name.steps)
 
 
 def test_prescribed_values_in_t():

@@ -13,6 +13,7 @@ from contact import (
     Fixed,
     Friction,
     InputError,
+    Layer,
     Level,
     Linear,
     Load,
@@ -23,6 +24,7 @@ from contact import (
     solve,
 )
 from contact.mesh.grid import rectangle
+from forms.laws import Coulomb, PotentialFactor
 
 pytestmark = pytest.mark.parallel
 
@@ -137,6 +139,60 @@ def test_what_one_rank_alone_meets_is_refused_by_all(place: str) -> None:
                 fails() if last else 0.01 * np.ones(np.shape(x)[0 if place == "shape" else -1])
             )
         )
+
+
+class Springs:
+    """p_nu = s for s > 0, from a table that ends."""
+
+    def __init__(self, end: float) -> None:
+        self._end = end
+
+    def __call__(self, s: Any) -> Any:
+        if np.max(s, initial=0.0) > self._end:
+            raise LookupError("beyond the table")
+        return np.maximum(s, 0.0)
+
+    def derivative(self, s: Any) -> Any:
+        return np.where(s > 0, 1.0, 0.0)
+
+
+def fails_in_slip(slip: Any) -> Any:
+    return 0.01 + 0 * slip if np.all(slip == 0) else fails()
+
+
+@pytest.mark.parametrize(
+    ("friction", "name"),
+    [
+        (Friction(mu=Coefficient(fails_in_slip)), "Friction: mu"),
+        (Friction(law=Coulomb(Coefficient(fails_in_slip))), "Friction: law"),
+    ],
+)
+def test_what_fails_where_it_slips_is_named_too(friction: Friction, name: str) -> None:
+    domain = rectangle(MPI.COMM_SELF, (0.0, 0.0), (2.0, 1.0), (8, 4))
+    body = Body(LAW, Fixed("top", [0.01, -0.005]))
+    with pytest.raises(InputError, match=f"^{name}.* raises KeyError: 'no such table'"):
+        solve(Problem(domain, body, Contact("bottom"), friction))
+
+
+def test_a_layer_is_named() -> None:
+    """Where it is looked at before the solve, and where an iterate presses deeper than that."""
+    stiffness = PotentialFactor(100.0)
+    for end, thickness in ((0.01, 0.1), (-0.1, 0.1)):
+        layer = Layer(thickness, Springs(end), stiffness)
+        with pytest.raises(InputError, match=r"^layer: p_nu: .* LookupError: beyond"):
+            solved(contact=Contact("bottom", layer=layer))
+    domain = rectangle(MPI.COMM_SELF, (0.0, 0.0), (2.0, 1.0), (8, 4))
+    problem = Problem(
+        domain, Body(LAW, TOP), Contact("bottom", layer=Layer(0.1, Springs(0.2), stiffness))
+    )
+    deep = np.zeros((problem.nodes.nodes.size, 2))
+    deep[:, 1] = -1.0
+    response = problem.interface.response
+    assert np.isfinite(response.layer_pressure(0 * deep)).all()
+    law = response.normal_law(0 * deep)
+    assert law is not None
+    with pytest.raises(InputError, match=r"^layer: p_nu: .* LookupError: beyond"):
+        law.layer(np.full(len(deep), 1.0))
 
 
 def test_a_modulus() -> None:
