@@ -21,6 +21,7 @@ from contact.methods.interrupt import Interrupted
 from contact.methods.method import Method
 from contact.methods.predictor import Reached, predicted
 from contact.methods.report import History, Outcome
+from contact.problem.grip import grips, let_go
 from contact.problem.kkt import KKT, evaluate
 from contact.problem.problem import ContactProblem
 from contact.problem.state import State
@@ -88,6 +89,7 @@ class Evolution:
     ) -> None:
         self.problem, self.method = problem, method
         self._last, self._before = start, before
+        self._grips = grips(problem)
 
     def run(self, times: Sequence[float], begin: float = 0.0) -> Iterator[LoadStep]:
         """Take the steps; the last one given has not converged if that has ended them. Collective.
@@ -118,20 +120,38 @@ class Evolution:
                     return
 
     def _step(self, now: float, end: float, whole: float) -> LoadStep:
-        """Take a step: of what is left to its end the whole, or a half, a quarter ... of it all."""
+        """Take a step: of what is left to its end the whole, or a half, a quarter ... of it all.
+
+        Where contact alone holds the body, loads that let it go are not tried.
+        """
         left = end - now
         sizes = [whole / 2**k for k in range(HALVINGS + 1)]
         for size in [size for size in sizes if size <= left * (1 + 1e-9)] or [left]:
             time = end if size >= left * (1 - 1e-9) else now + size
-            step = self._solve(time)
+            lost = let_go(self._grips, now, time)
+            step = self._lost(time, lost) if lost else self._solve(time)
             if step.outcome.converged or step.outcome.signal:
                 break
             logger.info("no step to %g: %s", time, step.outcome.reason)
         return step
 
+    def _lost(self, time: float, why: str) -> LoadStep:
+        """Return a step that is not taken: the last state under the loads of its end."""
+        problem = self._at(time)
+        start = problem.start() if self._last is None else self._last
+        state, outcome = measured(
+            problem, start, Outcome(NOTHING, self.method.options.allowed, why)
+        )
+        return LoadStep(problem, state, outcome, History(), Counters())
+
+    def _at(self, time: float) -> ContactProblem:
+        """Return the problem of a step that ends at a time."""
+        problem, last = self.problem, self._last
+        return problem.at(time) if last is None else after(problem, last, time)
+
     def _solve(self, time: float) -> LoadStep:
         last, method = self._last, self.method
-        problem = self.problem.at(time) if last is None else after(self.problem, last, time)
+        problem = self._at(time)
         method.turn_to(problem)
         counted = replace(method.counters)
         start = None
@@ -177,19 +197,24 @@ def check_gaps(problem: ContactProblem, times: Sequence[float]) -> None:
 def solve_step(
     problem: ContactProblem, method: Method, start: State | None
 ) -> tuple[State, Outcome]:
-    """Solve by a method, and measure what that has left. Collective.
-
-    From scratch and at the whole load, whatever the method says and wherever it has stopped.
-    """
+    """Solve by a method, and measure what that has left. Collective."""
     try:
         state, outcome = method.solve(start)
     except Interrupted as interrupt:
         state = method.state
         outcome = Outcome(NOTHING, NOTHING, str(interrupt), interrupt.number)
+    return measured(problem, state, replace(outcome, allowed=method.options.allowed))
+
+
+def measured(problem: ContactProblem, state: State, outcome: Outcome) -> tuple[State, Outcome]:
+    """Measure what a method has left, and return it as a state of the problem. Collective.
+
+    From scratch and at the whole load, whatever the method says and wherever it has stopped.
+    """
     x = problem.equilibrium.prescribe(state.x, problem.time)
     history = problem.interface.friction.history
     state = replace(state, x=x, time=problem.time, history=history)
-    return state, replace(outcome, kkt=evaluate(problem, state), allowed=method.options.allowed)
+    return state, replace(outcome, kkt=evaluate(problem, state))
 
 
 def after(problem: ContactProblem, state: State, time: float) -> ContactProblem:

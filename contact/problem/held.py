@@ -10,13 +10,11 @@ from scipy import linalg
 from contact.errors import InputError
 from contact.interface.current import Conductor
 from contact.mesh.pieces import connected_pieces
-from contact.problem.mobility import ROUNDING, Group, described, groups, middle, null_space
+from contact.problem.grip import Grip
+from contact.problem.mobility import Group, described, groups, middle, null_space
 from contact.problem.problem import ContactProblem
 from contact.problem.state import State
 from contact.typing import Array
-
-#: Directions in space, of half a turn, in which friction is asked for what it can hold.
-DIRECTIONS = 8
 
 
 def check_held(problem: ContactProblem) -> None:
@@ -44,14 +42,12 @@ def _check_group(problem: ContactProblem, group: Group) -> None:
     loose = null_space(group.held(problem.frictional))
     if loose.shape[1] > 0:
         raise InputError(_what_is_loose(problem, group, loose))
-    body = problem.equilibrium
-    loads = body.external(problem.time)
-    on_masters = loads[body.owned :]
-    own = np.where(group.inside[:, None], body.nodal(loads), 0.0).ravel()
-    work = problem.comm.allreduce(group.moved[: body.owned].T @ own, op=MPI.SUM)
-    work = work + group.moved[body.owned :].T @ on_masters
-    scale = problem.comm.allreduce(float(np.abs(own).sum()), op=MPI.SUM)
-    _check_loads(problem, work, scale + np.abs(on_masters).sum(), free, group)
+    grip = Grip.of(group)
+    if grip is not None and not grip.holds(problem.time):
+        raise InputError(
+            f"the loads pull the body off the foundation{grip.besides}, and no support holds it "
+            "there; accepted: loads that press it on, or more displacement components fixed"
+        )
 
 
 def _what_is_loose(problem: ContactProblem, group: Group, loose: Array) -> str:
@@ -154,66 +150,3 @@ def _conducts(conductor: Conductor, count: int, deep: float) -> NDArray[np.bool_
     closed = np.ones(count, dtype=bool)
     psi = conductor.psi.at(np.full(count, deep), ~closed, closed)
     return np.broadcast_to(psi, (count,)) > 0
-
-
-def _check_loads(
-    problem: ContactProblem, work: Array, scale: float, free: Array, group: Group
-) -> None:
-    """Refuse loads that no contact force can balance.
-
-    That is so where they do work on a rigid motion m on which no admissible contact force can:
-    m.nu <= -mu |m_tau| at every node (Farkas). A given friction bound, and a smoothed pressure,
-    are not bounded by the pressure at the node: such problems are left to the solver.
-
-    Parameters
-    ----------
-    problem
-        The problem.
-    work, scale
-        Of the loads on the rigid motions, shape (m,), and the size of the loads.
-    free
-        The motions that no support holds, shape (m, k).
-    group
-        Has all motions at the contact nodes.
-    """
-    friction = problem.interface.friction
-    mu = 0.0 if friction.law is None else friction.law.maximum
-    mu = problem.comm.allreduce(mu, op=MPI.MAX)
-    if not np.isfinite(mu) or not friction.local:
-        return
-    comm, work = problem.comm, work @ free
-    across = [
-        mu * np.einsum("ni,nim->nm", along, group.tangential) @ free
-        for along in _sideways(problem.nodes.normal)
-    ]
-    rows = [group.normal @ free + sign * part for part in across for sign in (-1, 1)]
-    cone = np.concatenate([problem.nodes.gather(row) for row in rows])
-    pulled = False
-    if comm.rank == 0 and np.abs(work).max() > ROUNDING * scale:
-        from scipy.optimize import linprog  # takes a while to load
-
-        motion = linprog(-work, cone, np.zeros(len(cone)), bounds=[(-1, 1)] * free.shape[1])
-        pulled = motion.status == 0 and -motion.fun > 1e-6 * scale
-    if comm.bcast(pulled):
-        moving = ", or force and moment what is rigid off the body" if group.moving else ""
-        raise InputError(
-            f"the loads pull the body off the foundation{moving}, and no support holds it there; "
-            "accepted: loads that press it on, or more displacement components fixed"
-        )
-
-
-def _sideways(normal: Array) -> list[Array]:
-    """Return tangential vectors t, shape (n, d) each, with |m_tau| <= max |m.t| for every m.
-
-    In the plane that is the unit tangent. In space they are spread over half a turn, and as long as
-    it takes: planes around the cone of friction, 2 % wider at most.
-    """
-    if normal.shape[1] == 2:
-        return [normal[:, ::-1] * [-1.0, 1.0]]
-    beside = np.eye(3)[np.argmin(np.abs(normal), axis=1)]
-    first = np.cross(normal, beside)
-    first /= np.linalg.norm(first, axis=1)[:, None]
-    second = np.cross(normal, first)
-    longer = 1 / np.cos(np.pi / (2 * DIRECTIONS))
-    angles = np.pi / DIRECTIONS * np.arange(DIRECTIONS)
-    return [longer * (np.cos(angle) * first + np.sin(angle) * second) for angle in angles]
