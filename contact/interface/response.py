@@ -115,7 +115,9 @@ class FoundationResponse:
     def _conductivity(self, x: Array, pressure: Array) -> Array:
         assert self.conductor is not None
         pressed = self._pressed(x, pressure)
-        return self.conductor.psi.at(self._penetration(x), pressed, pressure > 0)
+        # What rounding leaves of a multiplier on an open node is no pressure.
+        loaded = pressed | (self.layer_pressure(x) > 0)
+        return self.conductor.psi.at(self._penetration(x), pressed, loaded)
 
     def _pressed(self, x: Array, pressure: Array) -> NDArray[np.bool_]:
         """Tell where the rigid part presses, and u_nu = rho.

@@ -17,6 +17,7 @@ from contact.interface.response import FoundationResponse
 from forms.foundation import compliance, electric_contact
 from forms.laws import (
     Compliance,
+    PerfectConductivity,
     PotentialFactor,
     RampConductivity,
     ShiftedConductivity,
@@ -74,6 +75,20 @@ def test_block_is_the_symmetric_part_without_the_frozen_factors():
     assert np.allclose(block, block.transpose(0, 2, 1), rtol=1e-14)
     # Without dependence of h_nu on the potential and of psi on the gap nothing is left out.
     assert np.allclose(block, response.jacobian(x, np.zeros(50)), rtol=1e-14)
+
+
+def test_what_rounding_leaves_of_a_multiplier_conducts_nothing():
+    """A body that hung free was said to have a known potential, after 1e-19 of a pressure."""
+    nodes = random_nodes(3, 2, 3, np.random.default_rng(5))
+    response = FoundationResponse(nodes, None, Conductor(PerfectConductivity(0.7), 1.5), 1.0, 1.0)
+    # Open, pressed, and deep in but without a pressure: the constraint is about to press there.
+    depth = nodes.gap + np.array([-0.5, 0.0, 0.1])
+    x = np.column_stack([depth[:, None] * nodes.normal, np.zeros(3)])
+    charge = response.charge(x, np.array([1e-19, 0.1, 0.0]))
+    assert charge == pytest.approx([0.0, -0.7 * 1.5, -0.7 * 1.5], abs=0)
+    layered = replace(response, layer=Layer(0.2, Compliance(0.3), PotentialFactor(5.0, 1.0)))
+    x = np.column_stack([(nodes.gap - 0.1)[:, None] * nodes.normal, np.zeros(3)])
+    assert layered.charge(x, layered.layer_pressure(x)) == pytest.approx([-0.7 * 1.5] * 3)
 
 
 def test_the_forms_j_1_and_l_are_the_nodal_force_and_charge():
