@@ -1,39 +1,24 @@
-"""Load steps: friction remembers, methods agree, steps are halved, a state can be gone on from."""
+"""Load steps: friction remembers, methods agree, a state can be gone on from."""
 
 from dataclasses import replace
 
 import numpy as np
 import pytest
-from mpi4py import MPI
 
 from contact import build_problem, evolve, load_case
-from contact.body.amplitude import Tabulated
-from contact.body.description import Body, Fixed, Load
 from contact.case.file import parse_case
 from contact.errors import InputError
-from contact.evolving import NotConvergedError
-from contact.interface.friction import Friction
-from contact.interface.obstacle import GapFunction
-from contact.mesh.grid import rectangle
-from contact.methods.every import METHODS
-from contact.methods.options import FixedPointOptions, NewtonOptions, PenaltyOptions
-from contact.methods.report import Outcome
-from contact.methods.steps import Evolution, LoadStep
-from contact.problem.contact import Contact
+from contact.methods.options import NewtonOptions, PenaltyOptions
 from contact.problem.energy import Moment, balance, moment
-from contact.problem.kkt import KKT, evaluate
-from contact.problem.problem import ContactProblem
+from contact.problem.kkt import evaluate
 from contact.solving import solve
 from forms.hencky import Linear, Log
 from forms.laws import ConstantCoefficient, SlipCoefficient
 from scripts.cases import CASES
 from tests.problems import mechanics
-from tests.problems.mechanics import SlidingBlock, constant
+from tests.problems.mechanics import SlidingBlock
+from tests.problems.shaken import SELF, TIGHT, shaken, steps_of, times
 from tests.problems.stepped import SteppedBlock, to_and_fro
-
-SELF = MPI.COMM_SELF
-TIGHT = {"newton": NewtonOptions(tolerance=1e-12), "uzawa": FixedPointOptions(tolerance=1e-12)}
-AT_EASE = {"newton": NewtonOptions(tolerance=1e-8), "uzawa": FixedPointOptions(tolerance=1e-8)}
 
 #: The stress p mu is that of the shear 0.0175: with pushes of 0.00875 no step both sticks and
 #: slides.
@@ -48,41 +33,6 @@ BLOCKS = {
         to_and_fro(0.2, 0.1),
     ),
 }
-
-
-def steps_of(problem, times, options=TIGHT["newton"], start=None) -> list[LoadStep]:
-    """Return all steps, which have to converge."""
-    method = METHODS[options.method](problem, options, None)
-    steps = list(Evolution(problem, method, start).run(times))
-    assert all(step.outcome.converged for step in steps)
-    return steps
-
-
-#: Press, shear to and fro, unload.
-STAGES = [0.0, 1.0, 2.0, 3.0, 4.0]
-PRESS = Tabulated(tuple(STAGES), (0.0, 1.0, 1.0, 1.0, 0.1))
-SHEAR = Tabulated(tuple(STAGES), (0.0, 0.0, 1.0, -1.0, 0.0))
-
-
-def shaken(law=None, degree=1, mu=0.4, comm=SELF) -> ContactProblem:
-    """Return a block whose top is pressed down, then moved to and fro."""
-    down, along = constant(-0.01, 2), constant(0.006, 2)
-    held = [
-        Fixed("top", [None, down], amplitude=PRESS),
-        Fixed("top", [along, None], amplitude=SHEAR),
-    ]
-    return ContactProblem(
-        rectangle(comm, [0.0, 0.0], [2.0, 1.0], [16, 6]),
-        Body(law or Linear(1.0, 0.3), held),
-        Contact("bottom", GapFunction(lambda x: 0.001 * (x[:, 0] - 1) ** 2)),
-        Friction(ConstantCoefficient(mu)),
-        degree=degree,
-    )
-
-
-def times(count: int) -> list[float]:
-    """Return the ends of `count` steps in each stage."""
-    return [(k + 1) / count for k in range(count * (len(STAGES) - 1))]
 
 
 def test_the_block_slides_by_the_closed_form():
@@ -184,46 +134,6 @@ def test_penalty_comes_near():
         assert np.abs(one.state.x - two.state.x).max() < 1e-4
 
 
-@pytest.mark.parametrize("left", [1e-8, 1e-12, 1e-16, 0.0])
-def test_what_is_unloaded_to_next_to_nothing_is_as_accurate(left):
-    """Beside slips of the whole load the relaxation lost what it looked for."""
-    amplitude = Tabulated((0.0, 1.0, 2.0), (0.0, 1.0, left))
-    loads = [
-        Load("top", [constant(0.0, 2), constant(-0.01, 2)], amplitude=amplitude),
-        Load("right", [constant(0.002, 2), constant(0.0, 2)], amplitude=amplitude),
-    ]
-    problem = ContactProblem(
-        rectangle(SELF, [0.0, 0.0], [2.0, 1.0], [8, 4]),
-        Body(Linear(1.0, 0.3), [Fixed("left", [constant(0.0, 2)] * 2)], loads),
-        Contact("bottom"),
-        Friction(mu=0.3),
-    )
-    loaded = steps_of(problem, [0.5, 1.0, 1.5])[-1].state
-    newton, uzawa = (steps_of(problem, [2.0], told, loaded) for told in AT_EASE.values())
-    assert len(newton) == len(uzawa) == 1  # none was halved
-    one, two = newton[0].state, uzawa[0].state
-    size = 0.02 * left + 1e-100
-    assert np.abs(one.x - two.x).max() < 1e-6 * size
-    assert np.abs(one.forces.friction - two.forces.friction).max() < 1e-6 * size
-    assert 0.5 * left <= np.abs(one.forces.pressure).max() / 0.01 < 100 * size
-
-
-def test_a_penalised_body_that_is_unloaded_to_nothing_rests():
-    """The last step was halved again and again, and the evolution ended before."""
-    amplitude = Tabulated((0.0, 1.0, 2.0), (0.0, 1.0, 0.0))
-    pressed = Fixed("top", [constant(0.001, 2), constant(-0.002, 2)], amplitude=amplitude)
-    problem = ContactProblem(
-        rectangle(SELF, [0.0, 0.0], [1.0, 1.0], [4, 4]),
-        Body(Linear(10.0, 0.3), [pressed]),
-        Contact("bottom"),
-        Friction(mu=0.3),
-    )
-    steps = steps_of(problem, [1.0, 2.0], PenaltyOptions())
-    assert [step.state.time for step in steps] == [1.0, 2.0]
-    assert np.abs(steps[0].state.x).max() > 1e-3
-    assert np.abs(steps[-1].state.x).max() == 0
-
-
 def test_unloaded_in_one_step_or_two_is_not_the_same():
     """Friction remembers: where the load has been matters, not only where it is."""
     there = steps_of(shaken(), [1.0, 2.0, 2.5])[-1].state
@@ -262,45 +172,6 @@ def test_a_state_can_be_gone_on_from():
 def test_a_linear_body_is_factorised_once():
     steps = steps_of(shaken(), times(4))
     assert [step.counters.factorizations for step in steps] == [1] + 15 * [0]
-
-
-def failing(problem, largest: float, options=TIGHT["newton"]):
-    """Return Newton's method that fails for steps longer than `largest`."""
-
-    class Careful(type(METHODS[options.method](problem, options, None))):
-        def solve(self, start=None):
-            state, outcome = super().solve(start)
-            since = self.problem.since or 0.0
-            if self.problem.time - since > largest * (1 + 1e-9):
-                kkt = KKT(1.0, 1.0, 1.0)
-                outcome = Outcome(kkt, outcome.allowed, "too long")
-                state = replace(state, x=state.x + 1.0)
-            return state, outcome
-
-    return Careful(problem, options, None)
-
-
-@pytest.mark.parametrize("parts", [1, 2, 16])
-def test_a_step_that_fails_is_halved(parts):
-    problem = shaken()
-    steps = list(Evolution(problem, failing(problem, 1 / parts)).run([1.0, 2.0]))
-    assert all(step.outcome.converged for step in steps)
-    assert [step.state.time for step in steps] == [(k + 1) / parts for k in range(2 * parts)]
-
-
-def test_an_evolution_ends_with_what_it_has():
-    problem = shaken()
-    steps = list(Evolution(problem, failing(problem, 1 / 17)).run([0.05, 1.05, 2.0]))
-    assert [step.outcome.converged for step in steps] == [True, False]
-    assert steps[0].state.time == 0.05
-    assert steps[1].state.time == 0.05 + 1 / 16
-
-
-def test_evolve_says_that_a_step_fails():
-    options = NewtonOptions(tolerance=1e-12, max_outer=1, max_iterations=1, condense=False)
-    states = evolve(shaken(), [1.0, 2.0], options)
-    with pytest.raises(NotConvergedError, match=r"no step to 0\.0625: .*"):
-        list(states)
 
 
 @pytest.mark.parametrize("ends", [[1.0, 1.0], [0.0, 1.0], [1.0, np.nan], [2.0, 1.0]])

@@ -5,14 +5,12 @@ from typing import Any
 
 import numpy as np
 import pytest
-from mpi4py import MPI
 
 from contact import (
     Body,
     Cone,
     Contact,
     Cylinder,
-    Domain,
     Electrode,
     Fixed,
     Friction,
@@ -35,21 +33,7 @@ from contact import (
     parse_case,
     solve,
 )
-from contact.mesh.grid import rectangle
-
-LAW = Linear(10.0, 0.3)
-TOP = Fixed("top", [0.0, -0.005])
-
-
-def block() -> Domain:
-    return rectangle(MPI.COMM_WORLD, (0.0, 0.0), (2.0, 1.0), (8, 4))
-
-
-def problem(
-    *fixed: Any, loads: Any = (), contact: Any = None, law: Any = LAW, **more: Any
-) -> Problem:
-    domain, contact = block(), Contact("bottom") if contact is None else contact
-    return Problem(domain, Body(law, fixed or (TOP,), loads, **more), contact)
+from tests.problems.put_together import LAW, TOP, block, problem
 
 
 def hole(x: Any) -> Any:
@@ -258,51 +242,3 @@ def test_what_agrees_is_accepted() -> None:
     start = solve(problem(), start=plain)
     assert len(start.history.records) <= len(plain.history.records)
     assert start.contact_force == pytest.approx(plain.contact_force)
-
-
-def test_the_words_of_the_case_file() -> None:
-    given = {"traction": [0.0, 0.001]}
-    assert Load("right", **given) == Load("right", force=[0.0, 0.001])
-    assert Load(body_force=[0.0, 0.001]) == Load(None, [0.0, 0.001])
-    assert Load(None, body_charge=2.0) == Load(None, charge=2.0)
-    x = problem(contact=Contact("bottom", gap=0.002)).nodes.gap
-    assert x == pytest.approx(0.002)
-
-
-def test_an_interference_by_a_gap() -> None:
-    pressed = solve(
-        problem(Fixed("top", [0.0, 0.0]), contact=Contact("bottom", -0.001, press=True))
-    )
-    moved = solve(problem(Fixed("top", [0.0, -0.001])))
-    assert pressed.contact_force == pytest.approx(moved.contact_force, rel=1e-6)
-
-
-def test_steps_of_a_problem() -> None:
-    """They are those that `evolve` gives, and their rows say what they have come to."""
-    made = problem(Fixed("top", [lambda x: 1e-3 * x[0], -0.005]))
-    friction = Problem(made.domain, made.body, Contact("bottom"), Friction(mu=0.2))
-    times = [0.5, 1.0]
-    states = list(evolve(friction, times))
-    solution = solve(friction, times=times)
-    assert [step.row["t"] for step in solution.steps] == times
-    assert solution.state.near(states[-1], atol=1e-9)
-    force = solution.steps[-1].row["contact_force_y"]
-    assert force == pytest.approx(solution.contact_force[1])
-    assert solution.movements == {}
-    assert solution.charges is None
-
-
-def test_materials_of_keys() -> None:
-    """They are those of a case with the same keys; a list of them makes a body."""
-    keys = {"name": "PZT-4", "units": "GPa", "poling": 30.0}
-    given = make_material(2, **keys)
-    potential = {"on": "bottom", "potential": 0.0}
-    mesh = {"generator": "rectangle", "size": [2.0, 1.0], "cells": [8, 4]}
-    fixed = [{"on": "top", "displacement": [0, -0.005], "potential": 0.01}, potential]
-    case = {"mesh": mesh, "material": keys, "fixed": fixed, "contact": {"on": "bottom"}}
-    plain = solve(parse_case(case))
-    body = Body([given], [Fixed("top", [0, -0.005], 0.01), Fixed("bottom", potential=0.0)])
-    same = solve(Problem(block(), body, Contact("bottom")))
-    assert same.contact_force == pytest.approx(plain.contact_force, rel=1e-10)
-    assert same.charges is not None
-    assert same.charges.electrodes == pytest.approx(plain.charges.electrodes, rel=1e-8)

@@ -1,0 +1,53 @@
+"""Load steps that fail: they are halved, and an evolution ends with what it has."""
+
+from dataclasses import replace
+
+import pytest
+
+from contact import evolve
+from contact.evolving import NotConvergedError
+from contact.methods.every import METHODS
+from contact.methods.options import NewtonOptions
+from contact.methods.report import Outcome
+from contact.methods.steps import Evolution
+from contact.problem.kkt import KKT
+from tests.problems.shaken import TIGHT, shaken
+
+
+def failing(problem, largest: float, options=TIGHT["newton"]):
+    """Return Newton's method that fails for steps longer than `largest`."""
+
+    class Careful(type(METHODS[options.method](problem, options, None))):
+        def solve(self, start=None):
+            state, outcome = super().solve(start)
+            since = self.problem.since or 0.0
+            if self.problem.time - since > largest * (1 + 1e-9):
+                kkt = KKT(1.0, 1.0, 1.0)
+                outcome = Outcome(kkt, outcome.allowed, "too long")
+                state = replace(state, x=state.x + 1.0)
+            return state, outcome
+
+    return Careful(problem, options, None)
+
+
+@pytest.mark.parametrize("parts", [1, 2, 16])
+def test_a_step_that_fails_is_halved(parts):
+    problem = shaken()
+    steps = list(Evolution(problem, failing(problem, 1 / parts)).run([1.0, 2.0]))
+    assert all(step.outcome.converged for step in steps)
+    assert [step.state.time for step in steps] == [(k + 1) / parts for k in range(2 * parts)]
+
+
+def test_an_evolution_ends_with_what_it_has():
+    problem = shaken()
+    steps = list(Evolution(problem, failing(problem, 1 / 17)).run([0.05, 1.05, 2.0]))
+    assert [step.outcome.converged for step in steps] == [True, False]
+    assert steps[0].state.time == 0.05
+    assert steps[1].state.time == 0.05 + 1 / 16
+
+
+def test_evolve_says_that_a_step_fails():
+    options = NewtonOptions(tolerance=1e-12, max_outer=1, max_iterations=1, condense=False)
+    states = evolve(shaken(), [1.0, 2.0], options)
+    with pytest.raises(NotConvergedError, match=r"no step to 0\.0625: .*"):
+        list(states)

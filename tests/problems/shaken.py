@@ -1,0 +1,55 @@
+"""A block whose top is pressed down, moved to and fro and unloaded, and its load steps."""
+
+from mpi4py import MPI
+
+from contact.body.amplitude import Tabulated
+from contact.body.description import Body, Fixed
+from contact.interface.friction import Friction
+from contact.interface.obstacle import GapFunction
+from contact.mesh.grid import rectangle
+from contact.methods.every import METHODS
+from contact.methods.options import FixedPointOptions, NewtonOptions
+from contact.methods.steps import Evolution, LoadStep
+from contact.problem.contact import Contact
+from contact.problem.problem import ContactProblem
+from forms.hencky import Linear
+from forms.laws import ConstantCoefficient
+from tests.problems.mechanics import constant
+
+SELF = MPI.COMM_SELF
+TIGHT = {"newton": NewtonOptions(tolerance=1e-12), "uzawa": FixedPointOptions(tolerance=1e-12)}
+
+
+def steps_of(problem, times, options=TIGHT["newton"], start=None) -> list[LoadStep]:
+    """Return all steps, which have to converge."""
+    method = METHODS[options.method](problem, options, None)
+    steps = list(Evolution(problem, method, start).run(times))
+    assert all(step.outcome.converged for step in steps)
+    return steps
+
+
+#: Press, shear to and fro, unload.
+STAGES = [0.0, 1.0, 2.0, 3.0, 4.0]
+PRESS = Tabulated(tuple(STAGES), (0.0, 1.0, 1.0, 1.0, 0.1))
+SHEAR = Tabulated(tuple(STAGES), (0.0, 0.0, 1.0, -1.0, 0.0))
+
+
+def shaken(law=None, degree=1, mu=0.4, comm=SELF) -> ContactProblem:
+    """Return a block whose top is pressed down, then moved to and fro."""
+    down, along = constant(-0.01, 2), constant(0.006, 2)
+    held = [
+        Fixed("top", [None, down], amplitude=PRESS),
+        Fixed("top", [along, None], amplitude=SHEAR),
+    ]
+    return ContactProblem(
+        rectangle(comm, [0.0, 0.0], [2.0, 1.0], [16, 6]),
+        Body(law or Linear(1.0, 0.3), held),
+        Contact("bottom", GapFunction(lambda x: 0.001 * (x[:, 0] - 1) ** 2)),
+        Friction(ConstantCoefficient(mu)),
+        degree=degree,
+    )
+
+
+def times(count: int) -> list[float]:
+    """Return the ends of `count` steps in each stage."""
+    return [(k + 1) / count for k in range(count * (len(STAGES) - 1))]
