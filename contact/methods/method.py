@@ -15,8 +15,8 @@ class Method(Protocol):
 
     A new one is a class with these that is made of a problem, its options and a monitor; its
     options, with an entry in `contact.methods.options.OPTIONS`; and an entry in
-    `contact.methods.every.METHODS`. One that uses others makes their options by `with_method`, and
-    hands on the monitor, the counters and the records of all of them.
+    `contact.methods.every.METHODS`. One that uses others makes their options by `with_method`,
+    hands the monitor and the counters on to them, and its history has the records of all of them.
     """
 
     @property

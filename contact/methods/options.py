@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, TypeVar
 
 from annotated_types import Ge, Gt, Le, Lt
 
@@ -209,7 +209,10 @@ OPTIONS: Mapping[str, type[Options]] = {
 }
 
 
-def with_method(options: Options, method: str, **changes: Any) -> Options:
+Told = TypeVar("Told", bound=Options)
+
+
+def with_method(options: Options, method: type[Told], **changes: Any) -> Told:
     """Return the options of a method with those settings of another's that both have.
 
     Parameters
@@ -217,10 +220,9 @@ def with_method(options: Options, method: str, **changes: Any) -> Options:
     options
         Options of any method.
     method
-        Name of the method to be told.
+        Class of the options of the method to be told.
     changes
         Further settings of that method.
     """
-    other = OPTIONS[method]
-    shared = {f.name for f in fields(other)} & {f.name for f in fields(options)} - {"method"}
-    return other(method=method, **{key: getattr(options, key) for key in shared} | changes)
+    shared = {f.name for f in fields(method)} & {f.name for f in fields(options)} - {"method"}
+    return method(**{key: getattr(options, key) for key in shared} | changes)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from contact.linear.operator import Counters
 from contact.methods.fixed_point import FixedPoint
-from contact.methods.options import FixedPointOptions
+from contact.methods.options import FixedPointOptions, with_method
 from contact.methods.report import Outcome, Record
 from contact.methods.search import Search
 from contact.methods.step import Iterate
@@ -20,11 +20,8 @@ def block_relaxation(search: Search, counters: Counters) -> tuple[Iterate, Outco
         search.see(Iterate(relaxed.state), record.kkt)
         search.history.record(record.kkt, BLOCK_RELAXATION, record.inner)
 
-    options = FixedPointOptions(
-        tolerance=search.options.tolerance,
-        max_outer=min(FixedPointOptions.max_outer, search.left),
-        linear=search.options.linear,
-    )
+    limit = min(FixedPointOptions.max_outer, search.left)
+    options = with_method(search.options, FixedPointOptions, max_outer=limit)
     relaxed = FixedPoint(search.problem, options, note, counters, search.history.poll)
     state, outcome = relaxed.solve()
     return Iterate(state), outcome

@@ -15,7 +15,7 @@ from itertools import groupby
 import numpy as np
 
 from contact import Solution, build_problem
-from contact.methods.options import Options, PenaltyOptions, with_method
+from contact.methods.options import FixedPointOptions, Options, PenaltyOptions, with_method
 from scripts.reporting import Report, append, observed_orders, parser
 from scripts.studies.agreement_examples import TOLERANCE, Example, examples
 from scripts.studies.branches import AGREE, DISTURBANCE, SOLVES, Branches
@@ -78,7 +78,7 @@ def compare(example: Example, coarse: bool) -> Compared:
 
 def relaxed(newton: Options) -> Options:
     """Return the settings of block relaxation: hundreds of solves by one factorisation."""
-    return with_method(newton, "uzawa", linear="lu")
+    return with_method(newton, FixedPointOptions, linear="lu")
 
 
 def penalised(branches: Branches, solution: Solution, eps: float) -> Options:

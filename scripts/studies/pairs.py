@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from contact import parse_case, solve
-from contact.methods.options import with_method
+from contact.methods.options import FixedPointOptions, with_method
 
 #: Largest difference of the displacements, relative to the largest of them, that agrees.
 AGREES = 1e-7
@@ -68,7 +68,7 @@ def converges(given: Mapping[str, Any], compared: bool) -> tuple[bool, str]:
     words = f"{len(solution.history.records)} iterations, {solution.outcome.reason}"
     if not solution.converged or not compared:
         return solution.converged, words
-    other = solve(case, with_method(case.solver, "uzawa"))
+    other = solve(case, with_method(case.solver, FixedPointOptions))
     size = np.abs(solution.state.x).max()
     apart = float(np.abs(other.state.x - solution.state.x).max() / size)
     agrees = other.converged and apart <= AGREES

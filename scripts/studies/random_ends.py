@@ -27,7 +27,7 @@ import numpy as np
 from contact import Case, Solution, build_problem, solve_problem
 from contact.case.file import parse_case
 from contact.methods.interrupt import Terminated, ending_on_signal
-from contact.methods.options import Options, with_method
+from contact.methods.options import OPTIONS, Options, with_method
 from contact.output.files import write_outputs
 from contact.output.options import OutputOptions
 from contact.problem.kkt import evaluate
@@ -70,7 +70,7 @@ def draws(count: int) -> list[tuple[Case, Options]]:
         case, method = drawn[number], str(rng.choice(METHODS))
         limit = int(rng.choice([1, 2, 3, 5, 8, 20]))
         linear = str(rng.choice(SOLVERS))
-        settings = with_method(case.solver, method)
+        settings = with_method(case.solver, OPTIONS[method])
         found.append((case, replace(settings, max_outer=limit, linear=linear)))
     return found
 

@@ -17,7 +17,7 @@ from mpi4py import MPI
 
 from contact import Solution, build_problem, solve_problem
 from contact.case.file import Case, parse_case
-from contact.methods.options import with_method
+from contact.methods.options import OPTIONS, with_method
 from scripts.reporting import Report, append, parser
 from scripts.studies import hard_problems
 
@@ -226,7 +226,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
         problem, first = build_problem(case), None
         for method in given.methods:
             begin = time.perf_counter()
-            settings = with_method(case.solver, method)
+            settings = with_method(case.solver, OPTIONS[method])
             solution = solve_problem(problem, settings)
             notes = {r.note for r in solution.history.records}
             for word in ("kept", "lengthened", "tangent", "taken back"):  # of the method itself

@@ -150,7 +150,7 @@ BAD = {
         {"material__law": "linear", "material__argument": "square"},
         'argument with law = "log"',
     ),
-    "method": ({"solver__method": "newtn"}, '"uzawa", "penalty" or "newton"'),
+    "method": ({"solver__method": "newtn"}, 'solver.method: given "newtn"; accepted: "uzawa", '),
     "setting of another method": (
         {"solver__r": 25},
         'solver.r: given 25; accepted: r with method = "uzawa"',

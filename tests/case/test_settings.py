@@ -27,7 +27,7 @@ def test_the_settings_of_a_method_are_its_options(method):
     assert solver == OPTIONS[method]()
     given = OPTIONS[method](tolerance=1e-18)  # not looked at, in Python
     assert parse_case(changed(solver=given)).solver is given
-    assert with_method(given, "newton") == NewtonOptions(tolerance=1e-18)
+    assert with_method(given, NewtonOptions) == NewtonOptions(tolerance=1e-18)
 
 
 def test_the_resolved_case_holds_what_the_method_reads():

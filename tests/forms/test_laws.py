@@ -28,6 +28,7 @@ FRICTION = [
     SlipCoefficient(0.5, -0.2, 10.0),
     SlipCoefficient(0.5, 0.2, 0.0),
 ]
+LAWS = [Coulomb(SlipCoefficient(0.5, 0.2, 10.0)), Tresca(np.array([0.1, 0.4]))]
 #: Law, kinks.
 OTHERS = [
     (Truncation(0.5), (-0.5, 0.5)),
@@ -74,9 +75,7 @@ def test_a_coefficient_may_differ_from_node_to_node():
     assert ConstantCoefficient(np.array([])).maximum == 0.0  # a rank without contact nodes
 
 
-@pytest.mark.parametrize(
-    "law", [Coulomb(SlipCoefficient(0.5, 0.2, 10.0)), Tresca(np.array([0.1, 0.4]))], ids=name
-)
+@pytest.mark.parametrize("law", LAWS, ids=name)
 def test_friction_laws_know_their_derivatives(law):
     slip, pressure, h = np.array([0.02, 0.3]), np.array([0.5, 2.0]), 1e-6
     by_slip = (law(slip + h, pressure) - law(slip - h, pressure)) / (2 * h)

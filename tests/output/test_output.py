@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from contact.methods.options import with_method
+from contact.methods.options import OPTIONS, with_method
 from contact.output.files import write_outputs
 from contact.output.options import OutputOptions
 from contact.output.table import contact_table, csv_columns, tangent_of
@@ -165,7 +165,7 @@ def test_outputs_are_replaced(shared_tmp_path: Path) -> None:
 def test_ranks_without_cells_write_and_draw_too(method: str, shared_tmp_path: Path) -> None:
     """Two triangles: with three ranks one has none."""
     case = block(2, mesh={"generator": "rectangle", "size": [1.0, 1.0], "cells": [1, 1]})
-    solution = solve(case, with_method(case.solver, method))
+    solution = solve(case, with_method(case.solver, OPTIONS[method]))
     assert solution.converged
     summary, rows = written(solution, shared_tmp_path, figures=True)
     assert summary["cells"] == 2
