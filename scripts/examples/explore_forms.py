@@ -24,18 +24,27 @@ import matplotlib.pyplot as plt
 import numpy as np
 import ufl
 
-from forms.foundation import augmented_lagrangian
+from forms.foundation import (
+    augmented_lagrangian,
+    auxiliary_load,
+    compliance,
+    electric_contact,
+    penalty,
+    penalty_friction,
+    penalty_pressure,
+)
 from forms.hencky import Linear, Log, energy_density, secant_form
-from forms.kinematics import strain
+from forms.kinematics import normal_part, strain, tangential_part
 from forms.laws import (
     Compliance,
     PotentialFactor,
     RampConductivity,
     ShiftedConductivity,
     SlipCoefficient,
+    Truncation,
 )
 from forms.monotonicity import check_monotonicity
-from forms.piezo import hexagonal, saddle_form, symmetrised_form
+from forms.piezo import coupling_number, hexagonal, saddle_form, symmetrised_form
 
 # %% [markdown]
 # ## Printing a form
@@ -121,14 +130,71 @@ axes.set(xlabel="mode", ylabel="eigenvalue")
 _ = axes.legend()
 
 # %% [markdown]
+# ## What the foundation does
+#
+# The integrands of section 3.4 on $\Gamma_3$, here the whole boundary. Step 1 of Algorithm 2
+# balances where its auxiliary unknowns are those of the body: its two sides differ by the
+# multipliers alone.
+
+# %%
+nu, r, eps = ufl.FacetNormal(square), 25.0, 1e-3
+normal, along, none = normal_part(u, nu), tangential_part(u, nu), ufl.zero(2)
+left_side = vector(augmented_lagrangian(u, w, nu, r) * ufl.ds)
+right_side = vector(auxiliary_load(normal, along, ufl.zero(), none, w, nu, r) * ufl.ds)
+assert np.linalg.norm(left_side - right_side) < 1e-13 * np.linalg.norm(left_side)
+
+# %% [markdown]
+# The penalty $\Phi/\varepsilon$ of (4.32) is the derivative of an energy. The regularised
+# friction $J_\varepsilon$ of (4.33) is symmetric as long as its modulus is frozen. Its
+# derivative is not: the bound follows the pressure, as Coulomb's does.
+
+# %%
+gap = ufl.as_ufl(0.01)
+contact = penalty(u, w, nu, gap, eps) * ufl.ds
+pressed = ufl.conditional(ufl.gt(normal, gap), normal - gap, 0.0)
+by_ufl = vector(ufl.derivative(pressed**2 / (2 * eps) * ufl.ds, u, w))
+assert np.linalg.norm(vector(contact) - by_ufl) < 1e-12 * np.linalg.norm(by_ufl)
+bound = 0.3 * penalty_pressure(normal, gap, eps)
+frozen_friction = matrix(penalty_friction(u, v, w, nu, bound, eps) * ufl.ds)
+friction = ufl.derivative(penalty_friction(u, u, w, nu, bound, eps) * ufl.ds, u, v)
+print(f"friction, frozen: asymmetry {asymmetry(frozen_friction):.1e}")
+print(f"its derivative:   asymmetry {asymmetry(matrix(friction)):.2f}")
+assert asymmetry(frozen_friction) < 1e-14
+
+# %% [markdown]
+# The layer $j_1$ of section 6.2 presses the harder the further the potential is from that of the
+# foundation; the current $l$ of (5.11) flows where the gap is nearly closed. Far in contact the
+# charge is that of a plate: $k_e (\varphi - \varphi_F)$ times the area.
+
+# %%
+layer, grows = Compliance(0.5), PotentialFactor(1.0, 2.0, 0.6)
+press = [
+    vector(compliance(u, w, nu, layer, grows, gap, ufl.as_ufl(s)) * ufl.ds) for s in (0.0, 0.6)
+]
+print(f"the layer presses {np.linalg.norm(press[1]) / np.linalg.norm(press[0]):.1f} times as hard")
+potentials = fem.functionspace(square, ("Lagrange", 1))
+phi, xi = fem.Function(potentials), ufl.TestFunction(potentials)
+phi.x.array[:] = 3.0
+psi, phi_l = ShiftedConductivity(2.0, 4.0), Truncation(np.inf)
+flow = electric_contact(nu, phi, xi, nu, psi, phi_l, gap, 1.0)  # u = nu, far in contact
+charge = vector(flow * ufl.ds).sum()
+print(f"charge {charge:.3f}: 2 (3 - 1) on four sides")
+assert np.isclose(charge, 16.0)
+
+# %% [markdown]
 # ## Piezoelectric bodies
 #
 # The saddle form of (5.16) is positive and not symmetric; with the electric test function
 # negated, (5.27), it is symmetric and indefinite.
 
 # %%
-material = hexagonal(-5.4, 15.8, 12.3, 8.1387, 7.3746).in_plane()
+crystal = hexagonal(-5.4, 15.8, 12.3, 8.1387, 7.3746)
+material = crystal.in_plane()
 ceramic = Linear(58.7102, 0.3)
+# In the plane the crystal is poled along y; how strongly it couples does not depend on that.
+assert np.allclose(material.e, crystal.poled_along([0.0, 1.0, 0.0]).e)
+assert np.isclose(coupling_number(ceramic, material), coupling_number(ceramic, crystal))
+print(f"without electrodes it is up to {coupling_number(ceramic, crystal):.0%} stiffer")
 mixed = fem.functionspace(square, ("Lagrange", 1, (3,)))
 x, y, z = fem.Function(mixed), ufl.TrialFunction(mixed), ufl.TestFunction(mixed)
 
