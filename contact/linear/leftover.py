@@ -73,9 +73,10 @@ class Leftover:
     def _add(self, at: NDArray[np.int64], begin: int, rows: Array) -> None:
         k, here = self._kept.shape[0], at[begin : begin + len(rows)]
         split, above = np.searchsorted(at, k), np.searchsorted(here, k)
-        self._kept[np.ix_(here[:above], at[:split])] += rows[:above, :split]
-        self._coupling[np.ix_(here[:above], at[split:] - k)] += rows[:above, split:]
-        self._among[np.ix_(here[above:] - k, at[split:] - k)] += rows[above:, split:]
+        # Matrix and share are symmetric: rows are added as columns, which lie together.
+        self._kept.T[np.ix_(here[:above], at[:split])] += rows[:above, :split]
+        self._coupling.T[np.ix_(here[above:] - k, at[:split])] += rows[above:, :split]
+        self._among.T[np.ix_(here[above:] - k, at[split:] - k)] += rows[above:, split:]
 
     def eliminate(self) -> Array:
         """Return what is left of the kept unknowns once the others are eliminated.

@@ -60,6 +60,51 @@ def _farthest_first(
     return unknowns[inside[unknowns]]
 
 
+def _staying(
+    matrix: PETSc.Mat,
+    rows: NDArray[np.int64],
+    columns: NDArray[np.int32],
+    kept: NDArray[np.int32],
+) -> NDArray[np.bool_]:
+    """Return which owned unknowns have to stay beside the kept ones, as others know of them.
+
+    Of two coupled unknowns of different ranks one stays: that which knows more of other ranks', or
+    else that of the higher rank. Those at a cut know both sides, whoever owns them: hardly any
+    other one stays. Collective.
+
+    Parameters
+    ----------
+    matrix
+        The matrix.
+    rows, columns
+        Owned rows and their columns, of all entries.
+    kept
+        Owned unknowns that are kept anyway.
+    """
+    begin, end = matrix.getOwnershipRange()
+    outside = (columns < begin) | (columns >= end)
+    others = np.bincount(rows[outside], minlength=end - begin).astype(float)
+    others[kept] = np.inf
+    vector = matrix.createVecRight()
+    vector.array[:] = others
+    of_columns = _values(vector, columns[outside])
+    own = others[rows[outside]]
+    less = (of_columns < own) | ((of_columns == own) & (columns[outside] < begin))
+    staying = np.zeros(end - begin, dtype=bool)
+    staying[rows[outside][less]] = True
+    staying[kept] = False
+    return staying
+
+
+def _values(vector: PETSc.Vec, at: NDArray[np.int32]) -> Array:
+    """Return a vector's values at places of any ranks. Collective."""
+    places, back = np.unique(at, return_inverse=True)
+    here = PETSc.Vec().createSeq(places.size, comm=PETSc.COMM_SELF)
+    where = PETSc.IS().createGeneral(places.astype(PETSc.IntType), PETSc.COMM_SELF)
+    PETSc.Scatter().create(vector, where, here, None).scatter(vector, here)
+    return np.asarray(here.array)[back]
+
+
 class SchurComplement:
     """A symmetric matrix reduced to kept unknowns.
 
@@ -77,11 +122,8 @@ class SchurComplement:
         self.comm = lasting(matrix.getComm().tompi4py())
         begin, end = matrix.getOwnershipRange()
         starts, columns, _ = matrix.getValuesCSR()
-        shared = np.zeros(end - begin, dtype=bool)
-        # Of two coupled unknowns of different ranks one has to stay: that of the higher rank.
         rows = np.repeat(np.arange(end - begin), np.diff(starts))
-        shared[rows[columns < begin]] = True
-        shared[kept] = False
+        shared = _staying(matrix, rows, columns, kept)
         inside = np.ones(end - begin, dtype=bool)
         inside[kept] = inside[shared] = False
         self._inside = _farthest_first(rows, columns - begin, inside, matrix.getBlockSize())

@@ -12,6 +12,7 @@ from mpi4py import MPI
 from contact.errors import InputError
 from contact.mesh.domain import Domain, exterior_facets, with_names
 from contact.mesh.rotation import rotate
+from contact.mesh.shares import grid_partitioner
 
 #: Sides of the generators: name -> (axis, end), end 0 at the lower coordinate.
 RECTANGLE_SIDES = {"left": (0, 0), "right": (0, 1), "bottom": (1, 0), "top": (1, 1)}
@@ -111,7 +112,7 @@ def rectangle(
         comm,
         grid[:2],
         list(cells),
-        ghost_mode=dmesh.GhostMode.none,
+        partitioner=grid_partitioner(cells, size),
         diagonal=kinds[diagonal],
     )
     domain = _name_grid(mesh, grid, chosen)
@@ -142,7 +143,7 @@ def box(
     grid, chosen = plan("box", origin, size, cells, parts or {})
     if np.shape(axis) != (3,) or not np.linalg.norm(axis) > 0.0:
         raise InputError(f"mesh axis must be 3 numbers, not all zero; given: {axis}")
-    mesh = dmesh.create_box(comm, grid[:2], list(cells), ghost_mode=dmesh.GhostMode.none)
+    mesh = dmesh.create_box(comm, grid[:2], list(cells), partitioner=grid_partitioner(cells, size))
     domain = _name_grid(mesh, grid, chosen)
     rotate(mesh, rotation, axis)
     return domain

@@ -48,6 +48,17 @@ def test_condensing_and_expanding_solves_the_whole_system(cells):
     assert np.allclose(found, whole, rtol=0, atol=1e-9 * largest)
 
 
+@pytest.mark.parallel
+def test_hardly_more_stays_between_ranks_than_the_cuts():
+    problem = mechanics.bar(WORLD, 16, law=Linear(1.0, 0.3))
+    matrix = problem.equilibrium.create_matrix()
+    problem.equilibrium.assemble(matrix, "secant", problem.equilibrium.rest())
+    kept = (problem.nodes.nodes[:, None] * 2 + np.arange(2, dtype=np.int32)).ravel()
+    schur = SchurComplement(matrix, kept, "contact_")
+    # 17 nodes across the bar, of which one is kept.
+    assert schur.dense_size - schur.size <= 1.15 * 32 * (WORLD.size - 1)
+
+
 @pytest.mark.parametrize("few", [1, 5, 10])
 def test_few_unknowns_are_eliminated_beside_many_that_are_kept(few):
     """MUMPS's own estimate of its workspace is too small there."""
