@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from dolfinx.common import IndexMap
@@ -116,7 +117,7 @@ def _side_by_side(pieces: Sequence[ContactNodes]) -> ContactNodes:
     first = pieces[0]
     if len(pieces) == 1:
         return first
-    together = {
+    together: dict[str, Any] = {
         name: np.concatenate([getattr(nodes, name) for nodes in pieces])
         for name in ("nodes", "points", "weight", "normal", "tangent", "gap")
     }

@@ -46,9 +46,8 @@ class KeptUnknowns:
             _, here = owned_among(layout.index_map, change.nodes)
             nodes = np.concatenate([coupled, np.setdiff1d(here, coupled)])
         size = layout.block_size
-        self.unknowns: NDArray[np.int32] = (
-            nodes[:, None] * size + np.arange(size, dtype=np.int32)
-        ).ravel()
+        own = np.arange(size, dtype=np.int32)
+        self.unknowns: NDArray[np.int32] = (nodes[:, None] * np.int32(size) + own).ravel()
         self.offset = size * sum(comm.allgather(coupled.size)[: comm.rank])
         is_jump = np.arange(nodes.size) < coupled.size
         jumps = np.repeat(np.concatenate(comm.allgather(is_jump)), size)

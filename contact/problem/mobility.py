@@ -97,10 +97,12 @@ def groups(problem: ContactProblem) -> Iterator[Group]:
     """
     piece, count = connected_pieces(problem.equilibrium.space)
     joined = _joined(problem, piece, count)
-    for k in np.flatnonzero(~joined):
+    for k in map(int, np.flatnonzero(~joined)):
         yield _group(problem, piece, [k], count)
     if joined.any():
-        yield _group(problem, piece, [*np.flatnonzero(joined)], count, _free_motions(problem))
+        yield _group(
+            problem, piece, [*map(int, np.flatnonzero(joined))], count, _free_motions(problem)
+        )
 
 
 def held_by_friction(problem: ContactProblem) -> bool:
@@ -131,7 +133,7 @@ def _free_motions(problem: ContactProblem) -> dict[int, str]:
         member.begin + k: f"{NAMES[problem.dim][k]} of what is rigid"
         for member in problem.equilibrium.masters.members
         if isinstance(member.what, Rigid)
-        for k in np.flatnonzero(member.free)
+        for k in map(int, np.flatnonzero(member.free))
     }
 
 

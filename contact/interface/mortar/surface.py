@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, fields, replace
+from typing import Any
 
 import basix
 import numpy as np
@@ -64,7 +65,7 @@ class Surface:
 
     def gathered(self, comm: MPI.Intracomm) -> Surface:
         """Return the facets of all ranks. Collective."""
-        arrays = {
+        arrays: dict[str, Any] = {
             f.name: np.concatenate(comm.allgather(getattr(self, f.name)))
             for f in fields(self)
             if f.name not in ("degree", "revolved")

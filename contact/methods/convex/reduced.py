@@ -104,7 +104,7 @@ class Reduced:
             raise NotConvexError("the stiffness has no positive diagonal")
         size = np.sqrt(size)
         factor = cholesky(self._ordered(order, size))
-        self._split = np.count_nonzero(left)
+        self._split = int(np.count_nonzero(left))
         definite = factor is not None and _count_free(_lowest(factor)[0]) == 0
         if definite:
             assert factor is not None

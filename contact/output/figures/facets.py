@@ -10,6 +10,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure
+from numpy.typing import NDArray
 
 from contact.output.figures.contact import BLUE, NARROW, ORANGE, UNNAMED, ZONES, fitted
 from contact.output.surface import STATUS
@@ -212,7 +213,7 @@ def _shown(surface: VTU, flat: Array) -> tuple[Array, Array]:
     return flat.min(axis=0) - margin, flat.max(axis=0) + margin
 
 
-def _thinned(flat: Array, count: int) -> Array:
+def _thinned(flat: Array, count: int) -> NDArray[np.intp]:
     """Return the first point of each cell of a grid of count x count cells."""
     span = np.ptp(flat, axis=0).max() or 1.0
     cells = np.floor((flat - flat.min(axis=0)) / span * count)
