@@ -23,12 +23,12 @@ from petsc4py import PETSc
 from ufl.core.expr import Expr
 
 from contact.body.description import Body
-from contact.body.field_norms import field_norms
 from contact.body.internal import InternalForces
 from contact.body.loads import Loads
 from contact.body.masters import make_masters
 from contact.body.materials import cells_of
 from contact.body.operators import WholeOperator, make_operator
+from contact.body.shares import shares_of
 from contact.body.supports import free_components, supports_of, without_field
 from contact.body.weak_forms import WeakForms
 from contact.errors import InputError
@@ -81,6 +81,8 @@ class BodyEquilibrium:
         #: Which unknowns of the owned nodes no support holds, shape (nodes, block size).
         self.unsupported = free_components(self.space, self.supports)
         self.masters = make_masters(domain, self.space, body, self.unsupported)
+        #: Which forces are compared with each other.
+        self.shares = shares_of(domain, self.space, self.masters, self.dim)
         self.layout = Layout(
             domain.comm,
             index_map,
@@ -142,12 +144,6 @@ class BodyEquilibrium:
     def motion(self, values: Array) -> Array:
         """Return what belongs to the global unknowns, shape (m,)."""
         return values[values.size - self.masters.size :]
-
-    @property
-    def mechanical(self) -> NDArray[np.bool_]:
-        """Which of owned values, global ones behind them, are displacements or forces."""
-        nodal = np.tile(np.arange(self.block_size) < self.dim, self.free.shape[0])
-        return np.concatenate([nodal, self.masters.mechanical])
 
     def owned_part(self, x: Array) -> Array:
         """Return the owned ones of local unknowns, and the global ones behind them."""
@@ -282,8 +278,8 @@ class BodyEquilibrium:
         return np.asarray(own + ones[behind:].T @ others[behind:])
 
     def sizes(self, values: Array) -> Array:
-        """Return the norms of forces and, with a potential, of charges apart. Collective."""
-        return field_norms(self, values)
+        """Return the norms of forces, and of charges, of each piece apart. Collective."""
+        return self.shares.sizes(values)
 
     def load_sizes(self, time: float = 1.0) -> Array:
         """Return the `sizes` of the nodal loads at a time. Collective."""
@@ -292,9 +288,9 @@ class BodyEquilibrium:
     def exchanged(self, x: Array) -> Array:
         """Return the `sizes` of the potential's forces and the strain's charges. Collective."""
         if not self.piezoelectric:
-            return np.zeros(1)
+            return np.zeros((1, self.shares.count))
         alone = x.copy()
         self.nodal(alone)[:, : self.dim] = 0.0
         of_potential = self.internal_forces(alone)
         of_strain = self.internal_forces(x) - of_potential
-        return self.sizes(np.where(self.mechanical, of_potential, of_strain))
+        return self.sizes(np.where(self.shares.mechanical, of_potential, of_strain))

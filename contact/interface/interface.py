@@ -40,6 +40,9 @@ class Interface:
         of what touches.
     size
         Largest extent of the body (length).
+    piece, pieces
+        The piece of the body that each contact node belongs to, shape (n,), and how many there are
+        (`contact.body.shares`).
     """
 
     jump: ContactNodes
@@ -48,6 +51,8 @@ class Interface:
     held: HeldCurrent | None
     stiffness: float
     size: float
+    piece: NDArray[np.intp]
+    pieces: int
 
     @property
     def comm(self) -> MPI.Intracomm:
@@ -67,6 +72,25 @@ class Interface:
             friction=replace(self.friction, history=history),
             held=None if self.held is None else self.held.at(time),
         )
+
+    def norms(self, values: Array) -> Array:
+        """Return the norms in L2(Gamma_3) of scalars or vectors on each piece, (k,). Collective."""
+        if self.pieces == 1:
+            return np.array([self.jump.norm(values)])
+        squares = values**2 if values.ndim == 1 else np.einsum("ni,ni->n", values, values)
+        sums = np.bincount(self.piece, self.jump.weight * squares, minlength=self.pieces)
+        self.comm.Allreduce(MPI.IN_PLACE, sums, op=MPI.SUM)
+        return np.sqrt(sums)
+
+    @property
+    def extents(self) -> tuple[Array, Array]:
+        """The number of contact nodes of each piece, and their area, shape (k,). Collective."""
+        jump, ones = self.jump, np.ones_like(self.jump.weight)
+        if self.pieces == 1:
+            return np.array([float(jump.size)]), np.array([jump.sum(ones)])
+        sums = np.array([np.bincount(self.piece, w, self.pieces) for w in (ones, jump.weight)])
+        self.comm.Allreduce(MPI.IN_PLACE, sums, op=MPI.SUM)
+        return sums[0], sums[1]
 
     def opening(self, nodal: Array) -> Array:
         """Return u_nu - rho, shape (n,)."""

@@ -21,7 +21,7 @@ def connected_pieces(space: fem.FunctionSpace) -> tuple[NDArray[np.int32], int]:
     comm, index_map, cells = lasting(space.mesh.comm), space.dofmap.index_map, space.dofmap.list
     owned = index_map.size_local
     first = np.repeat(cells[:, 0], cells.shape[1] - 1)
-    count, here = _components(first, cells[:, 1:].ravel(), owned + index_map.num_ghosts)
+    count, here = joined(first, cells[:, 1:].ravel(), owned + index_map.num_ghosts)
     here = here + comm.scan(count) - count
     total = comm.allreduce(count, op=MPI.SUM)
     # What a ghost is called here and what its owner calls it are one piece.
@@ -31,11 +31,11 @@ def connected_pieces(space: fem.FunctionSpace) -> tuple[NDArray[np.int32], int]:
     there = names.array[owned:].astype(np.int64)
     pairs = np.unique(np.column_stack([here[owned:], there]), axis=0)
     both = np.concatenate(comm.allgather(pairs))
-    pieces, labels = _components(both[:, 0], both[:, 1], total)
+    pieces, labels = joined(both[:, 0], both[:, 1], total)
     return labels[here[:owned]], pieces
 
 
-def _components(
+def joined(
     one: NDArray[np.integer], other: NDArray[np.integer], size: int
 ) -> tuple[int, NDArray[np.int32]]:
     """Return the number of components of a graph given by its edges, and that of each vertex."""

@@ -90,7 +90,8 @@ def interior_point(
 def _loads(problem: ContactProblem) -> float:
     """Return the sum of all forces that act at rest, without regard to sign. Collective."""
     body = problem.equilibrium
-    forces = np.abs(body.unbalanced(residual_forces(problem, problem.start()))) * body.mechanical
+    residual = residual_forces(problem, problem.start())
+    forces = np.abs(body.unbalanced(residual)) * body.shares.mechanical
     own = float(problem.comm.allreduce(forces[: body.owned].sum(), op=MPI.SUM))
     return own + float(forces[body.owned :].sum())
 

@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 from petsc4py import PETSc
 
-from contact.body.field_norms import of_fields
 from contact.errors import InputError, SingularError
 from contact.interface.penalised import NodalLaw, Regularisation, outer
 from contact.linear.faults import petsc_options
@@ -136,7 +135,7 @@ class PenalisedProblem:
         interface.add_forces(on_contact, state.x, state.forces)
         sizes = body.load_sizes(state.time) + body.sizes(residual)
         sizes = sizes + body.sizes(on_contact) + body.exchanged(state.x)
-        self._units = of_fields(body, np.where(sizes > 0, sizes, 1.0))
+        self._units = body.shares.spread(np.where(sizes > 0, sizes, 1.0))
         self.snes.setTolerances(
             rtol=1e-14,
             # Rounding is magnified by 1/eps: the residual may stay above any tolerance.

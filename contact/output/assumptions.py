@@ -254,7 +254,7 @@ def rounding(solution: Solution) -> Remark:
 def unknown_pressures(solution: Solution) -> Remark:
     """Say where contact forces are hardly more than what rounding leaves of far larger ones."""
     unknown = solution.outcome.kkt.unknown
-    loads = solution.problem.equilibrium.load_sizes(solution.state.time)[0]
+    loads = solution.problem.equilibrium.load_sizes(solution.state.time)[0].max()
     moved = solution.problem.comm.allreduce(bool(np.any(solution.problem.start().x)), op=MPI.LOR)
     if not (solution.converged and unknown > KNOWN and (moved or loads > 0)):
         return "", True
@@ -282,12 +282,15 @@ def beside_loads(solution: Solution) -> Remark:
     left = body.sizes(body.unbalanced(residual))[0]
     borne = body.sizes(body.reactions(residual))[0]
     most = max(LEFT, solution.outcome.allowed.equilibrium)
-    little = left <= most * acting or borne <= acting  # then what is left is rounding
-    if moved or not solution.converged or not acting > 0 or little:
+    # Where supports bear no more than what acts, what is left is rounding.
+    much = (acting > 0) & (left > most * acting) & (borne > acting)
+    if moved or not solution.converged or not much.any():
         return "", True
+    worst = np.argmax(np.where(much, left, 0.0) / np.where(much, acting, 1.0))
+    left, borne = left[worst] / acting[worst], borne[worst] / acting[worst]
     return (
-        f"{left / acting:.1e} of loads and contact forces are out of balance, and displacements "
-        f"about as far off: the supports bear {borne / acting:.3g} times as much, beside which it "
+        f"{left:.1e} of loads and contact forces are out of balance, and displacements "
+        f"about as far off: the supports bear {borne:.3g} times as much, beside which it "
         "is nothing; fewer cells along a slender body, linear elements, or a smaller tolerance "
         "where rounding allows it, bring them nearer",
         False,

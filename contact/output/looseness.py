@@ -38,7 +38,8 @@ def looseness(solution: Solution) -> Remark:
     touches = solution.status != "open"
     if not (solution.converged and problem.comm.allreduce(bool(touches.any()), op=MPI.LOR)):
         return "", True
-    left = float(body.sizes(body.unbalanced(residual_forces(problem, solution.state)))[0])
+    residual = body.unbalanced(residual_forces(problem, solution.state))
+    left = float(np.linalg.norm(body.sizes(residual)[0]))
     whole = problem.interface.stiffness * problem.nodes.sum(np.ones_like(problem.nodes.weight))
     largest, kkt = largest_displacement(solution), solution.outcome.kkt
     for group in groups(problem):

@@ -13,7 +13,7 @@ import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
 
-from contact.body.field_norms import field_norms, of_fields
+from contact.body.shares import Shares
 from contact.interface.interface import Interface
 from contact.interface.multipliers import Multipliers
 from contact.linear.balance import balance
@@ -62,6 +62,8 @@ class CondensedBody:
         The owned kept unknowns there, and where these are among those of all ranks.
     acting
         `sizes` of what acts on the whole body: loads, reactions, and one field on the other.
+    shares
+        Which forces are compared with each other.
     """
 
     comm: MPI.Intracomm
@@ -74,6 +76,7 @@ class CondensedBody:
     at: Array
     own: slice
     acting: Array
+    shares: Shares
 
     linear, most_rounding = True, MOST_ROUNDING
 
@@ -120,14 +123,9 @@ class CondensedBody:
         """Return what of forces acts on fixed unknowns."""
         return np.where(self.free.ravel(), 0.0, forces)
 
-    @property
-    def mechanical(self) -> NDArray[np.bool_]:
-        """Which of the owned values are displacements or forces."""
-        return np.tile(np.arange(self.block_size) < self.dim, self.free.shape[0])
-
     def sizes(self, values: Array) -> Array:
-        """Return the norms of forces and, with a potential, of charges apart. Collective."""
-        return field_norms(self, values)
+        """Return the norms of forces, and of charges, of each piece apart. Collective."""
+        return self.shares.sizes(values)
 
     def load_sizes(self, time: float = 1.0) -> Array:
         """Return the `sizes` of what acts on the whole body."""
@@ -251,7 +249,7 @@ class Condensation:
         acting = body.load_sizes(state.time) + reactions + body.exchanged(state.x)
         # Where the loads go on as before, the prediction of a step is in equilibrium but for that.
         inside = body.layout.mask(-residual[: body.owned])
-        nothing = ROUNDING * of_fields(body, acting)[: body.owned]
+        nothing = ROUNDING * body.shares.spread(acting)[: body.owned]
         forces = -self._schur.condense(inside, nothing)
         if self._masters is not None:
             forces = self._masters.forces(forces, residual)
@@ -268,6 +266,7 @@ class Condensation:
             self._at(state.x),
             self._own,
             acting,
+            body.shares.at(self.nodes),
         )
         return CondensedProblem(condensed, self._interface, self.full.scales, state.time)
 

@@ -32,18 +32,19 @@ class KKT:
     ----------
     equilibrium
         |F(u) + contact forces| on free unknowns, less `rounding`, over the sum of the norms of
-        loads, contact forces and reactions. Of a piezoelectric body the larger one of forces and of
+        loads, contact forces and reactions. Of bodies that nothing connects the largest, each over
+        what acts on itself. Of a piezoelectric body the larger one of forces and of
         charges, each over those of its own kind: to these belong what the potential exerts on the
         body at rest, and the charges of the strain.
     contact
         |p - max(0, p + c (u_nu - rho))| / |p| in L2(Gamma_3), c = E/length with
-        the modulus of what touches.
+        the modulus of what touches; the largest of those of bodies that nothing connects.
     friction
         |lambda_f - proj(lambda_f + c u_tau)| / |p| with the final bound s. Both are less what the
         forces that `rounding` stands for are as pressures: no contact force is known better than
         equilibrium knows it, and where the loads ask for none at all, all of them are that.
     rounding
-        What has been subtracted from the first, over the same, the larger one: `force_rounding`,
+        What has been subtracted from the first, over the same, the largest: `force_rounding`,
         but not more than the `most_rounding` of the body. Zero where no load acts, nothing touches
         and the other field exerts nothing: all forces are rounding then, and there is nothing to
         compare it with.
@@ -104,7 +105,7 @@ def _shakes(size: int) -> Array:
 
 
 def force_rounding(problem: Problem, state: State, internal: Array) -> Array:
-    """Return what rounding may leave of the forces, and of the charges. Collective.
+    """Return what rounding may leave of the forces, and of the charges, by piece. Collective.
 
     Unknowns are known to `EPS` of their size. The stresses around a node of a slender body, or of
     one that is moved far, cancel but for far smaller forces, and so do potentials on both sides of
@@ -122,11 +123,10 @@ def force_rounding(problem: Problem, state: State, internal: Array) -> Array:
     return MARGIN * EPS / SHAKE * body.sizes(body.unbalanced(change))
 
 
-def _as_pressures(problem: Problem, forces: float) -> float:
-    """Return the norm in L2(Gamma_3) of pressures with forces of a given norm. Collective."""
-    jump = problem.interface.jump
-    area = jump.sum(np.ones_like(jump.weight))
-    return forces * float(np.sqrt(jump.size / area)) if area > 0 else 0.0
+def _as_pressures(problem: Problem, forces: Array) -> Array:
+    """Return the norms in L2(Gamma_3) of pressures with forces of given norms. Collective."""
+    count, area = problem.interface.extents
+    return forces * np.sqrt(np.divide(count, area, out=np.zeros_like(area), where=area > 0))
 
 
 def evaluate(problem: Problem, state: State) -> KKT:
@@ -142,18 +142,21 @@ def evaluate(problem: Problem, state: State) -> KKT:
     unbalanced = body.sizes(body.unbalanced(residual))
     most, acted = body.most_rounding * scale, loads > 0
     asked = ~acted | (unbalanced <= most)
-    rounding, unknown = np.zeros_like(scale), 0.0
+    rounding, unknown = np.zeros_like(scale), np.zeros(interface.pieces)
     if asked.any():
         rounding = np.where(asked, force_rounding(problem, state, internal), 0.0)
-        unknown = float(np.minimum(rounding, most)[0])
+        unknown = np.minimum(rounding, most)[0]
         acted |= answers > rounding
         # Of a body that flies away all forces are rounding.
         rounding = np.minimum(np.where(acted, np.minimum(rounding, most), rounding), unbalanced)
+    # Of a piece on which nothing acts there is what rounding of the others makes of it.
+    scale = np.maximum(scale, EPS * scale.max(axis=1, keepdims=True))
     size = np.where(scale > 0, scale, 1.0)
     equilibrium = float(np.max((unbalanced - rounding) / size))
     nodal = interface.jump.apply(state.x)
     bound, pressures = interface.bound(nodal, state.forces), _as_pressures(problem, unknown)
     laws = interface_residuals(interface, nodal, state.forces, bound, pressures)
-    pressed = interface.jump.norm(interface.pressure(nodal, state.forces))
+    pressed = interface.norms(interface.pressure(nodal, state.forces))
     granted = float(np.max(np.where(acted, rounding / size, 0.0)))
-    return KKT(equilibrium, *laws, granted, pressures / pressed if pressed > 0 else 0.0)
+    known = np.divide(pressures, pressed, out=np.zeros_like(pressed), where=pressed > 0)
+    return KKT(equilibrium, *laws, granted, float(known.max()))

@@ -143,7 +143,10 @@ class ContactProblem:
         response = FoundationResponse(found, layer, conductor, body.phi_scale, stiffness)
         friction = joined_friction(self.entries, found)
         held = joined_held(self.entries, body.layout.index_map.local_range[0], found.links)
-        return Interface(response.constrained, response, friction, held, stiffness, size)
+        piece, pieces = body.shares.piece[found.nodes], body.shares.count
+        return Interface(
+            response.constrained, response, friction, held, stiffness, size, piece, pieces
+        )
 
     def _young_of_contacts(self) -> float:
         """Return the modulus of what yields where bodies touch. Collective.

@@ -11,6 +11,7 @@ import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
 
+from contact.body.shares import Shares
 from contact.interface.interface import Interface
 from contact.linear.change import Change
 from contact.linear.operator import Counters, Operator
@@ -51,6 +52,10 @@ class Equilibrium(Protocol):
         """Whether the operator is the same at all unknowns."""
 
     @property
+    def shares(self) -> Shares:
+        """Which forces are compared with each other."""
+
+    @property
     def most_rounding(self) -> float:
         """Most that counts as rounding, over all forces of a field."""
 
@@ -79,7 +84,7 @@ class Equilibrium(Protocol):
         """Return what of forces the supports bear."""
 
     def sizes(self, values: Array) -> Array:
-        """Return the norms of owned forces and, with a potential, of charges apart. Collective."""
+        """Return the norms of owned forces, and of charges, of each piece apart. Collective."""
 
     def load_sizes(self, time: float = 1.0) -> Array:
         """Return the `sizes` of the loads at a time. Collective."""

@@ -1,0 +1,132 @@
+"""Bodies that nothing connects are judged each by itself, however large the loads of others."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+
+from contact.body.description import Fixed
+from contact.body.rigid import Motion, Rigid
+from contact.methods.options import FixedPointOptions, NewtonOptions
+from contact.problem.kkt import evaluate, residual_forces
+from contact.problem.problem import ContactProblem
+from contact.problem.state import State
+from contact.solving import solve
+from forms.hencky import Linear
+from tests.problems.apart import blocks, pressed
+from tests.problems.piezo import pzt
+
+COMM, LITTLE = MPI.COMM_WORLD, 1e-10
+METHODS = {"newton": NewtonOptions, "uzawa": FixedPointOptions}
+
+
+def of_second(solution, values):
+    """Return values at the contact nodes of the second block, in order. Collective."""
+    nodes = solution.problem.nodes
+    points, values = nodes.gather(nodes.points[:, 0]), nodes.gather(values)
+    return values[np.argsort(points)][np.sort(points) > 1.5]
+
+
+@pytest.mark.parallel
+@pytest.mark.parametrize("linear", ["lu", "iterative"])
+@pytest.mark.parametrize("method", METHODS)
+def test_a_body_beside_one_that_is_pressed_far_more(method, linear):
+    """Newton's method with multigrid left its contact forces off by 5e-6, and had converged."""
+    options = METHODS[method](linear=linear)
+    beside = solve(pressed(blocks(COMM), 0.01, 0.01 * LITTLE), options, comm=COMM)
+    exact = solve(pressed(blocks(COMM), 0.01, 0.01), NewtonOptions(tolerance=1e-12), comm=COMM)
+    assert beside.converged, beside.outcome.reason
+    found, known = (of_second(one, one.state.forces.pressure) for one in (beside, exact))
+    assert np.linalg.norm(found / LITTLE - known) < 3e-8 * np.linalg.norm(known)
+
+
+@pytest.fixture(scope="module")
+def beside():
+    return solve(pressed(blocks(MPI.COMM_SELF), 0.01, 0.01 * LITTLE), comm=MPI.COMM_SELF)
+
+
+def test_where_nothing_touches_is_no_solution(beside):
+    """At rest the second block does not touch: nothing is in balance with its loads."""
+    problem, state = beside.problem, beside.state
+    kept = problem.equilibrium.layout.points[:, 0] < 1.5
+    x = np.where(np.repeat(kept, 2), state.x, 0.0)
+    pressed_nodes = problem.nodes.points[:, 0] < 1.5
+    forces = replace(
+        state.forces,
+        pressure=np.where(pressed_nodes, state.forces.pressure, 0.0),
+        friction=state.forces.friction * pressed_nodes[:, None],
+    )
+    assert evaluate(problem, state).largest < 1e-8
+    assert evaluate(problem, State(x, forces)).equilibrium > 0.1
+
+
+@pytest.mark.parametrize("name", ["contact", "friction"])
+def test_the_laws_hold_on_each_body(beside, name):
+    """A pressure of another sign, and a friction far beyond its bound."""
+    problem, state = beside.problem, beside.state
+    second = problem.nodes.points[:, 0] > 1.5
+    pressure, friction = state.forces.pressure.copy(), state.forces.friction.copy()
+    if name == "contact":
+        pressure[second] *= -1
+    else:
+        friction[second] *= 100
+    spoilt = State(state.x, replace(state.forces, pressure=pressure, friction=friction))
+    assert getattr(evaluate(problem, spoilt), name) > 0.1
+
+
+def test_charges_of_each_body():
+    """Potentials of the second block are wrong by their own size."""
+    supports = [
+        Fixed("held", [0.0, 0.0], potential=0.0),
+        Fixed("top0", potential=1.0),
+        Fixed("top1", potential=LITTLE),
+    ]
+    problem = pressed(
+        blocks(MPI.COMM_SELF), 0.01, 0.01 * LITTLE, law=Linear(1.0, 0.3), piezo=pzt(2), fixed=supports
+    )
+    found = solve(problem, comm=MPI.COMM_SELF)
+    assert found.converged, found.outcome.reason
+    x, body = found.state.x.copy(), problem.equilibrium
+    wrong = body.free[:, -1] & (body.layout.points[:, 0] > 1.5)
+    body.nodal(x)[wrong, -1] = 0.0
+    assert evaluate(problem, State(x, found.state.forces)).equilibrium > 0.01
+
+
+@pytest.mark.parametrize("linear", ["lu", "iterative"])
+@pytest.mark.parametrize("method", METHODS)
+def test_what_is_left_of_a_body_that_is_no_longer_loaded(method, linear):
+    """Nothing acts on it any more: what a solver leaves of its displacements is not its scale."""
+    given = pressed(blocks(MPI.COMM_SELF), 0.01, 0.01, gap=0.001)
+    first, second = given.body.loads
+    loads = (first, replace(second, amplitude=lambda t: float(t == 1)))
+    body = replace(given.body, loads=loads)
+    problem = ContactProblem(given.domain, body, given.contacts)
+    found = solve(problem, METHODS[method](linear=linear), times=[1.0, 2.0], comm=MPI.COMM_SELF)
+    assert found.converged, found.outcome.reason
+    assert np.abs(of_second(found, found.state.forces.pressure)).max() < 1e-14
+
+
+@pytest.mark.parametrize("given", [True, False])
+def test_what_moves_freely_joins_bodies(given):
+    """A foundation in front of both passes forces on, unless it moves as is given."""
+    height = 0.001 if given else None
+    motion = Motion([0.0, height], [0.0], [0.0, 0.0 if given else 0.01], [0.0], [0.0, 0.0])
+    pushed = Rigid("bottom", motion, foundation=True)
+    problem = pressed(blocks(MPI.COMM_SELF), 0.0, 0.0, mu=0.0, rigid=[pushed])
+    shares = problem.equilibrium.shares
+    assert shares.count == (3 if given else 1)
+    assert len(set(shares.piece)) == (2 if given else 1)
+    assert set(shares.behind) == {*range(shares.count)} - {*shares.piece} or not given
+
+
+@pytest.mark.parallel
+def test_sizes_do_not_depend_on_ranks():
+    """Here each rank has a part of one block at most, or none."""
+    sizes = []
+    for comm in (MPI.COMM_SELF, COMM):
+        problem = pressed(blocks(comm, (1.0, 3.0, 2.0)), 1.0, 1e-5, 0.0)
+        residual = residual_forces(problem, problem.start())
+        sizes.append(np.sort(problem.equilibrium.sizes(residual)[0]))
+    assert np.allclose(*sizes, rtol=1e-12, atol=0)
+    assert np.count_nonzero(sizes[0]) == 2

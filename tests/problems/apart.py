@@ -1,0 +1,56 @@
+"""Blocks beside each other, connected by nothing: each has its own loads and its own solution."""
+
+from collections.abc import Sequence
+
+import basix.ufl
+import numpy as np
+import ufl
+from dolfinx import mesh as dmesh
+from mpi4py import MPI
+
+from contact.body.description import Body, Fixed, Load
+from contact.interface.friction import Friction
+from contact.mesh.domain import Domain, from_mesh
+from contact.problem.contact import Contact
+from contact.problem.problem import ContactProblem
+from forms.hencky import Linear
+from forms.laws import ConstantCoefficient
+from tests.problems.mechanics import flat
+
+
+def blocks(comm: MPI.Intracomm, heights: Sequence[float] = (1.0, 3.0), n: int = 4) -> Domain:
+    """Return blocks of width 1, one at x = 0, one at x = 2 and so on, with n cells a length of 1.
+
+    Their parts are `bottom` and `held`, the sides on the left, of all of them; `top0`, `top1` and
+    so on are the tops of one each.
+    """
+    points, cells = np.zeros((0, 2)), np.zeros((0, 3), dtype=np.int64)
+    for k, height in enumerate(heights):
+        corners = [[2.0 * k, 0.0], [2.0 * k + 1, height]]
+        block = dmesh.create_rectangle(MPI.COMM_SELF, corners, [n, round(n * height)])
+        cells = np.concatenate([cells, block.geometry.dofmap + len(points)])
+        points = np.concatenate([points, block.geometry.x[:, :2]])
+    element = basix.ufl.element("Lagrange", "triangle", 1, shape=(2,), dtype=np.float64)
+    first = comm.rank == 0
+    given = (cells, points) if first else (cells[:0], points[:0])
+    mesh = dmesh.create_mesh(comm, cells=given[0], x=given[1], e=ufl.Mesh(element))
+
+    def top(k, height):
+        return lambda x: (np.abs(x[1] - height) < 1e-9) & (np.abs(x[0] - 2 * k - 0.5) < 0.6)
+
+    parts = {
+        "bottom": lambda x: np.abs(x[1]) < 1e-9,
+        "held": lambda x: np.abs(x[0] / 2 - np.round(x[0] / 2)) < 1e-9,
+        **{f"top{k}": top(k, height) for k, height in enumerate(heights)},
+    }
+    return from_mesh(mesh, parts, 2)
+
+
+def pressed(domain: Domain, *tractions: float, mu: float = 0.3, gap: float = 0.0, **of_body):
+    """Return the problem of blocks on a foundation, pressed by a traction each."""
+    given = {"law": Linear(1.0, 0.3), "fixed": [Fixed("held", [0.0, 0.0])], **of_body}
+    loads = [Load(f"top{k}", traction=[0.0, -size]) for k, size in enumerate(tractions)]
+    friction = Friction(ConstantCoefficient(mu)) if mu > 0 else Friction()
+    return ContactProblem(
+        domain, Body(loads=loads, **given), Contact("bottom", flat(gap)), friction
+    )
