@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from contact.body.masters import Masters
 from contact.mesh.domain import Domain
-from contact.mesh.pieces import connected_pieces, joined
+from contact.mesh.pieces import connected_pieces, joined, sums
 from contact.typing import Array
 
 
@@ -83,8 +83,7 @@ class Shares:
             square = self.comm.allreduce(np.dot(own, own), op=MPI.SUM) + np.dot(other, other)
             return np.array([np.sqrt(square)])
         piece = np.repeat(self.piece, self.block_size)
-        squares = np.bincount(piece, own**2, minlength=self.count)
-        self.comm.Allreduce(MPI.IN_PLACE, squares, op=MPI.SUM)
+        squares = sums(self.comm, piece, own**2, self.count)
         return np.sqrt(squares + np.bincount(self.behind, other**2, minlength=self.count))
 
     def spread(self, sizes: Array) -> Array:

@@ -16,6 +16,7 @@ from contact.interface.nodes import ContactNodes
 from contact.interface.response import FoundationResponse
 from contact.interface.status import CLOSED, node_status, touching
 from contact.linear.change import Change
+from contact.mesh.pieces import sums
 from contact.typing import Array
 
 
@@ -78,9 +79,7 @@ class Interface:
         if self.pieces == 1:
             return np.array([self.jump.norm(values)])
         squares = values**2 if values.ndim == 1 else np.einsum("ni,ni->n", values, values)
-        sums = np.bincount(self.piece, self.jump.weight * squares, minlength=self.pieces)
-        self.comm.Allreduce(MPI.IN_PLACE, sums, op=MPI.SUM)
-        return np.sqrt(sums)
+        return np.sqrt(sums(self.comm, self.piece, self.jump.weight * squares, self.pieces))
 
     @property
     def extents(self) -> tuple[Array, Array]:
@@ -88,9 +87,8 @@ class Interface:
         jump, ones = self.jump, np.ones_like(self.jump.weight)
         if self.pieces == 1:
             return np.array([float(jump.size)]), np.array([jump.sum(ones)])
-        sums = np.array([np.bincount(self.piece, w, self.pieces) for w in (ones, jump.weight)])
-        self.comm.Allreduce(MPI.IN_PLACE, sums, op=MPI.SUM)
-        return sums[0], sums[1]
+        count = sums(self.comm, self.piece, ones, self.pieces)
+        return count, sums(self.comm, self.piece, jump.weight, self.pieces)
 
     def opening(self, nodal: Array) -> Array:
         """Return u_nu - rho, shape (n,)."""

@@ -35,6 +35,15 @@ def connected_pieces(space: fem.FunctionSpace) -> tuple[NDArray[np.int32], int]:
     return labels[here[:owned]], pieces
 
 
+def sums(
+    comm: MPI.Intracomm, piece: NDArray[np.integer], values: NDArray[np.float64], count: int
+) -> NDArray[np.float64]:
+    """Return the sums of the values of all ranks over each piece, shape (count,). Collective."""
+    # Of no values at all numpy makes integers.
+    own = np.bincount(piece, values, minlength=count).astype(np.float64)
+    return np.asarray(comm.allreduce(own, op=MPI.SUM))
+
+
 def joined(
     one: NDArray[np.integer], other: NDArray[np.integer], size: int
 ) -> tuple[int, NDArray[np.int32]]:

@@ -29,8 +29,9 @@ def of_second(solution, values):
 
 
 @pytest.mark.parallel
-@pytest.mark.parametrize("linear", ["lu", "iterative"])
-@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize(
+    ("method", "linear"), [("newton", "lu"), ("newton", "iterative"), ("uzawa", "lu")]
+)
 def test_a_body_beside_one_that_is_pressed_far_more(method, linear):
     """Newton's method with multigrid left its contact forces off by 5e-6, and had converged."""
     options = METHODS[method](linear=linear)
@@ -83,7 +84,12 @@ def test_charges_of_each_body():
         Fixed("top1", potential=LITTLE),
     ]
     problem = pressed(
-        blocks(MPI.COMM_SELF), 0.01, 0.01 * LITTLE, law=Linear(1.0, 0.3), piezo=pzt(2), fixed=supports
+        blocks(MPI.COMM_SELF),
+        0.01,
+        0.01 * LITTLE,
+        law=Linear(1.0, 0.3),
+        piezo=pzt(2),
+        fixed=supports,
     )
     found = solve(problem, comm=MPI.COMM_SELF)
     assert found.converged, found.outcome.reason
