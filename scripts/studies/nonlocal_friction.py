@@ -90,9 +90,9 @@ def study(report: Report, n: int, load: float) -> dict[str, Solution]:
         "changes only as far as friction changes it. Where it varies quickly, at the end of the "
         "bar and at the ends of the contact zones, the bound is spread over the radius. It is then "
         "positive on open nodes too, where friction acts by the letter of (3.6): this is "
-        "the price of a law for which existence and uniqueness are proved. Radius 0 is what the "
-        "thesis computes with, a positive radius what its theorems are about; a radius up to h "
-        "is no smoothing on the mesh."
+        "the price of a law for which existence is proved, and uniqueness where friction is small. "
+        "Radius 0 is what the thesis computes with, a positive radius what its theorems are about; "
+        "a radius up to h is no smoothing on the mesh."
     )
     report.table(f"{name}-table", f"Smoothing radius of R: {where}", columns, note)
     if MPI.COMM_WORLD.rank == 0:
