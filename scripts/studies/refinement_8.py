@@ -44,11 +44,11 @@ ALL_CLOSED = (
     "is that at the free end x = 8, where the bar stands on its edge: it grows from mesh to mesh, "
     "without bound where nothing yields. The force is what the load does not leave to the clamp, "
     "to rounding, and so can be no better than the reaction of the clamp, at whose corner x = 0 a "
-    "node is held whose own reaction counts as the clamp's: it falls like h^0.5 only (-10.9, "
-    "-7.6, -5.3 on 48, 96, 192 cells), against the rest of the error, so that the force is within "
-    "0.4 % at once and then turns. The moment about x = 0 gives that node no weight, and tests "
-    "equilibrium with a displacement that the clamp allows: it changes by half as much from level to level, like the "
-    "force inside and the charge."
+    "node is held whose own reaction counts as the clamp's: it falls like h^0.5 only (-10.9, -7.6, "
+    "-5.3 on 48, 96, 192 cells), against the rest of the error, so that the force is within 0.4 % "
+    "at once and then turns. The moment about x = 0 gives that node no weight, and tests "
+    "equilibrium with a displacement that the clamp allows: it changes by half as much from level "
+    "to level, like the force inside and the charge."
 )
 NOTES = {
     "8.1": ALL_CLOSED,
