@@ -13,6 +13,7 @@ import numpy as np
 from dolfinx.common import IndexMap
 from mpi4py import MPI
 from numpy.typing import NDArray
+from scipy import sparse
 
 from contact.errors import InputError
 from contact.interface.current import Conductor, HeldCurrent
@@ -78,7 +79,10 @@ class Entry:
 
 
 def joined_nodes(
-    entries: Sequence[Entry], index_map: IndexMap, free: NDArray[np.bool_]
+    entries: Sequence[Entry],
+    index_map: IndexMap,
+    free: NDArray[np.bool_],
+    ties: sparse.csr_array,
 ) -> ContactNodes:
     """Return the nodes of all entries, one entry after the other. Collective.
 
@@ -88,6 +92,8 @@ def joined_nodes(
         The entries.
     index_map, free
         Nodes of the mesh, and which of their unknowns are not fixed.
+    ties
+        How those that follow move with the global unknowns (`contact.body.masters`).
 
     Raises
     ------
@@ -98,7 +104,21 @@ def joined_nodes(
     nodes = _side_by_side([entry.nodes for entry in entries])
     given = [entry.coupling or entry.mixing for entry in entries]
     rows = [jumps for jumps in given if jumps is not None]
-    return replace(nodes, links=make_links(nodes.comm, index_map, rows, nodes.nodes, free))
+    links = make_links(nodes.comm, index_map, rows, nodes.nodes, free)
+    return replace(nodes, links=links, carried=_carried(nodes, links, ties, free))
+
+
+def _carried(
+    nodes: ContactNodes, links: Links | None, ties: sparse.csr_array, free: NDArray[np.bool_]
+) -> Array | None:
+    """Return how nodes move with the global unknowns where no jump changes. Collective."""
+    if nodes.motion is None or links is None:
+        return nodes.motion
+    carried = nodes.motion.copy()
+    for k, column in enumerate(ties.toarray().T):
+        beside = links.apply(column.reshape(free.shape))
+        carried[links.places, :, k] -= beside * free[nodes.nodes[links.places]]
+    return carried
 
 
 def _check_apart(entries: Sequence[Entry]) -> None:

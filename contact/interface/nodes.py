@@ -65,6 +65,9 @@ class ContactNodes:
         part; the gap of these nodes is 0 (length).
     revolved
         Whether the nodes stand for the rings through them, about the axis x = 0.
+    carried
+        How the nodes move with these unknowns where no jump changes, likewise: as the foundation
+        does, and against nodes beside them that follow a rigid part.
     links
         Jumps that are no nodal values, between bodies and on quadratic triangles; None for none.
     held
@@ -83,6 +86,7 @@ class ContactNodes:
     cut: float = 0.0
     revolved: bool = False
     motion: Array | None = None
+    carried: Array | None = None
     links: Links | None = None
     held: Array | None = None
 

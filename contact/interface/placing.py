@@ -162,8 +162,8 @@ def find_nodes(
     ------
     InputError
         If no contact node is left on any rank, none sees the foundation, one has no contact
-        direction or a gap that is no number, a part of quadratic triangles shares nodes with a
-        rigid part, or the foundation lies behind the contact part or cuts the body at rest.
+        direction or a gap that is no number, or the foundation lies behind the contact part or
+        cuts the body at rest.
     """
     domain, space, d = body.domain, body.space, body.dim
     found = candidates(domain, space, part)
@@ -180,12 +180,6 @@ def find_nodes(
             gap, cut = _place(domain, space, (part, obstacle), found, direction, gap, press)
     else:
         check_gap(domain, gap, key, press)
-    shared = found.mixing is not None and bool(body.masters.tied[nodes, :d].any())
-    if domain.comm.allreduce(shared, op=MPI.LOR):
-        raise InputError(
-            f"{key}.on: part {part!r} shares nodes with a rigid part; accepted with quadratic "
-            "triangles, whose jumps are sums over nodes: parts apart, or space.degree = 1"
-        )
     free = body.free[nodes, :d]
     fixed = found.jumps(body.nodal(body.prescribe(body.rest()))[nodes, :d])
     gap = found.gaps(direction, gap) - np.einsum("ni,ni->n", direction, ~free * fixed)

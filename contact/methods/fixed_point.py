@@ -120,7 +120,7 @@ class FixedPoint:
     def _new_operator(self, symmetric: bool) -> Operator:
         return self.problem.equilibrium.operator(
             self.problem.interface.coupled,
-            self.problem.interface.jump.motion,
+            self.problem.interface.jump.carried,
             self.problem.interface.change,
             symmetric=symmetric,
             counters=self.counters,

@@ -46,7 +46,7 @@ class PenalisedProblem:
         self._body, self._interface = problem.equilibrium, problem.interface
         self.operator = self._body.operator(
             self._interface.coupled,
-            self._interface.jump.motion,
+            self._interface.jump.carried,
             self._interface.change,
             symmetric=symmetric,
             counters=counters,

@@ -173,7 +173,7 @@ class WholeStep:
             asymmetric = interface.friction.acts or interface.response.active
             self._operator = self.problem.equilibrium.operator(
                 interface.coupled,
-                interface.jump.motion,
+                interface.jump.carried,
                 interface.change,
                 symmetric=not asymmetric,
                 counters=self.counters,

@@ -56,7 +56,7 @@ class CondensedMasters:
     def _moves(self, interface: Interface) -> sparse.csr_array:
         """Return how jumps move with the masters: not with others, with q as the foundation."""
         own = np.zeros((interface.coupled.size * self._body.block_size, self._body.masters.size))
-        motion = interface.jump.motion
+        motion = interface.jump.carried
         if motion is not None:
             own[: motion.shape[0] * motion.shape[1]] = motion.reshape(-1, motion.shape[2])
         moves = np.concatenate(self._body.comm.allgather(own))[:, self._free]

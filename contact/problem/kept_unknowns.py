@@ -97,6 +97,8 @@ def at_kept_nodes(interface: Interface) -> Interface:
         held = replace(held, jump=replace(held.jump, nodes=positions[count:], links=None))
     return replace(
         interface,
-        jump=replace(interface.jump, nodes=positions[:count], motion=None, links=None),
+        jump=replace(
+            interface.jump, nodes=positions[:count], motion=None, carried=None, links=None
+        ),
         held=held,
     )

@@ -137,7 +137,7 @@ class ContactProblem:
             for i, contact in enumerate(self.contacts)
         )
         body = self.equilibrium
-        found = joined_nodes(self.entries, body.layout.index_map, body.free)
+        found = joined_nodes(self.entries, body.layout.index_map, body.free, body.masters.ties)
         layer, conductor = joined_layer(self.entries), joined_conductor(self.entries)
         stiffness = self._young_of_contacts() / size
         response = FoundationResponse(found, layer, conductor, body.phi_scale, stiffness)

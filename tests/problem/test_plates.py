@@ -66,6 +66,45 @@ def test_a_plate_that_meets_the_contact_part_holds_the_nodes_there_as_a_support_
         assert solution.pressure == pytest.approx(first.pressure, abs=1e-9)
 
 
+def sheared(stretch, shear, **moves):
+    """Return a block of quadratic tetrahedra that is pressed and sheared, its right side a plate.
+
+    With u = (stretch x, 0, -shear x) its bottom lies on the foundation and slides everywhere.
+    """
+    young, poisson = 1.0, 0.3
+    lame, modulus = young * poisson / ((1 + poisson) * (1 - 2 * poisson)), young / (2 + 2 * poisson)
+    held = [("left", [0.0] * 3), ("front", ["free", 0.0, "free"]), ("back", ["free", 0.0, "free"])]
+    traction = [-modulus * shear, 0.0, lame * stretch]
+    data = {
+        "mesh": {"generator": "box", "size": [2.0, 1.0, 1.0], "cells": [4, 2, 2]},
+        "space": {"degree": 2},
+        "material": {"young": young, "poisson": poisson},
+        "fixed": [{"on": on, "displacement": values} for on, values in held],
+        "load": [{"on": "top", "traction": traction}],
+        "rigid": [{"on": "right", "centre": [2.0, 0.5, 0.5], "rotation": [0.0] * 3, **moves}],
+        "contact": {"on": "bottom", "gap": f"{shear}*x"},
+        "friction": {"law": "tresca", "bound": modulus * shear},
+    }
+    return parse_case(data), -lame * stretch
+
+
+def test_a_plate_at_quadratic_triangles():
+    """A patch test: jumps there are sums over nodes, and those of its edge follow the plate."""
+    stretch, shear = -0.01, 0.004
+    move = [2 * stretch, 0.0, -2 * shear]
+    case, pressure = sheared(stretch, shear, displacement=move)
+    one, moved = solved(case, SELF)
+    assert one.pressure == pytest.approx(pressure, rel=1e-9)
+    force = moved["rigid_parts"]["right"]["force"]
+    free = {"displacement": ["free", 0.0, "free"], "force": [force[0], 0.0, force[2]]}
+    case, _ = sheared(stretch, shear, **free)
+    for condense in (True, False):
+        two, moved = solved(case, SELF, NewtonOptions(tolerance=1e-10, condense=condense))
+        assert moved["rigid_parts"]["right"]["displacement"] == pytest.approx(move, abs=1e-10)
+        assert two.pressure == pytest.approx(pressure, rel=1e-8)
+        assert len(two.history.records) <= 4
+
+
 def test_balls_whose_cuts_are_plates():
     """The rims of both cuts belong to the contact parts too, far from where these touch."""
     mesh = {"radius": 1.0, "size": 0.3, "contact_size": 0.1, "contact_width": 0.3}

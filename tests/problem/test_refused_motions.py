@@ -63,14 +63,6 @@ def test_bad_rigid_parts_are_refused(rigid, words):
         build_problem(plate(rigid=rigid), SELF)
 
 
-def test_sums_over_quadratic_triangles_take_no_nodes_of_a_plate():
-    data = indented(3, n=2).model_dump(exclude_unset=True)
-    data["space"] = {"degree": 2}
-    data["rigid"] = [{"on": "right"}]
-    with pytest.raises(InputError, match="shares nodes with a rigid part; accepted with quadratic"):
-        build_problem(parse_case(data), SELF)
-
-
 @pytest.mark.parametrize("axis", [[0.0, -1.0], [1.0, 0.0]])
 def test_an_axis_that_leads_away_is_no_contact_direction(axis):
     data = indented().model_dump(exclude_unset=True)
