@@ -21,9 +21,10 @@ from contact.methods.convex.path import central
 from contact.methods.report import Outcome
 from contact.methods.search import Search
 from contact.methods.step import Iterate, WholeStep
+from contact.methods.stuck import all_loads, stuck_bound
 from contact.methods.sure import INTERIOR_POINT
 from contact.problem.kkt import evaluate, residual_forces
-from contact.problem.mobility import groups, held_by_supports, null_space
+from contact.problem.mobility import held_by_supports
 from contact.problem.problem import ContactProblem
 from contact.problem.state import State
 from contact.tolerances import EPS
@@ -48,9 +49,6 @@ SHARE = 1e-2
 #: The same for a body that nothing but contact holds, over what the loads do in the mean gap.
 LOOSE = 0.1
 
-#: Friction bound over all loads where friction alone holds the body: it is first taken for stuck.
-STUCK = 10.0
-
 
 def interior_point(
     search: Search, whole: WholeStep, finish: Callable[[State], tuple[Iterate, Outcome]]
@@ -72,9 +70,8 @@ def interior_point(
     problem, interface = search.problem, search.problem.interface
     assert isinstance(problem, ContactProblem)
     held = held_by_supports(problem)
-    bound: Array = np.zeros(interface.jump.weight.size)
-    if not all([null_space(group.held(False)).size == 0 for group in groups(problem)]):
-        bound = np.full_like(bound, STUCK * _loads(problem)) / interface.jump.weight
+    stuck = stuck_bound(problem)
+    bound = np.zeros(interface.jump.weight.size) if stuck is None else stuck
     for _ in range(UPDATES):
         method = Barrier(problem, whole, bound, held)
         outcome, state = method.run(search), method.state
@@ -85,15 +82,6 @@ def interior_point(
             break
         bound = interface.bound(interface.jump.apply(state.x), state.forces)
     return iterate, outcome
-
-
-def _loads(problem: ContactProblem) -> float:
-    """Return the sum of all forces that act at rest, without regard to sign. Collective."""
-    body = problem.equilibrium
-    residual = residual_forces(problem, problem.start())
-    forces = np.abs(body.unbalanced(residual)) * body.shares.mechanical
-    own = float(problem.comm.allreduce(forces[: body.owned].sum(), op=MPI.SUM))
-    return own + float(forces[body.owned :].sum())
 
 
 class Barrier:
@@ -118,7 +106,7 @@ class Barrier:
         interface = problem.interface
         jump, self._state = interface.jump, problem.start()
         self._near = np.isfinite(jump.gap)
-        total, limit = _loads(problem), jump.weight * bound
+        total, limit = all_loads(problem), jump.weight * bound
         count = max(jump.size, 1)
         self._rubbing = self._near & (limit > EPS * max(jump.maximum(limit), total / count))
         nodal = jump.apply(self._state.x)

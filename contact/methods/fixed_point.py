@@ -34,7 +34,9 @@ from contact.methods.report import History, Monitor, Outcome, Record
 from contact.methods.resting import resting
 from contact.methods.softness import Softer, softer, spectrum
 from contact.methods.stagnation import Stagnation
+from contact.methods.stuck import stuck_bound
 from contact.problem.kkt import KKT, evaluate
+from contact.problem.problem import ContactProblem
 from contact.problem.protocols import Problem
 from contact.problem.state import State
 from contact.tolerances import PRECISION
@@ -49,6 +51,12 @@ FAR = 100
 
 #: Residual below which frozen coefficients give way to their derivatives.
 NEAR = 1e-2
+
+#: Why the loop stalls far from a solution though its block relaxations converge.
+FROZEN = (
+    "though each frozen problem is solved: what is frozen (the friction bound, which nodes "
+    "conduct, the material) changes to and fro"
+)
 
 
 @dataclass
@@ -140,11 +148,14 @@ class FixedPoint:
         jump, frictional = interface.jump, interface.friction.acts
         if start is None:
             self.state = problem.start()
+            stuck = stuck_bound(problem) if isinstance(problem, ContactProblem) else None
             # Iteration 0 is the pure contact problem that the thesis starts from. A bound that is
-            # updated in the block relaxation needs none.
-            first = 0 if frictional and not self.options.single_loop else 1
+            # updated in the block relaxation needs none, and a body that friction alone holds has
+            # no such problem.
+            first = 0 if frictional and not self.options.single_loop and stuck is None else 1
             # The secant at rest: prescribed values strain the elements beside them alone.
-            z, bound = self._about(0.0, frictional and first > 0), np.zeros(jump.gap.size)
+            z = self._about(0.0, frictional and first > 0)
+            bound = np.zeros(jump.gap.size) if stuck is None else stuck
             return self._solve(z, bound, first, problem.equilibrium.rest())
         self.state, nodal = start, jump.apply(start.x)
         pressure = start.forces.pressure
@@ -163,7 +174,7 @@ class FixedPoint:
         begin, problem, options = time.perf_counter(), self.problem, self.options
         body, frictional = problem.equilibrium, problem.interface.friction.acts
         tangent = options.material_step == "tangent"
-        stagnation = Stagnation(PATIENCE, PROGRESS)
+        stagnation, begun = Stagnation(PATIENCE, PROGRESS), bound
         best: Best[tuple[State, KKT]] = Best()
         for iteration in range(first, options.max_outer + 1):
             friction = frictional and iteration > 0
@@ -173,7 +184,7 @@ class FixedPoint:
             if self._far and (start := self._soften(friction)) is not None:
                 # What was found with an r that does not fit is worse than nothing.
                 self.state, secant_at = problem.start(), body.rest()
-                z, bound = self._about(start, friction), np.zeros_like(bound)
+                z, bound = self._about(start, friction), begun
                 stagnation, best = Stagnation(PATIENCE, PROGRESS), Best()
             previous = self.state
             # Newton's tangent of a zero strain is the secant, and cheaper.
@@ -201,8 +212,11 @@ class FixedPoint:
             patience = PATIENCE_STALLED if self._stalled else PATIENCE
             given_up = stagnation(residuals.largest, patience)
             if given_up and options.stopping == "residual":
-                why = f": {spectrum(problem, options.r, self._softer)}" if self._far else ""
-                ended = f"the residual stalled at {stagnation.best:.2e}{why}"
+                ended = f"the residual stalled at {stagnation.best:.2e}"
+                if self._far:
+                    ended += f": {spectrum(problem, options.r, self._softer)}"
+                elif not self._stalled and stagnation.best > NEAR:
+                    ended += f" {FROZEN}"
                 break
         else:
             ended = f"not converged in {options.max_outer} outer iterations"
