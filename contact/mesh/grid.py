@@ -10,9 +10,9 @@ from dolfinx import mesh as dmesh
 from mpi4py import MPI
 
 from contact.errors import InputError
+from contact.mesh.cutting import grid_partitioner
 from contact.mesh.domain import Domain, exterior_facets, with_names
 from contact.mesh.rotation import rotate
-from contact.mesh.shares import grid_partitioner
 
 #: Sides of the generators: name -> (axis, end), end 0 at the lower coordinate.
 RECTANGLE_SIDES = {"left": (0, 0), "right": (0, 1), "bottom": (1, 0), "top": (1, 1)}
