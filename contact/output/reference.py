@@ -11,6 +11,9 @@ from pathlib import Path
 
 from contact.output.described import BODY, OPPOSITE, SUMMARY, SURFACE, TABLES, Item
 
+#: What Markdown has for the symbols of the command line's help.
+FORMULAS = {"σ_ν": r"$\sigma_\nu$", "σ_τ": r"$\sigma_\tau$", "u_τ": r"$u_\tau$"}
+
 PAGE = Path(__file__).parents[2] / "docs" / "output.md"
 
 INTRODUCTION = """\
@@ -117,6 +120,8 @@ def _rows(items: Mapping[str, Item], what: str) -> Iterator[str]:
     yield from (f"| {what} | unit | meaning |", "|---|---|---|")
     for name, item in items.items():
         text = item.text.replace("|", r"\|")
+        for plain, formula in FORMULAS.items():
+            text = text.replace(plain, formula)
         yield f"| `{name}` | {item.unit or '—'} | {text} |"
 
 

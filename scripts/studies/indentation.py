@@ -239,9 +239,9 @@ def table(report: Report, fineness: float, materials: Sequence[str] = MATERIALS)
     note = (
         "Ratios of the computed to the closed form at the computed contact radius (that of the "
         "punch is given), extrapolated from boxes of 30 and 60 contact radii; phi is the potential "
-        "over (M_21/M_11) u_z beneath an insulating indenter. At a potential the foundation "
-        "conducts across gaps up to 1e-6 m: with conduction in contact alone, contact could end "
-        "at any smaller radius, with a singular pressure."
+        r"over $(M_{21}/M_{11})\, u_z$ beneath an insulating indenter. At a potential the "
+        "foundation conducts across gaps up to 1e-6 m: with conduction in contact alone, contact "
+        "could end at any smaller radius, with a singular pressure."
     )
     report.table("closed-forms", "Indentation, computed over closed form", columns, note)
 

@@ -80,7 +80,8 @@ def test_words_are_within_the_figure(dim: int, inches: float) -> None:
 
 
 @pytest.mark.parametrize("height", [0.25, 0.5, 1.0, 2.0])
-def test_the_lines_of_a_title_are_above_the_body(height: float) -> None:
+@pytest.mark.parametrize("lines", [1, 3])
+def test_the_lines_of_a_title_are_above_the_body(height: float, lines: int) -> None:
     from matplotlib import rc_context
     from matplotlib.backends.backend_agg import FigureCanvasAgg
 
@@ -94,9 +95,10 @@ def test_the_lines_of_a_title_are_above_the_body(height: float) -> None:
     table, drawn = contact_table(solution), picture(solution, "von_mises", "stress")
     assert table is not None and drawn is not None
     with rc_context(style(6.3)):
-        figure = draw_plane(drawn, table, "A body that a load of some size presses " * 3)
+        title = "A body" + (lines - 1) * " that a load of some size presses for as long as it takes"
+        figure = draw_plane(drawn, table, title)
         FigureCanvasAgg(figure).draw()
-    assert figure.axes[0].get_title().count("\n") >= 2
+    assert figure.axes[0].get_title().count("\n") == lines - 1
     assert figure.axes[0].title.get_window_extent().y1 < figure.bbox.height
 
 

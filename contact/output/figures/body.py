@@ -68,7 +68,9 @@ def draw_plane(
     strip = 0.0 if lifted is None else STRIP
     head = with_scale(title, picture.scale)
     more = 0.02 * float(matplotlib.rcParams["font.size"]) * head.count("\n")
-    figure = Figure(figsize=(inches, tall * inches + 1.4 + strip + more))
+    size = inches, tall * inches + 1.4 + strip + more
+    # Made for axes of equal scale, whose title it leaves room for; it knows of no strip beneath.
+    figure = Figure(figsize=size, layout="compressed" if lifted is None else "constrained")
     ax = figure.subplots()
     # Dashes would be those of an edge each: none where edges are short.
     rest = {"colors": "black", "lw": 0.5}

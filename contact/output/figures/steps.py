@@ -11,7 +11,7 @@ from matplotlib.colors import ListedColormap
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
-from contact.output.figures.contact import UNNAMED, ZONES, fitted, position
+from contact.output.figures.contact import NARROW, UNNAMED, ZONES, fitted, position
 from contact.output.table import Table
 from contact.output.units import Units
 from contact.typing import Array
@@ -87,7 +87,9 @@ class Course:
         return figure
 
     def _energies(self) -> Figure:
-        time, figure = np.concatenate([[0.0], self.column("t")]), _figure(0.6)
+        narrow = float(matplotlib.rcParams["figure.figsize"][0]) < NARROW
+        time = np.concatenate([[0.0], self.column("t")])
+        figure = _figure(0.9 if narrow else 0.6)
         ax = figure.subplots()
         work, taken = (
             np.concatenate([[0.0], np.cumsum(self.column(name))])
@@ -100,7 +102,7 @@ class Course:
         ax.plot(time, taken, color="#7F7F7F", label="taken by friction")
         ax.set_xlabel("time")
         ax.set_ylabel("energy")
-        ax.legend()
+        ax.legend(ncols=1 if narrow else 2, loc="lower left", bbox_to_anchor=(0, 1))
         ax.grid(alpha=0.25)
         return figure
 
