@@ -32,7 +32,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
     """Make the table and the figure."""
     given = options(__doc__, "mindlin", arguments)
     report = Report(given.out)
-    fine = [(0.0, 6, 3), (0.0, 10, 3), (0.0, 12, 3), (0.0, 16, 3), (0.3, 8, 6), (0.0, 8, 6)]
+    fine = [(0.0, 6, 3), (0.0, 10, 3), (0.0, 12, 3), (0.0, 16, 3), (0.0, 20, 3)]
+    fine += [(0.3, 8, 6), (0.0, 8, 6)]
     runs = [(0.0, 4, 2)] if given.coarse else fine
     rows: dict[str, list[Any]] = {"nu": [], "a/h": [], "steps": [], "Q/(mu P)": []}
     rows |= {"area": [], "dissipation": []}
@@ -55,7 +56,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     draw(report, shown)
     plane: dict[str, list[Any]] = {"degree": [], "a/h": [], "dissipation": []}
     for degree in (1, 2):
-        for elements in (6,) if given.coarse else (6, 12, 24, 48)[: 5 - degree]:
+        for elements in (6,) if given.coarse else (6, 12, 24, 48, 96)[: 7 - 2 * degree]:
             plane["degree"].append(degree)
             plane["a/h"].append(elements)
             plane["dissipation"].append(turn_of_cylinders(elements, 3, degree))
