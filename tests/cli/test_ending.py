@@ -98,23 +98,6 @@ def test_a_crash_has_a_status_of_its_own(ranks: int, kind: str, tmp_path: Path) 
     assert not (out / "summary.json").exists()
 
 
-@pytest.mark.parametrize(
-    "title",
-    [
-        pytest.param("long " * 1000, id="words"),
-        pytest.param("x" * 5000, id="word"),
-        pytest.param("a $ b $ \\\\frac", id="formula"),
-        pytest.param("two\\nlines", id="lines"),
-    ],
-)
-def test_any_title_can_be_drawn(title: str, tmp_path: Path) -> None:
-    out = tmp_path / "out"
-    options = ["--plot", "--set", f'title="{title}"']
-    status, text = run("solve", str(BAR), "--out", str(out), *SMALL, *options)
-    assert status == 0, text
-    assert len(list(out.glob("figure-*.png"))) == 2
-
-
 def test_a_figure_that_fails_costs_nothing_else(tmp_path: Path) -> None:
     before = "import matplotlib.figure; matplotlib.figure.Figure.savefig = lambda *_: 1 / 0"
     out = tmp_path / "out"

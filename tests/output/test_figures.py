@@ -1,5 +1,6 @@
 """The figures of a solution."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -100,6 +101,16 @@ def test_the_lines_of_a_title_are_above_the_body(height: float, lines: int) -> N
         FigureCanvasAgg(figure).draw()
     assert figure.axes[0].get_title().count("\n") == lines - 1
     assert figure.axes[0].title.get_window_extent().y1 < figure.bbox.height
+
+
+def test_any_title_can_be_drawn(shared_tmp_path: Path) -> None:
+    from contact.output.figures.figures import collect
+
+    solution = solve(block(2))
+    for title in ("long " * 1000, "x" * 5000, "a $ b $ \\frac", "two\nlines"):
+        drawing = collect(replace(solution, title=title))
+        assert drawing is not None
+        assert all(file.stat().st_size > 10_000 for file in drawing.draw(shared_tmp_path))
 
 
 def test_rounding_has_no_colours() -> None:

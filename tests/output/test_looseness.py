@@ -8,7 +8,7 @@ from tests.problems.pairs import case
 from tests.problems.written import block
 
 CYLINDERS = {
-    "mesh": {"generator": "two_half_cylinders", "contact_size": 0.1, "contact_width": 0.7},
+    "mesh": {"generator": "two_half_cylinders", "contact_size": 0.2, "contact_width": 0.7},
     "material": {"young": 1000.0, "poisson": 0.3},
     "fixed": [{"on": "lower_cut", "displacement": [0.0, 0.0]}],
     "load": [{"on": "upper_cut", "traction": [0.0, -1.0]}],
