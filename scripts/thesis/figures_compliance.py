@@ -260,7 +260,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
     symmetric = (
         "The mesh is symmetric, and so are bar, loads and this solution. The bump in the middle is "
         "where slips to either side meet: friction changes its sign there within a few nodes, and "
-        "on finer meshes the peak is 11.4 (*Chapter 8 on finer meshes*)."
+        "on finer meshes the peak is 11.4 (*Chapter 8 on finer meshes*). The thesis has sticking "
+        "and sliding zones clearly identified; here what sticks is this middle alone, 0.06 wide."
     )
     example(report, "8-10", "compliance-8-4", what, cells, "", crossed, note=symmetric)
     leaning = (
