@@ -1,13 +1,17 @@
 """Load steps beside one static solve: `python3 -m scripts.benchmarks.steps [--out DIR] [--coarse]`.
 
 Example 7.2 in 100 steps and a block in space in 20, both of linear material with friction, loaded
-from nothing to all. Seconds of the processor, with the problem's making; all in one process.
+from nothing to all. Then Example 7.2 by Hencky's law under 20 loads, swept from one solution to the
+next and each from rest. Seconds of the processor, with the problem's making; all in one process.
+`--only steps` or `--only sweep` measures the one.
 """
 
 from __future__ import annotations
 
+import tempfile
 import time
 from collections.abc import Sequence
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -16,9 +20,13 @@ from contact import Case, build_problem
 from contact.evolving import in_steps
 from contact.methods.newton import Newton
 from contact.methods.steps import Evolution
+from contact.sweeping import Axis, sweep
 from scripts.benchmarks.bench_one import LINEAR, block, unknowns
-from scripts.cases import bar
+from scripts.cases import CASES, bar
 from scripts.reporting import Report, parser
+
+#: Loads of the sweep.
+LOADS = 20
 
 #: Times that the static solve is measured, before the steps and after them.
 REPEATED = 2
@@ -44,14 +52,31 @@ def measured(case: Case, count: int) -> dict[str, Any]:
     }
 
 
-def main(arguments: Sequence[str] | None = None) -> None:
-    """Measure both, and write what they took."""
-    given = parser(__doc__, "steps").parse_args(arguments)
+def swept(cells: int, warm: bool) -> dict[str, Any]:
+    """Return what Example 7.2 under `LOADS` loads takes, each from the one before or from rest."""
+    loads = tuple(f"[0.0, {-0.005 * (k + 1) / LOADS}]" for k in range(LOADS))
+    settings = [f"mesh.cells=[{4 * cells}, {cells}]", "solver.method=newton"]
+    with tempfile.TemporaryDirectory() as folder:
+        begin = time.process_time()
+        axes = [Axis("load.0.traction", loads)]
+        rows = sweep(CASES / "bar.toml", axes, Path(folder), settings, warm=warm)
+        seconds = time.process_time() - begin
+    return {
+        "": "from the last" if warm else "from rest",
+        "converged": all(row["converged"] for row in rows),
+        "loads": len(rows),
+        "set-ups": sum(int(row["factorizations"]) for row in rows),
+        "seconds": seconds,
+    }
+
+
+def stepped(coarse: bool) -> list[dict[str, Any]]:
+    """Return what the evolutions take beside static solves."""
     rows = []
     for name, case, small, count in (
-        ("plane", bar(16 if given.coarse else 128, -0.005, 1e5, "material.law=linear"),
+        ("plane", bar(16 if coarse else 128, -0.005, 1e5, "material.law=linear"),
          bar(4, -0.005, 1e5, "material.law=linear"), 100),
-        ("space", block(8 if given.coarse else 32, LINEAR), block(4, LINEAR), 20),
+        ("space", block(8 if coarse else 32, LINEAR), block(4, LINEAR), 20),
     ):  # fmt: skip
         measured(small, 1)  # its forms are compiled
         before = [measured(case, 1)["seconds"] for _ in range(REPEATED)]
@@ -59,14 +84,35 @@ def main(arguments: Sequence[str] | None = None) -> None:
         after = [measured(case, 1)["seconds"] for _ in range(REPEATED)]
         static = float(np.mean([*before, *after]))
         rows.append({"": name, **found, "static": static, "ratio": found["seconds"] / static})
-    Report(given.out).table(
-        "bench-steps",
-        "Load steps beside one static solve",
-        {key: [row[key] for row in rows] for key in rows[0]},
-        "Example 7.2 and a block in space, linear material, friction. `static` is one step to the "
-        f"full load, the mean of {REPEATED} before the steps and {REPEATED} after them; seconds of "
-        "the processor, of one process.",
-    )
+    return rows
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Measure both, and write what they took."""
+    options = parser(__doc__, "steps")
+    options.add_argument("--only", choices=["steps", "sweep"], help="measure this alone")
+    given = options.parse_args(arguments)
+    report = Report(given.out)
+    if given.only != "sweep":
+        rows = stepped(given.coarse)
+        report.table(
+            "bench-steps",
+            "Load steps beside one static solve",
+            {key: [row[key] for row in rows] for key in rows[0]},
+            "Example 7.2 and a block in space, linear material, friction. `static` is one step to "
+            f"the full load, the mean of {REPEATED} before the steps and {REPEATED} after them; "
+            "seconds of the processor, of one process.",
+        )
+    if given.only != "steps":
+        swept(4, warm=True)
+        rows = [swept(16 if given.coarse else 128, warm) for warm in (False, True)]
+        share = rows[1]["seconds"] / rows[0]["seconds"]
+        report.table(
+            "bench-sweep",
+            f"{LOADS} loads swept, each from the one before or from rest",
+            {key: [row[key] for row in rows] for key in rows[0]},
+            f"Example 7.2, Hencky's law; {share:.2f} of the seconds of the processor.",
+        )
 
 
 if __name__ == "__main__":
