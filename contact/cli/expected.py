@@ -72,9 +72,8 @@ def _sizes(problem: ContactProblem) -> list[str]:
     if expected == 0:
         return ["# warning: nothing is loaded or moved: all results will be 0"]
     lines = [
-        f"# expected: displacements of some {expected:.2g} (prescribed {moved:.2g}, by the loads "
-        f"{pressed:.2g} if they pressed a block of the body's size there); gap {least:.3g} to "
-        f"{largest:.3g}"
+        f"# expected: displacements of some {expected:.2g} (prescribed {moved:.2g}; the loads on a "
+        f"block of the body's size {pressed:.2g}); gap {least:.3g} to {largest:.3g}"
     ]
     if expected > LARGE * scales.size:
         lines.append(
