@@ -115,7 +115,14 @@ class Loop:
         return np.asarray(sign * factor * (2 * along - first))
 
 
-def turn(poisson: float, elements: float, steps: int, degree: int = 1) -> Loop:
+def turn(
+    poisson: float,
+    elements: float,
+    steps: int,
+    degree: int = 1,
+    press: float = PRESS,
+    shear: float = SHEAR,
+) -> Loop:
     """Press, push, and move there and back.
 
     Parameters
@@ -128,8 +135,10 @@ def turn(poisson: float, elements: float, steps: int, degree: int = 1) -> Loop:
         From the middle to an end of the way.
     degree
         Of the space.
+    press, shear
+        How far the cuts approach each other, and half the way along x.
     """
-    width = np.sqrt(RADIUS / 2 * PRESS)
+    width = np.sqrt(RADIUS / 2 * press)
     case = {
         "mesh": {
             "generator": "two_spheres",
@@ -145,8 +154,8 @@ def turn(poisson: float, elements: float, steps: int, degree: int = 1) -> Loop:
         "fixed": [
             {"on": "symmetry_y", "displacement": ["free", 0.0, "free"]},
             {"on": "lower_cut", "displacement": [0.0, 0.0, 0.0]},
-            {"on": "upper_cut", "displacement": [SHEAR, 0.0, "free"], "amplitude": "shear"},
-            {"on": "upper_cut", "displacement": ["free", "free", -PRESS], "amplitude": "press"},
+            {"on": "upper_cut", "displacement": [shear, 0.0, "free"], "amplitude": "shear"},
+            {"on": "upper_cut", "displacement": ["free", "free", -press], "amplitude": "press"},
         ],
         "contact": {"on": "upper_round", "against": "lower_round"},
         "friction": {"law": "coulomb", "mu": MU},
@@ -154,14 +163,14 @@ def turn(poisson: float, elements: float, steps: int, degree: int = 1) -> Loop:
     rows, turning = moved(case, steps)
     # Both halves of the balls.
     normal = -2 * rows[-1]["contact_force_z"]
-    modulus, shear = YOUNG / (2 * (1 - poisson**2)), YOUNG / (2 * (1 + poisson))
+    modulus, rigidity = YOUNG / (2 * (1 - poisson**2)), YOUNG / (2 * (1 + poisson))
     return Loop(
         np.array([row["driven_x"] for row in turning]),
         np.array([2 * row["driven_force_x"] for row in turning]),
         2 * sum(row["dissipation"] for row in turning[1:]),
         normal,
         float((3 * normal * RADIUS / 2 / (4 * modulus)) ** (1 / 3)),
-        2 * (2 - poisson) / shear,
+        2 * (2 - poisson) / rigidity,
     )
 
 
