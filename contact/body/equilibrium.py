@@ -259,6 +259,8 @@ class BodyEquilibrium:
             As of `SparseOperator`.
         """
         options = {"symmetric": symmetric, "counters": counters, "kind": kind}
+        if change is None and self.masters.size == 0:
+            options["pieces"] = self.shares.apart
         blocks = nodes, motion, change
         return make_operator(self, self.rest(), self.masters, blocks, options)
 

@@ -14,6 +14,7 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 
 from contact.body.masters import Masters
+from contact.linear.refinement import Pieces
 from contact.mesh.domain import Domain
 from contact.mesh.pieces import connected_pieces, joined, sums
 from contact.typing import Array
@@ -63,6 +64,12 @@ class Shares:
         return Shares(
             self.comm, piece, none, self.count, self.block_size, self.dim, none.astype(bool)
         )
+
+    @property
+    def apart(self) -> Pieces | None:
+        """The pieces of owned unknowns; None where there is one."""
+        of = np.repeat(self.piece, self.block_size)
+        return Pieces(self.comm, of, self.count) if self.count > 1 else None
 
     def sizes(self, values: Array) -> Array:
         """Return the Euclidean norms of owned values, by field and piece. Collective.

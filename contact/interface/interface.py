@@ -17,6 +17,7 @@ from contact.interface.response import FoundationResponse
 from contact.interface.status import CLOSED, node_status, touching
 from contact.linear.change import Change
 from contact.mesh.pieces import sums
+from contact.tolerances import EPS
 from contact.typing import Array
 
 
@@ -80,6 +81,13 @@ class Interface:
             return np.array([self.jump.norm(values)])
         squares = values**2 if values.ndim == 1 else np.einsum("ni,ni->n", values, values)
         return np.sqrt(sums(self.comm, self.piece, self.jump.weight * squares, self.pieces))
+
+    def piece_norms(self, values: Array) -> Array:
+        """Return at each node how large values are on its piece, 1 for a single one. Collective."""
+        norms = self.norms(values)
+        if self.pieces == 1 or not norms.max() > 0:
+            return np.ones_like(self.jump.weight)
+        return np.maximum(norms, EPS * norms.max())[self.piece]
 
     @property
     def extents(self) -> tuple[Array, Array]:

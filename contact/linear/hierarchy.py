@@ -10,7 +10,7 @@ from petsc4py import PETSc
 
 from contact.linear.faults import petsc_options
 from contact.linear.products import quick_products
-from contact.linear.refinement import refine
+from contact.linear.refinement import Pieces, refine
 from contact.linear.stiff_nodes import StiffNodes
 from contact.typing import Array
 
@@ -35,10 +35,14 @@ class Hierarchy:
         A solver with GAMG, set up with the body's operator.
     nodes
         Owned nodes that may have contact blocks, local numbers, shape (n,).
+    pieces
+        As of `refine`.
     """
 
-    def __init__(self, ksp: PETSc.KSP, nodes: NDArray[np.int32]) -> None:
-        self._ksp = ksp
+    def __init__(
+        self, ksp: PETSc.KSP, nodes: NDArray[np.int32], pieces: Pieces | None = None
+    ) -> None:
+        self._ksp, self._pieces = ksp, pieces
         self._stiff = StiffNodes(ksp.getPC(), nodes)
         self._most = ksp.getTolerances()[3]
         self._lost = np.inf
@@ -85,7 +89,7 @@ class Hierarchy:
         """
         self._taken, self._renewals = 0, 0
         self._solve(rhs.copy(), solution)
-        refine(self._ksp, rhs, solution, self._correct)
+        refine(self._ksp, rhs, solution, self._correct, self._pieces)
         return self._taken, self._renewals > 0
 
     def _correct(self, rhs: PETSc.Vec, correction: PETSc.Vec) -> None:

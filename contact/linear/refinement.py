@@ -8,11 +8,41 @@ some methods end without a solution, and say so to nobody who does not ask.
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 
+import numpy as np
+from mpi4py import MPI
+from numpy.typing import NDArray
 from petsc4py import PETSc
+
+from contact.mesh.pieces import sums
+from contact.typing import Array
 
 #: How often a solution is corrected, at most, by a solve for what it leaves.
 CORRECTIONS = 3
+
+
+@dataclass(frozen=True)
+class Pieces:
+    """Systems that nothing couples.
+
+    Attributes
+    ----------
+    comm
+        Communicator.
+    of
+        To which each owned unknown belongs.
+    count
+        How many they are.
+    """
+
+    comm: MPI.Intracomm
+    of: NDArray[np.intp]
+    count: int
+
+    def norms(self, vector: PETSc.Vec) -> Array:
+        """Return the norm of a vector in each of them, shape (count,). Collective."""
+        return np.sqrt(sums(self.comm, self.of, vector.array_r**2, self.count))
 
 
 def refine(
@@ -20,10 +50,13 @@ def refine(
     rhs: PETSc.Vec,
     solution: PETSc.Vec,
     solve: Callable[[PETSc.Vec, PETSc.Vec], None],
+    pieces: Pieces | None = None,
 ) -> None:
     """Correct a solution while it leaves far too much and corrections help. Collective.
 
-    That is more than the root of what was asked for: norms differ by as much as that.
+    That is more than the root of what was asked for: norms differ by as much as that. Of systems
+    beside each other, which iterations take for one, each has to leave little by itself: beside a
+    far larger right-hand side nothing of a small one is seen.
 
     Parameters
     ----------
@@ -33,17 +66,23 @@ def refine(
         The system's; the latter is corrected.
     solve
         Solves for another right-hand side, from zero.
+    pieces
+        Systems that nothing couples; None where there is one.
     """
-    matrix, allowed = ksp.getOperators()[0], ksp.getTolerances()[0] ** 0.5 * rhs.norm()
+    norms = (lambda vector: np.array([vector.norm()])) if pieces is None else pieces.norms
+    matrix, allowed = ksp.getOperators()[0], ksp.getTolerances()[0] ** 0.5 * norms(rhs)
     left = rhs - matrix * solution
     for _ in range(CORRECTIONS):
-        before = left.norm()
-        if not before > allowed:
+        before = norms(left)
+        beyond = before > allowed
+        if not beyond.any():
             return
-        correction = left.duplicate()
+        correction, asked = left.duplicate(), left.copy()
+        if pieces is not None:
+            asked.array[~beyond[pieces.of]] = 0.0
         ksp.setInitialGuessNonzero(False)
-        solve(left.copy(), correction)
+        solve(asked, correction)
         left.axpy(-1.0, matrix * correction)
-        if not left.norm() < before:
+        if not np.any(norms(left)[beyond] < before[beyond]):
             return
         solution.axpy(1.0, correction)

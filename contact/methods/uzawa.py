@@ -149,12 +149,18 @@ class _Projection:
         tangential = disc_derivative(z[:, 1:], self.bound, directions[:, 1:])
         return np.concatenate([normal, tangential], axis=1)
 
-    def accelerator(self, depth: int, anew: bool) -> ResidualMinimiser | None:
-        """Return what speeds up the iteration of z, as a flat array; None with depth 0."""
-        if depth == 0:
-            return None
+    def accelerator(self, depth: int, anew: bool, size: Array) -> ResidualMinimiser:
+        """Return what speeds up the iteration of z, as a flat array.
+
+        Parameters
+        ----------
+        depth, anew
+            As of `Relaxation`.
+        size
+            What forces are measured by at each node, shape (n,).
+        """
         jump, shape = self.jump, (self.jump.weight.size, 1 + self.jump.normal.shape[1])
-        weights = np.repeat(jump.weight, shape[1])
+        weights = np.repeat(jump.weight / size**2, shape[1])
 
         def inner(a: Array, b: Array) -> Array:
             return np.asarray(jump.comm.allreduce(a.T @ (weights[:, None] * b), op=MPI.SUM))
@@ -231,13 +237,14 @@ def block_relaxation(
     jump, r, law = interface.jump, parameters.r, step.law
     origin = r * split(interface, step.nodal, step.friction)
     project = _Projection(jump, r, step.bound, law, origin)
-    accelerator = project.accelerator(parameters.depth, parameters.anew)
+    accelerator: ResidualMinimiser | None = None
+    beside: Array = np.ones_like(jump.weight)
     changes = None if domain_norm is None else _Changes(project, step.x, domain_norm)
     rtol = max(SHARE * parameters.tolerance, LEAST)
     residual, forces = np.inf, Multipliers.zero(jump)
     increment: Array = np.zeros(step.x.size)
     way: Array = np.zeros_like(z)
-    stagnation = Stagnation(PATIENCE_PLAIN if accelerator is None else PATIENCE, PROGRESS)
+    stagnation = Stagnation(PATIENCE if parameters.depth > 0 else PATIENCE_PLAIN, PROGRESS)
     for iteration in range(1, parameters.max_iterations + 1):
         if poll is not None:
             poll()
@@ -251,6 +258,8 @@ def block_relaxation(
         way = r * components(jump, moved, step.friction)
         # q + r (u - u_0) is the force that the foundation exerted in this very solve.
         total = q + way
+        if iteration == 1:
+            beside = interface.piece_norms(total)
         layer = 0.0 if law is None else law.layer(jump.normal_component(nodal))
         forces = Multipliers(total[:, 0] - layer, total[:, 1:])
         if parameters.single_loop and step.friction:
@@ -261,7 +270,7 @@ def block_relaxation(
         image = multiplier + relaxed + parameters.over_relaxation * way
         done = residual <= parameters.tolerance or not np.isfinite(residual)
         # Not the residual: where nothing touches yet it is small, beside the stress of closing.
-        measured = jump.norm(total - project(total + way))
+        measured = jump.norm((total - project(total + way)) / beside[:, None])
         if parameters.thesis_tolerance is not None:
             assert changes is not None
             squares, done = changes.squares(increment, image), False
@@ -273,7 +282,9 @@ def block_relaxation(
         if done or stalled:
             return RelaxationResult(increment, forces, image - way, iteration, residual, stalled)
         z = image
-        if accelerator is not None:
+        if parameters.depth > 0:
+            if accelerator is None:
+                accelerator = project.accelerator(parameters.depth, parameters.anew, beside)
             newest = (total + way).ravel()
             z = accelerator.next(total.ravel(), newest, image.ravel()).reshape(z.shape)
     return RelaxationResult(increment, forces, z - way, parameters.max_iterations, residual)

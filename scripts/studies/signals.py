@@ -1,10 +1,10 @@
 """Runs that are ended by signals: the earlier result or the new one is there whole, always.
 
-`python3 -m scripts.studies.signals [--out DIR] [--coarse] [--count N] [--kills N]`. One bar is
-solved again and again into one folder, each time under another load, on one rank and on two. Half
-of the runs get their signal (SIGINT, SIGTERM or SIGKILL, with two ranks sent to the launcher) at a
-random time, half while they write. Each result is then held against its own load, and no process
-may be left.
+`python3 -m scripts.studies.signals [--out DIR] [--coarse] [--count N] [--first K] [--kills N]`. One
+bar is solved again and again into one folder, each time under another load, on one rank and on two.
+Half of the runs get their signal (SIGINT, SIGTERM or SIGKILL, with two ranks sent to the launcher)
+at a random time, half while they write. Each result is then held against its own load, and no
+process may be left.
 
 Then evolutions with friction are killed at random times, on one rank and on two, and go on from
 their checkpoints on one, two or three; one is killed again and again, on 1, 2 and 3 ranks, and ends
@@ -232,6 +232,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Disturb runs and look at what they leave."""
     options = parser(__doc__, "signals")
     options.add_argument("--count", type=int, help="number of signals to the bar")
+    options.add_argument("--first", type=int, default=0, help="number of the first of them")
     options.add_argument("--kills", type=int, help="number of evolutions to kill")
     given = options.parse_args(arguments)
     count = (COARSE_COUNT if given.coarse else COUNT) if given.count is None else given.count
@@ -243,10 +244,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
     columns = ("run", "ranks", "signal", "writing", "status", "fault")
     rows: dict[str, list[Any]] = {name: [] for name in columns}
     ends = Counter[str]()
-    for number in range(1, count + 1):
+    delays = rng.uniform(size=count)
+    for number in range(given.first + 1, count + 1):
         ranks, kind = 1 + number % 2, SIGNALS[number // 2 % 3]
         writing = bool(number // 6 % 2)
-        delay = float(rng.uniform(0.0, 0.5 if writing else seconds))
+        delay = float(delays[number - 1] * (0.5 if writing else seconds))
         wait = partial(wait_until_writing, folder=folder) if writing else None
         status, left = disturbed(command(folder, number, ranks), kind, delay, wait)
         wrong = fault(folder, {before, number}) or (f"{left} processes left" if left else "")
@@ -259,7 +261,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
             append(rows, *row)
     for end, times in sorted(ends.items()):
         print(f"{times:4d}  {end}")
-    Report(given.out).table("signals", f"Faults after {count} signals", rows)
+    Report(given.out).table("signals", f"Faults after {count - given.first} signals", rows)
     steps = ended(given.out / "evolutions", kills, rng)
     Report(given.out).table("evolutions", f"Evolutions that went on, {kills} after SIGKILL", steps)
     far = max(steps["difference"]) > AGREE or any(steps["left"])
