@@ -105,7 +105,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
         )
     if given.only != "steps":
         swept(4, warm=True)
-        rows = [swept(16 if given.coarse else 128, warm) for warm in (False, True)]
+        rows = [swept(16 if given.coarse else 64, warm) for warm in (False, True)]
         share = rows[1]["seconds"] / rows[0]["seconds"]
         report.table(
             "bench-sweep",
