@@ -9,7 +9,7 @@ import numpy as np
 from mpi4py import MPI
 
 from contact.output.solution import Solution
-from contact.problem.kkt import residual_forces
+from contact.problem.kkt import left_as_pressures, residual_forces
 from contact.problem.problem import ContactProblem
 from forms.elasticity import Anisotropic
 from forms.hencky import Hencky
@@ -252,16 +252,18 @@ def rounding(solution: Solution) -> Remark:
 
 
 def unknown_pressures(solution: Solution) -> Remark:
-    """Say where contact forces are hardly more than what rounding leaves of far larger ones."""
-    unknown = solution.outcome.kkt.unknown
+    """Say where contact forces are hardly more than what is left of far larger ones. Collective."""
+    left = left_as_pressures(solution.problem, solution.state)
+    unknown = max(solution.outcome.kkt.unknown, left)
     loads = solution.problem.equilibrium.load_sizes(solution.state.time)[0].max()
     moved = solution.problem.comm.allreduce(bool(np.any(solution.problem.start().x)), op=MPI.LOR)
     if not (solution.converged and unknown > KNOWN and (moved or loads > 0)):
         return "", True
     return (
-        f"contact forces are known to {unknown:.1e} of their size only: what rounding leaves of "
-        "the far larger ones in the bodies does not count as a wrong pressure; smaller "
-        "displacements and stresses elsewhere make them known better",
+        f"contact forces are known to {unknown:.1e} of their size only: what rounding or "
+        "the tolerance leaves of far larger ones in the bodies does not count as a wrong pressure; "
+        'a smaller solver.tolerance, linear = "lu", or smaller displacements and stresses '
+        "elsewhere, make them known better",
         False,
     )
 

@@ -10,6 +10,7 @@ from functools import lru_cache
 
 import numpy as np
 
+from contact.interface.interface import Interface
 from contact.interface.residuals import interface_residuals
 from contact.problem.protocols import Problem
 from contact.problem.state import State
@@ -123,10 +124,19 @@ def force_rounding(problem: Problem, state: State, internal: Array) -> Array:
     return MARGIN * EPS / SHAKE * body.sizes(body.unbalanced(change))
 
 
-def _as_pressures(problem: Problem, forces: Array) -> Array:
+def _as_pressures(interface: Interface, forces: Array) -> Array:
     """Return the norms in L2(Gamma_3) of pressures with forces of given norms. Collective."""
-    count, area = problem.interface.extents
+    count, area = interface.extents
     return forces * np.sqrt(np.divide(count, area, out=np.zeros_like(area), where=area > 0))
+
+
+def left_as_pressures(problem: Problem, state: State) -> float:
+    """Return what is left of the forces, as pressures over those that press. Collective."""
+    body, interface = problem.equilibrium, problem.interface
+    left = body.sizes(body.unbalanced(residual_forces(problem, state)))[0]
+    pressed = interface.norms(interface.pressure(interface.jump.apply(state.x), state.forces))
+    known = _as_pressures(interface, left)
+    return float(np.divide(known, pressed, out=np.zeros_like(known), where=pressed > 0).max())
 
 
 def evaluate(problem: Problem, state: State) -> KKT:
@@ -154,7 +164,7 @@ def evaluate(problem: Problem, state: State) -> KKT:
     size = np.where(scale > 0, scale, 1.0)
     equilibrium = float(np.max((unbalanced - rounding) / size))
     nodal = interface.jump.apply(state.x)
-    bound, pressures = interface.bound(nodal, state.forces), _as_pressures(problem, unknown)
+    bound, pressures = interface.bound(nodal, state.forces), _as_pressures(interface, unknown)
     laws = interface_residuals(interface, nodal, state.forces, bound, pressures)
     pressed = interface.norms(interface.pressure(nodal, state.forces))
     granted = float(np.max(np.where(acted, rounding / size, 0.0)))

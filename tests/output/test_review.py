@@ -174,6 +174,25 @@ def test_pressures_that_are_lost_in_rounding_are_warned_of(depth: float, warned:
     assert any("contact forces are known to" in text for text in solution.warnings) == warned
 
 
+def test_pressures_that_the_tolerance_leaves_open_are_warned_of() -> None:
+    """The same bar by multigrid: 1e-8 of its stresses is more than what presses it."""
+    case = block(
+        2,
+        material={"young": 10.0, "poisson": 0.0},
+        fixed=[
+            {"on": "left", "displacement": [0.0, "free"]},
+            {"on": "right", "displacement": [2.0, "free"]},
+            {"on": "top", "displacement": ["free", -1e-9]},
+        ],
+        friction={"law": "none"},
+        solver={"linear": "iterative"},
+    )
+    solution = solve(case)
+    off = np.abs(solution.pressure / 1e-8 - 1.0).max()
+    assert solution.converged and off > 1e-3
+    assert any("contact forces are known to" in text for text in solution.warnings)
+
+
 def test_forces_that_are_rounding_are_not_out_of_balance() -> None:
     """A free block is unloaded: what was left was said to be beside what supports bear: none."""
     top = {"on": "top", "traction": [0.0, -0.01], "amplitude": "pulse"}
