@@ -7,7 +7,7 @@ import pytest
 
 pytest.importorskip("gmsh")
 from contact.case.shapes import Sphere
-from contact.methods.options import with_method
+from contact.methods.options import OPTIONS, with_method
 from scripts.thesis import hertz
 
 
@@ -73,7 +73,7 @@ def test_other_methods_agree(method):
     _, newton = hertz.run(hertz.cylinder(160.0, mu="0.2", fineness=8), 80.0)
     case = hertz.cylinder(160.0, mu="0.2", fineness=8)
     given = {"eps_contact": 1e-9, "eps_slip": 1e-9} if method == "penalty" else {}
-    solver = with_method(case.solver, method, **given)
+    solver = with_method(case.solver, OPTIONS[method], **given)
     _, other = hertz.run(case.model_copy(update={"solver": solver}), 80.0)
     assert other.peak == pytest.approx(newton.peak, rel=1e-5)
     assert other.moment == pytest.approx(newton.moment, rel=1e-5)
