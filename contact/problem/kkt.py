@@ -12,6 +12,7 @@ import numpy as np
 
 from contact.interface.interface import Interface
 from contact.interface.residuals import interface_residuals
+from contact.interface.status import touching
 from contact.problem.protocols import Problem
 from contact.problem.state import State
 from contact.tolerances import EPS
@@ -134,9 +135,20 @@ def left_as_pressures(problem: Problem, state: State) -> float:
     """Return what is left of the forces, as pressures over those that press. Collective."""
     body, interface = problem.equilibrium, problem.interface
     left = body.sizes(body.unbalanced(residual_forces(problem, state)))[0]
-    pressed = interface.norms(interface.pressure(interface.jump.apply(state.x), state.forces))
-    known = _as_pressures(interface, left)
-    return float(np.divide(known, pressed, out=np.zeros_like(known), where=pressed > 0).max())
+    return _over_pressed(interface, state, _as_pressures(interface, left))
+
+
+def _over_pressed(interface: Interface, state: State, pressures: Array) -> float:
+    """Return the largest of norms of pressures over what presses on each piece. Collective.
+
+    What a method leaves of a multiplier at open nodes presses nothing, and neither does what is
+    rounding beside the pressures on other pieces.
+    """
+    nodal, own = interface.jump.apply(state.x), state.forces.pressure
+    on = touching(own, interface.opening(nodal), interface.stiffness)
+    pressed = interface.norms(interface.pressure(nodal, state.forces) - own * ~on)
+    much = (pressed > 0) & (pressed > EPS * pressed.max())
+    return float(np.divide(pressures, pressed, out=np.zeros_like(pressed), where=much).max())
 
 
 def evaluate(problem: Problem, state: State) -> KKT:
@@ -166,7 +178,5 @@ def evaluate(problem: Problem, state: State) -> KKT:
     nodal = interface.jump.apply(state.x)
     bound, pressures = interface.bound(nodal, state.forces), _as_pressures(interface, unknown)
     laws = interface_residuals(interface, nodal, state.forces, bound, pressures)
-    pressed = interface.norms(interface.pressure(nodal, state.forces))
     granted = float(np.max(np.where(acted, rounding / size, 0.0)))
-    known = np.divide(pressures, pressed, out=np.zeros_like(pressed), where=pressed > 0)
-    return KKT(equilibrium, *laws, granted, float(known.max()))
+    return KKT(equilibrium, *laws, granted, _over_pressed(interface, state, pressures))
