@@ -32,6 +32,13 @@ PETSc's options have one dash, those of the linear solver the prefix contact_, a
 #: Names of arguments that are no options.
 POSITIONAL = ("command", "case", "folder", "name", "mesh")
 
+#: What the command takes one of, where that is no case file.
+ONE = {
+    "new": "mesh file",
+    "plot": "folder with results",
+    "materials": 'name of a material, in quotes where it has spaces: "PZT-4 Clevite"',
+}
+
 
 def _parser() -> Parser:
     parser = Parser(prog="contact", description=DESCRIPTION, epilog=EXIT, **COMMON)
@@ -99,5 +106,6 @@ def parse(arguments: Sequence[str]) -> tuple[argparse.Namespace, list[str]]:
             hint = f", did you mean {near[0]}?" if near else ""
             raise InputError(f"{argument}: unknown option{hint}; accepted: {', '.join(known)}")
         if not argument.startswith("-") and not follows:
-            raise InputError(f"{argument}: one argument too many; accepted: one case file")
+            one = ONE.get(options.command, "case file")
+            raise InputError(f"{argument}: one argument too many; accepted: one {one}")
     return options, rest

@@ -54,7 +54,10 @@ SUMMARY: Mapping[str, Item] = {
         "area", "Sum of the weights of the nodes that touch; in the plane a length."
     ),
     "contact_force": Item(
-        "force", "What the body exerts on the foundation, a vector; in the plane a unit of depth."
+        "force",
+        "What the body exerts on the foundation, a vector; in the plane a unit of depth. Between "
+        "bodies what the one with `on` exerts on the other; of several contacts the sum, and "
+        "`traction`, `weight` and `entry` of `contact.vtu` have the force of each.",
     ),
     "contact_moment": Item(
         "force · length",
@@ -65,7 +68,7 @@ SUMMARY: Mapping[str, Item] = {
         "force",
         "What the support of each part exerts on the body, a vector a part. A node of two parts "
         "counts for the one that stands first in the case. With the loads and minus "
-        "`contact_force` they add up to nothing.",
+        "`contact_force` they add up to nothing; what passes between bodies is no part of that.",
     ),
     "reaction_moments": Item("force · length", "Moments of these, as `contact_moment`."),
     "max_displacement": Item("length", "Largest Euclidean norm of the displacement at a node."),

@@ -48,7 +48,7 @@ solved again by another method, to another tolerance, with other outputs.
 
 **Units.** All is in the units of the case: with millimetres and newtons, stresses are in MPa. In
 the plane, forces and charges are those of a unit of depth; of bodies of revolution they are those
-of the full turn (along r the sum of the radial ones, which is no resultant).
+of the full turn, in which those along r cancel: resultants have 0 there.
 
 **Signs.** ν points out of the body, to the foundation. Pressure is positive; contact forces and
 friction stresses are what the body exerts *on the foundation*; reactions are what the supports
