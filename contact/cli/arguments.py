@@ -82,7 +82,9 @@ def _add_solve(commands: Any) -> None:
     )
     add_progress(command)
     command.add_argument(
-        "--overwrite", action="store_true", help="replace results of another case, if DIR has any"
+        "--overwrite",
+        action="store_true",
+        help="replace results or checkpoints of another case, if DIR has any",
     )
 
 

@@ -42,7 +42,7 @@ from contact.methods.interrupt import (
     signals_held,
 )
 from contact.output.folder import on_root, refused, result_folder
-from contact.output.rerun import check_rerun
+from contact.output.rerun import check_kept, check_rerun
 
 if TYPE_CHECKING:  # it loads dolfinx, which PETSc's options have to precede
     from contact.case.file import Case
@@ -77,15 +77,22 @@ def _solve(case: Case, options: argparse.Namespace, comm: MPI.Intracomm) -> int:
         raise InputError('--out "": no folder; accepted: a folder to write to')
     restart = None if options.restart is None else Path(options.restart)
     # Not earlier: these load dolfinx, which PETSc's options have to precede.
-    from contact.case.text import to_toml
+    from contact.case.text import anchored, to_toml
     from contact.cli.progress import progress
     from contact.output.files import write_outputs
-    from contact.output.resume import discard
+    from contact.output.resume import discard, kept_case
     from contact.solving import SolveInterrupted, solve
 
     with result_folder(out, comm) as folder:
+
+        def check() -> None:
+            check_rerun(folder.path, to_toml(case))
+            kept = kept_case(folder.path)
+            if kept is not None:
+                check_kept(folder.path, kept, to_toml(anchored(case)))
+
         if not options.overwrite:
-            on_root(comm, lambda: check_rerun(folder.path, to_toml(case)))
+            on_root(comm, check)
         with progress(comm, options.quiet, options.log) as monitor:
             try:
                 solution = solve(

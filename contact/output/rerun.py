@@ -55,6 +55,30 @@ def check_rerun(folder: Path, case: str) -> None:
     )
 
 
+def check_kept(folder: Path, before: str, case: str) -> None:
+    """Refuse to replace checkpoints of another case, all that a killed run has left. On one rank.
+
+    Parameters
+    ----------
+    folder
+        Where the results are to go.
+    before, case
+        The case of the checkpoints there and the one at hand, as `contact check` prints them.
+
+    Raises
+    ------
+    InputError
+        If they differ in more than in how they are solved and shown.
+    """
+    place = difference(*(_without(tomllib.loads(text)) for text in (before, case)))
+    if place is not None:
+        raise InputError(
+            f"--out {folder}: given a folder with checkpoints of another case: there {place}; "
+            f"accepted: --restart {folder} to go on with that, --overwrite to replace them, or "
+            "another folder"
+        )
+
+
 def check_restart(folder: Path, before: str, case: str) -> None:
     """Refuse to go on with another case than the one that was interrupted.
 

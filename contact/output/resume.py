@@ -201,6 +201,14 @@ def case_of(folder: Path) -> Path:
     return _files(folder)[0].parent / CASE
 
 
+def kept_case(folder: Path) -> str | None:
+    """Return the case of the checkpoints in a folder; None without any. On one rank."""
+    try:
+        return case_of(folder).read_text(encoding="utf-8")
+    except InputError:
+        return None
+
+
 def discard(folder: Path) -> None:
     """Remove the checkpoints of a run that has come to its end. On one rank."""
     for name in (FOLDER, FRESH):

@@ -131,6 +131,10 @@ def test_the_command_line(tmp_path, ended, capfd):
     assert on_the_line("solve", case, "--restart", out, *other) == 2
     words = "given checkpoints of another case: there friction.mu.rho is 10000.0, here 1.0"
     assert words in capfd.readouterr().err
+    assert on_the_line("solve", case, "--out", out, *other) == 2
+    words = f"--out {out}: given a folder with checkpoints of another case: there friction.mu.rho"
+    assert words in capfd.readouterr().err
+    assert len(list((out / "checkpoints").glob("0*.npz"))) == 2
     assert on_the_line("solve", "--restart", out, "--set", "output.fields=none") == 0
     assert not (out / "checkpoints").exists()
     summary = json.loads((out / "summary.json").read_text())
