@@ -239,6 +239,24 @@ def test_a_stack_that_friction_alone_holds():
     check_loose(case, 200)
 
 
+def test_a_body_that_lies_lightly_on_one_that_is_bent():
+    """What bends the lower one is far more than friction has to bear: it stalled at 4e-1.
+
+    Where the upper one comes to rest is not unique.
+    """
+    case = pairs.case(
+        load=[{"on": "upper_top", "traction": [0, -1e-6]}],
+        fixed=[{"on": "lower_bottom", "displacement": ["1e-3*x", "1e-3*x*x"]}],
+    )
+    problem = build_problem(parse_case(case), MPI.COMM_SELF)
+    loop = FixedPoint(problem, FixedPointOptions(tolerance=1e-9))
+    state, outcome = loop.solve()
+    assert outcome.converged, outcome.reason
+    assert loop.counters.linear_solves <= 150
+    pressed = problem.interface.jump.sum(state.forces.pressure * problem.nodes.normal[:, 1])
+    assert abs(pressed) == pytest.approx(2e-6, rel=1e-6)  # 2 wide
+
+
 def check_loose(case, most):
     """Solve by block relaxation with so many solves at most, and as Newton's method does."""
     problem = build_problem(parse_case(case), MPI.COMM_SELF)
