@@ -9,6 +9,7 @@ from typing import Any
 
 from mpi4py import MPI
 
+from contact.kinds import expect
 from contact.output.field_files import write_fields, write_share
 from contact.output.folder import ResultFolder, on_root, result_folder
 from contact.output.opposite import AGAINST, opposite_surface, opposite_table
@@ -41,11 +42,14 @@ def write_outputs(
     Raises
     ------
     InputError
-        If the folder cannot be written to, or has no room, or something that is no result
-        stands in the way.
+        If it is given something else, the folder cannot be written to, or has no room, or
+        something that is no result stands in the way.
     OSError
         If a library fails to write on this rank; others may wait for it.
     """
+    expect("write_outputs", solution, "a Solution", isinstance(solution, Solution))
+    fits = isinstance(folder, str | Path | ResultFolder)
+    expect("write_outputs: folder", folder, "the name of a folder, or a ResultFolder", fits)
     if isinstance(folder, ResultFolder):
         _replace(solution, folder, figures)
     else:
