@@ -70,7 +70,7 @@ def check_kept(folder: Path, before: str, case: str) -> None:
     InputError
         If they differ in more than in how they are solved and shown.
     """
-    place = difference(*(_without(tomllib.loads(text)) for text in (before, case)))
+    place = _apart(before, case)
     if place is not None:
         raise InputError(
             f"--out {folder}: given a folder with checkpoints of another case: there {place}; "
@@ -94,12 +94,17 @@ def check_restart(folder: Path, before: str, case: str) -> None:
     InputError
         If they differ in more than in how they are solved and shown.
     """
-    place = difference(*(_without(tomllib.loads(text)) for text in (before, case)))
+    place = _apart(before, case)
     if place is not None:
         raise InputError(
             f"--restart {folder}: given checkpoints of another case: there {place}; accepted: the "
             "same case, solved and shown as you like"
         )
+
+
+def _apart(before: str, case: str) -> str | None:
+    """Say what differs first between cases, but in how they are solved and shown."""
+    return difference(*(_without(tomllib.loads(text)) for text in (before, case)))
 
 
 def difference(before: Mapping[str, Any], now: Mapping[str, Any]) -> str | None:

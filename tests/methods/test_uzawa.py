@@ -13,14 +13,12 @@ from contact.interface.projections import disc_derivative, project_disc, project
 from contact.methods.acceleration import ResidualMinimiser
 from contact.methods.augmentation import automatic_r
 from contact.methods.fixed_point import FixedPoint
-from contact.methods.newton import Newton
-from contact.methods.options import FixedPointOptions, NewtonOptions
+from contact.methods.options import FixedPointOptions
 from contact.problem.contact import Contact
 from contact.problem.problem import ContactProblem
 from contact.problem.state import State
 from forms.hencky import Linear, Log
 from forms.laws import ConstantCoefficient
-from tests.problems import pairs
 from tests.problems.mechanics import Affine, attempt, bar, contact_data, flat, pressed_block, solve
 
 
@@ -213,60 +211,6 @@ def test_a_start_from_the_solution_takes_one_step():
         assert len(loop.history.records) <= most
         assert disturbance > 0 or loop.counters.linear_solves == 1
         assert np.allclose(state.x, exact.x, rtol=0, atol=1e-7 * np.abs(exact.x).max())
-
-
-@pytest.mark.parametrize("push", [0.3, 0.97])
-def test_what_friction_alone_holds_is_stuck_at_first(push):
-    """Without friction, as the thesis begins, it would slide away: it stalled at 1e-2."""
-    case = {
-        "mesh": {"generator": "rectangle", "size": [4.0, 1.0], "cells": [16, 4]},
-        "material": {"young": 1.0, "poisson": 0.3},
-        "load": [{"on": "top", "traction": [0.4 * push * 0.01, -0.01]}],
-        "contact": {"on": "bottom"},
-        "friction": {"law": "coulomb", "mu": 0.4},
-    }
-    check_loose(case, 200)
-
-
-def test_a_stack_that_friction_alone_holds():
-    """It stalled at 1e-2 and more."""
-    case = pairs.case(
-        load=[{"on": "upper_top", "traction": [0.45, -1.0]}],
-        friction={"law": "coulomb", "mu": 0.6},
-        contact=[{"on": "upper_bottom", "against": "lower_top"}, {"on": "lower_bottom"}],
-    )
-    del case["fixed"]
-    check_loose(case, 200)
-
-
-def test_a_body_that_lies_lightly_on_one_that_is_bent():
-    """What bends the lower one is far more than friction has to bear: it stalled at 4e-1.
-
-    Where the upper one comes to rest is not unique.
-    """
-    case = pairs.case(
-        load=[{"on": "upper_top", "traction": [0, -1e-6]}],
-        fixed=[{"on": "lower_bottom", "displacement": ["1e-3*x", "1e-3*x*x"]}],
-    )
-    problem = build_problem(parse_case(case), MPI.COMM_SELF)
-    loop = FixedPoint(problem, FixedPointOptions(tolerance=1e-9))
-    state, outcome = loop.solve()
-    assert outcome.converged, outcome.reason
-    assert loop.counters.linear_solves <= 150
-    pressed = problem.interface.jump.sum(state.forces.pressure * problem.nodes.normal[:, 1])
-    assert abs(pressed) == pytest.approx(2e-6, rel=1e-6)  # 2 wide
-
-
-def check_loose(case, most):
-    """Solve by block relaxation with so many solves at most, and as Newton's method does."""
-    problem = build_problem(parse_case(case), MPI.COMM_SELF)
-    loop = FixedPoint(problem, FixedPointOptions(tolerance=1e-9))
-    state, outcome = loop.solve()
-    assert outcome.converged, outcome.reason
-    assert loop.counters.linear_solves <= most
-    exact, outcome = Newton(problem, NewtonOptions(tolerance=1e-10)).solve()
-    assert outcome.converged
-    np.testing.assert_allclose(state.x, exact.x, rtol=0, atol=1e-7 * np.abs(exact.x).max())
 
 
 def test_what_is_frozen_may_change_to_and_fro():
