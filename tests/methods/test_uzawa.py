@@ -9,8 +9,6 @@ from mpi4py import MPI
 from contact import build_problem, parse_case
 from contact.body.description import Body
 from contact.interface.friction import Friction
-from contact.interface.projections import disc_derivative, project_disc, project_half_line
-from contact.methods.acceleration import ResidualMinimiser
 from contact.methods.augmentation import automatic_r
 from contact.methods.fixed_point import FixedPoint
 from contact.methods.options import FixedPointOptions
@@ -246,60 +244,3 @@ def test_nothing_to_do():
     lifted = bar(MPI.COMM_SELF, 4, 0.005)
     gapped = ContactProblem(lifted.domain, lifted.body, Contact("bottom", flat(5.0)))
     assert np.abs(solve(gapped).state.forces.pressure).max() < 1e-13
-
-
-def test_projections():
-    z = np.array([[3.0, 4.0], [0.3, 0.4], [0.0, 0.0], [-6.0, 8.0]])
-    assert project_disc(z, np.array([1.0, 1.0, 0.0, 0.0])) == pytest.approx(
-        np.array([[0.6, 0.8], [0.3, 0.4], [0.0, 0.0], [0.0, 0.0]])
-    )
-    assert project_half_line(np.array([-1.0, 2.0])).tolist() == [0.0, 2.0]
-
-
-@pytest.mark.parametrize("dim", [1, 2, 3])
-def test_the_derivative_of_the_projection_onto_a_disc(dim):
-    random = np.random.default_rng(dim)
-    z, radius = random.standard_normal((40, dim)), random.uniform(0, 2, 40)
-    directions, h = random.standard_normal((40, dim, 5)), 1e-6
-    exact = disc_derivative(z, radius, directions)
-    for k in range(5):
-        step = h * directions[:, :, k]
-        slope = (project_disc(z + step, radius) - project_disc(z - step, radius)) / (2 * h)
-        assert np.abs(exact[:, :, k] - slope).max() < 1e-6
-
-
-@pytest.mark.parametrize("seed", range(5))
-def test_the_acceleration_solves_random_complementarity_problems(seed):
-    """Find p >= 0 with u = u_0 - C p <= 0, p u = 0, for a random positive definite C."""
-    random = np.random.default_rng(seed)
-    m, r = 60, 1.0
-    basis = np.linalg.qr(random.standard_normal((m, m)))[0]
-    compliance = basis @ np.diag(np.geomspace(0.02, 20, m)) @ basis.T
-    u_0 = random.standard_normal(m)
-    matrix = np.linalg.inv(np.eye(m) + r * compliance)
-
-    def project(z):
-        return np.maximum(z, 0.0)
-
-    def solves(depth):
-        accelerator = ResidualMinimiser(
-            lambda a, b: a.T @ b, project, lambda z, d: (z > 0)[:, None] * d, depth
-        )
-        z = np.zeros(m)
-        for count in range(1, 2000):
-            force = project(z)
-            q = 2 * force - z
-            u = matrix @ (u_0 - compliance @ q)
-            p = q + r * u
-            if np.linalg.norm(p - project(p + r * u)) < 1e-9:
-                return count, p
-            image = force + r * u
-            z = accelerator.next(p, p + r * u, image) if depth else image
-        raise AssertionError("not converged")
-
-    slow, expected = solves(0)
-    for depth in (2, 10, 40):
-        fast, found = solves(depth)
-        assert fast < slow
-        assert found == pytest.approx(expected, abs=1e-7)
-    assert fast <= 60
