@@ -151,8 +151,12 @@ def _over_pressed(interface: Interface, state: State, pressures: Array) -> float
     return float(np.divide(pressures, pressed, out=np.zeros_like(pressed), where=much).max())
 
 
+@np.errstate(over="ignore", invalid="ignore")
 def evaluate(problem: Problem, state: State) -> KKT:
-    """Return the residuals of a state. Collective; nothing is changed by it."""
+    """Return the residuals of a state. Collective; nothing is changed by it.
+
+    Those of a body that flies away are no numbers, which is all there is to say of them.
+    """
     body, interface = problem.equilibrium, problem.interface
     internal = body.internal_forces(state.x)
     on_contact = np.zeros_like(internal)
