@@ -5,7 +5,9 @@ import os
 import sys
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
+import ffcx.codegeneration.jit
 import pytest
 from hypothesis import HealthCheck, settings
 from mpi4py import MPI
@@ -22,6 +24,21 @@ settings.load_profile("contact")
 
 # messages of the hooks below must not meet those of a test that failed half way
 _comm = MPI.COMM_WORLD.Dup()
+
+# FFCx lists its whole cache folder each time that it looks for a form: once a process is enough.
+_look_up, _known = ffcx.codegeneration.jit.get_cached_module, {}
+
+
+def _look_up_once(name: str, objects: list[str], *rest: Any) -> tuple[Any, Any]:
+    """Return a form's compiled objects and their module; two None where it is to be compiled."""
+    key = (name, *objects)
+    found = _known.get(key) or _look_up(name, objects, *rest)
+    if found[1] is not None:
+        _known[key] = found
+    return found
+
+
+ffcx.codegeneration.jit.get_cached_module = _look_up_once
 
 
 @pytest.fixture
