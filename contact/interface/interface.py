@@ -38,10 +38,12 @@ class Interface:
     held
         The current through nodes that cannot move; None without.
     stiffness
-        c = E/size, which weighs displacements against stresses in residuals (stress/length); E
-        of what touches.
+        c = E/size, which weighs displacements against stresses (stress/length); E of what touches.
     size
         Largest extent of the body (length).
+    elongation
+        How many times longer than usual the cells behind Gamma_3 are, across it
+        (`contact.mesh.entities.elongation`); residuals take c so many times as large.
     piece, pieces
         The piece of the body that each contact node belongs to, shape (n,), and how many there are
         (`contact.body.shares`).
@@ -53,6 +55,7 @@ class Interface:
     held: HeldCurrent | None
     stiffness: float
     size: float
+    elongation: float
     piece: NDArray[np.intp]
     pieces: int
 

@@ -30,7 +30,9 @@ def interface_residuals(
         Norm of pressures in L2(Gamma_3) that nothing can tell from zero, of each piece: both are
         less it.
     """
-    c = interface.stiffness
+    # What a gap between neighbouring nodes costs is E/h: where a body is that long only because its
+    # cells are stretched, E/size hides errors of the pressure far above the tolerance.
+    c = interface.elongation * interface.stiffness
     opening = interface.opening(nodal)
     contact = forces.pressure - project_half_line(forces.pressure + c * opening)
     trial = forces.friction + c * interface.slip(nodal)
@@ -40,7 +42,9 @@ def interface_residuals(
     # but not of gaps far wider than nodes move: these say nothing of the loads.
     before = np.linalg.norm(interface.friction.history.jump, axis=1)
     way = np.maximum(np.linalg.norm(nodal[:, : interface.dim], axis=1), before)
-    closing = c * interface.norms(np.minimum(np.minimum(np.abs(opening), way), interface.size))
+    closing = interface.stiffness * interface.norms(
+        np.minimum(np.minimum(np.abs(opening), way), interface.size)
+    )
     scale = np.maximum(interface.norms(interface.pressure(nodal, forces)), 1e-4 * closing)
     scale = np.maximum(scale, EPS * scale.max())
     norms = np.array([interface.norms(contact), interface.norms(friction)])

@@ -55,6 +55,18 @@ def cells_at(mesh: dmesh.Mesh, facets: Indices) -> tuple[Indices, npt.NDArray[np
     return cells, place
 
 
+def elongation(mesh: dmesh.Mesh, facets: Indices) -> float:
+    """Return how many times longer than twice their facets the cells behind are, at most; 1 if not.
+
+    Collective. Twice as long is usual, of cells as a mesh generator makes them.
+    """
+    behind, _ = cells_at(mesh, facets)
+    dim, found = mesh.topology.dim, 1.0
+    if facets.size:
+        found = float(np.max(mesh.h(dim, behind) / (2 * mesh.h(dim - 1, facets)), initial=1.0))
+    return mesh.comm.allreduce(found, op=MPI.MAX)
+
+
 def extent(mesh: dmesh.Mesh) -> float:
     """Largest extent of the bounding box over all ranks; a rank may hold no node."""
     x = mesh.geometry.x

@@ -40,7 +40,8 @@ class KKT:
         body at rest, and the charges of the strain.
     contact
         |p - max(0, p + c (u_nu - rho))| / |p| in L2(Gamma_3), c = E/length with
-        the modulus of what touches; the largest of those of bodies that nothing connects.
+        the modulus of what touches, and the length of the body, or less if that is long because its
+        cells are; the largest of those of bodies that nothing connects.
     friction
         |lambda_f - proj(lambda_f + c u_tau)| / |p| with the final bound s. Both are less what the
         forces that `rounding` stands for are as pressures: no contact force is known better than

@@ -33,6 +33,7 @@ from contact.interface.placing import find_nodes
 from contact.interface.response import FoundationResponse
 from contact.kinds import expect, several
 from contact.mesh.domain import Domain
+from contact.mesh.entities import elongation
 from contact.problem.approach import approached
 from contact.problem.contact import Contact, check_laws
 from contact.problem.scales import Scales
@@ -143,9 +144,11 @@ class ContactProblem:
         response = FoundationResponse(found, layer, conductor, body.phi_scale, stiffness)
         friction = joined_friction(self.entries, found)
         held = joined_held(self.entries, body.layout.index_map.local_range[0], found.links)
+        mesh = self.domain.mesh
+        longer = max(elongation(mesh, self.domain.facets(contact.on)) for contact in self.contacts)
         piece, pieces = body.shares.piece[found.nodes], body.shares.count
         return Interface(
-            response.constrained, response, friction, held, stiffness, size, piece, pieces
+            response.constrained, response, friction, held, stiffness, size, longer, piece, pieces
         )
 
     def _young_of_contacts(self) -> float:
