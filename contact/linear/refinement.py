@@ -82,7 +82,12 @@ def refine(
             asked.array[~beyond[pieces.of]] = 0.0
         ksp.setInitialGuessNonzero(False)
         solve(asked, correction)
-        left.axpy(-1.0, matrix * correction)
-        if not np.any(norms(left)[beyond] < before[beyond]):
+        corrected = left - matrix * correction
+        gained = norms(corrected) < before
+        if not np.any(gained & beyond):
             return
+        if pieces is not None:
+            lost = ~gained[pieces.of]
+            correction.array[lost], corrected.array[lost] = 0.0, left.array_r[lost]
         solution.axpy(1.0, correction)
+        left = corrected

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from mpi4py import MPI
 
+from contact.linear.first_rank import together
 from contact.problem.mobility import ROUNDING, Group, groups, null_space
 from contact.problem.problem import ContactProblem
 from contact.typing import Array
@@ -72,14 +73,18 @@ class Grip:
         work = comm.allreduce(moved[: body.owned].T @ own, op=MPI.SUM)
         work = (work + moved[body.owned :].T @ on_masters) @ self.free
         scale = comm.allreduce(float(np.abs(own).sum()), op=MPI.SUM) + np.abs(on_masters).sum()
-        held = True
-        if comm.rank == 0 and np.abs(work).max() > ROUNDING * scale:
-            from scipy.optimize import linprog  # takes a while to load
+        first = comm.rank == 0
+        return bool(comm.bcast(together(comm, lambda: first and self._balances(work, scale))))
 
-            bounds = [(-1, 1)] * work.size
-            motion = linprog(-work, self.cone, np.zeros(len(self.cone)), bounds=bounds)
-            held = motion.status != 0 or -motion.fun <= 1e-6 * scale
-        return bool(comm.bcast(held))
+    def _balances(self, work: Array, scale: float) -> bool:
+        """Tell whether contact can balance a work of loads, on the rank that has the cone."""
+        if np.abs(work).max() <= ROUNDING * scale:
+            return True
+        from scipy.optimize import linprog  # takes a while to load
+
+        bounds = [(-1, 1)] * work.size
+        motion = linprog(-work, self.cone, np.zeros(len(self.cone)), bounds=bounds)
+        return bool(motion.status != 0 or -motion.fun <= 1e-6 * scale)
 
     @property
     def besides(self) -> str:
