@@ -16,7 +16,11 @@ from scipy.spatial import KDTree
 
 from contact import Solution
 from contact.body.description import Material
+from contact.tolerances import EPS
 from contact.typing import Array
+
+#: Part of an unknown by which it is moved to see what the forces owe to its rounding.
+SHAKE = 1e-9
 
 CELLS = {2: basix.CellType.triangle, 3: basix.CellType.tetrahedron}
 FACETS = {2: basix.CellType.interval, 3: basix.CellType.triangle}
@@ -34,12 +38,20 @@ class Imbalance:
     charge, electrified
         The same of charges, those of the strain among them, but for what flows through nodes that a
         support holds; 0 without a potential (charge).
+    unsure
+        What the rounding of each unknown makes of `force` and `charge`: moved up or down at random.
     """
 
     force: float
     applied: float
     charge: float
     electrified: float
+    unsure: tuple[float, float]
+
+    @property
+    def all(self) -> tuple[tuple[float, float], ...]:
+        """What is left of forces and of charges, what acts, and what is unsure of the former."""
+        return (self.force, self.charge), (self.applied, self.electrified), self.unsure
 
 
 def imbalance(solution: Solution) -> Imbalance:
@@ -68,8 +80,15 @@ def imbalance(solution: Solution) -> Imbalance:
     _, of_strain = _internal(solution, nodal[:, :d], np.zeros_like(phi))
     applied = norm(loads) + norm(touch) + norm(left[~free]) + norm(of_field)
     electrified = norm(flux) + norm(charge[~loose]) + norm(of_strain)
+    up_or_down = 1 + SHAKE * np.random.default_rng(0).choice((-1.0, 1.0), nodal.shape)
+    shaken = _internal(solution, (nodal * up_or_down)[:, :d], phi * up_or_down[:, -1])
+    unsure = norm((shaken[0] - inner)[free]), norm((shaken[1] - charges)[loose])
     return Imbalance(
-        float(norm(left[free])), float(applied), float(norm(charge[loose])), float(electrified)
+        float(norm(left[free])),
+        float(applied),
+        float(norm(charge[loose])),
+        float(electrified),
+        (EPS / SHAKE * float(unsure[0]), EPS / SHAKE * float(unsure[1])),
     )
 
 
