@@ -83,15 +83,15 @@ def rate_of(sizes: Array) -> float:
     return float((tail[-1] / tail[0]) ** (1 / (len(tail) - 1))) if len(tail) > 1 else np.nan
 
 
-def threshold(name: str, cells: tuple[int, int]) -> tuple[float, float]:
+def threshold(name: str, cells: tuple[int, int], width: float) -> tuple[float, float]:
     """Return k_e at which the lagged charge still converges, and does no longer. Collective.
 
-    Beyond, the iterates do not run away: where the bar is lifted, the current is cut off, and
-    they end in a cycle. A sequence whose steps do not shrink by a quarter in its second half
-    counts as one.
+    They are no more than the relative `width` apart. Beyond, the iterates do not run away: where
+    the bar is lifted, the current is cut off, and they end in a cycle. A sequence whose steps do
+    not shrink by a quarter in its second half counts as one.
     """
     low, high, k_e = 0.0, np.inf, 0.5
-    while high - low > 0.03 * low:
+    while high - low > width * low:
         moves, converged = errors(name, cells, k_e, True, 60, exact=False)
         rate = rate_of(moves)
         if converged or moves[-1] < 0.75 * moves[len(moves) // 2]:
@@ -125,8 +125,8 @@ def theorem_5_2(report: Report, coarse: bool) -> dict[str, float]:
         ax.set(title=f"charge {how}", xlabel="iteration n")
         ax.legend()
     axes[0].set_ylabel(r"$\|x_n - x\|_X$")
-    grid = (16, 8) if coarse else (32, 16)
-    low, high = threshold(name, grid)
+    grid, width = ((8, 4), 0.1) if coarse else ((32, 16), 0.03)
+    low, high = threshold(name, grid, width)
     rates["threshold"] = low
     ends = errors(name, grid, 2.0, True, 60, changes=HYPOTHESES)[0][-2:]
     note = (
