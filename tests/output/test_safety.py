@@ -14,7 +14,15 @@ import pytest
 
 from contact.output.folder import LOCK
 from contact.output.transaction import STAGE, recover
-from tests.problems.processes import BAR, RANKS, SMALL, command, environment, processes
+from tests.problems.processes import (
+    BAR,
+    RANKS,
+    SMALL,
+    command,
+    environment,
+    processes,
+    served,
+)
 
 
 def solving(out: Path, *options: str, ranks: int = 1, before: str = "") -> list[str]:
@@ -82,20 +90,22 @@ def test_a_full_disk_keeps_the_earlier_results(
     """However little is left, there is one message, and no abort of a library."""
     out, ballast = small_disk / "out", small_disk / "ballast"
     shutil.copytree(good, out)
-    for left in (0, 16_000, 40_000):
-        ballast.unlink(missing_ok=True)
-        room = os.statvfs(small_disk)
-        with ballast.open("wb") as file:
-            os.posix_fallocate(file.fileno(), 0, room.f_bavail * room.f_bsize - left)
-        status, text = run(out, "--set", f"output.fields={format_}", ranks=ranks)
-        assert status == 2, text
-        (message,) = messages(text)
-        assert "No space left on device" in message
-        assert same(out, good)
-    ballast.unlink()
-    status, text = run(out, "--set", f"output.fields={format_}", ranks=ranks)
-    assert status == 0, text
-    assert whole(out) and not (out / "checkpoint.bp").exists()
+    arguments = ["solve", str(BAR), "--out", str(out), *SMALL, "--set", f"output.fields={format_}"]
+    with served(ranks) as run:
+        for left in (0, 16_000, 40_000):
+            ballast.unlink(missing_ok=True)
+            room = os.statvfs(small_disk)
+            with ballast.open("wb") as file:
+                os.posix_fallocate(file.fileno(), 0, room.f_bavail * room.f_bsize - left)
+            status, text = run(*arguments)
+            assert status == 2, text
+            (message,) = messages(text)
+            assert "No space left on device" in message
+            assert same(out, good)
+        ballast.unlink()
+        status, text = run(*arguments)
+        assert status == 0, text
+        assert whole(out) and not (out / "checkpoint.bp").exists()
 
 
 @RANKS

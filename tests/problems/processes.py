@@ -1,8 +1,12 @@
 """The command line in processes of its own, on one rank or several."""
 
 import os
+import shlex
+import subprocess
 import sys
-from collections.abc import Iterator
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import NamedTuple
 
@@ -26,8 +30,60 @@ def environment() -> dict[str, str]:
 def command(*arguments: str, ranks: int = 1, before: str = "") -> list[str]:
     """Return what starts the command line, after some Python."""
     program = f"import sys\n{before}\nfrom contact.cli.main import run\nrun()"
-    launch = [] if ranks == 1 else ["mpirun", "--oversubscribe", "-n", str(ranks)]
-    return [*launch, sys.executable, "-c", program, *arguments]
+    return [*_launch(ranks), sys.executable, "-c", program, *arguments]
+
+
+def _launch(ranks: int) -> list[str]:
+    return [] if ranks == 1 else ["mpirun", "--oversubscribe", "-n", str(ranks)]
+
+
+#: Runs the command lines that it reads, and says with which status each has ended.
+SERVER = """
+import shlex, sys
+from mpi4py import MPI
+from contact.cli.main import main
+comm = MPI.COMM_WORLD
+while line := comm.bcast(sys.stdin.readline() if comm.rank == 0 else None):
+    status = main(shlex.split(line))
+    comm.barrier()
+    if comm.rank == 0:
+        print("status", status, file=sys.stderr, flush=True)
+"""
+
+
+@contextmanager
+def served(ranks: int = 1, seconds: float = 300) -> Iterator[Callable[..., tuple[int, str]]]:
+    """Start processes that run one command line after the other.
+
+    Yields a function that runs one and returns its status and what it said. One that ends its
+    process gives the status of this, and the next fails. After so many seconds all are killed.
+    """
+    process = subprocess.Popen(
+        [*_launch(ranks), sys.executable, "-c", SERVER], env=environment(), text=True,
+        stdin=subprocess.PIPE, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE,
+    )  # fmt: skip
+    assert process.stdin is not None and process.stderr is not None
+    requests, said = process.stdin, process.stderr
+
+    def run(*arguments: str) -> tuple[int, str]:
+        print(shlex.join(arguments), file=requests, flush=True)
+        text = ""
+        for line in said:
+            if line.startswith("status "):
+                return int(line.split()[1]), text
+            text += line
+        return process.wait(), text
+
+    guard = threading.Timer(seconds, process.kill)
+    guard.start()
+    try:
+        with process:
+            yield run
+            requests.close()
+            assert process.wait() == 0, said.read()
+    finally:
+        guard.cancel()
+        process.kill()
 
 
 class Process(NamedTuple):
