@@ -8,6 +8,7 @@ import pytest
 NOTEBOOKS = sorted((Path(__file__).parents[2] / "scripts" / "notebooks").glob("[a-z]*.py"))
 
 
+@pytest.mark.filterwarnings("ignore:FigureCanvasAgg is non-interactive")  # nobody sees them
 @pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
 def test_notebook(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("MPLBACKEND", "Agg")

@@ -113,7 +113,7 @@ def binary(name, version, path):
 
 def is_sound_or_refused(path, comm):
     """Read a file and check what comes of it; returns whether it was refused."""
-    start = time.monotonic()
+    start = time.process_time()
     try:
         domain = from_msh(comm, path)
     except InputError as error:
@@ -123,7 +123,7 @@ def is_sound_or_refused(path, comm):
         assert len(message) < 500
         return True
     finally:
-        assert time.monotonic() - start < 50
+        assert time.process_time() - start < 50
     assert np.all(np.isfinite(domain.mesh.geometry.x))
     one = fem.Constant(domain.mesh, 1.0 / domain.size)
     measures = [domain.dx, *map(domain.dx_in, domain.regions), *map(domain.ds, domain.parts)]

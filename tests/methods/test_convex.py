@@ -113,9 +113,12 @@ def test_a_block_held_by_contact_alone(d, aside, bound):
 @pytest.mark.parametrize(
     "setting", [random_setting(50, 3, 1e6, 0.5, 4), beam(80, 100.0, bound=0.1)]
 )
-@pytest.mark.parametrize(("stress", "length"), [(1e-12, 1.0), (1e12, 1.0), (3e5, 1e-12), (1, 1e12)])
+@pytest.mark.parametrize(
+    ("stress", "length"),
+    [(2.0**-40, 1.0), (2.0**40, 1.0), (2.0**18, 2.0**-40), (1.0, 2.0**40)],
+)
 def test_units_change_no_count(setting, stress, length):
-    # forces are a stress times an area
+    """By powers of two, which no number is rounded by. Forces are a stress times an area."""
     scaled = replace(
         setting,
         stiffness=stress * length * setting.stiffness,
