@@ -1,5 +1,6 @@
 """How the command line begins and ends: PETSc's options, exit statuses, processes."""
 
+import os
 import shutil
 import signal
 import subprocess
@@ -107,20 +108,31 @@ def test_a_figure_that_fails_costs_nothing_else(tmp_path: Path) -> None:
 
 
 def test_ranks_end_with_a_killed_launcher(tmp_path: Path) -> None:
-    """Nobody else would end them."""
-    options = ["--out", str(tmp_path / "out"), "--set", "mesh.cells=[512, 128]"]
-    process = start("solve", str(BAR), *options, ranks=2)
+    """Nobody else would end them, and they have long to go."""
+    before = (
+        "import contact.build, time\n"
+        "from mpi4py import MPI\n"
+        "def build(*_, **__):\n"
+        "    MPI.COMM_WORLD.barrier()\n"
+        "    print('building', flush=True)\n"
+        "    time.sleep(1000)\n"
+        "contact.build.build_problem = build\n"
+    )
+    options = ["--out", str(tmp_path / "out")]
+    process = start("solve", str(BAR), *options, ranks=2, before=before)
     assert process.stdout is not None
-    while "iteration 0" not in process.stdout.readline():
+    while "building" not in process.stdout.readline():
         assert process.poll() is None
     ranks = {rank.pid for rank in processes() if rank.parent == process.pid}
     assert len(ranks) == 2
     process.send_signal(signal.SIGKILL)
     process.communicate(timeout=60)
     end = time.monotonic() + 60
-    while ranks & {left.pid for left in processes()} and time.monotonic() < end:
+    while (left := ranks & {process.pid for process in processes()}) and time.monotonic() < end:
         time.sleep(0.05)
-    assert not ranks & {left.pid for left in processes()}
+    for rank in left:
+        os.kill(rank, signal.SIGKILL)
+    assert not left
 
 
 MESHING = """
