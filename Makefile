@@ -31,12 +31,12 @@ test:
 	@status=0; \
 	echo "== 2 ranks"; $(call MPI_TESTS,2) || status=1; \
 	echo "== 3 ranks"; $(call MPI_TESTS,3) || status=1; \
-	echo "== serial"; $(FX) python3 -m pytest tests -n auto || status=1; \
+	echo "== serial"; $(FX) python3 -m pytest tests -n auto --dist worksteal || status=1; \
 	exit $$status
 
 test-serial: export OMP_NUM_THREADS := 1
 test-serial:
-	$(FX) python3 -m pytest tests -n auto
+	$(FX) python3 -m pytest tests -n auto --dist worksteal
 
 lint:
 	scripts/ruff check .
