@@ -46,8 +46,9 @@ class Hierarchy:
         self._stiff = StiffNodes(ksp.getPC(), nodes)
         self._most = ksp.getTolerances()[3]
         self._lost = np.inf
-        self._rate: float | None = None
-        self._taken, self._renewals = 0, 0
+        #: Iterations a digit with coarse levels of the operator itself, and whether they are that.
+        self._rate, self._fresh = 0.0, False
+        self._taken, self._renewed = 0, False
 
     def follow(self, own: Array, blocks: Array) -> bool:
         """Follow the operator, and tell whether its coarse levels are renewed. Collective.
@@ -62,6 +63,7 @@ class Hierarchy:
         if self._lost >= PRICE:
             self._renew()
             return True
+        self._fresh = False
         pc = self._ksp.getPC()
         pc.setReusePreconditioner(True)
         self._set_up()
@@ -71,8 +73,7 @@ class Hierarchy:
     def _renew(self) -> None:
         self._ksp.getPC().setReusePreconditioner(False)
         self._set_up()
-        self._lost, self._rate = 0.0, None
-        self._renewals += 1
+        self._lost, self._rate, self._fresh, self._renewed = 0.0, 0.0, True, True
 
     def _set_up(self) -> None:
         self._ksp.setOperators(*self._ksp.getOperators())
@@ -87,14 +88,14 @@ class Hierarchy:
         -------
         The number of iterations, and whether the coarse levels have been renewed on the way.
         """
-        self._taken, self._renewals = 0, 0
+        self._taken, self._renewed = 0, False
         self._solve(rhs.copy(), solution)
         refine(self._ksp, rhs, solution, self._correct, self._pieces)
-        return self._taken, self._renewals > 0
+        return self._taken, self._renewed
 
     def _correct(self, rhs: PETSc.Vec, correction: PETSc.Vec) -> None:
         """Solve for what a solution has left, which old coarse levels may not see."""
-        if self._renewals == 0:
+        if not self._fresh:
             self._renew()
         if self._taken < self._most:
             self._solve(rhs, correction)
@@ -108,10 +109,10 @@ class Hierarchy:
 
     def _iterate(self, rhs: PETSc.Vec, solution: PETSc.Vec, most: int) -> int:
         ksp, digits = self._ksp, -log10(self._ksp.getTolerances()[0])
-        if self._rate is None:
+        if self._fresh:
             ksp.setTolerances(max_it=most)
             ksp.solve(rhs, solution)
-            self._rate = ksp.getIterationNumber() / digits
+            self._rate = self._rate or ksp.getIterationNumber() / digits
             return ksp.getIterationNumber()
         fresh = self._rate * digits
         ksp.setTolerances(max_it=min(ceil(fresh) + PRICE, most))

@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from contact import nesting
-from contact.linear import multigrid
+from contact import build_problem, nesting
+from contact.linear import hierarchy, multigrid
+from contact.linear.operator import SparseOperator
 from contact.output.solution import Solution
 from contact.solving import solve
 from scripts.benchmarks.bench_one import block
@@ -61,3 +62,21 @@ def test_a_direct_solver_factorises_a_large_body_once():
     assert largest(solution) == pytest.approx(largest(other), rel=1e-7)
     assert solution.counters.linear_solves == solution.counters.factorizations == 1
     assert other.counters.linear_solves > 1
+
+
+@pytest.mark.usefixtures("small_is_large")
+def test_coarse_levels_that_are_new_are_not_renewed_for_a_correction(monkeypatch):
+    """Of the same operator they would be the same; those of an earlier one are renewed."""
+
+    def correct(_, rhs, solution, solve, __) -> None:
+        solve(rhs.copy(), solution.duplicate())
+
+    monkeypatch.setattr(hierarchy, "refine", correct)
+    problem = build_problem(block(6))
+    body, nodes = problem.equilibrium, problem.nodes.nodes
+    operator, x = SparseOperator(body, nodes), problem.start().x
+    blocks = np.zeros((nodes.size, body.block_size, body.block_size))
+    for stiffness, made in ((0.0, 1), (1.0, 2)):
+        operator.update("secant", x, blocks + stiffness * np.eye(body.block_size), constant=True)
+        operator.solve(body.external(), 1e-8)
+        assert operator.counters.factorizations == made
