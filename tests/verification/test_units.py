@@ -8,17 +8,18 @@ from contact.case.file import parse_case
 from contact.solving import solve
 from scripts.studies.units import scaled
 
-#: Lengths and stresses, from atoms to mountains, in the units of the first.
+#: Lengths and stresses, from atoms to mountains, in the units of the first. They are powers of two,
+#: which no number is rounded by: counts of one machine's rounding would not be those of another's.
 UNITS = [
     (1.0, 1.0),
-    (1e-9, 1.0),
-    (1e6, 1.0),
-    (1.0, 1e-9),
-    (1.0, 1e13),
-    (1e-6, 2e11),
-    (1e3, 1e-6),
-    (1e-9, 1e-9),
-    (1e6, 1e13),
+    (2.0**-30, 1.0),
+    (2.0**20, 1.0),
+    (1.0, 2.0**-30),
+    (1.0, 2.0**44),
+    (2.0**-20, 2.0**38),
+    (2.0**10, 2.0**-20),
+    (2.0**-30, 2.0**-30),
+    (2.0**20, 2.0**44),
 ]
 
 
