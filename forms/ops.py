@@ -10,6 +10,7 @@ from typing import Any, TypeAlias
 
 import numpy as np
 import ufl
+from ufl.algebra import Abs
 from ufl.core.expr import Expr
 
 #: A number, a NumPy array or a UFL expression.
@@ -115,4 +116,7 @@ def tan(a: Value) -> Value:
 
 def absolute(a: Value) -> Value:
     """Return the absolute value."""
+    # UFL would make one of it that contains itself, and never come back.
+    if isinstance(a, Abs):
+        return a
     return abs(a) if is_symbolic(a) else np.abs(a)

@@ -99,6 +99,7 @@ def test_numpy_and_ufl_agree_with_numpy_itself(formula, point):
         ("sin(pi/2) + 1e-0", 2.0),
         ("0.0**x", 0.0),
         ("abs(-x)", 2.0),
+        ("abs(abs(-x))**2", 4.0),
     ],
 )
 def test_values(formula, value):
