@@ -70,7 +70,8 @@ def refine(
         Systems that nothing couples; None where there is one.
     """
     norms = (lambda vector: np.array([vector.norm()])) if pieces is None else pieces.norms
-    matrix, allowed = ksp.getOperators()[0], ksp.getTolerances()[0] ** 0.5 * norms(rhs)
+    matrix, asked_for = ksp.getOperators()[0], ksp.getTolerances()[0]
+    allowed = asked_for**0.5 * norms(rhs)
     left = rhs - matrix * solution
     for _ in range(CORRECTIONS):
         before = norms(left)
@@ -81,7 +82,13 @@ def refine(
         if pieces is not None:
             asked.array[~beyond[pieces.of]] = 0.0
         ksp.setInitialGuessNonzero(False)
-        solve(asked, correction)
+        # No more than is missing, by what norms may differ.
+        missing = float(np.min(allowed[beyond] / before[beyond]))
+        ksp.setTolerances(rtol=max(asked_for, missing**2))
+        try:
+            solve(asked, correction)
+        finally:
+            ksp.setTolerances(rtol=asked_for)
         corrected = left - matrix * correction
         gained = norms(corrected) < before
         if not np.any(gained & beyond):
