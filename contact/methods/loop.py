@@ -68,7 +68,7 @@ class NewtonLoop:
         linear, patience = problem.equilibrium.linear, self.patience or options.patience
         goal = max(goal, options.tolerance)
         residuals = evaluate(problem, iterate.state)
-        stagnation = Stagnation(patience, PROGRESS)
+        stagnation = Stagnation(patience, PROGRESS, together=True)
         self.step.begin()
         # A start from elsewhere is near the solution; zero displacement has no better tangent.
         tangent = iterate.status is not None and not linear
