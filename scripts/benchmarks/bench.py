@@ -114,7 +114,8 @@ def draw_ratios(report: Report, rows: Sequence[Run]) -> None:
 def ranks(bench: Bench) -> None:
     """Part (c): one rank against two."""
     rows = []
-    for dimension, n in ((2, 32), (3, 10)) if bench.coarse else ((2, 256), (3, 40)):
+    sizes = {2: bench.sizes((32,), (256,), ()), 3: bench.sizes((10,), (40, 56), ())}
+    for dimension, n in ((d, n) for d, chosen in sizes.items() for n in chosen):
         one, two = (run("ratio", str(dimension), str(n), "cold", ranks=k) for k in (1, 2))
         rows.append(
             {
@@ -123,6 +124,7 @@ def ranks(bench: Bench) -> None:
                 "1 rank (s)": one["seconds"],
                 "2 ranks (s)": two["seconds"],
                 "speed-up": one["seconds"] / two["seconds"],
+                "of a linear solve": one["one"] / two["one"],
             }
         )
     bench.report.table("bench-ranks", "One rank against two, cold", columns(rows))

