@@ -32,6 +32,8 @@ def real(values: Any, shape: tuple[int, ...], each: str) -> Array:
     each
         What is accepted: "one number ...".
     """
+    if isinstance(values, np.ndarray) and values.dtype == float and values.shape == shape:
+        return values.copy()
     try:
         array = np.asarray(values)
     except ValueError:  # lists of different lengths

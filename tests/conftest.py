@@ -41,6 +41,13 @@ def _look_up_once(name: str, objects: list[str], *rest: Any) -> tuple[Any, Any]:
 ffcx.codegeneration.jit.get_cached_module = _look_up_once
 
 
+@pytest.fixture(autouse=True)
+def _small_pictures(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Let scripts write small pictures: to encode them takes longer than to solve and draw."""
+    if "scripts.reporting" in sys.modules:
+        monkeypatch.setattr("scripts.reporting.DPI", 60)
+
+
 @pytest.fixture
 def bar(tmp_path: Path) -> Path:
     """Return the path of the bar's case file."""

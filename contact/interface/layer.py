@@ -141,12 +141,12 @@ class NormalLaw:
         r > 0; where p_nu falls, r must exceed its slope.
         """
         low, high = self.touch, np.minimum(self.gap, z / r)
-        free, rigid = z <= r * low, z - r * self.gap >= self.layer(high)
-        phi, done = high, free | rigid
+        phi, layer, steep = high, self.layer(high), self.layer_slope(high)
+        free, rigid = z <= r * low, z - r * self.gap >= layer
+        done = free | rigid
         # Newton's method in a bracket; every third sweep halves it, should Newton not.
         for sweep in range(90):
-            excess = r * phi + self.layer(phi) - z
-            slope = r + self.layer_slope(phi)
+            excess, slope = r * phi + layer - z, r + steep
             # Below this the excess is rounding in phi.
             rounding = 4 * EPS * (np.abs(z) + np.abs(slope) * (np.abs(phi) + np.abs(self.touch)))
             done |= np.abs(excess) <= rounding
@@ -156,9 +156,9 @@ class NormalLaw:
             newton = phi - excess / np.where(slope > 0, slope, r)
             inside = (newton > low) & (newton < high) & (sweep % 3 < 2)
             phi = np.where(done, phi, np.where(inside, newton, 0.5 * (low + high)))
+            layer, steep = self.layer(phi), self.layer_slope(phi)
         # The layer's pressure is exact where it is small, the remainder where it is stiff.
-        soft = self.layer_slope(phi) < r
-        pressed = np.where(soft, self.layer(phi), z - r * phi)
+        pressed = np.where(steep < r, layer, z - r * phi)
         return np.where(free, 0.0, np.where(rigid, z - r * self.gap, pressed))
 
     def displacement(self, z: Array, r: float) -> Array:

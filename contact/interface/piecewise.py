@@ -52,7 +52,7 @@ class Pieces:
             with naming(what) if what else nullcontext():
                 values = getattr(law, name)(*here)
                 parts.append(real(values, (end - begin,), "one number for each node"))
-        return np.concatenate(parts)
+        return np.concatenate(parts) if len(parts) > 1 else parts[0]
 
 
 @dataclass(frozen=True)
