@@ -54,6 +54,34 @@ class Conductor:
         """Return the foundation at a time."""
         return self if self.phi_f_at is None else replace(self, phi_f=self.phi_f_at(time))
 
+    def part(self, part: float) -> Conductor:
+        """Return the foundation with a part of its conductivity."""
+        return replace(self, phi_l=Part(self.phi_l, part))
+
+
+@dataclass(frozen=True)
+class Part:
+    """A part of what a law of the potential lets through.
+
+    Attributes
+    ----------
+    law
+        The law.
+    part
+        From 0 to 1.
+    """
+
+    law: PotentialLaw
+    part: float
+
+    def __call__(self, s: Value) -> Value:
+        """Return the part at potential differences."""
+        return self.part * self.law(s)
+
+    def derivative(self, s: Value) -> Value:
+        """Return its derivative."""
+        return self.part * self.law.derivative(s)
+
 
 @dataclass(frozen=True)
 class HeldCurrent:

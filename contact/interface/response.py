@@ -71,6 +71,11 @@ class FoundationResponse:
             return self
         return replace(self, conductor=self.conductor.at(time))
 
+    def conducting(self, part: float) -> FoundationResponse:
+        """Return the foundation with a part of its conductivity."""
+        assert self.conductor is not None
+        return replace(self, conductor=self.conductor.part(part))
+
     def normal_law(self, x: Array) -> NormalLaw | None:
         """Return the layer and the constraint as one graph, h_nu frozen at the nodal unknowns.
 

@@ -26,6 +26,8 @@ from contact.interface.status import touching
 from contact.linear.operator import Counters
 from contact.methods.augmentation import automatic_r
 from contact.methods.barrier import interior_point
+from contact.methods.best import Best
+from contact.methods.conductivity_steps import CONDUCTIVITY, conductivity_steps
 from contact.methods.frozen_friction import FROZEN_FRICTION, frozen_friction
 from contact.methods.load_steps import load_steps
 from contact.methods.loop import NewtonLoop
@@ -49,7 +51,7 @@ from contact.problem.state import State
 logger = logging.getLogger("contact.solver")
 
 #: What the history says of the slower methods.
-SLOWER = INTERIOR_POINT, FROZEN_FRICTION, BLOCK_RELAXATION
+SLOWER = CONDUCTIVITY, INTERIOR_POINT, FROZEN_FRICTION, BLOCK_RELAXATION
 
 #: Patience with the whole body where a surer road is left.
 SHORT = 4
@@ -192,7 +194,9 @@ class Newton:
         if not outcome.converged:
             iterate, outcome = self._resting() or (iterate, outcome)
         if not outcome.converged and isinstance(self.problem, CondensedProblem):
-            iterate, outcome = self._convex(self.problem, iterate, outcome)
+            iterate, outcome = self._conducting(self.problem) or self._convex(
+                self.problem, iterate, outcome
+            )
         elif not outcome.converged and search.left > 0:
             logger.info("%s; going on with an interior point", outcome.ended)
             iterate, outcome = interior_point(search, self.whole, self._finished)
@@ -231,6 +235,21 @@ class Newton:
     def _at_contact(self, step: MaterialStep, iterate: Iterate) -> tuple[Iterate, Outcome]:
         """Iterate with the body condensed onto the contact nodes."""
         return NewtonLoop(self.search, step, SECANT_UNTIL).run(iterate)
+
+    def _conducting(self, problem: CondensedProblem) -> tuple[Iterate, Outcome] | None:
+        """Follow solutions from a foundation that hardly conducts, if it conducts."""
+        interface = problem.interface
+        if interface.response.conductor is None:
+            return None
+
+        def loop(part: float) -> NewtonLoop:
+            response = interface.response.conducting(part)
+            less = replace(problem, interface=replace(interface, response=response))
+            search = self.search if part == 1 else replace(self.search, problem=less, best=Best())
+            step = WholeStep(search.problem, self.options, self._moduli, self.counters)
+            return NewtonLoop(search, step, self.options.secant_until, SHORT)
+
+        return conductivity_steps(loop, Iterate(problem.start()))
 
     def _convex(
         self, problem: CondensedProblem, iterate: Iterate, outcome: Outcome

@@ -44,6 +44,21 @@ def random_nodes(n: int, dim: int, block_size: int, rng: np.random.Generator) ->
     )
 
 
+def test_a_part_of_the_conductivity_is_that_of_a_smaller_k_e():
+    rng = np.random.default_rng(5)
+    nodes, x = random_nodes(50, 2, 3, rng), rng.standard_normal((50, 3))
+    pressure = rng.uniform(-1.0, 1.0, 50)
+
+    def foundation(k_e: float) -> FoundationResponse:
+        conductor = Conductor(ShiftedConductivity(k_e, 2.0), 1.5, Truncation(1.0))
+        return FoundationResponse(nodes, None, conductor, 1.7, 1.0)
+
+    less, small = foundation(4.0).conducting(0.25), foundation(1.0)
+    assert np.abs(less.charge(x, pressure)).max() > 0.1
+    assert less.charge(x, pressure) == pytest.approx(small.charge(x, pressure))
+    assert less.jacobian(x, pressure) == pytest.approx(small.jacobian(x, pressure))
+
+
 @pytest.mark.parametrize("dim", [2, 3])
 @pytest.mark.parametrize("psi", [ShiftedConductivity(0.7, 2.0), RampConductivity(0.7, 2.0)])
 def test_jacobian_is_the_derivative_of_the_force(dim, psi):

@@ -9,19 +9,20 @@ from scripts.studies.sweep import problems
 
 @pytest.mark.parametrize(
     ("name", "whole", "dense"),
-    [("bimorph-3", 1, 40), ("bimorph-8", 60, None), ("loose-5", 1, 40)],
+    [("bimorph-3", 1, 40), ("bimorph-8", 1, 60), ("loose-5", 1, 40)],
 )
 def test_what_takes_no_block_relaxation(name, whole, dense):
     """A bent bimorph, a good conductor, and a block that Newton's loop lets fly away.
 
-    The first took 212 dense steps, the second 700 solves of the body. Of the last the convex
+    The first took 212 dense steps, the second 700 solves of the body or 970 dense ones, or was not
+    solved, by the BLAS: its foundation conducts next to nothing at first. Of the last the convex
     problem was taken 3e12 away from rest: a fifth of its load was rounding there.
     """
     ((_, case),) = problems(False, name, True)
     solution = solve_problem(build_problem(case), NewtonOptions())
     assert solution.converged, solution.outcome.reason
     assert solution.counters.linear_solves <= whole
-    assert dense is None or solution.counters.contact_solves <= dense
+    assert solution.counters.contact_solves <= dense
     assert not any("block relaxation" in record.note for record in solution.history.records)
 
 
