@@ -23,7 +23,7 @@ MOVED = 1e-3
 HELD = 1e-8
 
 #: Largest pressure at the end of a step, over that of all steps, that is rounding of none.
-NOTHING = 1e-13
+NOTHING = 1e-12
 
 
 def looseness(solution: Solution) -> Remark:
