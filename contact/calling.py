@@ -32,7 +32,7 @@ def real(values: Any, shape: tuple[int, ...], each: str) -> Array:
     each
         What is accepted: "one number ...".
     """
-    if isinstance(values, np.ndarray) and values.dtype == float and values.shape == shape:
+    if type(values) is np.ndarray and values.dtype == float and values.shape == shape:
         return values.copy()
     try:
         array = np.asarray(values)

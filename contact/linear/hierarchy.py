@@ -95,10 +95,11 @@ class Hierarchy:
 
     def _correct(self, rhs: PETSc.Vec, correction: PETSc.Vec) -> None:
         """Solve for what a solution has left, which old coarse levels may not see."""
+        if self._taken >= self._most:
+            return
         if not self._fresh:
             self._renew()
-        if self._taken < self._most:
-            self._solve(rhs, correction)
+        self._solve(rhs, correction)
 
     def _solve(self, rhs: PETSc.Vec, solution: PETSc.Vec) -> None:
         jump = self._stiff.jump(rhs)
@@ -111,9 +112,13 @@ class Hierarchy:
         ksp, digits = self._ksp, -log10(self._ksp.getTolerances()[0])
         if self._fresh:
             ksp.setTolerances(max_it=most)
+            ksp.setConvergenceHistory(length=most + 1, reset=True)
             ksp.solve(rhs, solution)
-            self._rate = self._rate or ksp.getIterationNumber() / digits
-            return ksp.getIterationNumber()
+            taken, norms = ksp.getIterationNumber(), ksp.getConvergenceHistory()
+            # What was asked for is not what was gained: of few digits, or from a start.
+            if not self._rate and taken > 0 and norms.size > 0 and norms[-1] > 0:
+                self._rate = taken / max(log10(norms[0] / norms[-1]), 1.0)
+            return taken
         fresh = self._rate * digits
         ksp.setTolerances(max_it=min(ceil(fresh) + PRICE, most))
         ksp.solve(rhs, solution)

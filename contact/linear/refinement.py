@@ -83,7 +83,7 @@ def refine(
             asked.array[~beyond[pieces.of]] = 0.0
         ksp.setInitialGuessNonzero(False)
         # No more than is missing, by what norms may differ.
-        missing = float(np.min(allowed[beyond] / before[beyond]))
+        missing = float(allowed[beyond].min() / np.linalg.norm(before[beyond]))
         ksp.setTolerances(rtol=max(asked_for, missing**2))
         try:
             solve(asked, correction)

@@ -58,12 +58,15 @@ def cells_at(mesh: dmesh.Mesh, facets: Indices) -> tuple[Indices, npt.NDArray[np
 def elongation(mesh: dmesh.Mesh, facets: Indices) -> float:
     """Return how many times longer than twice their facets the cells behind are, at most; 1 if not.
 
-    Collective. Twice as long is usual, of cells as a mesh generator makes them.
+    Collective. Twice as long is usual, of cells as a mesh generator makes them. Facets are as long
+    as their shortest edge: across it a node has its neighbour.
     """
     behind, _ = cells_at(mesh, facets)
     dim, found = mesh.topology.dim, 1.0
     if facets.size:
-        found = float(np.max(mesh.h(dim, behind) / (2 * mesh.h(dim - 1, facets)), initial=1.0))
+        corners = mesh.geometry.x[dmesh.entities_to_geometry(mesh, dim - 1, facets)]
+        edges = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2)
+        found = float(np.max(mesh.h(dim, behind) / (2 * edges.min(axis=1)), initial=1.0))
     return mesh.comm.allreduce(found, op=MPI.MAX)
 
 

@@ -30,9 +30,9 @@ def looseness(solution: Solution) -> Remark:
     """Say where nearly nothing resists a motion of a body that contact alone holds. Collective.
 
     A cylinder without friction rolls in its place against next to nothing, and wherever it has
-    rolled to, its forces are in balance. Contact is taken to resist with c = E/length times areas,
-    as in the residuals: along the normal where bodies touch, along the surface where they stick,
-    and across the friction where they slip.
+    rolled to, its forces are in balance. Contact is taken to resist with c = E/length times areas:
+    along the normal where bodies touch, along the surface where they stick, and across the friction
+    where they slip.
     """
     problem, body = solution.problem, solution.problem.equilibrium
     touches = solution.status != "open"

@@ -17,8 +17,8 @@ BELOW = 0.9
 def giving_way(solution: Solution) -> Remark:
     """Say where penalties move contact nodes by much of the largest displacement. Collective.
 
-    The residuals weigh penetrations and slips by c = E/length. A flat body is stiffer by far: its
-    displacements are those of the penalties where these are as small as the residuals ask for.
+    The residuals weigh penetrations and slips by E/length, or more. A flat body is stiffer by far:
+    its displacements are those of the penalties where these are as small as the residuals ask for.
     Later steps are not looked at: what has slipped before stays.
     """
     problem = solution.problem

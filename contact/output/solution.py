@@ -273,7 +273,7 @@ class Solution:
         """What each contact node does: "open", "stick" or "slip", shape (n,). Collective.
 
         A node is in contact where p + c (u_nu - rho) > 0 for the multiplier p, or where the
-        layer presses; c = E / size as in the residuals. There it slips if |lambda_f + c u_tau|
+        layer presses; c = E / size. There it slips if |lambda_f + c u_tau|
         exceeds the friction bound (always where that is 0), and sticks else. What is below
         1e-9 of the largest pressure counts as rounding.
         """

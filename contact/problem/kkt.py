@@ -40,8 +40,9 @@ class KKT:
         body at rest, and the charges of the strain.
     contact
         |p - max(0, p + c (u_nu - rho))| / |p| in L2(Gamma_3), c = E/length with
-        the modulus of what touches, and the length of the body, or less if that is long because its
-        cells are; the largest of those of bodies that nothing connects.
+        the modulus of what touches, and the length of the body, less as many times as cells behind
+        Gamma_3 are longer than twice their facets (`contact.mesh.entities.elongation`); the largest
+        of those of bodies that nothing connects.
     friction
         |lambda_f - proj(lambda_f + c u_tau)| / |p| with the final bound s. Both are less what the
         forces that `rounding` stands for are as pressures: no contact force is known better than

@@ -80,3 +80,25 @@ def test_coarse_levels_that_are_new_are_not_renewed_for_a_correction(monkeypatch
         operator.update("secant", x, blocks + stiffness * np.eye(body.block_size), constant=True)
         operator.solve(body.external(), 1e-8)
         assert operator.counters.factorizations == made
+
+
+@pytest.mark.usefixtures("small_is_large")
+@pytest.mark.parametrize("rtol", [0.9, 1e-8])
+def test_the_iterations_a_digit_are_those_that_were_gained(monkeypatch, rtol):
+    """One iteration for a twentieth of a digit was taken for 22 a digit: nothing was ever lost."""
+
+    def correct(ksp, rhs, solution, solve, _) -> None:
+        asked_for = ksp.getTolerances()[0]
+        ksp.setTolerances(rtol=rtol)
+        solve(rhs.copy(), solution.duplicate())
+        ksp.setTolerances(rtol=asked_for)
+
+    problem = build_problem(block(6))
+    body, nodes = problem.equilibrium, problem.nodes.nodes
+    operator, x = SparseOperator(body, nodes), problem.start().x
+    for stiffness in (0.0, 1.0):
+        operator.update("secant", x, stiffness * np.stack(nodes.size * [np.eye(3)]), constant=True)
+        operator.solve(body.external(), 1e-8)
+        monkeypatch.setattr(hierarchy, "refine", correct)
+    assert operator.counters.factorizations == 2
+    assert operator._hierarchy._rate < 4
