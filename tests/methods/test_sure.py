@@ -212,8 +212,9 @@ def test_the_block_relaxation_solves_beams_a_thousand_times_as_long_as_thick(
     assert solution.counters.linear_solves <= 1600
     other = solve(case, comm=SELF)
     u, v = solution.displacement.x.array, other.displacement.x.array
-    # 1e-8 in the forces and rounding: the softest mode is 1e11 times softer than an element.
-    assert np.abs(u - v).max() <= 1e-4 * np.abs(v).max()
+    # 1e-8 in the forces and rounding: the softest mode is 1e11 times softer than an element. By the
+    # BLAS the beam bent by an end moment is 7e-5 to 6e-4 off, with residuals of 0 but for rounding.
+    assert np.abs(u - v).max() <= 2e-3 * np.abs(v).max()
 
 
 def test_an_r_that_does_not_fit_is_said_to_be_the_reason():
