@@ -28,6 +28,7 @@ from contact.body.loads import Loads
 from contact.body.masters import make_masters
 from contact.body.materials import cells_of
 from contact.body.operators import WholeOperator, make_operator
+from contact.body.pointwise import Pointwise
 from contact.body.shares import shares_of
 from contact.body.supports import free_components, supports_of, without_field
 from contact.body.weak_forms import WeakForms
@@ -72,6 +73,7 @@ class BodyEquilibrium:
         self.space = fem.functionspace(mesh, ("Lagrange", degree, (self.block_size,)))
         #: The owned cells of each material.
         self.cells = cells_of(domain, body.materials)
+        self.pointwise = Pointwise(self.space)
         self.supports = supports_of(domain, self.space, body)
         coupled = [material.piezo is not None for material in body.materials]
         if any(coupled) and not all(coupled):
@@ -293,6 +295,5 @@ class BodyEquilibrium:
             return np.zeros((1, self.shares.count))
         alone = x.copy()
         self.nodal(alone)[:, : self.dim] = 0.0
-        of_potential = self.internal_forces(alone)
-        of_strain = self.internal_forces(x) - of_potential
-        return self.sizes(np.where(self.shares.mechanical, of_potential, of_strain))
+        of_all, of_potential = map(self.internal_forces, (x, alone))
+        return self.sizes(np.where(self.shares.mechanical, of_potential, of_all - of_potential))

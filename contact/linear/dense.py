@@ -104,7 +104,7 @@ class DenseOperator:
         Where factorisations and solves are counted.
     """
 
-    symmetric = False
+    symmetric, iterative = False, False
 
     def __init__(self, bulk: DenseBulk, counters: Counters) -> None:
         self.bulk, self.counters = bulk, counters
@@ -160,6 +160,10 @@ class DenseOperator:
         total = _gather(self.bulk, np.where(self.bulk.free.ravel(), rhs, 0.0))
         self.counters.linear_solves += 1
         return from_first(self.bulk.comm, lambda: self._refined(total), total.size)[self.bulk.own]
+
+    def solve_all(self, sides: Array) -> Array:
+        """Solve for columns of owned unknowns. Collective."""
+        return np.column_stack([self.solve(side) for side in sides.T])
 
     def _refined(self, rhs: Array) -> Array:
         solution = self._solve(rhs)

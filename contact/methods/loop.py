@@ -22,6 +22,9 @@ PROGRESS = 0.5
 #: Why a loop with a frozen friction bound ends.
 UPDATE = "friction bound to be updated"
 
+#: Why a loop that is hopeless ends.
+SOFTER = "the body is far softer than a block"
+
 
 @dataclass
 class NewtonLoop:
@@ -94,7 +97,7 @@ class NewtonLoop:
             if bound is not None and measured <= goal:
                 return iterate, self._end(residuals, UPDATE)
             if self.hopeless is not None and kept.status is None and self.hopeless(iterate.state):
-                return iterate, self._end(residuals, "the body is far softer than a block")
+                return iterate, self._end(residuals, SOFTER)
             if not np.isfinite(measured):
                 return iterate, self._end(residuals, "Newton's method diverged")
             if not linear:

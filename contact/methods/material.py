@@ -35,9 +35,10 @@ SECANT_UNTIL = 0.3
 #: Most dense steps in one solve of the condensed contact problem.
 MOST_STEPS = 1000
 
-#: Solves a condensed problem from an iterate, with a history of its own.
+#: Solves a condensed problem from an iterate, with a history of its own; told whether the body is
+#: known to be soft.
 Solver = Callable[
-    [CondensedProblem, NewtonOptions, Moduli, History, Iterate], tuple[Iterate, Outcome]
+    [CondensedProblem, NewtonOptions, Moduli, History, Iterate, bool], tuple[Iterate, Outcome]
 ]
 
 
@@ -56,11 +57,17 @@ class MaterialStep:
         Of the whole problem: it is asked whether the solve is to end.
     counters
         Where the dense solves are counted.
-    slower
-        Notes of records that tell of slower methods.
+    roads
+        Notes of records that tell of other roads than Newton's loop.
+
+    Attributes
+    ----------
+    soft
+        Whether the body is known to be far softer than a block.
     """
 
     fault = "the condensed contact problem is not solved"
+    soft = False
 
     def __init__(
         self,
@@ -70,11 +77,11 @@ class MaterialStep:
         solve: Solver,
         history: History,
         counters: Counters,
-        slower: tuple[str, ...],
+        roads: tuple[str, ...],
     ) -> None:
         self.condensation, self.options, self.moduli = condensation, options, moduli
         self.counters, self.following = counters, Following()
-        self._solve, self._history, self._slower = solve, history, slower
+        self._solve, self._history, self._roads = solve, history, roads
         inner = condensation.full.equilibrium.products
         self._kept = Kept(options.tolerance, inner, WORTH if options.keep != "never" else 0.0)
 
@@ -115,7 +122,7 @@ class MaterialStep:
         )
         history = History(self._history.quiet(), level=logging.DEBUG)
         begin = replace(iterate, state=replace(state, x=condensed.equilibrium.at))
-        end, outcome = self._solve(condensed, options, self.moduli, history, begin)
+        end, outcome = self._solve(condensed, options, self.moduli, history, begin, self.soft)
         solves = sum(record.inner for record in history.records)
         self.counters.contact_solves += solves
         if outcome.kkt.largest > max(enough, NEAR * reached.largest):
@@ -130,8 +137,8 @@ class MaterialStep:
         elif not body.linear:
             new = self._kept.mixed(state, new)
         notes = [record.note for record in history.records]
-        slower = [word for word in self._slower if any(word in note for note in notes)]
-        note = ", ".join([*["kept"] * keep, *["lengthened"] * (length > 1), *slower])
+        taken = [word for word in self._roads if any(word in note for note in notes)]
+        note = ", ".join([*["kept"] * keep, *["lengthened"] * (length > 1), *taken])
         return Taken(replace(end, state=new), note, solves, length > 1)
 
     def _length(self, new: State, state: State, increment: Array) -> float:

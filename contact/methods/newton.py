@@ -16,22 +16,23 @@ from __future__ import annotations
 
 import logging
 from dataclasses import dataclass, field, replace
+from functools import partial
 
 import numpy as np
-from mpi4py import MPI
 
 from contact.interface.linearised import Moduli
 from contact.interface.multipliers import Multipliers
 from contact.interface.status import touching
 from contact.linear.operator import Counters
-from contact.methods.augmentation import automatic_r
 from contact.methods.barrier import interior_point
 from contact.methods.best import Best
 from contact.methods.conductivity_steps import CONDUCTIVITY, conductivity_steps
+from contact.methods.few import FEW_NODES, at_few_nodes
 from contact.methods.frozen_friction import FROZEN_FRICTION, frozen_friction
 from contact.methods.load_steps import load_steps
-from contact.methods.loop import NewtonLoop
+from contact.methods.loop import SOFTER, NewtonLoop
 from contact.methods.material import SECANT_UNTIL, MaterialStep
+from contact.methods.moduli import far_softer, moduli_of
 from contact.methods.options import NewtonOptions
 from contact.methods.relaxed import BLOCK_RELAXATION, block_relaxation
 from contact.methods.report import History, Monitor, Outcome
@@ -41,35 +42,19 @@ from contact.methods.step import Iterate, WholeStep
 from contact.methods.sure import INTERIOR_POINT, solve_convex
 from contact.problem.condensed import CondensedProblem
 from contact.problem.condensing import condensation, pays
-from contact.problem.kkt import evaluate, residual_forces
+from contact.problem.kkt import evaluate
 from contact.problem.mobility import held_at_rest
 from contact.problem.problem import ContactProblem
 from contact.problem.protocols import Problem
-from contact.problem.scales import Scales
 from contact.problem.state import State
 
 logger = logging.getLogger("contact.solver")
 
-#: What the history says of the slower methods.
-SLOWER = CONDUCTIVITY, INTERIOR_POINT, FROZEN_FRICTION, BLOCK_RELAXATION
+#: What the history says of other roads than Newton's loop.
+ROADS = FEW_NODES, CONDUCTIVITY, INTERIOR_POINT, FROZEN_FRICTION, BLOCK_RELAXATION
 
 #: Patience with the whole body where a surer road is left.
 SHORT = 4
-
-#: Forces that the moduli make of the first penetration, over the loads, from which on the body is
-#: far softer than the block that they are those of. Of a block they are some sqrt(H/h).
-SOFT = 1e3
-
-
-def moduli_of(scales: Scales, gamma: float) -> Moduli:
-    """Return stiffnesses of the linearised laws that fit a body and its mesh, in any units.
-
-    A mode of Gamma_3 as long as the body is high has the stiffness E'/H, and with r* in the
-    middle, one as short as an element has r*^2 H/E'.
-    """
-    middle = automatic_r(scales)
-    nodal = middle**2 * scales.height / scales.plane_modulus
-    return Moduli(middle, nodal, gamma * max(middle, nodal))
 
 
 @dataclass
@@ -86,6 +71,8 @@ class Newton:
         Told of every step.
     moduli
         Stiffnesses of the linearised laws; chosen from those of the body by default.
+    soft
+        Whether it is known that Newton's loop is hopeless, for the body is far softer than these.
     """
 
     problem: Problem
@@ -93,6 +80,7 @@ class Newton:
     monitor: Monitor | None = None
     counters: Counters = field(default_factory=Counters)
     moduli: Moduli | None = None
+    soft: bool = False
     history: History = field(init=False)
 
     def __post_init__(self) -> None:
@@ -113,7 +101,7 @@ class Newton:
                 inner = options if self._pays else replace(options, patience=SHORT)
                 self._condensed = MaterialStep(
                     body, inner, self._moduli, _solve_condensed, self.history, self.counters,
-                    SLOWER,
+                    ROADS,
                 )  # fmt: skip
 
     def turn_to(self, problem: Problem) -> None:
@@ -183,13 +171,18 @@ class Newton:
             logger.info("%s; going on with the whole body", outcome.ended)
         surer = None if self._pays else self._condensed
         loop = self.whole_loop(SHORT if surer is not None else None)
-        # Where the condensed body has come first, its loop has found out already.
-        first = loop if self._pays else replace(loop, hopeless=self._bends)
-        iterate, outcome = first.run(iterate)
+        if self.soft:
+            outcome = Outcome(evaluate(self.problem, iterate.state), self.options.allowed, SOFTER)
+        else:
+            # Where the condensed body has come first, its loop has found out already.
+            soft = None if self._pays else partial(far_softer, self.problem, self._moduli)
+            iterate, outcome = replace(loop, hopeless=soft).run(iterate)
+            if not outcome.converged:
+                iterate, outcome = self._at_few_nodes(iterate, outcome)
         if not outcome.converged and surer is not None:
             logger.info("%s; going on at the contact nodes", outcome.ended)
             # From rest: where Newton's method has failed, the body may have flown away.
-            start = Iterate(self.problem.start())
+            start, surer.soft = Iterate(self.problem.start()), outcome.ended == SOFTER
             iterate, outcome = self._at_contact(surer, start)
         if not outcome.converged:
             iterate, outcome = self._resting() or (iterate, outcome)
@@ -208,19 +201,19 @@ class Newton:
             iterate, outcome = block_relaxation(search, self.counters)
         return iterate, outcome
 
-    def _bends(self, state: State) -> bool:
-        """Tell whether a surer road is to be taken at once. Collective.
-
-        It is where the moduli make far more of a penetration than any load, also of what is rigid.
-        Where nothing but a given motion of the foundation acts, there is no load to tell by.
-        """
-        problem, interface = self.problem, self.problem.interface
-        opening = np.maximum(interface.opening(interface.jump.apply(state.x)), 0.0)
-        foreseen = self._moduli.status * interface.jump.sum(opening)
-        forces = np.abs(residual_forces(problem, problem.start()))
-        on_nodes, on_masters = np.split(forces, [problem.equilibrium.owned])
-        loads = interface.comm.allreduce(float(on_nodes.sum()), op=MPI.SUM) + on_masters.sum()
-        return bool(foreseen > SOFT * loads > 0)
+    def _at_few_nodes(self, iterate: Iterate, outcome: Outcome) -> tuple[Iterate, Outcome]:
+        """Let a body that is free so far touch at a few nodes. Collective."""
+        tolerance = self.options.tolerance
+        found = None
+        if outcome.kkt.equilibrium <= tolerance:
+            found = at_few_nodes(self.problem, self.whole.operator, iterate.state, tolerance)
+        if found is None:
+            return iterate, outcome
+        iterate, residuals = self._started(found), evaluate(self.problem, found)
+        self.search.see(iterate, residuals)
+        self.history.record(residuals, FEW_NODES)
+        outcome = Outcome(residuals, self.options.allowed, FEW_NODES)
+        return (iterate, outcome) if outcome.converged else self._finished(found, FEW_NODES)
 
     def _resting(self) -> tuple[Iterate, Outcome] | None:
         """Return the body at rest where nothing is left that acts on it. Collective."""
@@ -281,9 +274,9 @@ class Newton:
                 break
         return iterate, outcome
 
-    def _finished(self, state: State) -> tuple[Iterate, Outcome]:
-        """Go on from what an interior point has left."""
-        return self.whole_loop(SHORT).run(self._started(state), INTERIOR_POINT)
+    def _finished(self, state: State, note: str = INTERIOR_POINT) -> tuple[Iterate, Outcome]:
+        """Go on from what a surer road has left."""
+        return self.whole_loop(SHORT).run(self._started(state), note)
 
     def whole_loop(self, patience: int | None = None) -> NewtonLoop:
         """Return Newton's loop on the problem's own body."""
@@ -291,9 +284,14 @@ class Newton:
 
 
 def _solve_condensed(
-    problem: Problem, options: NewtonOptions, moduli: Moduli, history: History, iterate: Iterate
+    problem: Problem,
+    options: NewtonOptions,
+    moduli: Moduli,
+    history: History,
+    iterate: Iterate,
+    soft: bool,
 ) -> tuple[Iterate, Outcome]:
     """Solve a contact problem at its own nodes, by all roads that are open there."""
-    method = Newton(problem, options, moduli=moduli)
+    method = Newton(problem, options, moduli=moduli, soft=soft)
     method.history = history
     return method.run(iterate)

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from contact.interface.interface import Interface
 from contact.interface.multipliers import Multipliers
+from contact.linear.first_rank import with_questions
 from contact.methods.convex.haslinger import coulomb
 from contact.methods.convex.reduced import NotConvexError, without_potential
 from contact.methods.convex.tresca import TrescaSolver
@@ -132,28 +133,17 @@ def _solve_linearised(
         bound = interface.friction.bound(pressure[own] + layer, slip[own])
         return np.concatenate([bound, np.zeros(body.free.shape[0] - layer.size)])
 
-    def bound(pressure: Array, slip: Array) -> Array:
-        comm.bcast((pressure, slip))
-        gathered_bound = comm.gather(own_bound(pressure, slip))
-        assert gathered_bound is not None
-        return np.concatenate(gathered_bound)
+    def bound(pressure: Array, slip: Array) -> Array | None:
+        parts = comm.gather(own_bound(pressure, slip))
+        return None if parts is None else np.concatenate(parts)
 
-    answer: tuple[Array, Array, Array, int, str] | Exception | None = None
-    if gathered is not None:
-        try:
-            answer = gathered.solve(bound, friction, tolerance)
-        except NotConvexError:
-            answer = None
-        except (ValueError, ArithmeticError, MemoryError) as fault:
-            answer = fault  # the others are waiting, and are to end as this one does
-        comm.bcast(None)
-    else:
-        while (asked := comm.bcast(None)) is not None:
-            comm.gather(own_bound(*asked))
-    answer = comm.bcast(answer)
-    if isinstance(answer, Exception):
-        raise answer
-    if answer is None:
+    def work(ask: Bound) -> tuple[Array, Array, Array, int, str]:
+        assert gathered is not None
+        return gathered.solve(ask, friction, tolerance)
+
+    try:
+        answer = with_questions(comm, work, bound)
+    except NotConvexError:
         return None
     x, pressure, tangential, steps, words = answer
     begin = body.own.start // body.block_size

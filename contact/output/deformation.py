@@ -8,6 +8,7 @@ import numpy as np
 import ufl
 from dolfinx import fem
 from mpi4py import MPI
+from ufl.core.expr import Expr
 
 from contact.body.equilibrium import BodyEquilibrium
 from contact.output.fields import CHUNK
@@ -41,18 +42,18 @@ def deformation(body: BodyEquilibrium, x: Array) -> Deformation:
         The body, and its local unknowns.
     """
     mesh, kinematics = body.domain.mesh, body.domain.kinematics
-    u, _ = body.split(body.function(x))
-    eps, identity = strain(u, kinematics), ufl.Identity(3)
-    values = ufl.as_vector(
-        [ufl.sqrt(ufl.inner(eps, eps)), ufl.det(identity + kinematics.gradient(u))]
-    )
-    middle = np.full((1, body.dim), 1 / (body.dim + 1))
-    expression = fem.Expression(values, middle)
+    nodal, middle = body.nodal(x).ravel(), np.full((1, body.dim), 1 / (body.dim + 1))
+
+    def measures(at: fem.Function) -> Expr:
+        u, _ = body.split(at)
+        eps, stretch = strain(u, kinematics), ufl.Identity(3) + kinematics.gradient(u)
+        return ufl.as_vector([ufl.sqrt(ufl.inner(eps, eps)), ufl.det(stretch)])
+
     count = mesh.topology.index_map(mesh.topology.dim).size_local
     extremes = np.array([0.0, -np.inf, -np.inf])
     for begin in range(0, count, CHUNK):
         cells = np.arange(begin, min(begin + CHUNK, count), dtype=np.int32)
-        found = expression.eval(mesh, cells).reshape(cells.size, 2)
+        found = body.pointwise.values("deformation", measures, middle, nodal, cells)[:, 0]
         here = [found[:, 0].max(), (-found[:, 1]).max(), found[:, 1].max()]
         extremes = np.maximum(extremes, here)
     body.comm.Allreduce(MPI.IN_PLACE, extremes, op=MPI.MAX)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping
-from functools import cached_property
+from functools import cached_property, partial
 from itertools import accumulate
 from typing import NamedTuple
 
@@ -15,6 +15,7 @@ from dolfinx import fem
 from dolfinx.la import InsertMode
 from mpi4py import MPI
 from numpy.typing import NDArray
+from ufl.core.expr import Expr
 
 from contact import _compat
 from contact.body.constants import law_with_constants, piezo_with_constants
@@ -113,7 +114,8 @@ class DerivedFields:
     """
 
     def __init__(self, body: BodyEquilibrium, x: Array) -> None:
-        self.body, self._x = body, body.function(x)
+        self.body = body
+        self.move_to(x)
         self.shapes: dict[str, tuple[int, ...]] = {
             "stress": (3, 3),
             "von_mises": (),
@@ -142,20 +144,16 @@ class DerivedFields:
         element = basix.ufl.element("Lagrange", mesh.topology.cell_name(), self.body.degree)
         return np.asarray(element.basix_element.points)
 
-    @cached_property
-    def expressions(self) -> list[fem.Expression]:
-        """All components, one after the other, for each material."""
-        return [self._expression(material) for material in self.body.body.materials]
-
-    def _expression(self, material: Material) -> fem.Expression:
+    def _expression(self, material: Material, at: fem.Function) -> Expr:
+        """Return all components of a material's fields, one after the other."""
         body, mesh = self.body, self.body.domain.mesh
-        u, phi = body.split(self._x)
+        u, phi = body.split(at)
         # The nodes may lie on the axis.
         revolved = body.domain.revolved
         kinematics = Axisymmetric(on_axis=True) if revolved else body.domain.kinematics
         eps = strain(u, kinematics)
         sigma = stress(law_with_constants(material.law, mesh), eps)
-        induced: list[ufl.core.expr.Expr] = []
+        induced: list[Expr] = []
         if material.piezo is not None:
             constants = piezo_with_constants(material.piezo, mesh)
             sigma = sigma + coupling_stress(constants, phi)
@@ -167,32 +165,35 @@ class DerivedFields:
         values = [sigma[i, j] for i in range(3) for j in range(3)]
         # Rounding can make |dev eps|^2 slightly negative.
         values += [von_mises(sigma), sqrt(maximum(deviator_squared(eps), 0.0))]
-        return fem.Expression(ufl.as_vector(values + induced), self.points)
+        return ufl.as_vector(values + induced)
 
     def _chunks(self) -> Iterator[tuple[NDArray[np.int32], Array]]:
         """Yield owned cells and the values there, shape (cells, points, components)."""
-        for material in range(len(self.expressions)):
+        for material in range(len(self.body.cells)):
             yield from self._chunks_of(material)
 
     def _chunks_of(self, material: int) -> Iterator[tuple[NDArray[np.int32], Array]]:
         """Yield the owned cells of one material, likewise."""
-        mesh, cells = self.body.domain.mesh, self.body.cells[material]
-        expression = self.expressions[material]
-        components = sum(math.prod(shape) for shape in self.shapes.values())
+        body, cells = self.body, self.body.cells[material]
+        expression = partial(self._expression, body.body.materials[material])
         for chosen in np.array_split(cells, cells.size // CHUNK + 1):
-            values = expression.eval(mesh, chosen)
-            yield chosen, values.reshape(chosen.size, len(self.points), components)
+            yield (
+                chosen,
+                body.pointwise.values(
+                    ("fields", material), expression, self.points, self._x, chosen
+                ),
+            )
 
     def move_to(self, x: Array) -> None:
         """Look at the fields of other unknowns of the same body from now on."""
-        self._x.x.array[:] = self.body.nodal(x).ravel()
+        self._x = self.body.nodal(x).ravel()
 
     def strains(self) -> list[Array]:
         """Return |dev eps| in the owned cells of each material, shape (cells, points)."""
         column = self.columns["dev_strain"]
         return [
             np.concatenate([values[..., column][..., 0] for _, values in self._chunks_of(material)])
-            for material in range(len(self.expressions))
+            for material in range(len(self.body.cells))
         ]
 
     def volumes_of_materials(self) -> list[Array]:

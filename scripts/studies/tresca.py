@@ -21,7 +21,7 @@ from contact.interface.multipliers import Multipliers
 from contact.linear.operator import Counters
 from contact.methods.convex.tresca import Result, TrescaSolver
 from contact.methods.loop import NewtonLoop
-from contact.methods.newton import moduli_of
+from contact.methods.moduli import moduli_of
 from contact.methods.options import NewtonOptions
 from contact.methods.report import History
 from contact.methods.search import Search

@@ -56,14 +56,15 @@ def test_a_cantilever_that_touches_a_stop(case, force, nodes):
     assert solution.counters.factorizations <= 3
 
 
-def test_a_fine_mesh_of_a_long_beam_takes_two_solves_of_the_body():
-    """Sparse steps come first there, in vain: nine of them, and then all roads at its nodes."""
+def test_a_fine_mesh_of_a_long_beam_is_factorised_once():
+    """Sparse steps came first there, in vain: nine of them, and then all roads at its nodes."""
     load = {"on": "top", "traction": [0.0, -1e-13]}
     case = beam(1000.0, [400, 1], load, 0.1, 0.8, space={"degree": 2})
     solution = solve(parse_case(case), comm=SELF)
     assert solution.converged, solution.outcome.reason
-    assert solution.counters.linear_solves <= 2
-    assert {record.note for record in solution.history.records} == {"", "interior point"}
+    assert solution.counters.linear_solves <= 3
+    assert solution.counters.factorizations == 1
+    assert {record.note for record in solution.history.records} == {"", "few nodes"}
 
 
 @pytest.mark.parametrize(("mu", "force"), [(0.0, [0, -9.9734515e-05]), (0.3, FRICTION)])
@@ -126,8 +127,8 @@ def test_rounding_does_not_keep_a_long_beam_from_its_solution():
     case = beam(1000.0, [100, 1], load, 0.1, 0.8, space={"degree": 2})
     solution = solve(parse_case({**case, "solver": {"tolerance": 1e-10}}), comm=SELF)
     assert solution.converged, solution.outcome.reason
-    assert [record.note for record in solution.history.records] == ["interior point"]
-    assert solution.counters.contact_solves < 100
+    assert len(solution.history.records) == 1
+    assert solution.counters.contact_solves < 5
     assert 1e-10 < solution.outcome.kkt.rounding < 1e-7
     assert any("rounding decides how well the forces balance" in w for w in solution.warnings)
 

@@ -19,6 +19,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from contact.methods.convex.cones import Array
+from contact.methods.convex.interior import Point
 from contact.methods.convex.tresca import Result, TrescaSolver
 
 #: Earlier Tresca problems that the next bound is made of.
@@ -68,6 +69,7 @@ def coulomb(
     tolerance: float = 1e-8,
     inner: float = 1e-10,
     limit: int = 60,
+    start: Point | None = None,
 ) -> CoulombResult:
     """Look for a bound that its own Tresca problem gives, from zero on.
 
@@ -88,12 +90,14 @@ def coulomb(
         Tolerance of each Tresca problem.
     limit
         Most Tresca problems.
+    start
+        What the first one starts from.
     """
     root, body = np.sqrt(solver.weight), solver.body
     s: Array = np.zeros_like(root)
     history: deque[tuple[Array, Array]] = deque(maxlen=DEPTH)
     best: CoulombResult | None = None
-    target, share, iterations, start = s, 1.0, 0, None
+    target, share, iterations = s, 1.0, 0
     for problems in range(1, limit + 1):
         result = solver.solve(load, s, tolerance=inner, start=start)
         iterations += result.iterations

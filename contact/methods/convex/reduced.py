@@ -148,6 +148,11 @@ class Reduced:
         self._passed = passed
         return self._size[k:] * (self._factor[k:, k:] @ passed[k:])
 
+    def acting(self, displacement: Array) -> Array:
+        """Return the kept x of all displacements, shape (n, d)."""
+        turned = np.einsum("nia,ni->na", self._basis, displacement).ravel()[self._order]
+        return np.asarray(turned[self._split :])
+
     def expand(self, x: Array) -> Array:
         """Return all displacements under the load last given, shape (n, d), from the kept x."""
         n, d = self._basis.shape[:2]
