@@ -38,6 +38,7 @@ from contact.linear.layout import Layout
 from contact.linear.multigrid import is_large
 from contact.linear.operator import Counters
 from contact.mesh.domain import Domain
+from contact.mesh.pieces import connected_pieces
 from contact.tolerances import MOST_ROUNDING
 from contact.typing import Array
 
@@ -69,8 +70,7 @@ class BodyEquilibrium:
         self.domain, self.body, self.degree = domain, body, degree
         self.dim, self.phi_scale = domain.dim, body.phi_scale
         self.block_size = self.dim + (body.piezo is not None)
-        mesh = domain.mesh
-        self.space = fem.functionspace(mesh, ("Lagrange", degree, (self.block_size,)))
+        self.space = fem.functionspace(domain.mesh, ("Lagrange", degree, (self.block_size,)))
         #: The owned cells of each material.
         self.cells = cells_of(domain, body.materials)
         self.pointwise = Pointwise(self.space)
@@ -84,7 +84,8 @@ class BodyEquilibrium:
         self.unsupported = free_components(self.space, self.supports)
         self.masters = make_masters(domain, self.space, body, self.unsupported)
         #: Which forces are compared with each other.
-        self.shares = shares_of(domain, self.space, self.masters, self.dim)
+        self.pieces = connected_pieces(self.space)
+        self.shares = shares_of(domain, self.space, self.masters, self.pieces)
         self.layout = Layout(
             domain.comm,
             index_map,

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from contact.body.masters import Masters
 from contact.linear.refinement import Pieces
 from contact.mesh.domain import Domain
-from contact.mesh.pieces import connected_pieces, joined, sums
+from contact.mesh.pieces import joined, sums
 from contact.typing import Array
 
 
@@ -99,12 +99,15 @@ class Shares:
         return np.where(self.mechanical, sizes[0, piece], sizes[-1, piece])
 
 
-def shares_of(domain: Domain, space: fem.FunctionSpace, masters: Masters, dim: int) -> Shares:
-    """Return what is compared with each other in a body. Collective."""
-    piece, count = connected_pieces(space)
-    members = masters.members
+def shares_of(
+    domain: Domain,
+    space: fem.FunctionSpace,
+    masters: Masters,
+    pieces: tuple[NDArray[np.int32], int],
+) -> Shares:
+    """Return what is compared with each other in a body, of given pieces. Collective."""
+    (piece, count), members, d = pieces, masters.members, domain.dim
     if count > 1 and members:
-        d = domain.dim
         touched = np.zeros((len(members), count), dtype=np.intc)
         for member, at in zip(members, touched, strict=True):
             if member.free.any():
@@ -120,5 +123,5 @@ def shares_of(domain: Domain, space: fem.FunctionSpace, masters: Masters, dim: i
     behind = np.repeat(of_members, [member.free.size for member in members]).astype(np.intp)
     block_size = space.dofmap.index_map_bs
     return Shares(
-        domain.comm, piece.astype(np.intp), behind, count, block_size, dim, masters.mechanical
+        domain.comm, piece.astype(np.intp), behind, count, block_size, d, masters.mechanical
     )

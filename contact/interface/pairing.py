@@ -19,7 +19,6 @@ from contact.interface.obstacle.measuring import measured
 from contact.interface.placing import check_gap
 from contact.kinds import expect
 from contact.mesh.entities import owned_among
-from contact.mesh.pieces import connected_pieces
 from contact.typing import Array
 
 #: Share of the mesh's extent up to which facets are taken to face each other.
@@ -235,7 +234,7 @@ def _apart(
 
 def _connected(body: BodyEquilibrium, coupling: Coupling) -> bool:
     """Tell whether both sides are on the same piece of the mesh. Collective."""
-    piece, count = connected_pieces(body.space)
+    piece, count = body.pieces
     found = np.zeros((2, count), dtype=np.intc)
     for k, nodes in enumerate((coupling.slaves, coupling.masters)):
         found[k, piece[owned_among(body.layout.index_map, nodes)[1]]] = 1

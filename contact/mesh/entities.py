@@ -7,6 +7,7 @@ from typing import Any, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
+from dolfinx import fem, la
 from dolfinx import mesh as dmesh
 from dolfinx.common import IndexMap
 from mpi4py import MPI
@@ -42,6 +43,17 @@ def owned_among(
     begin, end = index_map.local_range
     here = np.flatnonzero((numbers >= begin) & (numbers < end))
     return here, (numbers[here] - begin).astype(np.int32)
+
+
+def between_ranks(space: fem.FunctionSpace) -> npt.NDArray[np.bool_]:
+    """Return which owned nodes are in cells of several ranks, shape (n,). Collective."""
+    index_map, mesh = space.dofmap.index_map, space.mesh
+    cells = mesh.topology.index_map(mesh.topology.dim).size_local
+    ranks = la.vector(index_map)
+    ranks.array[:] = 0.0
+    ranks.array[space.dofmap.list[:cells].ravel()] = 1.0
+    ranks.scatter_reverse(la.InsertMode.add)
+    return np.asarray(ranks.array[: index_map.size_local] > 1)
 
 
 def cells_at(mesh: dmesh.Mesh, facets: Indices) -> tuple[Indices, npt.NDArray[np.intp]]:

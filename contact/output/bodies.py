@@ -9,7 +9,6 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 
 from contact.mesh.entities import cells_at, owned_among
-from contact.mesh.pieces import connected_pieces
 from contact.output.solution import Solution
 from contact.problem.problem import ContactProblem
 from contact.problem.state import State
@@ -126,7 +125,7 @@ def regions(solution: Solution) -> tuple[str, bool]:
 
 def passing(problem: ContactProblem) -> tuple[str, bool]:
     """Warn where pieces of the mesh are in no contact with another: nothing keeps them apart."""
-    piece, count = connected_pieces(problem.equilibrium.space)
+    piece, count = problem.equilibrium.pieces
     if count == 1:
         return "", True
     met = np.zeros(count, dtype=np.intc)

@@ -22,6 +22,7 @@ from contact.linear.dense import DenseOperator, Factors
 from contact.linear.faults import check_overflow, petsc_options
 from contact.linear.operator import Bulk, Counters
 from contact.linear.schur import SchurComplement
+from contact.mesh.entities import between_ranks
 from contact.problem.condensed_masters import CondensedMasters
 from contact.problem.kept_unknowns import KeptUnknowns, at_kept_nodes
 from contact.problem.problem import ContactProblem
@@ -228,7 +229,8 @@ class Condensation:
             self._bulk.assemble(self._matrix, kind, state.x)
             balance(self._matrix, body.layout)
             if self._schur is None:
-                self._schur = SchurComplement(self._matrix, self._kept.unknowns, PREFIX)
+                cut = np.repeat(between_ranks(body.space), body.block_size)
+                self._schur = SchurComplement(self._matrix, self._kept.unknowns, PREFIX, cut)
             if self._schur.dense_size > LARGEST:
                 return None
             with petsc_options(PREFIX):

@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 
 from contact.body.motions import rigid_motions
 from contact.body.rigid import Rigid
-from contact.mesh.pieces import connected_pieces
 from contact.problem.problem import ContactProblem
 from contact.typing import Array
 
@@ -95,7 +94,7 @@ def groups(problem: ContactProblem) -> Iterator[Group]:
     That is for those that touch each other, or that a rigid part or a foundation joins: they are
     looked at together, with its motion.
     """
-    piece, count = connected_pieces(problem.equilibrium.space)
+    piece, count = problem.equilibrium.pieces
     joined = _joined(problem, piece, count)
     for k in map(int, np.flatnonzero(~joined)):
         yield _group(problem, piece, [k], count)

@@ -8,7 +8,6 @@ from contact import build_problem, solve_problem
 from contact.case.file import parse_case
 from contact.linear.first_rank import with_questions
 from contact.methods import few, newton
-from contact.methods.options import NewtonOptions
 from tests.methods.test_sure import TIP, beam
 
 SELF = MPI.COMM_SELF
