@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Hashable
+from collections.abc import Callable, Hashable, Iterator
 
 import numpy as np
 from dolfinx import fem
@@ -10,6 +10,9 @@ from numpy.typing import NDArray
 from ufl.core.expr import Expr
 
 from contact.typing import Array
+
+#: Cells that are evaluated at once: bounds the memory that large meshes need.
+CHUNK = 100_000
 
 
 class Pointwise:
@@ -28,6 +31,8 @@ class Pointwise:
         self._space = space
         self._at: fem.Function | None = None
         self._made: dict[Hashable, fem.Expression] = {}
+        #: Whose unknowns are in the function.
+        self._reader = object()
 
     def values(
         self,
@@ -36,8 +41,8 @@ class Pointwise:
         points: Array,
         x: Array,
         cells: NDArray[np.int32],
-    ) -> Array:
-        """Return the values of a vector, shape (cells, points, components).
+    ) -> Iterator[tuple[NDArray[np.int32], Array]]:
+        """Yield some cells after others, and a vector there, shape (cells, points, components).
 
         Parameters
         ----------
@@ -52,11 +57,12 @@ class Pointwise:
         cells
             Local numbers of cells.
         """
-        if self._at is None:
-            self._at = fem.Function(self._space)
+        at = self._at = self._at or fem.Function(self._space)
         if name not in self._made:
-            self._made[name] = fem.Expression(expression(self._at), points)
-        self._at.x.array[:] = x
-        made = self._made[name]
-        found = np.asarray(made.eval(self._space.mesh, cells))
-        return found.reshape(cells.size, len(points), made.value_size)
+            self._made[name] = fem.Expression(expression(at), points)
+        made, reader = self._made[name], object()
+        for chosen in np.array_split(cells, cells.size // CHUNK + 1):
+            if self._reader is not reader:
+                self._reader, at.x.array[:] = reader, x
+            found = np.asarray(made.eval(self._space.mesh, chosen))
+            yield chosen, found.reshape(chosen.size, len(points), made.value_size)

@@ -11,7 +11,6 @@ from mpi4py import MPI
 from ufl.core.expr import Expr
 
 from contact.body.equilibrium import BodyEquilibrium
-from contact.output.fields import CHUNK
 from contact.typing import Array
 from forms.kinematics import strain
 
@@ -49,12 +48,11 @@ def deformation(body: BodyEquilibrium, x: Array) -> Deformation:
         eps, stretch = strain(u, kinematics), ufl.Identity(3) + kinematics.gradient(u)
         return ufl.as_vector([ufl.sqrt(ufl.inner(eps, eps)), ufl.det(stretch)])
 
-    count = mesh.topology.index_map(mesh.topology.dim).size_local
+    cells = np.arange(mesh.topology.index_map(mesh.topology.dim).size_local, dtype=np.int32)
     extremes = np.array([0.0, -np.inf, -np.inf])
-    for begin in range(0, count, CHUNK):
-        cells = np.arange(begin, min(begin + CHUNK, count), dtype=np.int32)
-        found = body.pointwise.values("deformation", measures, middle, nodal, cells)[:, 0]
-        here = [found[:, 0].max(), (-found[:, 1]).max(), found[:, 1].max()]
+    for _, found in body.pointwise.values("deformation", measures, middle, nodal, cells):
+        size, volume = found[:, 0].T
+        here = [size.max(initial=0.0), (-volume).max(initial=-np.inf), volume.max(initial=-np.inf)]
         extremes = np.maximum(extremes, here)
     body.comm.Allreduce(MPI.IN_PLACE, extremes, op=MPI.MAX)
     return Deformation(float(extremes[0]), float(-extremes[1]), float(extremes[2]))

@@ -27,9 +27,6 @@ from forms.kinematics import Axisymmetric, deviator_squared, strain, von_mises
 from forms.ops import maximum, sqrt
 from forms.piezo import coupling_stress, electric_displacement
 
-#: Cells that are evaluated at once: bounds the memory that large meshes need.
-CHUNK = 100_000
-
 
 def nodal_function(
     name: str, source: fem.FunctionSpace, values: Array, shape: tuple[int, ...]
@@ -176,13 +173,8 @@ class DerivedFields:
         """Yield the owned cells of one material, likewise."""
         body, cells = self.body, self.body.cells[material]
         expression = partial(self._expression, body.body.materials[material])
-        for chosen in np.array_split(cells, cells.size // CHUNK + 1):
-            yield (
-                chosen,
-                body.pointwise.values(
-                    ("fields", material), expression, self.points, self._x, chosen
-                ),
-            )
+        name = "fields", material
+        yield from body.pointwise.values(name, expression, self.points, self._x, cells)
 
     def move_to(self, x: Array) -> None:
         """Look at the fields of other unknowns of the same body from now on."""
