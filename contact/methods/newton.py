@@ -73,6 +73,8 @@ class Newton:
         Stiffnesses of the linearised laws; chosen from those of the body by default.
     soft
         Whether it is known that Newton's loop is hopeless, for the body is far softer than these.
+    loose
+        As of `WholeStep`; of a condensed body, whose supports are not seen, it has to be told.
     """
 
     problem: Problem
@@ -81,16 +83,17 @@ class Newton:
     counters: Counters = field(default_factory=Counters)
     moduli: Moduli | None = None
     soft: bool = False
+    loose: bool = False
     history: History = field(init=False)
 
     def __post_init__(self) -> None:
         """Choose the moduli, and condense the body where that pays."""
-        problem, options = self.problem, self.options
-        self.history = History(self.monitor)
+        problem, options, self.history = self.problem, self.options, History(self.monitor)
         self._moduli = self.moduli or moduli_of(problem.scales, options.gamma)
         self._begin()
-        loose = isinstance(problem, ContactProblem) and not held_at_rest(problem)
-        self.whole = WholeStep(problem, options, self._moduli, self.counters, loose)
+        if isinstance(problem, ContactProblem):
+            self.loose = not held_at_rest(problem)
+        self.whole = WholeStep(problem, options, self._moduli, self.counters, self.loose)
         self._condensed: MaterialStep | None = None
         self._pays = False
         if options.condense and isinstance(problem, ContactProblem):
@@ -100,8 +103,8 @@ class Newton:
                 # Where the whole body comes first, its loop has found out already.
                 inner = options if self._pays else replace(options, patience=SHORT)
                 self._condensed = MaterialStep(
-                    body, inner, self._moduli, _solve_condensed, self.history, self.counters,
-                    ROADS,
+                    body, inner, self._moduli, partial(_solve_condensed, loose=self.loose),
+                    self.history, self.counters, ROADS,
                 )  # fmt: skip
 
     def turn_to(self, problem: Problem) -> None:
@@ -203,11 +206,10 @@ class Newton:
 
     def _at_few_nodes(self, iterate: Iterate, outcome: Outcome) -> tuple[Iterate, Outcome]:
         """Let a body that is free so far touch at a few nodes. Collective."""
-        tolerance = self.options.tolerance
-        found = None
-        if outcome.kkt.equilibrium <= tolerance:
-            found = at_few_nodes(self.problem, self.whole.operator, iterate.state, tolerance)
-        if found is None:
+        operator, tolerance = self.whole.operator, self.options.tolerance
+        balanced = outcome.kkt.equilibrium <= tolerance
+        found = balanced and at_few_nodes(self.problem, operator, iterate.state, tolerance)
+        if not found:
             return iterate, outcome
         iterate, residuals = self._started(found), evaluate(self.problem, found)
         self.search.see(iterate, residuals)
@@ -290,8 +292,9 @@ def _solve_condensed(
     history: History,
     iterate: Iterate,
     soft: bool,
+    loose: bool,
 ) -> tuple[Iterate, Outcome]:
     """Solve a contact problem at its own nodes, by all roads that are open there."""
-    method = Newton(problem, options, moduli=moduli, soft=soft)
+    method = Newton(problem, options, moduli=moduli, soft=soft, loose=loose)
     method.history = history
     return method.run(iterate)
