@@ -30,8 +30,9 @@ from contact.typing import Array
 #: What the history says of this road.
 FEW_NODES = "few nodes"
 
-#: Nodes that may touch at most. Beyond these the dense problem of all costs less.
-MOST = 4
+#: Nodes that may touch at most: beyond these the dense problem of all costs less. And those that
+#: may penetrate once the deepest one touches.
+MOST, CROWD = 4, 16
 
 #: Penetration that is rounding, over the largest displacement without contact.
 ROUNDING = 1e-13
@@ -65,8 +66,11 @@ def at_few_nodes(
         return None
     if not body.linear or interface.response.active or interface.held is not None:
         return None
-    forces = free.forces
-    if interface.comm.allreduce(bool(forces.pressure.any() or forces.friction.any()), op=MPI.LOR):
+    # Tresca's law, and Coulomb's with a smoothed pressure, act on nodes that do not touch.
+    forces, none = free.forces, np.zeros_like(interface.jump.weight)
+    acts = forces.pressure, forces.friction, interface.friction.bound(none, none)
+    acting = not interface.friction.local or any(values.any() for values in acts)
+    if interface.comm.allreduce(acting, op=MPI.LOR):
         return None
     blocks = np.zeros((interface.coupled.size, body.block_size, body.block_size))
     operator.update("secant", free.x, blocks, constant=True)
@@ -110,12 +114,14 @@ class FewNodes:
         """
         state, frictional = self.free, False
         while True:
-            deepest = self._deepest(state)
-            if deepest is not None and deepest not in self.places:
-                if len(self.places) == MOST:
+            deepest, count = self._deepest(state)
+            if count > 0 and deepest not in self.places:
+                if len(self.places) == MOST or (self.places and count > CROWD):
                     return None
                 self._join(deepest)
-            elif self.places and frictional == self.problem.interface.friction.acts:
+            elif not self.places:
+                return None
+            elif frictional == self.problem.interface.friction.acts:
                 return self._refined(state, frictional, tolerance)
             else:  # friction mostly presses no further nodes down
                 frictional = True
@@ -124,16 +130,17 @@ class FewNodes:
                 return None
             state = solved
 
-    def _deepest(self, state: State) -> tuple[int, int] | None:
-        """Return the rank and number of the node that penetrates most; None for none."""
+    def _deepest(self, state: State) -> tuple[tuple[int, int], int]:
+        """Return rank and number of the node that penetrates most, and how many do. Collective."""
         interface = self.problem.interface
         nodal, free = interface.jump.apply(state.x), interface.jump.apply(self.free.x)
         size = interface.jump.maximum(np.abs(free[:, : interface.dim]).max(axis=1, initial=0.0))
         opening = interface.opening(nodal)
         worst = int(np.argmax(opening)) if opening.size else 0
-        found = interface.comm.allgather((float(np.max(opening, initial=0.0)), worst))
-        depth, rank = max((depth, rank) for rank, (depth, _) in enumerate(found))
-        return (rank, found[rank][1]) if depth > ROUNDING * size else None
+        count = int(np.count_nonzero(opening > ROUNDING * size))
+        found = interface.comm.allgather((float(np.max(opening, initial=0.0)), worst, count))
+        rank = max(range(len(found)), key=lambda rank: found[rank][0])
+        return (rank, found[rank][1]), sum(own[2] for own in found)
 
     def _join(self, place: tuple[int, int]) -> None:
         """Let a node touch: ask how the body gives way to forces there."""

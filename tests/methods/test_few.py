@@ -8,6 +8,7 @@ from contact import build_problem, solve_problem
 from contact.case.file import parse_case
 from contact.linear.first_rank import with_questions
 from contact.methods import few, newton
+from contact.solving import solve
 from tests.methods.test_sure import TIP, beam
 
 SELF = MPI.COMM_SELF
@@ -111,3 +112,25 @@ def test_what_a_question_raises_is_raised_on_all():
 
     with pytest.raises(ValueError, match="first rank"):
         with_questions(comm, broken, answer)
+
+
+def test_tresca_friction_acts_on_nodes_that_do_not_touch(monkeypatch):
+    """The few are not alone there."""
+    case = beam(100.0, [200, 2], TIP, 0.5) | {"friction": {"law": "tresca", "bound": 1e-5}}
+    assert notes(solved(monkeypatch, case)) == {"interior point"}
+
+
+def test_what_has_slipped_before_is_remembered(monkeypatch):
+    """The tip is pressed down and rubbed to and fro, so that it slips both ways."""
+    load = {"on": "right", "traction": ["1e-4*sin(3*t)", "-1e-4*t"]}
+    steps = {"evolution": {"times": [0.0, 2.0], "steps": [8]}}
+    case = parse_case(beam(100.0, [200, 2], load, 0.5, 0.3) | steps)
+    quick = solve(case, comm=SELF)
+    monkeypatch.setattr(newton, "at_few_nodes", lambda *_: None)
+    sure = solve(case, comm=SELF)
+    assert quick.converged and sure.converged
+    for one, other in zip(quick.steps, sure.steps, strict=True):
+        size = np.abs(other.state.forces.pressure).max()
+        for name in ("pressure", "friction"):
+            given, expected = (getattr(step.state.forces, name) for step in (one, other))
+            assert np.allclose(given, expected, rtol=0, atol=1e-8 * size)
