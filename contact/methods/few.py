@@ -195,6 +195,8 @@ class FewNodes:
         vectors = jump.weight[:, None] * state.forces.vectors(jump)
         at = (slips, vectors, jump.normal, jump.tangent, jump.gap, jump.weight)
         few = Few(np.column_stack(gives), interface.friction.acts, *map(self._at_places, at))
+        if not np.all(few.weight > 0):
+            return None
 
         def bound(pressure: Array, slip: Array) -> Array:
             on_nodes = self._on_nodes(pressure), self._on_nodes(slip)
