@@ -19,7 +19,7 @@ from mpi4py import MPI
 from petsc4py import PETSc
 
 from contact.linear.multigrid import DEFAULTS
-from scripts.benchmarks.ranks import peak
+from scripts.benchmarks.bench_one import memory
 
 COMM = MPI.COMM_WORLD
 
@@ -69,12 +69,12 @@ def solve(dimension: int, n: int) -> int:
 def measure(dimension: int, n: int) -> dict[str, Any]:
     """Measure a solve, after one on a small mesh."""
     solve(dimension, 4)
-    libraries = peak()
+    libraries = memory()
     size = solve(dimension, n)
     return {
         "ranks": COMM.size,
         "unknowns": size,
-        "bytes an unknown": (peak() - libraries) / size,
+        "bytes an unknown": (memory() - libraries) / size,
         "libraries (MB)": libraries / 1e6,
     }
 

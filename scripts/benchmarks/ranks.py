@@ -8,7 +8,6 @@ solves, as PETSc counts them. Counts do not depend on the machine, nor on how ma
 from __future__ import annotations
 
 import json
-import resource
 import sys
 from typing import Any
 
@@ -17,15 +16,9 @@ from petsc4py import PETSc
 
 from contact import build_problem
 from contact.solving import solve_problem
-from scripts.benchmarks.bench_one import block, problem_case, unknowns, warm
+from scripts.benchmarks.bench_one import block, memory, problem_case, unknowns, warm
 
 COMM = MPI.COMM_WORLD
-
-
-def peak() -> float:
-    """Return the sum over the ranks of their peak memory (bytes)."""
-    own = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024.0
-    return float(COMM.allreduce(own, op=MPI.SUM))
 
 
 def told(event: str) -> dict[str, float]:
@@ -49,7 +42,7 @@ def measure(dimension: int, n: int) -> dict[str, Any]:
     # Multigrid also on meshes that a direct solver would take less time for: they are the samples.
     case = block(n, linear="iterative") if dimension == 3 else problem_case(dimension, n)
     warm(case, lambda: problem_case(dimension, 4))
-    libraries = peak()
+    libraries = memory()
     problem = build_problem(case)
     before = told("KSPSolve"), told("PCSetUp")
     solution = solve_problem(problem, case.solver)
@@ -58,7 +51,7 @@ def measure(dimension: int, n: int) -> dict[str, Any]:
         "ranks": COMM.size,
         "unknowns": size,
         "converged": solution.converged,
-        "bytes an unknown": (peak() - libraries) / size,
+        "bytes an unknown": (memory() - libraries) / size,
         "libraries (MB)": libraries / 1e6,
     }
     iterations = solution.counters.linear_iterations
