@@ -44,6 +44,8 @@ class Pointwise:
     ) -> Iterator[tuple[NDArray[np.int32], Array]]:
         """Yield some cells after others, and a vector there, shape (cells, points, components).
 
+        Collective where a name is asked for the first time.
+
         Parameters
         ----------
         name

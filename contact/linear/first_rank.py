@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from typing import Any, TypeVar
 
 import numpy as np
@@ -73,7 +74,7 @@ def with_questions(
         What the first one does, given whom to ask.
     answer
         What all ranks do together with the arguments of a question; the first one is told what it
-        returns there. What it raises, it raises on all.
+        returns there. What one of them raises, all do.
     """
     found, error = None, None
     if comm.rank == 0:
@@ -82,7 +83,7 @@ def with_questions(
         def ask(*question: Any) -> Any:
             comm.bcast(question)
             try:
-                return answer(*question)
+                return together(comm, lambda: answer(*question))
             except BaseException as caught:
                 broken.append(caught)
                 raise
@@ -96,7 +97,7 @@ def with_questions(
         comm.bcast(None)
     else:
         while (question := comm.bcast(None)) is not None:
-            answer(*question)
+            together(comm, partial(answer, *question))
     found, error = comm.bcast((found, error))
     if error is not None:
         raise error

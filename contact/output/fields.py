@@ -178,7 +178,7 @@ class DerivedFields:
 
     def move_to(self, x: Array) -> None:
         """Look at the fields of other unknowns of the same body from now on."""
-        self._x = self.body.nodal(x).ravel()
+        self._x = self.body.nodal(x).flatten()
 
     def strains(self) -> list[Array]:
         """Return |dev eps| in the owned cells of each material, shape (cells, points)."""

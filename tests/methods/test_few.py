@@ -91,6 +91,16 @@ def test_it_is_the_same_on_many_ranks(monkeypatch, cells, mu):
 
 
 @pytest.mark.parallel
+def test_ranks_without_cells(monkeypatch):
+    """Two triangles on any number of ranks."""
+    load = {"on": "right", "traction": [0.0, -3e-6]}
+    case = beam(100.0, [1, 1], load, 0.5, 0.3)
+    alone, together = (solved(monkeypatch, case, comm) for comm in (SELF, MPI.COMM_WORLD))
+    assert together.converged == alone.converged
+    assert np.allclose(together.contact_force, alone.contact_force, rtol=1e-9, atol=0)
+
+
+@pytest.mark.parallel
 def test_what_a_question_raises_is_raised_on_all():
     comm = MPI.COMM_WORLD
 
@@ -105,6 +115,14 @@ def test_what_a_question_raises_is_raised_on_all():
     assert with_questions(comm, work, answer) == 3 * comm.size
     with pytest.raises(KeyboardInterrupt):
         with_questions(comm, lambda ask: ask(3), answer)
+
+    def of_one(value: int) -> int:
+        if comm.rank == 0:
+            raise ValueError("of the answer")
+        return value
+
+    with pytest.raises(ValueError, match="of the answer"):
+        with_questions(comm, lambda ask: ask(1), of_one)
 
     def broken(ask):
         ask(1)
