@@ -11,9 +11,10 @@ from typing import Any
 from mpi4py import MPI
 
 from contact.build import REPLACEMENTS, build_problem, named
+from contact.case.digest import check_digest, digest
 from contact.case.file import Case, load_case
 from contact.case.replaced import replaced_by
-from contact.case.text import anchored, to_toml
+from contact.case.text import to_toml
 from contact.errors import InputError
 from contact.evolving import check_options, check_times, solve_steps
 from contact.kinds import expect
@@ -23,7 +24,8 @@ from contact.methods.options import NewtonOptions, Options
 from contact.methods.report import Monitor
 from contact.methods.steps import solve_step
 from contact.nesting import nested_start, pays
-from contact.output.resume import Checkpoints, read_steps
+from contact.output.folder import on_root
+from contact.output.resume import Checkpoints, kept_digest, read_steps
 from contact.output.review import announce
 from contact.output.solution import Solution
 from contact.problem.consistent import check_problem
@@ -148,6 +150,9 @@ def _solve(
     _refuse({"times": times}, "a case, whose [evolution] says them")
     case = case if isinstance(case, Case) else load_case(case, without=replaced_by(replacements))
     settings = settings or case.solver
+    computed_from = on_root(comm, lambda: digest(case)) if case.evolution and folder else None
+    if restart is not None and case.evolution is not None:
+        on_root(comm, lambda: check_digest(restart, kept_digest(restart), digest(case)))
     problem = build_problem(case, comm, **replacements)
     with named(case.source):
         nested = isinstance(settings, NewtonOptions) and settings.nested
@@ -168,7 +173,8 @@ def _solve(
             keep = None
             if folder is not None:
                 here = restart is not None and restart.samefile(folder)
-                keep = Checkpoints(folder, problem, to_toml(anchored(case)), kept, here).keep
+                text = to_toml(case, anchored=True)
+                keep = Checkpoints(folder, problem, text, kept, here, computed_from).keep
             times, rest = case.evolution.ends, case.evolution.times[0]
             solution = solve_steps(problem, times, settings, monitor, rest, keep, kept)
     solution.title, solution.output, solution.units = case.title, case.output, case.case.units

@@ -193,7 +193,7 @@ def parse_case(
     data
         Tables of the case file; it is not changed.
     folder
-        Folder that a relative name of a mesh file belongs to.
+        Folder that relative names of files in it belong to.
     source
         What messages call the case.
     without
@@ -205,40 +205,16 @@ def parse_case(
     InputError
         On the first mistake; the message is one line.
     """
-    data, filled = stand_ins({**data, **_found(data, Path(folder))}, without)
+    data, filled = stand_ins(data, without)
     try:
-        case = Case.model_validate(data)
+        case = Case.model_validate(data, context={"folder": folder})
     except ValidationError as error:
         raise InputError(describe(error, Case, source)) from None
-    if case.mesh.file is not None:
-        path = Path(folder) / case.mesh.file
-        if not path.is_file():
-            raise InputError(f"{source}: mesh.file: no file {path}; accepted: a Gmsh file (.msh)")
-        mesh = case.mesh.model_copy(update={"file": str(path)})
-        case = case.model_copy(update={"mesh": mesh})
+    file = case.mesh.file
+    if file is not None and not Path(file).is_file():
+        raise InputError(f"{source}: mesh.file: no file {file}; accepted: a Gmsh file (.msh)")
     case._source, case._filled = source, tuple(filled)
     return case
-
-
-def _found(data: Mapping[str, Any], folder: Path) -> dict[str, Any]:
-    """Return the tables that name files, other than that of the mesh, with their places."""
-
-    def placed(table: Any, *keys: str) -> Any:
-        if not isinstance(table, Mapping) or keys[0] not in table:
-            return table
-        inner = table[keys[0]]
-        if len(keys) > 1:
-            return {**table, keys[0]: placed(inner, *keys[1:])}
-        return {**table, keys[0]: str(folder / inner)} if isinstance(inner, str) else table
-
-    found: dict[str, Any] = {}
-    for key, path in (("material", ("library",)), ("contact", ("foundation", "file"))):
-        given = data.get(key)
-        if isinstance(given, list | tuple):
-            found[key] = [placed(table, *path) for table in given]
-        elif given is not None:
-            found[key] = placed(given, *path)
-    return found
 
 
 def load_case(

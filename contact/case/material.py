@@ -13,6 +13,7 @@ from pydantic import Field, model_validator
 
 from contact.case.accepted import accepted_by
 from contact.case.types import (
+    File,
     Names,
     NonNegative,
     Number,
@@ -126,7 +127,7 @@ class Material(Section):
         description="With `name`: units of the case. `SI`: Pa, V, C/m2; `GPa`: lengths in m, GPa, "
         "GV, C/m2. Default: `SI`.",
     )
-    library: Text | None = Field(
+    library: Annotated[File, Accepted("a library of materials (TOML)")] | None = Field(
         default=None,
         description="With `name`: a library of one's own (TOML), relative to the case file. "
         "Default: that of the package.",

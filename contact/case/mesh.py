@@ -11,10 +11,10 @@ from pydantic import Discriminator, Field, PrivateAttr, Tag, model_validator
 import meshes
 from contact.case.types import (
     UNKNOWN,
+    File,
     Name,
     Number,
     Section,
-    Text,
     Triple,
     Vector,
     Words,
@@ -82,7 +82,7 @@ class Mesh(Section):
     generator: (
         Annotated[str, Accepted('"rectangle", "box" or the name of a mesh recipe')] | None
     ) = Field(default=None, description="What makes the mesh. This or `file`.")
-    file: Text | None = Field(
+    file: Annotated[File, Accepted("a Gmsh file (.msh)")] | None = Field(
         default=None,
         description="Gmsh file (.msh); its named physical groups are the parts. Relative "
         "to the case file.",

@@ -9,7 +9,7 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from contact.case.formula import Expression
-from contact.case.types import Direction, Formula, NonNegative, Section, Text, Vector, fault
+from contact.case.types import Direction, File, Formula, NonNegative, Section, Vector, fault
 from contact.case.unions import one_of
 from contact.errors import InputError
 from contact.interface import obstacle
@@ -138,7 +138,7 @@ class Surface(Shape):
     only = 3
 
     shape: Literal["surface"] = Field(description="A surface of an STL file.")
-    file: Text = Field(
+    file: Annotated[File, Accepted("an STL file")] = Field(
         description="STL file, binary or text, its normals towards the body. Relative to the case "
         "file."
     )

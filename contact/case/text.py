@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import json
+import os
 import re
 from collections.abc import Iterator, Mapping
-from pathlib import Path
 from typing import Any
 
 from contact.case.file import Case
@@ -13,15 +13,7 @@ from contact.case.file import Case
 _BARE = re.compile(r"[A-Za-z0-9_-]+")
 
 
-def anchored(case: Case) -> Case:
-    """Return the same case with the whole path of its mesh file, to be read from anywhere."""
-    if case.mesh.file is None:
-        return case
-    mesh = case.mesh.model_copy(update={"file": str(Path(case.mesh.file).resolve())})
-    return case.model_copy(update={"mesh": mesh})
-
-
-def to_toml(case: Case, dimension: int | None = None) -> str:
+def to_toml(case: Case, dimension: int | None = None, anchored: bool = False) -> str:
     """Return a case file that gives the same case again, without what its method ignores.
 
     Parameters
@@ -30,9 +22,12 @@ def to_toml(case: Case, dimension: int | None = None) -> str:
         The case.
     dimension
         Of its mesh, if it is known: what has no effect there is left out.
+    anchored
+        Whether files are given with their whole paths, for a case that is read from anywhere.
     """
     ignored = {"space": {"kinematics"}} if dimension == 3 else None
-    data = case.model_dump(by_alias=True, exclude_none=True, exclude=ignored)
+    context = {"path": os.path.abspath} if anchored else None
+    data = case.model_dump(by_alias=True, exclude_none=True, exclude=ignored, context=context)
     return "\n".join(_table(data, ())).strip() + "\n"
 
 

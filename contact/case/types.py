@@ -5,6 +5,7 @@ Each kind of value carries, in words, what it accepts: see `contact.case.accepte
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Annotated, Any, TypeAlias
 
 from pydantic import (
@@ -13,6 +14,9 @@ from pydantic import (
     BeforeValidator,
     ConfigDict,
     Field,
+    PlainSerializer,
+    SerializationInfo,
+    ValidationInfo,
 )
 from pydantic_core import PydanticCustomError, core_schema
 
@@ -59,6 +63,19 @@ class _FormulaSchema:
         )
 
 
+class FilePath(str):
+    """Path of a file that the case reads, relative to the working folder."""
+
+
+def _placed(given: str, info: ValidationInfo) -> FilePath:
+    # A name in a case file is relative to the folder of that file.
+    return FilePath(Path((info.context or {}).get("folder", ".")) / given)
+
+
+def _path(path: str, info: SerializationInfo) -> str:
+    return (info.context or {}).get("path", str)(path)  # type: ignore[no-any-return]
+
+
 def _as_tuple(given: Any) -> Any:
     # TOML has lists, and strict models take tuples alone.
     return tuple(given) if isinstance(given, list) else given
@@ -102,6 +119,8 @@ TimeFormula: TypeAlias = Annotated[
 Number: TypeAlias = Annotated[float, Accepted("a number")]
 NonNegative: TypeAlias = Annotated[float, Field(ge=0), Accepted("a number >= 0")]
 Text: TypeAlias = Annotated[str, Accepted("a text")]
+#: A file, whose path a dump writes by the function ``path`` of its context.
+File: TypeAlias = Annotated[str, AfterValidator(_placed), PlainSerializer(_path)]
 Name: TypeAlias = Annotated[str, Field(min_length=1), Accepted("the name of a part")]
 AmplitudeName: TypeAlias = Annotated[
     str, Field(min_length=1), Accepted("a name below evolution.amplitudes")

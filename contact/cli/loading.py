@@ -22,12 +22,12 @@ def load(options: argparse.Namespace) -> Case:
         if options.command == "solve" and options.out is None:
             raise InputError("--out: missing; accepted: a folder to write to")
         return load_case(options.case, options.set)
-    from contact.case.text import anchored, to_toml
+    from contact.case.text import to_toml
     from contact.output.rerun import check_restart
     from contact.output.resume import case_of
 
     folder = Path(options.restart)
     stored = case_of(folder)
     case = load_case(options.case or stored, options.set)
-    check_restart(folder, to_toml(load_case(stored)), to_toml(anchored(case)))
+    check_restart(folder, to_toml(load_case(stored)), to_toml(case, anchored=True))
     return case

@@ -77,7 +77,7 @@ def _solve(case: Case, options: argparse.Namespace, comm: MPI.Intracomm) -> int:
         raise InputError('--out "": no folder; accepted: a folder to write to')
     restart = None if options.restart is None else Path(options.restart)
     # Not earlier: these load dolfinx, which PETSc's options have to precede.
-    from contact.case.text import anchored, to_toml
+    from contact.case.text import to_toml
     from contact.cli.progress import progress
     from contact.output.files import write_outputs
     from contact.output.resume import discard, kept_case
@@ -89,7 +89,7 @@ def _solve(case: Case, options: argparse.Namespace, comm: MPI.Intracomm) -> int:
             check_rerun(folder.path, to_toml(case))
             kept = kept_case(folder.path)
             if kept is not None:
-                check_kept(folder.path, kept, to_toml(anchored(case)))
+                check_kept(folder.path, kept, to_toml(case, anchored=True))
 
         if not options.overwrite:
             on_root(comm, check)

@@ -33,6 +33,8 @@ from contact.typing import Array
 #: Folder of the checkpoints in that of the results, that of a run which has not ended a step yet,
 #: and the case in it.
 FOLDER, FRESH, CASE = "checkpoints", "checkpoints.new", "case.toml"
+#: File with the digests of what they were computed from.
+_DIGEST = "digest.json"
 _NODES = "nodes.npz"
 #: How near a node has to be to where it was, over the size of the body.
 _NEAR = 1e-9
@@ -54,6 +56,8 @@ class Checkpoints:
         them; else they are written there first.
     here
         Whether they are.
+    digest
+        Digests of what the problem is made of, by names; None where nothing is known of them.
     """
 
     def __init__(
@@ -63,8 +67,10 @@ class Checkpoints:
         case: str,
         kept: Sequence[StepRecord] = (),
         here: bool = False,
+        digest: Mapping[str, str] | None = None,
     ) -> None:
         self._folder, self._problem, self._case = folder, problem, case
+        self._digest = digest or {}
         self._count, self._fresh = 0, not here
         if here:
             self._count, self._where = len(kept), _where(folder, problem)
@@ -84,6 +90,7 @@ class Checkpoints:
         shutil.rmtree(fresh, ignore_errors=True)
         fresh.mkdir()
         (fresh / CASE).write_text(self._case, encoding="utf-8")
+        (fresh / _DIGEST).write_text(json.dumps(self._digest, indent=1), encoding="utf-8")
         _save(fresh / _NODES, {"points": points})
 
     def keep(self, record: StepRecord) -> None:
@@ -199,6 +206,24 @@ def case_of(folder: Path) -> Path:
         If there is none.
     """
     return _files(folder)[0].parent / CASE
+
+
+def kept_digest(folder: Path) -> dict[str, str]:
+    """Return the digests of what the checkpoints in a folder were computed from. On one rank.
+
+    Raises
+    ------
+    InputError
+        If there are none.
+    """
+    path = _files(folder)[0].parent / _DIGEST
+    try:
+        given = json.loads(path.read_bytes())
+    except (OSError, ValueError, RecursionError):
+        given = None
+    if not isinstance(given, dict):
+        raise InputError(f"{path}: no digests; accepted: checkpoints of this program")
+    return given
 
 
 def kept_case(folder: Path) -> str | None:

@@ -2,13 +2,16 @@
 
 import csv
 import json
+import shutil
 import signal
+from pathlib import Path
 
 import numpy as np
 import pytest
 from mpi4py import MPI
 
 from contact import solve
+from contact.building.meshing import make_domain
 from contact.case.text import to_toml
 from contact.cli.main import main
 from contact.errors import InputError
@@ -18,6 +21,24 @@ from contact.output.resume import Checkpoints, case_of, discard, read_steps
 from tests.output.test_steps import case_of as steps_case
 
 SELF = MPI.COMM_SELF
+MESHES = Path(__file__).parents[2] / "meshes" / "fixtures"
+
+#: A case with a mesh file.
+SQUARE = """
+[mesh]
+file = "{mesh}"
+[material]
+young = 1.0
+poisson = 0.3
+[[fixed]]
+on = "top"
+displacement = ["0", "-0.001*t"]
+[contact]
+on = "bottom"
+[evolution]
+times = [0.0, 1.0]
+steps = [3]
+"""
 
 
 class Killed(BaseException):
@@ -103,8 +124,35 @@ def test_all_steps_were_there(tmp_path):
 def test_another_mesh(tmp_path):
     solve(steps_case(), comm=SELF, folder=tmp_path)
     for cells in ([8, 4], [16, 2]):
+        domain = make_domain(steps_case(mesh__cells=cells).mesh, SELF)
         with pytest.raises(InputError, match=r"--restart .*: given checkpoints of another mesh"):
+            solve(steps_case(), comm=SELF, restart=tmp_path, domain=domain)
+        with pytest.raises(InputError, match=r"--restart .*: the case has changed since"):
             solve(steps_case(mesh__cells=cells), comm=SELF, restart=tmp_path)
+
+
+@pytest.mark.parametrize("edited", ["the mesh file", "the stored case", "the digests"])
+def test_other_input_is_not_continued(tmp_path, ended, capfd, edited):
+    """Another mesh file of the same nodes, and a stored case with another modulus."""
+    out, case, mesh = tmp_path / "out", tmp_path / "case.toml", tmp_path / "square.msh"
+    shutil.copy(MESHES / "square.msh", mesh)
+    case.write_text(SQUARE.format(mesh=mesh))
+    heal = ended(1)
+    with pytest.raises(Killed):
+        on_the_line("solve", case, "--out", out)
+    heal()
+    if edited == "the mesh file":
+        mesh.write_text(mesh.read_text() + "\n")
+        words = "the file mesh.file has changed since the checkpoints were written"
+    elif edited == "the stored case":
+        stored = out / "checkpoints" / "case.toml"
+        stored.write_text(stored.read_text().replace("young = 1.0", "young = 2.0"))
+        words = "the case has changed since the checkpoints were written"
+    else:
+        (out / "checkpoints" / "digest.json").write_text("{")
+        words = "digest.json: no digests; accepted: checkpoints of this program"
+    assert on_the_line("solve", "--restart", out) == 2
+    assert words in capfd.readouterr().err
 
 
 def test_a_damaged_checkpoint(tmp_path):

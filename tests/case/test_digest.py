@@ -1,0 +1,82 @@
+"""The digests of a case tell whether it, or a file that it reads, has changed."""
+
+import shutil
+
+import pytest
+
+from contact.case.digest import difference, digest
+from contact.case.file import load_case
+from contact.case.text import to_toml
+from contact.errors import InputError
+from contact.library.reading import PACKAGED
+
+CASE = """
+title = "Punch"
+[mesh]
+file = "body.msh"
+[material]
+name = "steel"
+library = "own.toml"
+[[fixed]]
+on = "left"
+displacement = [0, 0, 0]
+[contact]
+on = "bottom"
+foundation = { shape = "surface", file = "tool.stl" }
+"""
+
+
+@pytest.fixture
+def written(tmp_path):
+    """Return a case file with the files that it reads."""
+    for name in ("body.msh", "tool.stl"):
+        (tmp_path / name).write_text(name)
+    shutil.copy(PACKAGED, tmp_path / "own.toml")
+    (tmp_path / "case.toml").write_text(CASE)
+    return tmp_path / "case.toml"
+
+
+def test_nothing_has_changed(written, tmp_path, monkeypatch):
+    first = digest(load_case(written))
+    assert set(first) == {"case", "mesh.file", "material.library", "contact.foundation.file"}
+    monkeypatch.chdir(tmp_path)
+    again = load_case("case.toml", ["title=Other", "solver.tolerance=1e-9", "output.fields=vtx"])
+    assert difference(first, digest(again)) is None
+    (tmp_path / "stored").mkdir()
+    stored = tmp_path / "stored" / "case.toml"
+    stored.write_text(to_toml(again, anchored=True))
+    assert difference(first, digest(load_case(stored))) is None
+
+
+@pytest.mark.parametrize(
+    ("name", "said"),
+    [
+        ("body.msh", "the file mesh.file"),
+        ("tool.stl", "the file contact.foundation.file"),
+        ("own.toml", "the file material.library"),
+    ],
+)
+def test_a_file_has_changed(written, name, said):
+    first = digest(load_case(written))
+    with (written.parent / name).open("a") as file:
+        file.write("\n")
+    assert difference(first, digest(load_case(written))) == said
+
+
+def test_the_case_has_changed(written):
+    first = digest(load_case(written))
+    other = digest(load_case(written, ["fixed.0.displacement=[0, 0, 1]"]))
+    assert difference(first, other) == "the case"
+
+
+def test_a_file_is_not_there(written):
+    case = load_case(written)
+    (written.parent / "tool.stl").unlink()
+    with pytest.raises(InputError, match=r"contact\.foundation\.file: .*tool\.stl: No such file"):
+        digest(case)
+
+
+def test_the_library_of_the_package_counts(written):
+    text = CASE.replace('library = "own.toml"\n', "")
+    written.write_text(text)
+    assert "material.library" in digest(load_case(written))
