@@ -1,28 +1,18 @@
-"""``contact materials``: the materials that have a name, and what is known of one."""
+"""``contact materials``: the materials that have a name, and the constants of one."""
 
 from __future__ import annotations
 
 import argparse
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
 
 from contact.cli.ending import CONVERGED
-from contact.cli.options import add_command
 from contact.library.entry import Entry
 from contact.library.reading import PACKAGED, find, library
 from contact.output.folder import on_root
-
-
-def add_parser(commands: Any) -> None:
-    """Add the command to the parser's commands."""
-    text = "list the materials that have a name, or show one with what follows from it"
-    command = add_command(commands, "materials [NAME] [--file FILE]", text)
-    command.add_argument("name", nargs="?", metavar="NAME", help="material to show")
-    command.add_argument("--file", metavar="FILE", help="a library of one's own (TOML)")
 
 
 def run(options: argparse.Namespace, comm: MPI.Intracomm) -> int:
@@ -46,7 +36,7 @@ def listing(path: Path = PACKAGED) -> str:
 
 
 def description(entry: Entry) -> str:
-    """Return all that is known of a material."""
+    """Return the constants of a material and those that follow from them."""
     s = entry.compliance
     lines = [
         f"{entry.name}, {entry.symmetry}",

@@ -5,7 +5,8 @@ from pathlib import Path
 import pytest
 from mpi4py import MPI
 
-from contact.cli.main import BAD_INPUT, main
+from contact.cli.ending import BAD_INPUT
+from contact.cli.main import main
 
 BAR = """
 [mesh]

@@ -6,13 +6,13 @@ import signal
 import subprocess
 import sys
 import tomllib
-import types
 from pathlib import Path
 
 import pytest
 
 from contact.case.file import load_case, parse_case
-from contact.cli.main import main, parse
+from contact.cli.arguments import parse
+from contact.cli.main import main
 from contact.output.environment import identify
 
 
@@ -60,11 +60,11 @@ def test_bad_command_lines_leave_with_status_2(bar, capsys, monkeypatch, line, f
 @pytest.mark.parametrize(("limit", "status"), [(100, 0), (1, 1)])
 def test_exit_status_and_outputs_of_a_solve(bar, capsys, monkeypatch, limit, status):
     written = []
-    output = types.ModuleType("contact.output.files")
-    output.write_outputs = lambda solution, out, figures: written.append(
-        (solution.converged, out.path)
-    )
-    monkeypatch.setitem(sys.modules, "contact.output.files", output)
+
+    def write(solution, out, figures):
+        written.append((solution.converged, out.path))
+
+    monkeypatch.setattr("contact.cli.solve.write_outputs", write)
     changes = ["--set", "solver.method=uzawa", "--set", f"solver.max_outer={limit}"]
     assert main(["solve", str(bar), "--out", str(bar.parent / "out"), *changes]) == status
     assert written == [(status == 0, bar.parent / "out")]
@@ -95,10 +95,10 @@ def test_a_signal_before_the_solve_ends_the_run_in_words(
 @pytest.mark.parametrize("place", ["swallowed", "held"])
 def test_no_signal_is_lost(bar, capsys, monkeypatch, place):
     """Libraries may swallow an exception, and those that are being loaded would not survive one."""
-    import contact.case.file
+    import contact.cli.solve
     import contact.solving
 
-    load, build = contact.case.file.load_case, contact.solving.build_problem
+    load, build = contact.cli.solve.load_case, contact.solving.build_problem
 
     def swallow(*args, **options):
         with contextlib.suppress(BaseException):
@@ -112,7 +112,7 @@ def test_no_signal_is_lost(bar, capsys, monkeypatch, place):
     if place == "swallowed":
         monkeypatch.setattr(contact.solving, "build_problem", swallow)
     else:
-        monkeypatch.setattr(contact.case.file, "load_case", hold)
+        monkeypatch.setattr(contact.cli.solve, "load_case", hold)
     out = bar.parent / "out"
     assert main(["solve", str(bar), "--out", str(out), "--quiet"]) == 143
     assert out.exists() == (place == "swallowed")

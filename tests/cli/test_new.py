@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from contact.case.file import load_case
-from contact.cli.expected import mean_ratio
-from contact.cli.main import BAD_INPUT, CONVERGED, main
+from contact.cli.check import mean_ratio
+from contact.cli.ending import BAD_INPUT, CONVERGED
+from contact.cli.main import main
 from meshes import write
 from scripts.cases import CASES
 

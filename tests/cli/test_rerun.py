@@ -6,7 +6,8 @@ from pathlib import Path
 import pytest
 from mpi4py import MPI
 
-from contact.cli.main import BAD_INPUT, CONVERGED, main
+from contact.cli.ending import BAD_INPUT, CONVERGED
+from contact.cli.main import main
 
 pytestmark = pytest.mark.parallel
 

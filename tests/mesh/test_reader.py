@@ -13,7 +13,7 @@ from mpi4py import MPI
 import meshes
 from contact.build import build_problem
 from contact.case.file import parse_case
-from contact.cli.describe import describe
+from contact.cli.check import describe
 from contact.errors import InputError
 from contact.mesh.reader import from_msh
 from tests.problems.sizes import integral, measures

@@ -204,10 +204,9 @@ def test_what_is_not_ours_is_refused_before_the_solve(
     capsys: pytest.CaptureFixture[str],
 ) -> None:  # fmt: skip
     """No pipe is waited for, no link followed, nothing overwritten: one message."""
-    import contact.solving
     from contact.cli.main import main
 
-    monkeypatch.setattr(contact.solving, "solve", lambda *_, **__: pytest.fail("it has solved"))
+    monkeypatch.setattr("contact.cli.solve.solve", lambda *_, **__: pytest.fail("it has solved"))
     folder = tmp_path / "out"
     folder.mkdir()
     make(folder / name)

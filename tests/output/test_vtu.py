@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from contact.cli.main import BAD_INPUT, CONVERGED, main
+from contact.cli.ending import BAD_INPUT, CONVERGED
+from contact.cli.main import main
 from contact.output.files import write_outputs
 from contact.output.vtu import VTU, Grid, gathered, read_vtu, write_vtu
 from contact.solving import solve

@@ -1,13 +1,26 @@
-"""What ``check`` expects of a case before it is solved: mesh quality, sizes of displacements."""
+"""``contact check CASE``: the resolved case, its mesh and unknowns, and the expected sizes."""
 
 from __future__ import annotations
+
+import argparse
+from collections.abc import Mapping
+from pathlib import Path
 
 import numpy as np
 from mpi4py import MPI
 
 from contact import _compat
+from contact.build import build_problem
+from contact.case.file import Case, load_case
+from contact.case.nesting import coarser_cases
+from contact.case.text import to_toml
+from contact.cli.ending import CONVERGED
+from contact.mesh.domain import Indices
+from contact.methods.options import NewtonOptions
+from contact.output import environment
 from contact.output.assumptions import fitting
 from contact.output.bodies import passing
+from contact.output.folder import on_root
 from contact.problem.expected import expected_displacements
 from contact.problem.problem import ContactProblem
 from contact.typing import Array
@@ -18,8 +31,57 @@ THIN = 0.1
 LARGE = 0.05
 
 
+def run(options: argparse.Namespace, comm: MPI.Intracomm) -> int:
+    """Validate a case, print it, and draw its set-up where that is asked for."""
+    case = on_root(comm, lambda: load_case(options.case, options.set))
+    if isinstance(case.solver, NewtonOptions) and case.solver.nested:
+        coarser_cases(case, case.solver.nested_levels)
+    problem = build_problem(case, comm)
+    text = describe(case, problem)
+    if comm.rank == 0:
+        print(text)
+    if options.plot:
+        from contact.cli.setup import save_setup  # matplotlib takes a while to load
+
+        for path in save_setup(case, problem, Path.cwd()):
+            print(f"# set-up: {path.name}")
+    return CONVERGED
+
+
+def describe(case: Case, problem: ContactProblem) -> str:
+    """Return the text. Collective; the same on all ranks."""
+    domain, comm = problem.domain, problem.comm
+    cells = domain.mesh.topology.index_map(domain.dim).size_global
+    layout = problem.equilibrium.layout
+    library = environment.blas()
+    lines = [
+        to_toml(case, domain.dim),
+        f"# mesh: {cells} cells in {domain.dim}-D on {comm.size} rank(s), largest extent "
+        f"{domain.size:g}",
+        "# parts of its boundary, with their facets:",
+        *_counts(domain.parts, comm),
+        "# regions, with their cells:",
+        *_counts(domain.regions, comm),
+        *(f"# note: {note}" for note in domain.notes),
+        f"# unknowns: {layout.unknowns} ({layout.block_size} a node), contact nodes: "
+        f"{problem.nodes.size}",
+        *expectations(problem),
+        f"# blas: {library.name} {library.path}".rstrip(),
+        "# versions: " + ", ".join(f"{k} {v}" for k, v in environment.versions().items()),
+    ]
+    if library.is_reference:
+        lines.append(f"# {environment.ADVICE}")
+    return "\n".join(lines)
+
+
+def _counts(sets: Mapping[str, Indices], comm: MPI.Intracomm) -> list[str]:
+    """Return a line for each set of indices, with its number over all ranks. Collective."""
+    width = max(map(len, sets))
+    return [f"#   {name:{width}}  {comm.allreduce(sets[name].size)}" for name in sorted(sets)]
+
+
 def expectations(problem: ContactProblem) -> list[str]:
-    """Return lines on the mesh and on what the loads will do. Collective."""
+    """Return lines on the mesh and on the expected effect of the loads. Collective."""
     warnings = [f"# warning: {text}" for text, _ in (fitting(problem), passing(problem)) if text]
     return [*_quality(problem), *_sizes(problem), *warnings]
 

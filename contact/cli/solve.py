@@ -1,0 +1,114 @@
+"""``contact solve`` and ``contact sweep``: a case, or a case for several values of its keys."""
+
+from __future__ import annotations
+
+import argparse
+import logging
+import signal
+import sys
+from pathlib import Path
+
+from mpi4py import MPI
+
+from contact.case.file import Case, load_case
+from contact.case.text import to_toml
+from contact.cli.ending import CONVERGED, NOT_CONVERGED
+from contact.cli.progress import progress
+from contact.errors import InputError
+from contact.methods.interrupt import SIGNALLED, Terminated, signals_held
+from contact.output.files import write_outputs
+from contact.output.folder import on_root, result_folder
+from contact.output.rerun import check_kept, check_rerun, check_restart
+from contact.output.resume import case_of, discard, kept_case
+from contact.solving import SolveInterrupted, solve
+from contact.sweeping import TABLE, Axis, sweep
+
+#: Seconds after a signal from which on a second one ends the writing of results too.
+PATIENCE = 2.0
+
+
+def run(options: argparse.Namespace, comm: MPI.Intracomm) -> int:
+    """Solve the case, or sweep over it, and return the exit status. Collective."""
+    return {"solve": _solve, "sweep": _sweep}[options.command](options, comm)
+
+
+def _solve(options: argparse.Namespace, comm: MPI.Intracomm) -> int:
+    case = on_root(comm, lambda: _load(options))
+    out = options.restart if options.out is None else options.out
+    if not out:  # the present folder is "."; this is rather a variable that is not set
+        raise InputError('--out "": no folder; accepted: a folder to write to')
+    restart = None if options.restart is None else Path(options.restart)
+    with result_folder(out, comm) as folder:
+        if not options.overwrite:
+            on_root(comm, lambda: _check_results(folder.path, case))
+        with progress(comm, options.quiet, options.log) as monitor:
+            try:
+                solution = solve(
+                    case, monitor=monitor, comm=comm, folder=folder.path, restart=restart
+                )
+            except SolveInterrupted as interrupt:
+                solution = interrupt.solution
+            logging.getLogger("contact").debug(solution.outcome.reason)
+        outcome = solution.outcome
+        earlier = on_root(comm, (folder.path / "summary.json").exists)
+        if outcome.signal and not solution.begun and earlier:  # which are worth more
+            raise Terminated if outcome.signal == signal.SIGTERM else KeyboardInterrupt
+        # Results that have taken long to compute are written, signal or not.
+        with signals_held(PATIENCE) as caught:
+            write_outputs(solution, folder, figures=options.plot)
+            if outcome.converged:
+                on_root(comm, lambda: discard(folder.path))
+            number = comm.allreduce(caught[0] if caught else 0, op=MPI.MAX)
+            caught.clear()
+    if comm.rank == 0 and not (options.quiet and outcome.converged):
+        state = "converged" if outcome.converged else "stopped"
+        text = f"{state}: {outcome.reason}; results in {folder.path}"
+        print(
+            f"contact: {text}" if options.quiet else text,
+            file=sys.stderr if options.quiet else None,
+            flush=True,
+        )
+    if outcome.signal or number:
+        return SIGNALLED + (outcome.signal or number)
+    return CONVERGED if outcome.converged else NOT_CONVERGED
+
+
+def _load(options: argparse.Namespace) -> Case:
+    """Read the case: that of its file, or that of an interrupted run. On one rank."""
+    if options.restart is None:
+        if options.case is None:
+            raise InputError("CASE.toml: missing; accepted: a case file, or --restart DIR")
+        if options.out is None:
+            raise InputError("--out: missing; accepted: a folder to write to")
+        return load_case(options.case, options.set)
+    folder = Path(options.restart)
+    stored = case_of(folder)
+    case = load_case(options.case or stored, options.set)
+    check_restart(folder, to_toml(load_case(stored)), to_toml(case, anchored=True))
+    return case
+
+
+def _check_results(folder: Path, case: Case) -> None:
+    """Refuse to replace results or checkpoints of another case. On one rank."""
+    check_rerun(folder, to_toml(case))
+    kept = kept_case(folder)
+    if kept is not None:
+        check_kept(folder, kept, to_toml(case, anchored=True))
+
+
+def _sweep(options: argparse.Namespace, comm: MPI.Intracomm) -> int:
+    if not options.over:
+        raise InputError("--over: missing; accepted: --over KEY=V1,V2,...")
+    if not options.out:
+        raise InputError("--out: missing; accepted: a folder to write to")
+    axes = [Axis.of(text) for text in options.over]
+    shown = progress(comm, options.quiet, options.log)
+    with result_folder(options.out, comm) as folder, shown as monitor:
+        rows = sweep(
+            options.case, axes, folder.path, options.set, monitor, comm, warm=not options.cold
+        )
+    bad = sum(row["converged"] not in (True, "True") for row in rows)
+    if comm.rank == 0 and not (options.quiet and bad == 0):
+        words = f", {bad} of them not converged" if bad else ""
+        print(f"{len(rows)} rows{words}: {folder.path / TABLE}")
+    return NOT_CONVERGED if bad else CONVERGED
