@@ -181,6 +181,11 @@ def _begin(folder: Path, names: list[str], text: str) -> dict[tuple[str, ...], d
             f"{', '.join(swept)}, or another folder"
         )
     before = folder / CASE
+    if (folder / TABLE).exists() and not before.is_file():
+        raise InputError(
+            f"--out {folder}: given a {TABLE} without the {CASE} that a sweep leaves beside it; "
+            "accepted: another folder"
+        )
     if before.is_file():
         place = difference(*(_without(t, names) for t in (before.read_text("utf-8"), text)))
         if place is not None:
@@ -209,7 +214,7 @@ def _without(text: str, names: list[str]) -> dict[str, Any]:
 
 
 def _write(folder: Path, rows: Sequence[Mapping[str, Any]]) -> None:
-    draft = folder / f"{TABLE}.draft"
+    draft = folder / f".contact-{TABLE}"
     write_csv(draft, rows[0], (row.values() for row in rows))
     os.replace(draft, folder / TABLE)
 

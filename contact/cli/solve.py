@@ -20,6 +20,7 @@ from contact.output.files import write_outputs
 from contact.output.folder import on_root, result_folder
 from contact.output.rerun import check_kept, check_rerun, check_restart
 from contact.output.resume import case_of, discard, kept_case
+from contact.output.transaction import check_foreign
 from contact.solving import SolveInterrupted, solve
 from contact.sweeping import TABLE, Axis, sweep
 
@@ -38,7 +39,7 @@ def _solve(options: argparse.Namespace, comm: MPI.Intracomm) -> int:
     if not out:  # the present folder is "."; this is rather a variable that is not set
         raise InputError('--out "": no folder; accepted: a folder to write to')
     restart = None if options.restart is None else Path(options.restart)
-    with result_folder(out, comm) as folder:
+    with result_folder(out, comm, overwrite=True) as folder:
         if not options.overwrite:
             on_root(comm, lambda: _check_results(folder.path, case))
         with progress(comm, options.quiet, options.log) as monitor:
@@ -89,8 +90,9 @@ def _load(options: argparse.Namespace) -> Case:
 
 
 def _check_results(folder: Path, case: Case) -> None:
-    """Refuse to replace results or checkpoints of another case. On one rank."""
+    """Refuse to replace results or checkpoints of another case, or a user's own files."""
     check_rerun(folder, to_toml(case))
+    check_foreign(folder)
     kept = kept_case(folder)
     if kept is not None:
         check_kept(folder, kept, to_toml(case, anchored=True))
@@ -103,7 +105,7 @@ def _sweep(options: argparse.Namespace, comm: MPI.Intracomm) -> int:
         raise InputError("--out: missing; accepted: a folder to write to")
     axes = [Axis.of(text) for text in options.over]
     shown = progress(comm, options.quiet, options.log)
-    with result_folder(options.out, comm) as folder, shown as monitor:
+    with result_folder(options.out, comm, overwrite=True) as folder, shown as monitor:
         rows = sweep(
             options.case, axes, folder.path, options.set, monitor, comm, warm=not options.cold
         )

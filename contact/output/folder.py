@@ -103,11 +103,20 @@ class ResultFolder:
 
 
 @contextmanager
-def result_folder(path: str | Path, comm: MPI.Intracomm) -> Iterator[ResultFolder]:
+def result_folder(
+    path: str | Path, comm: MPI.Intracomm, overwrite: bool = False
+) -> Iterator[ResultFolder]:
     """Make a folder if need be, and keep other runs out of it. Collective.
 
     What an interrupted run has left is put in order first. A folder that has been made here
     and stays empty is removed in the end.
+
+    Parameters
+    ----------
+    path, comm
+        The folder, and the ranks of the run.
+    overwrite
+        Whether files may be replaced that no run has left, but have the names of results.
 
     Raises
     ------
@@ -117,7 +126,7 @@ def result_folder(path: str | Path, comm: MPI.Intracomm) -> Iterator[ResultFolde
     """
     path = Path(path)
     taken: list[tuple[int, list[Path]]] = []
-    on_root(comm, lambda: taken.append(_take(path)))
+    on_root(comm, lambda: taken.append(_take(path, overwrite)))
     together = False
     try:
         yield ResultFolder(path, comm)
@@ -139,11 +148,11 @@ def settle(path: Path) -> None:
     """
     if (path / transaction.STAGE).is_dir():
         with suppress(InputError, OSError):
-            lock, made = _take(path)
+            lock, made = _take(path, overwrite=True)
             _release(path, lock, made)
 
 
-def _take(path: Path) -> tuple[int, list[Path]]:
+def _take(path: Path, overwrite: bool) -> tuple[int, list[Path]]:
     """Make, lock and check a folder; return the lock and the folders that were made."""
     made: list[Path] = []
     lock = -1
@@ -153,6 +162,8 @@ def _take(path: Path) -> tuple[int, list[Path]]:
         lock = _lock(path)
         transaction.recover(path)
         transaction.check_members(path)
+        if not overwrite:
+            transaction.check_foreign(path)
     except (InputError, OSError) as error:
         _release(path, lock, made)
         if isinstance(error, InputError):

@@ -1,15 +1,20 @@
 """Checkpoints of an evolution: what each step has left, for a run on any number of ranks to go on.
 
 A file a step, written under another name and renamed when it is whole: whatever ends a run, the
-steps before remain. Nodes are found again by where they are, on other ranks too.
+steps before remain. Nodes are found again by where they are, on other ranks too. A manifest names
+the files with their checksums: it alone says which of them belong to a run.
 """
 
 from __future__ import annotations
 
+import hashlib
+import io
 import json
+import logging
 import os
-import shutil
+import re
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -26,6 +31,7 @@ from contact.interface.history import SlipHistory
 from contact.interface.multipliers import Multipliers
 from contact.output.folder import on_root
 from contact.output.record import StepRecord
+from contact.output.transaction import kind
 from contact.problem.problem import ContactProblem
 from contact.problem.state import State
 from contact.typing import Array
@@ -35,9 +41,15 @@ from contact.typing import Array
 FOLDER, FRESH, CASE = "checkpoints", "checkpoints.new", "case.toml"
 #: File with the digests of what they were computed from.
 _DIGEST = "digest.json"
+#: The list of the files in a folder of checkpoints, and a file before it has its name.
+MANIFEST, DRAFT = "manifest.json", ".contact-draft"
 _NODES = "nodes.npz"
+#: Names that a manifest may have: it is data of whoever wrote it.
+_LISTED = re.compile(r"\d{5}\.npz|case\.toml|digest\.json|nodes\.npz")
 #: How near a node has to be to where it was, over the size of the body.
 _NEAR = 1e-9
+
+logger = logging.getLogger("contact.steps")
 
 
 class Checkpoints:
@@ -58,6 +70,11 @@ class Checkpoints:
         Whether they are.
     digest
         Digests of what the problem is made of, by names; None where nothing is known of them.
+
+    Raises
+    ------
+    InputError
+        If something stands under the name of the folder that no run has left there.
     """
 
     def __init__(
@@ -74,6 +91,7 @@ class Checkpoints:
         self._count, self._fresh = 0, not here
         if here:
             self._count, self._where = len(kept), _where(folder, problem)
+            on_root(problem.comm, lambda: _cut(_files(folder)[0].parent, self._count))
             return
         points = _places(problem)
         sizes = problem.comm.allgather(len(points))
@@ -87,11 +105,13 @@ class Checkpoints:
 
     def _begin(self, points: Array) -> None:
         fresh = self._folder / FRESH
-        shutil.rmtree(fresh, ignore_errors=True)
-        fresh.mkdir()
-        (fresh / CASE).write_text(self._case, encoding="utf-8")
-        (fresh / _DIGEST).write_text(json.dumps(self._digest, indent=1), encoding="utf-8")
-        _save(fresh / _NODES, {"points": points})
+        _check_own(self._folder)
+        _remove(fresh)
+        fresh.mkdir(parents=True, exist_ok=True)
+        _put(fresh / MANIFEST, json.dumps({}).encode())
+        _save(fresh, CASE, self._case.encode())
+        _save(fresh, _DIGEST, json.dumps(self._digest, indent=1).encode())
+        _save(fresh, _NODES, _packed({"points": points}))
 
     def keep(self, record: StepRecord) -> None:
         """Write the checkpoint of the next step; the first replaces those of an earlier run."""
@@ -101,7 +121,8 @@ class Checkpoints:
         self._fresh = False
 
     def _settle(self) -> None:
-        shutil.rmtree(self._folder / FOLDER, ignore_errors=True)
+        _check_own(self._folder)
+        _remove(self._folder / FOLDER)
         os.rename(self._folder / FRESH, self._folder / FOLDER)
 
     def _gather(self, record: StepRecord) -> None:
@@ -140,11 +161,13 @@ class Checkpoints:
         }
         arrays |= {f"table {name}": column for name, column in (record.table or {}).items()}
         place = self._folder / (FRESH if self._fresh else FOLDER)
-        _save(place / _name(self._count), arrays)
+        _save(place, _name(self._count), _packed(arrays))
 
 
 def read_steps(folder: Path, problem: ContactProblem) -> list[StepRecord]:
-    """Return the records of all steps that a run has left in a folder. Collective.
+    """Return the records of the steps that a run has left in a folder, up to a damaged one.
+
+    Collective.
 
     Raises
     ------
@@ -152,7 +175,7 @@ def read_steps(folder: Path, problem: ContactProblem) -> list[StepRecord]:
         If there are none, or they belong to another mesh.
     """
     where = _where(folder, problem)
-    files: list[Path] = on_root(problem.comm, lambda: _files(folder))
+    files: list[Path] = on_root(problem.comm, lambda: _intact(folder))
     return [_read(problem, path, where) for path in files]
 
 
@@ -237,14 +260,15 @@ def kept_case(folder: Path) -> str | None:
 def discard(folder: Path) -> None:
     """Remove the checkpoints of a run that has come to its end. On one rank."""
     for name in (FOLDER, FRESH):
-        shutil.rmtree(folder / name, ignore_errors=True)
+        if _manifest(folder / name) is not None:
+            _remove(folder / name)
 
 
 def _files(folder: Path) -> list[Path]:
     """Return the checkpoints in a folder, one after the other."""
     for name in (FOLDER, FRESH):  # where a run was ended between removal and renaming
-        found: list[Path] = []
-        while (path := folder / name / _name(len(found) + 1)).is_file():
+        listed, found = _manifest(folder / name) or {}, list[Path]()
+        while (path := folder / name / _name(len(found) + 1)).is_file() and path.name in listed:
             found.append(path)
         if found:
             return found
@@ -254,27 +278,120 @@ def _files(folder: Path) -> list[Path]:
     )
 
 
+def _intact(folder: Path) -> list[Path]:
+    """Return the checkpoints before the first one that is damaged or missing, and say so."""
+    files = _files(folder)
+    for count, path in enumerate(files):
+        try:
+            _load(path)
+        except InputError as error:
+            if count == 0:
+                raise
+            logger.warning("%s; going on from step %d, the last one intact", error, count)
+            return files[:count]
+    later = [*files[0].parent.glob("0*.npz")]
+    if len(later) > len(files):
+        missing = files[0].parent / _name(len(files) + 1)
+        logger.warning("%s is missing; going on from step %d", missing, len(files))
+    return files
+
+
 def _name(count: int) -> str:
     return f"{count:05d}.npz"
 
 
-def _save(path: Path, arrays: dict[str, Any]) -> None:
-    draft = path.with_suffix(".draft")
+def _manifest(place: Path) -> dict[str, str] | None:
+    """Return the checksums of the files that a run has left in a folder; None without a list."""
+    if kind(place) != "a folder" or kind(place / MANIFEST) != "a file":
+        return None
+    with suppress(ValueError, RecursionError):
+        listed = json.loads((place / MANIFEST).read_bytes())
+        if isinstance(listed, dict):
+            return {name: str(sum_) for name, sum_ in listed.items() if _LISTED.fullmatch(name)}
+    return None
+
+
+def _check_own(folder: Path) -> None:
+    """Refuse to replace checkpoints that no run has left.
+
+    Raises
+    ------
+    InputError
+        If there are files that no manifest names, or something else than a folder.
+    """
+    for place in (folder / FOLDER, folder / FRESH):
+        given = kind(place)
+        if given == "a folder":
+            listed = _manifest(place)
+            own = {DRAFT} if listed is None else {DRAFT, MANIFEST, *listed}
+            given = next((path.name for path in place.iterdir() if path.name not in own), None)
+        if given is not None:
+            raise InputError(
+                f"{place}: given {given}, which no run has left there; accepted: a folder of "
+                "results without it, checkpoints of the evolution go there"
+            )
+
+
+def _remove(place: Path) -> None:
+    """Remove what a manifest names, the first step first, and the folder where nothing is left."""
+    for name in (*sorted(_manifest(place) or ()), DRAFT):
+        (place / name).unlink(missing_ok=True)
+    (place / MANIFEST).unlink(missing_ok=True)
+    with suppress(OSError):  # it is not there, or not empty
+        place.rmdir()
+
+
+def _cut(place: Path, count: int) -> None:
+    """Remove the checkpoints after a step, which those of another course are to replace."""
+    listed = _manifest(place) or {}
+    later = [name for name in sorted(listed) if name[0].isdigit() and name > _name(count)]
+    for name in later:
+        (place / name).unlink(missing_ok=True)
+    kept = {name: sum_ for name, sum_ in listed.items() if name not in later}
+    _put(place / MANIFEST, json.dumps(kept).encode())
+
+
+def _packed(arrays: dict[str, Any]) -> bytes:
+    file = io.BytesIO()
+    np.savez(file, **arrays)
+    return file.getvalue()
+
+
+def _save(place: Path, name: str, data: bytes) -> None:
+    """Write a file and its name in the manifest, which comes first: no file is without one."""
+    if name not in (listed := _manifest(place) or {}) and kind(place / name) is not None:
+        raise InputError(f"{place / name}: no run has left it; accepted: a folder without it")
+    listed[name] = hashlib.sha256(data).hexdigest()
+    _put(place / MANIFEST, json.dumps(listed).encode())
+    _put(place / name, data)
+
+
+def _put(path: Path, data: bytes) -> None:
+    draft = path.with_name(DRAFT)
     with draft.open("wb") as file:
-        np.savez(file, **arrays)
+        file.write(data)
         file.flush()
         os.fsync(file.fileno())
     os.replace(draft, path)
 
 
+def _bytes(path: Path) -> bytes:
+    """Return what is in a file of the manifest.
+
+    Raises
+    ------
+    InputError
+        If it is not what has been written.
+    """
+    data = path.read_bytes() if path.is_file() else b""
+    if hashlib.sha256(data).hexdigest() != (_manifest(path.parent) or {}).get(path.name):
+        raise InputError(f"{path}: no checkpoint, or a damaged one; accepted: as a run has left it")
+    return data
+
+
 def _load(path: Path) -> dict[str, NDArray[Any]]:
-    try:
-        with np.load(path, allow_pickle=False) as arrays:
-            return dict(arrays)
-    except (ValueError, KeyError, EOFError) as error:
-        raise InputError(
-            f"{path}: no checkpoint ({error}); accepted: one of this program"
-        ) from None
+    with np.load(io.BytesIO(_bytes(path)), allow_pickle=False) as arrays:
+        return dict(arrays)
 
 
 def _places(problem: ContactProblem) -> Array:

@@ -49,6 +49,8 @@ MEMBERS = (
     "steps.csv",
     "contact-steps.csv",
     "contact.vtu",
+    "contact-against.csv",
+    "contact-against.vtu",
     "fields.pvd",
     "fields.vtu",
     "fields.bp",
@@ -63,6 +65,8 @@ MEMBERS = (
     "figure-deformed.png",
     "figure-potential.png",
 )
+#: Further names, of fields a step.
+_STEP = re.compile(r"fields-\d{4,}\.vtu")
 
 
 def check_members(folder: Path, names: tuple[str, ...] = MEMBERS) -> None:
@@ -76,6 +80,32 @@ def check_members(folder: Path, names: tuple[str, ...] = MEMBERS) -> None:
     """
     for name in names:
         _check_member(folder / name)
+
+
+def check_foreign(folder: Path, names: Sequence[str] | None = None) -> None:
+    """Check that under the names of members stands what a run has left, by its summary.
+
+    Parameters
+    ----------
+    folder
+        Of the results.
+    names
+        Of the members; by default all that runs may write.
+
+    Raises
+    ------
+    InputError
+        If there is something else, which a run would replace.
+    """
+    own = _members(folder / SUMMARY)
+    if names is None:
+        names = (*MEMBERS, *filter(_STEP.fullmatch, sorted(os.listdir(folder))))
+    for name in names:
+        if name not in own and kind(folder / name) is not None:
+            raise InputError(
+                f"{folder / name}: given {kind(folder / name)} that no run's {SUMMARY} there names "
+                "as its own; accepted: --overwrite to replace it, or another folder"
+            )
 
 
 def begin(folder: Path) -> Path:
@@ -109,6 +139,7 @@ def add(folder: Path, files: Sequence[Path]) -> None:
     later run would leave a file without a name.
     """
     names = tuple(path.name for path in files)
+    check_foreign(folder, names)
     check_members(folder, names)
     summary = json.loads((folder / SUMMARY).read_bytes())
     summary[MANIFEST] = sorted({*_members(folder / SUMMARY), *names})
@@ -145,14 +176,14 @@ def recover(folder: Path) -> None:
         If something that is not ours stands under the name of our temporary folder.
     """
     stage = folder / STAGE
-    kind = _kind(stage)
-    if kind is None:
+    found = kind(stage)
+    if found is None:
         return
-    if kind != "a folder" or not all(_is_stage(path) for path in stage.iterdir()):
+    if found != "a folder" or not all(_is_stage(path) for path in stage.iterdir()):
         raise InputError(
-            f"{stage}: given {kind} that no run has left there; accepted: a folder without it"
+            f"{stage}: given {found} that no run has left there; accepted: a folder without it"
         )
-    if _kind(stage / "new" / SUMMARY) == "a file":
+    if kind(stage / "new" / SUMMARY) == "a file":
         names = tuple(path.name for path in (stage / "new").iterdir())
         check_members(stage / "new", names)
         swap(folder)
@@ -174,7 +205,7 @@ def _advance(folder: Path) -> None:
     leaving = (set(earlier) - arrived) | left
     for name in sorted(leaving, key=lambda name: name != SUMMARY):
         _check_member(folder / name)
-        if _kind(folder / name) is not None:
+        if kind(folder / name) is not None:
             os.rename(folder / name, old / name)
         if name in left and name != SUMMARY:
             os.rename(new / name, folder / name)
@@ -185,7 +216,7 @@ def _return(folder: Path) -> None:
     """Undo `_advance`, from wherever it has come to."""
     new, old = folder / STAGE / "new", folder / STAGE / "old"
     for name in _members(new / SUMMARY):
-        if _kind(new / name) is None and _kind(folder / name) is not None:
+        if kind(new / name) is None and kind(folder / name) is not None:
             os.rename(folder / name, new / name)
     if old.is_dir():
         for path in sorted(old.iterdir(), key=lambda path: path.name == SUMMARY):
@@ -196,15 +227,15 @@ def _return(folder: Path) -> None:
 def _is_stage(path: Path) -> bool:
     """Whether a run may have left this in its temporary folder."""
     if path.name == SUMMARY:
-        return _kind(path) == "a file"
-    if path.name not in ("new", "old") or _kind(path) != "a folder":
+        return kind(path) == "a file"
+    if path.name not in ("new", "old") or kind(path) != "a folder":
         return False
     return all(name == ROOM or _MEMBER.fullmatch(name) for name in os.listdir(path))
 
 
 def _members(summary: Path) -> list[str]:
     """Return the members that a summary names; none if it is not there or not ours."""
-    if _kind(summary) != "a file":
+    if kind(summary) != "a file":
         return []
     with suppress(ValueError, RecursionError):
         content = json.loads(summary.read_bytes())
@@ -215,21 +246,22 @@ def _members(summary: Path) -> list[str]:
 
 
 def _check_member(path: Path) -> None:
-    kind, expected = _kind(path), "a folder" if path.suffix == ".bp" else "a file"
-    if kind not in (None, expected):
+    found, expected = kind(path), "a folder" if path.suffix == ".bp" else "a file"
+    if found not in (None, expected):
         raise InputError(
-            f"{path}: given {kind} where the results have {expected}; accepted: a folder without it"
+            f"{path}: given {found} where the results have {expected}; accepted: a folder without "
+            "it"
         )
-    if kind == "a folder":
+    if found == "a folder":
         for inner in path.iterdir():
-            if not _ADIOS.fullmatch(inner.name) or _kind(inner) != "a file":
+            if not _ADIOS.fullmatch(inner.name) or kind(inner) != "a file":
                 raise InputError(
                     f"{path}: given a folder with {inner.name} in it, which is not of a run; "
                     "accepted: a folder without it"
                 )
 
 
-def _kind(path: Path) -> str | None:
+def kind(path: Path) -> str | None:
     """Say what stands under a name, without following or opening it."""
     try:
         mode = path.lstat().st_mode

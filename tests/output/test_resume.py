@@ -155,13 +155,6 @@ def test_other_input_is_not_continued(tmp_path, ended, capfd, edited):
     assert words in capfd.readouterr().err
 
 
-def test_a_damaged_checkpoint(tmp_path):
-    solve(steps_case(), comm=SELF, folder=tmp_path)
-    (tmp_path / "checkpoints" / "00002.npz").write_bytes(b"no archive")
-    with pytest.raises(InputError, match=r"00002\.npz: no checkpoint .* accepted: one of this"):
-        solve(steps_case(), comm=SELF, restart=tmp_path)
-
-
 def on_the_line(*arguments):
     return main([str(argument) for argument in (*arguments, "--quiet")])
 

@@ -131,7 +131,7 @@ def added(folder: Path, draw: Callable[[Path], list[Path]]) -> list[Path]:
     """
     if not (folder / "summary.json").is_file():
         raise InputError(f"{folder}: no results there; accepted: a folder that a run has left")
-    with result_folder(folder, MPI.COMM_SELF):
+    with result_folder(folder, MPI.COMM_SELF, overwrite=True):  # it adds to what is there
         try:
             files = draw(transaction.begin(folder))
             transaction.add(folder, files)
