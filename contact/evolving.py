@@ -76,7 +76,7 @@ def evolve(
     expect("evolve", problem, "a Problem", isinstance(problem, ContactProblem))
     begin = 0.0 if start is None else start.time
     ends = check_times(problem, times, begin)
-    settings = in_steps(settings or NewtonOptions())
+    settings = settings or NewtonOptions()
     method = METHODS[settings.method](problem, settings, monitor)
     for step in Evolution(problem, method, start).run(ends, begin):
         if not step.outcome.converged:
@@ -127,13 +127,6 @@ def check_options(settings: Options | None, monitor: Monitor | None) -> None:
     expect("monitor", monitor, accepted, monitor is None or callable(monitor))
 
 
-def in_steps(settings: Options) -> Options:
-    """Return the options of a method whose steps are halved where they fail."""
-    if isinstance(settings, NewtonOptions):
-        return replace(settings, load_steps=False)
-    return settings
-
-
 def solve_steps(
     problem: ContactProblem,
     times: Sequence[float],
@@ -171,7 +164,7 @@ def solve_steps(
     clock = time.perf_counter()
     history, records = History(), list(kept)
     with stop_on_signal(problem.comm, monitor) as stop:
-        method = METHODS[settings.method](problem, in_steps(settings), stop)
+        method = METHODS[settings.method](problem, settings, stop)
         setup = time.perf_counter() - clock
         recorder = StepRecorder(problem, records[-1] if records else None)
         states = [record.state for record in records[-1:-3:-1]]

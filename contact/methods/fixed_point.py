@@ -26,15 +26,14 @@ from contact.body.norms import domain_norm
 from contact.linear.operator import Counters, Operator
 from contact.methods import uzawa
 from contact.methods.augmentation import augmentation, automatic_r, split
-from contact.methods.best import Best
 from contact.methods.following import Following
 from contact.methods.frozen import linearised
 from contact.methods.options import FixedPointOptions
+from contact.methods.progress import Best, Stagnation
 from contact.methods.report import History, Monitor, Outcome, Record
 from contact.methods.resting import resting
+from contact.methods.restraint import Restraint
 from contact.methods.softness import Softer, softer, spectrum
-from contact.methods.stagnation import Stagnation
-from contact.methods.stuck import stuck_bound
 from contact.problem.kkt import KKT, evaluate
 from contact.problem.problem import ContactProblem
 from contact.problem.protocols import Problem
@@ -148,7 +147,9 @@ class FixedPoint:
         jump, frictional = interface.jump, interface.friction.acts
         if start is None:
             self.state = problem.start()
-            stuck = stuck_bound(problem) if isinstance(problem, ContactProblem) else None
+            stuck = (
+                Restraint(problem).stuck_bound() if isinstance(problem, ContactProblem) else None
+            )
             # Iteration 0 is the pure contact problem that the thesis starts from. A bound that is
             # updated in the block relaxation needs none, and a body that friction alone holds has
             # no such problem.

@@ -1,20 +1,39 @@
-"""Newton's method, and the roads that are taken where it fails.
+"""Semismooth Newton method, a primal-dual active set strategy, and its fallbacks.
 
-First the condensed body, where the contact nodes are few, then the whole one. Where Newton's loop
-cycles, an interior-point method takes over, a dense one at the contact nodes of a condensed body,
-for others a sparse one. Where that fails, friction is frozen and updated outside (Algorithm 1 with
-Newton inside); then the load is applied in steps, and at last the block relaxation takes over. The
-history says which.
+1. Complementarity functions p - max(0, p + c (u_nu - rho)) and lambda - proj(lambda + c u_tau)
+   state contact and friction at each node. Their values tell the active sets: which nodes are
+   open, stick or slip. Each of them has a generalised derivative there.
+2. A step linearises material, contact, friction, layer and current together (`newton_step`). The
+   multipliers are condensed node by node, so that one linear system in the unknowns of the body is
+   left. Where the contact nodes are few, the body is condensed onto them first
+   (`condensed_step`): a step then linearises the material, and iterates contact there.
+3. Where the material yields on the way, a line search goes on along the step to where the energy
+   is least (`line_search`).
+4. The iteration ends with the residuals of the problem, computed from scratch, or with their
+   stagnation: the active sets cycle.
+5. A primal-dual interior point then finds the active sets on the same operator, with the friction
+   bound updated outside (`interior_point`), and Newton's method takes the last steps.
+6. Where that fails too and a current flows, the solutions are followed from a foundation that
+   hardly conducts (`continuation`).
+
+The notes of the history say which.
 
 References
 ----------
-Alart and Curnier, Comput. Methods Appl. Mech. Engrg. 92 (1991).
-Hueeber, Stadler and Wohlmuth, SIAM J. Sci. Comput. 30 (2008).
+Alart and Curnier, A mixed formulation for frictional contact problems prone to Newton like solution
+methods, Comput. Methods Appl. Mech. Engrg. 92 (1991).
+Hintermueller, Ito and Kunisch, The primal-dual active set strategy as a semismooth Newton method,
+SIAM J. Optim. 13 (2002).
+Hueeber, Stadler and Wohlmuth, A primal-dual active set algorithm for three-dimensional contact
+problems with Coulomb friction, SIAM J. Sci. Comput. 30 (2008).
+Haslinger, Approximation of the Signorini problem with friction, obeying the Coulomb law, Math.
+Methods Appl. Sci. 5 (1983).
 """
 
 from __future__ import annotations
 
 import logging
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import partial
 
@@ -24,57 +43,54 @@ from contact.interface.linearised import Moduli
 from contact.interface.multipliers import Multipliers
 from contact.interface.status import touching
 from contact.linear.operator import Counters
-from contact.methods.barrier import interior_point
-from contact.methods.best import Best
-from contact.methods.conductivity_steps import CONDUCTIVITY, conductivity_steps
-from contact.methods.few import FEW_NODES, at_few_nodes
-from contact.methods.frozen_friction import FROZEN_FRICTION, frozen_friction
-from contact.methods.load_steps import load_steps
-from contact.methods.loop import SOFTER, NewtonLoop
-from contact.methods.material import SECANT_UNTIL, MaterialStep
+from contact.methods.condensed_step import SECANT_UNTIL, CondensedStep
+from contact.methods.continuation import CONTINUATION, continuation
+from contact.methods.interior_point import INTERIOR_POINT, interior_point
 from contact.methods.moduli import far_softer, moduli_of
+from contact.methods.newton_step import Iterate, NewtonStep, Search, Step
 from contact.methods.options import NewtonOptions
-from contact.methods.relaxed import BLOCK_RELAXATION, block_relaxation
+from contact.methods.progress import Best, Stagnation
 from contact.methods.report import History, Monitor, Outcome
 from contact.methods.resting import resting
-from contact.methods.search import Search
-from contact.methods.step import Iterate, WholeStep
-from contact.methods.sure import INTERIOR_POINT, solve_convex
+from contact.methods.restraint import Restraint
 from contact.problem.condensed import CondensedProblem
 from contact.problem.condensing import condensation, pays
-from contact.problem.kkt import evaluate
-from contact.problem.mobility import held_at_rest
+from contact.problem.kkt import KKT, evaluate
 from contact.problem.problem import ContactProblem
 from contact.problem.protocols import Problem
 from contact.problem.state import State
 
 logger = logging.getLogger("contact.solver")
 
-#: What the history says of other roads than Newton's loop.
-ROADS = FEW_NODES, CONDUCTIVITY, INTERIOR_POINT, FROZEN_FRICTION, BLOCK_RELAXATION
+#: Notes of the fallbacks in the history.
+FALLBACKS = CONTINUATION, INTERIOR_POINT
 
-#: Patience with the whole body where a surer road is left.
+#: Stagnation limit of Newton's steps after a fallback.
 SHORT = 4
+
+#: What counts as progress of a step.
+PROGRESS = 0.5
+
+#: Why an iteration that is hopeless ends.
+SOFTER = "the body is far softer than a block"
 
 
 @dataclass
 class Newton:
-    """Newton's method on one problem.
+    """The semismooth Newton method on one problem.
 
     Parameters
     ----------
     problem
-        The contact problem.
+        The contact problem, or a condensed one.
     options
         Options of the method.
     monitor
         Told of every step.
     moduli
         Stiffnesses of the linearised laws; chosen from those of the body by default.
-    soft
-        Whether it is known that Newton's loop is hopeless, for the body is far softer than these.
-    loose
-        As of `WholeStep`; of a condensed body, whose supports are not seen, it has to be told.
+    restraint
+        Of a condensed problem that of the whole one, whose supports it does not see.
     """
 
     problem: Problem
@@ -82,8 +98,7 @@ class Newton:
     monitor: Monitor | None = None
     counters: Counters = field(default_factory=Counters)
     moduli: Moduli | None = None
-    soft: bool = False
-    loose: bool = False
+    restraint: Restraint | None = None
     history: History = field(init=False)
 
     def __post_init__(self) -> None:
@@ -91,29 +106,32 @@ class Newton:
         problem, options, self.history = self.problem, self.options, History(self.monitor)
         self._moduli = self.moduli or moduli_of(problem.scales, options.gamma)
         self._begin()
-        if isinstance(problem, ContactProblem):
-            self.loose = not held_at_rest(problem)
-        self.whole = WholeStep(problem, options, self._moduli, self.counters, self.loose)
-        self._condensed: MaterialStep | None = None
-        self._pays = False
-        if options.condense and isinstance(problem, ContactProblem):
-            body = condensation(problem, self.counters, options.linear)
-            if body is not None:
-                self._pays = pays(problem, options.linear)
-                # Where the whole body comes first, its loop has found out already.
-                inner = options if self._pays else replace(options, patience=SHORT)
-                self._condensed = MaterialStep(
-                    body, inner, self._moduli, partial(_solve_condensed, loose=self.loose),
-                    self.history, self.counters, ROADS,
-                )  # fmt: skip
+        if self.restraint is None:
+            assert isinstance(problem, ContactProblem)
+            self.restraint = Restraint(problem)
+        loose = not self.restraint.at_rest
+        self.whole = NewtonStep(problem, options, self._moduli, self.counters, loose)
+        self._condensed: CondensedStep | None = None
+        if (
+            options.condense
+            and isinstance(problem, ContactProblem)
+            and pays(problem, options.linear)
+            and (body := condensation(problem, self.counters, options.linear))
+        ):
+            solve = partial(_solve_condensed, restraint=self.restraint)
+            self._condensed = CondensedStep(
+                body, options, self._moduli, solve, self.history, self.counters, FALLBACKS
+            )
 
     def turn_to(self, problem: Problem) -> None:
         """Go on with another step of the same problem; what is factorised remains."""
         self.problem = self.whole.problem = problem
         self.history = History(self.monitor)
-        if self._condensed is not None:
-            assert isinstance(problem, ContactProblem)
-            self._condensed.turn_to(problem, self.history)
+        if isinstance(problem, ContactProblem):
+            assert self.restraint is not None
+            self.restraint.problem = problem
+            if self._condensed is not None:
+                self._condensed.turn_to(problem, self.history)
         self._begin()
 
     def _begin(self, iterate: Iterate | None = None) -> None:
@@ -122,7 +140,7 @@ class Newton:
 
     @property
     def state(self) -> State:
-        """What the last step has left."""
+        """The state after the last step."""
         return self.search.at.state
 
     def solve(self, start: State | None = None) -> tuple[State, Outcome]:
@@ -131,16 +149,16 @@ class Newton:
         Parameters
         ----------
         start
-            Where from; from rest by default.
+            Initial guess; zero by default.
         """
         self._begin()
         if self._condensed is not None:
             self._condensed.forget()
-        iterate = self.search.at if start is None else self._started(start)
+        iterate = self.search.at if start is None else self.started(start)
         iterate, outcome = self.run(iterate)
         return iterate.state, outcome
 
-    def _started(self, start: State) -> Iterate:
+    def started(self, start: State) -> Iterate:
         """Return an iterate at a given state."""
         interface, c = self.problem.interface, self._moduli.status
         nodal = interface.jump.apply(start.x)
@@ -154,68 +172,45 @@ class Newton:
         return Iterate(replace(start, forces=forces), status)
 
     def run(self, iterate: Iterate) -> tuple[Iterate, Outcome]:
-        """Take one road after the other from an iterate; the best iterate if all fail."""
+        """Iterate, with fallbacks; the best iterate if all fail. Collective."""
         self._begin(iterate)
         search = self.search
         self.history.restart()
-        iterate, outcome = self._roads(iterate)
+        iterate, outcome = self._iterate(iterate)
+        if not outcome.converged:
+            iterate, outcome = self._fall_back(iterate, outcome)
         if not outcome.converged and search.best.found is not None:
             iterate = search.best.found
             outcome = replace(outcome, kkt=evaluate(self.problem, iterate.state))
         search.at = iterate
         return iterate, outcome
 
-    def _roads(self, iterate: Iterate) -> tuple[Iterate, Outcome]:
+    def _iterate(self, iterate: Iterate) -> tuple[Iterate, Outcome]:
+        """Take Newton's steps, with the body condensed where that pays."""
         search = self.search
-        if self._condensed is not None and self._pays:
-            iterate, outcome = self._at_contact(self._condensed, iterate)
+        if self._condensed is not None:
+            iterate, outcome = NewtonLoop(search, self._condensed, SECANT_UNTIL).run(iterate)
             if outcome.converged or search.left <= 0:
                 return iterate, outcome
             logger.info("%s; going on with the whole body", outcome.ended)
-        surer = None if self._pays else self._condensed
-        loop = self.whole_loop(SHORT if surer is not None else None)
-        if self.soft:
-            outcome = Outcome(evaluate(self.problem, iterate.state), self.options.allowed, SOFTER)
-        else:
-            # Where the condensed body has come first, its loop has found out already.
-            soft = None if self._pays else partial(far_softer, self.problem, self._moduli)
-            iterate, outcome = replace(loop, hopeless=soft).run(iterate)
-            if not outcome.converged:
-                iterate, outcome = self._at_few_nodes(iterate, outcome)
-        if not outcome.converged and surer is not None:
-            logger.info("%s; going on at the contact nodes", outcome.ended)
-            # From rest: where Newton's method has failed, the body may have flown away.
-            start, surer.soft = Iterate(self.problem.start()), outcome.ended == SOFTER
-            iterate, outcome = self._at_contact(surer, start)
-        if not outcome.converged:
-            iterate, outcome = self._resting() or (iterate, outcome)
-        if not outcome.converged and isinstance(self.problem, CondensedProblem):
-            iterate, outcome = self._conducting(self.problem) or self._convex(
-                self.problem, iterate, outcome
-            )
-        elif not outcome.converged and search.left > 0:
-            logger.info("%s; going on with an interior point", outcome.ended)
-            iterate, outcome = interior_point(search, self.whole, self._finished)
-        if not outcome.converged and self.problem.interface.friction.acts and search.left > 0:
-            iterate, outcome = frozen_friction(loop, iterate)
-        if not outcome.converged and search.left > 0 and self.options.load_steps:
-            iterate, outcome = load_steps(loop)
-        if not outcome.converged and search.left > 0:
-            iterate, outcome = block_relaxation(search, self.counters)
-        return iterate, outcome
+            return self.whole_loop().run(iterate)
+        loop = replace(self.whole_loop(), hopeless=partial(far_softer, self.problem, self._moduli))
+        return loop.run(iterate)
 
-    def _at_few_nodes(self, iterate: Iterate, outcome: Outcome) -> tuple[Iterate, Outcome]:
-        """Let a body that is free so far touch at a few nodes. Collective."""
-        operator, tolerance = self.whole.operator, self.options.tolerance
-        balanced = outcome.kkt.equilibrium <= tolerance
-        found = balanced and at_few_nodes(self.problem, operator, iterate.state, tolerance)
-        if not found:
-            return iterate, outcome
-        iterate, residuals = self._started(found), evaluate(self.problem, found)
-        self.search.see(iterate, residuals)
-        self.history.record(residuals, FEW_NODES)
-        outcome = Outcome(residuals, self.options.allowed, FEW_NODES)
-        return (iterate, outcome) if outcome.converged else self._finished(found, FEW_NODES)
+    def _fall_back(self, iterate: Iterate, outcome: Outcome) -> tuple[Iterate, Outcome]:
+        """Solve by the interior point, and by continuation where that fails."""
+        search = self.search
+        if (found := self._resting()) is not None:
+            return found
+        if isinstance(self.problem, CondensedProblem):
+            found = self._conducting(self.problem)
+            if found is not None:
+                return found
+        if search.left > 0:
+            logger.info("%s; going on with an interior point", outcome.ended)
+            assert self.restraint is not None
+            iterate, outcome = interior_point(search, self.whole, self.restraint, self.finished)
+        return iterate, outcome
 
     def _resting(self) -> tuple[Iterate, Outcome] | None:
         """Return the body at rest where nothing is left that acts on it. Collective."""
@@ -227,74 +222,119 @@ class Newton:
         self.history.record(residuals, "at rest")
         return iterate, Outcome(residuals, self.options.allowed, "nothing acts")
 
-    def _at_contact(self, step: MaterialStep, iterate: Iterate) -> tuple[Iterate, Outcome]:
-        """Iterate with the body condensed onto the contact nodes."""
-        return NewtonLoop(self.search, step, SECANT_UNTIL).run(iterate)
-
     def _conducting(self, problem: CondensedProblem) -> tuple[Iterate, Outcome] | None:
         """Follow solutions from a foundation that hardly conducts, if it conducts."""
         interface = problem.interface
         if interface.response.conductor is None:
             return None
 
-        def loop(part: float) -> NewtonLoop:
+        def solve(part: float, iterate: Iterate) -> tuple[Iterate, Outcome]:
             response = interface.response.conducting(part)
             less = replace(problem, interface=replace(interface, response=response))
             search = self.search if part == 1 else replace(self.search, problem=less, best=Best())
-            step = WholeStep(search.problem, self.options, self._moduli, self.counters)
-            return NewtonLoop(search, step, self.options.secant_until, SHORT)
+            step = NewtonStep(search.problem, self.options, self._moduli, self.counters)
+            loop = NewtonLoop(search, step, self.options.secant_until, SHORT)
+            return loop.run(iterate, CONTINUATION)
 
-        return conductivity_steps(loop, Iterate(problem.start()))
+        return continuation(solve, Iterate(problem.start()))
 
-    def _convex(
-        self, problem: CondensedProblem, iterate: Iterate, outcome: Outcome
-    ) -> tuple[Iterate, Outcome]:
-        """Solve convex problems for sure, and let Newton's loop finish what they leave.
-
-        Without friction first: where the body touches, Newton's method mostly finds the rest. What
-        is linear is so from anywhere, and least rounded from rest: Newton's loop may have let a
-        loose body fly away.
-        """
-        answers = problem.interface.response.active
-        for friction in (False, True) if problem.interface.friction.acts else (False,):
-            best = self.search.best.found
-            start = best.state if answers and best is not None else problem.start()
-            poll, goal = self.history.poll, self.options.tolerance
-            found = solve_convex(problem, start, poll, friction, goal)
-            if found is None:
-                break
-            residuals = evaluate(problem, found.state)
-            iterate = self._started(found.state)
-            self.search.see(iterate, residuals)
-            self.history.record(residuals, INTERIOR_POINT, found.steps)
-            outcome = Outcome(residuals, self.options.allowed, found.words)
-            if outcome.converged or self.search.left <= 0:
-                break
-            loop = self.whole_loop(None if friction else SHORT)
-            iterate, outcome = loop.run(iterate, INTERIOR_POINT)
-            if outcome.converged:
-                break
-        return iterate, outcome
-
-    def _finished(self, state: State, note: str = INTERIOR_POINT) -> tuple[Iterate, Outcome]:
-        """Go on from what a surer road has left."""
-        return self.whole_loop(SHORT).run(self._started(state), note)
+    def finished(self, state: State) -> tuple[Iterate, Outcome]:
+        """Take Newton's last steps from what a fallback has left. Collective."""
+        return self.whole_loop(SHORT).run(self.started(state), INTERIOR_POINT)
 
     def whole_loop(self, patience: int | None = None) -> NewtonLoop:
-        """Return Newton's loop on the problem's own body."""
+        """Return the iteration on the problem's own body."""
         return NewtonLoop(self.search, self.whole, self.options.secant_until, patience)
 
 
 def _solve_condensed(
-    problem: Problem,
+    problem: CondensedProblem,
     options: NewtonOptions,
     moduli: Moduli,
     history: History,
     iterate: Iterate,
-    soft: bool,
-    loose: bool,
+    restraint: Restraint,
 ) -> tuple[Iterate, Outcome]:
-    """Solve a contact problem at its own nodes, by all roads that are open there."""
-    method = Newton(problem, options, moduli=moduli, soft=soft, loose=loose)
+    """Solve a contact problem at its own nodes."""
+    method = Newton(problem, options, moduli=moduli, restraint=restraint)
     method.history = history
     return method.run(iterate)
+
+
+@dataclass
+class NewtonLoop:
+    """Steps of one kind, until the residuals say that they have converged or stagnate.
+
+    Attributes
+    ----------
+    search
+        The problem with the tolerances; told of every iterate.
+    step
+        Takes the steps.
+    secant_until
+        Equilibrium residual below which the material's tangent replaces its secant: far from the
+        solution the tangent is too soft, and overshoots.
+    patience
+        Stagnation limit; that of the options by default.
+    hopeless
+        Asked after the first step from rest whether to give up at once; None to go on.
+    """
+
+    search: Search
+    step: Step
+    secant_until: float
+    patience: int | None = None
+    hopeless: Callable[[State], bool] | None = None
+
+    def run(self, iterate: Iterate, note: str = "") -> tuple[Iterate, Outcome]:
+        """Iterate. Collective.
+
+        Parameters
+        ----------
+        iterate
+            Initial guess.
+        note
+            Note of the steps in the history.
+        """
+        search, problem, options = self.search, self.search.problem, self.search.options
+        linear, patience = problem.equilibrium.linear, self.patience or options.patience
+        residuals = evaluate(problem, iterate.state)
+        stagnation = Stagnation(patience, PROGRESS, together=True)
+        self.step.begin()
+        # A start from elsewhere is near the solution; zero displacement has no better tangent.
+        tangent = iterate.status is not None and not linear
+        for _ in range(min(options.max_iterations, search.left)):
+            before, kept = residuals, iterate
+            taken = self.step(iterate, tangent, residuals)
+            if taken is None:
+                return kept, self._end(residuals, self.step.fault)
+            iterate = taken.iterate
+            residuals = evaluate(problem, iterate.state)
+            worse = self.step.following.worsened(residuals.largest)
+            search.see(iterate, residuals)
+            words = (note, taken.note, "tangent" * tangent, "taken back" * worse)
+            said = " ".join(word for word in words if word)
+            search.history.record(residuals, said, contact=taken.solves)
+            if worse:
+                iterate = kept
+                residuals = evaluate(problem, iterate.state)
+                search.see(iterate, residuals)
+            if residuals.largest <= options.tolerance:
+                return iterate, self._end(residuals)
+            if self.hopeless is not None and kept.status is None and self.hopeless(iterate.state):
+                return iterate, self._end(residuals, SOFTER)
+            if not np.isfinite(residuals.largest):
+                return iterate, self._end(residuals, "Newton's method diverged")
+            if not linear:
+                falls = residuals.equilibrium < max(before.equilibrium, options.tolerance)
+                near = residuals.equilibrium < self.secant_until
+                # The energy falls along a step that is lengthened, where residuals may rise.
+                tangent = taken.lengthened or (near and (falls or not tangent))
+            if stagnation(residuals.largest):
+                ended = f"Newton's method stalled at {stagnation.best:.1e}"
+                return iterate, self._end(residuals, ended)
+        steps = len(search.history.records)
+        return iterate, self._end(residuals, f"not converged in {steps} steps")
+
+    def _end(self, residuals: KKT, ended: str = "") -> Outcome:
+        return Outcome(residuals, self.search.options.allowed, ended)

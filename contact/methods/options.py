@@ -183,8 +183,6 @@ class NewtonOptions(Options):
     keep
         Whether to keep the factorisation of a condensed body while that costs less than new ones:
         within a solve, which then does not depend on those before, or across solves too.
-    load_steps
-        Whether to apply the load in steps where surer roads have failed.
     """
 
     method: Literal["newton"] = "newton"
@@ -200,7 +198,6 @@ class NewtonOptions(Options):
     softening: Annotated[float, Internal()] = 0.25
     condense: Annotated[bool, Internal()] = True
     keep: Annotated[Literal["never", "within", "across"], Internal()] = "within"
-    load_steps: Annotated[bool, Internal()] = True
 
 
 #: Name of a method -> its options.

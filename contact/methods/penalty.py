@@ -32,12 +32,11 @@ from contact.interface.penalised import (
     penalised_forces,
 )
 from contact.linear.operator import Counters
-from contact.methods.best import Best
 from contact.methods.options import PenaltyOptions
 from contact.methods.penalised import PenalisedProblem
+from contact.methods.progress import Best, Stagnation
 from contact.methods.report import History, Monitor, Outcome, Record
 from contact.methods.resting import resting
-from contact.methods.stagnation import Stagnation
 from contact.problem.expected import expected_displacements
 from contact.problem.kkt import KKT, evaluate
 from contact.problem.mobility import held_by_friction

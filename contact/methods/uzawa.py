@@ -27,7 +27,7 @@ from contact.linear.multigrid import TOLERANCE
 from contact.methods.acceleration import ResidualMinimiser
 from contact.methods.augmentation import components, split
 from contact.methods.frozen import Linearised
-from contact.methods.stagnation import Stagnation
+from contact.methods.progress import Stagnation
 from contact.typing import Array
 from forms.foundation import contact_multiplier
 

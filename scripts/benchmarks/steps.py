@@ -17,7 +17,6 @@ from typing import Any
 import numpy as np
 
 from contact import Case, build_problem
-from contact.evolving import in_steps
 from contact.methods.newton import Newton
 from contact.methods.steps import Evolution
 from contact.sweeping import Axis, sweep
@@ -36,7 +35,7 @@ def measured(case: Case, count: int) -> dict[str, Any]:
     """Return what an evolution in so many steps takes."""
     begin = time.process_time()
     problem = build_problem(case)
-    method = Newton(problem, in_steps(case.solver))
+    method = Newton(problem, case.solver)
     solves, converged = 0, True
     for step in Evolution(problem, method).run([*(np.arange(1, count + 1) / count)]):
         solves += step.counters.contact_solves

@@ -8,7 +8,7 @@ from contact.case.file import parse_case
 from contact.mesh.domain import Domain, from_mesh
 from contact.mesh.grid import rectangle
 from contact.solving import solve
-from tests.methods.test_sure import TIP, beam
+from tests.methods.test_slender import TIP, beam
 
 
 def curved(thickness: float, begin: float, end: float, cells: list[int]) -> Domain:

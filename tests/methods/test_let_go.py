@@ -55,7 +55,7 @@ def lying(comm, press, push) -> ContactProblem:
 def test_an_evolution_ends_where_loads_let_the_body_go(press, push, when, why):
     """Steps that end beyond are not tried; the last one before is as near as halves come."""
     problem = lying(MPI.COMM_SELF, press, push)
-    method = Newton(problem, NewtonOptions(load_steps=False))
+    method = Newton(problem, NewtonOptions())
     *complete, last = Evolution(problem, method).run(TIMES)
     assert [step.state.time for step in complete[:3]] == [0.5, 1.0, 1.5]
     assert all(step.outcome.converged for step in complete)

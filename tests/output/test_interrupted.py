@@ -6,19 +6,13 @@ import sys
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pytest
 from mpi4py import MPI
 
 import contact.solving
-from contact.build import build_problem
 from contact.linear.operator import SparseOperator
-from contact.methods.load_steps import load_steps
-from contact.methods.newton import Newton
-from contact.methods.options import NewtonOptions
 from contact.methods.report import Record
-from contact.problem.kkt import evaluate
-from contact.solving import SolveInterrupted, solve, solve_problem
+from contact.solving import SolveInterrupted, solve
 from tests.problems.written import block, written
 
 ROOT = Path(__file__).parents[2]
@@ -99,29 +93,3 @@ def test_a_solve_stops_between_inner_iterations(
     summary, _ = written(solution, shared_tmp_path)
     assert summary["reason"] == "interrupted (SIGTERM)"
     assert summary["outer_iterations"] == len(solution.history.records)
-
-
-def test_an_interrupted_load_step_is_judged_by_the_full_load(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    """The residuals of a solve that ends in a load step are those of the problem itself."""
-    problem = build_problem(block(2))
-    notes = []
-
-    def stepped(method: Newton, _: object) -> Any:
-        return load_steps(method.whole_loop())
-
-    def press(record: Record) -> None:
-        notes.append(record.note)
-        signal.raise_signal(signal.SIGINT)
-
-    monkeypatch.setattr(Newton, "_roads", stepped)
-    with pytest.raises(SolveInterrupted) as interrupt:
-        solve_problem(problem, NewtonOptions(condense=False), press)
-    solution = interrupt.value.solution
-    assert solution.outcome.signal == signal.SIGINT
-    assert [note.split()[:2] for note in notes] == [["load", "0.25"]]
-    state = solution.state
-    assert state.time == 1.0
-    np.testing.assert_array_equal(state.x, problem.equilibrium.prescribe(state.x))
-    assert solution.outcome.kkt == evaluate(problem, state)

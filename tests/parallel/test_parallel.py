@@ -11,11 +11,8 @@ from contact._compat import geometry_dofmap
 from contact.body.description import Body, Fixed, Load
 from contact.interface.friction import Friction
 from contact.interface.smoothing import Smoothing
-from contact.linear.operator import Counters
 from contact.mesh.domain import from_mesh
 from contact.mesh.grid import Piece, rectangle
-from contact.methods.sure import Gathered, solve_convex
-from contact.problem.condensed import Condensation
 from contact.problem.contact import Contact
 from contact.problem.problem import ContactProblem
 from forms.hencky import Log
@@ -207,16 +204,3 @@ def test_prescribed_values_reach_ghosts(comm):
     height.interpolate(lambda x: np.vstack([x[1], x[1]]))
     top = np.isclose(height.x.array, 1.0)
     assert set(np.unique(x[top]).tolist()) <= {0.02, -0.03}
-
-
-def test_what_stops_the_first_rank_stops_all(comm, monkeypatch):
-    """It alone solves the convex problems of a condensed body; the others waited for ever."""
-
-    def fails(*_given):
-        raise ValueError("a gap that can close lies along a fixed component")
-
-    monkeypatch.setattr(Gathered, "solve", fails)
-    full = bar(comm, 4, -0.005, 1e5)
-    condensed = Condensation(full, Counters()).linearise("secant", full.start())
-    with pytest.raises(ValueError, match="a gap that can close"):
-        solve_convex(condensed, condensed.start(), lambda: None)

@@ -21,8 +21,8 @@ import numpy as np
 
 from contact.interface.multipliers import Multipliers
 from contact.methods.acceleration import least_squares
-from contact.methods.lengthening import FAR
-from contact.methods.step import Iterate
+from contact.methods.line_search import FAR
+from contact.methods.newton_step import Iterate
 from contact.problem.state import State
 from contact.typing import Array
 

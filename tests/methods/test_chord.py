@@ -7,10 +7,10 @@ import pytest
 from mpi4py import MPI
 
 from contact.interface.friction import Friction
-from contact.methods.kept import Kept
+from contact.methods.chord import Kept
 from contact.methods.newton import Newton
+from contact.methods.newton_step import Iterate
 from contact.methods.options import NewtonOptions
-from contact.methods.step import Iterate
 from contact.problem.problem import ContactProblem
 from forms.hencky import Log
 from forms.laws import ConstantCoefficient

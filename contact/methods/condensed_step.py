@@ -13,12 +13,12 @@ from dataclasses import replace
 
 from contact.interface.linearised import Moduli
 from contact.linear.operator import Counters
+from contact.methods.chord import WORTH, Kept
 from contact.methods.following import Following
-from contact.methods.kept import WORTH, Kept
-from contact.methods.lengthening import FAR, lengthened
+from contact.methods.line_search import FAR, lengthened
+from contact.methods.newton_step import NEAR, Iterate, Taken
 from contact.methods.options import NewtonOptions
 from contact.methods.report import History, Outcome
-from contact.methods.step import NEAR, Iterate, Taken
 from contact.problem.condensed import Condensation, CondensedProblem
 from contact.problem.kkt import KKT, residual_forces
 from contact.problem.problem import ContactProblem
@@ -35,14 +35,13 @@ SECANT_UNTIL = 0.3
 #: Most dense steps in one solve of the condensed contact problem.
 MOST_STEPS = 1000
 
-#: Solves a condensed problem from an iterate, with a history of its own; told whether the body is
-#: known to be soft.
+#: Solves a condensed problem from an iterate, with a history of its own.
 Solver = Callable[
-    [CondensedProblem, NewtonOptions, Moduli, History, Iterate, bool], tuple[Iterate, Outcome]
+    [CondensedProblem, NewtonOptions, Moduli, History, Iterate], tuple[Iterate, Outcome]
 ]
 
 
-class MaterialStep:
+class CondensedStep:
     """Linearises the material, and solves the contact problem that is left.
 
     Parameters
@@ -57,17 +56,11 @@ class MaterialStep:
         Of the whole problem: it is asked whether the solve is to end.
     counters
         Where the dense solves are counted.
-    roads
-        Notes of records that tell of other roads than Newton's loop.
-
-    Attributes
-    ----------
-    soft
-        Whether the body is known to be far softer than a block.
+    fallbacks
+        Notes of records that tell of a fallback.
     """
 
     fault = "the condensed contact problem is not solved"
-    soft = False
 
     def __init__(
         self,
@@ -77,11 +70,11 @@ class MaterialStep:
         solve: Solver,
         history: History,
         counters: Counters,
-        roads: tuple[str, ...],
+        fallbacks: tuple[str, ...],
     ) -> None:
         self.condensation, self.options, self.moduli = condensation, options, moduli
         self.counters, self.following = counters, Following()
-        self._solve, self._history, self._roads = solve, history, roads
+        self._solve, self._history, self._fallbacks = solve, history, fallbacks
         inner = condensation.full.equilibrium.products
         self._kept = Kept(options.tolerance, inner, WORTH if options.keep != "never" else 0.0)
 
@@ -99,9 +92,7 @@ class MaterialStep:
         """Begin another loop; what is factorised remains."""
         self._kept.begin()
 
-    def __call__(
-        self, iterate: Iterate, tangent: bool, reached: KKT, bound: Array | None
-    ) -> Taken | None:
+    def __call__(self, iterate: Iterate, tangent: bool, reached: KKT) -> Taken | None:
         """Take a step; None where the body cannot be condensed or contact is not solved."""
         body = self.condensation.full.equilibrium
         iterate, keep = self._kept.turn(iterate, reached.largest)
@@ -118,11 +109,10 @@ class MaterialStep:
             tolerance=enough,
             max_outer=MOST_STEPS,
             condense=False,
-            load_steps=False,
         )
         history = History(self._history.quiet(), level=logging.DEBUG)
         begin = replace(iterate, state=replace(state, x=condensed.equilibrium.at))
-        end, outcome = self._solve(condensed, options, self.moduli, history, begin, self.soft)
+        end, outcome = self._solve(condensed, options, self.moduli, history, begin)
         solves = sum(record.inner for record in history.records)
         self.counters.contact_solves += solves
         if outcome.kkt.largest > max(enough, NEAR * reached.largest):
@@ -137,7 +127,7 @@ class MaterialStep:
         elif not body.linear:
             new = self._kept.mixed(state, new)
         notes = [record.note for record in history.records]
-        taken = [word for word in self._roads if any(word in note for note in notes)]
+        taken = [word for word in self._fallbacks if any(word in note for note in notes)]
         note = ", ".join([*["kept"] * keep, *["lengthened"] * (length > 1), *taken])
         return Taken(replace(end, state=new), note, solves, length > 1)
 

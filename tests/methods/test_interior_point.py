@@ -9,9 +9,7 @@ from contact.build import build_problem
 from contact.case.file import Case, parse_case
 from contact.cli.main import main
 from contact.interface.friction import Friction
-from contact.methods import barrier
-from contact.methods.barrier import interior_point
-from contact.methods.load_steps import load_steps
+from contact.methods.interior_point import interior_point
 from contact.methods.newton import Newton
 from contact.methods.options import NewtonOptions
 from contact.methods.report import Outcome
@@ -56,7 +54,7 @@ def test_an_interior_point_on_a_body_that_friction_alone_keeps_from_sliding():
     state, outcome = Newton(problem, NewtonOptions()).solve()
     assert outcome.converged
     method = Newton(problem, NewtonOptions(condense=False))
-    found, outcome = interior_point(method.search, method.whole, method._finished)
+    found, outcome = interior_point(method.search, method.whole, method.restraint, method.finished)
     assert outcome.converged, outcome.reason
     assert found.state.near(state, rtol=1e-6, atol=1e-9)
 
@@ -68,7 +66,7 @@ def interior(
     problem = build_problem(parse_case(case), SELF)
     state, _ = Newton(problem, NewtonOptions()).solve()
     method = Newton(problem, NewtonOptions(condense=False, linear=linear))
-    found, outcome = interior_point(method.search, method.whole, method._finished)
+    found, outcome = interior_point(method.search, method.whole, method.restraint, method.finished)
     return outcome, found.state.near(state, rtol=1e-6, atol=atol)
 
 
@@ -146,55 +144,12 @@ def test_no_friction_is_solved_like_none(law):
     assert state.near(found, rtol=1e-7, atol=1e-8)
 
 
-@pytest.mark.parametrize(
-    ("friction", "note"), [(COULOMB, "frozen friction"), (Friction(), "block relaxation")]
-)
-def test_slower_methods_take_over_where_that_fails(friction, note, monkeypatch):
-    monkeypatch.setattr(barrier, "LIMIT", 1)
-    problem = mechanics.bar(SELF, 8, -0.05, friction=friction)
-    method = newton(problem, max_iterations=2, condense=False)
-    assert any(record.note.startswith(note) for record in method.history.records)
-
-
 @pytest.mark.parametrize("method", ["newton", "uzawa"])
 def test_the_number_of_outer_iterations_is_limited(method):
     solution = solve(bar_case(8, f"solver.method={method}", "solver.max_outer=2"), comm=SELF)
     assert not solution.outcome.converged
     # the frictionless start of the fixed point is its iteration 0
     assert len(solution.history.records) <= 3
-
-
-def test_load_steps_that_end_early_have_not_converged():
-    """The last step's convergence was taken for that of the whole load."""
-    case = {
-        "mesh": {"generator": "rectangle", "size": [40.0, 1.0], "cells": [80, 2]},
-        "material": {"young": 1.0, "poisson": 0.3},
-        "fixed": [{"on": side, "displacement": [0.0, 0.0]} for side in ("left", "right")],
-        "load": [{"on": "top", "traction": [0.0, -3.90625e-5]}],
-        "contact": {"on": "bottom", "gap": 0.3},
-        "friction": {"law": "coulomb", "mu": 0.3},
-    }
-    problem = build_problem(parse_case(case), SELF)
-    method = Newton(problem, NewtonOptions())
-    loads: list[float] = []
-
-    class FailsLate:
-        """Two steps of load, the second of which fails."""
-
-        search = method.search
-
-        def run(self, iterate, note="", bound=None, goal=0.0):
-            loads.append(iterate.state.time)
-            residual = 0.0 if iterate.state.time <= 0.25 else 1.0
-            kkt = KKT(residual, residual, residual)
-            return iterate, Outcome(kkt, method.options.allowed, "" if residual == 0 else "no")
-
-    iterate, outcome = load_steps(FailsLate())
-    assert max(loads) > 0.25
-    assert not outcome.converged
-    assert "load steps ended at 0.25 of the load" in outcome.reason
-    assert iterate.state.time == 1.0
-    assert outcome.kkt == evaluate(problem, iterate.state)
 
 
 def test_a_method_cannot_call_itself_converged(monkeypatch):

@@ -1,9 +1,21 @@
-"""The sure road of a body that is not condensed: an interior point on all its unknowns.
+"""The fallback of Newton's method: a primal-dual interior point, sparse or dense.
 
-Frictionless contact and Tresca's friction are convex, and what the interior-point method needs of
-the body is what Newton's step needs too: its operator plus a block at each contact node, force
-over slack in place of gamma. So it takes sparse factorisations, or multigrid, of any size, on any
-number of ranks. Where it ends the contact zone is known, and Newton's method does the rest.
+Frictionless contact and Tresca's friction are convex. The linear systems of an interior point are
+those of a Newton step with other nodal blocks: force over slack in place of gamma. So it runs on
+whole bodies and condensed ones alike, on any number of ranks.
+
+1. The friction bound is zero at first; where friction alone restrains a body, no load exceeds it.
+2. A step of the interior point is Mehrotra's predictor and corrector with the scaling of Nesterov
+   and Todd, both with one matrix; material, layer and current are linearised anew in each.
+3. Where the duality gap is closed the contact zone is known; Newton's method takes the last steps.
+4. Where it has not converged, the friction bound is that of the last solution (Haslinger's
+   iteration), and the next problem begins at 2.
+
+References
+----------
+Mehrotra, On the implementation of a primal-dual interior point method, SIAM J. Optim. 2 (1992).
+Haslinger, Approximation of the Signorini problem with friction, obeying the Coulomb law, Math.
+Methods Appl. Sci. 5 (1983).
 """
 
 from __future__ import annotations
@@ -16,18 +28,17 @@ from mpi4py import MPI
 
 from contact.errors import InputError
 from contact.interface.multipliers import Multipliers
-from contact.methods.convex.cones import Array, Cones, Step
-from contact.methods.convex.path import central
+from contact.methods.cones import Array, Cones, Step
+from contact.methods.newton_step import Iterate, NewtonStep, Search
 from contact.methods.report import Outcome
-from contact.methods.search import Search
-from contact.methods.step import Iterate, WholeStep
-from contact.methods.stuck import all_loads, stuck_bound
-from contact.methods.sure import INTERIOR_POINT
+from contact.methods.restraint import Restraint, all_loads
 from contact.problem.kkt import evaluate, residual_forces
-from contact.problem.mobility import held_by_supports
-from contact.problem.problem import ContactProblem
+from contact.problem.protocols import Problem
 from contact.problem.state import State
 from contact.tolerances import EPS
+
+#: What the history says of its steps.
+INTERIOR_POINT = "interior point"
 
 #: Steps of one convex problem at most, and convex problems with one friction bound after the other.
 LIMIT, UPDATES = 60, 8
@@ -37,7 +48,7 @@ CLOSED = 1e-10
 
 #: Forces out of balance then. Where an iterative solver leaves more, the slacks vanish beneath what
 #: it can tell long before: Newton's method, whose right-hand sides are what is left, does better.
-BALANCED = 1e-6
+BALANCED = 1e-4
 
 #: What an iterative solver leaves of the forces out of balance: the next step sees what is left. A
 #: hundredth of that takes as many steps, and a third to a half more iterations.
@@ -49,31 +60,34 @@ SHARE = 1e-2
 #: The same for a body that nothing but contact holds, over what the loads do in the mean gap.
 LOOSE = 0.1
 
+#: Shares of the way to the rim of a cone that a step takes.
+SHORTEST, LONGEST = 0.9, 0.999
+
 
 def interior_point(
-    search: Search, whole: WholeStep, finish: Callable[[State], tuple[Iterate, Outcome]]
+    search: Search,
+    whole: NewtonStep,
+    restraint: Restraint,
+    finish: Callable[[State], tuple[Iterate, Outcome]],
 ) -> tuple[Iterate, Outcome]:
-    """Solve convex problems for sure, and let Newton's loop finish what they leave. Collective.
-
-    Without friction first: where the body touches, Newton's method mostly finds the rest. Then
-    with the friction bound of the problem before, which is Haslinger's iteration.
+    """Solve convex problems with one friction bound after the other. Collective.
 
     Parameters
     ----------
     search
-        What is solved, a whole body.
+        The problem, and what has been met of it.
     whole
         Has the operator of the body, with blocks at its contact nodes.
+    restraint
+        Of the whole problem.
     finish
-        Newton's loop, from a state on.
+        Newton's method, from a state on.
     """
     problem, interface = search.problem, search.problem.interface
-    assert isinstance(problem, ContactProblem)
-    held = held_by_supports(problem)
-    stuck = stuck_bound(problem)
+    stuck = restraint.stuck_bound()
     bound = np.zeros(interface.jump.weight.size) if stuck is None else stuck
     for _ in range(UPDATES):
-        method = Barrier(problem, whole, bound, held)
+        method = InteriorPoint(problem, whole, bound, restraint.complete)
         outcome, state = method.run(search), method.state
         iterate = Iterate(state)
         if not outcome.converged and search.left > 0:
@@ -84,7 +98,7 @@ def interior_point(
     return iterate, outcome
 
 
-class Barrier:
+class InteriorPoint:
     """The interior-point method on a body with its contact nodes, for one friction bound.
 
     Layer and current are linearised anew in each step, like the material.
@@ -101,7 +115,7 @@ class Barrier:
         Whether supports hold the body: where it would go without contact then says much.
     """
 
-    def __init__(self, problem: ContactProblem, whole: WholeStep, bound: Array, held: bool) -> None:
+    def __init__(self, problem: Problem, whole: NewtonStep, bound: Array, held: bool) -> None:
         self.problem, self._whole = problem, whole
         interface = problem.interface
         jump, self._state = interface.jump, problem.start()
@@ -162,7 +176,7 @@ class Barrier:
 
     def _sum(self, value: float) -> float:
         """Return the sum of the values of all ranks. Collective."""
-        return float(self.problem.comm.allreduce(value, op=MPI.SUM))
+        return float(self.problem.equilibrium.comm.allreduce(value, op=MPI.SUM))
 
     @property
     def state(self) -> State:
@@ -233,3 +247,27 @@ class Barrier:
         self._state = replace(state, x=x)
         cones.move(step, length)
         return True
+
+
+#: From constants of the cones, see `Cones.affine_target`, to the step of the body and of the cones.
+Solve = Callable[[tuple[Array, Array]], tuple[Array, Step]]
+
+
+def central(cones: Cones, solve: Solve) -> tuple[Array, Step, float]:
+    """Return the step of the body, that of the cones, and how much of both is to be taken.
+
+    Parameters
+    ----------
+    cones
+        The point of the method, scaled.
+    solve
+        Solves the linearised problem; both times with the same matrix.
+    """
+    now, degree = cones.work(), max(cones.degree, 1)
+    _, affine = solve(cones.affine_target())
+    length = min(1.0, cones.longest(affine))
+    centre = (cones.work_after(affine, length) / now) ** 3 if now > 0 else 0.0
+    centre = max(0.0, centre)
+    dx, step = solve(cones.target(affine, centre * now / degree))
+    share = min(LONGEST, max(SHORTEST, 1 - centre))
+    return dx, step, min(1.0, share * cones.longest(step))

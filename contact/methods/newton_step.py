@@ -6,7 +6,7 @@ size and the pattern of the elastic ones.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Protocol
 
 import numpy as np
@@ -19,6 +19,8 @@ from contact.interface.multipliers import Multipliers
 from contact.linear.operator import Counters, Operator
 from contact.methods.following import Following
 from contact.methods.options import NewtonOptions
+from contact.methods.progress import Best
+from contact.methods.report import History
 from contact.problem.kkt import KKT, residual_forces
 from contact.problem.protocols import Problem
 from contact.problem.state import State
@@ -86,6 +88,39 @@ class Taken:
     lengthened: bool = False
 
 
+@dataclass
+class Search:
+    """One solve of a problem: its iterate, the best one, and the number of steps left.
+
+    Attributes
+    ----------
+    problem, options
+        The problem, with the tolerances and limits.
+    history
+        Gets a record a step.
+    at
+        The last iterate.
+    best
+        The iterate with the least residual.
+    """
+
+    problem: Problem
+    options: NewtonOptions
+    history: History
+    at: Iterate
+    best: Best[Iterate] = field(default_factory=Best)
+
+    @property
+    def left(self) -> int:
+        """Number of steps that are left of the limit."""
+        return self.options.max_outer - len(self.history.records)
+
+    def see(self, iterate: Iterate, residuals: KKT) -> None:
+        """Remember an iterate."""
+        self.at = iterate
+        self.best.see(iterate, residuals.largest)
+
+
 class Step(Protocol):
     """A step of Newton's method."""
 
@@ -96,9 +131,7 @@ class Step(Protocol):
     def begin(self) -> None:
         """Forget the steps before: a new loop begins."""
 
-    def __call__(
-        self, iterate: Iterate, tangent: bool, reached: KKT, bound: Array | None
-    ) -> Taken | None:
+    def __call__(self, iterate: Iterate, tangent: bool, reached: KKT) -> Taken | None:
         """Take a step; None if it cannot be taken. Collective.
 
         Parameters
@@ -109,12 +142,10 @@ class Step(Protocol):
             Whether the material's tangent is taken, or its secant.
         reached
             The residuals there.
-        bound
-            A friction bound that is frozen, shape (n,); None for the law's own.
         """
 
 
-class WholeStep:
+class NewtonStep:
     """One assembly, one factorisation, one solve of the whole linearised problem.
 
     Parameters
@@ -181,9 +212,7 @@ class WholeStep:
             )
         return self._operator
 
-    def __call__(
-        self, iterate: Iterate, tangent: bool, reached: KKT, bound: Array | None
-    ) -> Taken | None:
+    def __call__(self, iterate: Iterate, tangent: bool, reached: KKT) -> Taken | None:
         """Take a step; see `Step`."""
         state, interface = iterate.state, self.problem.interface
         body, jump = self.problem.equilibrium, interface.jump
@@ -194,8 +223,7 @@ class WholeStep:
             state.forces,
             self.moduli,
             iterate.status,
-            bound,
-            self.options.softening,
+            softening=self.options.softening,
         )
         layer, shift = linearised_layer(interface, nodal, iterate, self.moduli, contact.settled)
         blocks = contact.blocks + layer + self._current(nodal, contact, reached.largest)

@@ -1,10 +1,32 @@
-"""The one rule by which a loop that gets no further is given up."""
+"""The progress of an iteration: its best iterate, and the limit of its stagnation."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Generic, TypeVar
 
 import numpy as np
+
+T = TypeVar("T")
+
+
+@dataclass
+class Best(Generic[T]):
+    """The iterate with the least residual, which a method leaves where it fails.
+
+    Attributes
+    ----------
+    found
+        The iterate; None before there was one that has a residual.
+    """
+
+    found: T | None = None
+    _least: float = np.inf
+
+    def see(self, iterate: T, residual: float) -> None:
+        """Remember an iterate, if its residual is the least. No number is no residual."""
+        if residual < self._least:
+            self.found, self._least = iterate, residual
 
 
 @dataclass
@@ -13,33 +35,33 @@ class Stagnation:
 
     Attributes
     ----------
-    patience
-        Steps without progress after which the loop is given up.
+    limit
+        Steps without progress after which the iteration is given up.
     progress
         What counts as progress: a measure below this part of the best one.
     together
-        Whether steps make progress together too: what counts is the best one at the last
+        Whether steps make progress together too: what counts is the best measure at the last
         progress, not that of the step before. Where steps are to halve the measure, ones that
         take a fifth of it each would be given up else.
     best
         The least measure so far.
     """
 
-    patience: int
+    limit: int
     progress: float
     together: bool = False
     best: float = np.inf
     _since: int = 0
     _reference: float = np.inf
 
-    def __call__(self, measure: float, patience: int | None = None) -> bool:
+    def __call__(self, measure: float, limit: int | None = None) -> bool:
         """Take note of a step's measure; tell whether to give up.
 
         Parameters
         ----------
         measure
             What is to become small.
-        patience
+        limit
             In place of that of all steps.
         """
         gained = measure < self.progress * self._reference
@@ -47,4 +69,4 @@ class Stagnation:
         self.best = min(self.best, measure)
         if gained or not self.together:
             self._reference = self.best
-        return self._since >= (self.patience if patience is None else patience)
+        return self._since >= (self.limit if limit is None else limit)

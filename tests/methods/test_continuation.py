@@ -6,38 +6,33 @@ import pytest
 from mpi4py import MPI
 
 from contact import build_problem, solve_problem
-from contact.methods.conductivity_steps import FIRST_PART, conductivity_steps
+from contact.methods.continuation import FIRST_PART, continuation
 from contact.methods.options import NewtonOptions
 from scripts.studies.sweep import problems
 
 
 class Loops:
-    """Newton's loops that succeed up to a part, or where parts are close to each other."""
+    """Newton's solves that succeed up to a part, or where parts are close to each other."""
 
     def __init__(self, most: float, reach: float = 1e30) -> None:
         self.most, self.reach, self.parts, self.reached = most, reach, [], FIRST_PART
 
-    def __call__(self, part: float) -> SimpleNamespace:
+    def __call__(self, part: float, _: object) -> tuple[float, SimpleNamespace]:
         self.parts.append(part)
-
-        def run(iterate: object, note: str) -> tuple[float, SimpleNamespace]:
-            assert note == "conductivity"
-            found = part <= min(self.most, self.reach * self.reached)
-            self.reached = part if found else self.reached
-            return part, SimpleNamespace(converged=found)
-
-        return SimpleNamespace(run=run, search=SimpleNamespace(left=9))
+        found = part <= min(self.most, self.reach * self.reached)
+        self.reached = part if found else self.reached
+        return part, SimpleNamespace(converged=found)
 
 
 def test_nothing_is_tried_where_conduction_is_not_what_fails():
     loops = Loops(0.0)
-    assert conductivity_steps(loops, 0.0) is None
+    assert continuation(loops, 0.0) is None
     assert loops.parts == [FIRST_PART]
 
 
 def test_steps_become_shorter_where_they_are_too_long():
     loops = Loops(1.0, reach=40.0)
-    end, outcome = conductivity_steps(loops, 0.0)
+    end, outcome = continuation(loops, 0.0)
     assert end == 1.0 and outcome.converged
     assert loops.parts[1] == 1e3 * FIRST_PART  # failed
     assert loops.parts[2] == pytest.approx(1e1**1.5 * FIRST_PART)
@@ -46,7 +41,7 @@ def test_steps_become_shorter_where_they_are_too_long():
 
 def test_it_ends_where_no_step_is_short_enough():
     loops = Loops(1e-4)
-    assert conductivity_steps(loops, 0.0) is None
+    assert continuation(loops, 0.0) is None
     assert len(loops.parts) < 15
 
 
@@ -59,4 +54,4 @@ def test_a_bimorph_in_front_of_a_good_conductor():
     assert solution.converged, solution.outcome.reason
     assert solution.counters.linear_solves <= 2
     assert solution.counters.contact_solves <= 60
-    assert any("conductivity" in record.note for record in solution.history.records)
+    assert any("continuation" in record.note for record in solution.history.records)

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from contact import build_problem, solve_problem
-from contact.methods.lengthening import FLAT, lengthened
+from contact.methods.line_search import FLAT, lengthened
 from contact.methods.options import NewtonOptions
 from scripts.studies.sweep import problems
 

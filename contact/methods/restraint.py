@@ -1,0 +1,89 @@
+"""How supports, contact and friction restrain the rigid-body modes of a problem's bodies.
+
+Where friction alone keeps a body from sliding, a method cannot begin without friction, nor with the
+bound of pressures that are not known yet: the body would slide away. All that touches is first
+taken for sticking.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from contact.mesh.pieces import sums
+from contact.problem.kkt import residual_forces
+from contact.problem.mobility import held_at_rest, held_by_friction, held_by_supports
+from contact.problem.problem import ContactProblem
+from contact.problem.protocols import Problem
+from contact.tolerances import EPS
+from contact.typing import Array
+
+#: Force that a node can bear by friction then, over all loads.
+STUCK = 10.0
+
+
+@dataclass
+class Restraint:
+    """What restrains the rigid-body modes; found out when it is first asked. Collective.
+
+    Parameters
+    ----------
+    problem
+        The whole problem: of a condensed one the supports are not seen.
+    """
+
+    problem: ContactProblem
+
+    @cached_property
+    def complete(self) -> bool:
+        """Whether supports hold all bodies without contact."""
+        return held_by_supports(self.problem)
+
+    @cached_property
+    def at_rest(self) -> bool:
+        """Whether supports, and contact where it touches in the reference configuration, do."""
+        return held_at_rest(self.problem)
+
+    @cached_property
+    def by_friction(self) -> bool:
+        """Whether a rigid-body mode is restrained by friction alone."""
+        return self.problem.frictional and held_by_friction(self.problem)
+
+    def stuck_bound(self) -> Array | None:
+        """Return friction bounds that no load exceeds, shape (n,) (stress). Collective.
+
+        None where supports and the foundation restrain all modes without friction.
+        """
+        if not self.by_friction:
+            return None
+        problem = self.problem
+        weight = problem.interface.jump.weight
+        loads = _loads(problem)
+        borne, total = float(loads[_loose(problem)].sum()), float(loads.sum())
+        # Loads on another body need not be borne, but where a body is squeezed by it alone.
+        return np.full_like(weight, STUCK * (borne if borne > EPS * total else total)) / weight
+
+
+def all_loads(problem: Problem) -> float:
+    """Return the sum of all forces that act at rest, without regard to sign. Collective."""
+    return float(_loads(problem).sum())
+
+
+def _loads(problem: Problem) -> Array:
+    """Return these sums of each piece of the body, shape (k,). Collective."""
+    body, shares = problem.equilibrium, problem.equilibrium.shares
+    residual = residual_forces(problem, problem.start())
+    forces = np.abs(body.unbalanced(residual)) * shares.mechanical
+    own = np.repeat(shares.piece, body.block_size)
+    found = sums(body.comm, own, forces[: body.owned], shares.count)
+    return found + np.bincount(shares.behind, forces[body.owned :], shares.count)
+
+
+def _loose(problem: ContactProblem) -> NDArray[np.bool_]:
+    """Return which pieces no support holds anywhere, shape (k,). Collective."""
+    body, shares = problem.equilibrium, problem.equilibrium.shares
+    supported = ~body.unsupported[:, : body.dim].all(axis=1)
+    return sums(problem.comm, shares.piece, supported.astype(float), shares.count) == 0
