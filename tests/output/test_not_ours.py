@@ -1,6 +1,7 @@
 """Files of a user's own in a folder of results: nothing but what a manifest names is removed."""
 
 import logging
+import os
 import shutil
 from pathlib import Path
 
@@ -167,13 +168,18 @@ def test_a_table_of_a_users_is_no_sweep(tmp_path: Path, cases: dict[str, Path]) 
     assert (tmp_path / "out" / "sweep.csv.draft").exists()
 
 
+def flip(path: Path) -> None:
+    """Change one bit in the middle of a file."""
+    data = bytearray(path.read_bytes())
+    data[len(data) // 2] ^= 1
+    path.write_bytes(data)
+
+
 DAMAGES = {
-    "truncated": lambda path: path.write_bytes(path.read_bytes()[:100]),
-    "flipped": lambda path: path.write_bytes(
-        path.read_bytes()[:300] + bytes([path.read_bytes()[300] ^ 1]) + path.read_bytes()[301:]
-    ),
+    "truncated": lambda path: os.truncate(path, path.stat().st_size // 2),
+    "flipped": flip,
     "missing arrays": lambda path: np.savez(path.open("wb"), x=np.zeros(3)),
-    "empty": lambda path: path.write_bytes(b""),
+    "empty": lambda path: os.truncate(path, 0),
     "missing": Path.unlink,
 }
 
