@@ -1,20 +1,23 @@
-"""Formulas of the case file, such as ``"-10*x"``, as functions of the coordinates and the time."""
+"""Formulas of the case file, such as ``"-10*x"``, as functions of the coordinates and the time.
+
+A formula is read with Python's own parser and checked, node by node, against a short list of what
+is accepted. Nothing is handed to ``eval``.
+"""
 
 from __future__ import annotations
 
+import ast
 import itertools
-from typing import TYPE_CHECKING, Any
+import math
+import operator
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial, reduce
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
+import ufl
 from numpy.typing import ArrayLike, NDArray
 
-from contact.case.grammar import (
-    VARIABLES,
-    Number,
-    evaluate,
-    parse,
-    variables,
-)
 from contact.case.showing import shown
 from contact.errors import InputError
 from forms import ops
@@ -22,6 +25,51 @@ from forms import ops
 if TYPE_CHECKING:
     from mpi4py import MPI
     from ufl.core.expr import Expr
+
+#: What a formula may contain, for messages and the reference page.
+ACCEPTED = (
+    "numbers, x, y, z, t, pi, + - * / **, comparisons, and sin, cos, tan, exp, log, sqrt, abs, "
+    "min, max, where(condition, a, b)"
+)
+
+#: Longest formula (characters) and deepest nesting: far beyond any load, and small enough for
+#: every recursion over the tree, here and in UFL.
+MAX_LENGTH = 1000
+MAX_DEPTH = 100
+
+#: The coordinates and the time.
+VARIABLES = ("x", "y", "z", "t")
+
+#: A formula as read: a number, or a function of the values of the variables by their names.
+Read: TypeAlias = float | Callable[[Mapping[str, Any]], Any]
+
+_FUNCTIONS: Mapping[str, Callable[[Any], Any]] = {
+    "sin": ops.sin,
+    "cos": ops.cos,
+    "tan": ops.tan,
+    "exp": ops.exp,
+    "log": ops.log,
+    "sqrt": ops.sqrt,
+    "abs": ops.absolute,
+}
+_EXTREMES: Mapping[str, Callable[[Any, Any], Any]] = {"min": ops.minimum, "max": ops.maximum}
+_ARITHMETIC: Mapping[type[ast.AST], Callable[..., Any]] = {
+    ast.Add: operator.add,
+    ast.Sub: operator.sub,
+    ast.Mult: operator.mul,
+    ast.Div: operator.truediv,
+    ast.Pow: operator.pow,
+    ast.USub: operator.neg,
+    ast.UAdd: lambda a: a,
+}
+_COMPARISONS: Mapping[type[ast.cmpop], Callable[[Any, Any], Any]] = {
+    ast.Lt: ops.less,
+    ast.LtE: ops.less_equal,
+    ast.Gt: lambda a, b: ops.less(b, a),
+    ast.GtE: lambda a, b: ops.less_equal(b, a),
+    ast.Eq: ops.equal,
+    ast.NotEq: ops.not_equal,
+}
 
 
 class Expression:
@@ -41,7 +89,7 @@ class Expression:
         If the source is anything else; the message names the source and what is accepted.
     """
 
-    __slots__ = ("_tree", "names", "source")
+    __slots__ = ("_read", "names", "source")
 
     source: float | str
     #: Coordinates that the formula uses, and "t" if it uses the time.
@@ -50,18 +98,21 @@ class Expression:
     def __init__(self, source: float | str) -> None:
         if isinstance(source, bool) or not isinstance(source, int | float | str):
             raise InputError(f"{source!r} is neither a number nor a formula")
+        if isinstance(source, str):
+            self.source, (self._read, names) = source, _parse(source)
+            self.names = frozenset() if isinstance(self._read, float) else names
+            return
         try:
-            self.source = source if isinstance(source, str) else float(source)
-        except OverflowError:
+            self.source, self.names = float(source), frozenset()
+            self._read = _finite(self.source)
+        except (OverflowError, InputError):
             # A whole number may be as long as it likes.
             raise InputError(f"{shown(source)} is not finite; accepted: finite numbers") from None
-        self._tree = parse(self.source)
-        self.names = frozenset(VARIABLES[i] for i in variables(self._tree))
 
     @property
     def is_constant(self) -> bool:
         """True if the value is the same everywhere at all times."""
-        return isinstance(self._tree, Number)
+        return isinstance(self._read, float)
 
     @property
     def value(self) -> float:
@@ -72,9 +123,9 @@ class Expression:
         ValueError
             If the expression depends on the coordinates or the time.
         """
-        if not isinstance(self._tree, Number):
+        if not isinstance(self._read, float):
             raise ValueError(f"{self} depends on the coordinates or the time")
-        return self._tree.value
+        return self._read
 
     def number(self, time: float) -> float:
         """Return the value of an expression that depends on the time alone."""
@@ -101,12 +152,11 @@ class Expression:
         Raises
         ------
         InputError
-            If a value is not finite, or z is used in the plane.
+            If a value is not finite, or z is used in 2-D.
         """
         points = np.asarray(points, dtype=np.float64)
-        self.check_dimension(points.shape[1])
         with np.errstate(all="ignore"):
-            result = evaluate(self._tree, self._variables(points.T, time))
+            result = self._evaluate(points.T, points.shape[1], time)
         values = np.array(np.broadcast_to(result, points.shape[:1]), dtype=np.float64)
         bad = points[~np.isfinite(values)][:1].tolist()
         # The lowest rank that has a bad point speaks for all.
@@ -116,31 +166,25 @@ class Expression:
             raise InputError(f"{self} is not finite at ({place}); accepted: a formula that is")
         return values
 
-    def _variables(self, x: Any, time: Any) -> list[Any]:
-        """Return the values of the variables: the time stands behind three coordinates."""
-        if time is None and "t" in self.names:
-            raise InputError(f"{self} uses t; accepted in a static problem: formulas without")
-        given = list(x)
-        return [*given, *[None] * (3 - len(given)), time]
-
     def ufl(self, x: Expr, time: Any = None) -> Expr:
         """Return the scalar UFL expression at ``x``, a vector of length 2 or 3, and a time.
 
         Raises
         ------
         InputError
-            If z is used in the plane.
+            If z is used in 2-D.
         """
         (dimension,) = x.ufl_shape
-        self.check_dimension(dimension)
-        return ops.symbolic(
-            evaluate(self._tree, self._variables([x[i] for i in range(dimension)], time))
-        )
+        return ops.symbolic(self._evaluate(x, dimension, time))
 
-    def check_dimension(self, dimension: int) -> None:
-        """Raise an InputError if z is used in the plane."""
+    def _evaluate(self, x: Any, dimension: int, time: Any) -> Any:
         if dimension < 3 and "z" in self.names:
             raise InputError(f"{self} uses z in a plane problem; accepted there: x and y")
+        if time is None and "t" in self.names:
+            raise InputError(f"{self} uses t; accepted in a static problem: formulas without")
+        coordinates = (x[i] for i in range(dimension))
+        variables = dict(zip(VARIABLES, coordinates, strict=False)) | {"t": time}
+        return _as_number(_value(self._read, variables))
 
     def __repr__(self) -> str:
         """Return the call that makes this expression."""
@@ -160,5 +204,158 @@ class Expression:
 
     def __reduce__(self) -> tuple[type[Expression], tuple[float | str]]:
         """Pickle the source alone."""
-        # The tree's functions would not pass between ranks.
+        # The functions that were read would not pass between ranks.
         return Expression, (self.source,)
+
+
+def _parse(source: str) -> tuple[Read, frozenset[str]]:
+    """Read a formula and the names of its variables, or raise an InputError that shows it."""
+    if len(source) > MAX_LENGTH:
+        raise InputError(
+            f"{shown(source)} has {len(source)} characters; accepted: at most {MAX_LENGTH}"
+        )
+    try:
+        body = ast.parse(source.strip(), mode="eval").body
+    except (SyntaxError, ValueError, RecursionError, MemoryError) as error:
+        # Python reports some malformed or deeply nested texts by the last three.
+        raise InputError(f"{shown(source)} is not a formula; accepted: {ACCEPTED}") from error
+    if _depth(body) > MAX_DEPTH:
+        raise InputError(f"{shown(source)} is nested too deeply; accepted: {MAX_DEPTH} levels")
+    try:
+        read = _read(body)
+    except InputError as error:
+        raise InputError(f"{shown(source)}: {error}") from None
+    names = {node.id for node in ast.walk(body) if isinstance(node, ast.Name)}
+    return read, frozenset(names & {*VARIABLES})
+
+
+def _depth(root: ast.AST) -> int:
+    """Depth of a syntax tree, without recursion: the depth is what is in doubt."""
+    level, depth = [root], 0
+    while level:
+        level = [child for node in level for child in ast.iter_child_nodes(node)]
+        depth += 1
+    return depth
+
+
+def _read(node: ast.AST) -> Read:
+    """Read a node of the syntax tree; constant parts are evaluated at once."""
+    match node:
+        case ast.Constant(value=int() | float() as value) if not isinstance(value, bool):
+            return _finite(value)
+        case ast.Name(id="pi"):
+            return math.pi
+        case ast.Name(id=name) if name in VARIABLES:
+            return operator.itemgetter(name)
+        case ast.Name(id=name):
+            raise InputError(f"unknown name {name}; accepted: {ACCEPTED}")
+        case ast.UnaryOp(op=op, operand=operand) if type(op) in _ARITHMETIC:
+            return _apply(_ARITHMETIC[type(op)], _read(operand))
+        case ast.BinOp(op=op, left=left, right=right) if type(op) in _ARITHMETIC:
+            return _arithmetic(op, _read(left), _read(right))
+        case ast.BinOp(op=ast.BitXor()):
+            raise InputError("^ is not accepted; a power is written **")
+        case ast.Compare(left=left, ops=signs, comparators=others):
+            return _comparison(signs, [_read(side) for side in (left, *others)])
+        case ast.Call(func=ast.Name(id=name), args=args, keywords=[]):
+            return _function(name, [_read(arg) for arg in args])
+    raise InputError(f"{ast.unparse(node)[:40]} is not accepted; accepted: {ACCEPTED}")
+
+
+def _arithmetic(op: ast.operator, left: Read, right: Read) -> Read:
+    """Read an operation of two; 0*a, 0/a and a**0 are constants.
+
+    UFL would simplify these and go on to compute in Python's numbers, which raise or go complex
+    where NumPy's do not; here they are caught as any constant is.
+    """
+    if isinstance(op, ast.Div) and right == 0.0:
+        raise InputError("division by zero is not accepted")
+    if isinstance(op, ast.Pow) and right == 0.0:
+        return 1.0
+    if (isinstance(op, ast.Mult) and 0.0 in (left, right)) or (
+        isinstance(op, ast.Div) and left == 0.0
+    ):
+        return 0.0
+    return _apply(_ARITHMETIC[type(op)], left, right)
+
+
+def _comparison(signs: Sequence[ast.cmpop], sides: Sequence[Read]) -> Read:
+    """Read ``a < b``, or the chain ``a < b < c``, which holds if each link does."""
+    if not all(type(sign) in _COMPARISONS for sign in signs):
+        raise InputError("only the comparisons < <= > >= == != are accepted")
+    pairs = zip(signs, itertools.pairwise(sides), strict=True)
+    links = [_apply(_COMPARISONS[type(sign)], *pair) for sign, pair in pairs]
+    if 0.0 in links:
+        return 0.0
+    conditions: list[Callable[..., Any]] = [link for link in links if callable(link)]
+
+    def both(one: Callable[..., Any], other: Callable[..., Any]) -> Callable[..., Any]:
+        return lambda variables: ops.both(one(variables), other(variables))
+
+    return reduce(both, conditions) if conditions else 1.0
+
+
+def _function(name: str, arguments: Sequence[Read]) -> Read:
+    def check(right: bool, accepted: str) -> None:
+        if not right:
+            given = f"{name} is given {len(arguments)} argument(s)"
+            raise InputError(f"{given}; accepted: {accepted}")
+
+    if name in _FUNCTIONS:
+        check(len(arguments) == 1, "1 argument")
+        return _apply(_FUNCTIONS[name], *arguments)
+    if name in _EXTREMES:
+        check(len(arguments) >= 2, "2 arguments or more")
+        return reduce(partial(_apply, _EXTREMES[name]), arguments)
+    if name == "where":
+        check(len(arguments) == 3, "3 arguments: condition, a, b")
+        return _where(*arguments)
+    raise InputError(f"unknown function {name}; accepted: {ACCEPTED}")
+
+
+def _where(condition: Read, a: Read, b: Read) -> Read:
+    if isinstance(condition, float):
+        return a if condition else b
+
+    def chosen(variables: Mapping[str, Any]) -> Any:
+        holds = condition(variables)
+        if not _is_condition(holds):
+            holds = ops.not_equal(holds, 0.0)
+        return ops.where(holds, *(_as_number(_value(part, variables)) for part in (a, b)))
+
+    return chosen
+
+
+def _apply(function: Callable[..., Any], *arguments: Read) -> Read:
+    """Apply a function; at once if all is known, so that neither NumPy nor UFL has to."""
+    numbers = [argument for argument in arguments if isinstance(argument, float)]
+    if len(numbers) == len(arguments):
+        with np.errstate(all="ignore"):
+            # NumPy's floats: Python's own raise for 9.0**999 and go complex for (-8.0)**0.3.
+            return _finite(function(*map(np.float64, numbers)))
+    return lambda variables: function(
+        *(_as_number(_value(argument, variables)) for argument in arguments)
+    )
+
+
+def _value(read: Read, variables: Mapping[str, Any]) -> Any:
+    return read if isinstance(read, float) else read(variables)
+
+
+def _as_number(value: Any) -> Any:
+    """Turn a condition that is used as a number into 1 or 0."""
+    return ops.where(value, 1.0, 0.0) if _is_condition(value) else value
+
+
+def _is_condition(value: Any) -> bool:
+    return isinstance(value, ufl.classes.Condition) or getattr(value, "dtype", None) == np.bool_
+
+
+def _finite(value: Any) -> float:
+    try:
+        number = float(value)
+    except OverflowError:
+        number = math.inf
+    if not math.isfinite(number):
+        raise InputError("a constant in it is not finite; accepted: finite numbers")
+    return number

@@ -15,7 +15,7 @@ from pathlib import Path
 from pydantic.fields import FieldInfo
 
 import meshes
-from contact.case import grammar as formulas
+from contact.case import formula as formulas
 from contact.case.accepted import accepted_by, either, keys_of, sections_of
 from contact.case.file import Case
 from contact.case.solver import DEFAULT
