@@ -10,6 +10,7 @@ from scipy.spatial import cKDTree
 from contact.build import build_problem
 from contact.case.file import Case
 from contact.case.nesting import coarser_cases, has_coarser
+from contact.history import History
 from contact.interface.multipliers import Multipliers
 from contact.interface.projections import project_half_line
 from contact.linear import multigrid
@@ -91,7 +92,20 @@ def prolong(coarse: ContactProblem, state: State, fine: ContactProblem) -> State
     values = _interpolate(points, coarse.nodes.gather(forces), fine.nodes.points)
     friction = np.einsum("nij,nj->ni", fine.nodes.tangent, values[:, 1:])
     multipliers = Multipliers(project_half_line(values[:, 0]), friction)
-    return State(body.prescribe(x, fine.time), multipliers, fine.time)
+    history = transferred(state.history, coarse, fine)
+    return State(body.prescribe(x, fine.time), multipliers, fine.time, history)
+
+
+def transferred(history: History, coarse: ContactProblem, fine: ContactProblem) -> History:
+    """Carry a history to the contact nodes and quadrature points of a finer mesh. Collective."""
+    arrays = fine.initial.arrays()
+    for place in history.places:
+        given, at = history.arrays(place), fine.points(place)
+        points = np.concatenate(coarse.comm.allgather(coarse.points(place)))
+        for name, array in given.items():
+            values = np.concatenate(coarse.comm.allgather(array.reshape(len(array), -1)))
+            arrays[name] = _interpolate(points, values, at).reshape(arrays[name].shape)
+    return fine.initial.replaced(arrays)
 
 
 def _interpolate(points: Array, values: Array, at: Array) -> Array:

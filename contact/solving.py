@@ -267,4 +267,5 @@ def _begun(problem: ContactProblem, start: State) -> State:
             "start: given a state of another problem; accepted: one with the same mesh, elements "
             "and contact nodes, on the same ranks"
         )
-    return State(problem.equilibrium.prescribe(start.x, problem.time), start.forces, problem.time)
+    x = problem.equilibrium.prescribe(start.x, problem.time)
+    return State(x, start.forces, problem.time, problem.history)

@@ -8,13 +8,14 @@ and plotting.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Protocol, TypeAlias
+from typing import Protocol, TypeAlias, runtime_checkable
 
 import numpy as np
 import ufl
+from numpy.typing import ArrayLike
 from ufl.core.expr import Expr
 
 from forms.elasticity import Anisotropic
@@ -239,6 +240,24 @@ class UserLaw(Isotropic):
 Law: TypeAlias = Hencky | Anisotropic
 
 
+@runtime_checkable
+class HistoryLaw(Protocol):
+    """A law of the stress with internal variables, which a step changes; see `Hencky` for the rest.
+
+    Its own `secant_stress(frozen, eps)`, where it has one, takes the place of (1.13).
+    """
+
+    @property
+    def variables(self) -> Mapping[str, ArrayLike]:
+        """The names of the variables, with their values in the reference configuration."""
+
+    def since(self, variables: Mapping[str, Expr]) -> Law:
+        """Return the law in a step that begins with values of the variables."""
+
+    def updated(self, eps: Expr) -> Mapping[str, Expr]:
+        """Return the variables at the end of that step, with the strain there."""
+
+
 def secant_stress(law: Law, frozen: Expr, eps: Expr) -> Expr:
     """Return (k0 - 2g/3) tr(eps) I + 2 g eps with g taken at the frozen strain, (1.13).
 
@@ -247,6 +266,9 @@ def secant_stress(law: Law, frozen: Expr, eps: Expr) -> Expr:
     """
     if isinstance(law, Anisotropic):
         return law.stress(eps)
+    own = getattr(law, "secant_stress", None)
+    if own is not None:
+        return own(frozen, eps)
     g = law.secant_modulus(deviator_squared(frozen))
     return (law.bulk - 2 * g / 3) * ufl.tr(eps) * ufl.Identity(3) + 2 * g * embed(eps)
 

@@ -10,7 +10,17 @@ ROOT = Path(__file__).parents[1]
 
 #: A package or module of contact/ imports its own line and those above it.
 LAYERS = (
-    {"errors", "typing", "tolerances", "settings", "_compat", "_neighbours", "kinds", "calling"},
+    {
+        "errors",
+        "typing",
+        "tolerances",
+        "settings",
+        "_compat",
+        "_neighbours",
+        "kinds",
+        "calling",
+        "history",
+    },
     {"mesh", "library"},
     {"linear"},
     {"body"},

@@ -33,6 +33,7 @@ from contact.body.shares import shares_of
 from contact.body.supports import free_components, supports_of, without_field
 from contact.body.weak_forms import WeakForms
 from contact.errors import InputError
+from contact.history import BodyState, Evaluated, InternalVariables
 from contact.linear.change import Change
 from contact.linear.layout import Layout
 from contact.linear.multigrid import is_large
@@ -98,6 +99,8 @@ class BodyEquilibrium:
         # Where the forms are evaluated is written anew by each query.
         self._forms = WeakForms(domain, body, self.space, self.cells, degree)
         self._at = self._forms.at
+        #: The internal variables of the materials: the body's part of a history.
+        self.variables = self._forms.variables
         self._internal = InternalForces(domain.comm, self._forms, self.owned)
         test = self._forms.split(ufl.TestFunction(self.space))
         self._loads = Loads(domain, body, *test, self.owned)
@@ -182,18 +185,24 @@ class BodyEquilibrium:
         """Return unknowns plus an increment of the owned ones. Collective."""
         return self.local(self.owned_part(x) + increment)
 
-    def internal_forces(self, x: Array, secant_at: Array | None = None) -> Array:
-        """Return the owned nodal forces of the stresses at local unknowns. Collective.
+    def commit(self, state: Evaluated) -> InternalVariables | None:
+        """Return the internal variables at the end of the step of a state. Collective."""
+        return self.variables.commit(self.pointwise, state, self.nodal(state.x).ravel())
+
+    def internal_forces(self, state: Evaluated, secant_at: Array | None = None) -> Array:
+        """Return the owned nodal forces of the stresses at a state. Collective.
 
         Parameters
         ----------
-        x
-            The unknowns.
+        state
+            The unknowns, and the history with which their step began.
         secant_at
-            Where the secant modulus is taken; at `x` by default: the material law itself.
+            Unknowns at which the secant modulus is taken; those of the state by default: the
+            material law itself.
         """
-        given = [x] if secant_at is None or self.linear else [x, secant_at]
-        forces = self._internal(*(self.nodal(values).ravel() for values in given))
+        about = None if secant_at is None or self.linear else self.nodal(secant_at).ravel()
+        variables = self.variables.of(state)
+        forces = self._internal(self.nodal(state.x).ravel(), about, variables)
         return np.concatenate([forces, np.zeros(self.masters.size)])
 
     def expect_many(self) -> None:
@@ -227,10 +236,11 @@ class BodyEquilibrium:
         """Return an empty matrix with the pattern of the body. Collective."""
         return create_matrix(self._forms.secant)
 
-    def assemble(self, matrix: PETSc.Mat, kind: str, x: Array) -> None:
-        """Assemble Kacanov's "secant" or Newton's "tangent" at local unknowns. Collective."""
+    def assemble(self, matrix: PETSc.Mat, kind: str, state: Evaluated) -> None:
+        """Assemble Kacanov's "secant" or Newton's "tangent" at a state. Collective."""
         forms = self._forms
-        forms.at.x.array[:] = forms.secant_at.x.array[:] = self.nodal(x).ravel()
+        self.variables.set(self.variables.of(state))
+        forms.at.x.array[:] = forms.secant_at.x.array[:] = self.nodal(state.x).ravel()
         form = forms.tangent if kind == "tangent" else forms.secant
         matrix.zeroEntries()
         assemble_matrix(matrix, form, bcs=[s.condition for s in self.supports])
@@ -265,7 +275,7 @@ class BodyEquilibrium:
         if change is None and self.masters.size == 0:
             options["pieces"] = self.shares.apart
         blocks = nodes, motion, change
-        return make_operator(self, self.rest(), self.masters, blocks, options)
+        return make_operator(self, BodyState(self.rest()), self.masters, blocks, options)
 
     def norm(self, values: Array) -> float:
         """Return the Euclidean norm of owned values. Collective."""
@@ -290,11 +300,13 @@ class BodyEquilibrium:
         """Return the `sizes` of the nodal loads at a time. Collective."""
         return self.sizes(self.external(time))
 
-    def exchanged(self, x: Array) -> Array:
+    def exchanged(self, state: Evaluated) -> Array:
         """Return the `sizes` of the potential's forces and the strain's charges. Collective."""
         if not self.piezoelectric:
             return np.zeros((1, self.shares.count))
-        alone = x.copy()
+        alone = state.x.copy()
         self.nodal(alone)[:, : self.dim] = 0.0
-        of_all, of_potential = map(self.internal_forces, (x, alone))
+        of_all, of_potential = (
+            self.internal_forces(at) for at in (state, BodyState(alone, state.history))
+        )
         return self.sizes(np.where(self.shares.mechanical, of_potential, of_all - of_potential))

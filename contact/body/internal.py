@@ -15,6 +15,7 @@ from petsc4py import PETSc
 from contact.body.known import LastAnswers
 from contact.body.loads import assembled
 from contact.body.weak_forms import WeakForms
+from contact.history import InternalVariables
 from contact.typing import Array
 
 
@@ -37,7 +38,9 @@ class InternalForces:
         self._last = LastAnswers(comm, 3)
         self._matrix: PETSc.Mat | None = None
 
-    def __call__(self, at: Array, secant_at: Array | None = None) -> Array:
+    def __call__(
+        self, at: Array, secant_at: Array | None, variables: InternalVariables | None
+    ) -> Array:
         """Return the owned forces at local unknowns of the nodes, shape (owned,). Collective.
 
         Parameters
@@ -45,10 +48,13 @@ class InternalForces:
         at
             The unknowns.
         secant_at
-            Where the secant modulus is taken; there too by default: the material law itself.
+            Where the secant modulus is taken; None for there too: the material law itself.
+        variables
+            The internal variables at the beginning of the step.
         """
         asked = (at,) if secant_at is None else (at, secant_at)
-        return self._last(asked, lambda: self._found(*asked))
+        history = () if variables is None else tuple(variables.arrays.values())
+        return self._last((*asked, *history), lambda: self._found(variables, *asked))
 
     def assemble(self) -> None:
         """Keep the matrix of a linear body, by which forces are found from now on. Collective."""
@@ -57,9 +63,12 @@ class InternalForces:
             assemble_matrix(self._matrix, self._forms.secant)
             self._matrix.assemble()
 
-    def _found(self, at: Array, about: Array | None = None) -> Array:
+    def _found(
+        self, variables: InternalVariables | None, at: Array, about: Array | None = None
+    ) -> Array:
         if self._matrix is not None:
             return self._product(self._matrix, at)
+        self._forms.variables.set(variables)
         self._forms.at.x.array[:] = at
         if about is not None:
             self._forms.secant_at.x.array[:] = about

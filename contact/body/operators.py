@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from contact.body.masters import Masters
+from contact.history import Evaluated
 from contact.linear.bordered import BorderedBulk, BorderedOperator
 from contact.linear.change import Change, ChangedBulk, ChangedOperator
 from contact.linear.operator import Bulk, SparseOperator
@@ -20,7 +21,7 @@ WholeOperator: TypeAlias = SparseOperator | BorderedOperator | ChangedOperator
 
 def make_operator(
     body: Bulk,
-    rest: Array,
+    rest: Evaluated,
     masters: Masters,
     blocks: tuple[NDArray[np.int32], Array | None, Change | None],
     options: Mapping[str, Any],

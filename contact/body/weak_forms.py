@@ -11,6 +11,7 @@ from dolfinx import fem
 from ufl.core.expr import Expr
 
 from contact.body.description import Body
+from contact.body.internal_variables import QuadratureVariables
 from contact.body.materials import pieces
 from contact.mesh.domain import Domain
 from contact.mesh.entities import Indices
@@ -52,7 +53,12 @@ class WeakForms:
         self._test = self.split(test)
         exact = 1 if degree == 1 else (2 if body.linear else 4)
         exact += self._kinematics.added_degree
-        self._materials = list(pieces(domain, body.materials, cells, exact))
+        #: The internal variables of the materials.
+        self.variables = QuadratureVariables(domain, body.materials, cells, exact)
+        self._materials = [
+            (self.variables.law(law), piezo, dx)
+            for law, piezo, dx in pieces(domain, body.materials, cells, exact)
+        ]
 
     def split(self, x: Any) -> tuple[Expr, Expr | None]:
         """Split a function or argument into displacement and scaled-back potential."""

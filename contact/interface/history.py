@@ -6,10 +6,12 @@ mu(slip) looks at all that has slipped so far. A static problem is one step from
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
 
+from contact.history import CONTACT_NODES
 from contact.interface.jump import Jump
 from contact.typing import Array
 
@@ -41,8 +43,16 @@ class SlipHistory:
         """Return that of a body that has never slipped."""
         return SlipHistory(np.zeros(jump.normal.shape), np.zeros(jump.gap.size))
 
-    def near(self, other: SlipHistory, rtol: float = 0.0, atol: float = 0.0) -> bool:
-        """Tell whether another history of the same nodes has the same values on this rank."""
-        return np.allclose(self.jump, other.jump, rtol=rtol, atol=atol) and np.allclose(
-            self.accumulated, other.accumulated, rtol=rtol, atol=atol
-        )
+    @property
+    def place(self) -> str:
+        """Its arrays live at the contact nodes."""
+        return CONTACT_NODES
+
+    @property
+    def arrays(self) -> Mapping[str, Array]:
+        """Both arrays by name."""
+        return {"jump": self.jump, "accumulated": self.accumulated}
+
+    def replaced(self, arrays: Mapping[str, Array]) -> SlipHistory:
+        """Return a slip history with other arrays."""
+        return SlipHistory(arrays["jump"], arrays["accumulated"])

@@ -113,8 +113,8 @@ class Interface:
         """
         return self.jump.tangential_component(nodal) - self.friction.history.jump
 
-    def remembered(self, nodal: Array) -> SlipHistory:
-        """Return the history of the next step, where this one ends at nodal unknowns."""
+    def commit(self, nodal: Array) -> SlipHistory:
+        """Return the slip history of the next step, where this one ends at nodal unknowns."""
         accumulated = self.friction.history.accumulated + self.slip_length(nodal)
         return SlipHistory(self.jump.tangential_component(nodal), accumulated)
 

@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from petsc4py import PETSc
 from scipy import sparse
 
+from contact.history import Evaluated
 from contact.linear.layout import Layout
 from contact.linear.operator import Bulk, Counters, SparseOperator
 from contact.typing import Array
@@ -60,9 +61,9 @@ class BorderedBulk:
         """Return an empty matrix with the pattern of the body. Collective."""
         return self._bulk.create_matrix()
 
-    def assemble(self, matrix: PETSc.Mat, kind: str, x: Array) -> None:
+    def assemble(self, matrix: PETSc.Mat, kind: str, state: Evaluated) -> None:
         """Assemble K, zero where an unknown is fixed or follows q, and the border. Collective."""
-        self._bulk.assemble(matrix, kind, x)
+        self._bulk.assemble(matrix, kind, state)
         own = self.layout.free.ravel().astype(float)
         vector, image = matrix.createVecs()
         for k, column in enumerate(self.motions.T.toarray()):
@@ -122,9 +123,9 @@ class BorderedOperator:
         """Whether the blocks are symmetric too."""
         return self._inner.symmetric
 
-    def update(self, kind: str, x: Array, blocks: Array, *, constant: bool = False) -> bool:
+    def update(self, kind: str, state: Evaluated, blocks: Array, *, constant: bool = False) -> bool:
         """Assemble and factorise; see `SparseOperator.update`. Collective."""
-        if not self._inner.update(kind, x, blocks, constant=constant):
+        if not self._inner.update(kind, state, blocks, constant=constant):
             return False
         self._behind = self._free.size > 0
         if self._inner.iterative and self._behind:

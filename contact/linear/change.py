@@ -14,6 +14,7 @@ from petsc4py import PETSc
 from scipy import sparse
 from scipy.sparse import csgraph
 
+from contact.history import Evaluated
 from contact.linear.bordered import BorderedOperator
 from contact.linear.layout import Layout
 from contact.linear.operator import Bulk, SparseOperator
@@ -165,10 +166,10 @@ class ChangedBulk:
     change
         The change.
     rest
-        Local unknowns at which a first matrix is assembled, for its pattern.
+        A state at which a first matrix is assembled, for its pattern.
     """
 
-    def __init__(self, bulk: Bulk, change: Change, rest: Array) -> None:
+    def __init__(self, bulk: Bulk, change: Change, rest: Evaluated) -> None:
         self._bulk, self._change, self._rest = bulk, change, rest
         self.matrix = change.petsc(change.matrix, bulk.layout)
         self.inverse = change.petsc(change.inverse, bulk.layout)
@@ -201,9 +202,9 @@ class ChangedBulk:
         matrix.axpy(1.0, self._plain, PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN)
         return self._change.petsc(self._change.unrestrained, self.layout)
 
-    def assemble(self, matrix: PETSc.Mat, kind: str, x: Array) -> None:
-        """Assemble Q^T K Q at local unknowns x. Collective."""
-        self._bulk.assemble(self._plain, kind, x)
+    def assemble(self, matrix: PETSc.Mat, kind: str, state: Evaluated) -> None:
+        """Assemble Q^T K Q at a state. Collective."""
+        self._bulk.assemble(self._plain, kind, state)
         self._plain.ptap(self.matrix, result=matrix)
 
 
@@ -226,9 +227,9 @@ class ChangedOperator:
         """Whether the blocks are symmetric too."""
         return self._inner.symmetric
 
-    def update(self, kind: str, x: Array, blocks: Array, *, constant: bool = False) -> bool:
+    def update(self, kind: str, state: Evaluated, blocks: Array, *, constant: bool = False) -> bool:
         """Assemble and factorise; see `SparseOperator.update`. Collective."""
-        return self._inner.update(kind, x, blocks, constant=constant)
+        return self._inner.update(kind, state, blocks, constant=constant)
 
     def solve(self, rhs: Array, rtol: float | None = None, guess: Array | None = None) -> Array:
         """Solve for the owned unknowns x; see `SparseOperator.solve`. Collective."""

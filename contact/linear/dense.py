@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from scipy.linalg.lapack import dgetrf, dgetrs
 from scipy.sparse import csr_array
 
+from contact.history import Evaluated
 from contact.linear.first_rank import from_first, together
 from contact.linear.operator import Counters
 from contact.typing import Array
@@ -110,7 +111,7 @@ class DenseOperator:
         self.bulk, self.counters = bulk, counters
         self._changes = False
 
-    def update(self, kind: str, x: Array, blocks: Array, *, constant: bool = False) -> bool:
+    def update(self, kind: str, state: Evaluated, blocks: Array, *, constant: bool = False) -> bool:
         """Add up and factorise. Collective; see `operator.SparseOperator.update`."""
         bulk, free = self.bulk, self.bulk.free.astype(float)
         self._blocks = _gather(bulk, blocks * free[:, :, None] * free[:, None, :])

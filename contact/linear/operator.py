@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from petsc4py import PETSc
 
+from contact.history import Evaluated
 from contact.linear import multigrid
 from contact.linear.apart import set_up_apart
 from contact.linear.balance import balance
@@ -39,8 +40,8 @@ class Bulk(Protocol):
     def create_matrix(self) -> PETSc.Mat:
         """Return an empty matrix with the pattern of the body. Collective."""
 
-    def assemble(self, matrix: PETSc.Mat, kind: str, x: Array) -> None:
-        """Assemble the body's "secant" or "tangent" at local unknowns. Collective."""
+    def assemble(self, matrix: PETSc.Mat, kind: str, state: Evaluated) -> None:
+        """Assemble the body's "secant" or "tangent" at a state. Collective."""
 
     def take_apart(self, matrix: PETSc.Mat) -> PETSc.Mat | None:
         """Fill a matrix with bodies that do not touch each other. Collective.
@@ -73,7 +74,7 @@ class Operator(Protocol):
     def symmetric(self) -> bool:
         """Whether the blocks are symmetric too."""
 
-    def update(self, kind: str, x: Array, blocks: Array, *, constant: bool = False) -> bool:
+    def update(self, kind: str, state: Evaluated, blocks: Array, *, constant: bool = False) -> bool:
         """Assemble and factorise; see `SparseOperator.update`. Collective."""
 
     def solve(self, rhs: Array, rtol: float | None = None, guess: Array | None = None) -> Array:
@@ -150,15 +151,15 @@ class SparseOperator:
         self.matrix.mult(vector, image)
         return np.asarray(image.array)
 
-    def update(self, kind: str, x: Array, blocks: Array, *, constant: bool = False) -> bool:
-        """Assemble the operator at local unknowns. Collective.
+    def update(self, kind: str, state: Evaluated, blocks: Array, *, constant: bool = False) -> bool:
+        """Assemble the operator at a state. Collective.
 
         Parameters
         ----------
         kind
             "secant" or "tangent".
-        x
-            Where the body is linearised, local unknowns.
+        state
+            Where the body is linearised.
         blocks
             Weighted blocks at the nodes, shape (n, block size, block size).
         constant
@@ -174,7 +175,7 @@ class SparseOperator:
             return False
         self._kind, self._blocks = kind, blocks.copy()
         if not same:
-            self.bulk.assemble(self.matrix, kind, x)
+            self.bulk.assemble(self.matrix, kind, state)
             balance(self.matrix, self.layout)
             self._own = nodal_blocks(self.matrix, nodes)
         rest, own = self._masked(nodes, blocks), self._own

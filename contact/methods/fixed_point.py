@@ -249,7 +249,8 @@ class FixedPoint:
             pressure = interface.pressure(nodal, state.forces)
             blocks = blocks + self._current_block(nodal, pressure)
         about = secant_at if kind == "secant" else state.x
-        self.operator.update(kind, about, interface.weighted(blocks, state.x), constant=body.linear)
+        weighted = interface.weighted(blocks, state.x)
+        self.operator.update(kind, replace(state, x=about), weighted, constant=body.linear)
         step = linearised(problem, state, self.operator, bound, friction, secant_at)
         poll = self.poll or self.history.poll
         result = uzawa.block_relaxation(interface, step, z, self._relaxation, self._norm, poll)

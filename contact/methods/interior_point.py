@@ -195,7 +195,7 @@ class InteriorPoint:
         slips = interface.slip_length(nodal)[self._rubbing]
         contact = self._sum(float(cones.force @ ways[self._near] + cones.bound @ slips))
         own = body.owned_part(x)[: body.owned]
-        forces = body.internal_forces(x), body.external(self._state.time)
+        forces = body.internal_forces(replace(self._state, x=x)), body.external(self._state.time)
         works = [abs(self._sum(float(own @ force[: body.owned]))) for force in forces]
         return cones.work() / ((contact + sum(works)) or 1.0)
 
@@ -207,7 +207,8 @@ class InteriorPoint:
             pressure = interface.pressure(nodal, self._state.forces)
             blocks = blocks + interface.response.block(nodal, pressure)
         weighted = interface.weighted(blocks, x)
-        self._whole.operator.update("secant", x, weighted, constant=body.linear)
+        at = replace(self._state, x=x)
+        self._whole.operator.update("secant", at, weighted, constant=body.linear)
 
     def step(self) -> bool:
         """Take a step; False if rounding lets no more be taken. Collective."""

@@ -234,7 +234,7 @@ class NewtonStep:
             along = jump.normal[:, :, None] * jump.normal[:, None, :]
             blocks[:, : body.dim, : body.dim] += stiffness * (along + jump.tangent)
         blocks = interface.weighted(blocks, state.x)
-        self.operator.update(kind, state.x, blocks, constant=body.linear or remains)
+        self.operator.update(kind, state, blocks, constant=body.linear or remains)
         self._kind = kind
         here = replace(state, forces=contact.forces)
         residual = residual_forces(self.problem, here)

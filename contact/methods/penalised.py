@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -134,7 +135,7 @@ class PenalisedProblem:
         on_contact = np.zeros_like(residual)
         interface.add_forces(on_contact, state.x, state.forces)
         sizes = body.load_sizes(state.time) + body.sizes(residual)
-        sizes = sizes + body.sizes(on_contact) + body.exchanged(state.x)
+        sizes = sizes + body.sizes(on_contact) + body.exchanged(state)
         self._units = body.shares.spread(np.where(sizes > 0, sizes, 1.0))
         self.snes.setTolerances(
             rtol=1e-14,
@@ -170,8 +171,8 @@ class PenalisedProblem:
         blocks = np.zeros((n, jump.block_size, jump.block_size))
         blocks[:, :d, :d] = spring[:, None, None] * outer(jump.normal, jump.normal)
         blocks[:, :d, :d] += self._law.block(nodal)
-        self.operator.update("secant", state.x, interface.weighted(blocks, state.x))
-        rhs = body.external(state.time) - body.internal_forces(state.x)
+        self.operator.update("secant", state, interface.weighted(blocks, state.x))
+        rhs = body.external(state.time) - body.internal_forces(state)
         jump.transpose(-(jump.weight * spring * opening)[:, None] * jump.normal, rhs)
         return self.operator.solve(rhs)
 
@@ -186,7 +187,8 @@ class PenalisedProblem:
         body, jump, x = self._body, self._interface.jump, self._unknowns(iterate)
         nodal = jump.apply(x)
         secant_at = None if self._implicit else self._state.x
-        values = body.internal_forces(x, secant_at) - body.external(self._state.time)
+        values = body.internal_forces(replace(self._state, x=x), secant_at)
+        values = values - body.external(self._state.time)
         jump.transpose(jump.weight[:, None] * self._law.forces(nodal).vectors(jump), values)
         change = np.einsum("nij,nj->ni", self._current_block, nodal - self._nodal)
         if self._layer is not None:
@@ -209,5 +211,6 @@ class PenalisedProblem:
         kind, about = ("tangent", x) if self._implicit else ("secant", self._state.x)
         unchanged = body.linear or (self._assembled and not self._implicit)
         blocks = self._interface.weighted(blocks, x)
-        self.operator.update(kind, about, blocks, constant=unchanged)
+        at = replace(self._state, x=about)
+        self.operator.update(kind, at, blocks, constant=unchanged)
         self._assembled = True

@@ -48,7 +48,8 @@ def predicted(problem: ContactProblem, last: Reached, before: Reached | None) ->
     x, body = last.state.x, problem.equilibrium
     if before is not None:
         x = x + _share(problem, last, before) * (x - before.state.x)
-    return State(body.prescribe(x, problem.time), last.state.forces, problem.time)
+    x = body.prescribe(x, problem.time)
+    return State(x, last.state.forces, problem.time, problem.history)
 
 
 def _share(problem: ContactProblem, last: Reached, before: Reached) -> float:

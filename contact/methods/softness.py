@@ -90,7 +90,7 @@ def softer(problem: Problem, operator: Operator, friction: bool) -> Softer | Non
         return jump.normal_component(jump.apply(operator.solve(rhs)))
 
     try:
-        operator.update("secant", state.x, blocks, constant=body.linear)
+        operator.update("secant", state, blocks, constant=body.linear)
         sigma, held = softest(jump, solve, shift)
         loads = -residual_forces(problem, state)
         free = jump.apply(operator.solve(loads)) if held else np.zeros_like(nodal)

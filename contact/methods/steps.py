@@ -15,7 +15,6 @@ import numpy as np
 from mpi4py import MPI
 
 from contact.errors import InputError
-from contact.interface.history import SlipHistory
 from contact.linear.operator import Counters
 from contact.methods.interrupt import Interrupted
 from contact.methods.method import Method
@@ -49,7 +48,7 @@ class LoadStep:
     Attributes
     ----------
     problem
-        The problem with the loads of the step's end and what friction remembers in it.
+        The problem with the loads of the step's end and the history at its beginning.
     state, outcome
         Its solution, and how that was found.
     history
@@ -212,8 +211,7 @@ def measured(problem: ContactProblem, state: State, outcome: Outcome) -> tuple[S
     From scratch and at the whole load, whatever the method says and wherever it has stopped.
     """
     x = problem.equilibrium.prescribe(state.x, problem.time)
-    history = problem.interface.friction.history
-    state = replace(state, x=x, time=problem.time, history=history)
+    state = replace(state, x=x, time=problem.time, history=problem.history)
     return state, replace(outcome, kkt=evaluate(problem, state))
 
 
@@ -225,13 +223,11 @@ def after(problem: ContactProblem, state: State, time: float) -> ContactProblem:
     problem
         The problem at any step.
     state
-        Where it is, and what friction remembered on the way there.
+        Where it is, with the history of the step that led there.
     time
         End of the step.
     """
-    here = problem.at(state.time, state.history or SlipHistory.rest(problem.nodes))
-    history = here.interface.remembered(here.nodal(state))
-    return problem.at(time, history, since=state.time)
+    return problem.at(time, problem.commit(state), since=state.time)
 
 
 def since(now: Counters, before: Counters) -> Counters:

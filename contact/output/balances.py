@@ -199,7 +199,7 @@ def force_balance(problem: ContactProblem, state: State) -> ForceBalance:
     passed = [part.sum(axis=0) for part in np.split(forces, ends)]
     local = np.stack([given, supports, contact, *passed])
     total = problem.domain.resultant(problem.comm.allreduce(local, op=MPI.SUM))
-    rounding = np.linalg.norm(force_rounding(problem, state, body.internal_forces(state.x))[0])
+    rounding = np.linalg.norm(force_rounding(problem, state, body.internal_forces(state))[0])
     return ForceBalance(total[0], total[1], total[2], total[3:], float(rounding))
 
 

@@ -64,11 +64,11 @@ def _frames(solution: Solved) -> list[Frame]:
 
 def _write_series(problem: ContactProblem, frames: Sequence[Frame], folder: Path) -> None:
     """Write a file of the main fields for each step, and ``fields.pvd``, which names them."""
-    derived = DerivedFields(problem.equilibrium, problem.equilibrium.rest())
+    derived = DerivedFields(problem.equilibrium, frames[0][1])
     lines = []
     for k, (time, state) in enumerate(frames):
         name = f"fields-{k:04d}.vtu"
-        derived.move_to(state.x)
+        derived.move_to(state)
         write_share(problem.comm, body_share(problem, state, SERIES, derived), folder / name)
         lines.append(f'<DataSet timestep="{time!r}" file="{name}"/>')
     collection = "\n".join(['<VTKFile type="Collection">', "<Collection>", *lines, "</Collection>"])
@@ -113,7 +113,7 @@ def body_share(
         values = function.x.array.reshape(-1, dofmap.index_map_bs)[dofmap.list[:owned]]
         return _rows(values.mean(axis=1))
 
-    derived = derived or DerivedFields(body, state.x)
+    derived = derived or DerivedFields(body, state)
     at_points, in_cells = unknowns(body, state.x), {}
     if names is None or set(names) - set(at_points):
         at_points |= derived.nodes()
@@ -151,7 +151,7 @@ def _write_vtx(problem: ContactProblem, frames: Sequence[Frame], folder: Path) -
             'output.fields: "vtx" needs a dolfinx with ADIOS2, and this one has none; accepted: '
             '"vtu", "xdmf" or "none"'
         )
-    derived = DerivedFields(problem.equilibrium, frames[0][1].x)
+    derived = DerivedFields(problem.equilibrium, frames[0][1])
     at_nodes, in_cells = _at_nodes(problem, frames[0][1], derived), list(derived.cells().values())
     claim_room(problem.comm, folder, len(frames) * (_bytes(at_nodes) + _bytes(in_cells)))
     paths = folder / "fields.bp", folder / "cells.bp"
@@ -161,7 +161,7 @@ def _write_vtx(problem: ContactProblem, frames: Sequence[Frame], folder: Path) -
         closing(_vtx(paths[1], in_cells)) as cellwise,
     ):
         for time, state in frames:
-            derived.move_to(state.x)
+            derived.move_to(state)
             _copy(_at_nodes(problem, state, derived), at_nodes)
             _copy(derived.cells().values(), in_cells)
             nodal.write(time)
@@ -174,14 +174,14 @@ def _copy(given: Iterable[fem.Function], into: Iterable[fem.Function]) -> None:
 
 
 def _write_xdmf(problem: ContactProblem, frames: Sequence[Frame], folder: Path) -> None:
-    derived = DerivedFields(problem.equilibrium, frames[0][1].x)
+    derived = DerivedFields(problem.equilibrium, frames[0][1])
     at_corners = [linear(f) for f in _at_nodes(problem, frames[0][1], derived)]
     claim_room(problem.comm, folder, len(frames) * _bytes(at_corners))
     path = folder / "fields.xdmf"
     with library_errors(path), closing(lambda: io.XDMFFile(problem.comm, path, "w")) as file:
         file.write_mesh(problem.domain.mesh)
         for time, state in frames:
-            derived.move_to(state.x)
+            derived.move_to(state)
             for function in _at_nodes(problem, state, derived):
                 file.write_function(linear(function), time)
 

@@ -21,6 +21,7 @@ from contact import _compat
 from contact.body.constants import law_with_constants, piezo_with_constants
 from contact.body.description import Material
 from contact.body.equilibrium import BodyEquilibrium
+from contact.history import Evaluated
 from contact.typing import Array
 from forms.hencky import stress
 from forms.kinematics import Axisymmetric, deviator_squared, strain, von_mises
@@ -99,20 +100,21 @@ class DerivedFields:
 
     Parameters
     ----------
-    body, x
-        The body, and its local unknowns.
+    body, state
+        The body, and its state.
 
     Attributes
     ----------
     shapes
         Name -> shape of the value: stress (3, 3), von_mises (), dev_strain () and, for a
-        piezoelectric body, electric_displacement (d,) and electric_field (d,). The third axis of
-        the stress of a body of revolution is that of theta.
+        piezoelectric body, electric_displacement (d,) and electric_field (d,); then the internal
+        variables of the materials. The third axis of the stress of a body of revolution is that of
+        theta.
     """
 
-    def __init__(self, body: BodyEquilibrium, x: Array) -> None:
+    def __init__(self, body: BodyEquilibrium, state: Evaluated) -> None:
         self.body = body
-        self.move_to(x)
+        self.move_to(state)
         self.shapes: dict[str, tuple[int, ...]] = {
             "stress": (3, 3),
             "von_mises": (),
@@ -121,6 +123,7 @@ class DerivedFields:
         if body.piezoelectric:
             self.shapes["electric_displacement"] = (body.dim,)
             self.shapes["electric_field"] = (body.dim,)
+        self.shapes |= body.variables.shapes
 
     @property
     def columns(self) -> Mapping[str, slice]:
@@ -149,7 +152,8 @@ class DerivedFields:
         revolved = body.domain.revolved
         kinematics = Axisymmetric(on_axis=True) if revolved else body.domain.kinematics
         eps = strain(u, kinematics)
-        sigma = stress(law_with_constants(material.law, mesh), eps)
+        law = body.variables.law_of_means(law_with_constants(material.law, mesh))
+        sigma = stress(law, eps)
         induced: list[Expr] = []
         if material.piezo is not None:
             constants = piezo_with_constants(material.piezo, mesh)
@@ -162,7 +166,7 @@ class DerivedFields:
         values = [sigma[i, j] for i in range(3) for j in range(3)]
         # Rounding can make |dev eps|^2 slightly negative.
         values += [von_mises(sigma), sqrt(maximum(deviator_squared(eps), 0.0))]
-        return ufl.as_vector(values + induced)
+        return ufl.as_vector(values + induced + body.variables.updated(law, eps))
 
     def _chunks(self) -> Iterator[tuple[NDArray[np.int32], Array]]:
         """Yield owned cells and the values there, shape (cells, points, components)."""
@@ -174,11 +178,12 @@ class DerivedFields:
         body, cells = self.body, self.body.cells[material]
         expression = partial(self._expression, body.body.materials[material])
         name = "fields", material
+        body.variables.set(body.variables.of(self._state))
         yield from body.pointwise.values(name, expression, self.points, self._x, cells)
 
-    def move_to(self, x: Array) -> None:
-        """Look at the fields of other unknowns of the same body from now on."""
-        self._x = self.body.nodal(x).flatten()
+    def move_to(self, state: Evaluated) -> None:
+        """Look at the fields of another state of the same body from now on."""
+        self._state, self._x = state, self.body.nodal(state.x).flatten()
 
     def strains(self) -> list[Array]:
         """Return |dev eps| in the owned cells of each material, shape (cells, points)."""

@@ -27,7 +27,7 @@ from scipy.spatial import cKDTree
 
 from contact import _compat
 from contact.errors import InputError
-from contact.interface.history import SlipHistory
+from contact.history import CONTACT_NODES, QUADRATURE_POINTS
 from contact.interface.multipliers import Multipliers
 from contact.output.folder import on_root
 from contact.output.record import StepRecord
@@ -46,6 +46,8 @@ MANIFEST, DRAFT = "manifest.json", ".contact-draft"
 _NODES = "nodes.npz"
 #: Names that a manifest may have: it is data of whoever wrote it.
 _LISTED = re.compile(r"\d{5}\.npz|case\.toml|digest\.json|nodes\.npz")
+#: Begin of the names of the arrays of a history in a checkpoint.
+HISTORY = "history "
 #: How near a node has to be to where it was, over the size of the body.
 _NEAR = 1e-9
 
@@ -129,19 +131,17 @@ class Checkpoints:
         self._count += 1
         problem, state = self._problem, record.state
         body, contact = problem.equilibrium, problem.nodes.nodes
-        history = state.history or SlipHistory.rest(problem.nodes)
-        nodal = [
-            state.forces.pressure[:, None],
-            state.forces.friction,
-            history.jump,
-            history.accumulated[:, None],
-        ]
+        history = state.history or problem.initial
         values = {
             "where": self._where,
             "x": body.nodal(state.x)[: self._where.size],
             "contact": self._where[contact],
-            "nodal": np.concatenate(nodal, axis=1),
+            "pressure": state.forces.pressure,
+            "friction": state.forces.friction,
         }
+        values |= {HISTORY + name: array for name, array in history.arrays().items()}
+        if QUADRATURE_POINTS in history.places:
+            values[QUADRATURE_POINTS] = problem.points(QUADRATURE_POINTS)
         gathered = {name: problem.comm.gather(own) for name, own in values.items()}
         on_root(problem.comm, lambda: self._write(record, gathered))
 
@@ -151,11 +151,10 @@ class Checkpoints:
         x[joined["where"]] = joined["x"]
         said = {"t": record.state.time, "enthalpy": record.enthalpy, "unloaded": record.unloaded}
         said["rounding"] = record.rounding
-        arrays = {
+        del joined["where"]
+        arrays = joined | {
             "x": x,
             "motion": self._problem.equilibrium.motion(record.state.x),
-            "contact": joined["contact"],
-            "nodal": joined["nodal"],
             "said": np.array(json.dumps(said)),
             "row": np.array(json.dumps(dict(record.row))),
         }
@@ -207,14 +206,22 @@ def _read(problem: ContactProblem, path: Path, where: NDArray[np.intp]) -> StepR
         }
     order = np.argsort(arrays["contact"])
     own = np.searchsorted(arrays["contact"], where[problem.nodes.nodes], sorter=order)
-    nodal, d = arrays["nodal"][order[own]], problem.dim
-    pressure, friction, jump, accumulated = np.split(nodal, [1, 1 + d, 1 + 2 * d], axis=1)
+    here = {CONTACT_NODES: order[own]}
+    if QUADRATURE_POINTS in arrays:
+        points = problem.points(QUADRATURE_POINTS)
+        nearest = cKDTree(arrays[QUADRATURE_POINTS]).query(points)[1] if len(points) else []
+        here[QUADRATURE_POINTS] = np.asarray(nearest, dtype=np.intp)
+    history = {
+        name: arrays[HISTORY + name][here[place]]
+        for place in problem.initial.places
+        for name in problem.initial.arrays(place)
+    }
     said = json.loads(str(arrays["said"]))
     state = State(
         problem.equilibrium.local(np.concatenate([arrays["x"][where].ravel(), arrays["motion"]])),
-        Multipliers(pressure[:, 0].copy(), friction.copy()),
+        Multipliers(arrays["pressure"][order[own]], arrays["friction"][order[own]]),
         said["t"],
-        SlipHistory(jump.copy(), accumulated[:, 0].copy()),
+        problem.initial.replaced(history),
     )
     row = json.loads(str(arrays["row"]))
     return StepRecord(state, row, table, said["enthalpy"], said["unloaded"], said["rounding"])

@@ -27,7 +27,7 @@ def announce(solution: Solution) -> None:
 def review(solution: Solution) -> None:
     """Add what there is to say to the notes and warnings of a solution. Collective."""
     body, x = solution.problem.equilibrium, solution.state.x
-    extremes = DerivedFields(body, x).extremes()
+    extremes = DerivedFields(body, solution.state).extremes()
     solution.max_dev_strain = max(largest.strain for largest in extremes)
     solution.max_von_mises = max(largest.von_mises for largest in extremes)
     if any(largest.yields for largest in extremes):

@@ -128,7 +128,7 @@ class Solution:
 
     @cached_property
     def _derived(self) -> dict[str, fem.Function]:
-        return DerivedFields(self.problem.equilibrium, self.state.x).cells()
+        return DerivedFields(self.problem.equilibrium, self.state).cells()
 
     @property
     def stress(self) -> fem.Function:

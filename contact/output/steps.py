@@ -11,6 +11,7 @@ import numpy as np
 from mpi4py import MPI
 
 from contact.body.amplitude import Moving, steady
+from contact.history import BodyState
 from contact.methods.steps import LoadStep
 from contact.output.record import StepRecord
 from contact.output.rows import contact_columns, moving_columns
@@ -40,7 +41,9 @@ class StepRecorder:
             here = problem.at(last.state.time, last.state.history)
             self._before = moment(here, last.state, self._before)
             self._before = replace(self._before, enthalpy=last.enthalpy)
-        self._unloading = Unloading(problem, self._before.x)
+        self._unloading = Unloading(
+            problem, BodyState(self._before.x) if last is None else last.state
+        )
         self._unloading.share = 0.0 if last is None else last.unloaded
         self._rounding = 0.0 if last is None else last.rounding
         self._driven = driven_part(problem)
@@ -57,7 +60,7 @@ class StepRecorder:
         now = moment(problem, state, self._before)
         energies = balance(problem, state, self._before, now)
         self._before = now
-        self._unloading.follow(state.x)
+        self._unloading.follow(state)
         solution = solution_of(step)
         table = contact_table(solution)
         row = self._row(step, solution, table, energies, now)

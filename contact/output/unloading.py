@@ -9,10 +9,11 @@ from __future__ import annotations
 import numpy as np
 from mpi4py import MPI
 
+from contact.history import Evaluated
 from contact.output.fields import DerivedFields
 from contact.problem.problem import ContactProblem
-from contact.typing import Array
 from forms.elasticity import Anisotropic
+from forms.hencky import HistoryLaw
 
 #: Decrease of |dev eps|, over what it was, that counts as unloading; and of the secant modulus,
 #: over that of small strains, that counts as yielding.
@@ -35,27 +36,27 @@ class Unloading:
         Largest share of the body (volume) that has unloaded from beyond yield in a step.
     """
 
-    def __init__(self, problem: ContactProblem, x: Array) -> None:
+    def __init__(self, problem: ContactProblem, state: Evaluated) -> None:
         self.share = 0.0
         body = problem.equilibrium
         self._body = body
-        self._fields = None if body.linear else DerivedFields(body, x)
+        self._fields = None if body.linear else DerivedFields(body, state)
         if self._fields is not None:
             self._strains = self._fields.strains()
             self._volumes = self._fields.volumes_of_materials()
             self._whole = body.comm.allreduce(sum(v.sum() for v in self._volumes), op=MPI.SUM)
 
-    def follow(self, x: Array) -> None:
+    def follow(self, state: Evaluated) -> None:
         """Look at the end of the next step. Collective."""
         if self._fields is None:
             return
-        self._fields.move_to(x)
+        self._fields.move_to(state)
         before, self._strains = self._strains, self._fields.strains()
         back = 0.0
         for material, volumes, old, new in zip(
             self._body.body.materials, self._volumes, before, self._strains, strict=True
         ):
-            if isinstance(material.law, Anisotropic):
+            if isinstance(material.law, Anisotropic | HistoryLaw):
                 continue
             modulus = np.asarray(material.law.secant_modulus(old**2), dtype=float)
             yielded = modulus < (1 - SOFTENED) * float(material.law.shear)

@@ -14,6 +14,7 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 
 from contact.body.shares import Shares
+from contact.history import Evaluated
 from contact.interface.interface import Interface
 from contact.interface.multipliers import Multipliers
 from contact.linear.balance import balance
@@ -107,9 +108,9 @@ class CondensedBody:
         """Return all unknowns: there are no ghosts."""
         return x
 
-    def internal_forces(self, x: Array, secant_at: Array | None = None) -> Array:
+    def internal_forces(self, state: Evaluated, secant_at: Array | None = None) -> Array:
         """Return the owned forces of the linear body, loads taken off. Collective."""
-        moved = np.concatenate(self.comm.allgather(x - self.at))
+        moved = np.concatenate(self.comm.allgather(state.x - self.at))
         return np.asarray(self.rows @ moved + self.residual[self.own])
 
     def external(self, time: float = 1.0) -> Array:
@@ -132,7 +133,7 @@ class CondensedBody:
         """Return the `sizes` of what acts on the whole body."""
         return self.acting
 
-    def exchanged(self, x: Array) -> Array:
+    def exchanged(self, state: Evaluated) -> Array:
         """Return zero: that is part of what acts on the whole body."""
         return np.zeros_like(self.acting)
 
@@ -226,7 +227,7 @@ class Condensation:
         if self._schur is None or not same:
             self._rows = self._stiffness = np.zeros((0, 0))  # room for new ones
             self._factors = Factors()
-            self._bulk.assemble(self._matrix, kind, state.x)
+            self._bulk.assemble(self._matrix, kind, state)
             balance(self._matrix, body.layout)
             if self._schur is None:
                 cut = np.repeat(between_ranks(body.space), body.block_size)
@@ -245,10 +246,10 @@ class Condensation:
                 self._rows, self._stiffness = self._rows.copy(), np.zeros((0, 0))
             self._kind, self._size = kind, self._matrix.norm()
             self.counters.factorizations += 1
-        residual = body.internal_forces(state.x) - body.external(state.time)
+        residual = body.internal_forces(state) - body.external(state.time)
         check_overflow(body.layout, self._size, body.norm(residual))
         reactions = body.sizes(body.reactions(residual))
-        acting = body.load_sizes(state.time) + reactions + body.exchanged(state.x)
+        acting = body.load_sizes(state.time) + reactions + body.exchanged(state)
         # Where the loads go on as before, the prediction of a step is in equilibrium but for that.
         inside = body.layout.mask(-residual[: body.owned])
         nothing = ROUNDING * body.shares.spread(acting)[: body.owned]

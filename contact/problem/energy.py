@@ -12,7 +12,7 @@ never negative. For a body that was at rest nothing has acted before.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from mpi4py import MPI
@@ -88,7 +88,8 @@ def moment(problem: ContactProblem, state: State, before: Moment) -> Moment:
         power = 0.5 * (internal + before.internal)
     else:
         forces = [
-            body.internal_forces(0.5 * ((1 - s) * before.x + (1 + s) * state.x)) for s in _POINTS
+            body.internal_forces(replace(state, x=0.5 * ((1 - s) * before.x + (1 + s) * state.x)))
+            for s in _POINTS
         ]
         power = 0.5 * _WEIGHTS @ np.array(forces)
     return Moment(state.x, given, internal, before.enthalpy + body.product(power, moved))

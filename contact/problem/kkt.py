@@ -5,7 +5,7 @@ They alone decide whether a run has converged, whatever the method.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import numpy as np
@@ -97,7 +97,7 @@ def residual_forces(problem: Problem, state: State, secant_at: Array | None = No
         default.
     """
     body = problem.equilibrium
-    residual = body.internal_forces(state.x, secant_at) - body.external(state.time)
+    residual = body.internal_forces(state, secant_at) - body.external(state.time)
     problem.interface.add_forces(residual, state.x, state.forces)
     return residual
 
@@ -122,7 +122,7 @@ def force_rounding(problem: Problem, state: State, internal: Array) -> Array:
     step = np.full(own.size, SHAKE)
     step[: body.owned] = _shakes(body.owned)
     moved = body.moved(state.x, step * own)
-    change = body.internal_forces(moved) - internal
+    change = body.internal_forces(replace(state, x=moved)) - internal
     problem.interface.add_current(change, state.x, moved - state.x, state.forces)
     return MARGIN * EPS / SHAKE * body.sizes(body.unbalanced(change))
 
@@ -160,12 +160,12 @@ def evaluate(problem: Problem, state: State) -> KKT:
     Those of a body that flies away are no numbers, which is all there is to say of them.
     """
     body, interface = problem.equilibrium, problem.interface
-    internal = body.internal_forces(state.x)
+    internal = body.internal_forces(state)
     on_contact = np.zeros_like(internal)
     interface.add_forces(on_contact, state.x, state.forces)
     residual = internal - body.external(state.time) + on_contact
     loads = body.load_sizes(state.time)
-    answers = body.sizes(on_contact) + body.exchanged(state.x)
+    answers = body.sizes(on_contact) + body.exchanged(state)
     scale = loads + answers + body.sizes(body.reactions(residual))
     unbalanced = body.sizes(body.unbalanced(residual))
     most, acted = body.most_rounding * scale, loads > 0

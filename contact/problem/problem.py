@@ -10,9 +10,11 @@ from mpi4py import MPI
 
 from contact.body.description import Body
 from contact.body.equilibrium import BodyEquilibrium
+from contact.body.internal_variables import VARIABLES
 from contact.body.materials import young_behind
 from contact.body.norms import volume
 from contact.errors import InputError
+from contact.history import CONTACT_NODES, History, InternalVariables, Part
 from contact.interface.candidates import candidates
 from contact.interface.current import Conductor, HeldCurrent, held_current
 from contact.interface.entries import (
@@ -39,6 +41,9 @@ from contact.problem.contact import Contact, check_laws
 from contact.problem.scales import Scales
 from contact.problem.state import State
 from contact.typing import Array
+
+#: Part of the history of each problem.
+SLIP = "slip"
 
 
 class ContactProblem:
@@ -75,6 +80,8 @@ class ContactProblem:
         When its loads and prescribed values act: 1, unless `at` has made it another step.
     since
         When that step begins; None where nothing has acted before.
+    history
+        That at its beginning: of friction and of the material.
 
     Raises
     ------
@@ -111,9 +118,14 @@ class ContactProblem:
         self.scales = self._scales()
         self.time = 1.0
         self.since: float | None = None
+        #: The history of a body to which nothing has been done.
+        self.initial = self._history(
+            self.interface.friction.history, self.equilibrium.variables.initial
+        )
+        self.history = self.initial
 
     def at(
-        self, time: float, history: SlipHistory | None = None, since: float | None = None
+        self, time: float, history: History | None = None, since: float | None = None
     ) -> ContactProblem:
         """Return a step of an evolution: the same body with other loads and another history.
 
@@ -122,14 +134,38 @@ class ContactProblem:
         time
             End of the step.
         history
-            What friction remembers; that of this problem by default.
+            The history at its beginning; that of this problem by default. An empty one is that of
+            a body to which nothing has been done.
         since
             Beginning of the step; None where nothing has acted before.
         """
         step = copy(self)
         step.time, step.since = time, since
-        step.interface = self.interface.at(time, history or self.interface.friction.history)
+        step.history = (history or self.initial) if history is not None else self.history
+        slip = step.history[SLIP]
+        assert isinstance(slip, SlipHistory)
+        step.interface = self.interface.at(time, slip)
         return step
+
+    def commit(self, state: State) -> History:
+        """Return the history of the step that follows a state of this problem. Collective.
+
+        The state knows the time and the history of the step that led to it: the problem may be
+        that of any step.
+        """
+        here = self.at(state.time, state.history)
+        slip = here.interface.commit(here.nodal(state))
+        return self._history(slip, self.equilibrium.commit(replace(state, history=here.history)))
+
+    @staticmethod
+    def _history(slip: SlipHistory, variables: InternalVariables | None) -> History:
+        """Return the history of these parts: who adds one adds it here."""
+        parts: dict[str, Part] = {SLIP: slip}
+        return History(parts if variables is None else parts | {VARIABLES: variables})
+
+    def points(self, place: str) -> Array:
+        """Return the points of the places of a history that this rank owns, shape (n, d)."""
+        return self.nodes.points if place == CONTACT_NODES else self.equilibrium.variables.places
 
     def _interface(self) -> Interface:
         size, one = self.domain.size, len(self.contacts) == 1
@@ -259,4 +295,4 @@ class ContactProblem:
             if all(fixed.potential is None for fixed in self.body.fixed):
                 body.nodal(x)[:, -1] = conductors[0].at(self.time).phi_f / body.phi_scale
         x = approached(self.nodes, body.prescribe(x, time), body.masters, time)
-        return State(x, Multipliers.zero(self.nodes), time)
+        return State(x, Multipliers.zero(self.nodes), time, self.history)

@@ -12,6 +12,7 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 
 from contact.body.shares import Shares
+from contact.history import Evaluated
 from contact.interface.interface import Interface
 from contact.linear.change import Change
 from contact.linear.operator import Counters, Operator
@@ -71,8 +72,8 @@ class Equilibrium(Protocol):
     def moved(self, x: Array, increment: Array) -> Array:
         """Return unknowns plus an increment of the owned ones. Collective."""
 
-    def internal_forces(self, x: Array, secant_at: Array | None = None) -> Array:
-        """Return the owned nodal forces of the stresses. Collective."""
+    def internal_forces(self, state: Evaluated, secant_at: Array | None = None) -> Array:
+        """Return the owned nodal forces of the stresses at a state. Collective."""
 
     def external(self, time: float = 1.0) -> Array:
         """Return the owned nodal loads at a time. Collective."""
@@ -89,7 +90,7 @@ class Equilibrium(Protocol):
     def load_sizes(self, time: float = 1.0) -> Array:
         """Return the `sizes` of the loads at a time. Collective."""
 
-    def exchanged(self, x: Array) -> Array:
+    def exchanged(self, state: Evaluated) -> Array:
         """Return the `sizes` of what each field exerts on the other. Collective."""
 
     def operator(

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
-from contact.interface.history import SlipHistory
+from contact.history import History
 from contact.interface.multipliers import Multipliers
 from contact.typing import Array
 
@@ -28,13 +28,14 @@ class State:
         When: loads and prescribed values are those of this time. What is given without a time
         grows with it, so that 1 stands for all of it (`contact.body.amplitude`).
     history
-        What friction remembered in the step that led here; None for nothing.
+        That at the beginning of the step that led here; empty for a step from the reference
+        configuration.
     """
 
     x: Array
     forces: Multipliers
     time: float = 1.0
-    history: SlipHistory | None = None
+    history: History = field(default_factory=History)
 
     def __post_init__(self) -> None:
         """Keep whoever holds the state from changing it."""
@@ -48,12 +49,8 @@ class State:
             (self.forces.pressure, other.forces.pressure),
             (self.forces.friction, other.forces.friction),
         )
-        if self.history is not None and other.history is not None:
-            alike = self.history.near(other.history, rtol, atol)
-        else:
-            alike = self.history is other.history
         return (
-            alike
+            self.history.near(other.history, rtol, atol)
             and self.time == other.time
             and all(np.allclose(one, two, rtol=rtol, atol=atol) for one, two in pairs)
         )

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from mpi4py import MPI
 
+from contact.history import BodyState
 from contact.linear.operator import SparseOperator
 from contact.problem.problem import ContactProblem
 from contact.typing import Array
@@ -29,7 +30,7 @@ class DualNorm:
         self._rest = body.rest()
         coupled = problem.interface.coupled
         self._operator = SparseOperator(body, coupled)
-        self._operator.update("secant", self._rest, np.zeros((coupled.size, size, size)))
+        self._operator.update("secant", BodyState(self._rest), np.zeros((coupled.size, size, size)))
 
     def pressure(self, q: Array) -> float:
         """Return the norm of nodal pressures, shape (n,). Collective."""
@@ -44,7 +45,7 @@ class DualNorm:
     def displacement(self, x: Array, other: Array) -> float:
         """Return |u - v|_V of local unknowns, the energy at rest. Collective."""
         body = self.problem.equilibrium
-        forces = (body.internal_forces(y, self._rest) for y in (x, other))
+        forces = (body.internal_forces(BodyState(y), self._rest) for y in (x, other))
         difference = (x - other)[: body.owned]
         free = np.where(body.free.ravel(), np.subtract(*forces), 0.0)
         return self._root(free, difference)

@@ -10,6 +10,7 @@ import numpy as np
 from contact import InputError, build_problem
 from contact.body.norms import errors
 from contact.case.file import Friction
+from contact.history import BodyState
 from contact.methods.options import FixedPointOptions, Options, PenaltyOptions
 from contact.output.fields import DerivedFields
 from contact.typing import Array
@@ -72,7 +73,7 @@ def watched(iteration: Iteration, n: int) -> tuple[Array, float, float]:
     residual = kkt.largest if iteration.eps is None else kkt.equilibrium
     return (
         np.array(distances),
-        max(e.strain for e in DerivedFields(body, last).extremes()),
+        max(e.strain for e in DerivedFields(body, BodyState(last)).extremes()),
         residual,
     )
 

@@ -25,6 +25,7 @@ import numpy as np
 
 from contact import build_problem, solve_problem
 from contact.case.file import parse_case
+from contact.history import BodyState
 from contact.linear.operator import Counters, SparseOperator
 from contact.methods.options import NewtonOptions
 from contact.problem.kkt import residual_forces
@@ -114,7 +115,7 @@ class ProjectedGradients:
         assert isinstance(operator, SparseOperator)
         self._operator, self._x = operator, start.x
         self._blocks = np.zeros((jump.nodes.size, jump.block_size, jump.block_size))
-        operator.update("secant", start.x, self._blocks)
+        operator.update("secant", start, self._blocks)
         self._matrix = operator.matrix.copy()
         self._load = body.layout.mask(-residual_forces(problem, start)[: body.owned])
         self._free = body.layout.free.ravel()
@@ -149,7 +150,7 @@ class ProjectedGradients:
         if self._adapted:
             blocks = self._blocks.copy()
             blocks[:, self._axis, self._axis] = STIFF * self._own * held[self._bounded]
-            self._operator.update("secant", self._x, blocks, constant=True)
+            self._operator.update("secant", BodyState(self._x), blocks, constant=True)
 
     def _largest(self) -> float:
         """Return about the largest eigenvalue, by the power method."""

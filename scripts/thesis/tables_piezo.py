@@ -204,7 +204,7 @@ def linear_iterations(problem: ContactProblem) -> int:
     blocks = augmentation(problem.nodes, automatic_r(problem.scales), problem.frictional)
     blocks = blocks + interface.response.current_block(nodal, np.ones(len(nodal)))
     operator = SparseOperator(problem.equilibrium, interface.coupled, kind="iterative")
-    operator.update("secant", state.x, interface.weighted(blocks, state.x))
+    operator.update("secant", state, interface.weighted(blocks, state.x))
     operator.solve(-residual_forces(problem, state))
     return operator.counters.linear_iterations
 

@@ -6,6 +6,7 @@ from dolfinx import fem
 from mpi4py import MPI
 
 from contact.body.description import Body, Fixed
+from contact.history import BodyState
 from contact.linear.operator import SparseOperator
 from contact.problem.contact import Contact
 from contact.problem.problem import ContactProblem
@@ -51,7 +52,7 @@ def operator_at(problem, kind, x):
     """Return the operator of the body, linearised at unknowns, without any blocks."""
     nodes, bs = problem.nodes.nodes, problem.equilibrium.block_size
     operator = SparseOperator(problem.equilibrium, nodes)
-    operator.update(kind, x, np.zeros((nodes.size, bs, bs)))
+    operator.update(kind, BodyState(x), np.zeros((nodes.size, bs, bs)))
     return operator
 
 
@@ -65,7 +66,7 @@ def test_internal_forces_are_the_derivative_of_the_assembled_energy(cases, case)
     degree = 1 if body.degree == 1 else 4
     dx = problem.domain.dx(metadata={"quadrature_degree": degree})
     stored = fem.form(energy_density(problem.body.law, strain(u)) * dx)
-    work, h = float(body.internal_forces(base) @ direction), 1e-5 * XI
+    work, h = float(body.internal_forces(BodyState(base)) @ direction), 1e-5 * XI
     energies = []
     for t in (2, 1, -1, -2):
         at.x.array[:] = base + t * h * direction
@@ -83,7 +84,7 @@ def test_tangent_is_the_derivative_of_the_internal_forces(cases, case):
     vector.array[:] = direction
     matrix.mult(vector, product)
     h = 1e-6 * XI
-    forces = [body.internal_forces(base + t * h * direction) for t in (1, -1)]
+    forces = [body.internal_forces(BodyState(base + t * h * direction)) for t in (1, -1)]
     slope = np.where(problem.equilibrium.free.ravel(), (forces[0] - forces[1]) / (2 * h), 0.0)
     assert np.linalg.norm(product.array - slope) < 2e-4 * np.linalg.norm(slope)
 
@@ -93,15 +94,15 @@ def test_the_secant_form_with_frozen_modulus(cases, case):
     """B(u; v, w) is linear and symmetric in v and w; B(u; u, w) are the internal forces."""
     problem, body = cases[case], cases[case].equilibrium
     x, _ = scattered(problem, 3)
-    forces = body.internal_forces(x)
+    forces = body.internal_forces(BodyState(x))
     matrix = operator_at(problem, "secant", x).matrix
     assert matrix.isSymmetric(1e-12)
     free = problem.equilibrium.free.ravel()
     vector, product = matrix.createVecs()
     # Columns of fixed unknowns are eliminated: take their displacement as 0.
     vector.array[:] = np.where(free, x, 0.0)
-    inner = body.internal_forces(np.where(free, x, 0.0), secant_at=x)
+    inner = body.internal_forces(BodyState(np.where(free, x, 0.0)), secant_at=x)
     matrix.mult(vector, product)
     assert np.abs(product.array - inner)[free].max() < 1e-13
-    twice = body.internal_forces(2 * x, secant_at=x)  # the frozen modulus stays
+    twice = body.internal_forces(BodyState(2 * x), secant_at=x)  # the frozen modulus stays
     assert np.abs(twice - 2 * forces).max() < 1e-13

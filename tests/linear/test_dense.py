@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
+from contact.history import BodyState
 from contact.linear.dense import DenseOperator, Factors
 from contact.linear.operator import Counters
 
@@ -43,11 +44,11 @@ def test_solves_are_those_of_the_whole_matrix_however_many_blocks_change(changed
     operator = DenseOperator(bulk, Counters())
     # Stiff blocks, not symmetric ones, that come and go.
     blocks = 1e4 * random.standard_normal((NODES, SIZE, SIZE)) ** 2
-    operator.update("secant", np.zeros(0), blocks)
+    operator.update("secant", BodyState(np.zeros(0)), blocks)
     kept = bulk.factors.lower_upper
     blocks[changed] = random.standard_normal((len(changed), SIZE, SIZE)) ** 2
     other = DenseOperator(bulk, Counters())
-    other.update("secant", np.zeros(0), blocks)
+    other.update("secant", BodyState(np.zeros(0)), blocks)
     assert (bulk.factors.lower_upper is kept) == (len(changed) < 20)
     rhs = np.where(bulk.free.ravel(), random.standard_normal(NODES * SIZE), 0.0)
     expected = np.linalg.solve(bulk.total(blocks), rhs)
@@ -61,7 +62,7 @@ def test_columns_of_the_inverse_are_asked_for_once():
     asked = []
     for changed in ([], [1, 2, 3], [2, 3, 9], [1, 9], [], range(20, 30), range(30, 38)):
         blocks[changed] = random.standard_normal((len(changed), SIZE, SIZE)) ** 2
-        operator.update("secant", np.zeros(0), blocks)
+        operator.update("secant", BodyState(np.zeros(0)), blocks)
         asked.append(bulk.factors.known.size)
         rhs = np.where(bulk.free.ravel(), random.standard_normal(NODES * SIZE), 0.0)
         expected = np.linalg.solve(bulk.total(blocks), rhs)
@@ -73,10 +74,10 @@ def test_nodes_that_slip_along_an_axis_ask_for_the_columns_of_their_tangential_r
     random, bulk = np.random.default_rng(2), Bulk()
     operator = DenseOperator(bulk, Counters())
     blocks = random.standard_normal((NODES, SIZE, SIZE)) ** 2
-    operator.update("secant", np.zeros(0), blocks)
+    operator.update("secant", BodyState(np.zeros(0)), blocks)
     kept = bulk.factors.lower_upper
     blocks[10:40, 0] = random.standard_normal((30, SIZE))
-    operator.update("secant", np.zeros(0), blocks)
+    operator.update("secant", BodyState(np.zeros(0)), blocks)
     assert bulk.factors.lower_upper is kept
     assert np.array_equal(bulk.factors.known, range(20, 80, 2))
     rhs = np.where(bulk.free.ravel(), random.standard_normal(NODES * SIZE), 0.0)
@@ -91,8 +92,8 @@ def test_blocks_that_alone_hold_a_node_are_taken_away():
     blocks = np.zeros((NODES, SIZE, SIZE))
     blocks[10] = np.eye(SIZE)
     operator = DenseOperator(bulk, Counters())
-    operator.update("secant", np.zeros(0), blocks)
-    operator.update("secant", np.zeros(0), np.zeros_like(blocks))
+    operator.update("secant", BodyState(np.zeros(0)), blocks)
+    operator.update("secant", BodyState(np.zeros(0)), np.zeros_like(blocks))
     assert not np.isfinite(operator.solve(np.ones(NODES * SIZE))).all()
-    operator.update("secant", np.zeros(0), blocks)
+    operator.update("secant", BodyState(np.zeros(0)), blocks)
     assert np.allclose(operator.solve(np.ones(NODES * SIZE))[20:22], 1.0)

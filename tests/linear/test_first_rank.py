@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
+from contact.history import BodyState
 from contact.linear.dense import DenseOperator, Factors
 from contact.linear.first_rank import from_first, together
 from contact.linear.operator import Counters
@@ -43,4 +44,4 @@ def test_a_dense_factorisation_without_room(monkeypatch):
     operator = DenseOperator(Bulk(), Counters())
     monkeypatch.setattr(Factors, "make", lambda *_: fails())
     with pytest.raises(MemoryError, match="no room"):
-        operator.update("tangent", np.zeros(2), np.ones((1, 2, 2)))
+        operator.update("tangent", BodyState(np.zeros(2)), np.ones((1, 2, 2)))

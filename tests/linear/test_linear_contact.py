@@ -13,6 +13,7 @@ from mpi4py import MPI
 from petsc4py import PETSc
 
 from contact.errors import InputError
+from contact.history import BodyState
 from contact.linear import multigrid
 from contact.linear.hierarchy import PRICE
 from contact.linear.layout import Layout
@@ -58,7 +59,7 @@ def test_counts_do_not_grow_with_the_number_of_sliding_nodes(mu: float) -> None:
         counts = []
         for blocks in (0 * sticking(problem), sticking(problem), sliding(problem, mu)[0]):
             operator = operator_of(problem, "iterative", symmetric=mu == 0)
-            operator.update("secant", x, weight * blocks)
+            operator.update("secant", BodyState(x), weight * blocks)
             operator.solve(problem.equilibrium.external(), 1e-6)
             counts.append(operator.counters.linear_iterations)
         assert max(counts) <= counts[0] + 3, counts
@@ -71,23 +72,23 @@ def test_coarse_levels_are_renewed_when_iterations_say_so() -> None:
     body, weight = problem.equilibrium, problem.nodes.weight[:, None, None]
     x, load, sticks = problem.start().x, body.external(), weight * sticking(problem)
     operator = operator_of(problem, "iterative")
-    operator.update("secant", x, sticks)
+    operator.update("secant", BodyState(x), sticks)
     operator.solve(load, 1e-6)
     fresh = operator.counters.linear_iterations
     for step in range(1, 5):
-        operator.update("secant", x, (1 + 0.1 * step) * sticks, constant=True)
+        operator.update("secant", BodyState(x), (1 + 0.1 * step) * sticks, constant=True)
         operator.solve(load, 1e-6)
     counters = operator.counters
     assert (counters.factorizations, counters.linear_solves) == (1, 5)
     assert counters.linear_iterations <= 5 * fresh + PRICE
     before = counters.linear_iterations
     # Nothing holds the nodes, and the coarse levels take them for held.
-    operator.update("secant", x, 0 * sticks, constant=True)
+    operator.update("secant", BodyState(x), 0 * sticks, constant=True)
     found = operator.solve(load, 1e-6)
     assert counters.factorizations == 2
     assert counters.linear_iterations - before <= 3 * fresh + PRICE
     direct = operator_of(problem, "lu")
-    direct.update("secant", x, 0 * sticks)
+    direct.update("secant", BodyState(x), 0 * sticks)
     assert body.norm(found - direct.solve(load)) <= 1e-5 * body.norm(found)
 
 
@@ -102,7 +103,7 @@ def test_no_solve_takes_more_iterations_than_are_allowed() -> None:
     try:
         operator = operator_of(problem, "iterative")
         for count, blocks in enumerate((sticks, 1.1 * sticks, 0 * sticks, 0 * sticks), start=1):
-            operator.update("secant", x, blocks, constant=count > 1)
+            operator.update("secant", BodyState(x), blocks, constant=count > 1)
             operator.solve(load, 1e-9)
             assert operator.counters.linear_iterations == count * most
     finally:
@@ -117,7 +118,7 @@ def test_aggregates_that_are_too_small_are_no_fault_of_the_body() -> None:
     options["contact_pc_gamg_aggressive_coarsening"] = 0
     try:
         operator = operator_of(problem, "iterative")
-        operator.update("secant", problem.start().x, sticking(problem))
+        operator.update("secant", problem.start(), sticking(problem))
         with pytest.raises(InputError, match=r"multigrid fails: .* -contact_pc_gamg_"):
             operator.solve(problem.equilibrium.external(), 1e-6)
     finally:
@@ -128,7 +129,7 @@ def test_an_operator_is_freed_at_once() -> None:
     """It holds most of the memory, and ranks would collect a cycle at different times."""
     problem = mechanics.leaning_block(SELF, 4)
     operator = operator_of(problem, "iterative")
-    operator.update("secant", problem.start().x, sticking(problem))
+    operator.update("secant", problem.start(), sticking(problem))
     operator.solve(problem.equilibrium.external(), 1e-6)
     left = weakref.ref(operator)
     gc.disable()
@@ -150,7 +151,7 @@ def test_forces_that_contact_carries_do_not_blur_the_solution() -> None:
     solutions = []
     for kind in ("lu", "iterative"):
         operator = operator_of(problem, kind, symmetric=False)
-        operator.update("secant", x, blocks)
+        operator.update("secant", BodyState(x), blocks)
         solutions.append(operator.solve(rhs, 1e-6))
     exact, found = solutions
     assert body.norm(found - exact) <= 1e-5 * body.norm(exact)
@@ -160,17 +161,17 @@ def test_without_contact_the_interpolation_is_that_of_the_body() -> None:
     problem = mechanics.leaning_block(SELF, 4)
     x, operator = problem.start().x, operator_of(problem, "iterative")
     nothing = 0 * sticking(problem)
-    operator.update("secant", x, nothing)
+    operator.update("secant", BodyState(x), nothing)
     pc = operator.ksp.getPC()
     finest = pc.getMGInterpolation(pc.getMGLevels() - 1)
     body = finest.getValuesCSR()[2].copy()
     nodes = problem.nodes.nodes
     rows = (nodes[:, None] * 3 + np.arange(3)).ravel()
-    operator.update("secant", x, sticking(problem))
+    operator.update("secant", BodyState(x), sticking(problem))
     starts, _, values = finest.getValuesCSR()
     largest = np.maximum.reduceat(np.abs(values), starts[:-1])
     assert largest[rows].max() < 1e-3 < 0.1 < largest.max()
-    operator.update("secant", x, nothing)
+    operator.update("secant", BodyState(x), nothing)
     assert np.array_equal(finest.getValuesCSR()[2], body)
 
 
@@ -179,10 +180,10 @@ def test_one_level_is_left_alone() -> None:
     problem = mechanics.leaning_block(SELF, 2)
     x, operator = problem.start().x, operator_of(problem, "iterative")
     operator.ksp.getPC().setGAMGLevels(1)
-    operator.update("secant", x, sticking(problem))
+    operator.update("secant", BodyState(x), sticking(problem))
     assert operator.ksp.getPC().getMGLevels() == 1
     direct = operator_of(problem, "lu")
-    direct.update("secant", x, sticking(problem))
+    direct.update("secant", BodyState(x), sticking(problem))
     solutions = [each.solve(problem.equilibrium.external(), 1e-10) for each in (operator, direct)]
     assert np.allclose(*solutions, rtol=0, atol=1e-9 * np.abs(solutions[0]).max())
 
@@ -206,7 +207,7 @@ def test_fixed_unknowns_stay_exactly_where_they_are():
         problem.nodes.nodes, symmetric=True, counters=Counters(), kind="iterative"
     )
     blocks = np.zeros((problem.nodes.nodes.size, 3, 3))
-    operator.update("secant", body.rest(), blocks)
+    operator.update("secant", BodyState(body.rest()), blocks)
     found = operator.solve(1e6 * body.external(), rtol=1e-2)
     assert np.abs(found).max() > 1.0
     assert np.all(found[~body.free.ravel()] == 0.0)
@@ -224,7 +225,7 @@ def test_a_factorisation_takes_the_workspace_it_needs(degree: int) -> None:
     pc.getFactorMatrix().setMumpsIcntl(14, -90)
     sides = np.column_stack([problem.equilibrium.external(), np.ones(problem.equilibrium.owned)])
     for operator in (kept, poor):
-        operator.update("secant", problem.equilibrium.rest(), sticking(problem))
+        operator.update("secant", BodyState(problem.equilibrium.rest()), sticking(problem))
     known, found = (operator.solve_all(sides) for operator in (kept, poor))
     np.testing.assert_allclose(found, known, rtol=1e-9, atol=1e-12)
     assert pc.getFactorMatrix().getMumpsIcntl(14) > 0
@@ -238,7 +239,7 @@ def test_a_failed_factorisation_solves_for_nothing(monkeypatch: pytest.MonkeyPat
     operator.ksp.setOperators(operator.matrix)
     operator.ksp.getPC().setFactorSetUpSolverType()
     operator.ksp.getPC().getFactorMatrix().setMumpsIcntl(14, -90)
-    operator.update("secant", problem.equilibrium.rest(), sticking(problem))
+    operator.update("secant", BodyState(problem.equilibrium.rest()), sticking(problem))
     with pytest.raises(InputError, match="out of memory in the factorisation"):
         operator.solve_all(np.ones((problem.equilibrium.owned, 2)))
 

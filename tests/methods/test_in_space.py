@@ -7,6 +7,7 @@ import pytest
 from mpi4py import MPI
 
 from contact import build_problem, nesting
+from contact.history import BodyState
 from contact.linear import hierarchy, multigrid
 from contact.linear.operator import SparseOperator
 from contact.output.solution import Solution
@@ -77,7 +78,9 @@ def test_coarse_levels_that_are_new_are_not_renewed_for_a_correction(monkeypatch
     operator, x = SparseOperator(body, nodes), problem.start().x
     blocks = np.zeros((nodes.size, body.block_size, body.block_size))
     for stiffness, made in ((0.0, 1), (1.0, 2)):
-        operator.update("secant", x, blocks + stiffness * np.eye(body.block_size), constant=True)
+        operator.update(
+            "secant", BodyState(x), blocks + stiffness * np.eye(body.block_size), constant=True
+        )
         operator.solve(body.external(), 1e-8)
         assert operator.counters.factorizations == made
 
@@ -97,7 +100,9 @@ def test_the_iterations_a_digit_are_those_that_were_gained(monkeypatch, rtol):
     body, nodes = problem.equilibrium, problem.nodes.nodes
     operator, x = SparseOperator(body, nodes), problem.start().x
     for stiffness in (0.0, 1.0):
-        operator.update("secant", x, stiffness * np.stack(nodes.size * [np.eye(3)]), constant=True)
+        operator.update(
+            "secant", BodyState(x), stiffness * np.stack(nodes.size * [np.eye(3)]), constant=True
+        )
         operator.solve(body.external(), 1e-8)
         monkeypatch.setattr(hierarchy, "refine", correct)
     assert operator.counters.factorizations == 2

@@ -57,7 +57,7 @@ def test_stepped_block(name, dim, degree, method):
         assert np.abs(nodal[:, 0] - exact.slip).max() < 1e-10
         assert np.abs(found.state.forces.friction[:, 0] - exact.stress).max() < 1e-10
         assert np.abs(found.state.forces.pressure - exact.pressure).max() < 1e-10
-        history = found.problem.interface.remembered(nodal)
+        history = found.problem.interface.commit(nodal)
         assert np.abs(history.accumulated - way).max() < 1e-10
     assert steps[-1].counters.factorizations <= 1 or name == "hencky" or method == "uzawa"
 

@@ -9,6 +9,7 @@ import pytest
 from mpi4py import MPI
 
 from contact.build import build_problem
+from contact.history import BodyState
 from contact.output.fields import DerivedFields
 from contact.output.files import write_outputs
 from contact.output.options import OutputOptions
@@ -80,7 +81,7 @@ def test_derived_fields_of_a_known_strain(degree: int) -> None:
     points = problem.equilibrium.space.tabulate_dof_coordinates()
     x = problem.equilibrium.rest()
     x[1::2] = -0.05 * points[:, 1]
-    fields = DerivedFields(problem.equilibrium, x)
+    fields = DerivedFields(problem.equilibrium, BodyState(x))
     law, t = problem.body.law, 0.05 * np.sqrt(2 / 3)
     g = float(law.secant_modulus(t**2))
     across = -0.05 * (law.bulk - 2 * g / 3)

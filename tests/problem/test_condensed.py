@@ -5,6 +5,7 @@ import pytest
 from mpi4py import MPI
 from petsc4py import PETSc
 
+from contact.history import BodyState
 from contact.interface.friction import Friction
 from contact.linear.operator import Counters, SparseOperator
 from contact.linear.schur import SchurComplement
@@ -38,7 +39,7 @@ def test_condensing_and_expanding_solves_the_whole_system(cells):
     body, nodes = problem.equilibrium, problem.nodes.nodes
     operator = SparseOperator(body, nodes)
     size = body.block_size
-    operator.update("secant", body.rest(), np.zeros((nodes.size, size, size)))
+    operator.update("secant", BodyState(body.rest()), np.zeros((nodes.size, size, size)))
     whole = operator.solve(body.external())
 
     kept = (problem.nodes.nodes[:, None] * size + np.arange(size, dtype=np.int32)).ravel()
@@ -58,7 +59,7 @@ def test_condensing_and_expanding_solves_the_whole_system(cells):
 def test_hardly_more_stays_between_ranks_than_the_cuts():
     problem = mechanics.bar(WORLD, 16, law=Linear(1.0, 0.3))
     matrix = problem.equilibrium.create_matrix()
-    problem.equilibrium.assemble(matrix, "secant", problem.equilibrium.rest())
+    problem.equilibrium.assemble(matrix, "secant", BodyState(problem.equilibrium.rest()))
     kept = (problem.nodes.nodes[:, None] * 2 + np.arange(2, dtype=np.int32)).ravel()
     schur = SchurComplement(matrix, kept, "contact_", cut(problem.equilibrium))
     # 17 nodes across the bar, of which one is kept: those in cells of two ranks, and no others.
@@ -74,7 +75,7 @@ def test_few_unknowns_are_eliminated_beside_many_that_are_kept(few):
     """MUMPS's own estimate of its workspace is too small there."""
     problem = mechanics.bar(SELF, 8, law=Linear(1.0, 0.3))
     matrix = problem.equilibrium.create_matrix()
-    problem.equilibrium.assemble(matrix, "secant", problem.equilibrium.rest())
+    problem.equilibrium.assemble(matrix, "secant", BodyState(problem.equilibrium.rest()))
     order = np.random.default_rng(1).permutation(problem.equilibrium.owned).astype(np.int32)
     kept, eliminated = np.sort(order[few:]), np.sort(order[:few])
     found = SchurComplement(matrix, kept, "contact_", cut(problem.equilibrium)).factorise(matrix)
@@ -94,7 +95,7 @@ def test_the_first_rank_alone_holds_the_dense_matrix_and_factors():
     nodes = np.arange(body.free.shape[0], dtype=np.int32)
     operator = body.operator(nodes, symmetric=False, counters=Counters(), kind="auto")
     blocks = np.tile(np.eye(body.block_size), (nodes.size, 1, 1))
-    operator.update("secant", body.at, blocks)
+    operator.update("secant", BodyState(body.at), blocks)
     assert (body.factors.lower_upper is not None) == (WORLD.rank == 0)
     rhs = np.where(body.free.ravel(), 1.0, 0.0)
     found = np.concatenate(WORLD.allgather(operator.solve(rhs)))

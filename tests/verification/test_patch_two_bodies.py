@@ -88,7 +88,7 @@ def test_constant_pressure(dim: int, degree: int, pair: Sequence[str], condense:
     problem = ContactProblem(domain, body, contact(*pair), degree=degree)
     state = solve(problem, condense=condense)
     np.testing.assert_allclose(state.forces.pressure, 0.01, rtol=1e-12)
-    stress = DerivedFields(problem.equilibrium, state.x).cells()["stress"].x.array.reshape(-1, 9)
+    stress = DerivedFields(problem.equilibrium, state).cells()["stress"].x.array.reshape(-1, 9)
     k = 4 * (dim - 1)
     np.testing.assert_allclose(stress[:, k], -0.01, rtol=1e-10)
     assert force_balance(problem, state).imbalance < 1e-12
@@ -109,7 +109,7 @@ def test_constant_pressure_on_discs(degree: int, pair: Sequence[str]) -> None:
     state = solve(problem)
     np.testing.assert_allclose(state.forces.pressure, 0.01, rtol=1e-11)
     assert problem.nodes.sum(np.ones(problem.nodes.nodes.size)) == pytest.approx(np.pi, rel=1e-12)
-    stress = DerivedFields(problem.equilibrium, state.x).cells()["stress"].x.array.reshape(-1, 9)
+    stress = DerivedFields(problem.equilibrium, state).cells()["stress"].x.array.reshape(-1, 9)
     np.testing.assert_allclose(stress[:, 4], -0.01, rtol=1e-9)
     np.testing.assert_allclose(np.delete(stress, 4, axis=1), 0, atol=1e-11)
 

@@ -155,7 +155,7 @@ def first_solve(problem, symmetric=True, compare=True):
         operator = SparseOperator(
             problem.equilibrium, interface.coupled, symmetric=symmetric, kind=kind
         )
-        operator.update("secant", state.x, blocks)
+        operator.update("secant", state, blocks)
         increment = operator.solve(-residual_forces(problem, state))
         found.append((increment, operator.counters.linear_iterations))
     comm = problem.comm

@@ -1,0 +1,161 @@
+"""A material with history, as a user adds one: scalar damage, a law object and no more.
+
+The secant modulus is E (1 - d(kappa)), and kappa the largest strain so far. A block that is pressed
+onto a frictionless foundation is in a homogeneous state, known in closed form.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+import pytest
+import ufl
+from mpi4py import MPI
+
+from contact import evolve, parse_case, solve
+from contact.build import build_problem
+from contact.history import QUADRATURE_POINTS
+from contact.nesting import prolong
+from contact.output.fields import DerivedFields
+from contact.output.resume import read_steps
+from forms.hencky import Isotropic, Linear, secant_stress
+from forms.kinematics import embed
+from forms.ops import maximum
+
+YOUNG, POISSON, LIMIT, MOST, HEIGHT, WIDTH = 10.0, 0.3, 2e-3, 0.5, 1.0, 2.0
+TIMES, PRESSED = [0.0, 1.0, 2.0, 3.0], [0.0, 4e-3, 1e-3, 6e-3]
+
+
+def damage(kappa):
+    return MOST * kappa / (kappa + LIMIT)
+
+
+@dataclass(frozen=True)
+class Damage(Isotropic):
+    """Stress (1 - d(kappa)) C eps."""
+
+    kappa: object = 0.0
+
+    @property
+    def variables(self) -> Mapping[str, float]:
+        return {"kappa": 0.0}
+
+    def since(self, variables):
+        return replace(self, **variables)
+
+    def updated(self, eps):
+        strain = ufl.sqrt(ufl.inner(embed(eps), embed(eps)) + 1e-30)
+        return {"kappa": maximum(self.kappa, strain)}
+
+    def secant_stress(self, frozen, eps):
+        elastic = secant_stress(Linear(self.young, self.poisson), eps, eps)
+        return (1 - damage(self.updated(frozen)["kappa"])) * elastic
+
+    def secant_modulus(self, q):
+        return (1 - damage(maximum(self.kappa, q**0.5))) * self.shear
+
+
+def case(cells=4, degree=1, stages=3, **more):
+    return parse_case(
+        {
+            "mesh": {
+                "generator": "rectangle",
+                "size": [WIDTH, HEIGHT],
+                "cells": [2 * cells, cells],
+            },
+            "space": {"degree": degree},
+            "material": {"law": "linear", "young": YOUNG, "poisson": POISSON},
+            "fixed": [
+                {"on": "top", "displacement": ["free", -1.0], "amplitude": "press"},
+                {"on": "left", "displacement": [0.0, "free"]},
+            ],
+            "contact": {"on": "bottom"},
+            "evolution": {
+                "times": TIMES[: stages + 1],
+                "steps": [2] * stages,
+                "amplitudes": {"press": {"time": TIMES, "value": PRESSED}},
+            },
+            **more,
+        }
+    )
+
+
+def expected(times):
+    """Return the force on the foundation and kappa at the ends of steps."""
+    kappa, found = 0.0, []
+    for time in times:
+        pressed = float(np.interp(time, TIMES, PRESSED)) / HEIGHT
+        across = POISSON / (1 - POISSON) * pressed
+        kappa = max(kappa, float(np.hypot(pressed, across)))
+        modulus = (1 - damage(kappa)) * YOUNG / (1 - POISSON**2)
+        found.append((modulus * pressed * WIDTH, kappa))
+    return found
+
+
+def kappa_after(solution):
+    """Return the variable at the end of the last step of a solution."""
+    return solution.problem.commit(solution.state).arrays()["material.kappa"]
+
+
+@pytest.mark.parallel
+@pytest.mark.parametrize("degree", [1, 2])
+def test_unloading_goes_back_along_the_secant(degree):
+    solution = solve(case(degree=degree), law=Damage(YOUNG, POISSON))
+    assert solution.converged
+    known = expected([step.state.time for step in solution.steps])
+    for step, (force, _) in zip(solution.steps, known, strict=True):
+        assert step.row["contact_force_y"] == pytest.approx(-force, rel=1e-6)
+    assert kappa_after(solution) == pytest.approx(known[-1][1], rel=1e-6)
+    places = solution.problem.points(QUADRATURE_POINTS)
+    assert len(places) == kappa_after(solution).size
+    fields = DerivedFields(solution.problem.equilibrium, solution.state).cells()
+    assert fields["kappa"].x.array == pytest.approx(known[-1][1], rel=1e-6)
+    stress = fields["stress"].x.array.reshape(-1, 9)[:, 4]
+    assert stress == pytest.approx(-known[-1][0] / WIDTH, rel=1e-6)
+    assert not any("Hencky" in warning for warning in solution.warnings)
+
+
+@pytest.mark.parallel
+def test_a_restart_goes_on_with_the_same_history(tmp_path):
+    comm, law = MPI.COMM_WORLD, Damage(YOUNG, POISSON)
+    tmp_path = comm.bcast(tmp_path)
+    # A gradient: the damage differs from cell to cell.
+    given = case(
+        load=[{"on": "right", "traction": [0.01, 0.0]}], friction={"mu": 0.2, "law": "coulomb"}
+    )
+    whole = solve(given, law=law, comm=comm, folder=tmp_path)
+    assert np.ptp(comm.allreduce(kappa_after(whole).tolist(), op=MPI.SUM)) > 1e-4
+    steps = read_steps(tmp_path, build_problem(given, comm, law=law))
+    for one, two in zip(whole.steps, steps, strict=True):
+        assert one.state.near(two.state, rtol=1e-12, atol=1e-15)
+        assert two.state.history.keys() == {"slip", "material"}
+    on_one = build_problem(given, MPI.COMM_SELF, law=law)
+    alone = read_steps(tmp_path, on_one)[2].state
+    *_, last = evolve(on_one, [step.state.time for step in steps[3:]], start=alone)
+    total = on_one.commit(last).arrays()["material.kappa"].sum()
+    here = comm.allreduce(kappa_after(whole).sum(), op=MPI.SUM)
+    assert total == pytest.approx(here, rel=1e-6)
+
+
+def test_a_state_without_its_history_is_of_another_step():
+    problem = build_problem(case(), MPI.COMM_SELF, law=Damage(YOUNG, POISSON))
+    first, second = evolve(problem, [1.0, 2.0])
+    body = problem.equilibrium
+    virgin = replace(second, history=problem.initial)
+    forces = [np.abs(body.internal_forces(state)).max() for state in (second, virgin)]
+    ratio = 1 - damage(expected([1.0])[0][1])
+    undamaged = 1 - damage(expected([2.0])[0][1])
+    assert forces[0] / forces[1] == pytest.approx(ratio / undamaged, rel=1e-6)
+    assert not second.near(virgin)
+    assert problem.commit(first).near(second.history, rtol=1e-14)
+
+
+def test_a_history_is_carried_to_a_finer_mesh():
+    law = Damage(YOUNG, POISSON)
+    coarse, fine = (build_problem(case(cells), MPI.COMM_SELF, law=law) for cells in (4, 8))
+    *_, state = evolve(coarse, [1.0, 2.0])
+    carried = prolong(coarse, state, fine)
+    assert carried.history.arrays()["material.kappa"] == pytest.approx(
+        expected([1.0])[0][1], rel=1e-6
+    )
+    assert carried.history["slip"].place != QUADRATURE_POINTS
