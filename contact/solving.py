@@ -1,13 +1,20 @@
-"""Solve a problem by the method that is asked for, and say what the result is worth."""
+"""Solve a case or a problem: one step, or one load step after the other.
+
+A static solve is an evolution of one step: both are `run_schedule`.
+"""
 
 from __future__ import annotations
 
+import logging
 import signal
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from numbers import Real
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from mpi4py import MPI
 
 from contact.build import REPLACEMENTS, build_problem, named
@@ -16,37 +23,43 @@ from contact.case.file import Case, load_case
 from contact.case.replaced import replaced_by
 from contact.case.text import to_toml
 from contact.errors import InputError
-from contact.evolving import check_options, check_times, solve_steps
 from contact.kinds import expect
 from contact.methods.every import METHODS
 from contact.methods.interrupt import SIGNALLED, stop_on_signal
+from contact.methods.method import Method
 from contact.methods.options import NewtonOptions, Options
-from contact.methods.report import Monitor
-from contact.methods.steps import solve_step
+from contact.methods.report import History, Monitor, Outcome, tell
+from contact.methods.steps import Evolution, LoadStep, solve_step
 from contact.nesting import nested_start, pays
 from contact.output.folder import on_root
+from contact.output.record import StepRecord
 from contact.output.resume import Checkpoints, kept_digest, read_steps
 from contact.output.review import announce
 from contact.output.solution import Solution
-from contact.problem.consistent import check_problem
+from contact.output.steps import StepRecorder
+from contact.problem.consistent import check_problem, check_supports
 from contact.problem.held import check_potential
+from contact.problem.kkt import evaluate
 from contact.problem.problem import ContactProblem
 from contact.problem.state import State
 
-#: What a start is called that is given as such.
-GIVEN = "the state that was given"
+logger = logging.getLogger("contact.steps")
+
+#: Names of initial guesses, for messages about the solution.
+ZERO, GIVEN = "the zero initial guess", "the state that was given"
+BEFORE, COARSE = "the step before", "the solution on a coarser mesh"
 
 
 class SolveInterrupted(SystemExit):
     """A SIGINT (Ctrl-C) or SIGTERM has ended a solve, on all ranks after the same iteration.
 
-    A program that does not catch it ends with the status 130 or 143: that is what a SystemExit is
-    for. That of Ctrl-C is a KeyboardInterrupt too; of that of SIGTERM Python would make 130.
+    A program that does not catch it ends with the status 130 or 143, as by any SystemExit. That
+    of Ctrl-C is a KeyboardInterrupt too; of that of SIGTERM Python would make 130.
 
     Parameters
     ----------
     solution
-        What was reached; `solution.outcome.signal` is the number of the signal.
+        The last iterate; `solution.outcome.signal` is the number of the signal.
     """
 
     def __init__(self, solution: Solution) -> None:
@@ -57,6 +70,48 @@ class SolveInterrupted(SystemExit):
 
 class _Pressed(SolveInterrupted, KeyboardInterrupt):
     """Ctrl-C."""
+
+
+class NotConvergedError(RuntimeError):
+    """A load step has not converged, however short."""
+
+
+@dataclass(frozen=True)
+class Schedule:
+    """The load steps of a run.
+
+    Attributes
+    ----------
+    times
+        Their ends; none for a single step to the problem's own time.
+    begin
+        Time of the reference configuration.
+    start
+        Initial guess of a single step; None for zero.
+    guess
+        Name of that guess, for messages.
+    kept
+        Records of the steps of an earlier run, to continue from.
+    keep
+        Called with the record of each step that has converged.
+    """
+
+    times: Sequence[float] = ()
+    begin: float = 0.0
+    start: State | None = None
+    guess: str = GIVEN
+    kept: Sequence[StepRecord] = ()
+    keep: Callable[[StepRecord], None] | None = None
+
+    def steps(self, problem: ContactProblem, method: Method) -> Iterator[LoadStep]:
+        """Take the steps. Collective."""
+        if self.times:
+            states = [record.state for record in self.kept[-1:-3:-1]]
+            tell(logger, 0.0, "steps to t = %g", self.times[-1])
+            yield from Evolution(problem, method, *states).run(self.times, self.begin)
+        else:
+            state, outcome = solve_step(problem, method, self.start)
+            yield LoadStep(problem, state, outcome, method.history, method.counters)
 
 
 def solve(
@@ -79,108 +134,261 @@ def solve(
     settings
         Method and tolerances; those of the case by default.
     monitor
-        Told of every outer iteration.
+        Called after every outer iteration.
     comm
         Communicator of the mesh.
     folder
-        Where checkpoints of an evolution's steps are kept until its results are written.
+        Folder for the checkpoints of an evolution's steps, until its results are written.
     restart
-        A folder with checkpoints of the same case, to go on from.
+        A folder with checkpoints of the same case, to continue from.
     start
-        An earlier solution on the same mesh to start from, or its state; from rest by default.
+        An earlier solution on the same mesh, or its state, as initial guess; zero by default.
     times
         Of a problem that is built already: the ends of load steps, as of `evolve`. The solution's
-        `steps` then say what each has come to.
+        `steps` then hold the results of each.
     replacements
         Objects that take the place of parts of the case; see `build.build_problem`.
 
     Raises
     ------
     InputError
-        If the case does not fit its mesh, the body is not held, or something is given that would
-        be ignored.
+        If the case does not fit its mesh, a rigid-body mode is not constrained, or an argument
+        is given that would be ignored.
     SolveInterrupted
-        After a SIGINT or SIGTERM, with what was reached; a second signal ends the program.
+        After a SIGINT or SIGTERM, with the last iterate; a second signal ends the program.
     """
-    return _uninterrupted(
-        _solve(case, settings, monitor, comm, folder, restart, start, times, **replacements)
-    )
-
-
-def _uninterrupted(solution: Solution) -> Solution:
-    if solution.outcome.signal:
-        ended = _Pressed if solution.outcome.signal == signal.SIGINT else SolveInterrupted
-        raise ended(solution)
-    return solution
-
-
-def _solve(
-    case: Case | ContactProblem | str | Path,
-    settings: Options | None,
-    monitor: Monitor | None,
-    comm: MPI.Intracomm,
-    folder: Path | None,
-    restart: Path | None,
-    start: State | Solution | None,
-    times: Sequence[float] | None = None,
-    **replacements: Any,
-) -> Solution:
-    """Solve as `solve` does; what a signal has ended is a solution like others."""
-    begin = time.perf_counter()
-    check_options(settings, monitor)
-    if isinstance(start, Solution):
-        start = start.state
+    clock = time.perf_counter()
+    _check_options(settings, monitor)
+    start = start.state if isinstance(start, Solution) else start
     fits = isinstance(start, State | None)
     expect("start", start, "an earlier solution of the same problem, or its state", fits)
     fits = isinstance(case, Case | ContactProblem | str | Path)
     expect("solve", case, "a case, the name of a case file, or a Problem", fits)
     for name in replacements.keys() - set(REPLACEMENTS):
         raise InputError(f"{name}: unknown; accepted: {', '.join(REPLACEMENTS)}")
+    nested = settings.nested if isinstance(settings, NewtonOptions) else None
     if isinstance(case, ContactProblem):
-        given = {"folder": folder, "restart": restart, **replacements}
+        given = {"folder": folder, "restart": restart, "nested": nested or None, **replacements}
         _refuse(given, "a problem that is built already")
-        nested = isinstance(settings, NewtonOptions) and settings.nested
-        _refuse({"nested": nested or None}, "a problem that is built already")
-        if times is not None:
+        if times is None:
+            check_problem(case)
+            schedule = Schedule(start=start)
+        else:
             _refuse({"start": start}, "times; evolve(problem, times, start=state) goes on")
-            ends = check_times(case, times, 0.0)
-            return solve_steps(case, ends, settings or NewtonOptions(), monitor)
-        check_problem(case)
-        return _reached(case, settings or NewtonOptions(), monitor, start, GIVEN)
+            schedule = Schedule(_checked_times(case, times, 0.0))
+        return _uninterrupted(run_schedule(case, settings or NewtonOptions(), monitor, schedule))
     _refuse({"times": times}, "a case, whose [evolution] says them")
     case = case if isinstance(case, Case) else load_case(case, without=replaced_by(replacements))
     settings = settings or case.solver
+    nested = settings.nested if isinstance(settings, NewtonOptions) else False
+    if case.evolution is None:
+        _refuse({"restart": restart}, "a case without [evolution]")
+        if nested:
+            _refuse({"start": start}, "nested = true, which makes an initial guess of its own")
+    else:
+        _refuse({"start": start}, "[evolution]; evolve(problem, times, start=state) goes on")
+        _refuse({"nested": nested or None}, "[evolution]")
     computed_from = on_root(comm, lambda: digest(case)) if case.evolution and folder else None
-    if restart is not None and case.evolution is not None:
+    if restart is not None:
         on_root(comm, lambda: check_digest(restart, kept_digest(restart), digest(case)))
     problem = build_problem(case, comm, **replacements)
     with named(case.source):
-        nested = isinstance(settings, NewtonOptions) and settings.nested
-        if isinstance(settings, NewtonOptions) and nested is None and start is None:
-            nested = not replacements and pays(case, problem)
-        if case.evolution is None:
-            _refuse({"restart": restart}, "a case without [evolution]")
-            words = GIVEN
-            if nested:
-                _refuse({"start": start}, "nested = true, which has a start of its own")
-                start = nested_start(case, problem, **replacements)
-                words = "the solution on a coarser mesh"
-            solution = _reached(problem, settings, monitor, start, words)
-        else:
-            _refuse({"start": start}, "[evolution]; evolve(problem, times, start=state) goes on")
-            _refuse({"nested": nested or None}, "[evolution]")
+        if case.evolution is not None:
             kept = [] if restart is None else read_steps(restart, problem)
             keep = None
             if folder is not None:
                 here = restart is not None and restart.samefile(folder)
                 text = to_toml(case, anchored=True)
                 keep = Checkpoints(folder, problem, text, kept, here, computed_from).keep
-            times, rest = case.evolution.ends, case.evolution.times[0]
-            solution = solve_steps(problem, times, settings, monitor, rest, keep, kept)
+            ends, begin = case.evolution.ends, case.evolution.times[0]
+            schedule = Schedule(ends, begin, kept=kept, keep=keep)
+        else:
+            if nested is None and start is None:
+                nested = not replacements and pays(case, problem)
+            schedule = Schedule(start=start)
+            if nested:
+                schedule = Schedule(start=nested_start(case, problem, **replacements), guess=COARSE)
+        solution = run_schedule(problem, settings, monitor, schedule)
     solution.title, solution.output, solution.units = case.title, case.output, case.case.units
     if not replacements:
         solution.case = to_toml(case)
-    solution.seconds["setup"] += time.perf_counter() - begin - sum(solution.seconds.values())
+    solution.seconds["setup"] += time.perf_counter() - clock - sum(solution.seconds.values())
+    return _uninterrupted(solution)
+
+
+def evolve(
+    problem: ContactProblem,
+    times: Sequence[float],
+    settings: Options | None = None,
+    monitor: Monitor | None = None,
+    start: State | Solution | None = None,
+) -> Iterator[State]:
+    """Load a problem in steps, and give the state at the end of each. Collective.
+
+    Friction is incremental: it acts on the slip of a step. Loads and prescribed values are
+    multiplied by their amplitudes; those without one grow with time, from 0 at time 0 to their
+    value at time 1.
+
+    Parameters
+    ----------
+    problem
+        The problem; `problem.at(state.time, state.history)` is the problem of a state's step.
+    times
+        Ends of the steps, increasing. A step that fails is halved, so that states in between
+        may be given too.
+    settings
+        Method and tolerances; Newton's by default.
+    monitor
+        Called after every outer iteration.
+    start
+        A state that was given before, to continue from; the reference configuration at time 0 by
+        default.
+
+    Raises
+    ------
+    InputError
+        If times do not increase, loads and supports contradict each other or leave a rigid-body
+        mode unconstrained, or a linear system is singular.
+    NotConvergedError
+        If a step fails; the states before have been given.
+    """
+    _check_options(settings, monitor)
+    start = start.state if isinstance(start, Solution) else start
+    expect("start", start, "an earlier state, or solution", isinstance(start, State | None))
+    expect("evolve", problem, "a Problem", isinstance(problem, ContactProblem))
+    begin = 0.0 if start is None else start.time
+    ends = _checked_times(problem, times, begin)
+    settings = settings or NewtonOptions()
+    method = METHODS[settings.method](problem, settings, monitor)
+    for step in Evolution(problem, method, start).run(ends, begin):
+        if not step.outcome.converged:
+            raise NotConvergedError(
+                f"no step to {step.problem.time:g}: {step.outcome.reason}; the states before remain"
+            )
+        yield step.state
+
+
+def run_schedule(
+    problem: ContactProblem, settings: Options, monitor: Monitor | None, schedule: Schedule
+) -> Solution:
+    """Take the steps of a schedule, and return the last one that has converged. Collective.
+
+    A signal or a step that fails ends them; all complete steps remain, with the outcome of the
+    one that has ended them.
+
+    Raises
+    ------
+    InputError
+        If a linear system is singular, the potential is not determined, or the initial guess is
+        that of another problem.
+    """
+    clock = time.perf_counter()
+    if schedule.start is not None:
+        schedule = replace(schedule, start=_prescribed(problem, schedule.start))
+    history, records = History(), list(schedule.kept)
+    with stop_on_signal(problem.comm, monitor) as stop:
+        method = METHODS[settings.method](problem, settings, stop)
+        setup = time.perf_counter() - clock
+        recorder = None
+        if schedule.times:
+            recorder = StepRecorder(problem, records[-1] if records else None)
+        step: LoadStep | None = None
+        for step in schedule.steps(problem, method):
+            history.records += step.history.records if recorder is None else _labelled(step)
+            if recorder is not None and step.outcome.converged:
+                records.append(recorder.record(step))
+                _report(step, records[-1], schedule)
+    here, state = _end(problem, records, step)
+    outcome = _outcome(here, state, step, method.options.allowed, schedule)
+    counters = method.counters
+    # The review needs the memory that the method's operators take.
+    del method
+    check_potential(here, state)
+    guess = ZERO if schedule.start is None else schedule.guess
+    solution = Solution(
+        problem=here,
+        state=state,
+        outcome=outcome,
+        history=history,
+        counters=counters,
+        method=settings.method,
+        start=BEFORE if records else guess,
+        seconds={"setup": setup, "solve": time.perf_counter() - clock - setup, "output": 0.0},
+        steps=records,
+    )
+    if records and records[-1].unloaded > 0:
+        solution.warnings.append(
+            f"{records[-1].unloaded:.1%} of the body unload from the plastic range in a "
+            "step: Hencky's law is nonlinear elasticity, and they come back the way they went; a "
+            "metal would keep a part of its strain"
+        )
+    announce(solution)
+    return solution
+
+
+def _labelled(step: LoadStep) -> Iterator[Any]:
+    """Give the outer iterations of a step, with its time in their notes."""
+    time = f"t = {step.problem.time:g}"
+    for record in step.history.records:
+        yield replace(record, note=f"{time} {record.note}".strip())
+
+
+def _report(step: LoadStep, record: StepRecord, schedule: Schedule) -> None:
+    """Hand on the record of a step, and log the progress of the run."""
+    if schedule.keep is not None:
+        schedule.keep(record)
+    end = schedule.times[-1]
+    tell(
+        logger,
+        (step.problem.time - schedule.begin) / (end - schedule.begin),
+        "t = %g of %g: iterations %d, residual %.1e",
+        *(step.problem.time, end, len(step.history.records), step.outcome.kkt.largest),
+    )
+
+
+def _end(
+    problem: ContactProblem, records: Sequence[StepRecord], step: LoadStep | None
+) -> tuple[ContactProblem, State]:
+    """Return the last step that is recorded; the iterate of the first one, if none is."""
+    if not records:
+        assert step is not None  # there is one step at least
+        return step.problem, step.state
+    state = records[-1].state
+    return problem.at(state.time, state.history), state
+
+
+def _outcome(
+    problem: ContactProblem, state: State, step: LoadStep | None, allowed: Any, schedule: Schedule
+) -> Outcome:
+    """Return the outcome of the last step, with the time that was reached. Collective."""
+    if step is None:  # all were there already
+        return Outcome(evaluate(problem, state), allowed)
+    if step.outcome.converged or not schedule.times:
+        return step.outcome
+    reached = problem.time if state is not step.state else 0.0
+    words = f"the steps end at t = {reached:g} of {schedule.times[-1]:g}"
+    ended = f"{words}: {step.outcome.ended or f'the one to {step.problem.time:g} fails'}"
+    return replace(step.outcome, ended=ended)
+
+
+def _prescribed(problem: ContactProblem, start: State) -> State:
+    """Return an initial guess with the values that the problem prescribes. Collective."""
+    zero, nodes = problem.start(), problem.nodes.nodes.size
+    fits = start.x.shape == zero.x.shape and start.forces.pressure.shape == (nodes,)
+    if not problem.comm.allreduce(fits, op=MPI.LAND):
+        raise InputError(
+            "start: given a state of another problem; accepted: one with the same mesh, elements "
+            "and contact nodes, on the same ranks"
+        )
+    x = problem.equilibrium.prescribe(start.x, problem.time)
+    return State(x, start.forces, problem.time, problem.history)
+
+
+def _uninterrupted(solution: Solution) -> Solution:
+    """Return a solution; raise `SolveInterrupted` with it if a signal has ended the solve."""
+    if solution.outcome.signal:
+        ended = _Pressed if solution.outcome.signal == signal.SIGINT else SolveInterrupted
+        raise ended(solution)
     return solution
 
 
@@ -191,81 +399,31 @@ def _refuse(given: Mapping[str, Any], beside: str) -> None:
             raise InputError(f"{name}: given together with {beside}; accepted: one without it")
 
 
-def solve_problem(
-    problem: ContactProblem,
-    settings: Options,
-    monitor: Monitor | None = None,
-    start: State | None = None,
-    words: str = GIVEN,
-) -> Solution:
-    """Solve a problem. Collective.
+def _check_options(settings: Options | None, monitor: Monitor | None) -> None:
+    """Refuse objects that are no options of a method, or no function."""
+    accepted = "NewtonOptions(), FixedPointOptions(), PenaltyOptions()"
+    expect("settings", settings, accepted, isinstance(settings, Options | None))
+    accepted = "a function of a record, called after each outer iteration"
+    expect("monitor", monitor, accepted, monitor is None or callable(monitor))
 
-    Parameters
-    ----------
-    problem, settings, monitor
-        The problem, the method with its tolerances, and who is told of the outer iterations.
-    start
-        A state of the problem, or of one with the same mesh and contact nodes, to start from.
-    words
-        What start that is, for what is said of the solution.
 
-    Raises
-    ------
-    InputError
-        If the linear system is singular, the potential is not determined, or the start is that of
-        another problem.
-    SolveInterrupted
-        After a SIGINT or SIGTERM, with what the last outer iteration has left; a second signal
-        ends the program.
+def _checked_times(
+    problem: ContactProblem, times: Sequence[float], begin: float
+) -> tuple[float, ...]:
+    """Return the ends of steps; refuse times that do not increase, and contradictory supports.
+
+    Collective.
     """
-    return _uninterrupted(_reached(problem, settings, monitor, start, words))
-
-
-def _reached(
-    problem: ContactProblem,
-    settings: Options,
-    monitor: Monitor | None,
-    start: State | None,
-    words: str,
-) -> Solution:
-    """Solve as `solve_problem` does; what a signal has ended is a solution like others."""
-    begin = time.perf_counter()
-    if start is not None:
-        start = _begun(problem, start)
-    with stop_on_signal(problem.comm, monitor) as stop:
-        method = METHODS[settings.method](problem, settings, stop)
-        setup = time.perf_counter() - begin
-        state, outcome = solve_step(problem, method, start)
-    history, counters = method.history, method.counters
-    # Its operators are most of what there is in memory, which what is said of the solution needs.
-    del method
-    check_potential(problem, state)
-    solution = Solution(
-        problem=problem,
-        state=state,
-        outcome=outcome,
-        history=history,
-        counters=counters,
-        method=settings.method,
-        start="zero slip" if start is None else words,
-        seconds={
-            "setup": setup,
-            "solve": time.perf_counter() - begin - setup,
-            "output": 0.0,
-        },
-    )
-    announce(solution)
-    return solution
-
-
-def _begun(problem: ContactProblem, start: State) -> State:
-    """Return a given start with the values that the problem prescribes. Collective."""
-    rest, nodes = problem.start(), problem.nodes.nodes.size
-    fits = start.x.shape == rest.x.shape and start.forces.pressure.shape == (nodes,)
-    if not problem.comm.allreduce(fits, op=MPI.LAND):
+    given = [*times] if isinstance(times, Iterable) and not isinstance(times, str) else []
+    numbers = len(given) > 0 and all(isinstance(time, Real) for time in given)
+    expect("times", times, "a list of times, the ends of the steps", numbers)
+    ends = tuple(float(time) for time in given)
+    if not np.all(np.isfinite(ends)) or np.any(np.diff([begin, *ends]) <= 0):
         raise InputError(
-            "start: given a state of another problem; accepted: one with the same mesh, elements "
-            "and contact nodes, on the same ranks"
+            f"times: given {', '.join(f'{time:g}' for time in ends)}; accepted: numbers that "
+            f"increase, the first above {begin:g}"
         )
-    x = problem.equilibrium.prescribe(start.x, problem.time)
-    return State(x, start.forces, problem.time, problem.history)
+    for end in ends:
+        check_supports(problem.at(end))
+    check_problem(problem.at(ends[-1]))
+    return ends

@@ -24,7 +24,6 @@ from contact.case.file import Case, load_case
 from contact.case.overrides import read_value
 from contact.case.text import literal, to_toml
 from contact.errors import InputError
-from contact.evolving import solve_steps
 from contact.mesh.domain import Domain
 from contact.methods.every import METHODS
 from contact.methods.interrupt import Interrupted, stop_on_signal
@@ -41,6 +40,7 @@ from contact.output.table import contact_table
 from contact.output.tables import write_csv
 from contact.problem.held import check_potential
 from contact.problem.problem import ContactProblem
+from contact.solving import Schedule, run_schedule
 
 logger = logging.getLogger("contact.sweep")
 
@@ -252,8 +252,8 @@ class _Runner:
         self._domain = problem.domain
         with named(case.source):
             if case.evolution is not None:
-                ends, rest = case.evolution.ends, case.evolution.times[0]
-                return solve_steps(problem, ends, case.solver, self._monitor, rest)
+                schedule = Schedule(case.evolution.ends, case.evolution.times[0])
+                return run_schedule(problem, case.solver, self._monitor, schedule)
             if self._method is None or before is None or not _alike(before, case):
                 self._method = METHODS[case.solver.method](
                     problem, self._settings(case), self._monitor

@@ -22,13 +22,13 @@ from matplotlib.figure import Figure
 from mpi4py import MPI
 from PIL import Image
 
-from contact import Case, InputError, Solution, solve, solve_problem
+from contact import Case, InputError, Solution, solve
+from contact.methods.every import METHODS
 from contact.methods.options import Options
 from contact.methods.report import Outcome, Record
 from contact.output.figures.figures import STYLE
 from contact.problem.problem import ContactProblem
 from contact.problem.state import State
-from contact.solving import METHODS
 
 #: Widths of figures of one column, 85 mm, and of two (inches).
 ONE_COLUMN, TWO_COLUMNS = 85 / 25.4, 175 / 25.4
@@ -181,7 +181,7 @@ def solved(case: Case, problem: ContactProblem | None = None) -> Solution:
     InputError
         If it does not converge: no table or figure shows such numbers.
     """
-    solution = solve(case) if problem is None else solve_problem(problem, case.solver)
+    solution = solve(case) if problem is None else solve(problem, case.solver)
     solution.units = case.case.units
     if not solution.converged:
         raise InputError(f"{case.title}: {solution.outcome.reason}")

@@ -20,7 +20,7 @@ from typing import Any
 import numpy as np
 from mpi4py import MPI
 
-from contact import Case, build_problem, load_case, solve_problem
+from contact import Case, build_problem, load_case, solve
 from contact.case.file import parse_case
 from contact.case.mesh import Mesh
 from contact.linear.operator import SparseOperator
@@ -93,14 +93,14 @@ def described(solution: Solution) -> dict[str, Any]:
 
 def warm(case: Case, coarse: Callable[[], Case]) -> None:
     """Compile the forms of a case on a small mesh."""
-    solve_problem(build_problem(coarse()), case.solver)
+    solve(build_problem(coarse()), case.solver)
 
 
 def bar_with_constant_friction(n: str, mu: str) -> dict[str, Any]:
     """Measure the problem that GetFEM solves too."""
     case = bar(int(n), -0.005, 1.0, "material.law=linear", f"friction.mu={mu}")
     warm(case, lambda: bar(4, -0.005, 1.0, "material.law=linear", f"friction.mu={mu}"))
-    return described(solve_problem(build_problem(case), case.solver))
+    return described(solve(build_problem(case), case.solver))
 
 
 def hertz_with_constant_friction(path: str, mu: str) -> dict[str, Any]:
@@ -108,14 +108,14 @@ def hertz_with_constant_friction(path: str, mu: str) -> dict[str, Any]:
     case = load_case(CASES / "hertz.toml", [f"friction.mu={mu}"])
     case = case.model_copy(update={"mesh": Mesh(file=path)})
     warm(case, lambda: load_case(CASES / "hertz.toml", [f"friction.mu={mu}"]))
-    return described(solve_problem(build_problem(case), case.solver))
+    return described(solve(build_problem(case), case.solver))
 
 
 def block_with_constant_friction(n: str, mu: str) -> dict[str, Any]:
     """Measure the block that GetFEM solves too."""
     case = block(int(n), LINEAR, float(mu))
     warm(case, lambda: block(4, LINEAR, float(mu)))
-    return described(solve_problem(build_problem(case), case.solver))
+    return described(solve(build_problem(case), case.solver))
 
 
 def one_linear_solve(problem: ContactProblem) -> tuple[float, int]:
@@ -133,7 +133,7 @@ def one_linear_solve(problem: ContactProblem) -> tuple[float, int]:
 def solved(case: Case, problem: ContactProblem, start: str) -> Solution:
     """Solve from zero: on the finest mesh alone if the start is cold, else as the program does."""
     begun = nested_start(case, problem) if start != "cold" and pays(case, problem) else None
-    return solve_problem(problem, case.solver, start=begun)
+    return solve(problem, case.solver, start=begun)
 
 
 def ratio(dimension: str, n: str, start: str = "") -> dict[str, Any]:

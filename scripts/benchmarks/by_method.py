@@ -9,7 +9,7 @@ import time
 from collections.abc import Iterator, Sequence
 from typing import Any
 
-from contact import Case, build_problem, load_case, solve_problem
+from contact import Case, build_problem, load_case, solve
 from contact.methods.options import NewtonOptions
 from contact.nesting import nested_start
 from scripts.cases import CASES, TABLE_8_4
@@ -47,9 +47,7 @@ def measured(case: Case) -> dict[str, Any]:
     problem = build_problem(case)
     begin = time.process_time()
     nested = isinstance(case.solver, NewtonOptions) and case.solver.nested
-    solution = solve_problem(
-        problem, case.solver, start=nested_start(case, problem) if nested else None
-    )
+    solution = solve(problem, case.solver, start=nested_start(case, problem) if nested else None)
     counters = solution.counters
     return {
         "converged": solution.converged,

@@ -12,7 +12,7 @@ import time
 from collections.abc import Sequence
 from typing import Any
 
-from contact import build_problem, parse_case, solve_problem
+from contact import build_problem, parse_case, solve
 from scripts.reporting import Report, parser
 
 FRICTION = {"law": "coulomb", "mu": 0.3}
@@ -62,7 +62,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
         case = parse_case(data)
         problem = build_problem(case)
         begin = time.process_time()
-        solution = solve_problem(problem, case.solver)
+        solution = solve(problem, case.solver)
         seconds, counters = time.process_time() - begin, solution.counters
         rows.append(
             {

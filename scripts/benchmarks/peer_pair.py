@@ -20,7 +20,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 import meshes
-from contact import Case, build_problem, parse_case, solve_problem
+from contact import Case, build_problem, parse_case, solve
 from scripts.reporting import Report, parser
 
 SIZES = {"lower_size": 0.08, "upper_size": 0.06}
@@ -86,7 +86,7 @@ def compare(mu: float, finer: int) -> dict[str, Any]:
     case = given(mu, sizes)
     own_problem = build_problem(case)
     begin = time.process_time()
-    solution = solve_problem(own_problem, case.solver)
+    solution = solve(own_problem, case.solver)
     own_seconds = time.process_time() - begin
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "blocks.msh"

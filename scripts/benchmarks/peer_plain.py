@@ -21,7 +21,7 @@ from dolfinx import fem
 from dolfinx.fem.petsc import assemble_matrix, create_matrix
 from petsc4py import PETSc
 
-from contact import Solution, build_problem, solve_problem
+from contact import Solution, build_problem, solve
 from contact.problem.problem import ContactProblem
 from forms.hencky import Log, stress
 from forms.kinematics import embed, strain
@@ -178,10 +178,10 @@ def main(arguments: Sequence[str] | None = None) -> None:
     for n in (8,) if given.coarse else (32, 64):
         case = bar(n, LOAD, 1.0, f"friction.mu={MU}")
         problem = build_problem(case)
-        solve_problem(problem, case.solver)  # its forms are compiled
+        solve(problem, case.solver)  # its forms are compiled
         Plain(problem, 1.0)
         begin = time.process_time()
-        ours = solve_problem(problem, case.solver)
+        ours = solve(problem, case.solver)
         seconds = time.process_time() - begin
         for kappa in PENALTIES[1:3] if given.coarse else PENALTIES:
             rows.append({"cells a unit": n, **compare(ours, seconds, kappa)})

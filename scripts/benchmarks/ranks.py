@@ -14,8 +14,7 @@ from typing import Any
 from mpi4py import MPI
 from petsc4py import PETSc
 
-from contact import build_problem
-from contact.solving import solve_problem
+from contact import build_problem, solve
 from scripts.benchmarks.bench_one import block, memory, problem_case, unknowns, warm
 
 COMM = MPI.COMM_WORLD
@@ -45,7 +44,7 @@ def measure(dimension: int, n: int) -> dict[str, Any]:
     libraries = memory()
     problem = build_problem(case)
     before = told("KSPSolve"), told("PCSetUp")
-    solution = solve_problem(problem, case.solver)
+    solution = solve(problem, case.solver)
     size = unknowns(problem)
     result = {
         "ranks": COMM.size,

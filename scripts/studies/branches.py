@@ -10,6 +10,7 @@ from mpi4py import MPI
 from contact import Case, Solution
 from contact.case.nesting import has_coarser
 from contact.interface.multipliers import Multipliers
+from contact.methods.every import METHODS
 from contact.methods.method import Method
 from contact.methods.newton import Newton
 from contact.methods.options import NewtonOptions, Options
@@ -19,7 +20,6 @@ from contact.output.review import review
 from contact.problem.kkt import KKT, evaluate
 from contact.problem.problem import ContactProblem
 from contact.problem.state import State
-from contact.solving import METHODS
 from contact.typing import Array
 from scripts.studies.product_norm import ProductNorm
 

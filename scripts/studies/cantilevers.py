@@ -19,7 +19,7 @@ import ufl
 from dolfinx import fem
 from dolfinx.fem.petsc import LinearProblem
 
-from contact import build_problem, solve_problem
+from contact import build_problem, solve
 from contact.case.file import parse_case
 from contact.problem.problem import ContactProblem
 from scripts.benchmarks.bench_one import one_linear_solve
@@ -97,13 +97,13 @@ def compare(
     """Solve a problem, and time what stands beside it."""
     near, far = (parse_case(cantilever(load, cells, degree, mu, gap)) for gap in (GAP, FAR))
     problem, free = build_problem(near), build_problem(far)
-    solution = solve_problem(problem, near.solver)
-    solve_problem(free, far.solver)
-    seconds = median(lambda: solve_problem(problem, near.solver))
+    solution = solve(problem, near.solver)
+    solve(free, far.solver)
+    seconds = median(lambda: solve(problem, near.solver))
     others = {
         "dolfinx": median(lambda: plain(problem, load)),
         "bare": float(np.median([one_linear_solve(problem)[0] for _ in range(TIMES)])),
-        "free": median(lambda: solve_problem(free, far.solver)),
+        "free": median(lambda: solve(free, far.solver)),
     }
     return {
         "load": name,

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from matplotlib.ticker import NullLocator
 
-from contact import InputError, solve_problem
+from contact import InputError, solve
 from contact.methods.options import NewtonOptions
 from contact.problem.problem import ContactProblem
 from contact.typing import Array
@@ -96,7 +96,7 @@ def measured(series: Series, n: int, degree: int) -> tuple[Array, float]:
     for place in PLACES:
         exact = series.make((np.floor(0.53 * n) + place) / n)
         problem = series.problem(exact, n, degree)
-        solution = solve_problem(problem, NewtonOptions(tolerance=1e-10))
+        solution = solve(problem, NewtonOptions(tolerance=1e-10))
         if not solution.converged:
             raise InputError(f"{n} cells: {solution.outcome.reason}")
         given = series.pressure(exact, problem.nodes.points)

@@ -23,7 +23,7 @@ from typing import Any
 
 import numpy as np
 
-from contact import build_problem, solve_problem
+from contact import build_problem, solve
 from contact.case.file import parse_case
 from contact.history import BodyState
 from contact.linear.operator import Counters, SparseOperator
@@ -205,7 +205,7 @@ class ProjectedGradients:
 def by_interior_point(problem: ContactProblem) -> tuple[Counted, Array]:
     """Solve as the program does; return what it took, and the owned unknowns."""
     begin = time.process_time()
-    found = solve_problem(problem, NewtonOptions(linear="iterative"))
+    found = solve(problem, NewtonOptions(linear="iterative"))
     took, cycles = time.process_time() - begin, found.counters.linear_iterations
     x = problem.equilibrium.owned_part(found.state.x)
     # each iteration of conjugate gradients is a product and a cycle

@@ -24,7 +24,7 @@ from typing import Any
 
 import numpy as np
 
-from contact import Case, Solution, build_problem, solve_problem
+from contact import Case, Solution, build_problem, solve
 from contact.case.file import parse_case
 from contact.methods.interrupt import Terminated, ending_on_signal
 from contact.methods.options import OPTIONS, Options, with_method
@@ -97,7 +97,7 @@ def solved(case: Case, settings: Options) -> Solution | None:
     """Solve within the limit; nothing where that ends before or behind the solve itself."""
     try:
         with limited(LIMIT):
-            return solve_problem(build_problem(case), settings)
+            return solve(build_problem(case), settings)
     except SolveInterrupted as ended:
         return ended.solution
     except Terminated:

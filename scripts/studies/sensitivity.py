@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from mpi4py import MPI
 
-from contact import Solution, build_problem, load_case, solve_problem
+from contact import Solution, build_problem, load_case, solve
 from scripts.cases import CASES
 from scripts.reporting import ONE_COLUMN, Report, options, subplots
 
@@ -96,7 +96,7 @@ def run(sweep: Sweep, value: float, cells: tuple[int, int], domain: object) -> S
     """Solve with one value. Collective."""
     changes = (f"mesh.cells=[{cells[0]}, {cells[1]}]", f"{sweep.key}={value}", *sweep.changes)
     case = load_case(CASES / f"{sweep.case}.toml", ["solver.method=newton", *changes])
-    solution = solve_problem(build_problem(case, domain=domain), case.solver)  # type: ignore[arg-type]
+    solution = solve(build_problem(case, domain=domain), case.solver)  # type: ignore[arg-type]
     solution.units = case.case.units
     return solution
 

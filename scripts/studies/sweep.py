@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from mpi4py import MPI
 
-from contact import Solution, build_problem, solve_problem
+from contact import Solution, build_problem, solve
 from contact.case.file import Case, parse_case
 from contact.methods.options import OPTIONS, with_method
 from scripts.reporting import Report, append, parser
@@ -227,7 +227,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
         for method in given.methods:
             begin = time.perf_counter()
             settings = with_method(case.solver, OPTIONS[method])
-            solution = solve_problem(problem, settings)
+            solution = solve(problem, settings)
             notes = {r.note for r in solution.history.records}
             for word in ("kept", "lengthened", "tangent", "taken back"):  # of the method itself
                 notes = {note.replace(word, "").strip(" ,") for note in notes}

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from contact import Solution, build_problem, solve_problem
+from contact import Solution, build_problem, solve
 from scripts.cases import bar
 from scripts.reporting import Report, append, parser
 
@@ -64,7 +64,7 @@ def run(n: int, load: float, rho: float, *changes: str) -> Run:
     case = bar(n, load, rho, *changes)
     problem = build_problem(case)
     begin = time.perf_counter()
-    solution: Solution = solve_problem(problem, case.solver)
+    solution: Solution = solve(problem, case.solver)
     seconds = time.perf_counter() - begin
     # The frictionless start is record 0; a single loop has none.
     records = [r for r in solution.history.records if r.iteration > 0]

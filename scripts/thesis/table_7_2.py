@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from contact import Case, InputError, build_problem, solve_problem
+from contact import Case, InputError, build_problem, solve
 from contact.body.norms import errors
 from contact.case.file import Friction
 from contact.output.solution import Solution
@@ -49,7 +49,7 @@ def distance(reference: Solution, penalty: Solution) -> Distance:
 def penalty(problem: ContactProblem, n: int, load: float, eps: float, *changes: str) -> Solution:
     """Run Algorithm 3. Collective."""
     case = bar(n, load, RHO, "solver.method=penalty", f"solver.eps_contact={eps}", *changes)
-    return solve_problem(problem, case.solver)
+    return solve(problem, case.solver)
 
 
 def table(report: Report, n: int) -> None:
@@ -176,7 +176,7 @@ def study(report: Report, n: int, values: Sequence[float] = SMALL) -> dict[str, 
         measure = DualNorm(problem)
         for eps in values:
             small = ("solver.method=penalty", f"solver.eps_contact={eps}", "solver.max_outer=1000")
-            solution = checked(solve_problem(problem, _with(n, changes, *small).solver))
+            solution = checked(solve(problem, _with(n, changes, *small).solver))
             distances.append(distance(reference, solution))
             residuals.append(solution.outcome.kkt.equilibrium)
             dual.append(measure.pressure(reference.pressure - solution.pressure))

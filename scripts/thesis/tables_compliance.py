@@ -9,7 +9,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from contact import Case, Solution, build_problem, load_case, solve_problem
+from contact import Case, Solution, build_problem, load_case, solve
 from contact.mesh.domain import Domain
 from scripts.cases import CASES
 from scripts.reporting import Report, options
@@ -68,7 +68,7 @@ def case_of(name: str, cells: tuple[int, int], *changes: str) -> Case:
 
 def run(case: Case, domain: Domain | None = None) -> Solution:
     """Solve a case as far as its method gets. Collective."""
-    solution = solve_problem(build_problem(case, domain=domain), case.solver)
+    solution = solve(build_problem(case, domain=domain), case.solver)
     solution.title = case.title
     return solution
 

@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import pytest
 from mpi4py import MPI
 
-from contact import build_problem, solve_problem
+from contact import build_problem, solve
 from contact.methods.continuation import FIRST_PART, continuation
 from contact.methods.options import NewtonOptions
 from scripts.studies.sweep import problems
@@ -50,7 +50,7 @@ def test_a_bimorph_in_front_of_a_good_conductor():
     """Its nodes hover where the ramp of psi begins; Newton's loop alone goes to and fro."""
     ((_, case),) = problems(False, "bimorph-8", True)
     comm = MPI.COMM_WORLD
-    solution = solve_problem(build_problem(case, comm=comm), NewtonOptions())
+    solution = solve(build_problem(case, comm=comm), NewtonOptions())
     assert solution.converged, solution.outcome.reason
     assert solution.counters.linear_solves <= 2
     assert solution.counters.contact_solves <= 60

@@ -5,12 +5,12 @@ from dataclasses import replace
 import pytest
 
 from contact import evolve
-from contact.evolving import NotConvergedError
 from contact.methods.every import METHODS
 from contact.methods.options import NewtonOptions
 from contact.methods.report import Outcome
 from contact.methods.steps import Evolution
 from contact.problem.kkt import KKT
+from contact.solving import NotConvergedError
 from tests.problems.shaken import TIGHT, shaken
 
 

@@ -36,7 +36,7 @@ def largest(solution: Solution) -> float:
 @pytest.mark.usefixtures("small_is_large")
 @pytest.mark.parametrize(
     ("solver", "start", "iterations"),
-    [({}, "the solution on a coarser mesh", 5), ({"nested": False}, "zero slip", 6)],
+    [({}, "the solution on a coarser mesh", 5), ({"nested": False}, "the zero initial guess", 6)],
     ids=["nested", "cold"],
 )
 def test_a_block_costs_few_set_ups_and_iterations(

@@ -14,7 +14,7 @@ CASE = -0.05, 1e5, "friction.mu=0.5"
 def test_a_large_body_that_yields_is_factorised_once(monkeypatch: pytest.MonkeyPatch) -> None:
     """The tangent is that of a coarser mesh's solution, without being asked for."""
     cold = solve(bar(32, *CASE))
-    assert cold.start == "zero slip"
+    assert cold.start == "the zero initial guess"
     monkeypatch.setitem(nesting.MANY, 2, 8000)
     found = solve(bar(32, *CASE))
     assert found.start == "the solution on a coarser mesh"
@@ -30,4 +30,4 @@ def test_a_large_body_that_yields_is_factorised_once(monkeypatch: pytest.MonkeyP
 def test_else_it_starts_from_rest(monkeypatch: pytest.MonkeyPatch, change: str) -> None:
     """A linear body is factorised once in any case; a part may not end on the coarser grid."""
     monkeypatch.setitem(nesting.MANY, 2, 100)
-    assert solve(bar(8, *CASE, change)).start == "zero slip"
+    assert solve(bar(8, *CASE, change)).start == "the zero initial guess"

@@ -6,7 +6,6 @@ from mpi4py import MPI
 from contact import evolve
 from contact.body.amplitude import Tabulated
 from contact.body.description import Body, Load
-from contact.evolving import NotConvergedError
 from contact.interface.friction import Friction
 from contact.mesh.grid import rectangle
 from contact.methods.newton import Newton
@@ -15,7 +14,7 @@ from contact.methods.steps import Evolution
 from contact.problem.contact import Contact
 from contact.problem.problem import ContactProblem
 from contact.problem.state import State
-from contact.solving import solve
+from contact.solving import NotConvergedError, solve
 from forms.hencky import Linear
 from forms.laws import ConstantCoefficient
 from tests.problems.mechanics import constant, flat

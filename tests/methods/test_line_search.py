@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from contact import build_problem, solve_problem
+from contact import build_problem, solve
 from contact.methods.line_search import FLAT, lengthened
 from contact.methods.options import NewtonOptions
 from scripts.studies.sweep import problems
@@ -42,14 +42,14 @@ def test_far_beyond_yield(name, solves):
     """Strains of 8, and of 3e4: 12 and 14 solves before. Sparse steps, never lengthened, agree."""
     ((_, case),) = problems(False, name, True)
     problem = build_problem(case)
-    solution = solve_problem(problem, NewtonOptions(tolerance=1e-10))
+    solution = solve(problem, NewtonOptions(tolerance=1e-10))
     assert solution.converged, solution.outcome.reason
     notes = [record.note for record in solution.history.records]
     assert any("lengthened" in note for note in notes)
-    rough = solve_problem(problem, NewtonOptions())
+    rough = solve(problem, NewtonOptions())
     assert rough.counters.linear_solves <= solves
     options = replace(NewtonOptions(tolerance=1e-10), condense=False)
-    other = solve_problem(problem, options)
+    other = solve(problem, options)
     assert other.converged, other.outcome.reason
     assert not any("lengthened" in record.note for record in other.history.records)
     u, v = solution.displacement.x.array, other.displacement.x.array

@@ -214,7 +214,7 @@ def test_the_warning_says_where_the_iteration_started(nested: bool) -> None:
         friction={"law": "coulomb", "mu": {"law": "slip", "rho": 1e4}},
         solver={"nested": nested},
     )
-    start = "the solution on a coarser mesh" if nested else "zero slip"
+    start = "the solution on a coarser mesh" if nested else "the zero initial guess"
     assert any(f"reached from {start}" in text for text in solve(case).warnings)
 
 

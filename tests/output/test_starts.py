@@ -30,7 +30,7 @@ def test_a_solution_is_found_again_at_once(options):
     assert cold.converged and warm.converged
     assert sum(r.inner for r in warm.history.records) < sum(r.inner for r in cold.history.records)
     assert warm.contact_force == pytest.approx(cold.contact_force, rel=1e-6)
-    assert (cold.start, warm.start) == ("zero slip", "the state that was given")
+    assert (cold.start, warm.start) == ("the zero initial guess", "the state that was given")
 
 
 def test_the_solution_of_a_case_starts_another():

@@ -10,13 +10,13 @@ from contact.errors import InputError, SingularError
 from contact.interface.friction import Friction
 from contact.interface.obstacle import GapFunction
 from contact.linear.operator import SparseOperator
+from contact.methods.every import METHODS
 from contact.methods.options import OPTIONS
 from contact.output.balances import charge_balance
 from contact.output.table import contact_table
 from contact.problem.contact import Contact
 from contact.problem.held import check_held
 from contact.problem.problem import ContactProblem
-from contact.solving import METHODS
 from forms.hencky import Linear
 from forms.laws import ConstantCoefficient
 from tests.problems.blocks import Blocks

@@ -2,7 +2,7 @@
 
 import pytest
 
-from contact import build_problem, solve_problem
+from contact import build_problem, solve
 from contact.methods.options import NewtonOptions
 from scripts.studies.sweep import problems
 
@@ -19,7 +19,7 @@ def test_what_takes_no_block_relaxation(name, whole, dense):
     problem was taken 3e12 away from rest: a fifth of its load was rounding there.
     """
     ((_, case),) = problems(False, name, True)
-    solution = solve_problem(build_problem(case), NewtonOptions())
+    solution = solve(build_problem(case), NewtonOptions())
     assert solution.converged, solution.outcome.reason
     assert solution.counters.linear_solves <= whole
     assert solution.counters.contact_solves <= dense
@@ -34,7 +34,7 @@ def test_contact_forces_that_are_all_rounding_are_none(condense):
     relaxation at the contact nodes, the direct solver's among them.
     """
     ((_, case),) = problems(False, "lifted-4", True)
-    solution = solve_problem(build_problem(case), NewtonOptions(condense=condense))
+    solution = solve(build_problem(case), NewtonOptions(condense=condense))
     assert solution.converged, solution.outcome.reason
     assert solution.counters.linear_solves <= 8
     assert {record.note for record in solution.history.records} == {""}

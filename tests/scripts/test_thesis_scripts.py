@@ -5,7 +5,7 @@ import csv
 import numpy as np
 import pytest
 
-from contact import build_problem, solve_problem
+from contact import build_problem, solve
 from contact.case.file import Friction
 from scripts.cases import bar
 from scripts.reporting import Report
@@ -46,11 +46,11 @@ def test_the_dual_norm_of_a_pressure_is_the_energy_that_it_makes():
     case = bar(4, -0.005, 1e4, "material={law='linear', young=1.0, poisson=0.3}")
     case = case.model_copy(update={"friction": Friction()})
     problem = build_problem(case)
-    exact = solve_problem(problem, case.solver)
+    exact = solve(problem, case.solver)
     measure, distances = DualNorm(problem), []
     for eps in (1e-2, 1e-3):
         options = bar(4, -0.005, 1e4, "solver.method=penalty", f"solver.eps_contact={eps}").solver
-        penalised = solve_problem(problem, options)
+        penalised = solve(problem, options)
         distances.append(measure.pressure(exact.pressure - penalised.pressure))
         moved = measure.displacement(exact.state.x, penalised.state.x)
         assert distances[-1] == pytest.approx(moved, rel=1e-6)

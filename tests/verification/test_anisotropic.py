@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
+from contact import solve
 from contact.body.description import Body, Fixed
 from contact.interface.friction import Friction
 from contact.interface.obstacle import Plane
@@ -12,7 +13,6 @@ from contact.mesh.grid import box, rectangle
 from contact.methods.options import NewtonOptions
 from contact.problem.contact import Contact
 from contact.problem.problem import ContactProblem
-from contact.solving import solve_problem
 from forms.crystal import PLANE, about_z
 from forms.elasticity import Anisotropic, isotropic
 from forms.hencky import Linear
@@ -36,7 +36,7 @@ def pressed(dim, law, piezo=None, degrees=0.0, axis=(0.0, 1.0, 0.0), degree=1):
     plate = Plane((0.0,) * dim, normal)
     friction = Friction(ConstantCoefficient(0.25))
     problem = ContactProblem(domain, body, Contact("bottom", plate), friction, degree=degree)
-    solution = solve_problem(problem, NewtonOptions(tolerance=1e-12))
+    solution = solve(problem, NewtonOptions(tolerance=1e-12))
     assert solution.converged
     nodes = problem.nodes
     back = nodes.points @ q

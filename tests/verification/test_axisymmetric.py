@@ -9,6 +9,7 @@ from dolfinx import fem
 from mpi4py import MPI
 
 import contact
+from contact import solve
 from contact.body.description import Body, Fixed
 from contact.body.norms import errors, volume
 from contact.case.file import parse_case
@@ -27,7 +28,6 @@ from contact.output.figures.figures import collect
 from contact.problem.contact import Contact
 from contact.problem.held import check_held
 from contact.problem.problem import ContactProblem
-from contact.solving import solve_problem
 from forms.hencky import Linear
 from tests.problems.mechanics import Affine, constant, flat
 from tests.problems.piezo import SCALED, pzt
@@ -36,8 +36,8 @@ from tests.problems.revolution import Drum, PoledCylinder, Tube, half_plane, pre
 pytestmark = pytest.mark.parallel
 
 
-def solve(problem, options=None):
-    solution = solve_problem(problem, options or NewtonOptions(tolerance=1e-10))
+def solved(problem, options=None):
+    solution = solve(problem, options or NewtonOptions(tolerance=1e-10))
     assert solution.converged, solution.outcome.reason
     return solution
 
@@ -46,7 +46,7 @@ def orders(make, cells, degree):
     found = []
     for n in cells:
         problem = make.problem(n, degree)
-        solution = solve(problem)
+        solution = solved(problem)
         e = errors(problem.equilibrium, solution.state.x, make.displacement)
         found.append((e.h1, e.energy, e.l2))
     return np.log2(np.array(found[-2]) / np.array(found[-1])), solution
@@ -79,7 +79,7 @@ def test_a_hencky_cylinder_with_its_axis(degree, cells):
 @pytest.mark.parametrize("degree", [1, 2])
 def test_a_poled_cylinder(degree):
     column = PoledCylinder(SCALED.law(), pzt(2))
-    solution = solve(column.problem(degree))
+    solution = solved(column.problem(degree))
     assert solution.contact_force == pytest.approx([0.0, -column.force], rel=1e-8, abs=1e-9)
     balance = charge_balance(solution.problem, solution.state)
     assert balance.electrodes["top"] == pytest.approx(column.charge, rel=1e-8)
@@ -93,17 +93,17 @@ def test_a_poled_cylinder(degree):
 @pytest.mark.parametrize("degree", [1, 2])
 def test_methods_agree(comm, degree):
     """A rough plate, a smoothed pressure, a material that yields."""
-    newton = solve(pressed_cylinder(comm, 6, degree, 0.3))
+    newton = solved(pressed_cylinder(comm, 6, degree, 0.3))
     status = np.concatenate(comm.allgather(newton.status))
     assert {"stick", "slip"} <= set(status)
     assert force_balance(newton.problem, newton.state).imbalance < 1e-12
     # 2 pi times the integral of (0.02 + 0.03 r^2) r.
     assert newton.contact_force == pytest.approx([0.0, -np.pi * 0.035], rel=1e-9)
-    uzawa = solve(pressed_cylinder(comm, 6, degree, 0.3), FixedPointOptions(tolerance=1e-9))
+    uzawa = solved(pressed_cylinder(comm, 6, degree, 0.3), FixedPointOptions(tolerance=1e-9))
     scale = newton.problem.nodes.maximum(newton.pressure)
     assert np.abs(uzawa.pressure - newton.pressure).max(initial=0.0) < 1e-6 * scale
     given = PenaltyOptions(eps_contact=1e-6, eps_slip=1e-8, tolerance=1e-4)
-    penalty = solve_problem(pressed_cylinder(comm, 6, degree, 0.3), given)
+    penalty = solve(pressed_cylinder(comm, 6, degree, 0.3), given)
     assert np.abs(penalty.pressure - newton.pressure).max(initial=0.0) < 1e-2 * scale
 
 
@@ -140,7 +140,7 @@ def test_p2_has_no_contact_node_on_the_axis(comm):
 
 def test_the_iterative_solver_knows_the_one_rigid_motion(comm):
     problem = pressed_cylinder(comm, 12)  # one mesh: another may be cut otherwise among the ranks
-    direct = solve(problem)
+    direct = solved(problem)
     loop = Newton(problem, NewtonOptions(tolerance=1e-9, linear="iterative", condense=False))
     state, outcome = loop.solve()
     assert outcome.converged

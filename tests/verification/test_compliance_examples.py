@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from contact import InputError, Solution, build_problem, load_case, solve, solve_problem
+from contact import InputError, Solution, build_problem, load_case, solve
 from contact.case.formula import Expression
 from contact.interface.friction import Friction
 from contact.interface.layer import Layer
@@ -81,7 +81,7 @@ def test_layer_without_stiffness_is_signorini(name, method):
         soft.body,
         replace(soft.contacts[0], layer=None),
     )
-    a, b = (solve_problem(problem, case.solver) for problem in (soft, bare))
+    a, b = (solve(problem, case.solver) for problem in (soft, bare))
     assert a.converged
     assert b.converged
     assert close(a, b, 1e-12)
@@ -185,7 +185,7 @@ def test_other_friction_laws_on_a_layer(law):
         problem.body,
         replace(problem.contacts[0], friction=laws[law]),
     )
-    solution = solve_problem(problem, case.solver)
+    solution = solve(problem, case.solver)
     assert solution.converged, solution.outcome
     size = np.linalg.norm(solution.friction, axis=1)
     slips = solution.status == "slip"
@@ -221,7 +221,7 @@ def test_ranks_agree(name):
     case = load_case(CASES / f"compliance-{name}.toml", exact)
     tables = []
     for comm in (MPI.COMM_WORLD, MPI.COMM_SELF):
-        solution = solve_problem(build_problem(case, comm), case.solver)
+        solution = solve(build_problem(case, comm), case.solver)
         assert solution.converged, solution.outcome
         tables.append(contact_table(solution))
     if MPI.COMM_WORLD.rank > 0:

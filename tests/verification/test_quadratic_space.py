@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
+from contact import solve
 from contact.body.description import Body, Fixed
 from contact.interface.obstacle import Sphere
 from contact.mesh.grid import box
@@ -13,7 +14,6 @@ from contact.methods.options import FixedPointOptions, NewtonOptions, PenaltyOpt
 from contact.output.table import contact_table
 from contact.problem.contact import Contact
 from contact.problem.problem import ContactProblem
-from contact.solving import solve_problem
 from forms.hencky import Linear
 from tests.problems.mechanics import constant, leaning_block
 from tests.problems.piezo import Column, potential
@@ -38,9 +38,9 @@ METHODS = {
 @pytest.mark.parametrize("name", METHODS)
 def test_all_methods_find_the_same_pressures(name):
     """Friction, yield, and a clamped side: nodes without forces whose neighbours have some."""
-    found = solve_problem(leaning_block(SELF, 2, 2), NewtonOptions(tolerance=1e-10))
+    found = solve(leaning_block(SELF, 2, 2), NewtonOptions(tolerance=1e-10))
     options, tolerance = METHODS[name]
-    other = solve_problem(leaning_block(SELF, 2, 2), options)
+    other = solve(leaning_block(SELF, 2, 2), options)
     assert found.converged and other.converged
     for one, two in ((found.pressure, other.pressure), (found.friction, other.friction)):
         assert np.abs(one - two).max() < tolerance * np.abs(found.pressure).max()
@@ -55,7 +55,7 @@ def test_no_node_is_in_the_ball():
     problem = ContactProblem(
         domain, Body(Linear(1.0, 0.3), [lifted]), Contact("top", ball), degree=2
     )
-    solution = solve_problem(problem, NewtonOptions(tolerance=1e-10))
+    solution = solve(problem, NewtonOptions(tolerance=1e-10))
     points = problem.equilibrium.space.tabulate_dof_coordinates()
     top = np.abs(points[:, 2]) < 1e-9
     u = solution.state.x.reshape(-1, 3)[top]
@@ -95,7 +95,7 @@ def test_current_through_nodes_that_are_held(comm, method):
     held = problem.interface.held
     assert held is not None
     assert comm.allreduce(held.jump.nodes.size) > 0
-    solution = solve_problem(problem, replace(method, tolerance=1e-10))
+    solution = solve(problem, replace(method, tolerance=1e-10))
     assert solution.converged
     _, bottom = column.solution()
     found = potential(problem, solution.state)
