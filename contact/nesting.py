@@ -90,8 +90,7 @@ def prolong(coarse: ContactProblem, state: State, fine: ContactProblem) -> State
     forces = np.column_stack([state.forces.pressure, state.forces.friction])
     points = coarse.nodes.gather(coarse.nodes.points)
     values = _interpolate(points, coarse.nodes.gather(forces), fine.nodes.points)
-    friction = np.einsum("nij,nj->ni", fine.nodes.tangent, values[:, 1:])
-    multipliers = Multipliers(project_half_line(values[:, 0]), friction)
+    multipliers = Multipliers.of(fine.nodes, project_half_line(values[:, 0]), values[:, 1:])
     history = transferred(state.history, coarse, fine)
     return State(body.prescribe(x, fine.time), multipliers, fine.time, history)
 

@@ -111,7 +111,7 @@ class Interface:
         All that friction does looks at this. For a static problem, one step from rest, it is
         u_tau itself.
         """
-        return self.jump.tangential_component(nodal) - self.friction.history.jump
+        return self.jump.tangential_component(nodal[:, : self.dim] - self.friction.history.jump)
 
     def commit(self, nodal: Array) -> SlipHistory:
         """Return the slip history of the next step, where this one ends at nodal unknowns."""
@@ -132,7 +132,7 @@ class Interface:
 
     def stress(self, nodal: Array, forces: Multipliers) -> Array:
         """Return -sigma nu, layer included, shape (n, d)."""
-        return self.pressure(nodal, forces)[:, None] * self.jump.normal + forces.friction
+        return Multipliers(self.pressure(nodal, forces), forces.friction).vectors(self.jump)
 
     def status(
         self,

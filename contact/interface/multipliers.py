@@ -30,6 +30,15 @@ class Multipliers:
         """Return vanishing contact forces."""
         return Multipliers(np.zeros(jump.gap.size), np.zeros(jump.normal.shape))
 
+    @staticmethod
+    def of(jump: Jump, pressure: Array, friction: Array) -> Multipliers:
+        """Return contact forces with the tangential part of vectors of shape (n, d).
+
+        All methods hand over theirs by this: what their arithmetic leaves along the normal is no
+        friction.
+        """
+        return Multipliers(pressure, jump.tangential_component(friction))
+
     def vectors(self, jump: Jump) -> Array:
-        """Return lambda_c nu + lambda_f, shape (n, d)."""
-        return self.pressure[:, None] * jump.normal + self.friction
+        """Return lambda_c nu + lambda_f, shape (n, d); of lambda_f the tangential part acts."""
+        return self.pressure[:, None] * jump.normal + jump.tangential_component(self.friction)

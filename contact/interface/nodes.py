@@ -135,8 +135,13 @@ class ContactNodes:
         return np.einsum("ni,ni->n", u[:, : self.dim], self.normal)
 
     def tangential_component(self, u: Array) -> Array:
-        """Return u_tau in the free tangential directions, shape (n, d)."""
-        return np.einsum("nij,nj->ni", self.tangent, u[:, : self.dim])
+        """Return u_tau in the free tangential directions, shape (n, d).
+
+        What is left along the normal is rounding of u_tau: the projector is applied twice, since
+        once leaves that of u, beside which u_tau may be small.
+        """
+        once = np.einsum("nij,nj->ni", self.tangent, u[:, : self.dim])
+        return np.einsum("nij,nj->ni", self.tangent, once)
 
     def sum(self, values: Array) -> float:
         """Return the lumped integral of nodal values over Gamma_3."""

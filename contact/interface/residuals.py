@@ -35,7 +35,8 @@ def interface_residuals(
     c = interface.elongation * interface.stiffness
     opening = interface.opening(nodal)
     contact = forces.pressure - project_half_line(forces.pressure + c * opening)
-    trial = forces.friction + c * interface.slip(nodal)
+    # What friction has along the normal is against the law wherever a node sticks or slips.
+    trial = interface.jump.tangential_component(forces.friction) + c * interface.slip(nodal)
     friction = forces.friction - project_disc(trial, bound)
     friction[np.isnan(bound)] = np.nan  # nothing is beyond what is no number
     # Where next to nothing presses, rounding is compared with the stress that closing would take,

@@ -12,6 +12,7 @@ from collections.abc import Callable
 from dataclasses import replace
 
 from contact.interface.linearised import Moduli
+from contact.interface.multipliers import Multipliers
 from contact.linear.operator import Counters
 from contact.methods.chord import WORTH, Kept
 from contact.methods.following import Following
@@ -126,6 +127,8 @@ class CondensedStep:
             self._kept.forget()
         elif not body.linear:
             new = self._kept.mixed(state, new)
+            jump, mixed = self.condensation.full.interface.jump, new.forces
+            new = replace(new, forces=Multipliers.of(jump, mixed.pressure, mixed.friction))
         notes = [record.note for record in history.records]
         taken = [word for word in self._fallbacks if any(word in note for note in notes)]
         note = ", ".join([*["kept"] * keep, *["lengthened"] * (length > 1), *taken])

@@ -185,7 +185,7 @@ class InteriorPoint:
         pressure, friction = np.zeros(jump.weight.size), np.zeros(jump.normal.shape)
         pressure[self._near] = cones.force / jump.weight[self._near]
         friction[self._rubbing] = -cones.friction / jump.weight[self._rubbing, None]
-        return replace(self._state, forces=Multipliers(pressure, friction))
+        return replace(self._state, forces=Multipliers.of(jump, pressure, friction))
 
     def gap(self) -> float:
         """Return what slacks times forces are beside the work of loads and contact. Collective."""

@@ -166,7 +166,7 @@ class Newton:
         # the size of rounding, with friction of any direction, on which the node would stick.
         closed = touching(start.forces.pressure, interface.opening(nodal), c)
         pressure = np.where(closed, start.forces.pressure, 0.0)
-        forces = Multipliers(pressure, start.forces.friction)
+        forces = Multipliers.of(interface.jump, pressure, start.forces.friction)
         bound = interface.bound(nodal, forces)
         status = interface.status(nodal, forces, bound, c)
         return Iterate(replace(start, forces=forces), status)

@@ -249,7 +249,7 @@ class NewtonStep:
         moved = jump.apply(increment)
         change = np.einsum("nij,nj->ni", contact.blocks, moved)
         vectors = contact.forces.vectors(jump) + change[:, : interface.dim]
-        forces = Multipliers(jump.normal_component(vectors), jump.tangential_component(vectors))
+        forces = Multipliers.of(jump, jump.normal_component(vectors), vectors)
         pressed = jump.normal_component(np.einsum("nij,nj->ni", layer, moved))
         known = interface.response.layer_pressure(nodal) + shift + pressed
         # What follows a rigid part that has flown far and comes back follows it but for rounding.

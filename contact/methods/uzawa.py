@@ -248,6 +248,9 @@ def block_relaxation(
     for iteration in range(1, parameters.max_iterations + 1):
         if poll is not None:
             poll()
+        # Neither projections nor solves change what z has along the normal beside its first
+        # column: of rounding, the acceleration makes a pressure that no law sees.
+        z[:, 1:] = jump.tangential_component(z[:, 1:])
         multiplier = project(z)
         q = 2 * multiplier - z
         rhs = -step.residual
@@ -261,7 +264,7 @@ def block_relaxation(
         if iteration == 1:
             beside = interface.piece_norms(total)
         layer = 0.0 if law is None else law.layer(jump.normal_component(nodal))
-        forces = Multipliers(total[:, 0] - layer, total[:, 1:])
+        forces = Multipliers.of(jump, total[:, 0] - layer, total[:, 1:])
         if parameters.single_loop and step.friction:
             project.bound = interface.bound(nodal, forces)
         residual = max(interface_residuals(interface, nodal, forces, project.bound))

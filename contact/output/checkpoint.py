@@ -80,7 +80,7 @@ class Checkpoint:
         vectors[nodes] = self.contact_forces.x.array.reshape(-1, d)[given.dofmap.list]
         jump = problem.nodes
         local = vectors[jump.nodes]
-        forces = Multipliers(jump.normal_component(local), jump.tangential_component(local))
+        forces = Multipliers.of(jump, jump.normal_component(local), local)
         owned = np.concatenate([x.ravel()[: body.owned], self.motion])
         return State(body.local(owned), forces)
 

@@ -219,7 +219,9 @@ def _read(problem: ContactProblem, path: Path, where: NDArray[np.intp]) -> StepR
     said = json.loads(str(arrays["said"]))
     state = State(
         problem.equilibrium.local(np.concatenate([arrays["x"][where].ravel(), arrays["motion"]])),
-        Multipliers(arrays["pressure"][order[own]], arrays["friction"][order[own]]),
+        Multipliers.of(
+            problem.nodes, arrays["pressure"][order[own]], arrays["friction"][order[own]]
+        ),
         said["t"],
         problem.initial.replaced(history),
     )

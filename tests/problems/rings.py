@@ -1,0 +1,130 @@
+"""A ring between a plate and a lid: two contacts on one small body, a few nodes touch each."""
+
+from collections.abc import Mapping
+from typing import Any
+
+import basix.ufl
+import numpy as np
+import ufl
+from dolfinx import mesh as dmesh
+from mpi4py import MPI
+
+from contact.case.file import Case, parse_case
+from contact.mesh.domain import Domain, from_mesh
+
+#: Radii of the ring, and half the width and the height of plate and lid.
+INNER, OUTER, HALF, HEIGHT = 0.5, 1.0, 0.75, 0.5
+
+#: Young's modulus and Poisson's ratio of each body.
+MODULI = {"ring": (0.44, 0.45), "plate": (0.68, 0.2), "lid": (9.8, 0.45)}
+
+
+def between_plates(comm: MPI.Intracomm, seed: int, around: int = 28) -> Domain:
+    """Return the mesh; angles of the ring's nodes are irregular, and so are its facets' normals.
+
+    Regions and parts are `plate`, `ring` and `lid`; `plate_bottom`, `plate_top`, `ring_outside`,
+    `ring_inside`, `lid_bottom` and `lid_top`.
+    """
+    rng = np.random.default_rng(seed)
+    angle = -np.pi / 2 + 2 * np.pi * (np.arange(around) + rng.uniform(-0.2, 0.2, around)) / around
+    angle[0] = -np.pi / 2  # touches the plate; opposite to it is a facet or a node beside the top
+    radii = np.linspace(INNER, OUTER, 4)
+    ring = np.stack([np.outer(radii, np.cos(angle)), np.outer(radii, np.sin(angle))], axis=2)
+    ring[..., 1] -= ring[-1, :, 1].min()
+    points, cells = [ring.reshape(-1, 2)], [_quads(np.arange(4 * around).reshape(4, -1), True)]
+    for low, n in ((-HEIGHT, 11), (ring[-1, :, 1].max(), 12)):
+        x, y = np.meshgrid(np.linspace(-HALF, HALF, n + 1), low + HEIGHT * np.linspace(0, 1, 4))
+        number = sum(map(len, points)) + np.arange(x.size).reshape(x.shape)
+        points.append(np.stack([x.ravel(), y.ravel()], axis=1))
+        cells.append(_quads(number, False))
+    x, triangles = np.concatenate(points), np.concatenate(cells).astype(np.int64)
+    if comm.rank > 0:
+        x, triangles = x[:0], triangles[:0]
+    element = basix.ufl.element("Lagrange", "triangle", 1, shape=(2,), dtype=np.float64)
+    mesh = dmesh.create_mesh(comm, cells=triangles, x=x, e=ufl.Mesh(element))
+    return from_mesh(mesh, *_named(mesh, comm.bcast(points[2][0, 1] if comm.rank == 0 else 0.0)))
+
+
+def _quads(number: np.ndarray, closed: bool) -> np.ndarray:
+    """Return two triangles for each cell of a grid of nodes; closed along its second index."""
+    beside = np.roll(number, -1, axis=1)
+    last = None if closed else -1
+    a, b = number[:-1, :last].ravel(), beside[:-1, :last].ravel()
+    c, d = number[1:, :last].ravel(), beside[1:, :last].ravel()
+    return np.concatenate([np.stack([a, b, d], 1), np.stack([a, d, c], 1)])
+
+
+def _named(mesh: dmesh.Mesh, top: float) -> tuple[dict, float, dict]:
+    """Return parts, what they are found by, and regions; the lid begins at a height."""
+    mesh.topology.create_connectivity(1, 2)
+    facets = dmesh.exterior_facet_indices(mesh.topology)
+    to_cell = mesh.topology.connectivity(1, 2)
+    inside = dmesh.compute_midpoints(mesh, 2, to_cell.array[to_cell.offsets[facets]])[:, 1]
+    middle = dmesh.compute_midpoints(mesh, 1, facets)
+    every = np.arange(mesh.topology.index_map(2).size_local, dtype=np.int32)
+    centre = dmesh.compute_midpoints(mesh, 2, every)[:, 1]
+
+    def at(height):
+        return np.abs(middle[:, 1] - height) < 1e-9
+
+    outside = np.linalg.norm(middle[:, :2] - [0.0, top / 2], axis=1) > (INNER + OUTER) / 2
+    parts = {
+        "plate_bottom": at(-HEIGHT),
+        "plate_top": at(0.0) & (inside < 0),
+        "ring_outside": outside & (inside > 0) & (inside < top),
+        "ring_inside": ~outside,
+        "lid_bottom": at(top) & (inside > top),
+        "lid_top": at(top + HEIGHT),
+    }
+    regions = {
+        "plate": np.flatnonzero(centre < 0),
+        "ring": np.flatnonzero((centre > 0) & (centre < top)),
+        "lid": np.flatnonzero(centre > top),
+    }
+    return {name: facets[there] for name, there in parts.items()}, 2.0, regions
+
+
+def squeezed(
+    method: str,
+    moduli: Mapping[str, tuple[float, float]] = MODULI,
+    side: str = "ring_outside",
+    way: float = -0.01,
+    file: str | None = None,
+    guided: bool = False,
+    **solver: object,
+) -> Case:
+    """Return the case: the lid goes down a little, both flat sides `against` the ring.
+
+    Parameters
+    ----------
+    method, solver
+        The method, and its options.
+    moduli
+        Young's modulus and Poisson's ratio of each region.
+    side
+        The part of the ring.
+    way
+        Displacement of the lid's top.
+    file
+        The mesh; None if it is given otherwise.
+    guided
+        Whether supports keep the ring from moving sideways and rolling.
+    """
+    tables: dict[str, Any] = {
+        "material": [
+            {"on": on, "young": young, "poisson": nu} for on, (young, nu) in moduli.items()
+        ],
+        "fixed": [
+            {"on": "plate_bottom", "displacement": [0.0, 0.0]},
+            {"on": "lid_top", "displacement": [0.0, way]},
+            *([{"on": "ring_inside", "displacement": [0.0, "free"]}] if guided else []),
+        ],
+        "contact": [
+            {"on": on, "against": side, "friction": {"law": "coulomb", "mu": 0.2}}
+            for on in ("plate_top", "lid_bottom")
+        ],
+        "solver": {"method": method, **solver},
+    }
+    if file is None:
+        return parse_case(tables, without=("mesh",))
+    return parse_case({"mesh": {"file": file}, **tables})
