@@ -33,11 +33,11 @@ from contact.methods.predictor import Reached, predicted
 from contact.methods.report import Monitor, tell
 from contact.methods.steps import since, solve_step
 from contact.output.folder import on_root
+from contact.output.quantities import SWEEP, values_of
 from contact.output.rerun import difference
-from contact.output.rows import contact_columns, moving_columns
+from contact.output.results import Results
 from contact.output.solution import Solution
-from contact.output.table import contact_table
-from contact.output.tables import write_csv
+from contact.output.table import contact_table, write_csv
 from contact.problem.held import check_potential
 from contact.problem.problem import ContactProblem
 from contact.solving import Schedule, run_schedule
@@ -155,7 +155,8 @@ def sweep(
                 if solution.outcome.signal:
                     raise Interrupted(solution.outcome.signal)
                 seconds = comm.bcast(time.perf_counter() - begin)
-                row = {**point, **_row(solution), "seconds": seconds}
+                results = Results(solution, contact_table(solution))
+                row = {**point, **values_of(SWEEP, results), "seconds": seconds}
                 said = f"{', '.join(_set(point))}: {solution.outcome.reason}"
                 tell(logger, (len(rows) + 1) / len(cases), said)
             rows.append(row)
@@ -217,20 +218,6 @@ def _write(folder: Path, rows: Sequence[Mapping[str, Any]]) -> None:
     draft = folder / f".contact-{TABLE}"
     write_csv(draft, rows[0], (row.values() for row in rows))
     os.replace(draft, folder / TABLE)
-
-
-def _row(solution: Solution) -> dict[str, Any]:
-    """Return what the table says of a solution. Collective."""
-    return {
-        "converged": solution.converged,
-        **contact_columns(solution, contact_table(solution)),
-        "contact_area": solution.contact_area,
-        **moving_columns(solution),
-        "outer_iterations": len(solution.history.records),
-        "linear_solves": solution.counters.linear_solves,
-        "factorizations": solution.counters.factorizations,
-        "kkt": solution.outcome.kkt.largest,
-    }
 
 
 class _Runner:

@@ -22,6 +22,7 @@ from contact.body.constants import law_with_constants, piezo_with_constants
 from contact.body.description import Material
 from contact.body.equilibrium import BodyEquilibrium
 from contact.history import Evaluated
+from contact.output.quantities import BODY, values_of
 from contact.typing import Array
 from forms.hencky import stress
 from forms.kinematics import Axisymmetric, deviator_squared, strain, von_mises
@@ -95,6 +96,58 @@ class Extremes(NamedTuple):
     yields: bool
 
 
+class Point:
+    """A point of a body at some unknowns as the quantities see it, in UFL.
+
+    Parameters
+    ----------
+    body, material, at
+        The body, the material there, and the unknowns.
+    """
+
+    def __init__(self, body: BodyEquilibrium, material: Material, at: fem.Function) -> None:
+        mesh, revolved = body.domain.mesh, body.domain.revolved
+        u, self._phi = body.split(at)
+        # The nodes may lie on the axis.
+        kinematics = Axisymmetric(on_axis=True) if revolved else body.domain.kinematics
+        self._dim, self.strain = body.dim, strain(u, kinematics)
+        self._piezo = material.piezo and piezo_with_constants(material.piezo, mesh)
+        self.law = body.variables.law_of_means(law_with_constants(material.law, mesh))
+        self.stress = stress(self.law, self.strain)
+        if self._piezo is not None:
+            self.stress += coupling_stress(self._piezo, self._phi)
+
+    @property
+    def von_mises(self) -> Expr:
+        """The von Mises stress."""
+        return von_mises(self.stress)
+
+    @property
+    def dev_strain(self) -> Expr:
+        """The norm of the strain deviator: rounding can make its square slightly negative."""
+        return sqrt(maximum(deviator_squared(self.strain), 0.0))
+
+    @property
+    def electric_displacement(self) -> Expr | None:
+        """D; None for a body without a potential."""
+        if self._piezo is None:
+            return self._nothing
+        found = electric_displacement(self._piezo, self.strain, self._phi)
+        return ufl.as_vector([found[i] for i in range(self._dim)])
+
+    @property
+    def electric_field(self) -> Expr | None:
+        """E = -grad phi, likewise."""
+        if self._piezo is None:
+            return self._nothing
+        return ufl.as_vector([-ufl.grad(self._phi)[i] for i in range(self._dim)])
+
+    @property
+    def _nothing(self) -> Expr | None:
+        """Zeros in a material without coupling."""
+        return None if self._phi is None else ufl.as_vector([0.0] * self._dim)
+
+
 class DerivedFields:
     """Fields derived from the unknowns of a body. The methods are collective.
 
@@ -106,23 +159,17 @@ class DerivedFields:
     Attributes
     ----------
     shapes
-        Name -> shape of the value: stress (3, 3), von_mises (), dev_strain () and, for a
-        piezoelectric body, electric_displacement (d,) and electric_field (d,); then the internal
-        variables of the materials. The third axis of the stress of a body of revolution is that of
-        theta.
+        Name -> shape of the value, for instance (3, 3) of the stress, whose third axis is that of
+        theta in a body of revolution; then the internal variables of the materials.
     """
 
     def __init__(self, body: BodyEquilibrium, state: Evaluated) -> None:
         self.body = body
         self.move_to(state)
+        at = Point(body, body.body.materials[0], fem.Function(body.space))
         self.shapes: dict[str, tuple[int, ...]] = {
-            "stress": (3, 3),
-            "von_mises": (),
-            "dev_strain": (),
+            name: expression.ufl_shape for name, expression in values_of(BODY, at).items()
         }
-        if body.piezoelectric:
-            self.shapes["electric_displacement"] = (body.dim,)
-            self.shapes["electric_field"] = (body.dim,)
         self.shapes |= body.variables.shapes
 
     @property
@@ -146,27 +193,10 @@ class DerivedFields:
 
     def _expression(self, material: Material, at: fem.Function) -> Expr:
         """Return all components of a material's fields, one after the other."""
-        body, mesh = self.body, self.body.domain.mesh
-        u, phi = body.split(at)
-        # The nodes may lie on the axis.
-        revolved = body.domain.revolved
-        kinematics = Axisymmetric(on_axis=True) if revolved else body.domain.kinematics
-        eps = strain(u, kinematics)
-        law = body.variables.law_of_means(law_with_constants(material.law, mesh))
-        sigma = stress(law, eps)
-        induced: list[Expr] = []
-        if material.piezo is not None:
-            constants = piezo_with_constants(material.piezo, mesh)
-            sigma = sigma + coupling_stress(constants, phi)
-            d = electric_displacement(constants, eps, phi)
-            induced = [d[i] for i in range(body.dim)]
-            induced += [-ufl.grad(phi)[i] for i in range(body.dim)]
-        elif phi is not None:
-            induced = [ufl.as_ufl(0.0)] * (2 * body.dim)
-        values = [sigma[i, j] for i in range(3) for j in range(3)]
-        # Rounding can make |dev eps|^2 slightly negative.
-        values += [von_mises(sigma), sqrt(maximum(deviator_squared(eps), 0.0))]
-        return ufl.as_vector(values + induced + body.variables.updated(law, eps))
+        point = Point(self.body, material, at)
+        fields = values_of(BODY, point).values()
+        values = [f[i] for f in fields for i in np.ndindex(f.ufl_shape)]
+        return ufl.as_vector(values + self.body.variables.updated(point.law, point.strain))
 
     def _chunks(self) -> Iterator[tuple[NDArray[np.int32], Array]]:
         """Yield owned cells and the values there, shape (cells, points, components)."""

@@ -13,12 +13,12 @@ from contact.kinds import expect
 from contact.output.field_files import write_fields, write_share
 from contact.output.folder import ResultFolder, on_root, result_folder
 from contact.output.opposite import AGAINST, opposite_surface, opposite_table
+from contact.output.quantities import HISTORY, quantities, values_of
+from contact.output.results import summarise
 from contact.output.solution import Solution
 from contact.output.steps import write_steps
-from contact.output.summary import summarise
 from contact.output.surface import contact_surface
-from contact.output.table import contact_table
-from contact.output.tables import write_table, write_tables
+from contact.output.table import contact_table, csv_columns, write_csv, write_table
 
 
 def write_outputs(
@@ -69,7 +69,10 @@ def _replace(solution: Solution, folder: ResultFolder, figures: bool) -> None:
         def write_contact() -> None:
             assert table is not None
             assert surface is not None
-            write_tables(solution, table, new)
+            write_table(csv_columns(table), new / "contact.csv")
+            rows = [values_of(HISTORY, record) for record in solution.history.records]
+            header = [quantity.name for quantity in quantities(HISTORY)]
+            write_csv(new / "history.csv", header, (row.values() for row in rows))
             if solution.steps:
                 write_steps(solution.steps, new)
             write_share(MPI.COMM_SELF, surface, new / "contact.vtu")

@@ -9,7 +9,6 @@ from scipy import linalg
 
 from contact.output.assumptions import Remark
 from contact.output.solution import Solution
-from contact.output.summary import largest_displacement
 from contact.problem.kkt import residual_forces
 from contact.problem.mobility import Group, described, groups, held_by_supports, null_space
 from contact.tolerances import EPS
@@ -41,7 +40,7 @@ def looseness(solution: Solution) -> Remark:
     residual = body.unbalanced(residual_forces(problem, solution.state))
     left = float(np.linalg.norm(body.sizes(residual)[0]))
     whole = problem.interface.stiffness * problem.nodes.sum(np.ones_like(problem.nodes.weight))
-    largest, kkt = largest_displacement(solution), solution.outcome.kkt
+    largest, kkt = solution.max_displacement, solution.outcome.kkt
     for group in groups(problem):
         free = null_space(group.supports)
         if free.shape[1] == 0:

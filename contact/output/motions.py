@@ -43,26 +43,31 @@ def movements(problem: ContactProblem, state: State) -> dict[str, Any]:
     return {key: value for key, value in found.items() if value}
 
 
-def rigid_columns(problem: ContactProblem, state: State) -> dict[str, float]:
-    """Return what a row of steps says of the foundations that move, and electrodes. Collective.
+def rigid_columns(problem: ContactProblem, state: State) -> dict[str, dict[str, float]]:
+    """Return the columns of the foundations that move, and of electrodes. Collective.
 
-    Of several foundations the names have that of the part behind them.
+    They are `moved` (displacements and rotations), `acting` (forces and moments) and
+    `potentials`. Of several foundations the names have that of the part behind them.
     """
-    row: dict[str, float] = {}
+    found: dict[str, dict[str, float]] = {"moved": {}, "acting": {}, "potentials": {}}
     several = sum(member.foundation for member in problem.equilibrium.masters.members) > 1
     for member, values, forces in _members(problem, state):
         part, d = member.what.on, problem.dim
         if isinstance(member.what, Electrode):
-            row[f"potential_{part}"] = float(values[0])
+            found["potentials"][f"potential_{part}"] = float(values[0])
         elif member.foundation:
             turns = ["rotation"] if d == 2 else [f"rotation_{axis}" for axis in "xyz"]
             moments = ["moment"] if d == 2 else [f"moment_{axis}" for axis in "xyz"]
-            moved = [*"xyz"[:d], *turns], [*values[:d], *np.rad2deg(values[d:])]
-            acting = [*(f"force_{axis}" for axis in "xyz"[:d]), *moments], forces
-            for names, numbers in (moved, acting):
+            axes, forced = (
+                [*"xyz"[:d], *turns],
+                [*(f"force_{axis}" for axis in "xyz"[:d]), *moments],
+            )
+            moved = np.concatenate([values[:d], np.rad2deg(values[d:])])
+            for kind, names, numbers in (("moved", axes, moved), ("acting", forced, forces)):
                 for name, number in zip(names, numbers, strict=True):
-                    row[f"rigid_{name}" + (f"_{part}" if several else "")] = float(number)
-    return row
+                    column = f"rigid_{name}" + (f"_{part}" if several else "")
+                    found[kind][column] = float(number)
+    return found
 
 
 def _members(problem: ContactProblem, state: State) -> Iterator[tuple[Member, Array, Array]]:

@@ -17,6 +17,8 @@ from contact.interface.mortar.coupling import Coupling
 from contact.interface.mortar.lumping import Lumping
 from contact.interface.mortar.surface import surface_of
 from contact.mesh.entities import owned_among
+from contact.output.quantities import AGAINST as AGAINST_TABLE
+from contact.output.quantities import values_of
 from contact.output.solved import Solved
 from contact.output.table import Table
 from contact.output.vtu import VTU, Grid
@@ -104,12 +106,8 @@ def opposite_table(problem: ContactProblem, surface: VTU) -> Table:
     fields, size = surface.at_points, problem.domain.size
     # Mesh generators leave coordinates such as -3e-19.
     points = np.where(np.abs(surface.grid.points) < 1e-15 * size, 0.0, surface.grid.points)
-    axes = "xyz"[: points.shape[1]]
     names = np.array([contact.against or "" for contact in problem.contacts])
-    columns = {"on": names[fields["entry"]], **dict(zip(axes, points.T, strict=True))}
-    columns |= {name: np.asarray(fields[name]) for name in ("weight", "pressure")}
-    for name, field in (("traction", "traction"), ("u", "displacement")):
-        columns |= {f"{name}_{axis}": fields[field][:, i] for i, axis in enumerate(axes)}
+    columns = values_of(AGAINST_TABLE, {"on": names[fields["entry"]], "x": points, **fields})
     rounded = np.round(points / (1e-9 * size))
     order = np.lexsort((*rounded.T[::-1], fields["entry"]))
     order = order[np.isfinite(columns["pressure"][order])]

@@ -7,7 +7,6 @@ from mpi4py import MPI
 
 from contact.output.assumptions import Remark
 from contact.output.solution import Solution
-from contact.output.summary import largest_displacement
 from contact.tolerances import LAWS_HOLD
 
 #: Share of its bound below which friction lets nothing slip: the penalised one nears it slowly.
@@ -34,7 +33,7 @@ def giving_way(solution: Solution) -> Remark:
         problem.comm.allreduce(float(values.max(initial=0.0)), op=MPI.MAX)
         for values in (depth, slip)
     )
-    largest = largest_displacement(solution)
+    largest = solution.max_displacement
     if max(deep, far) <= LAWS_HOLD * largest:
         return "", True
     what, key = ("touch penetrate", "contact") if deep > far else ("should stick slip", "slip")

@@ -9,7 +9,7 @@ import textwrap
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 
-from contact.output.described import BODY, OPPOSITE, SUMMARY, SURFACE, TABLES, Item
+from contact.output import quantities as q
 
 #: What Markdown has for the symbols of the command line's help.
 FORMULAS = {"σ_ν": r"$\sigma_\nu$", "σ_τ": r"$\sigma_\tau$", "u_τ": r"$u_\tau$"}
@@ -19,7 +19,7 @@ PAGE = Path(__file__).parents[2] / "docs" / "output.md"
 INTRODUCTION = """\
 # Output files
 
-<!-- Made by `python3 -m contact.output.reference`; edit contact/output/described.py instead. -->
+<!-- Made by `python3 -m contact.output.reference`; edit contact/output/quantities.py instead. -->
 
 `contact solve CASE.toml --out DIR` leaves in DIR:
 
@@ -89,53 +89,62 @@ contact plot results --field stress_xy --field displacement
 """
 
 
+#: Sections of the page, and what is said at the head of each.
+SECTIONS: Mapping[str, str] = {
+    q.SUMMARY: "",
+    q.NODES: "",
+    q.AGAINST: "",
+    q.HISTORY: "",
+    q.STEPS: "",
+    q.SWEEP: "",
+    q.BODY: "At the nodes. All but displacement and potential are averages of the cells around a "
+    "node, weighted by volume; as they are, they stand in the cells under NAME`_cell`.",
+    q.SURFACE: "At the nodes; `nan` where a node is held and hence no contact node.",
+    q.OPPOSITE: "",
+}
+
+
 def page() -> str:
     """Return the reference page (Markdown)."""
-    lines = [INTRODUCTION, "## summary.json", "", *_rows(SUMMARY, "key")]
-    for name, columns in TABLES.items():
-        lines += ["", f"## {name}", "", *_rows(columns, "column")]
-    lines += [
-        "",
-        "## fields.vtu",
-        "",
-        "At the nodes. All but displacement and potential are averages of the cells around a "
-        "node, weighted by volume; as they are, they stand in the cells under NAME`_cell`.",
-        "",
-        *_rows(BODY, "field"),
-        "",
-        "## contact.vtu",
-        "",
-        "At the nodes; `nan` where a node is held and hence no contact node.",
-        "",
-        *_rows(SURFACE, "field"),
-        "",
-        "## contact-against.vtu",
-        "",
-        *_rows(OPPOSITE, "field"),
-    ]
-    return "\n".join(lines) + "\n"
+    lines = [INTRODUCTION]
+    for file, head in SECTIONS.items():
+        lines += [f"## {file}", "", *([head, ""] if head else []), *_rows(file), ""]
+    return "\n".join(lines)
 
 
-def _rows(items: Mapping[str, Item], what: str) -> Iterator[str]:
-    yield from (f"| {what} | unit | meaning |", "|---|---|---|")
-    for name, item in items.items():
-        text = item.text.replace("|", r"\|")
+def _described(file: str) -> Iterator[tuple[str, q.Quantity, str]]:
+    """Yield the name of a key, column or field, its quantity, and the description there."""
+    known = {quantity.name for quantity in q.quantities(q.SUMMARY)}
+    for quantity in q.quantities(file):
+        name, text = quantity.name, quantity.text
+        if file.endswith(".csv") and quantity.component:
+            name = quantity.component.format(name=name, axis="x")
+        if file != q.SUMMARY and q.SUMMARY in quantity.files and quantity.name in known:
+            text = "As in `summary.json`."
+        if name != quantity.name:
+            text += " Likewise the other components."
+        yield name, quantity, text
+
+
+def _rows(file: str) -> Iterator[str]:
+    kind = {"json": "key", "csv": "column"}.get(file.rpartition(".")[2], "field")
+    yield from (f"| {kind} | unit | meaning |", "|---|---|---|")
+    for name, quantity, text in _described(file):
+        text = text.replace("|", r"\|")
         for plain, formula in FORMULAS.items():
             text = text.replace(plain, formula)
-        yield f"| `{name}` | {item.unit or '—'} | {text} |"
+        yield f"| `{name}` | {quantity.unit or '—'} | {text} |"
 
 
 def files_help(*names: str) -> str:
     """Return the keys or columns of some files, for the command line's help."""
     lines = []
-    for name in names:
-        columns = name.endswith(".csv")
-        items, what = (TABLES[name], "columns") if columns else (SUMMARY, "keys")
-        lines += ["", f"{what} of {name}:"]
-        for key, item in items.items():
-            unit = f" ({item.unit})" if item.unit else ""
-            text = f"{_first(item.text)}{unit}"
-            lines += textwrap.wrap(f"  {key:<20}{text}", 98, subsequent_indent=22 * " ")
+    for file in names:
+        lines += ["", f"{'columns' if file.endswith('.csv') else 'keys'} of {file}:"]
+        for name, quantity, described in _described(file):
+            unit = f" ({quantity.unit})" if quantity.unit else ""
+            text = f"{_first(described)}{unit}"
+            lines += textwrap.wrap(f"  {name:<20}{text}", 98, subsequent_indent=22 * " ")
     return "\n".join([*lines, "", "signs, units, all files: docs/output.md"]).lstrip("\n")
 
 

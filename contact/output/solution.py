@@ -233,6 +233,13 @@ class Solution:
         """The area of what touches: the sum of the weights of its nodes. Collective."""
         return self.problem.nodes.sum(np.where(self.status == "open", 0.0, 1.0))
 
+    @property
+    def max_displacement(self) -> float:
+        """The largest Euclidean norm of the displacement over the nodes. Collective."""
+        body, comm = self.problem.equilibrium, self.problem.comm
+        u = self.state.x[: body.owned].reshape(-1, body.block_size)[:, : self.problem.dim]
+        return float(comm.allreduce(np.linalg.norm(u, axis=1).max(initial=0.0), op=MPI.MAX))
+
     @cached_property
     def supports(self) -> Mapping[str, Support]:
         """What each part with prescribed displacements exerts on the body. Collective."""

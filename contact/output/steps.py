@@ -13,13 +13,13 @@ from mpi4py import MPI
 from contact.body.amplitude import Moving, steady
 from contact.history import BodyState
 from contact.methods.steps import LoadStep
+from contact.output.quantities import STEPS, values_of
 from contact.output.record import StepRecord
-from contact.output.rows import contact_columns, moving_columns
+from contact.output.results import Results
 from contact.output.solution import Solution
-from contact.output.table import Table, contact_table, csv_columns
-from contact.output.tables import write_csv
+from contact.output.table import Table, contact_table, csv_columns, write_csv
 from contact.output.unloading import Unloading
-from contact.problem.energy import Balance, Moment, balance, moment
+from contact.problem.energy import Moment, balance, moment
 from contact.problem.problem import ContactProblem
 from contact.typing import Array
 
@@ -63,34 +63,10 @@ class StepRecorder:
         self._unloading.follow(state)
         solution = solution_of(step)
         table = contact_table(solution)
-        row = self._row(step, solution, table, energies, now)
+        driven = None if self._nodes is None else _driven(problem, self._nodes, now)
+        row = values_of(STEPS, Results(solution, table, energies, driven))
         self._rounding = max(self._rounding, step.outcome.kkt.rounding)
         return StepRecord(state, row, table, now.enthalpy, self._unloading.share, self._rounding)
-
-    def _row(
-        self,
-        step: LoadStep,
-        solution: Solution,
-        table: Table | None,
-        energies: Balance,
-        now: Moment,
-    ) -> dict[str, float]:
-        axes = "xyz"[: step.problem.dim]
-        row = {"t": step.state.time, **contact_columns(solution, table)}
-        row |= {
-            "work": energies.work,
-            "energy": energies.energy,
-            "dissipation": energies.dissipation,
-            "linear_solves": step.counters.linear_solves,
-            "factorizations": step.counters.factorizations,
-            "kkt": step.outcome.kkt.largest,
-            **moving_columns(solution),
-        }
-        if self._nodes is not None:
-            moved, driving = _driven(step.problem, self._nodes, now)
-            row |= {f"driven_{axis}": float(u) for axis, u in zip(axes, moved, strict=True)}
-            row |= {f"driven_force_{a}": float(f) for a, f in zip(axes, driving, strict=True)}
-        return row
 
 
 def solution_of(step: LoadStep) -> Solution:

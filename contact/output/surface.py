@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+from functools import cached_property
+
 import numpy as np
 from numpy.typing import NDArray
 
 from contact.mesh.entities import cells_at
+from contact.output.quantities import SURFACE, values_of
 from contact.output.solved import Solved
 from contact.output.table import Table, tangent_of
 from contact.output.vtu import VTU, Grid, Values
@@ -71,39 +75,53 @@ def slip_and_friction(table: Table, normal: Array) -> tuple[Array, Array]:
     )
 
 
+@dataclass(frozen=True)
+class Facets:
+    """The contact nodes as the quantities of the surface see them: their table."""
+
+    table: Table
+
+    @cached_property
+    def normal(self) -> Array:
+        """Contact directions, shape (n, d)."""
+        return np.column_stack([self.table[k] for k in ("nu_x", "nu_y", "nu_z") if k in self.table])
+
+    @property
+    def slip(self) -> Array:
+        """Tangential displacements u_tau, shape (n, d)."""
+        return slip_and_friction(self.table, self.normal)[0]
+
+    @property
+    def traction(self) -> Array:
+        """Stresses on the foundation, shape (n, d)."""
+        friction = slip_and_friction(self.table, self.normal)[1]
+        return np.asarray(self.table["pressure"][:, None] * self.normal + friction)
+
+    @property
+    def status(self) -> NDArray[np.int32]:
+        """Numbers of the status."""
+        return np.array([STATUS[name] for name in self.table["status"]], dtype=np.int32)
+
+    @property
+    def rows(self) -> NDArray[np.int32]:
+        """Rows in the table."""
+        return np.arange(len(self.table["status"]), dtype=np.int32)
+
+
 def _fields(
     problem: ContactProblem, table: Table, names: NDArray[np.int64], x: Array
 ) -> dict[str, Values]:
     """Return the fields at nodes of given global names and unknowns."""
     d, size = problem.dim, problem.equilibrium.space.dofmap.index_map.size_global
     rows = np.searchsorted(names, table["entry"] * size + table["node"])
-    normal = np.column_stack([table[f"nu_{axis}"] for axis in "xyz"[:d]])
-    slip, friction = slip_and_friction(table, normal)
-
-    def spread(values: Values) -> Values:
-        """Put the values of the contact nodes in their places, NaN in the others."""
-        whole = np.full((len(names), *values.shape[1:]), np.nan)
-        whole[rows] = values
-        return whole
-
     fields: dict[str, Values] = {"displacement": x[:, :d]}
-    fields |= {
-        "pressure": spread(table["pressure"]),
-        "traction": spread(table["pressure"][:, None] * normal + friction),
-        "gap": spread(table["gap"]),
-        "opening": spread(table["gap"] - table["u_n"]),
-        "slip": spread(slip),
-        "friction_bound": spread(table["bound"]),
-        "normal": spread(normal),
-        "weight": spread(table["weight"]),
-    }
     if problem.piezoelectric:
         fields["potential"] = problem.equilibrium.phi_scale * x[:, d]
-        fields["charge"] = spread(table["d_n"])
-    numbers = np.full((2, len(names)), -1, dtype=np.int32)
-    numbers[0, rows] = [STATUS[name] for name in table["status"]]
-    numbers[1, rows] = np.arange(len(rows))
-    return fields | {"status": numbers[0], "row": numbers[1]}
+    for name, values in values_of(SURFACE, Facets(table)).items():
+        none = np.nan if values.dtype.kind == "f" else -1
+        fields[name] = np.full((len(names), *values.shape[1:]), none, dtype=values.dtype)
+        fields[name][rows] = values
+    return fields
 
 
 def _completed(values: Values, grid: Grid) -> Values:

@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import csv
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -11,7 +15,10 @@ from scipy import sparse
 from scipy.sparse import csgraph
 
 from contact.interface.candidates import candidates
+from contact.interface.nodes import ContactNodes as Nodes
+from contact.interface.response import FoundationResponse
 from contact.mesh.entities import cells_at
+from contact.output.quantities import NODES, quantities, values_of
 from contact.output.solved import Solved
 from contact.problem.problem import ContactProblem
 from contact.typing import Array
@@ -28,56 +35,85 @@ def tangent_of(normal: Array) -> Array:
     return np.column_stack([-normal[:, 1], normal[:, 0]])
 
 
+@dataclass(frozen=True)
+class ContactNodes:
+    """The owned contact nodes of a solution, as the quantities see them."""
+
+    solution: Solved
+
+    @cached_property
+    def _problem(self) -> ContactProblem:
+        return self.solution.problem
+
+    @property
+    def nodes(self) -> Nodes:
+        """The nodes at rest."""
+        return self._problem.nodes
+
+    @property
+    def response(self) -> FoundationResponse:
+        """Layer and current; the gap without a rigid part is that of the layer's first touch."""
+        return self._problem.interface.response
+
+    @property
+    def entry(self) -> NDArray[np.intp]:
+        """Number of the contact of each node."""
+        sizes = [entry.nodes.nodes.size for entry in self._problem.entries]
+        return np.repeat(np.arange(len(sizes)), sizes)
+
+    @property
+    def part(self) -> NDArray[Any] | None:
+        """Part of each node; None for a single contact."""
+        names = np.array([entry.on for entry in self._problem.entries])
+        return names[self.entry] if names.size > 1 else None
+
+    @property
+    def points(self) -> Array:
+        """Places at rest: mesh generators leave coordinates such as -3e-19."""
+        points = self.nodes.points
+        return np.where(np.abs(points) < 1e-15 * self._problem.domain.size, 0.0, points)
+
+    def tangential(self, vectors: Array) -> Array:
+        """Return the component along `tangent_of` the contact direction; in 3-D the vectors."""
+        if self._problem.dim == 3:
+            return vectors
+        return np.asarray(np.einsum("ni,ni->n", vectors, tangent_of(self.nodes.normal)))
+
+    @property
+    def potential(self) -> Array | None:
+        """Potential of a piezoelectric body."""
+        if not self._problem.piezoelectric:
+            return None
+        return np.asarray(self._problem.equilibrium.phi_scale * self.solution.nodal[:, -1])
+
+    @property
+    def charge(self) -> Array | None:
+        """Charge D.nu that leaves a piezoelectric body through the foundation."""
+        if not self._problem.piezoelectric:
+            return None
+        return self.response.charge(self.solution.nodal, self.solution.pressure)
+
+
 def contact_table(solution: Solved) -> Table | None:
     """Return a column a quantity on rank 0 and None elsewhere. Collective.
 
     These are the columns of ``contact.csv`` (`csv_columns`), the contact direction ``nu_x``...
     and the numbers of the node, over all ranks, and of the contact: ``node``, ``entry``.
 
-    In the plane the rows follow Gamma_3 from node to node, each connected piece from its end
+    In 2-D the rows follow Gamma_3 from node to node, each connected piece from its end
     with the smaller x (then y), and ``u_t`` and ``tau`` are the components of u_tau and
-    lambda_f = -sigma_tau along `tangent_of` the contact direction. In space they are vectors
-    and the rows are sorted by x, then y, then z. ``u_n`` and ``gap`` are taken along the
-    contact direction; ``pressure`` and ``bound`` are -sigma_nu and the friction bound;
-    ``d_n`` is the charge D.nu that leaves through the foundation. Of several contacts the rows
-    of one follow those of another, and the first column says which part they belong to.
+    lambda_f = -sigma_tau along `tangent_of` the contact direction. In 3-D they are vectors
+    and the rows are sorted by x, then y, then z. Of several contacts the rows of one follow
+    those of another.
     """
-    problem, nodes = solution.problem, solution.problem.nodes
-    nodal, pressure = solution.nodal, solution.pressure
-    # Mesh generators leave coordinates such as -3e-19.
-    points = np.where(np.abs(nodes.points) < 1e-15 * problem.domain.size, 0.0, nodes.points)
-    entry = np.repeat(
-        np.arange(len(problem.entries)), [entry.nodes.nodes.size for entry in problem.entries]
-    )
-    columns: dict[str, NDArray[Any]] = {}
-    if len(problem.entries) > 1:
-        columns["on"] = np.array([e.on for e in problem.entries])[entry]
-    columns |= dict(zip("xyz", points.T, strict=False))
-    # The gap without a rigid part is that of the layer's first touch.
-    response = problem.interface.response
-    gap = response.jump.gap
-    columns |= {"weight": nodes.weight, "gap": gap, "u_n": solution.normal_displacement}
-    slip, friction = solution.slip, solution.friction
-    if problem.dim == 2:
-        tangent = tangent_of(nodes.normal)
-        columns |= {
-            "u_t": np.einsum("ni,ni->n", slip, tangent),
-            "pressure": pressure,
-            "tau": np.einsum("ni,ni->n", friction, tangent),
-        }
-    else:
-        columns |= {f"u_t{axis}": slip[:, i] for i, axis in enumerate("xyz")}
-        columns["pressure"] = pressure
-        columns |= {f"tau_{axis}": friction[:, i] for i, axis in enumerate("xyz")}
-    columns |= {"bound": solution.friction_bound, "status": solution.status}
-    if problem.piezoelectric:
-        columns["phi"] = problem.equilibrium.phi_scale * nodal[:, -1]
-        columns["d_n"] = response.charge(nodal, pressure)
+    given = ContactNodes(solution)
+    problem, nodes = solution.problem, given.nodes
+    columns: dict[str, NDArray[Any]] = values_of(NODES, given)
     columns |= {f"nu_{axis}": nodes.normal[:, i] for i, axis in enumerate("xyz"[: problem.dim])}
     columns |= {
         "node": problem.equilibrium.layout.index_map.local_to_global(nodes.nodes),
-        "entry": entry,
-        "rigid": np.array([e.coupling is None for e in problem.entries])[entry],
+        "entry": given.entry,
+        "rigid": np.array([e.coupling is None for e in problem.entries])[given.entry],
     }
     # How far the foundation has moved along the contact direction.
     own = problem.equilibrium.nodal(solution.state.x)[nodes.nodes]
@@ -93,8 +129,22 @@ def contact_table(solution: Solved) -> Table | None:
 
 def csv_columns(table: Table) -> Table:
     """Return the columns of ``contact.csv``: all but contact direction and numbers."""
-    inner = ("nu_x", "nu_y", "nu_z", "node", "entry", "rigid", "moved")
-    return {name: values for name, values in table.items() if name not in inner}
+    known = quantities(NODES)
+    return {name: v for name, v in table.items() if any(q.fits(name) for q in known)}
+
+
+def write_table(columns: Table, path: Path) -> None:
+    """Write columns. On one rank."""
+    rows = zip(*(column.tolist() for column in columns.values()), strict=True)
+    write_csv(path, columns, rows)
+
+
+def write_csv(path: Path, header: Iterable[str], rows: Iterable[Iterable[Any]]) -> None:
+    """Write a table, numbers to the last digit. On one rank."""
+    with path.open("w", newline="", encoding="utf-8") as file:
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow(header)
+        writer.writerows(rows)
 
 
 def by_contact(table: Table) -> list[Table]:

@@ -7,16 +7,26 @@ from pathlib import Path
 
 import pytest
 
-from contact.output.described import BODY, SUMMARY, SURFACE, TABLES
+from contact.output import quantities as registry
 from contact.output.files import write_outputs
+from contact.output.quantities import (
+    BODY,
+    HISTORY,
+    NODES,
+    QUANTITIES,
+    STEPS,
+    SUMMARY,
+    SURFACE,
+    SWEEP,
+    Quantity,
+    quantities,
+)
 from contact.output.reference import PAGE, files_help, page
 from contact.output.vtu import read_vtu
 from contact.solving import solve
+from tests.output.test_steps import case_of as steps_case
 from tests.problems.rigid import column, indented, plate
 from tests.problems.written import block, electric
-
-#: Derived fields have a companion cell by cell.
-PLAIN = ("displacement", "potential")
 
 
 def two_contacts():
@@ -43,31 +53,59 @@ def written(tmp_path_factory: pytest.TempPathFactory) -> list[Path]:
     return folders
 
 
-def agree(found: list[list[str]], described: list[str]) -> None:
+def agree(found: list[list[str]], file: str) -> None:
     """All that is found is described, in its order, and all that is described is found."""
+    described = quantities(file)
     for names in found:
-        assert set(names) <= set(described)
-    assert set(described) == {name for names in found for name in names}
+        places = [next(i for i, q in enumerate(described) if q.fits(name)) for name in names]
+        assert file == SUMMARY or places == sorted(places)
+    for quantity in described:
+        assert any(quantity.fits(name) for names in found for name in names), quantity.name
+
+
+def header(path: Path) -> list[str]:
+    return next(csv.reader(path.open()))
 
 
 def test_summary(written: list[Path]) -> None:
-    agree([list(json.loads((f / "summary.json").read_text())) for f in written], list(SUMMARY))
+    agree([list(json.loads((f / SUMMARY).read_text())) for f in written], SUMMARY)
 
 
-@pytest.mark.parametrize("name", ["contact.csv", "history.csv"])
+@pytest.mark.parametrize("name", [NODES, HISTORY])
 def test_tables(name: str, written: list[Path]) -> None:
-    found = [next(csv.reader((folder / name).open())) for folder in written]
-    agree(found, list(TABLES[name]))
-    for names in found:
-        assert names == [column for column in TABLES[name] if column in names]
+    agree([header(folder / name) for folder in written], name)
 
 
 def test_fields(written: list[Path]) -> None:
-    bodies = [read_vtu(folder / "fields.vtu") for folder in written]
-    agree([list(body.at_points) for body in bodies], list(BODY))
-    cells = [f"{name}_cell" for name in BODY if name not in PLAIN]
-    agree([list(body.in_cells) for body in bodies], cells)
-    agree([list(read_vtu(f / "contact.vtu").at_points) for f in written], list(SURFACE))
+    for name in (BODY, SURFACE):
+        fields = [read_vtu(folder / name) for folder in written]
+        for quantity in quantities(name):
+            assert any(quantity.name in found.at_points for found in fields)
+        for found in fields:
+            known = {quantity.name for quantity in quantities(name)}
+            assert set(found.at_points) <= known
+            derived = set(found.at_points) - {"displacement", "potential"}
+            assert name == SURFACE or set(found.in_cells) == {f"{k}_cell" for k in derived}
+
+
+def test_one_entry_is_a_key_and_a_column(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A further quantity stands in the summary, the steps, a sweep, the page and the help."""
+    mean = Quantity(
+        "mean_pressure", "stress", "Mean contact pressure.",
+        lambda r: r.problem.nodes.sum(r.solution.pressure) / r.solution.contact_area,
+        (SUMMARY, STEPS, SWEEP),
+    )  # fmt: skip
+    monkeypatch.setattr(registry, "QUANTITIES", (*QUANTITIES, mean))
+    solution = solve(steps_case())
+    write_outputs(solution, tmp_path)
+    rows = list(csv.DictReader((tmp_path / STEPS).open()))
+    assert (
+        float(rows[-1]["mean_pressure"])
+        == json.loads((tmp_path / SUMMARY).read_text())["mean_pressure"]
+    )
+    assert "| `mean_pressure` | stress | Mean contact pressure. |" in page()
+    for name in (SUMMARY, STEPS, SWEEP):
+        assert "mean_pressure" in files_help(name)
 
 
 def test_the_page_is_made_from_this() -> None:
@@ -75,7 +113,9 @@ def test_the_page_is_made_from_this() -> None:
 
 
 def test_help_names_every_key() -> None:
-    for name, items in {"summary.json": SUMMARY, **TABLES}.items():
+    for name in (SUMMARY, NODES, HISTORY, STEPS, SWEEP):
         lines = files_help(name).splitlines()
         assert all(len(line) <= 100 for line in lines)
-        assert [line.split()[0] for line in lines if re.match(r"  \S", line)] == list(items)
+        shown = [line.split()[0] for line in lines if re.match(r"  \S", line)]
+        assert len(shown) == len(quantities(name))
+        assert all(q.fits(key) for q, key in zip(quantities(name), shown, strict=True))

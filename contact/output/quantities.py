@@ -1,0 +1,500 @@
+"""The quantities of the output files: an entry each is name, unit, description and value.
+
+``summary.json``, the csv tables, the fields, ``docs/output.md`` and the command line's help are
+made from these entries. Nothing is imported here that loads dolfinx: the help is shown before
+PETSc's options are read.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+#: Value of a quantity that a problem does not have: it has no key, column or field then.
+ABSENT = object()
+
+SUMMARY, STEPS, SWEEP = "summary.json", "steps.csv", "sweep.csv"
+NODES, HISTORY, AGAINST = "contact.csv", "history.csv", "contact-against.csv"
+BODY, SURFACE, OPPOSITE = "fields.vtu", "contact.vtu", "contact-against.vtu"
+#: Tables with a row a solution; the others have columns of arrays.
+ROWS = (STEPS, SWEEP)
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """A key of ``summary.json``, a column of a table or a field.
+
+    Attributes
+    ----------
+    name
+        Of the key, column or field. PART, KEY and AXIS stand for names of the case, and x, y, z.
+    unit
+        In words: "length", "stress", ...; empty for none.
+    text
+        The description, with the sign.
+    value
+        A function of `results.Results` in ``summary.json``, ``steps.csv`` and ``sweep.csv``, of
+        `methods.report.Record` in ``history.csv``, of `table.ContactNodes` in ``contact.csv``, of
+        `fields.Point` in ``fields.vtu``, of `surface.Facets` in ``contact.vtu``, of a mapping in
+        the files of master sides. A mapping is several columns, a vector one a component.
+    files
+        The files that have it.
+    component
+        Of a vector: name of the column of a component.
+    """
+
+    name: str
+    unit: str
+    text: str
+    value: Callable[[Any], Any]
+    files: tuple[str, ...] = (SUMMARY,)
+    component: str = ""
+
+    def in_file(self, file: str, given: Any) -> dict[str, Any]:
+        """Return the keys, columns or field in a file; none where the quantity is absent."""
+        value = self.value(given)
+        if value is ABSENT:
+            return {}
+        table = file.endswith(".csv")
+        if table and isinstance(value, Mapping):
+            return dict(value)
+        if table and self.component and np.ndim(value) > (file not in ROWS):
+            names = (self.component.format(name=self.name, axis=axis) for axis in "xyz")
+            parts = np.asarray(value).T
+            return dict(zip(names, parts.tolist() if file in ROWS else parts, strict=False))
+        return {self.name: value}
+
+    def fits(self, name: str) -> bool:
+        """Whether a key, column or field is the quantity's."""
+        names = [self.name, *(self.component.format(name=self.name, axis=axis) for axis in "xyz")]
+        return any(re.fullmatch(re.sub("PART|KEY|AXIS", ".+", known), name) for known in names)
+
+
+def quantities(file: str) -> list[Quantity]:
+    """Return the quantities of a file, in their order there."""
+    return [quantity for quantity in QUANTITIES if file in quantity.files]
+
+
+def values_of(file: str, given: Any) -> dict[str, Any]:
+    """Return the keys, columns or fields of a file for some object."""
+    found: dict[str, Any] = {}
+    for quantity in quantities(file):
+        found |= quantity.in_file(file, given)
+    return found
+
+
+def _present(value: Any) -> Any:
+    return ABSENT if value is None else value
+
+
+_ALL, _VECTOR = (SUMMARY, STEPS, SWEEP), "{name}_{axis}"
+
+#: Numbers of the run as a whole, of a step and of a case of a sweep.
+_RUN = (
+    Quantity(
+        "KEY", "", "A swept key, a column each: its value in this row.", lambda r: ABSENT, (SWEEP,)
+    ),
+    Quantity("title", "", "Title of the case.", lambda r: r.solution.title),
+    Quantity(
+        "units", "", "Names of the units, those of `[case] units`.",
+        lambda r: r.solution.units.given,
+    ),
+    Quantity("t", "time", "End of the step.", lambda r: r.solution.state.time, (STEPS,)),
+    Quantity(
+        "converged", "", "Whether all residuals are within the tolerance.",
+        lambda r: r.solution.converged, (SUMMARY, SWEEP),
+    ),
+    Quantity("reason", "", "Why the run ended, in words.", lambda r: r.solution.outcome.reason),
+    Quantity("method", "", "The method, as in `[solver]`.", lambda r: r.solution.method),
+    Quantity(
+        "kinematics", "", "`plane_strain`, `axisymmetric` or `solid`.", lambda r: r.kinematics
+    ),
+    Quantity("dofs", "", "Number of unknowns.", lambda r: r.problem.equilibrium.layout.unknowns),
+    Quantity("cells", "", "Number of triangles or tetrahedra.", lambda r: r.cells),
+    Quantity(
+        "ranks", "", "Number of MPI processes. The results do not depend on it.",
+        lambda r: r.problem.comm.size,
+    ),
+    Quantity(
+        "contact_force", "force",
+        "Force that the body exerts on the foundation, a vector; in 2-D a unit of depth. Between "
+        "bodies the one that the body with `on` exerts on the other; of several contacts the sum, "
+        "and `traction`, `weight` and `entry` of `contact.vtu` have the force of each.",
+        lambda r: r.solution.contact_force, _ALL, _VECTOR,
+    ),
+    Quantity(
+        "contact_moment", "force · length",
+        "Moment of these about the origin of coordinates, of points at rest: in 2-D a list "
+        "of one, about z and counter-clockwise, in 3-D a vector.",
+        lambda r: r.solution.contact_moment,
+    ),
+    Quantity(
+        "reactions", "force",
+        "Force of the support of each part on the body, a vector a part. A node of two parts "
+        "counts for the one that stands first in the case. With the loads and minus "
+        "`contact_force` they add up to nothing; forces between bodies are no part of that.",
+        lambda r: {part: held.force for part, held in r.solution.supports.items()},
+    ),
+    Quantity(
+        "reaction_moments", "force · length", "Moments of these, as `contact_moment`.",
+        lambda r: {part: held.moment for part, held in r.solution.supports.items()},
+    ),
+    Quantity(
+        "max_pressure", "stress", "Largest contact pressure, -σ_ν >= 0.",
+        lambda r: r.problem.nodes.maximum(r.solution.pressure), _ALL,
+    ),
+    Quantity(
+        "contact_nodes", "", "Number of contact nodes that touch: sticking and sliding ones.",
+        lambda r: r.counts["stick"] + r.counts["slip"], _ALL,
+    ),
+    Quantity("stick_nodes", "", "Number of those that stick.", lambda r: r.counts["stick"], _ALL),
+    Quantity(
+        "slip_nodes", "", "Number of those that slide; without friction all that touch.",
+        lambda r: r.counts["slip"], _ALL,
+    ),
+    Quantity(
+        "max_displacement", "length", "Largest Euclidean norm of the displacement at a node.",
+        lambda r: r.solution.max_displacement, _ALL,
+    ),
+    Quantity(
+        "contact_area", "area", "Sum of the weights of the nodes that touch; in 2-D a length.",
+        lambda r: r.solution.contact_area, (SUMMARY, SWEEP),
+    ),
+    Quantity(
+        "max_dev_strain", "", "Largest |dev ε| over the cells (at degree 2 their nodes).",
+        lambda r: r.solution.max_dev_strain,
+    ),
+    Quantity(
+        "max_strain", "",
+        "Largest Frobenius norm of ε in the middle of a cell; linear kinematics is for small ones.",
+        lambda r: r.of_deformation("largest_strain"),
+    ),
+    Quantity(
+        "volume_ratio", "", "Least and largest volume of a cell over that at rest.",
+        lambda r: r.of_deformation("least_volume", "largest_volume"),
+    ),
+    Quantity(
+        "max_von_mises", "stress",
+        "Largest von Mises stress over the same. At sharp corners it grows with each refinement.",
+        lambda r: r.solution.max_von_mises,
+    ),
+    Quantity(
+        "share_beyond_yield", "",
+        "Share of the volume in which |dev ε| is beyond the material's first yield, 0 to 1; "
+        "`null` where no material has such a limit.", lambda r: r.solution.share_beyond_yield,
+    ),
+    Quantity(
+        "contact_direction", "", "`[contact]` `direction`: whose normal ν is.",
+        lambda r: ", ".join(dict.fromkeys(c.foundation.direction for c in r.problem.contacts)),
+    ),
+    Quantity(
+        "work", "work", "Of loads and supports in the step.", lambda r: r.energies.work, (STEPS,)
+    ),
+    Quantity(
+        "energy", "work", "Stored in body and layer at its end.",
+        lambda r: r.energies.energy, (STEPS,),
+    ),
+    Quantity(
+        "dissipation", "work", "By friction in the step; over a cycle the area of the loop.",
+        lambda r: r.energies.dissipation, (STEPS,),
+    ),
+    Quantity(
+        "outer_iterations", "", "Outer iterations: rows of `history.csv`.",
+        lambda r: len(r.solution.history.records), (SUMMARY, SWEEP),
+    ),
+    Quantity(
+        "inner_iterations", "", "Linear solves in each of them, a list.",
+        lambda r: [record.inner for record in r.solution.history.records],
+    ),
+    Quantity(
+        "linear_solves", "", "Solves with the matrix of the whole body.",
+        lambda r: r.solution.counters.linear_solves, _ALL,
+    ),
+    Quantity(
+        "linear_iterations", "", "Iterations of the linear solver in all of these; 1 each by LU.",
+        lambda r: r.solution.counters.linear_iterations,
+    ),
+    Quantity(
+        "factorizations", "", "Factorisations of it, or set-ups of multigrid.",
+        lambda r: r.solution.counters.factorizations, _ALL,
+    ),
+    Quantity(
+        "contact_solves", "", "Dense solves at the contact nodes alone.",
+        lambda r: r.solution.counters.contact_solves,
+    ),
+    Quantity(
+        "kkt", "",
+        "Residuals of the equations, each relative to its own size: `equilibrium` (forces; of "
+        "piezoelectric bodies charges, where these are farther from balance), `contact` (no "
+        "penetration, no tension, one of them zero), `friction` (stick or slip).", lambda r: {
+        name: getattr(r.solution.outcome.kkt, name)
+        for name in ("equilibrium", "contact", "friction") },
+    ),
+    Quantity("kkt", "", "The largest residual.", lambda r: r.solution.outcome.kkt.largest, ROWS),
+    Quantity(
+        "rounding", "",
+        "Forces out of balance, or charges, that are no more than rounding, over all of them: "
+        "`equilibrium` is without them. Of an evolution the most in a step. More than the "
+        "tolerance in slender bodies alone, with a warning then.", lambda r: r.solution.rounding,
+    ),
+    Quantity(
+        "rigid", "",
+        "The foundation that moves: its `displacement` and `rotation` (degrees), and the `force` "
+        "and `moment` on it from outside, given or held. Of several, one entry a part.",
+        lambda r: r.moving("rigid"),
+    ),
+    Quantity(
+        "rigid_parts", "", "The same of each part that moves as a rigid body, by part.",
+        lambda r: r.moving("rigid_parts"),
+    ),
+    Quantity(
+        "electrodes", "",
+        "`potential` and `charge` of each electrode whose potential was unknown, by part.",
+        lambda r: r.moving("electrodes"),
+    ),
+    Quantity(
+        "rigid_AXIS", "length",
+        "Displacement of a foundation that moves, `rigid_x`...; `rigid_rotation` in degrees.",
+        lambda r: r.rigid["moved"], ROWS,
+    ),
+    Quantity(
+        "rigid_force_AXIS", "force", "Force on it; `rigid_moment`... Several end with their part.",
+        lambda r: r.rigid["acting"], ROWS,
+    ),
+    Quantity(
+        "potential_PART", "potential", "Of electrodes.", lambda r: r.rigid["potentials"], ROWS
+    ),
+    Quantity(
+        "charge_PART", "charge", "Likewise; `charge_foundation` through the contact part.",
+        lambda r: r.charge_columns, ROWS,
+    ),
+    Quantity(
+        "driven", "length", "Mean displacement of the part that is moved or loaded in time.",
+        lambda r: r.driven[0], (STEPS,), _VECTOR,
+    ),
+    Quantity(
+        "driven_force", "force", "The force that drives it: with `driven_x` it makes the loop.",
+        lambda r: r.driven[1], (STEPS,), _VECTOR,
+    ),
+    Quantity(
+        "notes", "", "Assumptions that were checked and found to hold, in words.",
+        lambda r: r.solution.notes,
+    ),
+    Quantity("warnings", "", "Reasons for care, in words.", lambda r: r.solution.warnings),
+    Quantity("phi_min", "potential", "Least potential at a node.", lambda r: r.potential_range[0]),
+    Quantity(
+        "phi_max", "potential", "Largest potential at a node.", lambda r: r.potential_range[1]
+    ),
+    Quantity(
+        "total_charge", "charge", "Sum of all charges: 0 up to the tolerance, by Gauss's law.",
+        lambda r: ABSENT if r.charges is None else r.charges.total,
+    ),
+    Quantity(
+        "charges", "charge",
+        "Free charges D·ν integrated, ν out of the body: `electrodes` and `given` part by part, "
+        "`foundation` (through the contact part), `body` (in the volume), `magnitude` (of all "
+        "nodal ones, without sign).", lambda r: ABSENT if r.charges is None else vars(r.charges),
+    ),
+    Quantity(
+        "conduction_ramp", "length",
+        "1/delta: how far in front of the closed gap the foundation conducts, if it does.",
+        lambda r: r.conduction_ramp,
+    ),
+    Quantity(
+        "case", "",
+        "The case as it was solved, all defaults written out: a case file to run again. Empty "
+        "where the problem was built or changed in Python.", lambda r: r.solution.case,
+    ),
+    Quantity(
+        "seconds", "s", "Time for `setup`, `solve` and `output`.", lambda r: r.solution.seconds
+    ),
+    Quantity("versions", "", "Of Python, the libraries and the BLAS.", lambda r: r.versions),
+    Quantity("files", "", "Files of this run: a later run replaces them.", lambda r: ABSENT),
+    Quantity("seconds", "s", "Time for this row.", lambda r: ABSENT, (SWEEP,)),
+)  # fmt: skip
+
+#: The contact nodes: one row each of ``contact.csv``.
+_NODES = (
+    Quantity(
+        "on", "", "Part of the node; where there are several contacts.",
+        lambda n: _present(n.part), (NODES,),
+    ),
+    Quantity("x", "length", "Place of the node at rest.", lambda n: n.points, (NODES,), "{axis}"),
+    Quantity(
+        "weight", "area", "Area that the node stands for; sums with it are integrals over Γ₃.",
+        lambda n: n.nodes.weight, (NODES,),
+    ),
+    Quantity(
+        "gap", "length", "Distance to the foundation at rest, along the contact direction ν.",
+        lambda n: n.response.jump.gap, (NODES,),
+    ),
+    Quantity(
+        "u_n", "length", "Displacement along ν, out of the body; gap - u_n is the open gap. Where "
+        "the foundation moves, relative to that; so are the tangential ones. At degree 2 in 3-D "
+        "mid-edges have (u - (u₁ + u₂)/5)/(3/5), u₁ and u₂ being at the ends of the edge, and so "
+        "has the gap: the pressure there acts against that, not against u.",
+        lambda n: n.solution.normal_displacement, (NODES,),
+    ),
+    Quantity(
+        "u_t", "length", "Tangential displacement u_τ: its components in 3-D, `u_t` in 2-D.",
+        lambda n: n.tangential(n.solution.slip), (NODES,), "{name}{axis}",
+    ),
+    Quantity(
+        "pressure", "stress", "Contact pressure -σ_ν, of the foundation and its layer.",
+        lambda n: n.solution.pressure, (NODES,),
+    ),
+    Quantity(
+        "tau", "stress",
+        "Friction stress -σ_τ of the body on the foundation: its components, `tau` in 2-D.",
+        lambda n: n.tangential(n.solution.friction), (NODES,), _VECTOR,
+    ),
+    Quantity(
+        "bound", "stress", "Friction bound: `tau` is no larger.",
+        lambda n: n.solution.friction_bound, (NODES,),
+    ),
+    Quantity("status", "", "`open`, `stick` or `slip`.", lambda n: n.solution.status, (NODES,)),
+    Quantity(
+        "phi", "potential", "Potential; of piezoelectric bodies.",
+        lambda n: _present(n.potential), (NODES,),
+    ),
+    Quantity(
+        "d_n", "charge/area",
+        "Charge D·ν that leaves through the foundation; likewise. Nodes that supports hold "
+        "conduct too, and have no row: `charges` of the summary has all.",
+        lambda n: _present(n.charge), (NODES,),
+    ),
+)  # fmt: skip
+
+_HISTORY = (
+    Quantity(
+        "iteration", "", "Number of the outer iteration; 0 is a frictionless start.",
+        lambda record: record.iteration, (HISTORY,),
+    ),
+    Quantity("inner", "", "Linear solves that it took.", lambda record: record.inner, (HISTORY,)),
+    Quantity(
+        "equilibrium", "", "Residual after it, as in `kkt`.",
+        lambda record: record.kkt.equilibrium, (HISTORY,),
+    ),
+    Quantity("contact", "", "The same.", lambda record: record.kkt.contact, (HISTORY,)),
+    Quantity("friction", "", "The same.", lambda record: record.kkt.friction, (HISTORY,)),
+    Quantity(
+        "change", "", "Relative change of the friction bound, (3.46); `nan` where there is none.",
+        lambda record: record.change, (HISTORY,),
+    ),
+    Quantity(
+        "seconds", "s", "Since the start of the solve.", lambda record: record.seconds, (HISTORY,)
+    ),
+    Quantity(
+        "note", "", "Its kind where it is no plain one, for instance `tangent`.",
+        lambda record: record.note, (HISTORY,),
+    ),
+    Quantity(
+        "contact_solves", "", "Dense solves at the contact nodes that it took.",
+        lambda record: record.contact, (HISTORY,),
+    ),
+)  # fmt: skip
+
+#: Master sides of contacts between bodies.
+_AGAINST = (
+    Quantity(
+        "on", "", "Part of the node: one that is `against` in a contact.",
+        lambda f: f["on"], (AGAINST,),
+    ),
+    Quantity("x", "length", "Place of the node at rest.", lambda f: f["x"], (AGAINST,), "{axis}"),
+    Quantity(
+        "weight", "area", "Area that the node stands for.",
+        lambda f: f["weight"], (AGAINST, OPPOSITE),
+    ),
+    Quantity(
+        "pressure", "stress", "Forces of the contact on the node, over its area: the pressure.",
+        lambda f: f["pressure"], (AGAINST, OPPOSITE),
+    ),
+    Quantity(
+        "traction", "stress", "Of all of the force: the stress of the body with `on`.",
+        lambda f: f["traction"], (AGAINST, OPPOSITE), _VECTOR,
+    ),
+    Quantity(
+        "u", "length", "Displacement of the node.", lambda f: f["displacement"], (AGAINST,), _VECTOR
+    ),
+    Quantity("displacement", "length", "Displacement.", lambda f: f["displacement"], (OPPOSITE,)),
+    Quantity("normal", "", "Out of the body.", lambda f: f["normal"], (OPPOSITE,)),
+    Quantity("entry", "", "Number of its contact, from 0.", lambda f: f["entry"], (OPPOSITE,)),
+)  # fmt: skip
+
+#: Fields of the body; the derived ones have a companion NAME_cell, cell by cell.
+_BODY = (
+    Quantity("displacement", "length", "Displacement.", lambda at: ABSENT, (BODY,)),
+    Quantity(
+        "potential", "potential", "Potential; of piezoelectric bodies.", lambda at: ABSENT, (BODY,)
+    ),
+    Quantity(
+        "stress", "stress", "σ, nine components, row by row; tension is positive.",
+        lambda at: at.stress, (BODY,),
+    ),
+    Quantity("von_mises", "stress", "Von Mises stress.", lambda at: at.von_mises, (BODY,)),
+    Quantity(
+        "dev_strain", "", "|dev ε|, the norm of the strain deviator.",
+        lambda at: at.dev_strain, (BODY,),
+    ),
+    Quantity(
+        "electric_displacement", "charge/area", "D; of piezoelectric bodies.",
+        lambda at: _present(at.electric_displacement), (BODY,),
+    ),
+    Quantity(
+        "electric_field", "potential/length", "E = -grad φ; likewise.",
+        lambda at: _present(at.electric_field), (BODY,),
+    ),
+)  # fmt: skip
+
+#: Fields of the contact part; `displacement` and `potential` are those of held nodes too.
+_SURFACE = (
+    Quantity("displacement", "length", "Displacement.", lambda t: ABSENT, (SURFACE,)),
+    Quantity(
+        "potential", "potential", "Potential; of piezoelectric bodies.", lambda t: ABSENT,
+        (SURFACE,),
+    ),
+    Quantity(
+        "pressure", "stress", "As in `contact.csv`.", lambda t: t.table["pressure"], (SURFACE,)
+    ),
+    Quantity(
+        "traction", "stress", "Stress of the body on the foundation, a vector: p ν - σ_τ.",
+        lambda t: t.traction, (SURFACE,),
+    ),
+    Quantity(
+        "gap", "length", "As in `contact.csv`: at rest.", lambda t: t.table["gap"], (SURFACE,)
+    ),
+    Quantity(
+        "opening", "length", "gap - u_n: the open gap.",
+        lambda t: t.table["gap"] - t.table["u_n"], (SURFACE,),
+    ),
+    Quantity("slip", "length", "Tangential displacement, a vector.", lambda t: t.slip, (SURFACE,)),
+    Quantity(
+        "friction_bound", "stress", "`bound` of `contact.csv`.",
+        lambda t: t.table["bound"], (SURFACE,),
+    ),
+    Quantity("normal", "", "Contact direction ν, out of the body.", lambda t: t.normal, (SURFACE,)),
+    Quantity("weight", "area", "As in `contact.csv`.", lambda t: t.table["weight"], (SURFACE,)),
+    Quantity(
+        "charge", "charge/area", "`d_n` of `contact.csv`; of piezoelectric bodies.",
+        lambda t: _present(t.table.get("d_n")), (SURFACE,),
+    ),
+    Quantity(
+        "status", "", "0 open, 1 stick, 2 slip; -1 for a node that is held.",
+        lambda t: t.status, (SURFACE,),
+    ),
+    Quantity(
+        "row", "", "Row of the node in `contact.csv`, from 0; -1 for none.",
+        lambda t: t.rows, (SURFACE,),
+    ),
+    Quantity("entry", "", "Number of its `[[contact]]`, from 0.", lambda t: ABSENT, (SURFACE,)),
+    Quantity(
+        "rigid", "", "1 in front of a rigid foundation, 0 in front of another body.",
+        lambda t: ABSENT, (SURFACE,),
+    ),
+)  # fmt: skip
+
+QUANTITIES = (*_RUN, *_NODES, *_HISTORY, *_AGAINST, *_BODY, *_SURFACE)
