@@ -27,6 +27,11 @@ class Candidates:
         Communicator.
     nodes, points, weight, normal
         As in `ContactNodes`, whatever is fixed there.
+    surface
+        Points of the curved surface in front of the nodes, shape (n, d) (length): nodes in the
+        middle of straight edges are on chords, and gaps to a shape are measured from the surface.
+    deviation
+        As in `ContactNodes`, in front of a shape.
     numbers
         Global numbers of the nodes, shape (n,).
     mixing
@@ -38,6 +43,8 @@ class Candidates:
     points: Array
     weight: Array
     normal: Array
+    surface: Array
+    deviation: float
     numbers: NDArray[np.int64]
     mixing: Mixing | None
 
@@ -49,7 +56,11 @@ class Candidates:
 
     def measure(self, obstacle: Obstacle) -> tuple[Array, Array]:
         """Return the contact directions and the gaps of nodes, before anything is mixed."""
-        return obstacle.measure(self.points, self.normal)
+        return obstacle.measure(self.in_front_of(obstacle), self.normal)
+
+    def in_front_of(self, obstacle: Obstacle) -> Array:
+        """Return the points from which gaps are measured: given gaps are those of the nodes."""
+        return self.surface if obstacle.is_shape else self.points
 
     def gaps(self, direction: Array, gap: Array) -> Array:
         """Return the gaps of the jumps, (n,); next to infinite ones no numbers. Collective."""
@@ -62,7 +73,10 @@ class Candidates:
 
 def candidates(domain: Domain, space: fem.FunctionSpace, part: str) -> Candidates:
     """Collect the nodes of a boundary part whose area is not zero. Collective."""
-    lumped = Lumping.of(surface_of(domain, space, part).gathered(domain.comm))
+    facets = surface_of(domain, space, part).gathered(domain.comm)
+    lumped = Lumping.of(facets)
+    # Vertices are on the curved surface, unless they are in the middle of refined edges.
+    deviation = facets.unknown_deviation(domain.levels) if domain.levels > 0 else 0.0
     # Nodes whose function has no mean on Gamma_3 carry none: P2 vertices of edges where they meet
     # the axis of a body of revolution.
     heavy = lumped.weight > 1e-9 * lumped.weight.sum() / max(lumped.weight.size, 1)
@@ -71,5 +85,15 @@ def candidates(domain: Domain, space: fem.FunctionSpace, part: str) -> Candidate
     numbers, normal = lumped.nodes[here], lumped.normal[here]
     points = space.tabulate_dof_coordinates()[nodes, : domain.dim]
     normal = normal / np.linalg.norm(normal, axis=1)[:, None]
-    weight = lumped.weight[here]
-    return Candidates(domain.comm, nodes, points, weight, normal, numbers, lumped.mixing)
+    weight, surface = lumped.weight[here], points + lumped.deviation[here]
+    return Candidates(
+        domain.comm,
+        nodes,
+        points,
+        weight,
+        normal,
+        surface,
+        deviation,
+        numbers,
+        lumped.mixing,
+    )

@@ -145,7 +145,9 @@ def _side_by_side(pieces: Sequence[ContactNodes]) -> ContactNodes:
         together["motion"] = np.concatenate([nodes.motion for nodes in pieces])
     held = [np.zeros_like(n.normal) if n.held is None else n.held for n in pieces]
     together["held"] = np.concatenate(held)
-    return replace(first, **together, cut=max(nodes.cut for nodes in pieces))
+    for name in ("cut", "deviation"):
+        together[name] = max(getattr(nodes, name) for nodes in pieces)
+    return replace(first, **together)
 
 
 def joined_friction(entries: Sequence[Entry], nodes: ContactNodes) -> NodalFriction:

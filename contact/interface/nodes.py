@@ -63,6 +63,8 @@ class ContactNodes:
     cut
         Largest depth in the foundation, at rest, of a node on a straight facet of a curved
         part; the gap of these nodes is 0 (length).
+    deviation
+        Largest deviation of a curved surface from its facets that the gaps do not have (length).
     revolved
         Whether the nodes stand for the rings through them, about the axis x = 0.
     carried
@@ -84,6 +86,7 @@ class ContactNodes:
     gap: Array
     block_size: int
     cut: float = 0.0
+    deviation: float = 0.0
     revolved: bool = False
     motion: Array | None = None
     carried: Array | None = None

@@ -96,6 +96,8 @@ def find_pair(
     admissible = normal * moves
     length = np.linalg.norm(admissible, axis=1)
     direction = admissible / length[:, None]
+    levels = body.domain.levels
+    unknown = max(side.unknown_deviation(levels) for side in (slave, master))
     nodes = ContactNodes(
         body.comm,
         local,
@@ -106,6 +108,7 @@ def find_pair(
         (gap + added) / length,
         body.block_size,
         cut,
+        body.comm.allreduce(unknown, op=MPI.MAX),
         body.domain.revolved,
         body.masters.still(local.size, body.block_size),
     )

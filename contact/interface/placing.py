@@ -83,12 +83,12 @@ def _place(
             "of it, or inside = true for a body within"
         )
     rounding = 1e-5 * domain.size  # that of mesh files
-    _refuse_within(domain, contact[1], found.points[facing > 0], gap[facing > 0], rounding)
+    _refuse_within(domain, contact[1], found.surface[facing > 0], gap[facing > 0], rounding)
     if press:
         return gap, 0.0
     tolerance = np.full_like(gap, rounding)
     depth = np.where(facing > 0, -gap, 0.0)
-    chord = max(rounding, _chord_depth(domain, *contact, found.points[depth > rounding]))
+    chord = max(rounding, _chord_depth(domain, *contact, found.surface[depth > rounding]))
     if domain.levels > 0:
         tolerance[:] = chord
     elif space.ufl_element().embedded_superdegree > 1:
@@ -168,7 +168,8 @@ def find_nodes(
     domain, space, d = body.domain, body.space, body.dim
     found = candidates(domain, space, part)
     nodes, points, weight = found.nodes, found.points, found.weight
-    direction, gap = measured(obstacle, points, found.normal, domain.comm, key)
+    front = found.in_front_of(obstacle)
+    direction, gap = measured(obstacle, front, found.normal, domain.comm, key)
     if domain.comm.allreduce(bool(np.isnan(direction).any()), op=MPI.LOR):
         raise InputError(
             f"{key}.foundation: a contact node has no contact direction (it is the sphere's "
@@ -208,6 +209,7 @@ def find_nodes(
         gap,
         space.dofmap.index_map_bs,
         cut if cut > 1e-5 * domain.size else 0.0,
+        found.deviation if obstacle.is_shape else 0.0,
         domain.revolved,
         _motion(body, part, points, direction, (free, held)),
         held=held,

@@ -28,6 +28,9 @@ OFF = 0.01
 #: cause are about as far off.
 LEFT = 1e-6
 
+#: Largest deviation of facets from a curved surface, as a share of the gaps that are closed.
+DEVIATION = 0.1
+
 #: Largest |eps| of which eps is a good measure: the square of the strain is then 1 % of it.
 SMALL = 0.1
 
@@ -133,6 +136,23 @@ def chords(solution: Solution) -> Remark:
     return (
         f"straight facets of the curved contact part reach {cut:.3g} into the foundation at rest: "
         "the gap there is taken as 0; a mesh that is finer from the beginning has less of it",
+        False,
+    )
+
+
+def coarse_curves(solution: Solution) -> Remark:
+    """Say where facets deviate from a curved surface by as much as contact closes gaps."""
+    problem = solution.problem
+    closed = solution.status != "open"
+    size = problem.nodes.maximum(np.where(closed, np.abs(problem.nodes.gap), 0.0))
+    deviation = problem.nodes.deviation
+    if not size > 1e-9 * problem.domain.size or deviation <= DEVIATION * size:
+        return "", True
+    return (
+        f"straight facets deviate by up to {deviation:.3g} from a curved contact surface, and gaps "
+        f"or overlaps that contact closes are at most {size:.3g}: pressures are off by about that "
+        "share; a mesh that is finer from the beginning, or space.degree = 2 without refinement, "
+        "has less of it",
         False,
     )
 

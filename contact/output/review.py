@@ -39,6 +39,7 @@ def review(solution: Solution) -> None:
         *assumptions.monotonicity(solution, [largest.strain for largest in extremes]),
         assumptions.small_strain(solution),
         assumptions.chords(solution),
+        assumptions.coarse_curves(solution),
         assumptions.fitting(solution.problem),
         assumptions.preload(solution),
         assumptions.falling(solution),

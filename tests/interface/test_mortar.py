@@ -11,7 +11,7 @@ from scipy.spatial import Delaunay
 from contact.body.description import Body, Fixed
 from contact.body.equilibrium import BodyEquilibrium
 from contact.interface.mortar.basis import basis, positive_change, rule, size_of
-from contact.interface.mortar.bulge import bulges, pairs_of
+from contact.interface.mortar.deviation import deviations, pairs_of
 from contact.interface.mortar.clipping import clipped
 from contact.interface.mortar.coupling import couple
 from contact.interface.mortar.surface import Surface, surface_of
@@ -180,8 +180,8 @@ def test_concentric_arcs(degree) -> None:
         out = sign * out / np.linalg.norm(out, axis=1)[:, None]
         nodes = np.column_stack([np.arange(n), np.arange(1, n + 1)])
         nodes = nodes if degree == 1 else np.column_stack([nodes, n + 1 + np.arange(n)])
-        bulge = bulges(nodes[:, :2], c, out, MPI.COMM_SELF) * (degree - 1)
-        return Surface(nodes + first, c, out, bulge, degree), a
+        deviation = deviations(nodes[:, :2], c, out, MPI.COMM_SELF) * (degree - 1)
+        return Surface(nodes + first, c, out, deviation, degree), a
 
     errors = []
     for n in (20, 40):
@@ -201,14 +201,14 @@ def test_a_bowl_that_touches_within_facets_does_not_cut_them() -> None:
     slave, points = flat(3, 2, 1, 0.0, 1.0, 1)
     bowl, _ = flat(3, 2, 1, 0.5, -1.0, 1, FIRST)
     edges = [bowl.corners[:, j] - bowl.corners[:, i] for i, j in pairs_of(3)]
-    found = couple(slave, replace(bowl, bulge=np.sum(np.square(edges), axis=2).T), 1.0)
+    found = couple(slave, replace(bowl, deviation=np.sum(np.square(edges), axis=2).T), 1.0)
     values = np.sum((points[:, :2] - 0.5) ** 2, axis=1)
     vertices = {0.5: 0.5, 0.25: (0.25 - 0.2) / 0.6, 0.0: -0.2 / 0.6}  # S of the positive functions
     expected = [vertices[value] for value in values[found.nodes].round(9)]
     np.testing.assert_allclose(found.gap, expected, atol=1e-12)
     np.testing.assert_allclose(found.apart, found.gap, atol=1e-12)
     lower = replace(slave, corners=slave.corners + np.array([0.0, 0.0, 0.1]))
-    cut = couple(lower, replace(bowl, bulge=np.sum(np.square(edges), axis=2).T), 1.0)
+    cut = couple(lower, replace(bowl, deviation=np.sum(np.square(edges), axis=2).T), 1.0)
     np.testing.assert_allclose(cut.gap, np.array(expected) - 0.1, atol=1e-12)
     deepest = int(np.argmin(cut.gap))
     assert cut.apart[deepest] > cut.gap[deepest] + 0.1
@@ -232,13 +232,13 @@ def test_bulges() -> None:
     triangles = Delaunay(flat).simplices.astype(np.int64)
     ball = np.column_stack([0.25 * flat, np.sqrt(1 - np.sum((0.25 * flat) ** 2, axis=1))])
     corners, normal, edges = oriented(ball, triangles, np.array([0.0, 0.0, 1.0]))
-    found = bulges(triangles, corners, normal, MPI.COMM_SELF)
+    found = deviations(triangles, corners, normal, MPI.COMM_SELF)
     np.testing.assert_allclose(found, np.sum(edges**2, axis=2) / 2, rtol=1e-9)
     x, y = (v.ravel() for v in np.meshgrid(np.linspace(0, 2, 9), np.linspace(0, 1, 5)))
     triangles = Delaunay(np.column_stack([x, y])).simplices.astype(np.int64)
     folded = np.column_stack([np.minimum(x, 1), y, -np.maximum(x - 1, 0)])
     corners, normal, _ = oriented(folded, triangles, np.array([1.0, 0.0, 1.0]))
-    np.testing.assert_array_equal(bulges(triangles, corners, normal, MPI.COMM_SELF), 0)
+    np.testing.assert_array_equal(deviations(triangles, corners, normal, MPI.COMM_SELF), 0)
 
 
 def test_surfaces_that_do_not_face_each_other_have_nothing_in_common() -> None:

@@ -117,6 +117,8 @@ class Lumping:
         int N~_j, shape (n,) (length^(d - 1)).
     normal
         int N~_j nu, shape (n, d).
+    deviation
+        From the nodes to the curved surface that the facets approximate, shape (n, d) (length).
     mixing
         The jumps that belong to the weights; None where they are the nodal values.
     """
@@ -124,6 +126,7 @@ class Lumping:
     nodes: NDArray[np.int64]
     weight: Array
     normal: Array
+    deviation: Array
     mixing: Mixing | None
 
     @staticmethod
@@ -135,8 +138,11 @@ class Lumping:
         weight, normal = np.zeros(nodes.size), np.zeros((nodes.size, surface.normal.shape[1]))
         np.add.at(weight, place, area)
         np.add.at(normal, place, area[:, :, None] * surface.normal[:, None, :])
+        deviation = np.zeros_like(normal)
+        np.add.at(deviation, place, surface.node_deviations)
+        deviation /= np.bincount(place.ravel(), minlength=nodes.size)[:, None]
         change = positive_change(surface.corners.shape[1], surface.degree)
         if np.array_equal(change, np.eye(len(change))):
-            return Lumping(nodes, weight, normal, None)
+            return Lumping(nodes, weight, normal, deviation, None)
         mixing = Mixing(nodes, coefficients(place, nodes.size, change))
-        return Lumping(nodes, weight, normal, mixing)
+        return Lumping(nodes, weight, normal, deviation, mixing)

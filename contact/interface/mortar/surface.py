@@ -12,7 +12,7 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 
 from contact import _compat
-from contact.interface.mortar.bulge import bulges, pairs_of
+from contact.interface.mortar.deviation import deviations, pairs_of
 from contact.mesh.domain import Domain
 from contact.mesh.entities import cells_at
 from contact.typing import Array
@@ -31,9 +31,8 @@ class Surface:
         Coordinates of the corners, shape (f, d, d) (length).
     normal
         Unit normals out of the body, shape (f, d).
-    bulge
-        How far the surface is above them (`contact.interface.mortar.bulge`), shape (f, edges):
-        what functions of the space can follow, hence none at degree 1.
+    deviation
+        Of the curved surface from them (`contact.interface.mortar.deviation`), shape (f, edges).
     degree
         Of the space.
     revolved
@@ -43,7 +42,7 @@ class Surface:
     nodes: NDArray[np.int64]
     corners: Array
     normal: Array
-    bulge: Array
+    deviation: Array
     degree: int
     revolved: bool = False
 
@@ -72,17 +71,45 @@ class Surface:
         }
         return replace(self, **arrays)
 
+    def unknown_deviation(self, levels: int) -> float:
+        """Return the largest one (length) that gaps do not have, on this rank.
+
+        Parameters
+        ----------
+        levels
+            How often straight edges have been cut in two: their parts lie on the same chord.
+        """
+        known = self.degree == 2 and levels == 0
+        return 0.0 if known else float(np.abs(self.deviation).max(initial=0.0)) * 4.0**levels / 4
+
     def height(self, facets: NDArray[np.intp], barycentric: Array) -> Array:
         """Return how far the surface is above facets at points, (p, q), along their normals.
+
+        At degree 1 nothing: displacements of that degree cannot follow a curve.
 
         Parameters
         ----------
         facets, barycentric
             The facets, and points on each, shapes (p,) and (p, q, d).
         """
+        if self.degree == 1:
+            return np.zeros(barycentric.shape[:2])
         edges = pairs_of(self.corners.shape[1])
         products = np.stack([barycentric[..., i] * barycentric[..., j] for i, j in edges], axis=2)
-        return np.asarray(np.einsum("pqe,pe->pq", products, self.bulge[facets]))
+        return np.asarray(np.einsum("pqe,pe->pq", products, self.deviation[facets]))
+
+    @property
+    def node_deviations(self) -> Array:
+        """From the nodes of each facet to the curved surface, shape (f, k, d) (length)."""
+        corners = self.corners.shape[1]
+        places = np.eye(corners)
+        if self.degree == 2:
+            middles = [[0.5, 0.5]] if corners == 2 else (1 - places) / 2
+            places = np.concatenate([places, middles])
+        heights = self.height(
+            np.arange(self.count), np.broadcast_to(places, (self.count, *places.shape))
+        )
+        return np.asarray(heights[:, :, None] * self.normal[:, None, :])
 
     def turn(self, facets: NDArray[np.intp], barycentric: Array) -> Array:
         """Return the circumferences through points of facets; 1 unless revolved, shape (p,).
@@ -120,12 +147,12 @@ def surface_of(domain: Domain, space: fem.FunctionSpace, part: str) -> Surface:
     numbers = space.dofmap.index_map.local_to_global(nodes.ravel().astype(np.int32))
     names = np.asarray(numbers, dtype=np.int64).reshape(nodes.shape)
     normal = _outward(corners, inside)
-    bulge = bulges(names[:, :d], corners, normal, domain.comm)
+    deviation = deviations(names[:, :d], corners, normal, domain.comm)
     return Surface(
         names,
         corners,
         normal,
-        bulge if degree == 2 else np.zeros_like(bulge),
+        deviation,
         degree,
         domain.revolved,
     )

@@ -1,0 +1,193 @@
+"""Deviation of a curved surface from the straight facets that approximate it.
+
+At each vertex a quadratic surface is fitted to the vertices around it. An edge e is the chord of
+a curve that is, to second order, lambda_i lambda_j c_ij above it, c = -e.K e/2 with the curvature K
+of the fits at its ends; so is a triangle with the sum over its edges, in barycentric coordinates.
+Circles and spheres are reproduced, and a flat side has no deviation.
+
+References
+----------
+Max, J. Graphics Tools 4 (1999) 1 (normals at vertices, exact on spheres); Cazals and Pouget,
+Comput. Aided Geom. Design 22 (2005) 121 (fits of vertices); Jiang and Shu, J. Comput. Phys. 126
+(1996) 202 (weights where something jumps).
+"""
+
+from __future__ import annotations
+
+from itertools import combinations
+
+import numpy as np
+from mpi4py import MPI
+from numpy.typing import NDArray
+from scipy import sparse
+
+from contact.typing import Array
+
+#: Least cosine between the normals of a surface and of its facets; corners of bodies have less.
+SMOOTH = 0.9
+
+#: Weight of the neighbours of neighbours, which decide only where there are too few neighbours.
+FAR = 1e-3
+
+#: Relative differences of curvature up to which both ends of an edge count alike.
+ALIKE = 0.1
+
+#: Numbers of vertices.
+Numbers = NDArray[np.intp]
+
+
+def pairs_of(corners: int) -> list[tuple[int, int]]:
+    """Return the edges of a facet, as pairs of its corners."""
+    return list(combinations(range(corners), 2))
+
+
+def deviations(
+    names: NDArray[np.int64], corners: Array, normal: Array, comm: MPI.Intracomm
+) -> Array:
+    """Return c of the edges of each facet, positive outwards, shape (f, edges). Collective.
+
+    Parameters
+    ----------
+    names
+        Global numbers of the corners, shape (f, d).
+    corners, normal
+        Their coordinates, shape (f, d, d), and the facets' normals, shape (f, d).
+    comm
+        Communicator; the facets are those of this rank.
+    """
+    counts = comm.allgather(len(names))
+    names, corners, normal = (
+        np.concatenate(comm.allgather(array)) for array in (names, corners, normal)
+    )
+    first = sum(counts[: comm.rank])
+    return _deviations(names, corners, normal)[first : first + counts[comm.rank]]
+
+
+def _deviations(names: NDArray[np.int64], corners: Array, normal: Array) -> Array:
+    """Return them, given all facets."""
+    vertices, place = np.unique(names, return_inverse=True)
+    place = place.reshape(names.shape)
+    points = np.zeros((vertices.size, normal.shape[1]))
+    points[place] = corners
+    own = np.zeros_like(points)
+    np.add.at(own, place, _weights(corners)[:, :, None] * normal[:, None, :])
+    own /= np.linalg.norm(own, axis=1)[:, None]
+    # An edge or a corner of the body has no normal.
+    known = np.ones(vertices.size, dtype=bool)
+    np.logical_and.at(known, place, np.einsum("fcd,fd->fc", own[place], normal) > SMOOTH)
+    pairs, near = _around(place, vertices.size)
+    alike = np.einsum("pd,pd->p", own[pairs[0]], own[pairs[1]]) > SMOOTH
+    pairs, near = pairs[:, alike & known[pairs[0]]], near[alike & known[pairs[0]]]
+    curvature = _curvatures(points, own, pairs, np.where(near, 1.0, FAR))
+    pairs = pairs[:, near & known[pairs[1]]]
+    edges = pairs_of(names.shape[1])
+    found = np.zeros((len(names), len(edges)))
+    sure = np.zeros(found.shape, dtype=bool)
+    for k, (i, j) in enumerate(edges):
+        ends = place[:, [i, j]]
+        found[:, k] = _between(points, curvature, pairs, ends, known)
+        sure[:, k] = known[ends].any(axis=1)
+    return np.where(sure, found, _likewise(found, sure, corners, edges))
+
+
+def _weights(corners: Array) -> Array:
+    """Return the weights of facets at their corners, shape (f, d)."""
+    d = corners.shape[1]
+    around = [[k for k in range(d) if k != c] for c in range(d)]
+    sides = [corners[:, others] - corners[:, [c]] for c, others in enumerate(around)]
+    lengths = np.stack([np.linalg.norm(side, axis=2).prod(axis=1) for side in sides], axis=1)
+    if d == 2:
+        return np.asarray(1 / lengths)
+    area = np.linalg.norm(np.cross(sides[0][:, 0], sides[0][:, 1]), axis=1)
+    return np.asarray(area[:, None] / lengths**2)
+
+
+def _around(place: Numbers, count: int) -> tuple[Numbers, NDArray[np.bool_]]:
+    """Return vertices with those up to two edges away, shape (2, p), and which are neighbours."""
+    ends = np.concatenate([place[:, pair] for pair in pairs_of(place.shape[1])])
+    rows, columns = np.concatenate([ends, ends[:, ::-1]]).T
+    beside = sparse.csr_array((np.ones(rows.size), (rows, columns)), shape=(count, count))
+    both = sparse.coo_array(beside @ beside + 1e6 * beside)
+    apart = both.row != both.col
+    return np.stack([both.row[apart], both.col[apart]]).astype(np.intp), both.data[apart] >= 1e6
+
+
+def _curvatures(points: Array, normal: Array, pairs: Numbers, weight: Array) -> Array:
+    """Return the curvature tensors at vertices, negative where convex, shape (v, d, d)."""
+    count, d = points.shape
+    # The last vectors of an orthonormal basis that begins with the normal.
+    tangent = np.linalg.svd(normal[:, None, :])[2][:, 1:]
+    at, offset = pairs[0], points[pairs[1]] - points[pairs[0]]
+    size = np.linalg.norm(offset, axis=1)
+    longest = np.zeros(count)
+    np.maximum.at(longest, at, size)
+    scale = longest[at]
+    along = np.einsum("pid,pd->pi", tangent[at], offset) / scale[:, None]
+    z = np.einsum("pd,pd->p", normal[at], offset) / scale
+    # A part of z^2 beside the squares makes spheres exact.
+    products = [along[:, i] * along[:, j] for i, j in pairs_of(d - 1)]
+    squares = [0.5 * (along[:, i] ** 2 + z**2 / (d - 1)) for i in range(d - 1)]
+    columns = np.column_stack([along, *squares, *products])
+    k = columns.shape[1]
+    weighted = weight[:, None] * columns
+    matrix, right = np.zeros((count, k, k)), np.zeros((count, k))
+    np.add.at(matrix, at, weighted[:, :, None] * columns[:, None, :])
+    np.add.at(right, at, weighted * z[:, None])
+    fit = np.einsum("vij,vj->vi", np.linalg.pinv(matrix, rcond=1e-10, hermitian=True), right)
+    slope = np.sqrt(1 + np.sum(fit[:, : d - 1] ** 2, axis=1))
+    fit /= np.where(longest > 0, longest * slope, 1.0)[:, None]
+    form = np.zeros((count, d - 1, d - 1))
+    diagonal = np.arange(d - 1)
+    form[:, diagonal, diagonal] = fit[:, d - 1 : 2 * (d - 1)]
+    for number, (i, j) in enumerate(pairs_of(d - 1), 2 * (d - 1)):
+        form[:, i, j] = form[:, j, i] = fit[:, number]
+    mean = np.trace(form, axis1=1, axis2=2) / (d - 1)
+    tensor = np.einsum("via,vij,vjb->vab", tangent, form, tangent)
+    return np.asarray(tensor + mean[:, None, None] * normal[:, :, None] * normal[:, None, :])
+
+
+def _between(
+    points: Array, curvature: Array, pairs: Numbers, ends: Numbers, known: NDArray[np.bool_]
+) -> Array:
+    """Return c of edges between two vertices each, shape (e,).
+
+    Where the curvature jumps, as from a side to a rounded edge, the end counts beyond which it
+    stays as it is.
+    """
+    edge = points[ends[:, 1]] - points[ends[:, 0]]
+    value = np.where(known[ends], _sagitta(edge[:, None], curvature[ends]), 0.0)
+    largest = np.abs(value).max(axis=1)
+    largest[largest == 0] = 1.0
+    begin = np.searchsorted(pairs[0], np.arange(len(points) + 1))
+    weights = np.zeros_like(value)
+    for k, sign in ((0, -1.0), (1, 1.0)):
+        # All neighbours of an end, edge by edge, of which those beyond it count.
+        end = ends[:, k]
+        counts = np.diff(begin)[end]
+        of = np.repeat(np.arange(len(ends)), counts)
+        last = np.cumsum(counts)
+        beyond = pairs[1][np.arange(of.size) + np.repeat(begin[end] - last + counts, counts)]
+        way = np.einsum("pd,pd->p", points[beyond] - points[end[of]], sign * edge[of])
+        share = np.maximum(way, 0.0)
+        change = share * np.abs(_sagitta(edge[of], curvature[beyond]) - value[of, k])
+        total, changed = (np.bincount(of, given, minlength=len(ends)) for given in (share, change))
+        other = np.abs(value[:, 1] - value[:, 0])
+        jump = np.where(total > 0, changed / np.where(total > 0, total, 1.0), other) / largest
+        weights[:, k] = known[end] / (jump**2 + ALIKE**2) ** 2
+    total = np.maximum(weights.sum(axis=1), np.finfo(float).tiny)
+    return np.asarray(np.sum(weights * value, axis=1) / total)
+
+
+def _sagitta(edge: Array, curvature: Array) -> Array:
+    """Return c = -e.K e/2 of edges, shape (..., d), with curvature tensors, shape (..., d, d)."""
+    return np.asarray(-0.5 * np.einsum("...i,...ij,...j->...", edge, curvature, edge))
+
+
+def _likewise(
+    found: Array, known: NDArray[np.bool_], corners: Array, edges: list[tuple[int, int]]
+) -> Array:
+    """Return c of edges of which nothing is known: the curvature of the facet's others."""
+    squares = [np.sum((corners[:, j] - corners[:, i]) ** 2, axis=1) for i, j in edges]
+    lengths = np.stack(squares, axis=1)
+    curvature = np.where(known, found / lengths, 0.0).sum(axis=1) / np.maximum(known.sum(axis=1), 1)
+    return np.asarray(curvature[:, None] * lengths)
