@@ -39,7 +39,7 @@ from contact import (
     Triangles,
     from_msh,
     load_case,
-    solve_problem,
+    solve,
 )
 from contact.mesh.revolution import revolved
 from contact.methods.options import NewtonOptions
@@ -136,10 +136,13 @@ def triangulated(_dim: int, factor: float, cells: int = 400) -> Triangles:
     return Triangles(corners[size > 1e-12])
 
 
-def shell(outer: float, shape: Callable[[int, float], Shape], height: float = 1.0) -> Profile:
-    """Return a quarter of a shell around an ellipse of the half axes 1 and `height`."""
-    points = [(1.0, 0.0), (outer, 0.0), (0.0, outer), (0.0, height)]
-    arcs = {1: ((0.0, 0.0), (outer, outer)), 3: ((0.0, 0.0), (1.0, height))}
+def shell(
+    outer: float, shape: Callable[[int, float], Shape], height: float = 1.0, inner: float = 1.0
+) -> Profile:
+    """Return a quarter of a shell around an ellipse of the half axes `inner`, `height inner`."""
+    low = height * inner
+    points = [(inner, 0.0), (outer, 0.0), (0.0, outer), (0.0, low)]
+    arcs = {1: ((0.0, 0.0), (outer, outer)), 3: ((0.0, 0.0), (inner, low))}
     return Profile(points, arcs, [3], [1], shape)
 
 
@@ -187,61 +190,49 @@ PROFILES = {
 }
 
 
-def mesh(profile: Profile, h: float, dim: int) -> Domain:
-    """Return a Gmsh mesh of straight edges; in 3-D a quarter of the turn. Collective."""
+def mesh(profile: Profile, h: float, dim: int, other: Profile | None = None) -> Domain:
+    """Return a Gmsh mesh of straight edges; in 3-D a quarter of the turn. Collective.
+
+    In 2-D there may be another body, whose parts have names with a 1 behind them.
+    """
     with tempfile.TemporaryDirectory() as folder:
         path = MPI.COMM_WORLD.bcast(str(Path(folder) / "body.msh"))
         if MPI.COMM_WORLD.rank == 0:
-            _write(profile, h, dim, path)
+            _write([profile, *([] if other is None else [other])], h, dim, path)
         MPI.COMM_WORLD.barrier()
         domain = from_msh(MPI.COMM_WORLD, path)
         MPI.COMM_WORLD.barrier()
     return domain
 
 
-def _write(profile: Profile, h: float, dim: int, path: str) -> None:
+def _write(profiles: Sequence[Profile], h: float, dim: int, path: str) -> None:
     import gmsh
 
     gmsh.initialize(readConfigFiles=False, interruptible=False)
     try:
         gmsh.option.setNumber("General.Terminal", 0)
         model = gmsh.model.occ
-        points = [
-            model.addPoint(r, 0, z) if dim == 3 else model.addPoint(r, z, 0)
-            for r, z in profile.points
-        ]
-        sides = []
-        for k, first in enumerate(points):
-            last = points[(k + 1) % len(points)]
-            if k not in profile.arcs:
-                sides.append(model.addLine(first, last))
-                continue
-            (r, z), (a, b) = profile.arcs[k]
-            ends = [profile.points[k], profile.points[(k + 1) % len(points)]]
-            angles = np.unwrap([np.arctan2((y - z) / b, (x - r) / a) for x, y in ends])
-            turns = np.linspace(*angles, 41)[1:-1]
-            way = [(r + a * np.cos(t), z + b * np.sin(t)) for t in turns]
-            if a == b:
-                middle = way[len(way) // 2]
-                through = model.addPoint(*((middle[0], 0, middle[1]) if dim == 3 else (*middle, 0)))
-                sides.append(model.addCircleArc(first, through, last, center=False))
-                continue
-            inner = [model.addPoint(*((x, 0, y) if dim == 3 else (x, y, 0))) for x, y in way]
-            sides.append(model.addSpline([first, *inner, last]))
-        face = model.addPlaneSurface([model.addCurveLoop(sides)])
-        groups = {"contact": profile.contact, "held": profile.held}
-        names = {f"side{k}": [k] for k in range(len(sides))}
+        body: list[int] = []
         parts: dict[str, list[int]] = {}
-        if dim == 2:
+        for behind, profile in zip(("", "1"), profiles, strict=False):
+            sides, face = _outline(model, profile, dim)
+            if dim == 3:
+                # What is swept from a side is its surface; on the axis there is none.
+                swept = model.revolve([(2, face)], 0, 0, 0, 0, 0, 1, np.pi / 2)
+                model.synchronize()
+                body += [tag for d, tag in swept if d == 3]
+                parts = _surfaces(gmsh, profile, body)
+                continue
             model.synchronize()
-            parts = {name: [sides[k] for k in of] for name, of in {**groups, **names}.items()}
-            body = [face]
-        else:
-            # One side at a time: what is swept from it is its surface; on the axis there is none.
-            swept = model.revolve([(2, face)], 0, 0, 0, 0, 0, 1, np.pi / 2)
-            model.synchronize()
-            body = [tag for d, tag in swept if d == 3]
-            parts = _surfaces(gmsh, profile, body)
+            body.append(face)
+            groups = {"contact": profile.contact, "held": profile.held}
+            groups |= {f"side{k}": [k] for k in range(len(sides))}
+            parts |= {name + behind: [sides[k] for k in of] for name, of in groups.items()}
+            if behind:
+                # The two sides of a pair do not match.
+                length = model.getMass(1, sides[profile.contact[0]])
+                count = round(1.4 * length / h)
+                gmsh.model.mesh.setTransfiniteCurve(sides[profile.contact[0]], count)
         for name, tags in parts.items():
             if tags:
                 gmsh.model.addPhysicalGroup(dim - 1, tags, name=name)
@@ -261,6 +252,32 @@ def _write(profile: Profile, h: float, dim: int, path: str) -> None:
         gmsh.write(path)
     finally:
         gmsh.finalize()
+
+
+def _outline(model: Any, profile: Profile, dim: int) -> tuple[list[int], int]:
+    """Return the curves of a profile, and the face within."""
+    points = [
+        model.addPoint(r, 0, z) if dim == 3 else model.addPoint(r, z, 0) for r, z in profile.points
+    ]
+    sides = []
+    for k, first in enumerate(points):
+        last = points[(k + 1) % len(points)]
+        if k not in profile.arcs:
+            sides.append(model.addLine(first, last))
+            continue
+        (r, z), (a, b) = profile.arcs[k]
+        ends = [profile.points[k], profile.points[(k + 1) % len(points)]]
+        angles = np.unwrap([np.arctan2((y - z) / b, (x - r) / a) for x, y in ends])
+        turns = np.linspace(*angles, 41)[1:-1]
+        way = [(r + a * np.cos(t), z + b * np.sin(t)) for t in turns]
+        if a == b:
+            middle = way[len(way) // 2]
+            through = model.addPoint(*((middle[0], 0, middle[1]) if dim == 3 else (*middle, 0)))
+            sides.append(model.addCircleArc(first, through, last, center=False))
+            continue
+        inner = [model.addPoint(*((x, 0, y) if dim == 3 else (x, y, 0))) for x, y in way]
+        sides.append(model.addSpline([first, *inner, last]))
+    return sides, model.addPlaneSurface([model.addCurveLoop(sides)])
 
 
 def _surfaces(gmsh: Any, profile: Profile, body: Sequence[int]) -> dict[str, list[int]]:
@@ -332,7 +349,7 @@ def hydrostatic(name: str, h: float, degree: int, kind: str) -> Array:
     body = Body(Linear(YOUNG, POISSON), fixed)
     problem = Problem(domain, body, Contact("contact", shape, press=True), degree=degree)
     exact = PRESSURE / (1 + POISSON if kind == "2-D" else 1)
-    return ratios(solve_problem(problem, NewtonOptions(tolerance=1e-10)), exact)
+    return ratios(solve(problem, NewtonOptions(tolerance=1e-10)), exact)
 
 
 def rings(name: str, h: float, degree: int) -> Array:
@@ -355,7 +372,28 @@ def rings(name: str, h: float, degree: int) -> Array:
     sides = [Fixed("side0", [None, 0.0]), Fixed("side2", [0.0, None])]
     body = Body(Linear(YOUNG, POISSON), sides, loads)
     problem = Problem(mesh(RING, h, 2), body, Contact(on, shape, press=True), degree=degree)
-    return ratios(solve_problem(problem, NewtonOptions(tolerance=1e-10)), float(exact))
+    return ratios(solve(problem, NewtonOptions(tolerance=1e-10)), float(exact))
+
+
+def two_rings(h: float, degree: int, overlap: float = 0.001) -> tuple[Solution, float]:
+    """Return a ring, 1 <= r <= 1.5, in another one, r <= 2, and the exact pressure. Collective.
+
+    The rings overlap, by a part of 1.5 that degree 1, whose gaps are those of facets, sees.
+    """
+    middle, outer = 1.5, 2.0
+    domain = mesh(shell(middle, ball), h, 2, shell(outer, ball, inner=middle - overlap))
+    sides = [Fixed(f"side0{k}", [None, 0.0]) for k in ("", "1")]
+    sides += [Fixed(f"side2{k}", [0.0, None]) for k in ("", "1")]
+    body = Body(Linear(YOUNG, POISSON), sides)
+    pair = Contact("held", against="contact1", press=True)
+    solution = solve(Problem(domain, body, pair, degree=degree))
+    # Compliances of both sides: u_r of a pressure of 1 there.
+    factor = np.array([1 / (1 - 2 * POISSON), -1.0]) * YOUNG / (1 + POISSON)
+    total = 0.0
+    for radius, free, sign in ((middle, 1.0, -1.0), (middle, outer, 1.0)):
+        stress = [factor * [1.0, 1 / r**2] for r in (radius, free)]
+        total += sign * float(np.linalg.solve(stress, [-1.0, 0.0]) @ [radius, 1 / radius])
+    return solution, overlap / total
 
 
 def hertz(h: float, degree: int) -> Array:
