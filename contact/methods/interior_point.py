@@ -43,8 +43,9 @@ INTERIOR_POINT = "interior point"
 #: Steps of one convex problem at most, and convex problems with one friction bound after the other.
 LIMIT, UPDATES = 60, 8
 
-#: Work of slacks and forces, beside all that is done, below which the contact zone is known.
-CLOSED = 1e-10
+#: Duality gap over the work of loads and contact, below which the active sets are known, part of it
+#: that the next problem is solved to where they were not, and where no solver tells more.
+CLOSED, CLOSER, VANISHED = 1e-10, 1e-2, 1e-20
 
 #: Forces out of balance then. Where an iterative solver leaves more, the slacks vanish beneath what
 #: it can tell long before: Newton's method, whose right-hand sides are what is left, does better.
@@ -86,14 +87,16 @@ def interior_point(
     problem, interface = search.problem, search.problem.interface
     stuck = restraint.stuck_bound()
     bound = np.zeros(interface.jump.weight.size) if stuck is None else stuck
-    for _ in range(UPDATES):
+    for update in range(UPDATES):
         method = InteriorPoint(problem, whole, bound, restraint.complete)
-        outcome, state = method.run(search), method.state
-        iterate = Iterate(state)
+        outcome, state = method.run(search, CLOSED * CLOSER**update), method.state
+        iterate, least = Iterate(state), outcome.kkt.largest
         if not outcome.converged and search.left > 0:
             iterate, outcome = finish(state)
         if outcome.converged or search.left <= 0 or not interface.friction.acts:
             break
+        if outcome.kkt.largest < least:
+            state = iterate.state
         bound = interface.bound(interface.jump.apply(state.x), state.forces)
     return iterate, outcome
 
@@ -152,8 +155,8 @@ class InteriorPoint:
         length = np.maximum(work / limit, slips)
         self.cones = Cones(slack, work / slack, length, zeros, limit, zeros, jump.comm)
 
-    def run(self, search: Search) -> Outcome:
-        """Go towards the solution. Collective."""
+    def run(self, search: Search, closed: float) -> Outcome:
+        """Go towards the solution, until the duality gap is closed. Collective."""
         kkt, ended = evaluate(self.problem, self.state), "the interior point was given no step"
         for steps in range(1, min(LIMIT, search.left) + 1):
             try:
@@ -169,7 +172,7 @@ class InteriorPoint:
                 ended = f"rounding ends the interior point after {steps} steps"
                 break
             gap = self.gap()
-            if gap <= CLOSED and (kkt.equilibrium <= BALANCED or gap <= CLOSED**2):
+            if gap <= closed and (kkt.equilibrium <= BALANCED or gap <= VANISHED):
                 ended = f"duality gap closed after {steps} steps"
                 break
         return Outcome(kkt, search.options.allowed, ended)
