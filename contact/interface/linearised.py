@@ -25,21 +25,21 @@ SOFTENING = 0.25
 
 
 @dataclass(frozen=True)
-class Moduli:
-    """Stiffnesses (stress/length) that the linearised laws need.
+class ComplementarityParameters:
+    """Parameters of the complementarity functions and of their linearisation (stress/length).
 
     Attributes
     ----------
-    status
-        c of the complementarity functions p + c (u_nu - rho) and lambda + c u_tau.
-    nodal
+    c
+        Weighs displacements against stresses in the functions, and thereby in the active set.
+    nodal_stiffness
         Of the body against a displacement of one contact node, about E'/h.
     gamma
         Of the condensed constraints, far above the others.
     """
 
-    status: float
-    nodal: float
+    c: float
+    nodal_stiffness: float
     gamma: float
 
 
@@ -69,7 +69,7 @@ def linearise(
     interface: Interface,
     nodal: Array,
     forces: Multipliers,
-    moduli: Moduli,
+    parameters: ComplementarityParameters,
     before: NDArray[np.int8] | None,
     frozen_bound: Array | None = None,
     softening: float = SOFTENING,
@@ -80,8 +80,8 @@ def linearise(
     ----------
     interface, nodal, forces
         The contact nodes with their laws, the unknowns there, and the contact forces.
-    moduli
-        Stiffnesses.
+    parameters
+        Of the complementarity functions.
     before
         Status in the step before; None in the first one, where closed nodes stick.
     frozen_bound
@@ -89,7 +89,7 @@ def linearise(
     softening
         Part of a node's own stiffness that a falling friction coefficient may take away.
     """
-    jump, frictional, c = interface.jump, interface.friction.acts, moduli.status
+    jump, frictional, c = interface.jump, interface.friction.acts, parameters.c
     p, lam, n, d = forces.pressure, forces.friction, jump.normal, jump.dim
     opening, slip = interface.opening(nodal), interface.slip(nodal)
     length = np.linalg.norm(slip, axis=1)
@@ -110,30 +110,30 @@ def linearise(
     changed = before is None or not np.array_equal(status, before)
     settled = interface.comm.allreduce(int(changed), op=MPI.SUM) == 0
     if frozen_bound is None and not settled and before is not None:
-        bound = np.where(slides, _foreseen_bound(interface, total, length, size, moduli), bound)
+        bound = np.where(slides, _foreseen_bound(interface, total, length, size, parameters), bound)
 
-    pressure = np.where(closed, p + moduli.gamma * opening, 0.0)
+    pressure = np.where(closed, p + parameters.gamma * opening, 0.0)
     blocks = np.zeros((p.size, jump.block_size, jump.block_size))
-    slope = np.where(closed, moduli.gamma, 0.0)[:, None] * n
+    slope = np.where(closed, parameters.gamma, 0.0)[:, None] * n
     blocks[:, :d, :d] = n[:, :, None] * slope[:, None, :]
     friction = np.zeros_like(lam)
     if frictional:
-        friction[sticks] = (lam + moduli.gamma * slip)[sticks]
-        blocks[sticks, :d, :d] += moduli.gamma * jump.tangent[sticks]
+        friction[sticks] = (lam + parameters.gamma * slip)[sticks]
+        blocks[sticks, :d, :d] += parameters.gamma * jump.tangent[sticks]
 
         along = trial / np.maximum(size, 1e-300)[:, None]
         across = jump.tangent - along[:, :, None] * along[:, None, :]
         # Across z = lambda + c u_tau the new multiplier is s/|u_tau| times the new slip:
         # lambda = s z/|z|, linearised in u and lambda and solved for the latter.
-        least = np.maximum(bound * c / moduli.gamma, 1e-300)  # turning is at most gamma
+        least = np.maximum(bound * c / parameters.gamma, 1e-300)  # turning is at most gamma
         turning = bound * c / np.maximum(size - bound, least)
         sliding = turning[:, None, None] * across
         friction[slides] = (bound[:, None] * along + np.einsum("nij,nj->ni", sliding, slip))[slides]
         if frozen_bound is None:
-            limit = softening * moduli.nodal if settled else None
+            limit = softening * parameters.nodal_stiffness if settled else None
             rate = _bound_gradient(interface, total, slip, length, limit)
             ahead, follows = _follow_pressure(
-                interface, nodal, total, length, slope, opening, moduli, closed
+                interface, nodal, total, length, slope, opening, parameters, closed
             )
             friction[slides] += (ahead[:, None] * along)[slides]
             rate = rate + follows
@@ -143,7 +143,11 @@ def linearise(
 
 
 def _foreseen_bound(
-    interface: Interface, total: Array, length: Array, size: Array, moduli: Moduli
+    interface: Interface,
+    total: Array,
+    length: Array,
+    size: Array,
+    parameters: ComplementarityParameters,
 ) -> Array:
     """Return the bound that a node which lets go will slide on, shape (n,).
 
@@ -152,7 +156,7 @@ def _foreseen_bound(
     """
     bound = interface.friction.bound(total, length)
     for _ in range(5):
-        ahead = np.maximum(length, (size - bound) / (0.5 * moduli.nodal))
+        ahead = np.maximum(length, (size - bound) / (0.5 * parameters.nodal_stiffness))
         bound = interface.friction.bound(total, ahead)
     return bound
 
@@ -181,7 +185,7 @@ def _follow_pressure(
     length: Array,
     slope: Array,
     opening: Array,
-    moduli: Moduli,
+    parameters: ComplementarityParameters,
     closed: NDArray[np.bool_],
 ) -> tuple[Array, Array]:
     """Return how the bound follows the pressure of this very step: change and gradient."""
@@ -189,4 +193,4 @@ def _follow_pressure(
     gradient = np.zeros((length.size, interface.jump.block_size))
     gradient[:, : interface.dim] = rate[:, None] * slope
     gradient += rate[:, None] * interface.response.layer_gradient(nodal)
-    return np.where(closed, rate * moduli.gamma * opening, 0.0), gradient
+    return np.where(closed, rate * parameters.gamma * opening, 0.0), gradient

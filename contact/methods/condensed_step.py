@@ -11,7 +11,7 @@ import logging
 from collections.abc import Callable
 from dataclasses import replace
 
-from contact.interface.linearised import Moduli
+from contact.interface.linearised import ComplementarityParameters
 from contact.interface.multipliers import Multipliers
 from contact.linear.operator import Counters
 from contact.methods.chord import WORTH, Kept
@@ -38,7 +38,8 @@ MOST_STEPS = 1000
 
 #: Solves a condensed problem from an iterate, with a history of its own.
 Solver = Callable[
-    [CondensedProblem, NewtonOptions, Moduli, History, Iterate], tuple[Iterate, Outcome]
+    [CondensedProblem, NewtonOptions, ComplementarityParameters, History, Iterate],
+    tuple[Iterate, Outcome],
 ]
 
 
@@ -49,7 +50,7 @@ class CondensedStep:
     ----------
     condensation
         Condenses the body of the whole problem.
-    options, moduli
+    options, parameters
         What is chosen for the whole problem.
     solve
         Solves a contact problem at its own nodes.
@@ -67,13 +68,13 @@ class CondensedStep:
         self,
         condensation: Condensation,
         options: NewtonOptions,
-        moduli: Moduli,
+        parameters: ComplementarityParameters,
         solve: Solver,
         history: History,
         counters: Counters,
         fallbacks: tuple[str, ...],
     ) -> None:
-        self.condensation, self.options, self.moduli = condensation, options, moduli
+        self.condensation, self.options, self.parameters = condensation, options, parameters
         self.counters, self.following = counters, Following()
         self._solve, self._history, self._fallbacks = solve, history, fallbacks
         inner = condensation.full.equilibrium.products
@@ -113,7 +114,7 @@ class CondensedStep:
         )
         history = History(self._history.quiet(), level=logging.DEBUG)
         begin = replace(iterate, state=replace(state, x=condensed.equilibrium.at))
-        end, outcome = self._solve(condensed, options, self.moduli, history, begin)
+        end, outcome = self._solve(condensed, options, self.parameters, history, begin)
         solves = sum(record.inner for record in history.records)
         self.counters.contact_solves += solves
         if outcome.kkt.largest > max(enough, NEAR * reached.largest):

@@ -39,16 +39,16 @@ from functools import partial
 
 import numpy as np
 
-from contact.interface.linearised import Moduli
+from contact.interface.linearised import ComplementarityParameters
 from contact.interface.multipliers import Multipliers
 from contact.interface.status import touching
 from contact.linear.operator import Counters
 from contact.methods.condensed_step import SECANT_UNTIL, CondensedStep
 from contact.methods.continuation import CONTINUATION, continuation
 from contact.methods.interior_point import INTERIOR_POINT, interior_point
-from contact.methods.moduli import far_softer, moduli_of
 from contact.methods.newton_step import Iterate, NewtonStep, Search, Step
 from contact.methods.options import NewtonOptions
+from contact.methods.parameters import complementarity_parameters, far_softer
 from contact.methods.progress import Best, Stagnation
 from contact.methods.report import History, Monitor, Outcome
 from contact.methods.resting import resting
@@ -87,8 +87,8 @@ class Newton:
         Options of the method.
     monitor
         Told of every step.
-    moduli
-        Stiffnesses of the linearised laws; chosen from those of the body by default.
+    parameters
+        Parameters of the complementarity functions; chosen from the body by default.
     restraint
         Of a condensed problem that of the whole one, whose supports it does not see.
     """
@@ -97,20 +97,22 @@ class Newton:
     options: NewtonOptions = field(default_factory=NewtonOptions)
     monitor: Monitor | None = None
     counters: Counters = field(default_factory=Counters)
-    moduli: Moduli | None = None
+    parameters: ComplementarityParameters | None = None
     restraint: Restraint | None = None
     history: History = field(init=False)
 
     def __post_init__(self) -> None:
-        """Choose the moduli, and condense the body where that pays."""
+        """Choose the complementarity parameters, and condense the body where that pays."""
         problem, options, self.history = self.problem, self.options, History(self.monitor)
-        self._moduli = self.moduli or moduli_of(problem.scales, options.gamma)
+        self._parameters = self.parameters or complementarity_parameters(
+            problem.scales, options.gamma
+        )
         self._begin()
         if self.restraint is None:
             assert isinstance(problem, ContactProblem)
             self.restraint = Restraint(problem)
         loose = not self.restraint.at_rest
-        self.whole = NewtonStep(problem, options, self._moduli, self.counters, loose)
+        self.whole = NewtonStep(problem, options, self._parameters, self.counters, loose)
         self._condensed: CondensedStep | None = None
         if (
             options.condense
@@ -120,7 +122,7 @@ class Newton:
         ):
             solve = partial(_solve_condensed, restraint=self.restraint)
             self._condensed = CondensedStep(
-                body, options, self._moduli, solve, self.history, self.counters, FALLBACKS
+                body, options, self._parameters, solve, self.history, self.counters, FALLBACKS
             )
 
     def turn_to(self, problem: Problem) -> None:
@@ -160,7 +162,7 @@ class Newton:
 
     def started(self, start: State) -> Iterate:
         """Return an iterate at a given state."""
-        interface, c = self.problem.interface, self._moduli.status
+        interface, c = self.problem.interface, self._parameters.c
         nodal = interface.jump.apply(start.x)
         # What is left of a pressure where a node is open would give it a friction bound: one of
         # the size of rounding, with friction of any direction, on which the node would stick.
@@ -194,7 +196,9 @@ class Newton:
                 return iterate, outcome
             logger.info("%s; going on with the whole body", outcome.ended)
             return self.whole_loop().run(iterate)
-        loop = replace(self.whole_loop(), hopeless=partial(far_softer, self.problem, self._moduli))
+        loop = replace(
+            self.whole_loop(), hopeless=partial(far_softer, self.problem, self._parameters)
+        )
         return loop.run(iterate)
 
     def _fall_back(self, iterate: Iterate, outcome: Outcome) -> tuple[Iterate, Outcome]:
@@ -232,7 +236,7 @@ class Newton:
             response = interface.response.conducting(part)
             less = replace(problem, interface=replace(interface, response=response))
             search = self.search if part == 1 else replace(self.search, problem=less, best=Best())
-            step = NewtonStep(search.problem, self.options, self._moduli, self.counters)
+            step = NewtonStep(search.problem, self.options, self._parameters, self.counters)
             loop = NewtonLoop(search, step, self.options.secant_until, SHORT)
             return loop.run(iterate, CONTINUATION)
 
@@ -250,13 +254,13 @@ class Newton:
 def _solve_condensed(
     problem: CondensedProblem,
     options: NewtonOptions,
-    moduli: Moduli,
+    parameters: ComplementarityParameters,
     history: History,
     iterate: Iterate,
     restraint: Restraint,
 ) -> tuple[Iterate, Outcome]:
     """Solve a contact problem at its own nodes."""
-    method = Newton(problem, options, moduli=moduli, restraint=restraint)
+    method = Newton(problem, options, parameters=parameters, restraint=restraint)
     method.history = history
     return method.run(iterate)
 

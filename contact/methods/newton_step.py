@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from contact.errors import SingularError
 from contact.interface.interface import Interface
-from contact.interface.linearised import LinearisedContact, Moduli, linearise
+from contact.interface.linearised import ComplementarityParameters, LinearisedContact, linearise
 from contact.interface.multipliers import Multipliers
 from contact.linear.operator import Counters, Operator
 from contact.methods.following import Following
@@ -150,7 +150,7 @@ class NewtonStep:
 
     Parameters
     ----------
-    problem, options, moduli
+    problem, options, parameters
         The problem, and what is chosen for it.
     counters
         Where factorisations and solves are counted.
@@ -168,12 +168,12 @@ class NewtonStep:
         self,
         problem: Problem,
         options: NewtonOptions,
-        moduli: Moduli,
+        parameters: ComplementarityParameters,
         counters: Counters,
         loose: bool = False,
     ) -> None:
         self._loose = loose
-        self.problem, self.options, self.moduli = problem, options, moduli
+        self.problem, self.options, self.parameters = problem, options, parameters
         self.counters = counters
         self._operator: Operator | None = None
         self.begin()
@@ -221,16 +221,16 @@ class NewtonStep:
             interface,
             nodal,
             state.forces,
-            self.moduli,
+            self.parameters,
             iterate.status,
             softening=self.options.softening,
         )
-        layer, shift = linearised_layer(interface, nodal, iterate, self.moduli, contact.settled)
+        layer, shift = linearised_layer(interface, nodal, iterate, self.parameters, contact.settled)
         blocks = contact.blocks + layer + self._current(nodal, contact, reached.largest)
         kind, last = "tangent" if tangent else "secant", self._kind
         remains = kind == last and reached.equilibrium < SMALL * reached.largest
         if self._loose and not contact.settled:
-            stiffness = SPRINGS * min(reached.largest, 1.0) * self.moduli.nodal
+            stiffness = SPRINGS * min(reached.largest, 1.0) * self.parameters.nodal_stiffness
             along = jump.normal[:, :, None] * jump.normal[:, None, :]
             blocks[:, : body.dim, : body.dim] += stiffness * (along + jump.tangent)
         blocks = interface.weighted(blocks, state.x)
@@ -271,7 +271,11 @@ class NewtonStep:
 
 
 def linearised_layer(
-    interface: Interface, nodal: Array, iterate: Iterate, moduli: Moduli, full: bool
+    interface: Interface,
+    nodal: Array,
+    iterate: Iterate,
+    parameters: ComplementarityParameters,
+    full: bool,
 ) -> tuple[Array, Array]:
     """Linearise the layer; return its block, and how it differs from the layer's force.
 
@@ -279,7 +283,7 @@ def linearised_layer(
     before together, as the status of a contact node is found. Linearised about the displacement
     alone, a layer stiffer than the body cycles between its regimes.
     """
-    response, jump, c = interface.response, interface.jump, moduli.status
+    response, jump, c = interface.response, interface.jump, parameters.c
     law = response.normal_law(nodal)
     if law is None:
         return response.layer_block(nodal, full), np.zeros(nodal.shape[0])

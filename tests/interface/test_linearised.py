@@ -7,7 +7,7 @@ import pytest
 from mpi4py import MPI
 
 from contact.interface.friction import Friction
-from contact.interface.linearised import Moduli, linearise
+from contact.interface.linearised import ComplementarityParameters, linearise
 from contact.interface.multipliers import Multipliers
 from contact.interface.status import CLOSED, FREE, SLIDES, STICKS
 from forms.laws import ConstantCoefficient, Coulomb, SlipCoefficient
@@ -29,14 +29,16 @@ def test_blocks_are_the_derivative_of_the_contact_forces(dimension):
         rng.uniform(0.5, 1.0, n),
         np.einsum("nij,nj->ni", nodes.tangent, 0.3 * rng.standard_normal((n, dimension))),
     )
-    moduli = Moduli(20.0, 20.0, 20.0)
+    parameters = ComplementarityParameters(20.0, 20.0, 20.0)
     before = np.full(n, FREE, dtype=np.int8)
-    base = linearise(interface, nodal, forces, moduli, before, forces.pressure * 0.4)
+    base = linearise(interface, nodal, forces, parameters, before, forces.pressure * 0.4)
     assert {CLOSED + SLIDES, CLOSED + STICKS} <= set(base.status.tolist())
     sticks = base.status & STICKS > 0
     # a sticking node pushes with lambda + gamma u_tau, a pressed one with p + gamma (u_nu - rho)
     direction = 1e-6 * rng.standard_normal(nodal.shape)
-    moved = linearise(interface, nodal + direction, forces, moduli, before, forces.pressure * 0.4)
+    moved = linearise(
+        interface, nodal + direction, forces, parameters, before, forces.pressure * 0.4
+    )
     difference = moved.forces.vectors(problem.nodes) - base.forces.vectors(problem.nodes)
     predicted = np.einsum("nij,nj->ni", base.blocks, direction)[:, :dimension]
     assert np.allclose(difference[sticks], predicted[sticks], rtol=1e-6, atol=1e-12)
@@ -53,13 +55,15 @@ def test_falling_friction_is_followed_as_far_as_allowed(softening):
     nodal[:, 0] = 1e-3
     pressure = np.full(nodes.nodes.size, 0.5)
     forces = Multipliers(pressure, 0.3 * pressure[:, None] * [1.0, 0.0])
-    moduli = Moduli(200.0, 20.0, 1e6)
+    parameters = ComplementarityParameters(200.0, 20.0, 1e6)
     before = np.full(nodes.nodes.size, CLOSED + SLIDES, dtype=np.int8)
-    base = linearise(problem.interface, nodal, forces, moduli, before, softening=softening)
+    base = linearise(problem.interface, nodal, forces, parameters, before, softening=softening)
     assert base.settled
     step = np.array([1e-8, 0.0])
-    moved = linearise(problem.interface, nodal + step, forces, moduli, before, softening=softening)
+    moved = linearise(
+        problem.interface, nodal + step, forces, parameters, before, softening=softening
+    )
     change = (moved.forces.friction - base.forces.friction)[:, 0] / step[0]
     assert np.all(change < -0.25 * 20.0)
-    expected = np.maximum(change, -softening * moduli.nodal)
+    expected = np.maximum(change, -softening * parameters.nodal_stiffness)
     assert np.allclose(base.blocks[:, 0, 0], expected, rtol=1e-4)

@@ -1,42 +1,42 @@
-"""Stiffnesses of the linearised laws: those of a block of the body's height."""
+"""Parameters of the complementarity functions: stiffnesses of a block of the body's height."""
 
 from __future__ import annotations
 
 import numpy as np
 from mpi4py import MPI
 
-from contact.interface.linearised import Moduli
+from contact.interface.linearised import ComplementarityParameters
 from contact.methods.augmentation import automatic_r
 from contact.problem.kkt import residual_forces
 from contact.problem.protocols import Problem
 from contact.problem.scales import Scales
 from contact.problem.state import State
 
-#: Forces that the moduli make of the first penetration, over the loads, from which on the body is
-#: far softer than the block that they are those of. Of a block they are some sqrt(H/h).
+#: Forces that c makes of the first penetration, over the loads, from which on the body is far
+#: softer than the block that c is the stiffness of. Of a block they are some sqrt(H/h).
 SOFT = 1e3
 
 
-def moduli_of(scales: Scales, gamma: float) -> Moduli:
-    """Return stiffnesses of the linearised laws that fit a body and its mesh, in any units.
+def complementarity_parameters(scales: Scales, gamma: float) -> ComplementarityParameters:
+    """Return parameters that fit a body and its mesh, in any units.
 
     A mode of Gamma_3 as long as the body is high has the stiffness E'/H, and with r* in the
     middle, one as short as an element has r*^2 H/E'.
     """
     middle = automatic_r(scales)
     nodal = middle**2 * scales.height / scales.plane_modulus
-    return Moduli(middle, nodal, gamma * max(middle, nodal))
+    return ComplementarityParameters(middle, nodal, gamma * max(middle, nodal))
 
 
-def far_softer(problem: Problem, moduli: Moduli, state: State) -> bool:
-    """Tell whether a body is far softer than its moduli, by a first state. Collective.
+def far_softer(problem: Problem, parameters: ComplementarityParameters, state: State) -> bool:
+    """Tell whether a body is far softer than its parameters, by a first state. Collective.
 
     It is where they make far more of a penetration than any load, also of what is rigid. Where
     nothing but a given motion of the foundation acts, there is no load to tell by.
     """
     interface = problem.interface
     opening = np.maximum(interface.opening(interface.jump.apply(state.x)), 0.0)
-    foreseen = moduli.status * interface.jump.sum(opening)
+    foreseen = parameters.c * interface.jump.sum(opening)
     forces = np.abs(residual_forces(problem, problem.start()))
     on_nodes, on_masters = np.split(forces, [problem.equilibrium.owned])
     loads = interface.comm.allreduce(float(on_nodes.sum()), op=MPI.SUM) + on_masters.sum()
