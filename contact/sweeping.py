@@ -1,7 +1,8 @@
 """Sweeps: a case for each of several values of some of its keys, one row a value.
 
-Each solve starts from the solution before it, and where loads and friction alone change what has
-been factorised is kept. Rows that are there already are not computed again.
+Each solve has the solution before it as warm start; where loads and friction alone change, the
+factorisation is kept. Rows that are there already are not computed again, provided that they were
+computed from the same input.
 """
 
 from __future__ import annotations
@@ -12,7 +13,7 @@ import logging
 import os
 import time
 import tomllib
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -20,6 +21,8 @@ from typing import Any
 from mpi4py import MPI
 
 from contact.build import build_problem, named
+from contact.case.digest import difference as changed_input
+from contact.case.digest import digest
 from contact.case.file import Case, load_case
 from contact.case.overrides import read_value
 from contact.case.text import literal, to_toml
@@ -46,6 +49,12 @@ logger = logging.getLogger("contact.sweep")
 
 #: Names of the table and of the case that was swept.
 TABLE, CASE = "sweep.csv", "sweep.toml"
+
+#: Column with the digests of the input of a row: of its case, and of each file that this reads.
+INPUT = "input"
+
+#: Columns that every table has.
+COLUMNS = ("converged", "kkt", "seconds", INPUT)
 
 #: Sections that may change without another matrix or other contact nodes.
 LIGHT = ("title", "load", "output", "friction", "fixed")
@@ -113,15 +122,15 @@ def sweep(
     path, overrides
         The case file, and values that replace some of its own.
     axes
-        What is varied; the last one fastest.
+        The varied keys; the last one fastest.
     folder
-        Where the table is, or goes to.
+        Folder of the table.
     monitor
-        Told of all outer iterations.
+        Called after every outer iteration.
     comm
         Communicator of the mesh.
     warm
-        Whether each solve starts from the one before.
+        Whether each solve has the solution before it as warm start.
 
     Returns
     -------
@@ -132,22 +141,27 @@ def sweep(
     Interrupted
         After a signal; the rows before it are in the table.
     InputError
-        If a value is not accepted, or the folder has the sweep of another case.
+        If a value is not accepted, or the folder has a sweep of other input, or files that no
+        sweep has left.
     """
     names = [axis.key for axis in axes]
     points = [
         dict(zip(names, values, strict=True))
         for values in itertools.product(*(axis.values for axis in axes))
     ]
+
+    def load(point: Mapping[str, str]) -> Case:
+        return load_case(path, [*overrides, *_set(point)])
+
     # All of them before the first is solved.
-    cases = on_root(comm, lambda: [load_case(path, [*overrides, *_set(p)]) for p in points])
-    text = to_toml(load_case(path, [*overrides, *_set(points[0])]))
-    kept = on_root(comm, lambda: _begin(folder, names, text))
+    cases = on_root(comm, lambda: [load(point) for point in points])
+    inputs = on_root(comm, lambda: [_input(case) for case in cases])
+    kept = on_root(comm, lambda: _kept_rows(folder, names, to_toml(cases[0]), load))
     rows: list[dict[str, Any]] = []
     tell(logger, 0.0, "%d cases", len(cases))
     with stop_on_signal(comm, monitor) as stop:
         runner = _Runner(comm, stop, warm)
-        for point, case in zip(points, cases, strict=True):
+        for point, case, given in zip(points, cases, inputs, strict=True):
             row = kept.pop(tuple(point.values()), None)
             if row is None or row["converged"] != "True":
                 begin = time.perf_counter()
@@ -157,10 +171,11 @@ def sweep(
                 seconds = comm.bcast(time.perf_counter() - begin)
                 results = Results(solution, contact_table(solution))
                 row = {**point, **values_of(SWEEP, results), "seconds": seconds}
+                row[INPUT] = given
                 said = f"{', '.join(_set(point))}: {solution.outcome.reason}"
                 tell(logger, (len(rows) + 1) / len(cases), said)
             rows.append(row)
-            # What has not come up yet, or is not asked for, remains.
+            # Rows that come later, or are not asked for, remain.
             on_root(comm, lambda: _write(folder, [*rows, *kept.values()]))
     return rows
 
@@ -169,59 +184,123 @@ def _set(point: Mapping[str, str]) -> list[str]:
     return [f"{key}={value}" for key, value in point.items()]
 
 
-def _begin(folder: Path, names: list[str], text: str) -> dict[tuple[str, ...], dict[str, Any]]:
-    """Return the rows that are there already. On one rank."""
-    rows: list[dict[str, Any]] = []
-    if (folder / TABLE).is_file():
-        with (folder / TABLE).open(newline="", encoding="utf-8") as file:
-            rows = list(csv.DictReader(file))
-    swept = list(itertools.takewhile(lambda column: column != "converged", rows[0] if rows else ()))
-    if rows and swept != names:
-        raise InputError(
-            f"--out {folder}: given a sweep over other keys; accepted: one over "
-            f"{', '.join(swept)}, or another folder"
+def _input(case: Case) -> str:
+    """Return short digests of a case and of each file that it reads. On one rank."""
+    return " ".join(f"{key}={value[:12]}" for key, value in digest(case).items())
+
+
+def _kept_rows(
+    folder: Path, names: list[str], text: str, load: Callable[[Mapping[str, str]], Case]
+) -> dict[tuple[str, ...], dict[str, Any]]:
+    """Return the rows that are there already, by the values of the keys. On one rank.
+
+    Parameters
+    ----------
+    folder
+        Folder of the table.
+    names, text
+        The keys of the sweep, and the case of its first row.
+    load
+        Returns the case of a row.
+
+    Raises
+    ------
+    InputError
+        If the files there are damaged, no sweep's, or those of a sweep of other input.
+    """
+    table, before = folder / TABLE, folder / CASE
+    for path in (table, before):
+        if path.is_symlink() or (path.exists() and not path.is_file()):
+            raise InputError(f"{path} is no file of ours; accepted: a folder without it")
+    rows = _read(table) if table.exists() else []
+    if rows:
+        swept = [*itertools.takewhile(lambda column: column != "converged", rows[0])]
+        if swept != names:
+            raise InputError(
+                f"--out {folder}: given a sweep over other keys; accepted: one over "
+                f"{', '.join(swept)}, or another folder"
+            )
+    if before.exists():
+        place = difference(
+            _without(before, before.read_bytes(), names), _without(before, text.encode(), names)
         )
-    before = folder / CASE
-    if (folder / TABLE).exists() and not before.is_file():
-        raise InputError(
-            f"--out {folder}: given a {TABLE} without the {CASE} that a sweep leaves beside it; "
-            "accepted: another folder"
-        )
-    if before.is_file():
-        place = difference(*(_without(t, names) for t in (before.read_text("utf-8"), text)))
         if place is not None:
             raise InputError(
                 f"--out {folder}: given a sweep of another case: there {place}; accepted: the same "
                 "case, or another folder"
             )
-    else:
+    elif table.exists():
+        raise InputError(
+            f"--out {folder}: given a {TABLE} without the {CASE} that a sweep leaves beside it; "
+            "accepted: another folder"
+        )
+    for row in rows:
+        point = {name: row[name] for name in names}
+        now, then = _input(load(point)), row[INPUT]
+        if now != then:
+            pairs = (dict(pair.partition("=")[::2] for pair in t.split()) for t in (then, now))
+            raise InputError(
+                f"--out {folder}: {changed_input(*pairs) or 'the input'} has changed since the row "
+                f"{', '.join(_set(point))} was computed; accepted: the same one, or another folder"
+            )
+    if not before.exists():
         before.write_text(text, encoding="utf-8")
     return {tuple(row[name] for name in names): dict(row) for row in rows}
 
 
-def _without(text: str, names: list[str]) -> dict[str, Any]:
+def _read(table: Path) -> list[dict[str, str]]:
+    """Return the rows of a table that a sweep has left."""
+    try:
+        with table.open(newline="", encoding="utf-8") as file:
+            header, *rows = csv.reader(file, strict=True)
+        computed = [*itertools.dropwhile(lambda column: column != "converged", header)]
+        found = [dict(zip(header, row, strict=True)) for row in rows]
+        whole = {*COLUMNS} <= {*header} and len({*header}) == len(header)
+        for row in found:
+            whole = whole and row["converged"] in ("True", "False")
+            [float(row[column]) for column in computed if column not in ("converged", INPUT)]
+    except (ValueError, csv.Error):
+        whole = False
+    if not whole:
+        raise InputError(
+            f"{table}: damaged, or no table of a sweep of this version; accepted: another folder"
+        )
+    return found
+
+
+def _without(path: Path, text: bytes, names: list[str]) -> dict[str, Any]:
     """Return a case without the keys that are swept."""
-    data = tomllib.loads(text)
-    for name in names:
-        *parents, last = name.split(".")
-        place: Any = data
-        for key in parents:
-            place = place[int(key)] if isinstance(place, list) else place.get(key, {})
-        if isinstance(place, list):
-            place[int(last)] = 0
-        else:
-            place.pop(last, None)
+    try:
+        data = tomllib.loads(text.decode())
+        for name in names:
+            *parents, last = name.split(".")
+            place: Any = data
+            for key in parents:
+                place = place[int(key)] if isinstance(place, list) else place.get(key, {})
+            if isinstance(place, list):
+                place[int(last)] = 0
+            else:
+                place.pop(last, None)
+    except (ValueError, LookupError, AttributeError, TypeError, RecursionError):
+        raise InputError(
+            f"{path}: damaged, or no case of this sweep; accepted: another folder"
+        ) from None
     return data
 
 
 def _write(folder: Path, rows: Sequence[Mapping[str, Any]]) -> None:
+    if any([*row] != [*rows[0]] for row in rows):
+        raise InputError(
+            f"{folder / TABLE}: its rows have other columns than those of this version; accepted: "
+            "another folder"
+        )
     draft = folder / f".contact-{TABLE}"
     write_csv(draft, rows[0], (row.values() for row in rows))
     os.replace(draft, folder / TABLE)
 
 
 class _Runner:
-    """Solves one case after the other, with what is left of the one before."""
+    """Solves one case after the other, each with the mesh and factorisation of the last."""
 
     def __init__(self, comm: MPI.Intracomm, monitor: Monitor, warm: bool) -> None:
         self._comm, self._monitor, self._warm = comm, monitor, warm
@@ -251,7 +330,7 @@ class _Runner:
             return self._static(problem, case.solver.method, self._method)
 
     def _settings(self, case: Case) -> Options:
-        """Return the method's options: what is factorised for one case may do for the next."""
+        """Return the method's options: the factorisation of a case may serve the next one."""
         if self._warm and isinstance(case.solver, NewtonOptions):
             return replace(case.solver, keep="across")
         return case.solver

@@ -309,12 +309,11 @@ _RUN = (
         "The case as it was solved, all defaults written out: a case file to run again. Empty "
         "where the problem was built or changed in Python.", lambda r: r.solution.case,
     ),
-    Quantity(
-        "seconds", "s", "Time for `setup`, `solve` and `output`.", lambda r: r.solution.seconds
-    ),
+    Quantity("seconds", "s", "For `setup`, `solve` and `output`.", lambda r: r.solution.seconds),
     Quantity("versions", "", "Of Python, the libraries and the BLAS.", lambda r: r.versions),
     Quantity("files", "", "Files of this run: a later run replaces them.", lambda r: ABSENT),
     Quantity("seconds", "s", "Time for this row.", lambda r: ABSENT, (SWEEP,)),
+    Quantity("input", "", "Digests of the case and its files.", lambda r: ABSENT, (SWEEP,)),
 )  # fmt: skip
 
 #: The contact nodes: one row each of ``contact.csv``.

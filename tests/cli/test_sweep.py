@@ -1,7 +1,10 @@
 """contact sweep: one row a value, resumable, warm-started, over several keys."""
 
 import csv
+import os
+import shutil
 import signal
+from pathlib import Path
 
 import pytest
 
@@ -9,9 +12,20 @@ from contact.cli.main import main
 from contact.errors import InputError
 from contact.methods.interrupt import Interrupted
 from contact.sweeping import Axis
+from tests.cli.running import MESH
 from tests.problems.bar import BAR
 
-RUNS = ("converged", "kkt", "seconds", "linear_solves", "factorizations", "outer_iterations")
+ROOT = Path(__file__).parents[2]
+
+RUNS = (
+    "converged",
+    "kkt",
+    "seconds",
+    "input",
+    "linear_solves",
+    "factorizations",
+    "outer_iterations",
+)
 
 
 @pytest.fixture
@@ -129,3 +143,94 @@ def test_commas_within_lists_and_texts():
     assert axis.values == ("[0, 1]", "[2, 3]", '"x,y"', "{ a = 1, b = 2 }")
     with pytest.raises(InputError):
         Axis.of("a=1,,2")
+
+
+@pytest.fixture
+def swept_mesh(sweep, tmp_path):
+    """Return a sweep's options and its mesh file, which has been swept over two values."""
+    mesh = tmp_path / "bar.msh"
+    shutil.copy(ROOT / "meshes" / "fixtures" / "bar.msh", mesh)
+    (tmp_path / "bar.toml").write_text(
+        MESH.format(file=mesh) + '[friction]\nlaw = "coulomb"\nmu = 0.1\n'
+    )
+    status, rows = sweep("--over", "friction.mu=0.1,0.2")
+    assert status == 0 and len(rows) == 2
+    return mesh
+
+
+def test_rows_of_another_mesh_are_not_continued(sweep, swept_mesh, tmp_path, capfd):
+    """Rows of both would stand side by side."""
+    before = {path: path.read_bytes() for path in (tmp_path / "out").iterdir()}
+    text = swept_mesh.read_text()
+    swept_mesh.write_text(text.replace("$EndNodes", "$EndNodes ", 1))
+    for over in ("friction.mu=0.1,0.2,0.3", "friction.mu=0.3"):
+        assert sweep("--over", over)[0] == 2
+        message = capfd.readouterr().err
+        assert "the file mesh.file has changed since the row friction.mu=0.1 was" in message
+        assert {path: path.read_bytes() for path in (tmp_path / "out").iterdir()} == before
+    swept_mesh.write_text(text)
+    assert sweep("--over", "friction.mu=0.1,0.2,0.3")[0] == 0
+
+
+DAMAGED = {
+    "cut": ("sweep.csv", lambda data: data[: 2 * len(data) // 3]),
+    "empty": ("sweep.csv", lambda data: b""),
+    "binary": ("sweep.csv", lambda data: bytes(range(256))),
+    "number": ("sweep.csv", lambda data: data.replace(b"-", b"x", 1)),
+    "another table": ("sweep.csv", lambda data: b"a,b\n1,2\n"),
+    "header alone of another": ("sweep.csv", lambda data: b"a,b\n"),
+    "fewer columns": ("sweep.csv", lambda data: b"".join(
+        b",".join(line.split(b",")[:-1]) + b"\n" for line in data.splitlines())),
+    "case cut": ("sweep.toml", lambda data: data[: len(data) // 2]),
+    "case binary": ("sweep.toml", lambda data: bytes(range(256))),
+    "case of another kind": ("sweep.toml", lambda data: b"friction = 3\n"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("kind", DAMAGED)
+def test_damaged_files_are_refused_and_kept(sweep, tmp_path, capfd, kind):
+    sweep("--over", "friction.mu=0.2,0.4")
+    name, damage = DAMAGED[kind]
+    path = tmp_path / "out" / name
+    path.write_bytes(damage(path.read_bytes()))
+    before = {path: path.read_bytes() for path in (tmp_path / "out").iterdir()}
+    capfd.readouterr()
+    assert main(["sweep", str(tmp_path / "bar.toml"), "--out", str(tmp_path / "out"),
+                 "--over", "friction.mu=0.2,0.3", "--quiet"]) == 2  # fmt: skip
+    message = capfd.readouterr().err
+    assert message.startswith("contact: ") and message.count("\n") == 1
+    assert {path: path.read_bytes() for path in (tmp_path / "out").iterdir()} == before
+
+
+def test_rows_with_other_columns_are_kept(sweep, tmp_path, capfd):
+    """A table of another version: a new row would have more columns."""
+    _, rows = sweep("--over", "friction.mu=0.2,0.4")
+    table = tmp_path / "out" / "sweep.csv"
+    with table.open("w", newline="") as file:
+        columns = [column for column in rows[0] if column != "max_pressure"]
+        writer = csv.DictWriter(file, columns, extrasaction="ignore", lineterminator="\n")
+        writer.writeheader()
+        writer.writerows(rows)
+    before = table.read_bytes()
+    assert sweep("--over", "friction.mu=0.2,0.4,0.6")[0] == 2
+    assert "other columns" in capfd.readouterr().err
+    assert table.read_bytes() == before
+
+
+@pytest.mark.parametrize("name", ["sweep.csv", "sweep.toml"])
+@pytest.mark.parametrize("kind", ["pipe", "folder", "link"])
+def test_other_files_under_our_names_are_left_alone(tmp_path, capfd, name, kind):
+    (tmp_path / "bar.toml").write_text(BAR)
+    out = tmp_path / "out"
+    out.mkdir()
+    path = out / name
+    if kind == "pipe":
+        os.mkfifo(path)
+    elif kind == "folder":
+        path.mkdir()
+    else:
+        path.symlink_to(tmp_path / "bar.toml")
+    arguments = ["--out", str(out), "--over", "friction.mu=0.2,0.4", "--quiet"]
+    assert main(["sweep", str(tmp_path / "bar.toml"), *arguments]) == 2
+    assert f"{path} is no file of ours" in capfd.readouterr().err
+    assert [*out.iterdir()] == [path]
