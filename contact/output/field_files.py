@@ -13,8 +13,9 @@ from mpi4py import MPI
 from contact.errors import InputError
 from contact.output.disk import OVERHEAD, claim_room, closing, library_errors
 from contact.output.fields import DerivedFields, linear, unknowns
+from contact.output.folder import on_root
 from contact.output.solved import Solved
-from contact.output.vtu import VTU, Grid, Values, write_vtu
+from contact.output.vtu import VTU, Grid, Values, gathered, write_vtu
 from contact.problem.problem import ContactProblem
 from contact.problem.state import State
 
@@ -130,19 +131,15 @@ def _rows(values: Values) -> Values:
 
 
 def write_share(comm: MPI.Intracomm, share: VTU, path: Path) -> None:
-    """Write a grid with its fields into a VTU file, if there is room. Collective.
+    """Write a grid with its fields into a VTU file. Collective.
 
     Raises
     ------
-    InputError, OSError
+    InputError
         As `write_fields`.
     """
-    grid = share.grid
-    arrays = [grid.points, grid.cells, *share.at_points.values(), *share.in_cells.values()]
-    # Vectors of the plane get a third component, cells their ends and kinds, and three bytes
-    # are written as four letters.
-    claim_room(comm, path.parent, OVERHEAD + sum(2 * array.nbytes for array in arrays))
-    write_vtu(comm, path, share)
+    whole = gathered(comm, share)
+    on_root(comm, lambda: None if whole is None else write_vtu(path, whole))
 
 
 def _write_vtx(problem: ContactProblem, frames: Sequence[Frame], folder: Path) -> None:
