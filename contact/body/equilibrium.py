@@ -27,17 +27,21 @@ from contact.body.internal import InternalForces
 from contact.body.loads import Loads
 from contact.body.masters import make_masters
 from contact.body.materials import cells_of
-from contact.body.operators import WholeOperator, make_operator
 from contact.body.pointwise import Pointwise
 from contact.body.shares import shares_of
 from contact.body.supports import free_components, supports_of, without_field
 from contact.body.weak_forms import WeakForms
 from contact.errors import InputError
 from contact.history import BodyState, Evaluated, InternalVariables
-from contact.linear.change import Change
+from contact.linear.constraint import (
+    Change,
+    ConstrainedBulk,
+    ConstrainedOperator,
+    Constraint,
+)
 from contact.linear.layout import Layout
 from contact.linear.multigrid import is_large
-from contact.linear.operator import Counters
+from contact.linear.operator import Counters, SparseOperator
 from contact.mesh.domain import Domain
 from contact.mesh.pieces import connected_pieces
 from contact.tolerances import MOST_ROUNDING
@@ -255,7 +259,7 @@ class BodyEquilibrium:
         symmetric: bool,
         counters: Counters,
         kind: str,
-    ) -> WholeOperator:
+    ) -> SparseOperator | ConstrainedOperator:
         """Return the operator of the body with blocks at nodes.
 
         Parameters
@@ -271,11 +275,17 @@ class BodyEquilibrium:
         symmetric, counters, kind
             As of `SparseOperator`.
         """
-        options = {"symmetric": symmetric, "counters": counters, "kind": kind}
-        if change is None and self.masters.size == 0:
-            options["pieces"] = self.shares.apart
-        blocks = nodes, motion, change
-        return make_operator(self, BodyState(self.rest()), self.masters, blocks, options)
+        options: dict[str, Any] = {"symmetric": symmetric, "counters": counters, "kind": kind}
+        masters = self.masters
+        if change is None and masters.size == 0:
+            return SparseOperator(self, nodes, pieces=self.shares.apart, **options)
+        motions = masters.ties
+        if motion is not None:
+            dofs = nodes[: motion.shape[0], None] * self.block_size + np.arange(self.block_size)
+            motions = masters.with_foundations(dofs, motion)
+        constraint = Constraint(self.layout, change, motions, masters.free)
+        bulk = ConstrainedBulk(self, constraint, BodyState(self.rest()))
+        return ConstrainedOperator(bulk, nodes, **options)
 
     def norm(self, values: Array) -> float:
         """Return the Euclidean norm of owned values. Collective."""

@@ -15,7 +15,7 @@ from contact.interface.multipliers import Multipliers
 from contact.interface.nodes import ContactNodes
 from contact.interface.response import FoundationResponse
 from contact.interface.status import CLOSED, node_status, touching
-from contact.linear.change import Change
+from contact.linear.constraint import Change
 from contact.mesh.pieces import sums
 from contact.tolerances import EPS
 from contact.typing import Array

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from contact.errors import InputError
-from contact.linear.change import Change, in_circles
+from contact.linear.constraint import Change, in_circles
 from contact.mesh.entities import owned_among
 from contact.typing import Array
 

@@ -53,8 +53,7 @@ from contact.methods.progress import Best, Stagnation
 from contact.methods.report import History, Monitor, Outcome
 from contact.methods.resting import resting
 from contact.methods.restraint import Restraint
-from contact.problem.condensed import CondensedProblem
-from contact.problem.condensing import condensation, pays
+from contact.problem.condensed import CondensedProblem, condensation, pays
 from contact.problem.kkt import KKT, evaluate
 from contact.problem.problem import ContactProblem
 from contact.problem.protocols import Problem

@@ -7,25 +7,28 @@ contact problem solves this one too, in small dense steps.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
+from petsc4py import PETSc
+from scipy import sparse
+from scipy.linalg import lu_factor, lu_solve
 
+from contact.body.equilibrium import BodyEquilibrium
 from contact.body.shares import Shares
-from contact.history import Evaluated
+from contact.history import BodyState, Evaluated
 from contact.interface.interface import Interface
 from contact.interface.multipliers import Multipliers
+from contact.linear import multigrid
 from contact.linear.balance import balance
-from contact.linear.change import Change
+from contact.linear.constraint import Change, ConstrainedBulk, Constraint
 from contact.linear.dense import DenseOperator, Factors
 from contact.linear.faults import check_overflow, petsc_options
-from contact.linear.operator import Bulk, Counters
+from contact.linear.operator import Counters
 from contact.linear.schur import SchurComplement
-from contact.mesh.entities import between_ranks
-from contact.problem.condensed_masters import CondensedMasters
-from contact.problem.kept_unknowns import KeptUnknowns, at_kept_nodes
+from contact.mesh.entities import between_ranks, owned_among
 from contact.problem.problem import ContactProblem
 from contact.problem.scales import Scales
 from contact.problem.state import State
@@ -42,6 +45,13 @@ ROUNDING = 1e-13
 MOST_ROUNDING = 1e-3
 
 PREFIX = "contact_"
+
+#: Unknowns up to which dense steps take no time to speak of.
+ALWAYS = 1000
+
+#: How much faster dense operations are than those of a sparse factorisation, and how many more of
+#: its steps Newton's method takes in the worst case.
+DENSE_IS_FASTER = 50.0
 
 
 @dataclass(frozen=True)
@@ -170,6 +180,149 @@ class CondensedProblem:
         return State(x, Multipliers.zero(self.interface.jump), self.time)
 
 
+class CondensedConstraint:
+    """The constraint of a condensed body: its Schur complement in jumps, the rest eliminated.
+
+    Kept unknowns x are those of contact nodes and of the nodes that their jumps are made of:
+    opposite, or of the same quadratic facets. With the free global unknowns q behind them,
+
+        [x; q] = C [j; z],  z = [y; q],
+
+    where j are the jumps and y the others; a foundation that moves is seen by the jumps alone. The
+    stiffness S becomes C^T S C, and z is eliminated from it: the rest has the size of the contact
+    nodes of one body. Plates and electrodes, which nodes follow, border S by a solve each.
+
+    Parameters
+    ----------
+    body, interface
+        The body and its interface. Collective.
+
+    Attributes
+    ----------
+    bulk
+        The body with nodes that follow q taken out of its matrix.
+    unknowns
+        Kept unknowns that this rank owns, local numbers: those of coupled nodes first.
+    offset
+        Where the coupled unknowns of this rank begin among those of all ranks.
+    """
+
+    def __init__(self, body: BodyEquilibrium, interface: Interface) -> None:
+        self._body, masters, layout, comm = body, body.masters, body.layout, body.comm
+        constraint = Constraint(layout, None, masters.ties, masters.free)
+        self.bulk = ConstrainedBulk(body, constraint, BodyState(body.rest()))
+        self._free = np.flatnonzero(masters.free)
+        #: Free unknowns that nodes follow: the others have no columns.
+        sizes = np.abs(masters.ties).sum(axis=0)
+        followed = np.asarray(comm.allreduce(sizes, op=MPI.SUM)) > 0
+        self._followed = [k for k, column in enumerate(self._free) if followed[column]]
+        self._responses = np.zeros((body.owned, self._free.size))
+        nodes = coupled = interface.coupled
+        if interface.change is not None:
+            _, here = owned_among(layout.index_map, interface.change.nodes)
+            nodes = np.concatenate([coupled, np.setdiff1d(here, coupled)])
+        size = layout.block_size
+        own = np.arange(size, dtype=np.int32)
+        self.unknowns: NDArray[np.int32] = (nodes[:, None] * np.int32(size) + own).ravel()
+        self.offset = size * sum(comm.allgather(coupled.size)[: comm.rank])
+        self._trivial = interface.change is None and masters.size == 0
+        self._matrix = None if self._trivial else self._made(interface, nodes)
+
+    def _made(self, interface: Interface, nodes: NDArray[np.int32]) -> sparse.csr_array:
+        """Return C, given the kept nodes of this rank. Collective."""
+        layout, comm = self._body.layout, self._body.comm
+        size, count = layout.block_size, interface.coupled.size
+        is_jump = np.repeat(np.concatenate(comm.allgather(np.arange(nodes.size) < count)), size)
+        free = np.concatenate(comm.allgather(layout.free[nodes])).ravel()
+        jumps, others = np.flatnonzero(is_jump), np.flatnonzero(~is_jump & free)
+        self._jumps = jumps.size
+        basis = sparse.eye_array(is_jump.size, format="csr")
+        if interface.change is not None:
+            numbers = np.concatenate(comm.allgather(layout.index_map.local_to_global(nodes)))
+            basis = interface.change.among(numbers, size)
+        moved = np.zeros((count * size, self._body.masters.size))
+        motion = interface.jump.carried
+        if motion is not None:
+            moved[: motion.shape[0] * motion.shape[1]] = motion.reshape(-1, motion.shape[2])
+        on_jumps = np.concatenate(comm.allgather(moved))[:, self._free]
+        with_q = basis[:, jumps] @ sparse.csr_array(on_jumps)
+        kept = sparse.hstack([basis[:, jumps], basis[:, others], with_q])
+        below = sparse.csr_array((self._free.size, jumps.size + others.size))
+        q = sparse.hstack([below, sparse.eye_array(self._free.size)])
+        return sparse.csr_array(sparse.vstack([kept, q]))
+
+    def eliminate(self, schur: SchurComplement, stiffness: Array) -> Array:
+        """Return the stiffness against jumps, for a body that was condensed. Collective.
+
+        It is not a number where z can move freely.
+        """
+        if self._matrix is None:
+            return stiffness
+        free, columns = self._free, self.bulk.columns[:, self._free]
+        if free.size:
+            across = np.zeros((stiffness.shape[0], free.size))
+            for k in self._followed:
+                across[:, k] = schur.condense(columns[:, k])
+                self._responses[:, k] = schur.expand(np.zeros(stiffness.shape[0]))
+            inside = self._body.comm.allreduce(columns.T @ self._responses, op=MPI.SUM)
+            corner = self.bulk.corner[np.ix_(free, free)] - inside
+            stiffness = np.block([[stiffness, across], [across.T, corner]])
+        j, matrix = self._jumps, self._matrix
+        made = np.asarray(matrix.T @ (matrix.T @ stiffness).T)
+        self._factors = lu_factor(made[j:, j:], check_finite=False)
+        self._answers = self._solve(made[j:, :j])
+        return np.asarray(made[:j, :j] - made[:j, j:] @ self._answers)
+
+    def _solve(self, values: Array) -> Array:
+        return np.asarray(lu_solve(self._factors, values, check_finite=False))
+
+    def forces(self, on_kept: Array, residual: Array) -> Array:
+        """Return the forces on jumps, given those on kept unknowns, and all. Collective.
+
+        They are remembered for `expand`.
+        """
+        body = self._body
+        self._residual = residual[: body.owned]
+        if self._matrix is None:
+            return on_kept
+        inside = self._responses.T @ body.layout.mask(self._residual)
+        on_q = body.unbalanced(residual)[body.owned :][self._free]
+        on_q = on_q - body.comm.allreduce(inside, op=MPI.SUM)
+        made = self._matrix.T @ np.concatenate([on_kept, on_q])
+        self._forces = made[self._jumps :]
+        return np.asarray(made[: self._jumps] - self._answers.T @ self._forces)
+
+    def expand(self, schur: SchurComplement, jumps: Array) -> Array:
+        """Return the increment of all owned unknowns and the global ones. Collective."""
+        if self._matrix is None:
+            return schur.expand(jumps)
+        body = self._body
+        others = -self._solve(self._forces) - self._answers @ jumps
+        moved = self._matrix @ np.concatenate([jumps, others])
+        kept, free = np.split(moved, [moved.size - self._free.size])
+        q = np.zeros(body.masters.size)
+        q[self._free] = free
+        if self._followed:
+            schur.condense(body.layout.mask(-self._residual) - self.bulk.columns @ q)
+        return np.concatenate([schur.expand(kept) + body.masters.ties @ q, q])
+
+
+def at_kept_nodes(interface: Interface) -> Interface:
+    """Return an interface whose nodes are numbered among the kept ones."""
+    count = interface.jump.nodes.size
+    positions = np.arange(interface.coupled.size, dtype=np.int32)
+    held = interface.held
+    if held is not None:
+        held = replace(held, jump=replace(held.jump, nodes=positions[count:], links=None))
+    return replace(
+        interface,
+        jump=replace(
+            interface.jump, nodes=positions[:count], motion=None, carried=None, links=None
+        ),
+        held=held,
+    )
+
+
 class Condensation:
     """The body of a problem, linearised and condensed onto the contact nodes.
 
@@ -186,10 +339,8 @@ class Condensation:
         self.nodes = full.interface.coupled
         self.turn_to(full)
         body = full.equilibrium
-        self._kept = KeptUnknowns(body, full.interface)
-        self._masters = CondensedMasters.of(body, full.interface, self._kept)
-        self._bulk: Bulk = body if self._masters is None else self._masters.bulk
-        begin = self._kept.offset
+        self._constraint = CondensedConstraint(body, full.interface)
+        begin = self._constraint.offset
         self._own = slice(begin, begin + self.nodes.size * body.block_size)
         self._matrix = full.equilibrium.create_matrix()
         self._kind = ""
@@ -227,17 +378,16 @@ class Condensation:
         if self._schur is None or not same:
             self._rows = self._stiffness = np.zeros((0, 0))  # room for new ones
             self._factors = Factors()
-            self._bulk.assemble(self._matrix, kind, state)
+            self._constraint.bulk.assemble(self._matrix, kind, state)
             balance(self._matrix, body.layout)
             if self._schur is None:
                 cut = np.repeat(between_ranks(body.space), body.block_size)
-                self._schur = SchurComplement(self._matrix, self._kept.unknowns, PREFIX, cut)
+                self._schur = SchurComplement(self._matrix, self._constraint.unknowns, PREFIX, cut)
             if self._schur.dense_size > LARGEST:
                 return None
             with petsc_options(PREFIX):
                 self._stiffness = self._schur.factorise(self._matrix)
-            if self._masters is not None:
-                self._stiffness = self._masters.eliminate(self._schur, self._stiffness)
+            self._stiffness = self._constraint.eliminate(self._schur, self._stiffness)
             # By columns, as LAPACK wants the copies of which factors are made.
             self._stiffness = np.asfortranarray(self._stiffness)
             self._regular = bool(np.isfinite(self._stiffness).all())
@@ -254,8 +404,7 @@ class Condensation:
         inside = body.layout.mask(-residual[: body.owned])
         nothing = ROUNDING * body.shares.spread(acting)[: body.owned]
         forces = -self._schur.condense(inside, nothing)
-        if self._masters is not None:
-            forces = self._masters.forces(forces, residual)
+        forces = self._constraint.forces(forces, residual)
         if not (self._regular and np.isfinite(forces).all()):
             return None
         condensed = CondensedBody(
@@ -293,5 +442,39 @@ class Condensation:
         self.counters.linear_solves += 1
         moved = x - condensed.equilibrium.at
         everywhere = np.concatenate(self.full.comm.allgather(moved))
-        masters, schur = self._masters, self._schur
-        return masters.expand(schur, everywhere) if masters else schur.expand(everywhere)
+        return self._constraint.expand(self._schur, everywhere)
+
+
+def pays(problem: ContactProblem, kind: str) -> bool:
+    """Tell whether dense steps at the contact nodes cost less than sparse ones of the body.
+
+    Large bodies in space are left to multigrid, unless a direct solver is asked for by `kind`.
+
+    A dense factorisation costs k^3 operations with k kept unknowns. A sparse one costs n b^2 with
+    n unknowns and fronts of b: in the plane the body's depth, n/k nodes, in
+    space some n^(1/2).
+    Of a slender body the contact nodes are too large a part.
+    """
+    layout = problem.equilibrium.layout
+    if kind == "auto" and multigrid.is_large(layout):
+        return False
+    kept, unknowns = problem.nodes.size * layout.block_size, layout.unknowns
+    front = unknowns / kept * layout.block_size if layout.dim == 2 else unknowns**0.5
+    return kept <= ALWAYS or kept**3 <= DENSE_IS_FASTER * unknowns * front**2
+
+
+def condensation(problem: ContactProblem, counters: Counters, kind: str) -> Condensation | None:
+    """Return the problem condensed onto its contact nodes, where that is possible. Collective.
+
+    That is where the contact nodes are few and a direct solver has the memory, unless the user
+    or his options of PETSc ask for another.
+    """
+    options = PETSc.Options(PREFIX)
+    names = ("ksp_type", "pc_type", "pc_factor_mat_solver_type")
+    chosen = any(options.hasName(name) for name in names)
+    layout = problem.equilibrium.layout
+    large = kind == "auto" and layout.dim == 3 and layout.unknowns > multigrid.DIRECT
+    many = problem.nodes.size * layout.block_size > LARGEST
+    if chosen or kind == "iterative" or large or many:
+        return None
+    return Condensation(problem, counters)

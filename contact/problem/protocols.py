@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from contact.body.shares import Shares
 from contact.history import Evaluated
 from contact.interface.interface import Interface
-from contact.linear.change import Change
+from contact.linear.constraint import Change
 from contact.linear.operator import Counters, Operator
 from contact.problem.scales import Scales
 from contact.problem.state import State

@@ -12,7 +12,7 @@ from contact.linear.schur import SchurComplement
 from contact.mesh.entities import between_ranks
 from contact.methods.newton import Newton
 from contact.methods.options import NewtonOptions
-from contact.problem import condensed, condensing
+from contact.problem import condensed
 from contact.problem.kkt import evaluate
 from contact.problem.problem import ContactProblem
 from contact.problem.state import State
@@ -178,7 +178,7 @@ def test_slower_methods_work_at_the_contact_nodes_too():
 
 
 def condenses(problem: ContactProblem, kind: str = "auto") -> bool:
-    return condensing.condensation(problem, Counters(), kind) is not None
+    return condensed.condensation(problem, Counters(), kind) is not None
 
 
 def test_where_the_body_is_condensed(monkeypatch):
@@ -186,7 +186,7 @@ def test_where_the_body_is_condensed(monkeypatch):
     assert condenses(problem)
     assert condenses(problem, "lu")
     assert not condenses(problem, "iterative")
-    monkeypatch.setattr(condensing, "LARGEST", 10)
+    monkeypatch.setattr(condensed, "LARGEST", 10)
     assert not condenses(problem)
 
 

@@ -1,0 +1,476 @@
+"""The constraint of a linear system: unknowns x = C y + d, and the system C^T K C in y.
+
+Of the increments of a solve d is 0: prescribed values are in x already. y are as many nodal
+unknowns as those of x, and m global ones q behind them,
+
+    x = Q (y^ + R q).
+
+Q makes mortar jumps the unknowns of slave nodes, of two bodies or of one quadratic facet, so that
+contact laws are blocks at single nodes of y^. The columns of R are rigid motions and potentials of
+electrodes: nodes that follow q have no y^ of their own, and at contact nodes in front of a moving
+foundation y^ is the distance to it.
+
+Q is sparse, and Q^T K Q is made by PtAP. R is not: its columns would fill the rows of all nodes
+that they touch. So q borders the system, [[K, K R], [R^T K, R^T K R]], which takes one solve either
+way: a factorisation solves for the columns of K R together with the right-hand side; for an
+iterative solver q is eliminated, which takes a matrix of rank m from K and leaves its
+preconditioner as it is. Where it is asked for a few digits, the remainder is left to the rows of
+nodes: the balance of q is met to rounding. `contact.problem.condensed` has the same C at the kept
+unknowns.
+
+Right-hand sides and solutions have the values of q, the same on all ranks, behind the owned ones.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from mpi4py import MPI
+from numpy.typing import NDArray
+from petsc4py import PETSc
+from scipy import sparse
+from scipy.sparse import csgraph
+
+from contact.history import Evaluated
+from contact.linear.layout import Layout
+from contact.linear.operator import Bulk, Counters, SparseOperator
+from contact.linear.products import quick_products
+from contact.mesh.entities import owned_among
+from contact.typing import Array
+
+#: Share of the stiffness against q that is taken for none: rounding. Where nothing holds it, q is
+#: left where it is.
+NOTHING = 1e-13
+
+
+@dataclass(frozen=True)
+class Change:
+    """A change of basis, x = Q y, that makes jumps unknowns; the same on all ranks.
+
+    Attributes
+    ----------
+    nodes
+        Global numbers of the nodes that take part, shape (c,).
+    matrix
+        Q at their unknowns, node by node, shape (c block size, c block size); at all others it is
+        the identity.
+    inverse
+        Its inverse.
+    unrestrained
+        The inverse if nothing were fixed: what it is made of is the same for all unknowns of a
+        node.
+    """
+
+    nodes: NDArray[np.int64]
+    matrix: sparse.csr_array
+    inverse: sparse.csr_array
+    unrestrained: sparse.csr_array
+
+    @staticmethod
+    def of(
+        nodes: NDArray[np.int64],
+        rows: NDArray[np.intp],
+        jumps: sparse.csr_array,
+        free: NDArray[np.bool_],
+    ) -> Change:
+        """Return the change that makes jumps unknowns, in place of those of some nodes.
+
+        Where an unknown is fixed it remains itself; the others lose what depends on it, for it
+        does not change.
+
+        Parameters
+        ----------
+        nodes
+            Global numbers of the nodes that take part, shape (c,).
+        rows
+            Which of them are replaced, shape (r,).
+        jumps
+            The jumps by the unknowns, shape (r, c). One is made of the node itself, of nodes that
+            are not replaced, and of replaced ones, but in no circle: see `in_circles`.
+        free
+            Which unknowns are not fixed, shape (c, block size).
+        """
+        made = [_of_component(rows, jumps, component) for component in free.T]
+        _, unrestrained = _of_component(rows, jumps, np.ones(free.shape[0], dtype=bool))
+        return Change(
+            nodes,
+            _interleaved([matrix for matrix, _ in made]),
+            _interleaved([inverse for _, inverse in made]),
+            _interleaved([unrestrained] * free.shape[1]),
+        )
+
+    def petsc(self, matrix: sparse.csr_array, layout: Layout) -> PETSc.Mat:
+        """Return Q, or its inverse, as a parallel matrix. Collective."""
+        size, index_map = layout.block_size, layout.index_map
+        begin, end = index_map.local_range
+        columns = self.nodes[:, None] * size + np.arange(size)
+        here, _ = owned_among(index_map, self.nodes)
+        local = (columns[here] - begin * size).ravel()
+        own = (here[:, None] * size + np.arange(size)).ravel()
+        entries = matrix[own].tocoo()
+        rest = np.setdiff1d(np.arange((end - begin) * size), local)
+        rows = np.concatenate([local[entries.row], rest])
+        across = np.concatenate([columns.ravel()[entries.col], rest + begin * size])
+        values = np.concatenate([entries.data, np.ones(rest.size)])
+        shape = ((end - begin) * size, index_map.size_global * size)
+        csr = sparse.csr_array((values, (rows, across)), shape=shape)
+        csr.sort_indices()
+        sizes = (shape, shape)
+        parts = (csr.indptr.astype(PETSc.IntType), csr.indices.astype(PETSc.IntType), csr.data)
+        made = PETSc.Mat().createAIJ(sizes, bsize=size, csr=parts, comm=layout.comm)
+        made.assemble()
+        return made
+
+    def among(self, numbers: NDArray[np.int64], size: int) -> sparse.csr_array:
+        """Return Q at nodes of all ranks that those which take part are among.
+
+        Parameters
+        ----------
+        numbers
+            Their global numbers, shape (k,).
+        size
+            Number of unknowns of a node.
+        """
+        order = np.argsort(numbers)
+        places = order[np.searchsorted(numbers, self.nodes, sorter=order)]
+        rows = (places[:, None] * size + np.arange(size)).ravel()
+        entries = self.matrix.tocoo()
+        rest = np.setdiff1d(np.arange(numbers.size * size), rows)
+        values = np.concatenate([entries.data, np.ones(rest.size)])
+        where = [np.concatenate([rows[part], rest]) for part in (entries.row, entries.col)]
+        return sparse.csr_array((values, (where[0], where[1])), shape=2 * (numbers.size * size,))
+
+
+def in_circles(rows: NDArray[np.intp], jumps: sparse.csr_array) -> NDArray[np.intp]:
+    """Return the replaced nodes that follow each other in circles; none, or there is no change.
+
+    Parameters
+    ----------
+    rows, jumps
+        As in `Change.of`.
+
+    Returns
+    -------
+    Places among the nodes that take part.
+    """
+    among = sparse.coo_array(jumps[:, rows])
+    edges = sparse.csr_array((among.data != 0, among.coords), shape=among.shape)
+    count, member = csgraph.connected_components(edges, connection="strong")
+    return rows[np.bincount(member, minlength=count)[member] > 1]
+
+
+def _of_component(
+    rows: NDArray[np.intp], jumps: sparse.csr_array, free: NDArray[np.bool_]
+) -> tuple[sparse.csr_array, sparse.csr_array]:
+    """Return the change and its inverse for one unknown of each node, given which are free."""
+    count = free.size
+    own = np.asarray(jumps[np.arange(rows.size), rows]).ravel()
+    replaced = np.flatnonzero(free[rows])
+    scale = np.ones(count)
+    scale[rows[replaced]] = own[replaced]
+    place = sparse.csr_array(
+        (np.ones(replaced.size), (rows[replaced], replaced)), shape=(count, rows.size)
+    )
+    others = place @ jumps @ sparse.diags_array(free.astype(float))
+    others = others - sparse.diags_array(others.diagonal())
+    identity = sparse.eye_array(count)
+    follows = -(sparse.diags_array(1 / scale) @ others)
+    # What follows replaced nodes follows what these follow; without circles there is an end.
+    whole, further = identity, follows
+    while further.count_nonzero():
+        whole = whole + further
+        further = further @ follows
+    whole = whole @ sparse.diags_array(1 / scale)
+    inverse = sparse.diags_array(scale) @ (identity - follows)
+    return sparse.csr_array(whole), sparse.csr_array(inverse)
+
+
+def _interleaved(components: list[sparse.csr_array]) -> sparse.csr_array:
+    """Return a matrix of blocks, node by node, given that of each component."""
+    size, total = len(components), None
+    for k, matrix in enumerate(components):
+        unit = sparse.csr_array(([1.0], ([k], [k])), shape=(size, size))
+        part = sparse.kron(matrix, unit, format="csr")
+        total = part if total is None else total + part
+    return sparse.csr_array(total)
+
+
+class Constraint:
+    """The matrix C of a body.
+
+    Parameters
+    ----------
+    layout
+        The unknowns x.
+    change
+        Q; None for the identity.
+    motions
+        R, shape (owned, m): rows of zeros where an unknown is fixed.
+    free
+        Which of q are unknown, shape (m,).
+    """
+
+    def __init__(
+        self,
+        layout: Layout,
+        change: Change | None,
+        motions: sparse.csr_array,
+        free: NDArray[np.bool_],
+    ) -> None:
+        self.layout, self.change, self.motions, self.free = layout, change, motions, free
+        self.owned = layout.free.size
+        self.matrix = None if change is None else change.petsc(change.matrix, layout)
+        self._inverse = None if change is None else change.petsc(change.inverse, layout)
+
+    def gathered(self, forces: Array) -> Array:
+        """Return R^T f of owned forces, shape (owned,) or (owned, k). Collective."""
+        return np.asarray(self.layout.comm.allreduce(self.motions.T @ forces, op=MPI.SUM))
+
+    def expand(self, y: Array) -> Array:
+        """Return x = C y, q behind. Collective."""
+        q = y[self.owned :]
+        return np.concatenate([_times(self.matrix, y[: self.owned] + self.motions @ q), q])
+
+    def relative(self, x: Array) -> Array:
+        """Return the y of x. Collective."""
+        q = x[self.owned :]
+        return np.concatenate([_times(self._inverse, x[: self.owned]) - self.motions @ q, q])
+
+    def restrict(self, forces: Array) -> Array:
+        """Return C^T f of forces on x. Collective."""
+        own = _times(self.matrix, forces[: self.owned], transposed=True)
+        return np.concatenate([own, forces[self.owned :] + self.gathered(own)])
+
+    def forces(self, restricted: Array) -> Array:
+        """Return the forces on x of those on y, where q is given none. Collective."""
+        own = restricted[: self.owned]
+        q = np.where(self.free, restricted[self.owned :] - self.gathered(own), 0.0)
+        return np.concatenate([_times(self._inverse, own, transposed=True), q])
+
+
+def _times(matrix: PETSc.Mat | None, values: Array, transposed: bool = False) -> Array:
+    """Return a matrix times owned values; None is the identity. Collective."""
+    if matrix is None:
+        return values
+    vector, image = matrix.createVecs()
+    vector.array[:] = values
+    (matrix.multTranspose if transposed else matrix.mult)(vector, image)
+    return np.asarray(image.array)
+
+
+class ConstrainedBulk:
+    """The matrices C^T K C of a body.
+
+    Parameters
+    ----------
+    bulk
+        Assembles K.
+    constraint
+        C.
+    rest
+        A state at which a first matrix is assembled, for its pattern.
+
+    Attributes
+    ----------
+    columns, corner
+        K R and R^T K R of what was assembled last, shapes (owned, m) and (m, m).
+    """
+
+    def __init__(self, bulk: Bulk, constraint: Constraint, rest: Evaluated) -> None:
+        self._bulk, self.constraint, self._rest = bulk, constraint, rest
+        self._plain: PETSc.Mat | None = None
+        self.columns: Array = np.zeros(constraint.motions.shape)
+        self.corner: Array = np.zeros((constraint.free.size, constraint.free.size))
+
+    @property
+    def layout(self) -> Layout:
+        """The unknowns: fixed ones are the same in x and y."""
+        return self.constraint.layout
+
+    def create_matrix(self) -> PETSc.Mat:
+        """Return a matrix with the pattern of Q^T K Q. Collective."""
+        made = self._bulk.create_matrix()
+        if self.constraint.matrix is None:
+            return made
+        self._plain = made
+        self._bulk.assemble(made, "secant", self._rest)
+        with quick_products(made):
+            product = made.ptap(self.constraint.matrix)
+        product.setLGMap(*made.getLGMap())
+        return product
+
+    def assemble(self, matrix: PETSc.Mat, kind: str, state: Evaluated) -> None:
+        """Assemble Q^T K Q, zero where an unknown is fixed or follows q, and the border.
+
+        Collective.
+        """
+        if self._plain is None:
+            self._bulk.assemble(matrix, kind, state)
+        else:
+            self._bulk.assemble(self._plain, kind, state)
+            self._plain.ptap(self.constraint.matrix, result=matrix)
+        if self.constraint.free.size == 0:
+            return
+        for k, column in enumerate(self.constraint.motions.T.toarray()):
+            self.columns[:, k] = _times(matrix, column)
+        self.corner = self.constraint.gathered(self.columns)
+        self.columns *= self.layout.free.ravel()[:, None]
+        self._without_followers(matrix)
+
+    def take_apart(self, matrix: PETSc.Mat) -> PETSc.Mat | None:
+        """Fill a matrix with bodies that do not touch; see `operator.Bulk`. Collective."""
+        change = self.constraint.change
+        if change is None:
+            return self._bulk.take_apart(matrix)
+        matrix.zeroEntries()
+        matrix.axpy(1.0, self._plain, PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN)
+        if self.constraint.free.size > 0:
+            self._without_followers(matrix)
+        return change.petsc(change.unrestrained, self.layout)
+
+    def _without_followers(self, matrix: PETSc.Mat) -> None:
+        """Take the rows and columns of unknowns that are not free out of a matrix. Collective."""
+        own = matrix.createVecLeft()
+        own.array[:] = self.layout.free.ravel()
+        matrix.diagonalScale(own, own)
+
+
+class ConstrainedOperator:
+    """C^T K C plus blocks at nodes of y; as `operator.SparseOperator`, in x.
+
+    Parameters
+    ----------
+    bulk
+        The body.
+    nodes, symmetric, counters, kind
+        As of `SparseOperator`.
+    """
+
+    def __init__(
+        self,
+        bulk: ConstrainedBulk,
+        nodes: NDArray[np.int32],
+        *,
+        symmetric: bool,
+        counters: Counters,
+        kind: str,
+    ) -> None:
+        self._bulk, self._constraint, self._nodes = bulk, bulk.constraint, nodes
+        self._inner = SparseOperator(bulk, nodes, symmetric=symmetric, counters=counters, kind=kind)
+        self._owned, self._free = bulk.layout.free.size, np.flatnonzero(bulk.constraint.free)
+        #: Whether the responses to the columns are those of another matrix.
+        self._behind = False
+        self._responses = np.zeros((self._owned, self._free.size))
+        self._inverse = np.zeros((self._free.size, self._free.size))
+        self._gives = np.zeros_like(self._inverse)
+
+    @property
+    def symmetric(self) -> bool:
+        """Whether the blocks are symmetric too."""
+        return self._inner.symmetric
+
+    def update(self, kind: str, state: Evaluated, blocks: Array, *, constant: bool = False) -> bool:
+        """Assemble and factorise; see `SparseOperator.update`. Collective."""
+        if not self._inner.update(kind, state, blocks, constant=constant):
+            return False
+        self._behind = self._free.size > 0
+        if self._inner.iterative and self._behind:
+            self._eliminate(blocks)
+        return True
+
+    def solve(self, rhs: Array, rtol: float | None = None, guess: Array | None = None) -> Array:
+        """Solve for the owned unknowns x and q; see `SparseOperator.solve`. Collective."""
+        constraint, free = self._constraint, self._free
+        restricted = constraint.restrict(rhs)
+        own, forces = restricted[: self._owned], restricted[self._owned :][free]
+        columns = self._bulk.columns[:, free]
+        if self._inner.iterative:
+            if guess is not None:
+                guess = constraint.relative(guess)[: self._owned]
+            relative = self._inner.solve(own - columns @ (self._inverse @ forces), rtol, guess)
+            moved = self._inverse @ (forces - self._on_q(columns, relative))
+        else:
+            if self._behind:
+                first, *responses = self._inner.solve_all(np.column_stack([own, columns])).T
+                self._responses, self._behind = np.column_stack(responses), False
+                self._condense(columns)
+            else:
+                first = self._inner.solve(own)
+            moved = self._inverse @ (forces - self._on_q(columns, first))
+            relative = first - self._responses @ moved
+        q = np.zeros(constraint.free.size)
+        q[free] = moved
+        solution = constraint.expand(np.concatenate([relative, q]))
+        if self._inner.iterative and rtol is not None and free.size:
+            # Blocks are stiff then: q hardly moves.
+            left = rhs[self._owned :] - self.multiply(solution)[self._owned :]
+            solution[self._owned :][free] += self._gives @ left[free]
+        return solution
+
+    def multiply(self, values: Array) -> Array:
+        """Return the matrix times owned values and q, as forces on x and q. Collective."""
+        bulk, layout = self._bulk, self._bulk.layout
+        relative = self._constraint.relative(values)
+        own, q = relative[: self._owned], relative[self._owned :]
+        if q.size == 0:
+            return self._constraint.forces(self._inner.multiply(own))
+        forces = layout.mask(self._inner.multiply(layout.mask(own)) + bulk.columns @ q)
+        on_q = self._on_q(bulk.columns, own) + bulk.corner @ q
+        return self._constraint.forces(np.concatenate([forces, on_q]))
+
+    def _condense(self, columns: Array) -> None:
+        """Find the inverse of the stiffness against q, given the columns' responses. Collective."""
+        corner = self._bulk.corner[np.ix_(self._free, self._free)]
+        left, size, right = np.linalg.svd(corner - self._on_q(columns, self._responses))
+        resists = size > NOTHING * np.abs(corner).max(initial=0.0)
+        self._inverse = (right[resists].T / size[resists]) @ left[:, resists].T
+
+    def _on_q(self, columns: Array, values: Array) -> Array:
+        """Return columns^T times values, summed over the ranks. Collective."""
+        return np.asarray(self._bulk.layout.comm.allreduce(columns.T @ values, op=MPI.SUM))
+
+    def _eliminate(self, blocks: Array) -> None:
+        """Eliminate those of q that anything resists, for an iterative solver. Collective."""
+        bulk, inner, free = self._bulk, self._inner, self._free
+        motion, pushed = self._pushed(blocks)
+        held = self._held(pushed)
+        resists = bulk.layout.comm.allreduce(motion.T @ pushed, op=MPI.SUM)
+        self._gives = np.linalg.pinv(resists, rcond=NOTHING)
+        stiffness, turned = np.linalg.eigh(held.T @ bulk.corner[np.ix_(free, free)] @ held)
+        basis = held @ turned
+        self._inverse = basis / stiffness @ basis.T
+        size = (self._owned, None), (None, basis.shape[1])
+        columns = PETSc.Mat().createDense(size, comm=bulk.layout.comm)
+        columns.setUp()
+        factors = PETSc.Vec().createSeq(basis.shape[1])
+        columns.getDenseArray()[:] = bulk.columns[:, free] @ basis
+        columns.assemble()
+        factors.array[:] = -1 / stiffness
+        inner.system = PETSc.Mat().createLRC(inner.matrix, columns, factors, columns)
+        inner.ksp.setOperators(inner.system, inner.ksp.getOperators()[1])
+
+    @property
+    def _dofs(self) -> NDArray[np.intp]:
+        """Owned unknowns of the nodes with blocks."""
+        size = self._bulk.layout.block_size
+        return (self._nodes[:, None] * size + np.arange(size)).ravel()
+
+    def _pushed(self, blocks: Array) -> tuple[Array, Array]:
+        """Return R at the nodes with blocks, and the blocks times it, (dofs, free) both."""
+        n, size, free = self._nodes.size, self._bulk.layout.block_size, self._free
+        motion = self._constraint.motions[self._dofs][:, free].toarray()
+        nodal = motion.reshape(n, size, free.size)
+        return motion, np.einsum("nij,njk->nik", blocks, nodal).reshape(-1, free.size)
+
+    def _held(self, pushed: Array) -> Array:
+        """Return a basis of the free motions that parts or blocks resist, (free, k). Collective."""
+        bulk, free = self._bulk, self._free
+        gram = bulk.layout.comm.allreduce(pushed.T @ pushed, op=MPI.SUM)
+        other = np.ones(self._owned)
+        other[self._dofs] = 0.0
+        tied = self._constraint.motions[:, free].multiply(other[:, None]).toarray()
+        parts = bulk.layout.comm.allreduce(tied.T @ tied, op=MPI.SUM)
+        gram = sum(part / max(np.abs(part).max(initial=0.0), 1e-300) for part in (gram, parts))
+        resistance, directions = np.linalg.eigh(gram)
+        return np.asarray(directions[:, resistance > NOTHING * resistance.max(initial=0.0)])
