@@ -11,8 +11,8 @@ from contact.build import build_problem
 from contact.case.file import Case
 from contact.case.nesting import coarser_cases, has_coarser
 from contact.history import History
+from contact.interface.complementarity import project_half_line
 from contact.interface.multipliers import Multipliers
-from contact.interface.projections import project_half_line
 from contact.linear import multigrid
 from contact.mesh.transfer import carry
 from contact.methods.newton import Newton

@@ -109,12 +109,12 @@ class HeldCurrent:
         """Return psi and phi - phi_F for a local dof array. Collective."""
         jump = self.jump
         nodal = jump.apply(x)
-        opening = jump.normal_component(nodal) - jump.gap
+        opening = jump.gap - jump.normal_component(nodal)
         # Closed up to the rounding of the prescribed displacement.
         reach = np.abs(jump.gap) + np.linalg.norm(nodal[:, :-1], axis=1)
-        closed = opening >= -1e-12 * reach
+        closed = opening <= 1e-12 * reach
         # Its displacement is prescribed, not found up to a tolerance: nothing is taken for closed.
-        conductivity = self.conductor.psi.at(opening, np.zeros_like(closed), closed)
+        conductivity = self.conductor.psi.at(-opening, np.zeros_like(closed), closed)
         return conductivity, self.phi_scale * nodal[:, -1] - self.conductor.phi_f
 
     def add_charge(self, into: Array, x: Array, factor: float = 1.0) -> None:

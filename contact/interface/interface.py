@@ -8,13 +8,13 @@ import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
 
+from contact.interface.active_set import ActiveSet, touching
 from contact.interface.current import HeldCurrent
 from contact.interface.friction import NodalFriction
 from contact.interface.history import SlipHistory
 from contact.interface.multipliers import Multipliers
 from contact.interface.nodes import ContactNodes
 from contact.interface.response import FoundationResponse
-from contact.interface.status import CLOSED, node_status, touching
 from contact.linear.constraint import Change
 from contact.mesh.pieces import sums
 from contact.tolerances import EPS
@@ -102,8 +102,8 @@ class Interface:
         return count, sums(self.comm, self.piece, jump.weight, self.pieces)
 
     def opening(self, nodal: Array) -> Array:
-        """Return u_nu - rho, shape (n,)."""
-        return self.jump.normal_component(nodal) - self.jump.gap
+        """Return gap - u_nu, shape (n,): the distance that is left."""
+        return self.jump.gap - self.jump.normal_component(nodal)
 
     def slip(self, nodal: Array) -> Array:
         """Return what slips in the step, u_tau less that at its beginning, shape (n, d).
@@ -134,15 +134,15 @@ class Interface:
         """Return -sigma nu, layer included, shape (n, d)."""
         return Multipliers(self.pressure(nodal, forces), forces.friction).vectors(self.jump)
 
-    def status(
+    def active_set(
         self,
         nodal: Array,
         forces: Multipliers,
         bound: Array,
         c: float | None = None,
         rounding: float = 0.0,
-    ) -> NDArray[np.int8]:
-        """Return what each node does, see `contact.interface.status`, shape (n,).
+    ) -> ActiveSet:
+        """Return which nodes are open, stick or slip.
 
         Parameters
         ----------
@@ -155,8 +155,8 @@ class Interface:
         c = self.stiffness if c is None else c
         closed = touching(forces.pressure, self.opening(nodal), c, rounding)
         if not self.friction.acts:
-            return (CLOSED * closed).astype(np.int8)
-        return node_status(closed, forces.friction, self.slip(nodal), bound, c, rounding)
+            return ActiveSet.without_slip(closed, False)
+        return ActiveSet.of(closed, forces.friction, self.slip(nodal), bound, c, rounding)
 
     def add_forces(self, residual: Array, x: Array, forces: Multipliers) -> None:
         """Add all that the foundation does to the body at local unknowns, to owned values."""

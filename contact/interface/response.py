@@ -17,10 +17,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from contact.interface.active_set import touching
 from contact.interface.current import Conductor
 from contact.interface.layer import Layer, NormalLaw
 from contact.interface.nodes import ContactNodes
-from contact.interface.status import touching
 from contact.typing import Array
 
 
@@ -130,7 +130,7 @@ class FoundationResponse:
         An iterate misses that by the tolerance of the inner loop, which the steep ramp would
         make a thousand times larger; an open node may carry a multiplier of that size.
         """
-        opening = self.jump.normal_component(x) - self.constrained.gap
+        opening = self.constrained.gap - self.jump.normal_component(x)
         return touching(pressure - self.layer_pressure(x), opening, self.contact_scale)
 
     def force(self, x: Array, pressure: Array) -> Array:

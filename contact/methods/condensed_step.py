@@ -11,7 +11,7 @@ import logging
 from collections.abc import Callable
 from dataclasses import replace
 
-from contact.interface.linearised import ComplementarityParameters
+from contact.interface.complementarity import ComplementarityParameters
 from contact.interface.multipliers import Multipliers
 from contact.linear.operator import Counters
 from contact.methods.chord import WORTH, Kept

@@ -133,7 +133,7 @@ class InteriorPoint:
             moved = jump.apply(
                 whole.operator.solve(-residual_forces(problem, self._state), FORCING)
             )
-        opening = -interface.opening(nodal + moved)[self._near]
+        opening = interface.opening(nodal + moved)[self._near]
         gap = jump.gap[self._near]
         scales = problem.scales
         block = scales.plane_modulus * scales.area / scales.height
@@ -220,7 +220,7 @@ class InteriorPoint:
         body, d = self.problem.equilibrium, jump.dim
         nodal = jump.apply(state.x)
         residual = -residual_forces(self.problem, state)
-        slack = -interface.opening(nodal)[near] - cones.slack
+        slack = interface.opening(nodal)[near] - cones.slack
         slip = interface.slip(nodal)[rubbing] - cones.slip
         cones.scale()
         stiff, across = cones.stiffness()

@@ -39,9 +39,9 @@ from functools import partial
 
 import numpy as np
 
-from contact.interface.linearised import ComplementarityParameters
+from contact.interface.active_set import touching
+from contact.interface.complementarity import ComplementarityParameters
 from contact.interface.multipliers import Multipliers
-from contact.interface.status import touching
 from contact.linear.operator import Counters
 from contact.methods.condensed_step import SECANT_UNTIL, CondensedStep
 from contact.methods.continuation import CONTINUATION, continuation
@@ -169,8 +169,8 @@ class Newton:
         pressure = np.where(closed, start.forces.pressure, 0.0)
         forces = Multipliers.of(interface.jump, pressure, start.forces.friction)
         bound = interface.bound(nodal, forces)
-        status = interface.status(nodal, forces, bound, c)
-        return Iterate(replace(start, forces=forces), status)
+        active_set = interface.active_set(nodal, forces, bound, c)
+        return Iterate(replace(start, forces=forces), active_set)
 
     def run(self, iterate: Iterate) -> tuple[Iterate, Outcome]:
         """Iterate, with fallbacks; the best iterate if all fail. Collective."""
@@ -305,7 +305,7 @@ class NewtonLoop:
         stagnation = Stagnation(patience, PROGRESS, together=True)
         self.step.begin()
         # A start from elsewhere is near the solution; zero displacement has no better tangent.
-        tangent = iterate.status is not None and not linear
+        tangent = iterate.active_set is not None and not linear
         for _ in range(min(options.max_iterations, search.left)):
             before, kept = residuals, iterate
             taken = self.step(iterate, tangent, residuals)
@@ -324,7 +324,11 @@ class NewtonLoop:
                 search.see(iterate, residuals)
             if residuals.largest <= options.tolerance:
                 return iterate, self._end(residuals)
-            if self.hopeless is not None and kept.status is None and self.hopeless(iterate.state):
+            if (
+                self.hopeless is not None
+                and kept.active_set is None
+                and self.hopeless(iterate.state)
+            ):
                 return iterate, self._end(residuals, SOFTER)
             if not np.isfinite(residuals.largest):
                 return iterate, self._end(residuals, "Newton's method diverged")

@@ -10,11 +10,15 @@ from dataclasses import dataclass, field, replace
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
 from contact.errors import SingularError
+from contact.interface.active_set import ActiveSet
+from contact.interface.complementarity import (
+    ComplementarityParameters,
+    LinearisedContact,
+    linearise,
+)
 from contact.interface.interface import Interface
-from contact.interface.linearised import ComplementarityParameters, LinearisedContact, linearise
 from contact.interface.multipliers import Multipliers
 from contact.linear.operator import Counters, Operator
 from contact.methods.following import Following
@@ -55,14 +59,14 @@ class Iterate:
     ----------
     state
         Unknowns and contact forces.
-    status
-        What each node did in that step, shape (n,); None before the first one.
+    active_set
+        Which nodes were open, stuck or slipped in that step; None before the first one.
     layer_pressure
         Pressure of the linearised layer after it, shape (n,); None for that of the state.
     """
 
     state: State
-    status: NDArray[np.int8] | None = None
+    active_set: ActiveSet | None = None
     layer_pressure: Array | None = None
 
 
@@ -222,14 +226,16 @@ class NewtonStep:
             nodal,
             state.forces,
             self.parameters,
-            iterate.status,
+            iterate.active_set,
             softening=self.options.softening,
         )
-        layer, shift = linearised_layer(interface, nodal, iterate, self.parameters, contact.settled)
+        layer, shift = linearised_layer(
+            interface, nodal, iterate, self.parameters, contact.unchanged
+        )
         blocks = contact.blocks + layer + self._current(nodal, contact, reached.largest)
         kind, last = "tangent" if tangent else "secant", self._kind
         remains = kind == last and reached.equilibrium < SMALL * reached.largest
-        if self._loose and not contact.settled:
+        if self._loose and not contact.unchanged:
             stiffness = SPRINGS * min(reached.largest, 1.0) * self.parameters.nodal_stiffness
             along = jump.normal[:, :, None] * jump.normal[:, None, :]
             blocks[:, : body.dim, : body.dim] += stiffness * (along + jump.tangent)
@@ -242,7 +248,7 @@ class NewtonStep:
         try:
             increment = self.operator.solve(-residual, self._leaves(reached.largest))
         except SingularError:
-            if body.linear or iterate.status is None:
+            if body.linear or iterate.active_set is None:
                 raise
             self.renew()
             return None  # at rest something has held it: it has been moved too far
@@ -255,7 +261,7 @@ class NewtonStep:
         # What follows a rigid part that has flown far and comes back follows it but for rounding.
         x = body.prescribe(body.moved(state.x, increment), state.time)
         new = replace(state, x=x, forces=forces)
-        return Taken(Iterate(new, contact.status, known))
+        return Taken(Iterate(new, contact.active_set, known))
 
     def _current(self, nodal: Array, contact: LinearisedContact, reached: float) -> Array | float:
         """Return the derivative of the current, with psi followed or frozen."""
@@ -263,7 +269,7 @@ class NewtonStep:
         response = interface.response
         if not response.active:
             return 0.0
-        follow = contact.settled or reached < NEAR
+        follow = contact.unchanged or reached < NEAR
         if response.follows_gap:
             follow = self.following(reached, follow)
         current = response.current_jacobian if follow else response.current_block
@@ -280,7 +286,7 @@ def linearised_layer(
     """Linearise the layer; return its block, and how it differs from the layer's force.
 
     It is linearised where the law is met from the pressure and the displacement of the step
-    before together, as the status of a contact node is found. Linearised about the displacement
+    before together, as the active set is. Linearised about the displacement
     alone, a layer stiffer than the body cycles between its regimes.
     """
     response, jump, c = interface.response, interface.jump, parameters.c

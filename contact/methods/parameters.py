@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from mpi4py import MPI
 
-from contact.interface.linearised import ComplementarityParameters
+from contact.interface.complementarity import ComplementarityParameters
 from contact.methods.augmentation import automatic_r
 from contact.problem.kkt import residual_forces
 from contact.problem.protocols import Problem
@@ -35,8 +35,8 @@ def far_softer(problem: Problem, parameters: ComplementarityParameters, state: S
     nothing but a given motion of the foundation acts, there is no load to tell by.
     """
     interface = problem.interface
-    opening = np.maximum(interface.opening(interface.jump.apply(state.x)), 0.0)
-    foreseen = parameters.c * interface.jump.sum(opening)
+    penetration = np.maximum(-interface.opening(interface.jump.apply(state.x)), 0.0)
+    foreseen = parameters.c * interface.jump.sum(penetration)
     forces = np.abs(residual_forces(problem, problem.start()))
     on_nodes, on_masters = np.split(forces, [problem.equilibrium.owned])
     loads = interface.comm.allreduce(float(on_nodes.sum()), op=MPI.SUM) + on_masters.sum()

@@ -16,13 +16,12 @@ from dataclasses import dataclass
 import numpy as np
 from mpi4py import MPI
 
+from contact.interface.complementarity import disc_derivative, interface_residuals, project_disc
 from contact.interface.interface import Interface
 from contact.interface.jump import Jump
 from contact.interface.layer import NormalLaw
 from contact.interface.multipliers import Multipliers
 from contact.interface.nodes import ContactNodes
-from contact.interface.projections import disc_derivative, project_disc
-from contact.interface.residuals import interface_residuals
 from contact.linear.multigrid import TOLERANCE
 from contact.methods.acceleration import ResidualMinimiser
 from contact.methods.augmentation import components, split

@@ -13,7 +13,6 @@ from mpi4py import MPI
 
 from contact.errors import InputError
 from contact.interface.multipliers import Multipliers
-from contact.interface.status import CLOSED, STICKS
 from contact.linear.operator import Counters
 from contact.methods.report import History, Outcome
 from contact.output.balances import ChargeBalance, charge_balance
@@ -279,15 +278,15 @@ class Solution:
     def status(self) -> Array:
         """What each contact node does: "open", "stick" or "slip", shape (n,). Collective.
 
-        A node is in contact where p + c (u_nu - rho) > 0 for the multiplier p, or where the
+        A node is in contact where p - c (gap - u_nu) > 0 for the multiplier p, or where the
         layer presses; c = E / size. There it slips if |lambda_f + c u_tau|
         exceeds the friction bound (always where that is 0), and sticks else. What is below
         1e-9 of the largest pressure counts as rounding.
         """
         interface, nodal = self.problem.interface, self.nodal
         rounding = 1e-9 * interface.jump.maximum(self.pressure)
-        status = interface.status(nodal, self.forces, self.friction_bound, rounding=rounding)
+        active = interface.active_set(nodal, self.forces, self.friction_bound, rounding=rounding)
         layer = interface.response.layer_pressure(nodal) > rounding
-        touches = (status & CLOSED > 0) | layer
-        sticks = (status & STICKS > 0) & (self.friction_bound > 0)
+        touches = active.closed | layer
+        sticks = active.sticks & (self.friction_bound > 0)
         return np.where(touches, np.where(sticks, "stick", "slip"), "open")

@@ -33,12 +33,12 @@ def approached(nodes: ContactNodes, x: Array, masters: Masters, time: float) -> 
         push[member.columns] = forces[member.columns]
         if nodes.motion is None or not member.foundation or not push.any():
             continue
-        opening = nodes.normal_component(nodes.apply(x)) - nodes.gap
+        opening = nodes.gap - nodes.normal_component(nodes.apply(x))
         closing = -nodes.normal_component(nodes.motion @ push)
         mine = np.abs(nodes.motion[:, :, member.columns]).max(axis=(1, 2), initial=0.0) > 0
         way = np.full(opening.size, np.inf)
         there = mine & (closing > 0)
-        way[there] = -opening[there] / closing[there]
+        way[there] = opening[there] / closing[there]
         least = nodes.comm.allreduce(float(way.min(initial=np.inf)), op=MPI.MIN)
         if 0 < least < np.inf:
             x = x.copy()

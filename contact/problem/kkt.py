@@ -10,9 +10,9 @@ from functools import lru_cache
 
 import numpy as np
 
+from contact.interface.active_set import touching
+from contact.interface.complementarity import interface_residuals
 from contact.interface.interface import Interface
-from contact.interface.residuals import interface_residuals
-from contact.interface.status import touching
 from contact.problem.protocols import Problem
 from contact.problem.state import State
 from contact.tolerances import EPS
@@ -39,7 +39,7 @@ class KKT:
         charges, each over those of its own kind: to these belong what the potential exerts on the
         body at rest, and the charges of the strain.
     contact
-        |p - max(0, p + c (u_nu - rho))| / |p| in L2(Gamma_3), c = E/length with
+        |p - max(0, p - c (gap - u_nu))| / |p| in L2(Gamma_3), c = E/length with
         the modulus of what touches, and the length of the body, less as many times as cells behind
         Gamma_3 are longer than twice their facets (`contact.mesh.entities.elongation`); the largest
         of those of bodies that nothing connects.

@@ -117,7 +117,7 @@ def held_by_supports(problem: ContactProblem) -> bool:
 def held_at_rest(problem: ContactProblem) -> bool:
     """Tell whether supports, and contact where it touches at rest, hold all bodies. Collective."""
     interface, rest = problem.interface, problem.start()
-    touching = interface.opening(interface.jump.apply(rest.x)) >= -1e-12 * interface.size
+    touching = interface.opening(interface.jump.apply(rest.x)) <= 1e-12 * interface.size
     return all(
         [
             null_space(group.held(problem.frictional, touching)).size == 0

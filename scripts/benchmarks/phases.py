@@ -33,7 +33,7 @@ PHASES = {
     "iterations, solves": ("~", "<method 'solve' of 'petsc4py.PETSc.KSP' objects>"),
     "solves with the factors": ("~", "<method 'solve' of 'petsc4py.PETSc.Mat' objects>"),
     "residual forces": ("body/internal.py", "_found"),
-    "contact laws": ("interface/linearised.py", "linearise"),
+    "contact laws": ("interface/complementarity.py", "linearise"),
     "dense solves at contact nodes": ("methods/newton.py", "_solve_condensed"),
     "transfer from mesh to mesh": ("nesting.py", "prolong"),
 }

@@ -12,8 +12,8 @@ from matplotlib.figure import Figure
 from mpi4py import MPI
 
 from contact import Solution, build_problem, load_case
+from contact.interface.complementarity import project_disc
 from contact.interface.layer import NormalLaw
-from contact.interface.projections import project_disc
 from contact.output.figures.body import draw_plane
 from contact.output.figures.contact import draw_line
 from contact.output.figures.picture import Picture, picture

@@ -68,7 +68,7 @@ def test_without_friction_the_penetration_is_eps_times_the_pressure():
     assert len(penalty.history.records) == 1
     opening = problem.interface.opening(problem.nodal(state))
     touching = state.forces.pressure > 0
-    assert np.allclose(opening[touching], 1e-5 * state.forces.pressure[touching])
+    assert np.allclose(opening[touching], -1e-5 * state.forces.pressure[touching])
     # The Signorini residual is the penetration: c eps with c = E/size = 1/4.
     assert outcome.kkt.contact == pytest.approx(0.25e-5, rel=1e-6)
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from contact.interface.projections import disc_derivative, project_disc, project_half_line
+from contact.interface.complementarity import disc_derivative, project_disc, project_half_line
 from contact.methods.acceleration import ResidualMinimiser
 
 

@@ -108,7 +108,8 @@ def test_methods_agree_at_every_step(law):
         assert np.abs(difference).max() < 1e-7 * size
         interface, nodal = one.problem.interface, one.problem.nodal(one.state)
         bound = interface.bound(nodal, one.state.forces)
-        kinds |= set(interface.status(nodal, one.state.forces, bound, rounding=1e-9).tolist())
+        active = interface.active_set(nodal, one.state.forces, bound, rounding=1e-9)
+        kinds |= set(zip(active.closed, active.sticks, active.slips, strict=True))
     assert len(kinds) == 3  # open, sticking and sliding nodes have been met
 
 

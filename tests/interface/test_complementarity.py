@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
+from contact.interface.active_set import ActiveSet
+from contact.interface.complementarity import ComplementarityParameters, linearise
 from contact.interface.friction import Friction
-from contact.interface.linearised import ComplementarityParameters, linearise
 from contact.interface.multipliers import Multipliers
-from contact.interface.status import CLOSED, FREE, SLIDES, STICKS
 from forms.laws import ConstantCoefficient, Coulomb, SlipCoefficient
 from tests.problems import mechanics
 
@@ -30,11 +30,13 @@ def test_blocks_are_the_derivative_of_the_contact_forces(dimension):
         np.einsum("nij,nj->ni", nodes.tangent, 0.3 * rng.standard_normal((n, dimension))),
     )
     parameters = ComplementarityParameters(20.0, 20.0, 20.0)
-    before = np.full(n, FREE, dtype=np.int8)
+    none = np.zeros(n, dtype=bool)
+    before = ActiveSet(none, none, none)
     base = linearise(interface, nodal, forces, parameters, before, forces.pressure * 0.4)
-    assert {CLOSED + SLIDES, CLOSED + STICKS} <= set(base.status.tolist())
-    sticks = base.status & STICKS > 0
-    # a sticking node pushes with lambda + gamma u_tau, a pressed one with p + gamma (u_nu - rho)
+    sticks = base.active_set.sticks
+    assert np.any(sticks & base.active_set.closed)
+    assert np.any(base.active_set.slips & base.active_set.closed)
+    # a sticking node pushes with lambda + gamma u_tau, a pressed one with p - gamma (gap - u_nu)
     direction = 1e-6 * rng.standard_normal(nodal.shape)
     moved = linearise(
         interface, nodal + direction, forces, parameters, before, forces.pressure * 0.4
@@ -56,9 +58,10 @@ def test_falling_friction_is_followed_as_far_as_allowed(softening):
     pressure = np.full(nodes.nodes.size, 0.5)
     forces = Multipliers(pressure, 0.3 * pressure[:, None] * [1.0, 0.0])
     parameters = ComplementarityParameters(200.0, 20.0, 1e6)
-    before = np.full(nodes.nodes.size, CLOSED + SLIDES, dtype=np.int8)
+    every = np.ones(nodes.nodes.size, dtype=bool)
+    before = ActiveSet(every, ~every, every)
     base = linearise(problem.interface, nodal, forces, parameters, before, softening=softening)
-    assert base.settled
+    assert base.unchanged
     step = np.array([1e-8, 0.0])
     moved = linearise(
         problem.interface, nodal + step, forces, parameters, before, softening=softening

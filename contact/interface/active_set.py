@@ -1,0 +1,104 @@
+"""The active set: which contact nodes are open, stick or slip. This is its only definition.
+
+The complementarity functions (`contact.interface.complementarity`) take their projections' pieces
+from it: a node is in contact where p - c (gap - u_nu) > 0, and sticks where
+|lambda_f + c u_tau| <= s.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from contact.typing import Array
+
+
+def touching(pressure: Array, opening: Array, c: float, rounding: float = 0.0) -> NDArray[np.bool_]:
+    """Tell where the rigid part presses: p - c (gap - u_nu) > 0, shape (n,).
+
+    Parameters
+    ----------
+    pressure
+        Multiplier of the unilateral constraint, shape (n,).
+    opening
+        gap - u_nu, shape (n,).
+    c
+        Weighs displacements against stresses (stress/length).
+    rounding
+        A stress that counts as none.
+    """
+    return np.greater(pressure - c * opening, rounding)
+
+
+@dataclass(frozen=True)
+class ActiveSet:
+    """The state of each contact node.
+
+    Attributes
+    ----------
+    closed
+        Where the rigid part presses, shape (n,).
+    sticks, slips
+        Where friction holds the node, and where it is at its bound, shape (n,). A smoothed
+        pressure and Tresca's law bound the friction of open nodes too, which then do either.
+    """
+
+    closed: NDArray[np.bool_]
+    sticks: NDArray[np.bool_]
+    slips: NDArray[np.bool_]
+
+    @staticmethod
+    def of(
+        closed: NDArray[np.bool_],
+        friction: Array,
+        slip: Array,
+        bound: Array,
+        c: float,
+        rounding: float = 0.0,
+    ) -> ActiveSet:
+        """Return the states of nodes with friction: |lambda_f + c u_tau| <= s sticks.
+
+        Parameters
+        ----------
+        closed
+            Where the rigid part presses, shape (n,).
+        friction, slip
+            lambda_f and the slip of the step, shape (n, d).
+        bound
+            Friction bound s, shape (n,).
+        c, rounding
+            As in `touching`.
+        """
+        within = np.linalg.norm(friction + c * slip, axis=1) <= bound + rounding
+        acts = (bound > 0) | closed
+        return ActiveSet(closed, within & acts, ~within & acts)
+
+    @staticmethod
+    def without_slip(closed: NDArray[np.bool_], friction: bool) -> ActiveSet:
+        """Return nodes that stick where they touch, if there is friction."""
+        return ActiveSet(closed, closed & friction, np.zeros_like(closed))
+
+    def stopped(self, before: ActiveSet, friction: Array, slip: Array) -> ActiveSet:
+        """Return this set where nodes stick that friction pushes along.
+
+        Such a node has to stop before it can slip back.
+
+        Parameters
+        ----------
+        before
+            The active set of the step before.
+        friction, slip
+            As in `of`.
+        """
+        stops = before.slips & self.slips & (np.einsum("ni,ni->n", friction, slip) < 0)
+        return replace(self, sticks=self.sticks | stops, slips=self.slips & ~stops)
+
+    def same(self, other: ActiveSet) -> bool:
+        """Tell whether all nodes of this rank are in the same state in another set."""
+        return (
+            np.array_equal(self.closed, other.closed)
+            and np.array_equal(self.sticks, other.sticks)
+            and np.array_equal(self.slips, other.slips)
+        )

@@ -1,0 +1,294 @@
+"""Complementarity functions of contact and friction: residuals and generalised derivative.
+
+With projections onto the admissible forces, a half line and a disc, the laws are equations,
+
+    p - max(0, p - c (gap - u_nu)) = 0,     lambda_f - proj_s(lambda_f + c u_tau) = 0,
+
+whose pieces are those of the active set (`contact.interface.active_set`). `interface_residuals`
+evaluates them; `linearise` takes a step of the semismooth Newton method on them, node by node.
+There a node in contact pushes with p - gamma (gap - u_nu), a sticking one with
+lambda_f + gamma u_tau, a slipping one with its friction bound along the slip: with gamma far above
+the stiffness of the body these are the linearised conditions u_nu = gap and u_tau = 0, and their
+residuals fall by that ratio in every step.
+
+References
+----------
+Alart and Curnier, Comput. Methods Appl. Mech. Engrg. 92 (1991) 353.
+Hueeber, Stadler and Wohlmuth, SIAM J. Sci. Comput. 30 (2008) 572.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from mpi4py import MPI
+from numpy.typing import NDArray
+
+from contact.interface.active_set import ActiveSet
+from contact.interface.interface import Interface
+from contact.interface.multipliers import Multipliers
+from contact.tolerances import EPS
+from contact.typing import Array
+
+#: Part of a node's own stiffness that a falling friction coefficient may take away: with its
+#: neighbours, which slide along, a node is less stiff than alone.
+SOFTENING = 0.25
+
+
+def project_half_line(z: Array) -> Array:
+    """Return max(0, z): the projection onto admissible pressures, equation (3.43)."""
+    return np.maximum(z, 0.0)
+
+
+def project_disc(z: Array, radius: Array) -> Array:
+    """Return the projection of tangential vectors onto discs |.| <= radius.
+
+    Parameters
+    ----------
+    z
+        Vectors, shape (n, d).
+    radius
+        Friction bounds s >= 0, shape (n,).
+    """
+    length = np.linalg.norm(z, axis=1)
+    beyond = length > radius
+    scale = np.ones_like(length)
+    scale[beyond] = radius[beyond] / length[beyond]
+    return z * scale[:, None]
+
+
+def disc_derivative(z: Array, radius: Array, directions: Array) -> Array:
+    """Return the derivatives of `project_disc` along directions.
+
+    Parameters
+    ----------
+    z, radius
+        Vectors, shape (n, d), and radii, shape (n,).
+    directions
+        Shape (n, d, k).
+
+    Returns
+    -------
+    Shape (n, d, k); on the rim that of the inside.
+    """
+    length = np.linalg.norm(z, axis=1)
+    beyond = length > radius
+    unit = z[beyond] / length[beyond, None]
+    outside = directions[beyond]
+    radial = np.einsum("ni,nik->nk", unit, outside)
+    outside = outside - unit[:, :, None] * radial[:, None, :]
+    result = directions.copy()
+    result[beyond] = (radius[beyond] / length[beyond])[:, None, None] * outside
+    return result
+
+
+def interface_residuals(
+    interface: Interface,
+    nodal: Array,
+    forces: Multipliers,
+    bound: Array,
+    rounding: Array | float = 0.0,
+) -> tuple[float, float]:
+    """Return the relative contact and friction residuals at nodal unknowns. Collective.
+
+    Each piece of the body has its own, relative to what presses it; the largest are returned.
+
+    Parameters
+    ----------
+    interface, nodal, forces, bound
+        The laws, unknowns and contact forces at the nodes, and the friction bound, shape (n,).
+    rounding
+        Norm of pressures in L2(Gamma_3) that nothing can tell from zero, of each piece: both are
+        less it.
+    """
+    # What a gap between neighbouring nodes costs is E/h: where a body is that long only because its
+    # cells are stretched, E/size hides errors of the pressure far above the tolerance.
+    c = interface.elongation * interface.stiffness
+    opening = interface.opening(nodal)
+    contact = forces.pressure - project_half_line(forces.pressure - c * opening)
+    # What friction has along the normal is against the law wherever a node sticks or slips.
+    trial = interface.jump.tangential_component(forces.friction) + c * interface.slip(nodal)
+    friction = forces.friction - project_disc(trial, bound)
+    friction[np.isnan(bound)] = np.nan  # nothing is beyond what is no number
+    # Where next to nothing presses, rounding is compared with the stress that closing would take,
+    # but not of gaps far wider than nodes move: these say nothing of the loads.
+    before = np.linalg.norm(interface.friction.history.jump, axis=1)
+    way = np.maximum(np.linalg.norm(nodal[:, : interface.dim], axis=1), before)
+    closing = interface.stiffness * interface.norms(
+        np.minimum(np.minimum(np.abs(opening), way), interface.size)
+    )
+    scale = np.maximum(interface.norms(interface.pressure(nodal, forces)), 1e-4 * closing)
+    scale = np.maximum(scale, EPS * scale.max())
+    norms = np.array([interface.norms(contact), interface.norms(friction)])
+    left = (norms - np.minimum(norms, rounding)) / np.where(scale > 0, scale, 1.0)
+    contact_left, friction_left = left.max(axis=1)
+    return float(contact_left), float(friction_left)
+
+
+@dataclass(frozen=True)
+class ComplementarityParameters:
+    """Parameters of the complementarity functions and of their linearisation (stress/length).
+
+    Attributes
+    ----------
+    c
+        Weighs displacements against stresses in the functions, and thereby in the active set.
+    nodal_stiffness
+        Of the body against a displacement of one contact node, about E'/h.
+    gamma
+        Of the condensed constraints, far above the others.
+    """
+
+    c: float
+    nodal_stiffness: float
+    gamma: float
+
+
+@dataclass(frozen=True)
+class LinearisedContact:
+    """Contact forces at an iterate and their derivative.
+
+    Attributes
+    ----------
+    forces
+        Multipliers, to be put into the residual.
+    blocks
+        Derivative by the nodal unknowns, shape (n, block size, block size), without weights.
+    active_set
+        The state of each node in this step.
+    unchanged
+        Whether that is the one of the step before, on all ranks.
+    """
+
+    forces: Multipliers
+    blocks: Array
+    active_set: ActiveSet
+    unchanged: bool
+
+
+def linearise(
+    interface: Interface,
+    nodal: Array,
+    forces: Multipliers,
+    parameters: ComplementarityParameters,
+    before: ActiveSet | None,
+    frozen_bound: Array | None = None,
+    softening: float = SOFTENING,
+) -> LinearisedContact:
+    """Linearise the contact laws at an iterate. Collective.
+
+    Parameters
+    ----------
+    interface, nodal, forces
+        The contact nodes with their laws, the unknowns there, and the contact forces.
+    parameters
+        Of the complementarity functions.
+    before
+        The active set of the step before; None in the first one, where closed nodes stick.
+    frozen_bound
+        A given friction bound: Tresca's law instead of Coulomb's.
+    softening
+        Part of a node's own stiffness that a falling friction coefficient may take away.
+    """
+    jump, frictional, c = interface.jump, interface.friction.acts, parameters.c
+    p, lam, n, d = forces.pressure, forces.friction, jump.normal, jump.dim
+    opening, slip = interface.opening(nodal), interface.slip(nodal)
+    length = np.linalg.norm(slip, axis=1)
+    total = interface.pressure(nodal, forces)
+    bound = interface.friction.bound(total, length) if frozen_bound is None else frozen_bound
+    trial = lam + c * slip
+    size = np.linalg.norm(trial, axis=1)
+
+    if before is None:
+        active = ActiveSet.without_slip(opening <= 1e-12 * interface.size, frictional)
+    else:
+        active = interface.active_set(nodal, forces, bound, c).stopped(before, lam, slip)
+    closed, sticks, slips = active.closed, active.sticks, active.slips
+    changed = before is None or not active.same(before)
+    unchanged = interface.comm.allreduce(int(changed), op=MPI.SUM) == 0
+    if frozen_bound is None and not unchanged and before is not None:
+        bound = np.where(slips, _foreseen_bound(interface, total, length, size, parameters), bound)
+
+    pressure = np.where(closed, p - parameters.gamma * opening, 0.0)
+    blocks = np.zeros((p.size, jump.block_size, jump.block_size))
+    slope = np.where(closed, parameters.gamma, 0.0)[:, None] * n
+    blocks[:, :d, :d] = n[:, :, None] * slope[:, None, :]
+    friction = np.zeros_like(lam)
+    if frictional:
+        friction[sticks] = (lam + parameters.gamma * slip)[sticks]
+        blocks[sticks, :d, :d] += parameters.gamma * jump.tangent[sticks]
+
+        along = trial / np.maximum(size, 1e-300)[:, None]
+        across = jump.tangent - along[:, :, None] * along[:, None, :]
+        # Across z = lambda + c u_tau the new multiplier is s/|u_tau| times the new slip:
+        # lambda = s z/|z|, linearised in u and lambda and solved for the latter.
+        least = np.maximum(bound * c / parameters.gamma, 1e-300)  # turning is at most gamma
+        turning = bound * c / np.maximum(size - bound, least)
+        sliding = turning[:, None, None] * across
+        friction[slips] = (bound[:, None] * along + np.einsum("nij,nj->ni", sliding, slip))[slips]
+        if frozen_bound is None:
+            limit = softening * parameters.nodal_stiffness if unchanged else None
+            rate = _bound_gradient(interface, total, slip, length, limit)
+            ahead, follows = _follow_pressure(
+                interface, nodal, total, length, slope, opening, parameters, closed
+            )
+            friction[slips] += (ahead[:, None] * along)[slips]
+            rate = rate + follows
+            blocks[slips, :d, :] += along[slips, :, None] * rate[slips, None, :]
+        blocks[slips, :d, :d] += sliding[slips]
+    return LinearisedContact(Multipliers(pressure, friction), blocks, active, unchanged)
+
+
+def _foreseen_bound(
+    interface: Interface,
+    total: Array,
+    length: Array,
+    size: Array,
+    parameters: ComplementarityParameters,
+) -> Array:
+    """Return the bound that a node which lets go will slide on, shape (n,).
+
+    Its coefficient falls on the way: foreseen, this saves steps for each node that the sliding
+    zone gains. With neighbours that slide along it is about half as stiff as alone.
+    """
+    bound = interface.friction.bound(total, length)
+    for _ in range(5):
+        ahead = np.maximum(length, (size - bound) / (0.5 * parameters.nodal_stiffness))
+        bound = interface.friction.bound(total, ahead)
+    return bound
+
+
+def _bound_gradient(
+    interface: Interface, total: Array, slip: Array, length: Array, limit: float | None
+) -> Array:
+    """Return the derivative of the friction bound by the slip, shape (n, block size).
+
+    Taken only when the slip zone is that of the step before, and limited: where friction falls
+    faster than the node's own stiffness, the linearised node would snap.
+    """
+    gradient = np.zeros((length.size, interface.jump.block_size))
+    if limit is None:
+        return gradient
+    fall = np.maximum(interface.friction.by_slip(total, length), -limit)
+    direction = slip / np.maximum(length, 1e-300)[:, None]
+    gradient[:, : interface.dim] = fall[:, None] * direction
+    return gradient
+
+
+def _follow_pressure(
+    interface: Interface,
+    nodal: Array,
+    total: Array,
+    length: Array,
+    slope: Array,
+    opening: Array,
+    parameters: ComplementarityParameters,
+    closed: NDArray[np.bool_],
+) -> tuple[Array, Array]:
+    """Return how the bound follows the pressure of this very step: change and gradient."""
+    rate = interface.friction.by_pressure(total, length)
+    gradient = np.zeros((length.size, interface.jump.block_size))
+    gradient[:, : interface.dim] = rate[:, None] * slope
+    gradient += rate[:, None] * interface.response.layer_gradient(nodal)
+    return np.where(closed, -rate * parameters.gamma * opening, 0.0), gradient
