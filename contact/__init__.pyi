@@ -7,11 +7,11 @@ from contact.body.description import Material as Material
 from contact.body.rigid import Electrode as Electrode
 from contact.body.rigid import Motion as Motion
 from contact.body.rigid import Rigid as Rigid
-from contact.build import build_problem as build_problem
-from contact.building.materials import make_material as make_material
+from contact.case.build import build_problem as build_problem
 from contact.case.file import Case as Case
 from contact.case.file import load_case as load_case
 from contact.case.file import parse_case as parse_case
+from contact.case.material import make_material as make_material
 from contact.errors import InputError as InputError
 from contact.interface.current import Conductor as Conductor
 from contact.interface.friction import Friction as Friction

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import dataclasses
 import inspect
+import json
 from dataclasses import dataclass
 from typing import Annotated, Any, TypeAlias, get_args, get_type_hints
 
@@ -27,10 +28,34 @@ class Accepted:
 
 @dataclass(frozen=True)
 class ReadWith:
-    """The value that another setting must have for this one to be read at all."""
+    """The values that another setting must have for this one to be read at all.
+
+    Attributes
+    ----------
+    key
+        The other setting.
+    value
+        Its value, or several; None for any that is given.
+    required
+        Whether this setting is then required.
+    """
 
     key: str
-    value: str | bool
+    value: str | bool | tuple[str, ...] | None = None
+    required: bool = False
+
+    def met(self, value: Any) -> bool:
+        """Tell whether a value of the other setting is one of these."""
+        if self.value is None:
+            return value is not None
+        return value in self.value if isinstance(self.value, tuple) else value == self.value
+
+    def __str__(self) -> str:
+        """Return the condition as in a case file."""
+        if self.value is None:
+            return self.key
+        values = self.value if isinstance(self.value, tuple) else (self.value,)
+        return f"{self.key} = {' or '.join(map(json.dumps, values))}"
 
 
 @dataclass(frozen=True)
@@ -94,7 +119,7 @@ def read_by(options: Any) -> dict[str, Any]:
     return {
         key: getattr(options, key)
         for key, setting in settings_of(type(options)).items()
-        if (to := setting.condition) is None or getattr(options, to.key) == to.value
+        if (to := setting.condition) is None or to.met(getattr(options, to.key))
     }
 
 

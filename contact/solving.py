@@ -17,10 +17,9 @@ from typing import Any
 import numpy as np
 from mpi4py import MPI
 
-from contact.build import REPLACEMENTS, build_problem, named
+from contact.case.build import REPLACEMENTS, build_problem, named, replaced_by
 from contact.case.digest import check_digest, digest
 from contact.case.file import Case, load_case
-from contact.case.replaced import replaced_by
 from contact.case.text import to_toml
 from contact.errors import InputError
 from contact.kinds import expect

@@ -20,11 +20,10 @@ from typing import Any
 
 from mpi4py import MPI
 
-from contact.build import build_problem, named
+from contact.case.build import build_problem, named
 from contact.case.digest import difference as changed_input
 from contact.case.digest import digest
-from contact.case.file import Case, load_case
-from contact.case.overrides import read_value
+from contact.case.file import Case, load_case, read_value
 from contact.case.text import literal, to_toml
 from contact.errors import InputError
 from contact.mesh.domain import Domain

@@ -29,8 +29,6 @@ LAYERS = (
     {"methods"},
     {"output"},
     {"case"},
-    {"building"},
-    {"build"},
     {"evolving", "nesting", "solving", "sweeping"},
     {"cli"},
 )

@@ -47,10 +47,9 @@ WORDS = {
 
 #: Most of them that a package, or a page, may have. Nothing may rise; what is mended lowers it.
 ALLOWED: dict[str, int] = {
-    "contact": 44,
+    "contact": 39,
     "contact/body": 96,
-    "contact/building": 14,
-    "contact/case": 104,
+    "contact/case": 8,
     "contact/cli": 16,
     "contact/interface": 155,
     "contact/library": 9,
@@ -64,9 +63,9 @@ ALLOWED: dict[str, int] = {
     "scripts": 332,
     "README.md": 19,
     "docs/api.md": 1,
-    "docs/architecture.md": 29,
+    "docs/architecture.md": 27,
     "docs/benchmarks.md": 7,
-    "docs/case-file.md": 68,
+    "docs/case-file.md": 10,
     "docs/evolution.md": 24,
     "docs/how-to.md": 5,
     "docs/indentation.md": 12,

@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import Any, Protocol, TypeAlias, runtime_checkable
 
-import numpy as np
 from mpi4py import MPI
 
 from contact.calling import OfTime, check_finite, naming, on_all_ranks, real
@@ -28,26 +26,6 @@ def ramp(time: float) -> float:
 def steady(time: float) -> float:
     """Return 1: what is given always acts."""
     return 1.0
-
-
-@dataclass(frozen=True)
-class Tabulated:
-    """Values at some times, linear between them, and constant before and after.
-
-    Attributes
-    ----------
-    times
-        Increasing.
-    values
-        As many.
-    """
-
-    times: tuple[float, ...]
-    values: tuple[float, ...]
-
-    def __call__(self, time: float) -> float:
-        """Return the value at a time."""
-        return float(np.interp(time, self.times, self.values))
 
 
 @runtime_checkable

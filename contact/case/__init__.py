@@ -1,5 +1,6 @@
-"""The case file: models of its tables, what they accept, messages, and the reference page.
+"""The case file: its models, messages, reference page, and the problem of it.
 
-Imports: the options of `contact.methods` and of `contact.output`, the shapes of
-`contact.interface`; nothing is built or solved here.
+`file` reads it, the sections check it (`mesh`, `material`, `body`, `interface`, `shapes`, `rigid`,
+`evolution`, `solver`), each key with its description, bounds and default in one place, and
+`build` makes a problem of it.
 """

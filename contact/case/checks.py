@@ -2,105 +2,137 @@
 
 from __future__ import annotations
 
-import difflib
 import math
-from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import fields, is_dataclass
+from collections.abc import Iterable
 from typing import Any, TypeAlias
 
-from pydantic import BaseModel
-
-from contact.case.evolution import check_evolution, check_time
 from contact.case.formula import Expression
-from contact.case.rigid import check_moving, moving
-from contact.case.showing import listed
-from contact.case.types import Words, as_given, fault
-from contact.mesh.together import members
+from contact.case.messages import Words, fault, listed, nearest
+from contact.case.section import AMPLITUDE, PART, SPATIAL, as_given, walk
+from contact.mesh.together import meet, members
 from contact.tolerances import HUGE
 
 #: `contact.case.file.Case`, which calls these checks.
 Case: TypeAlias = Any
 
+ZERO = Expression(0.0)
+
+#: Beginnings of the keys that may depend on the time.
+TIMED = ("fixed.", "load.", "rigid.", "electrode.")
+
 
 def check_sections(case: Case) -> None:
     """Raise a fault if sections contradict each other."""
-    check_sizes(case)
-    if any(material.piezoelectric for _, material in case.materials):
+    for path, value, marks in walk(case):
+        _check_size(path, value)
+        if isinstance(value, Expression) and "t" in value.names:
+            _check_time(case, path, value)
+        if AMPLITUDE in marks and value is not None:
+            _check_amplitude(case, path, value)
+    _check_regions(case)
+    piezoelectric = any(material.piezoelectric for _, material in case.materials)
+    if piezoelectric:
         _check_potential(case)
     else:
         _check_mechanical(case)
-    _check_regions(case)
-    _check_lagged(case)
-    check_evolution(case)
-    for path, formula in _formulas(case):
-        check_time(case, path, formula)
     _check_contacts(case)
-    check_moving(case)
+    _check_rigid(case)
+    if case.evolution is not None and getattr(case.solver, "nested", False):
+        raise fault("solver.nested", True, "nested = false with [evolution]")
     if case.mesh.dimension is not None:
-        _check_vectors(case, case.mesh.dimension)
-        _check_parts(case, [*case.mesh.sides, *case.mesh.parts])
-
-
-def check_sizes(case: Case) -> None:
-    """Raise a fault if a number is so large or so small that its square is none any more."""
-    for path, value in _values((), case):
-        if isinstance(value, Expression):
-            number = value.value if value.is_constant else 0.0
-        else:
-            number = value
-        if number != 0 and math.isfinite(number) and not 1 / HUGE <= abs(number) <= HUGE:
-            accepted = f"0, or sizes from {1 / HUGE:g} to {HUGE:g}, whose squares do not overflow"
-            raise fault(path, number, accepted)
-
-
-def _values(path: tuple[str, ...], value: Any) -> Iterator[tuple[str, float | Expression]]:
-    """Give all numbers and formulas below a value of the case, with their paths."""
-    match value:
-        case Expression() | int() | float():
-            yield ".".join(path), value
-        case tuple():
-            for i, entry in enumerate(value):
-                yield from _values((*path, str(i)), entry)
-        case Mapping():
-            for key, entry in value.items():
-                yield from _values((*path, key), entry)
-        case BaseModel():
-            for name, field in type(value).model_fields.items():
-                yield from _values((*path, field.alias or name), getattr(value, name))
-        case _ if is_dataclass(value):
-            for entry in fields(value):
-                yield from _values((*path, entry.name), getattr(value, entry.name))
-
-
-def _formulas(case: Case) -> Iterator[tuple[str, Expression]]:
-    found = _values((), case)
-    return ((path, value) for path, value in found if isinstance(value, Expression))
+        check_mesh(case, case.mesh.dimension, [*case.mesh.sides, *case.mesh.parts])
 
 
 def check_mesh(case: Case, dimension: int, parts: Iterable[str]) -> None:
     """Raise a fault if a case does not fit its mesh."""
-    _check_vectors(case, dimension)
-    _check_parts(case, list(parts))
+    known = sorted(parts)
+    for path, section in case.moving:
+        section.check_dimension(path, dimension)
+    for path, value, marks in walk(case):
+        if SPATIAL in marks and isinstance(value, tuple) and len(value) != dimension:
+            raise fault(path, as_given(value), f"{dimension} components in {dimension}-D")
+        if isinstance(value, Expression) and dimension == 2 and "z" in value.names:
+            raise fault(path, value.source, "formulas in x and y in 2-D")
+        if PART in marks and value is not None:
+            for name in members(value):
+                if name not in known:
+                    accepted = f"a part of the mesh: {listed(known)}{nearest(name, known)}"
+                    raise fault(path, name, accepted)
+    for path, contact in case.contacts:
+        only = None if contact.foundation is None else contact.foundation.only
+        if only is not None and only != dimension:
+            words = Words(f'given "{contact.foundation.shape}" in {dimension}-D')
+            raise fault(f"{path}.foundation.shape", words, f"this shape in {only}-D only")
+    if dimension == 3 and case.space.kinematics == "axisymmetric":
+        accepted = '"plane_strain" with a mesh in 3-D, where it has no effect'
+        raise fault("space.kinematics", case.space.kinematics, accepted)
+    if dimension == 2 and case.mesh.axis is not None:
+        raise fault("mesh.axis", case.mesh.axis, "no axis in 2-D")
+    for path, material in case.materials:
+        key, poling = material.axis
+        if poling is not None and isinstance(poling, tuple) != (dimension == 3):
+            accepted = "an angle in 2-D" if dimension == 2 else "3 numbers in 3-D"
+            raise fault(f"{path}.{key}", poling, accepted)
+
+
+def _check_size(path: str, value: Any) -> None:
+    """Raise a fault if a number is so large or so small that its square overflows or vanishes."""
+    if isinstance(value, Expression):
+        value = value.value if value.is_constant else 0.0
+    if isinstance(value, int | float) and value != 0 and math.isfinite(value):
+        if not 1 / HUGE <= abs(value) <= HUGE:
+            accepted = f"0, or sizes from {1 / HUGE:g} to {HUGE:g}, whose squares do not overflow"
+            raise fault(path, value, accepted)
+
+
+def _check_time(case: Case, path: str, formula: Expression) -> None:
+    """Raise a fault if a formula uses t where it has no meaning."""
+    if not (path.startswith(TIMED) or ".rigid." in path or path.endswith(".phi_f")):
+        raise fault(path, formula.source, "a formula without t")
+    if case.evolution is None:
+        raise fault(path, formula.source, "a formula in t with [evolution] only")
+
+
+def _check_amplitude(case: Case, path: str, name: str) -> None:
+    """Raise a fault if there is no amplitude of a name."""
+    if case.evolution is None:
+        raise fault(path, name, "an amplitude with [evolution] only")
+    known = sorted(case.evolution.amplitudes)
+    if name not in known:
+        names = f"{listed(known) or 'none is given'}{nearest(name, known)}"
+        raise fault(path, name, f"a name below evolution.amplitudes: {names}")
 
 
 def _check_mechanical(case: Case) -> None:
-    """Nothing electric without piezoelectric constants."""
+    """Raise a fault if a body without piezoelectric constants is given electric quantities."""
     accepted = "electric quantities with [material.piezo] only, or a piezoelectric material by name"
-    for i, fixed in enumerate(case.fixed):
-        if fixed.potential is not None:
-            raise fault(f"fixed.{i}.potential", fixed.potential.source, accepted)
-    for i, load in enumerate(case.load):
-        for key in ("charge", "body_charge"):
-            if getattr(load, key) is not None:
-                raise fault(f"load.{i}.{key}", getattr(load, key).source, accepted)
+    for key, names in (("fixed", ("potential",)), ("load", ("charge", "body_charge"))):
+        for i, section in enumerate(getattr(case, key)):
+            for name in names:
+                if getattr(section, name) is not None:
+                    raise fault(f"{key}.{i}.{name}", as_given(getattr(section, name)), accepted)
     for path, contact in case.contacts:
         key, electric = case.electric_of(path, contact)
         if electric is not None:
             raise fault(key, Words("given a table"), accepted)
+    if case.electrode:
+        raise fault("electrode", Words("given"), accepted)
+
+
+def _check_potential(case: Case) -> None:
+    """Raise a fault if the potential is known but for a constant, or prescribed twice."""
+    grounded = [fixed.on for fixed in case.fixed if fixed.potential is not None]
+    electric = [case.electric_of(*entry)[1] for entry in case.contacts]
+    if not grounded and not any(section is not None and section.k_e > 0 for section in electric):
+        accepted = "a potential on at least one part, or [electric] with k_e > 0"
+        raise fault("fixed", Words("no potential fixed"), accepted)
+    for i, section in enumerate(case.electrode):
+        if any(meet(section.on, other) for other in grounded):
+            raise fault(f"electrode.{i}.on", section.on, "a part whose potential is not fixed")
 
 
 def _check_contacts(case: Case) -> None:
-    """Each contact is of a part of its own, which can move."""
+    """Raise a fault unless each contact is of a part of its own, which can move."""
     seen: dict[str, str] = {}
     for path, contact in case.contacts:
         for i, fixed in enumerate(case.fixed):
@@ -108,10 +140,14 @@ def _check_contacts(case: Case) -> None:
                 accepted = f"a part that fixed.{i} does not fix wholly"
                 raise fault(f"{path}.on", contact.on, accepted)
         key, electric = case.electric_of(path, contact)
-        if contact.against is not None and electric is not None:
-            if electric.phi_f != Expression(0.0):
-                accepted = "0, or none, with against: the other body has a potential of its own"
-                raise fault(f"{key}.phi_f", electric.phi_f.source, accepted)
+        if contact.against is not None and electric is not None and electric.phi_f != ZERO:
+            accepted = "0, or none, with against: the other body has a potential of its own"
+            raise fault(f"{key}.phi_f", electric.phi_f.source, accepted)
+        # Newton's method linearises layer and current; it has no previous outer iteration.
+        for place, section in ((path, contact), (key, electric)):
+            if section is not None and section.lagged and case.solver.method == "newton":
+                accepted = 'lagged with solver.method = "uzawa" or "penalty"'
+                raise fault(f"{place}.lagged", section.lagged, accepted)
         for part in members(contact.on):
             if seen.setdefault(part, path) != path:
                 raise fault(f"{path}.on", part, f"a part that {seen[part]} does not have")
@@ -122,7 +158,7 @@ def _check_contacts(case: Case) -> None:
 
 
 def _check_regions(case: Case) -> None:
-    """Several materials need regions, each region one of them."""
+    """Raise a fault unless each of several materials has regions of its own."""
     seen: dict[str, str] = {}
     for path, material in case.materials:
         if material.on is None and len(case.materials) > 1:
@@ -132,80 +168,16 @@ def _check_regions(case: Case) -> None:
                 raise fault(f"{path}.on", name, f"regions that {seen[name]} does not have")
 
 
-def _check_lagged(case: Case) -> None:
-    """Newton's method linearises layer and current; it has no previous outer iteration."""
-    sections = [*case.contacts, *(case.electric_of(*entry) for entry in case.contacts)]
-    for key, section in sections:
-        if section is not None and section.lagged and case.solver.method == "newton":
-            accepted = 'lagged with solver.method = "uzawa" or "penalty"'
-            raise fault(f"{key}.lagged", section.lagged, accepted)
-
-
-def _check_potential(case: Case) -> None:
-    """Without a fixed value the potential is known but for a constant."""
-    grounded = any(fixed.potential is not None for fixed in case.fixed)
-    electric = [case.electric_of(*entry)[1] for entry in case.contacts]
-    conductive = any(section is not None and section.k_e > 0 for section in electric)
-    if not grounded and not conductive:
-        raise fault(
-            "fixed",
-            Words("no potential fixed"),
-            "a potential on at least one part, or [electric] with k_e > 0",
-        )
-
-
-def _vectors(case: Case) -> Iterator[tuple[str, tuple[Any, ...] | None]]:
-    for i, fixed in enumerate(case.fixed):
-        yield f"fixed.{i}.displacement", fixed.displacement
-    for i, load in enumerate(case.load):
-        yield f"load.{i}.traction", load.traction
-        yield f"load.{i}.body_force", load.body_force
-    for path, contact in case.contacts:
-        yield f"{path}.axis", contact.axis
-        if contact.foundation is not None:
-            for key, vector in contact.foundation.vectors.items():
-                yield f"{path}.foundation.{key}", vector
-    for path, section in moving(case):
-        yield from ((f"{path}.{key}", vector) for key, vector in section.vectors())
-
-
-def _check_vectors(case: Case, dimension: int) -> None:
-    """Vectors have as many components as space, and the plane has no z."""
-    for path, section in moving(case):
-        section.check_dimension(path, dimension)
-    for path, vector in _vectors(case):
-        if vector is not None and len(vector) != dimension:
-            raise fault(path, as_given(vector), f"{dimension} components in {dimension}-D")
-    for path, formula in _formulas(case):
-        if dimension == 2 and "z" in formula.names:
-            raise fault(path, formula.source, "formulas in x and y in the plane")
-    for path, contact in case.contacts:
-        only = None if contact.foundation is None else contact.foundation.only
-        if only is not None and only != dimension:
-            words = Words(f'given "{contact.foundation.shape}" in {dimension}-D')
-            raise fault(f"{path}.foundation.shape", words, f"this shape in {only}-D only")
-    if dimension == 3 and case.space.kinematics == "axisymmetric":
-        accepted = '"plane_strain" with a mesh in space, where it has no effect'
-        raise fault("space.kinematics", case.space.kinematics, accepted)
-    if dimension == 2 and case.mesh.axis is not None:
-        raise fault("mesh.axis", case.mesh.axis, "no axis in the plane")
-    for path, material in case.materials:
-        key, poling = material.axis
-        if poling is not None and isinstance(poling, tuple) != (dimension == 3):
-            accepted = "an angle in the plane" if dimension == 2 else "3 numbers in space"
-            raise fault(f"{path}.{key}", poling, accepted)
-
-
-def _check_parts(case: Case, parts: list[str]) -> None:
-    used = [(f"fixed.{i}.on", fixed.on) for i, fixed in enumerate(case.fixed)]
-    used += [(f"load.{i}.on", load.on) for i, load in enumerate(case.load) if load.on is not None]
-    used += [(f"{path}.on", contact.on) for path, contact in case.contacts]
-    used += [(f"rigid.{i}.on", part.on) for i, part in enumerate(case.rigid)]
-    used += [(f"electrode.{i}.on", part.on) for i, part in enumerate(case.electrode)]
-    against = [(f"{path}.against", contact.against) for path, contact in case.contacts]
-    used += [(path, name) for path, name in against if name is not None]
-    for path, name in ((path, name) for path, on in used for name in members(on)):
-        if name not in parts:
-            near = difflib.get_close_matches(name, parts, n=1)
-            hint = f" (did you mean {listed(near)}?)" if near else ""
-            raise fault(path, name, f"a part of the mesh: {listed(sorted(parts))}{hint}")
+def _check_rigid(case: Case) -> None:
+    """Raise a fault if a part is rigid or an electrode twice, or leaves the axis of revolution."""
+    for i, part in enumerate(case.rigid):
+        if any(meet(part.on, contact.on) for _, contact in case.contacts):
+            raise fault(f"rigid.{i}.on", part.on, "a part beside the contact part")
+    for path, motion in case.moving:
+        if case.space.kinematics == "axisymmetric":
+            motion.check_along_axis(path)
+    for key in ("rigid", "electrode"):
+        parts = [section.on for section in getattr(case, key)]
+        for i, on in enumerate(parts):
+            if any(meet(on, other) for other in parts[:i]):
+                raise fault(f"{key}.{i}.on", on, f"a part that no other [[{key}]] has")

@@ -8,7 +8,7 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 
 from contact.case.file import Case
-from contact.case.types import FilePath
+from contact.case.section import FilePath, walk
 from contact.errors import InputError
 from contact.library.reading import PACKAGED
 
@@ -83,11 +83,9 @@ def check_digest(folder: Path, before: Mapping[str, str], now: Mapping[str, str]
 
 def _files(case: Case) -> Iterator[tuple[str, Path]]:
     """Give the files that a case reads, each with its key."""
-    foundations = [(f"{key}.foundation", contact.foundation) for key, contact in case.contacts]
-    for key, section in (("mesh", case.mesh), *case.materials, *foundations):
-        for name, value in section or ():
-            if isinstance(value, FilePath):
-                yield f"{key}.{name}", Path(value)
+    for key, value, _ in walk(case):
+        if isinstance(value, FilePath):
+            yield key, Path(value)
     for key, material in case.materials:
         if material.name is not None and material.library is None:
             yield f"{key}.library", PACKAGED

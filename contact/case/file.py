@@ -1,7 +1,7 @@
 """The case file: one TOML file that says all about a problem and how to solve it.
 
 `load_case` reads a file, `parse_case` a dictionary. Every mistake is reported as one
-`contact.errors.InputError` that names the file, the key, what was given and what is accepted.
+`contact.errors.InputError` that names the file, the key, the given and the accepted values.
 """
 
 from __future__ import annotations
@@ -9,13 +9,14 @@ from __future__ import annotations
 import re
 import sys
 import tomllib
-from collections.abc import Collection, Iterable, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, TypeAlias
+from typing import Annotated, Any, Self, TypeAlias, TypeVar
 
-from pydantic import Field, PrivateAttr, ValidationError, model_validator
+from pydantic import Field, PrivateAttr, Tag, ValidationError, model_validator
 from pydantic_core import PydanticCustomError
 
+from contact.body.amplitude import Amplitude, steady
 from contact.case.body import Fixed, Load, Space
 from contact.case.checks import check_mesh, check_sections
 from contact.case.evolution import Evolution
@@ -23,15 +24,11 @@ from contact.case.formula import Expression
 from contact.case.interface import Contact, Electric, Friction, SlipLaw
 from contact.case.material import Material, Piezo
 from contact.case.mesh import Mesh, Piece
-from contact.case.messages import describe, describe_fault
-from contact.case.overrides import override
-from contact.case.replaced import stand_ins
-from contact.case.rigid import Electrode, RigidPart
+from contact.case.messages import clipped, describe, describe_fault, path_of, shown
+from contact.case.rigid import Electrode, Moving, RigidPart
+from contact.case.section import FromTable, Section, Text, as_tuple, one_or_many
 from contact.case.shapes import Plane, Sphere
-from contact.case.showing import clipped
 from contact.case.solver import DEFAULT, Solver
-from contact.case.types import FromTable, Section, Text, as_tuple
-from contact.case.unions import entries, one_or_more
 from contact.errors import InputError
 from contact.output.options import OutputOptions
 from contact.output.units import Units
@@ -59,65 +56,73 @@ __all__ = [
     "parse_case",
 ]
 
+#: Key of the case -> the arguments of `build_problem` of which one replaces it.
+REPLACEABLE = {
+    "mesh": ("domain",),
+    "material": ("law",),
+    "friction.mu": ("coefficient", "friction"),
+}
 
-if TYPE_CHECKING:
-    Materials: TypeAlias = Material | tuple[Material, ...]
-    Contacts: TypeAlias = Contact | tuple[Contact, ...]
-else:
-    Materials = one_or_more(Material, "material")
-    Contacts = one_or_more(Contact, "contact")
+#: Most keys above the last one of a path, and most digits of the number of a list's entry.
+DEEPEST, LONGEST_INDEX = 15, 9
+
+Kind = TypeVar("Kind")
+Materials: TypeAlias = Annotated[
+    Annotated[Material, Tag("one")]
+    | Annotated[tuple[Material, ...], Field(min_length=1), as_tuple, Tag("many")],
+    one_or_many,
+    Accepted("a table [material], or tables [[material]]"),
+]
+Contacts: TypeAlias = Annotated[
+    Annotated[Contact, Tag("one")]
+    | Annotated[tuple[Contact, ...], Field(min_length=1), as_tuple, Tag("many")],
+    one_or_many,
+    Accepted("a table [contact], or tables [[contact]]"),
+]
 
 
 class About(Section):
-    """`[case]`: what the numbers stand for. Nothing is computed with it."""
+    """`[case]`: names for labels. Nothing is computed with them."""
 
-    units: Annotated[Units, FromTable] = Field(
-        default=Units(),
-        description='Names of units for labels: `{ length = "mm", stress = "MPa", potential = '
-        '"V", charge = "C" }`, any of them. None is assumed.',
-    )
+    units: Annotated[Units, FromTable] = Units()
+    """Names of units for labels: `{ length = "mm", stress = "MPa", potential = "V", charge = "C"
+    }`, any of them. None is assumed."""
 
 
 class Case(Section):
     """A case file."""
 
-    title: Text = Field(default="", description="Title, for reports and figures.")
-    case: About = Field(default=About(), description="Names of units: `[case]`.")
-    mesh: Mesh = Field(description="The body: `[mesh]`.")
-    space: Space = Field(default=Space(), description="Finite elements: `[space]`.")
-    material: Materials = Field(
-        description="The material: `[material]`; several: `[[material]]`, each with its regions."
-    )
-    fixed: Annotated[tuple[Fixed, ...], as_tuple, Accepted("tables [[fixed]]")] = Field(
-        default=(),
-        description="Supports and electrodes: `[[fixed]]`. None where contact, with friction that "
-        "is enough, or `[[rigid]]` holds the body.",
-    )
-    load: Annotated[tuple[Load, ...], as_tuple, Accepted("tables [[load]]")] = Field(
-        default=(), description="Forces and charges: any number of `[[load]]`."
-    )
-    rigid: Annotated[tuple[RigidPart, ...], as_tuple, Accepted("tables [[rigid]]")] = Field(
-        default=(), description="Parts that move as rigid bodies: any number of `[[rigid]]`."
-    )
-    electrode: Annotated[tuple[Electrode, ...], as_tuple, Accepted("tables [[electrode]]")] = Field(
-        default=(), description="Electrodes of unknown potential: any number of `[[electrode]]`."
-    )
-    contact: Contacts = Field(
-        description="The foundation: `[contact]`; several: `[[contact]]`, each with its part."
-    )
-    friction: Friction | None = Field(
-        default=None, description="Friction: `[friction]`. Default: none."
-    )
-    electric: Electric | None = Field(
-        default=None, description="Conductive foundation: `[electric]`. Absent: insulated."
-    )
-    evolution: Evolution | None = Field(
-        default=None, description="Load steps: `[evolution]`. Absent: one static step."
-    )
-    solver: Solver = Field(default=DEFAULT, description="Method and tolerances: `[solver]`.")
-    output: Annotated[OutputOptions, FromTable] = Field(
-        default=OutputOptions(), description="What is written: `[output]`."
-    )
+    title: Text = ""
+    """Title, for reports and figures."""
+    case: About = About()
+    """Names of units: `[case]`."""
+    mesh: Mesh
+    """The body: `[mesh]`."""
+    space: Space = Space()
+    """Finite elements: `[space]`."""
+    material: Materials
+    """The material: `[material]`; several: `[[material]]`, each with its regions."""
+    fixed: Annotated[tuple[Fixed, ...], as_tuple, Accepted("tables [[fixed]]")] = ()
+    """Supports and electrodes: `[[fixed]]`. None where contact, with friction that is enough, or
+    `[[rigid]]` holds the body."""
+    load: Annotated[tuple[Load, ...], as_tuple, Accepted("tables [[load]]")] = ()
+    """Forces and charges: any number of `[[load]]`."""
+    rigid: Annotated[tuple[RigidPart, ...], as_tuple, Accepted("tables [[rigid]]")] = ()
+    """Parts that move as rigid bodies: any number of `[[rigid]]`."""
+    electrode: Annotated[tuple[Electrode, ...], as_tuple, Accepted("tables [[electrode]]")] = ()
+    """Electrodes of unknown potential: any number of `[[electrode]]`."""
+    contact: Contacts
+    """The foundation: `[contact]`; several: `[[contact]]`, each with its part."""
+    friction: Friction | None = None
+    """Friction: `[friction]`. Default: none."""
+    electric: Electric | None = None
+    """Conductive foundation: `[electric]`. Absent: insulated."""
+    evolution: Evolution | None = None
+    """Load steps: `[evolution]`. Absent: one static step."""
+    solver: Solver = DEFAULT
+    """Method and tolerances: `[solver]`."""
+    output: Annotated[OutputOptions, FromTable] = OutputOptions()
+    """Files of results: `[output]`."""
 
     _source: str = PrivateAttr("case")
     _filled: tuple[str, ...] = PrivateAttr(())
@@ -128,14 +133,28 @@ class Case(Section):
         return self._source
 
     @property
+    def filled(self) -> tuple[str, ...]:
+        """Keys that were missing, for objects are to take their places."""
+        return self._filled
+
+    @property
     def materials(self) -> tuple[tuple[str, Material], ...]:
         """The materials, each with its key in the file."""
-        return entries("material", self.material)
+        return _entries("material", self.material)
 
     @property
     def contacts(self) -> tuple[tuple[str, Contact], ...]:
         """The contacts, each with its key in the file."""
-        return entries("contact", self.contact)
+        return _entries("contact", self.contact)
+
+    @property
+    def moving(self) -> Iterator[tuple[str, Moving]]:
+        """The sections about rigid motions, with their keys."""
+        for path, contact in self.contacts:
+            if contact.rigid is not None:
+                yield f"{path}.rigid", contact.rigid
+        for i, part in enumerate(self.rigid):
+            yield f"rigid.{i}", part
 
     def friction_of(self, key: str, contact: Contact) -> tuple[str, Friction]:
         """Return the friction of a contact, with its key in the file."""
@@ -149,18 +168,19 @@ class Case(Section):
             return f"{key}.electric", contact.electric
         return "electric", self.electric
 
-    @property
-    def filled(self) -> tuple[str, ...]:
-        """Keys that were missing, for objects are to take their places."""
-        return self._filled
+    def amplitude(self, name: str | None) -> Amplitude | None:
+        """Return a factor of time by its name; in an evolution, 1 for none."""
+        if self.evolution is None:
+            return None
+        return steady if name is None else self.evolution.amplitudes[name]
 
     @model_validator(mode="after")
-    def _check(self) -> Case:
+    def _check(self) -> Self:
         check_sections(self)
         return self
 
     def check_mesh(self, dimension: int, parts: Iterable[str]) -> None:
-        """Check what only the mesh can tell: names of parts, lengths of vectors, use of z.
+        """Check the case against its mesh: names of parts, lengths of vectors, use of z.
 
         Parameters
         ----------
@@ -180,41 +200,11 @@ class Case(Section):
             raise InputError(f"{self._source}: {describe_fault(error)}") from None
 
 
-def parse_case(
-    data: Mapping[str, Any],
-    folder: str | Path = ".",
-    source: str = "case",
-    without: Collection[str] = (),
-) -> Case:
-    """Make a case of a dictionary with the keys of the case file.
-
-    Parameters
-    ----------
-    data
-        Tables of the case file; it is not changed.
-    folder
-        Folder that relative names of files in it belong to.
-    source
-        What messages call the case.
-    without
-        Keys that may be missing, for objects will take their places: "mesh", "material",
-        "friction.mu".
-
-    Raises
-    ------
-    InputError
-        On the first mistake; the message is one line.
-    """
-    data, filled = stand_ins(data, without)
-    try:
-        case = Case.model_validate(data, context={"folder": folder})
-    except ValidationError as error:
-        raise InputError(describe(error, Case, source)) from None
-    file = case.mesh.file
-    if file is not None and not Path(file).is_file():
-        raise InputError(f"{source}: mesh.file: no file {file}; accepted: a Gmsh file (.msh)")
-    case._source, case._filled = source, tuple(filled)
-    return case
+def _entries(key: str, given: Kind | tuple[Kind, ...]) -> tuple[tuple[str, Kind], ...]:
+    """Return one section, or several of a list, each with its key."""
+    if isinstance(given, tuple):
+        return tuple((f"{key}.{i}", section) for i, section in enumerate(given))
+    return ((key, given),)
 
 
 def load_case(
@@ -238,8 +228,8 @@ def load_case(
     Raises
     ------
     InputError
-        On the first mistake; the message is one line and names the file, the key, what was
-        given and what is accepted.
+        On the first mistake; the message is one line and names the file, the key, the
+        given and the accepted values.
     """
     path = Path(path)
     text = ""
@@ -261,5 +251,133 @@ def load_case(
         raise InputError(
             f"{path}{place}: a number of more than {digits} digits; accepted: shorter ones"
         ) from None
-    override(data, overrides, str(path))
+    if isinstance(overrides, Mapping):
+        overrides = [f"{key}={value}" for key, value in overrides.items()]
+    for override in overrides:
+        _override(data, override, str(path))
     return parse_case(data, path.parent, str(path), without)
+
+
+def parse_case(
+    data: Mapping[str, Any],
+    folder: str | Path = ".",
+    source: str = "case",
+    without: Collection[str] = (),
+) -> Case:
+    """Make a case of a dictionary with the keys of the case file.
+
+    Parameters
+    ----------
+    data
+        Tables of the case file; it is not changed.
+    folder
+        Folder that relative names of files in it belong to.
+    source
+        The name of the case in messages.
+    without
+        Keys that may be missing, for objects will take their places: "mesh", "material",
+        "friction.mu".
+
+    Raises
+    ------
+    InputError
+        On the first mistake; the message is one line.
+    """
+    data, filled = _stand_ins(data, without)
+    try:
+        case = Case.model_validate(data, context={"folder": folder})
+    except ValidationError as error:
+        raise InputError(describe(error, Case, source)) from None
+    file = case.mesh.file
+    if file is not None and not Path(file).is_file():
+        raise InputError(f"{source}: mesh.file: no file {file}; accepted: a Gmsh file (.msh)")
+    case._source, case._filled = source, tuple(filled)
+    return case
+
+
+def _stand_ins(
+    data: Mapping[str, Any], without: Collection[str]
+) -> tuple[dict[str, Any], list[str]]:
+    """Fill in missing keys that will be replaced, so that the rest can be checked.
+
+    Returns
+    -------
+    The tables, and the keys that were filled.
+    """
+    made, filled = dict(data), []
+    for key in without:
+        if key not in REPLACEABLE:
+            raise InputError(f"without: given {key!r}; accepted: {', '.join(REPLACEABLE)}")
+        table = made.get("friction")
+        if key == "friction.mu":
+            if isinstance(table, Mapping) and table.get("law") == "coulomb" and "mu" not in table:
+                made["friction"] = {**table, "mu": 0.0}
+                filled.append(key)
+        elif key not in made:
+            made[key] = Mesh.absent() if key == "mesh" else {"young": 1.0, "poisson": 0.0}
+            filled.append(key)
+    return made, filled
+
+
+def _override(data: dict[str, Any], text: str, source: str) -> None:
+    """Set a value of a case, ``"path.to.key=value"``, in its tables."""
+    path, equals, given = text.partition("=")
+    if not equals or not path.strip():
+        raise _refusal(source, text, "no assignment; accepted: path.to.key=value")
+    path = path.strip()
+    value = read_value(path, given.strip(), source)
+    *parents, last = path.split(".")
+    if len(parents) > DEEPEST:
+        words = f"{len(parents) + 1} keys deep; accepted: at most {DEEPEST + 1}"
+        raise _refusal(source, path, words)
+    place: Any = data
+    for i, key in enumerate(parents):
+        if isinstance(place, dict):
+            place = place.setdefault(key, {})
+        else:
+            place = place[_index(place, key, parents[:i], path, source)]
+        if not isinstance(place, dict | list):
+            words = f"{path_of(parents[: i + 1])} is {shown(place)}, no table"
+            raise _refusal(source, path, f"{words}; accepted: keys of tables")
+    if isinstance(place, dict):
+        place[last] = value
+    else:
+        place[_index(place, last, parents, path, source)] = value
+
+
+def read_value(path: str, text: str, source: str) -> Any:
+    """Read a TOML value; anything that does not look like one is a text.
+
+    Parameters
+    ----------
+    path, text
+        The key and its value.
+    source
+        The name of the case in messages.
+    """
+    try:
+        table = tomllib.loads(f"value = {text}")
+    except (tomllib.TOMLDecodeError, RecursionError) as error:
+        if text and text[0] not in "[{\"'":
+            return text
+        words = f"{shown(text)} is broken ({clipped(str(error))}); accepted: a TOML value"
+        raise _refusal(source, path, words) from None
+    except ValueError:
+        # Python reads whole numbers up to a limit of digits only.
+        words = f"{shown(text)} has too many digits; accepted: a TOML value"
+        raise _refusal(source, path, words) from None
+    # A value with line breaks could smuggle in further keys.
+    return table["value"] if set(table) == {"value"} else text
+
+
+def _index(place: list[Any], key: str, above: list[str], path: str, source: str) -> int:
+    number = key.isascii() and key.isdigit() and len(key) <= LONGEST_INDEX
+    if not number or int(key) >= len(place):
+        accepted = f"0 to {len(place) - 1}" if len(place) > 1 else "0" if place else "none"
+        words = f"{path_of(above)} has no entry {clipped(key)}; accepted: {accepted}"
+        raise _refusal(source, path, words)
+    return int(key)
+
+
+def _refusal(source: str, path: str, words: str) -> InputError:
+    return InputError(f"{source}: --set {clipped(path)}: {words}")

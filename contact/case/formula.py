@@ -1,7 +1,7 @@
 """Formulas of the case file, such as ``"-10*x"``, as functions of the coordinates and the time.
 
-A formula is read with Python's own parser and checked, node by node, against a short list of what
-is accepted. Nothing is handed to ``eval``.
+A formula is read with Python's own parser and checked, node by node, against a short list of
+accepted ones. Nothing is handed to ``eval``.
 """
 
 from __future__ import annotations
@@ -11,22 +11,25 @@ import itertools
 import math
 import operator
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from functools import partial, reduce
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 import ufl
+from mpi4py import MPI
 from numpy.typing import ArrayLike, NDArray
 
-from contact.case.showing import shown
+from contact.case.messages import shown
 from contact.errors import InputError
+from contact.kinds import check_range
+from contact.typing import Array
 from forms import ops
 
 if TYPE_CHECKING:
-    from mpi4py import MPI
     from ufl.core.expr import Expr
 
-#: What a formula may contain, for messages and the reference page.
+#: Contents of a formula, for messages and the reference page.
 ACCEPTED = (
     "numbers, x, y, z, t, pi, + - * / **, comparisons, and sin, cos, tan, exp, log, sqrt, abs, "
     "min, max, where(condition, a, b)"
@@ -86,7 +89,7 @@ class Expression:
     Raises
     ------
     InputError
-        If the source is anything else; the message names the source and what is accepted.
+        If the source is anything else; the message names the source and the accepted ones.
     """
 
     __slots__ = ("_read", "names", "source")
@@ -208,6 +211,79 @@ class Expression:
         return Expression, (self.source,)
 
 
+@dataclass(frozen=True)
+class NodalField:
+    """A formula of the case file as a function of position; messages name its key.
+
+    Attributes
+    ----------
+    key, expression
+        Key of the case file, and its formula.
+    comm
+        The ranks that evaluate it together.
+    minimum
+        Least value that is accepted at a node.
+    time
+        A number, or a constant of a form; None for a formula without t.
+    """
+
+    key: str
+    expression: Expression
+    comm: MPI.Intracomm
+    minimum: float = -np.inf
+    time: Any = None
+
+    def ufl(self, x: Expr) -> Expr:
+        """Return the formula as a UFL expression of the coordinates."""
+        return self.expression.ufl(x, self.time)
+
+    def numpy(self, points: Array) -> Array:
+        """Return the values at points of shape (n, d). Collective."""
+        try:
+            values = self.expression.numpy(points, self.comm, self.time)
+        except InputError as error:
+            raise InputError(f"{self.key}: {error}") from None
+        largest = float(np.abs(values).max(initial=0.0))
+        check_range(self.key, self.comm.allreduce(largest, op=MPI.MAX), least=0.0)
+        least = self.comm.allreduce(float(values.min(initial=np.inf)), op=MPI.MIN)
+        if least < self.minimum:
+            raise InputError(
+                f"{self.key}: {self.expression} is {least:g} at a node; accepted: values >= 0"
+            )
+        return values
+
+
+@dataclass(frozen=True)
+class TimeField:
+    """A formula of the case file that depends on the time."""
+
+    key: str
+    expression: Expression
+    comm: MPI.Intracomm
+
+    def at(self, time: Any) -> NodalField:
+        """Return the field at a time: a number, or a constant of a form."""
+        return NodalField(self.key, self.expression, self.comm, time=time)
+
+
+def as_field(
+    key: str, given: Any, comm: MPI.Intracomm, minimum: float = -np.inf
+) -> NodalField | TimeField | None:
+    """Return a formula of the case file as a function of position; None for anything else."""
+    if not isinstance(given, Expression):
+        return None
+    if "t" in given.names:
+        return TimeField(key, given, comm)
+    return NodalField(key, given, comm, minimum)
+
+
+def as_number(given: Expression, unit: float = 1.0) -> float | Callable[[float], float]:
+    """Return a formula without coordinates as a number, or as a function of the time."""
+    if given.is_constant:
+        return unit * given.value
+    return lambda time: unit * given.number(time)
+
+
 def _parse(source: str) -> tuple[Read, frozenset[str]]:
     """Read a formula and the names of its variables, or raise an InputError that shows it."""
     if len(source) > MAX_LENGTH:
@@ -230,7 +306,7 @@ def _parse(source: str) -> tuple[Read, frozenset[str]]:
 
 
 def _depth(root: ast.AST) -> int:
-    """Depth of a syntax tree, without recursion: the depth is what is in doubt."""
+    """Depth of a syntax tree, without recursion: the depth is in doubt."""
     level, depth = [root], 0
     while level:
         level = [child for node in level for child in ast.iter_child_nodes(node)]

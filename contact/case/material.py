@@ -1,18 +1,19 @@
-"""Sections of the case file about the material."""
+"""Sections of the case file about the material, and the material itself."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from functools import cached_property
 from pathlib import Path
-from typing import Annotated, Any, Literal, TypeAlias
+from typing import Annotated, Any, Literal, Self, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import Field, model_validator
+from pydantic import Field, Tag, ValidationError, model_validator
 
-from contact.case.accepted import accepted_by
-from contact.case.types import (
+from contact.body import description
+from contact.case.messages import Words, describe, fault
+from contact.case.section import (
     File,
     Names,
     NonNegative,
@@ -20,24 +21,40 @@ from contact.case.types import (
     Section,
     Text,
     Triple,
-    Words,
     as_tuple,
-    fault,
+    not_zero,
+    one_or_many,
 )
 from contact.errors import InputError
+from contact.kinds import expect
 from contact.library.entry import Entry
 from contact.library.reading import PACKAGED, find
-from contact.settings import Accepted, Positive
+from contact.settings import Accepted, Positive, ReadWith
+from contact.typing import Array
+from forms.crystal import in_plane, isotropic_about_x3, stiffness_tensor, to_axis
 from forms.elasticity import Anisotropic, hexagonal
-from forms.piezo import hexagonal_voigt
+from forms.hencky import Law, Linear, Log
+from forms.piezo import Piezo as PiezoTensors
+from forms.piezo import from_voigt, hexagonal_voigt
+
+#: Units of a case -> that of stress in Pa. Lengths and charges are SI; so is the potential times
+#: the coupling, which has the unit of stress times length.
+UNITS = {"SI": 1.0, "GPa": 1e9}
+
+#: The constants of a crystal of class 6mm: elastic; coupling and permittivity.
+SHORT = ("c11", "c12", "c13", "c33", "c44")
+PIEZO = ("e31", "e33", "e15", "beta11", "beta33")
+#: Keys that a material of the library does not take.
+CONSTANTS = ("law", "young", "poisson", "stiffness", *SHORT, "yield_strain", "piezo")
 
 Poling: TypeAlias = Annotated[
-    Number | Triple, Accepted("an angle in the plane, a list of 3 numbers in space")
+    Annotated[Number, Tag("one")] | Annotated[Triple, not_zero, Tag("many")],
+    one_or_many,
+    Accepted("an angle in 2-D, a list of 3 numbers in 3-D"),
 ]
-
-#: Constants of an isotropic material, and the two ways to give those of another.
-ISOTROPIC = ("young", "poisson")
-SHORT = ("c11", "c12", "c13", "c33", "c44")
+ISOTROPIC = ReadWith("law", ("linear", "log"), required=True)
+CRYSTAL = ReadWith("law", "anisotropic")
+LOG = ReadWith("law", "log")
 
 
 def _matrix(rows: int, columns: int) -> Any:
@@ -46,64 +63,58 @@ def _matrix(rows: int, columns: int) -> Any:
     return Annotated[tuple[row, ...], Field(min_length=rows, max_length=rows), as_tuple, words]
 
 
+def _either_way(section: Section, short: tuple[str, ...], full: tuple[str, ...]) -> None:
+    """Raise a fault unless all of some keys, or all of others, are given."""
+    given = [key for key in (*short, *full) if getattr(section, key) is not None]
+    if set(given) in ({*short}, {*full}):
+        return
+    missing = [k for k in (full if {*given} & {*full} else short) if k not in given]
+    words = f"only {', '.join(given) or 'nothing'}" if missing else "both ways"
+    key = missing[0] if missing else given[-1]
+    raise fault(key, Words(words), f"either all of {', '.join(short)}, or {' and '.join(full)}")
+
+
 class Piezo(Section):
     """`[material.piezo]`: the law sigma = F eps + e^T grad(phi), D = e eps - beta grad(phi).
 
-    A crystal of class 6mm poled along X3, by five constants, or full Voigt matrices. In the
-    plane x and y stand for X2 and X3.
+    A crystal of class 6mm poled along X3, by five constants, or full Voigt matrices. In 2-D x and
+    y stand for X2 and X3.
     """
 
-    e31: Number | None = Field(
-        default=None, description="Coupling e31 = e32 of class 6mm (charge/area)."
-    )
-    e33: Number | None = Field(default=None, description="Coupling e33 (charge/area).")
-    e15: Number | None = Field(default=None, description="Coupling e15 = e24 (charge/area).")
-    beta11: Positive | None = Field(
-        default=None, description="Permittivity across the poling axis."
-    )
-    beta33: Positive | None = Field(default=None, description="Permittivity along the poling axis.")
-    e: _matrix(3, 6) | None = Field(  # type: ignore[valid-type]
-        None,
-        description="Coupling matrix, columns 11, 22, 33, 23, 13, 12. With `beta`, instead "
-        "of the five constants.",
-    )
-    beta: _matrix(3, 3) | None = Field(  # type: ignore[valid-type]
-        None, description="Permittivity matrix, symmetric and positive definite."
-    )
-    poling: Poling | None = Field(
-        default=None,
-        description="Poling axis: angle (degrees) from x in the plane, a vector in space. "
-        "Default: y in the plane, z in space.",
-    )
+    e31: Number | None = None
+    """Coupling e31 = e32 of class 6mm (charge/area)."""
+    e33: Number | None = None
+    """Coupling e33 (charge/area)."""
+    e15: Number | None = None
+    """Coupling e15 = e24 (charge/area)."""
+    beta11: Positive | None = None
+    """Permittivity across the poling axis."""
+    beta33: Positive | None = None
+    """Permittivity along the poling axis."""
+    e: _matrix(3, 6) | None = None  # type: ignore[valid-type]
+    """Coupling matrix, columns 11, 22, 33, 23, 13, 12. With `beta`, instead of the five
+    constants."""
+    beta: _matrix(3, 3) | None = None  # type: ignore[valid-type]
+    """Permittivity matrix, symmetric and positive definite."""
+    poling: Poling | None = None
+    """Poling axis: angle (degrees) from x in 2-D, a vector in 3-D. Default: y in 2-D, z in
+    3-D."""
 
     @property
     def voigt(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Coupling, shape (3, 6), and permittivity, shape (3, 3), poled along X3."""
         if self.e is not None:
             return np.array(self.e), np.array(self.beta)
-        constants = (self.e31, self.e33, self.e15, self.beta11, self.beta33)
-        return hexagonal_voigt(*constants)  # type: ignore[arg-type]
+        return hexagonal_voigt(*(getattr(self, key) for key in PIEZO))
 
     @model_validator(mode="after")
-    def _check(self) -> Piezo:
-        short = ("e31", "e33", "e15", "beta11", "beta33")
-        full = ("e", "beta")
-        given = [key for key in (*short, *full) if getattr(self, key) is not None]
-        if set(given) not in ({*short}, {*full}):
-            accepted = f"either all of {', '.join(short)}, or e and beta"
-            missing = [k for k in (full if set(given) & {*full} else short) if k not in given]
-            raise fault(
-                missing[0] if missing else given[0],
-                Words(f"only {', '.join(given) or 'nothing'}" if missing else "both ways"),
-                accepted,
-            )
+    def _check(self) -> Self:
+        _either_way(self, PIEZO, ("e", "beta"))
         beta = self.voigt[1]
         if not np.allclose(beta, beta.T, rtol=1e-10, atol=0):
             raise fault("beta", self.beta, "a symmetric matrix")
         if not np.linalg.eigvalsh(beta)[0] > 0:
             raise fault("beta", self.beta, "a positive definite matrix")
-        if isinstance(self.poling, tuple) and not any(self.poling):
-            raise fault("poling", self.poling, "a vector that is not zero")
         return self
 
 
@@ -114,71 +125,56 @@ class Material(Section):
     constants are those of a library (`contact materials` lists them); they are then not given.
     """
 
-    on: Names | None = Field(
-        default=None,
-        description="Regions of the mesh (its named groups of cells) that consist of it. Default: "
-        "the whole mesh, where this is the only material.",
-    )
-    name: Text | None = Field(
-        default=None, description="Name of a material of the library, with its coupling."
-    )
-    units: Literal["SI", "GPa"] | None = Field(
-        default=None,
-        description="With `name`: units of the case. `SI`: Pa, V, C/m2; `GPa`: lengths in m, GPa, "
-        "GV, C/m2. Default: `SI`.",
-    )
-    library: Annotated[File, Accepted("a library of materials (TOML)")] | None = Field(
-        default=None,
-        description="With `name`: a library of one's own (TOML), relative to the case file. "
-        "Default: that of the package.",
-    )
-    law: Literal["linear", "log", "anisotropic"] | None = Field(
-        default=None,
-        description="`linear`: g = mu1; `log`: (7.8), g = mu1 (s/t)(ln(t/s) + 1) "
-        "beyond the yield strain s; `anisotropic`: sigma = C eps. Default: `linear`.",
-    )
-    young: Positive | None = Field(
-        default=None,
-        description="Young's modulus E (force/area). Required by `linear` and `log`.",
-    )
-    poisson: (
+    on: Names | None = None
+    """Regions of the mesh (its named groups of cells) that consist of it. Default: the whole
+    mesh, where this is the only material."""
+    name: Text | None = None
+    """Name of a material of the library, with its coupling."""
+    units: Annotated[Literal["SI", "GPa"] | None, ReadWith("name")] = None
+    """With `name`: units of the case. `SI`: Pa, V, C/m2; `GPa`: lengths in m, GPa, GV, C/m2.
+    Default: `SI`."""
+    library: Annotated[
+        Annotated[File, Accepted("a library of materials (TOML)")] | None, ReadWith("name")
+    ] = None
+    """With `name`: a library of one's own (TOML), relative to the case file. Default: that of the
+    package."""
+    law: Literal["linear", "log", "anisotropic"] | None = None
+    """`linear`: g = mu1; `log`: (7.8), g = mu1 (s/t)(ln(t/s) + 1) for t above the yield strain s;
+    `anisotropic`: sigma = C eps. Default: `linear`."""
+    young: Annotated[Positive | None, ISOTROPIC] = None
+    """Young's modulus E (force/area)."""
+    poisson: Annotated[
         Annotated[
             float, Field(gt=-1, lt=0.5), Accepted("a number between -1 and 0.5, both excluded")
         ]
-        | None
-    ) = Field(default=None, description="Poisson's ratio. Required by `linear` and `log`.")
-    stiffness: _matrix(6, 6) | None = Field(  # type: ignore[valid-type]
-        None,
-        description="C of `anisotropic`, rows and columns 11, 22, 33, 23, 13, 12, symmetric and "
-        "positive definite (force/area); or the five constants of class 6mm about X3:",
-    )
-    c11: Number | None = Field(default=None, description="Across the axis X3.")
-    c12: Number | None = Field(default=None, description="c12 = c11 - 2 c66.")
-    c13: Number | None = Field(default=None, description="c13 = c23.")
-    c33: Number | None = Field(default=None, description="Along the axis X3.")
-    c44: Number | None = Field(default=None, description="c44 = c55.")
-    poling: Poling | None = Field(
-        default=None,
-        description="Where X3 of a crystal points, its coupling's as well: angle (degrees) from "
-        "x in the plane, a vector in space. Default: y in the plane, z in space.",
-    )
-    yield_strain: Positive | None = Field(
-        default=None,
-        description="Yield strain xi_0, a limit on |dev eps|. Required by `log`, of no "
-        "effect on `linear`.",
-    )
-    argument: Literal["norm", "square"] = Field(
-        default="norm",
-        description="Argument of g: |dev eps|, or its square as printed in (7.8), which "
-        "softens beyond e xi_0. `log` only.",
-    )
-    g_min: NonNegative = Field(
-        default=0.0, description="Floor of g in `log` (force/area); 0: none."
-    )
-    piezo: Piezo | None = Field(
-        default=None,
-        description="Piezoelectric constants, `[material.piezo]`. Absent: mechanical only.",
-    )
+        | None,
+        ISOTROPIC,
+    ] = None
+    """Poisson's ratio."""
+    stiffness: Annotated[_matrix(6, 6) | None, CRYSTAL] = None  # type: ignore[valid-type]
+    """C of `anisotropic`, rows and columns 11, 22, 33, 23, 13, 12, symmetric and positive
+    definite (force/area). Or the five constants c11 to c44 of class 6mm about X3."""
+    c11: Annotated[Number | None, CRYSTAL] = None
+    """Across the axis X3."""
+    c12: Annotated[Number | None, CRYSTAL] = None
+    """c12 = c11 - 2 c66."""
+    c13: Annotated[Number | None, CRYSTAL] = None
+    """c13 = c23."""
+    c33: Annotated[Number | None, CRYSTAL] = None
+    """Along the axis X3."""
+    c44: Annotated[Number | None, CRYSTAL] = None
+    """c44 = c55."""
+    poling: Poling | None = None
+    """Where X3 of a crystal points, its coupling's as well: angle (degrees) from x in 2-D, a
+    vector in 3-D. Default: y in 2-D, z in 3-D."""
+    yield_strain: Positive | None = None
+    """Yield strain xi_0, a limit on |dev eps|. Required by `log`, of no effect on `linear`."""
+    argument: Annotated[Literal["norm", "square"], LOG] = "norm"
+    """Argument of g: |dev eps|, or its square as printed in (7.8), which softens beyond e xi_0."""
+    g_min: Annotated[NonNegative, LOG] = 0.0
+    """Floor of g (force/area); 0: none."""
+    piezo: Piezo | None = None
+    """Piezoelectric constants, `[material.piezo]`. Absent: mechanical only."""
 
     @cached_property
     def entry(self) -> Entry | None:
@@ -194,7 +190,7 @@ class Material(Section):
 
     @property
     def axis(self) -> tuple[str, float | tuple[float, ...] | None]:
-        """The key that says where X3 points, and what it says."""
+        """The key that says where X3 points, and its value."""
         if self.piezo is not None and self.piezo.poling is not None:
             return "piezo.poling", self.piezo.poling
         return "poling", self.poling
@@ -209,28 +205,30 @@ class Material(Section):
     @model_validator(mode="before")
     @classmethod
     def _fill_in(cls, given: Any) -> Any:
-        """Fill in the defaults that depend on other keys."""
+        """Fill in the law; a material of the library has none, nor constants."""
         if not isinstance(given, Mapping):
             return given
-        default = {"law": "linear"} if given.get("name") is None else {"units": "SI"}
-        return {**default, **given}
+        if given.get("name") is None:
+            return {"law": "linear", **given}
+        for key in CONSTANTS:
+            if given.get(key) is not None:
+                words = Words(f'given with name = "{given["name"]}"')
+                raise fault(key, words, f"{key} without name")
+        return {"units": "SI", **given}
 
     @model_validator(mode="after")
-    def _check(self) -> Material:
+    def _check(self) -> Self:
         if self.name is not None:
             self._check_name()
             return self
-        for key in ("units", "library"):
-            if getattr(self, key) is not None:
-                raise fault(key, getattr(self, key), f"{key} with name only")
         if self.law == "anisotropic":
             self._check_stiffness()
-        else:
-            self._check_isotropic()
+        elif self.poling is not None and self.piezo is None:
+            raise fault("poling", self.poling, 'an axis with law = "anisotropic" or piezo')
+        elif self.law == "log":
+            self._check_log()
         if self.poling is not None and self.piezo is not None and self.piezo.poling is not None:
             raise fault("piezo.poling", self.piezo.poling, "one of poling and piezo.poling")
-        if isinstance(self.poling, tuple) and not any(self.poling):
-            raise fault("poling", self.poling, "a vector that is not zero")
         return self
 
     def _check_name(self) -> None:
@@ -240,59 +238,107 @@ class Material(Section):
             key = "library" if self.library is not None and str(error)[0] == "/" else "name"
             words, _, accepted = str(error).partition("; accepted: ")
             raise fault(key, Words(words), accepted) from None
-        own = ("law", *ISOTROPIC, "stiffness", *SHORT, "yield_strain", "piezo")
-        for key in own:
-            if getattr(self, key) is not None:
-                raise fault(key, Words(f'given with name = "{self.name}"'), f"{key} without name")
-        self._refuse_log_keys()
         if self.poling is not None and entry is not None and entry.isotropic is not None:
             raise fault("poling", self.poling, f"no axis: {self.name} is isotropic")
 
-    def _check_isotropic(self) -> None:
-        for key in ISOTROPIC:
-            if getattr(self, key) is None:
-                accepted = accepted_by(type(self).model_fields[key].annotation)
-                raise fault(key, Words("missing"), accepted)
-        for key in ("stiffness", *SHORT):
-            if getattr(self, key) is not None:
-                raise fault(key, getattr(self, key), f'{key} with law = "anisotropic"')
-        if self.poling is not None and self.piezo is None:
-            raise fault("poling", self.poling, 'an axis with law = "anisotropic" or piezo')
-        if self.law == "linear":
-            self._refuse_log_keys()
-            return
+    def _check_log(self) -> None:
         if self.yield_strain is None:
             raise fault("yield_strain", Words("missing"), 'a number > 0 with law = "log"')
-        assert self.young is not None
-        assert self.poisson is not None
+        assert self.young is not None and self.poisson is not None  # required
         mu1 = self.young / (2 + 2 * self.poisson)
         if self.g_min > mu1:
             raise fault("g_min", self.g_min, f"at most the shear modulus {mu1:g}")
 
-    def _refuse_log_keys(self) -> None:
-        for key in ("argument", "g_min"):
-            value = getattr(self, key)
-            if value != type(self).model_fields[key].default:
-                raise fault(key, value, f'{key} with law = "log"')
-
     def _check_stiffness(self) -> None:
-        self._refuse_log_keys()
-        for key in (*ISOTROPIC, "yield_strain"):
-            if getattr(self, key) is not None:
-                raise fault(key, getattr(self, key), f"{key} with another law")
-        given = [key for key in ("stiffness", *SHORT) if getattr(self, key) is not None]
-        if set(given) not in ({"stiffness"}, {*SHORT}):
-            accepted = f"either stiffness, or all of {', '.join(SHORT)}"
-            missing = [key for key in SHORT if key not in given]
-            both = "stiffness" in given
-            raise fault(
-                given[-1] if both else missing[0],
-                Words("both ways" if both else f"only {', '.join(given) or 'nothing'}"),
-                accepted,
-            )
+        if self.yield_strain is not None:
+            raise fault("yield_strain", self.yield_strain, "yield_strain with another law")
+        _either_way(self, SHORT, ("stiffness",))
         try:
             Anisotropic(self.voigt).check()
         except ValueError as error:
-            matrix = Words(str(error).replace("the stiffness must", "must"))
+            key = "c11" if self.stiffness is None else "stiffness"
             accepted = "a symmetric, positive definite matrix"
-            raise fault(given[0], Words(f"the stiffness {matrix}"), accepted) from None
+            raise fault(key, Words(error), accepted) from None
+
+    def build(self, dim: int) -> description.Material:
+        """Return the material itself in the axes of a body in 2-D or 3-D."""
+        axis = self.axis[1]
+        if dim == 2:
+            turn = in_plane(90.0 if axis is None else float(axis))  # type: ignore[arg-type]
+        else:
+            turn = np.eye(3) if axis is None else to_axis(axis)
+        tensors = self._piezo_tensors()
+        turned = None if tensors is None else tensors.rotated(turn)
+        return description.Material(self._law(turn), turned, self.on or ())
+
+    def _law(self, turn: Array) -> Law:
+        """Return the law of the stress, the crystal turned into the body."""
+        if self.entry is not None:
+            unit = UNITS[self.units or "SI"]
+            if self.entry.isotropic is not None:
+                young, poisson = self.entry.isotropic
+                return Linear(young / unit, poisson)
+            return Anisotropic(self.entry.stiffness / unit).rotated(turn)
+        if self.law == "anisotropic":
+            return Anisotropic(self.voigt).rotated(turn)
+        assert self.young is not None and self.poisson is not None  # required
+        if self.law == "linear":
+            return Linear(self.young, self.poisson)
+        assert self.yield_strain is not None
+        return Log(
+            self.young,
+            self.poisson,
+            yield_strain=self.yield_strain,
+            argument=self.argument,
+            g_min=self.g_min,
+        )
+
+    def _piezo_tensors(self) -> PiezoTensors | None:
+        """Return the piezoelectric tensors in the axes of the crystal, if there are any."""
+        if self.piezo is not None:
+            return from_voigt(*self.piezo.voigt)
+        if self.entry is None or self.entry.piezo is None:
+            return None
+        tensors = self.entry.piezo
+        return PiezoTensors(tensors.e, np.asarray(tensors.beta) * UNITS[self.units or "SI"])
+
+    def check_revolved(self, key: str) -> None:
+        """Refuse a crystal that is not transversely isotropic, for a body of revolution."""
+        law, tensors = self._law(np.eye(3)), self._piezo_tensors()
+        parts = [] if tensors is None else [tensors.e, tensors.beta]
+        if isinstance(law, Anisotropic):
+            parts.append(stiffness_tensor(law.stiffness))
+        if not isotropic_about_x3(*parts):
+            raise InputError(
+                f"{key}: the crystal is not the same all around its axis X3, and no body of "
+                "revolution consists of it; accepted: materials of class 6mm, poled ceramics "
+                "among them, or a mesh in 3-D"
+            )
+
+
+def make_material(dim: int, **keys: Any) -> description.Material:
+    """Return the material that `[material]` of a case file with some keys describes.
+
+    Parameters
+    ----------
+    dim
+        Dimension of the body, whose axes crystals are turned into: 2 or 3.
+    keys
+        Keys of the section: ``name="PZT-4"`` with ``poling``, or ``young``, ``poisson`` and
+        ``piezo={"e31": ..., ...}``; ``on``, a region or a list of regions.
+
+    Raises
+    ------
+    InputError
+        As for a case file.
+    """
+    expect("make_material: dim", dim, "2 or 3", dim in (2, 3))
+    plain = {k: v.tolist() if isinstance(v, np.ndarray) else v for k, v in keys.items()}
+    try:
+        section = Material.model_validate(plain)
+    except ValidationError as error:
+        raise InputError(describe(error, Material, "make_material")) from None
+    key, axis = section.axis
+    accepted = "an angle from x in degrees" if dim == 2 else f"a vector of {dim} numbers"
+    expect(f"make_material: {key}", axis, accepted, axis is None or np.ndim(axis) == dim - 2)
+    return section.build(dim)

@@ -1,62 +1,72 @@
-"""Section of the case file about the mesh."""
+"""Section of the case file about the mesh, and the domain that it describes."""
 
 from __future__ import annotations
 
+import logging
+import math
 from collections.abc import Mapping
-from typing import Annotated, Any, Literal, TypeAlias
+from typing import Annotated, Any, Literal, Self, TypeAlias
 
 import numpy as np
-from pydantic import Discriminator, Field, PrivateAttr, Tag, model_validator
+from mpi4py import MPI
+from pydantic import Field, PrivateAttr, Tag, model_validator
 
 import meshes
-from contact.case.types import (
-    UNKNOWN,
+from contact.case.messages import UNKNOWN, Words, fault
+from contact.case.section import (
     File,
     Name,
     Number,
     Section,
     Triple,
     Vector,
-    Words,
     as_tuple,
-    fault,
+    few,
     not_zero,
+    one_or_many,
 )
+from contact.errors import InputError
 from contact.mesh import grid
+from contact.mesh.domain import Domain
+from contact.mesh.reader import from_msh, from_recipe
+from contact.mesh.refinement import refined
+from contact.mesh.rotation import rotate
+from contact.methods.interrupt import deaf
 from contact.settings import Accepted, Count, Positive
-
-#: Dimension and names of the sides of the generators that need no recipe.
-GENERATORS: Mapping[str, tuple[int, tuple[str, ...]]] = {
-    name: (len(sides) // 2, tuple(sides)) for name, sides in grid.SIDES.items()
-}
+from meshes.grading import memory
 
 #: Keys of `[mesh]` that go with every generator and file.
 COMMON = ("generator", "file", "rotation", "axis", "refine")
 
+#: Bytes that making the mesh takes for a cell, without any unknowns (seen: 235 to 345).
+CELL_MEMORY = 200
+
+#: Seconds that it takes for a cell (seen: 5e-6 to 7e-6).
+CELL_SECONDS = 6e-6
+
+#: Number of cells from which on a warning gives their memory and time: about a minute.
+MANY = 10_000_000
+
+logger = logging.getLogger("contact.mesh")
+
 Along: TypeAlias = Annotated[
-    Number | Annotated[tuple[Number, ...], Field(min_length=2, max_length=2), as_tuple],
-    Accepted("a number in the plane, a list of 2 numbers in space"),
+    Annotated[Number, Tag("one")]
+    | Annotated[tuple[Number, ...], Field(min_length=2, max_length=2), as_tuple, Tag("many")],
+    one_or_many,
+    Accepted("a number in 2-D, a list of 2 numbers in 3-D"),
 ]
 
 
 class Piece(Section):
     """`[mesh.parts.NAME]`: a side of a rectangle or box, or a piece of it."""
 
-    side: Name = Field(
-        description="Side of the generator: `left`, `right`, `bottom`, `top`; "
-        "of a box also `front`, `back`."
-    )
-    start: Along | None = Field(
-        default=None,
-        alias="from",
-        description="Where the piece starts, in the coordinates that run "
-        "along the side before rotation (of a box in the order x, y, z). Absent: at its end.",
-    )
-    stop: Along | None = Field(
-        default=None,
-        alias="to",
-        description="Where the piece ends. Both are positions of the grid.",
-    )
+    side: Name
+    """Side of the generator: `left`, `right`, `bottom`, `top`; of a box also `front`, `back`."""
+    start: Along | None = Field(default=None, alias="from")
+    """Where the piece starts, in the coordinates that run along the side before rotation (of a
+    box in the order x, y, z). Absent: at its end."""
+    stop: Along | None = Field(default=None, alias="to")
+    """Where the piece ends. Both are positions of the grid."""
 
     @property
     def on_grid(self) -> grid.Piece:
@@ -64,14 +74,10 @@ class Piece(Section):
         return grid.Piece(self.side, self.start, self.stop)
 
 
-def _piece_kind(given: Any) -> str:
-    return "pieces" if isinstance(given, list | tuple) else "Piece"
-
-
 Pieces: TypeAlias = Annotated[
-    Annotated[Piece, Tag("Piece")]
-    | Annotated[tuple[Piece, ...], Field(min_length=1), as_tuple, Tag("pieces")],
-    Discriminator(_piece_kind),
+    Annotated[Piece, Tag("one")]
+    | Annotated[tuple[Piece, ...], Field(min_length=1), as_tuple, Tag("many")],
+    one_or_many,
     Accepted("a table with side, from, to, or a list of them"),
 ]
 
@@ -80,113 +86,97 @@ class Mesh(Section):
     """`[mesh]`: a generator with its parameters, or a Gmsh file."""
 
     generator: (
-        Annotated[str, Accepted('"rectangle", "box" or the name of a mesh recipe')] | None
-    ) = Field(default=None, description="What makes the mesh. This or `file`.")
-    file: Annotated[File, Accepted("a Gmsh file (.msh)")] | None = Field(
-        default=None,
-        description="Gmsh file (.msh); its named physical groups are the parts. Relative "
-        "to the case file.",
-    )
-    origin: Vector | None = Field(
-        default=None, description="Lower left corner of a rectangle or box. Default: zeros."
-    )
+        Annotated[str, Accepted('"rectangle", "box" or the name of a parametric mesh generator')]
+        | None
+    ) = None
+    """Generator of the mesh. This or `file`."""
+    file: Annotated[File, Accepted("a Gmsh file (.msh)")] | None = None
+    """Gmsh file (.msh); its named physical groups are the parts. Relative to the case file."""
+    origin: Vector | None = None
+    """Lower left corner of a rectangle or box. Default: zeros."""
     size: (
         Annotated[
             tuple[Positive, ...],
-            Field(min_length=2, max_length=3),
+            few,
             as_tuple,
             Accepted("a list of 2 numbers > 0 for a rectangle, 3 for a box"),
         ]
         | None
-    ) = Field(default=None, description="Edge lengths of a rectangle or box; required there.")
+    ) = None
+    """Edge lengths of a rectangle or box; required there."""
     cells: (
         Annotated[
             tuple[Count, ...],
-            Field(min_length=2, max_length=3),
+            few,
             as_tuple,
-            Accepted("a list of 2 whole numbers >= 1 for a rectangle, 3 for a box"),
+            Accepted("a list of 2 whole numbers from 1 to 10000000 for a rectangle, 3 for a box"),
         ]
         | None
-    ) = Field(
-        default=None,
-        description="Squares or cubes along the edges; required for a rectangle or box.",
-    )
-    diagonal: Literal["right", "left", "crossed", "left_right", "right_left"] | None = Field(
-        default=None,
-        description='How a rectangle\'s squares are cut into triangles; there "right" by default.',
-    )
-    rotation: Number = Field(
-        default=0.0,
-        description="Angle (degrees) by which the mesh is turned about the origin of "
-        "coordinates, counter-clockwise; in space about `axis`.",
-    )
-    axis: Annotated[Triple, not_zero] | None = Field(
-        default=None, description="Axis of the rotation in space. Default: y, `[0, 1, 0]`."
-    )
-    refine: Annotated[int, Field(ge=0, le=10), Accepted("a whole number from 0 to 10")] = Field(
-        default=0, description="Uniform refinements of the mesh after it is made or read."
-    )
-    parts: dict[Name, Pieces] = Field(
-        default={}, description="Further parts of a rectangle or box by name: `[mesh.parts.NAME]`."
-    )
-    parameters: dict[Name, Number] = Field(
-        default={}, description="Parameters of a recipe. They may stand in `[mesh]` itself."
-    )
+    ) = None
+    """Squares or cubes along the edges; required for a rectangle or box."""
+    diagonal: Literal["right", "left", "crossed", "left_right", "right_left"] | None = None
+    """How a rectangle's squares are cut into triangles; there "right" by default."""
+    rotation: Number = 0.0
+    """Angle (degrees) by which the mesh is turned about the origin of coordinates,
+    counter-clockwise; in 3-D about `axis`."""
+    axis: Annotated[Triple, not_zero] | None = None
+    """Axis of the rotation in 3-D. Default: y, `[0, 1, 0]`."""
+    refine: Annotated[int, Field(ge=0, le=10), Accepted("a whole number from 0 to 10")] = 0
+    """Uniform refinements of the mesh after it is made or read."""
+    parts: dict[Name, Pieces] = Field(default={})
+    """Further parts of a rectangle or box by name: `[mesh.parts.NAME]`."""
+    parameters: dict[Name, Number] = Field(default={})
+    """Parameters of another generator. They may stand in `[mesh]` itself."""
 
     _absent: bool = PrivateAttr(False)
 
     @staticmethod
     def absent() -> Mesh:
-        """Return what stands where a domain made in Python is to take the place of `[mesh]`."""
+        """Return a stand-in where a domain made in Python takes the place of `[mesh]`."""
         made = Mesh.model_construct()
         made._absent = True
         return made
 
     @property
-    def dimension(self) -> int | None:
-        """Space dimension; None if only the mesh itself can tell."""
-        return GENERATORS.get(self.generator or "", (None, ()))[0]
-
-    @property
     def sides(self) -> tuple[str, ...]:
         """Sides of a rectangle or box; none for other meshes."""
-        return GENERATORS.get(self.generator or "", (None, ()))[1]
+        return tuple(grid.SIDES.get(self.generator or "", ()))
+
+    @property
+    def dimension(self) -> int | None:
+        """Space dimension; None if only the mesh itself can tell."""
+        return len(self.sides) // 2 or None
+
+    @property
+    def pieces(self) -> dict[str, grid.Piece | list[grid.Piece]]:
+        """The further parts of a rectangle or box."""
+        return {
+            name: [piece.on_grid for piece in given] if isinstance(given, tuple) else given.on_grid
+            for name, given in self.parts.items()
+        }
 
     @model_validator(mode="before")
     @classmethod
     def _gather_parameters(cls, given: Any) -> Any:
-        """Move the keys of a recipe into `parameters`, and fill in the defaults of a grid."""
+        """Move the keys of a generator into `parameters`; fill in the defaults of a grid."""
         if not isinstance(given, Mapping) or not isinstance(given.get("generator"), str):
             return given
-        if given["generator"] in GENERATORS:
-            dimension, _ = GENERATORS[given["generator"]]
-            defaults: dict[str, Any] = {"origin": (0.0,) * dimension}
-            if given["generator"] == "rectangle":
-                defaults["diagonal"] = "right"
+        if given["generator"] in grid.SIDES:
+            flat = given["generator"] == "rectangle"
+            defaults = (
+                {"origin": (0.0, 0.0), "diagonal": "right"} if flat else {"origin": (0.0,) * 3}
+            )
             return {**defaults, **given}
         inner = given.get("parameters", {})
         if not isinstance(inner, Mapping):
             return given
         kept = {key: given[key] for key in given if key in COMMON}
         moved = {key: given[key] for key in given if key not in (*COMMON, "parameters")}
-        parameters = {**inner, **moved}
-        cls._check_recipe(given["generator"], parameters)
-        return {**kept, "parameters": parameters}
-
-    @staticmethod
-    def _check_recipe(name: str, parameters: Mapping[str, Any]) -> None:
-        if name not in meshes.RECIPES:
-            raise fault("generator", name, ", ".join((*GENERATORS, *meshes.RECIPES)))
-        accepted = meshes.parameters(name)
-        for key, value in parameters.items():
-            if key not in accepted:
-                raise fault(key, UNKNOWN, ", ".join((*COMMON, *accepted)))
-            number = isinstance(value, int | float) and not isinstance(value, bool)
-            if not number or not 0 < value < np.inf:
-                raise fault(key, value, "a number > 0")
+        _check_parameters(given["generator"], {**inner, **moved})
+        return {**kept, "parameters": {**inner, **moved}}
 
     @model_validator(mode="after")
-    def _check(self) -> Mesh:
+    def _check(self) -> Self:
         if self._absent:
             return self
         if (self.generator is None) == (self.file is None):
@@ -201,28 +191,82 @@ class Mesh(Section):
             if getattr(self, key):
                 raise fault(key, getattr(self, key), f"{key} for a rectangle or box only")
         if self.generator is None and self.parameters:
-            raise fault("parameters", self.parameters, "parameters of a recipe only")
+            raise fault("parameters", self.parameters, "parameters of a generator only")
         return self
 
-    @property
-    def pieces(self) -> dict[str, grid.Piece | list[grid.Piece]]:
-        """The further parts of a rectangle or box."""
-        return {
-            name: [piece.on_grid for piece in given] if isinstance(given, tuple) else given.on_grid
-            for name, given in self.parts.items()
-        }
-
     def _check_grid(self, generator: str) -> None:
-        if self.parameters:
-            key = next(iter(self.parameters))
-            raise fault(f"parameters.{key}", self.parameters[key], "parameters of a recipe only")
+        for key, value in self.parameters.items():
+            raise fault(f"parameters.{key}", value, "parameters of another generator only")
         for key in ("size", "cells"):
             if getattr(self, key) is None:
                 raise fault(key, Words("missing"), f"a list of {self.dimension} numbers")
-        assert self.origin is not None  # filled in before
-        assert self.size is not None
-        assert self.cells is not None
         try:
-            grid.plan(generator, self.origin, self.size, self.cells, self.pieces)
+            grid.plan(generator, *self._grid)
         except grid.GridError as error:
             raise fault(error.key, error.given, error.accepted) from None
+
+    @property
+    def _grid(self) -> tuple[Any, Any, Any, Any]:
+        return self.origin, self.size, self.cells, self.pieces
+
+    def build(self, comm: MPI.Intracomm) -> Domain:
+        """Make the mesh with its parts. Collective.
+
+        Raises
+        ------
+        InputError
+            As `rectangle`, `box`, `from_msh` and `from_recipe`, and if the mesh does not fit into
+            the memory.
+        """
+        if self.file is not None:
+            domain = from_msh(comm, self.file)
+        elif self.generator == "rectangle":
+            each = 4 if self.diagonal == "crossed" else 2  # triangles of a square
+            self._check_memory(comm, each * math.prod(self.cells or ()), 2)
+            domain = grid.rectangle(comm, *self._grid, diagonal=self.diagonal or "right")
+        elif self.generator == "box":
+            self._check_memory(comm, 6 * math.prod(self.cells or ()), 3)
+            domain = grid.box(comm, *self._grid)
+        else:
+            assert self.generator is not None
+            with deaf():
+                domain = from_recipe(comm, self.generator, **self.parameters)
+        axis = self.axis or (0.0, 1.0, 0.0)
+        rotate(domain.mesh, self.rotation, axis if domain.dim == 3 else (0.0, 0.0, 1.0))
+        if not self.sides:
+            cells = domain.mesh.topology.index_map(domain.dim).size_global
+            self._check_memory(comm, cells, domain.dim)
+        for _ in range(self.refine):
+            domain = refined(domain)
+        return domain
+
+    def _check_memory(self, comm: MPI.Intracomm, cells: int, dim: int) -> None:
+        """Refuse a mesh that certainly does not fit, and warn of a large one, which takes long."""
+        total = cells * 2 ** (dim * self.refine)
+        least = comm.allreduce(memory(), op=MPI.MIN)
+        needed = total * CELL_MEMORY / comm.size
+        before = f"mesh.refine: {self.refine} refinements of {cells:.3g} cells, "
+        number = f"{before if self.refine else 'mesh: '}{total:.3g} cells"
+        if needed > least:
+            raise InputError(
+                f"{number} take more memory, {needed / 1e9:.3g} GB a rank, than there is, "
+                f"{least / 1e9:.3g} GB; accepted: fewer cells (mesh.cells, mesh.refine), or more "
+                "ranks on more machines"
+            )
+        if total > MANY and comm.rank == 0:
+            logger.warning(
+                f"{number}: their mesh alone takes some {needed / 1e9:.2g} GB a rank and "
+                f"{total * CELL_SECONDS / comm.size:.2g} s"
+            )
+
+
+def _check_parameters(name: str, parameters: Mapping[str, Any]) -> None:
+    if name not in meshes.RECIPES:
+        raise fault("generator", name, ", ".join((*grid.SIDES, *meshes.RECIPES)))
+    accepted = meshes.parameters(name)
+    for key, value in parameters.items():
+        if key not in accepted:
+            raise fault(key, UNKNOWN, ", ".join((*COMMON, *accepted)))
+        number = isinstance(value, int | float) and not isinstance(value, bool)
+        if not number or not 0 < value < np.inf:
+            raise fault(key, value, "a number > 0")

@@ -1,35 +1,188 @@
-"""One message for a wrong case file: the file, the key, what was given, what is accepted."""
+"""One message for a wrong case file: the file, the key, the given value, the accepted values.
+
+The words come from the models: each kind of value carries the accepted ones in words
+(`contact.settings.Accepted`), and the nearest key is found among those of its table.
+"""
 
 from __future__ import annotations
 
 import difflib
+import json
+import types
 from collections.abc import Iterable, Iterator, Mapping
-from typing import Any, Literal, get_args, get_origin
+from dataclasses import is_dataclass
+from functools import cache
+from typing import Annotated, Any, Literal, Union, get_args, get_origin
 
-from pydantic import ValidationError
+from pydantic import BaseModel, ValidationError
+from pydantic.fields import FieldInfo
 from pydantic_core import ErrorDetails, PydanticCustomError
 
-from contact.case.accepted import accepted_by, keys_of, sections_of
-from contact.case.body import Load
-from contact.case.showing import listed, path_of, shown
-from contact.case.types import UNKNOWN, Section, Words
+from contact.settings import Accepted, settings_of
 
-#: What a user may look for in a load, and where it is.
-FORCES = {
-    key: "a load is given per area, traction = resultant / area of the part, or per volume, "
-    "body_force; a resultant goes to a part that is rigid, force of [[rigid]]"
-    for key in ("force", "resultant", "forces")
-}
+#: Most characters of a quoted value, a key, a path of keys, and a list of accepted names.
+VALUE, KEY, PATH, LIST = 60, 60, 100, 300
 
-#: What pydantic calls an unknown key, of a section and of a class of options.
+#: pydantic's names for an unknown key, of a section and of a class of options.
 UNKNOWN_KEY = ("extra_forbidden", "unexpected_keyword_argument")
 
+#: pydantic's names for a table of none of several kinds.
+UNKNOWN_KIND = ("union_tag_invalid", "union_tag_not_found")
 
-def describe(error: ValidationError, root: type[Section], source: str) -> str:
+
+class Words(str):
+    """Words for a message, as against a text given in the case file."""
+
+
+#: Stands for the given value where the key itself is wrong.
+UNKNOWN = Words("unknown key")
+
+
+def fault(key: str, given: Any, accepted: str) -> PydanticCustomError:
+    """Return an error for a validator to raise.
+
+    Parameters
+    ----------
+    key
+        Dotted path below the model that raises it.
+    given
+        The given value of the case file, words inside `Words`, or `UNKNOWN`.
+    accepted
+        The accepted values, in words.
+    """
+    return PydanticCustomError("fault", "fault", {"key": key, "given": given, "accepted": accepted})
+
+
+def shown(given: Any) -> str:
+    """Show a given value as in the case file."""
+    try:
+        text = str(given) if isinstance(given, float) else json.dumps(given, default=str)
+    except ValueError:
+        # Python writes out integers up to a limit of digits only.
+        text = "a whole number of thousands of digits"
+    except RecursionError:
+        text = "a deeply nested list"
+    return clipped(text, VALUE)
+
+
+def clipped(text: str, length: int = PATH) -> str:
+    """Cut a text that is too long, and show characters that are not printable by their codes."""
+    text = text if len(text) <= length else text[: length - 3] + "..."
+    return "".join(c if c.isprintable() else ascii(c)[1:-1] for c in text)
+
+
+def path_of(keys: Iterable[str]) -> str:
+    """Join keys to a path, as on the command line; a long one loses its middle."""
+    text = ".".join(clipped(key, KEY) for key in keys)
+    return text if len(text) <= PATH else f"{text[: PATH // 2 - 3]}...{text[-PATH // 2 :]}"
+
+
+def listed(options: Iterable[str]) -> str:
+    """List accepted names; of very many, the first ones and how many more there are."""
+    given = [clipped(option) for option in options]
+    kept, length = 0, 0
+    while kept < len(given) and length < LIST:
+        length += len(given[kept]) + 2
+        kept += 1
+    more = f" and {len(given) - kept} more" if kept < len(given) else ""
+    return ", ".join(given[:kept]) + more
+
+
+def either(options: Iterable[str]) -> str:
+    """Join options: ``a, b or c``."""
+    *first, last = options
+    return f"{', '.join(first)} or {last}" if first else last
+
+
+def nearest(name: str, options: Iterable[str], words: str = " (did you mean {}?)") -> str:
+    """Return a suggestion of the name nearest to a wrong one; nothing if none is near."""
+    near = difflib.get_close_matches(name, list(options), n=1)
+    return words.format(listed(near)) if near else ""
+
+
+def sections_of(annotation: Any) -> dict[str, type]:
+    """Return the classes that read tables in an annotation, by their names.
+
+    These are sections, and classes of options (`contact.settings`).
+    """
+    if isinstance(annotation, type) and (
+        issubclass(annotation, BaseModel) or is_dataclass(annotation)
+    ):
+        return {annotation.__name__: annotation}
+    found: dict[str, type] = {}
+    if get_origin(annotation) is not Literal:
+        for argument in get_args(annotation):
+            found |= sections_of(argument)
+    return found
+
+
+@cache
+def keys_of(section: type) -> Mapping[str, FieldInfo]:
+    """Return the keys of a section, or of a class of options, as in the case file."""
+    if issubclass(section, BaseModel):
+        return {field.alias or name: field for name, field in section.model_fields.items()}
+    keys = {}
+    for name, setting in settings_of(section).items():
+        keys[name] = FieldInfo.from_annotated_attribute(setting.annotation, setting.default)
+        keys[name].description = setting.meaning
+    return keys
+
+
+def kinds_of(sections: Iterable[type]) -> tuple[str, dict[str, type]]:
+    """Return the key that tells sections of one place apart, and its value for each.
+
+    Nothing for sections without such a key: one with a single literal as its value.
+    """
+    found: dict[str, type] = {}
+    name = ""
+    for section in sections:
+        for key, field in keys_of(section).items():
+            if get_origin(field.annotation) is Literal and len(get_args(field.annotation)) == 1:
+                name = key
+                found[get_args(field.annotation)[0]] = section
+                break
+    return name, found
+
+
+def accepted_by(annotation: Any, metadata: Iterable[Any] = ()) -> str:
+    """Return the accepted values of an annotation in words."""
+    for item in reversed([*metadata]):  # the last one is of the narrower type
+        if isinstance(item, Accepted):
+            return item.text
+    if get_origin(annotation) is Annotated:
+        return accepted_by(get_args(annotation)[0], get_args(annotation)[1:])
+    if get_origin(annotation) is Literal:
+        return either(shown(value) for value in get_args(annotation))
+    key, kinds = kinds_of(sections_of(annotation).values())
+    words = [accepted_by(plain) for plain in _plain(annotation) if plain is not annotation]
+    if kinds:
+        words.append(f"a table {either(_written(key, *kind) for kind in kinds.items())}")
+    return either(words or ["a table"])
+
+
+def _plain(annotation: Any) -> Iterator[Any]:
+    """Give the alternatives of a union that are no tables."""
+    origin, arguments = get_origin(annotation), get_args(annotation)
+    if origin in (Union, types.UnionType):
+        for argument in arguments:
+            yield from _plain(argument)
+    elif origin is Annotated and sections_of(annotation):
+        yield from _plain(arguments[0])
+    elif not sections_of(annotation) and annotation is not type(None):
+        yield annotation
+
+
+def _written(key: str, value: str, kind: type) -> str:
+    """Write a section as a table, all but one of its keys without their values."""
+    others = [name for name in keys_of(kind) if name != key]
+    return "{ " + ", ".join([f"{key} = {shown(value)}", *others]) + " }"
+
+
+def describe(error: ValidationError, root: type[BaseModel], source: str) -> str:
     """Return the one-line message for the first mistake of a case.
 
-    An unknown key comes before all else: what is missing or wrong elsewhere is often but its
-    consequence.
+    An unknown key comes before all else: a missing key or a wrong value elsewhere is often but
+    its consequence.
     """
     errors = sorted(error.errors(), key=lambda e: e["type"] not in UNKNOWN_KEY)
     return f"{source}: {_message(errors[0], root)}"
@@ -40,82 +193,79 @@ def describe_fault(error: PydanticCustomError) -> str:
     return _fault([], **(error.context or {}))
 
 
-def _fault(keys: list[str], key: str, given: Any, accepted: str) -> str:
-    keys = [*keys, *key.split(".")]
-    if given is UNKNOWN:
-        return _unknown(keys, accepted.split(", "))
-    return f"{path_of(keys)}: {_given(given)}; accepted: {accepted}"
-
-
-def _message(error: ErrorDetails, root: type[Section]) -> str:
-    keys, sections, accepted = _locate(error["loc"], root)
-    kind, context = error["type"], error.get("ctx", {})
-    given = _given(error["input"])
+def _message(error: ErrorDetails, root: type[BaseModel]) -> str:
+    keys, sections, others, accepted = _locate(error["loc"], root)
+    kind, context, given = error["type"], error.get("ctx", {}), error["input"]
     if kind == "fault":
         return _fault(keys, **context)
     if kind in UNKNOWN_KEY:
-        key = str(error["loc"][-1])
-        options = dict.fromkeys(key for section in sections for key in keys_of(section))
-        others = _locate(error["loc"][:-2], root)[1]
-        return _unknown([*keys, key], options, _hint(key, sections, others, root))
+        return _unknown([*keys, str(error["loc"][-1])], given, sections, others, root)
+    if kind in UNKNOWN_KIND and isinstance(given, Mapping):
+        name, kinds = kinds_of(sections)
+        return _fault(keys, name, given.get(name, Words("missing")), either(map(shown, kinds)))
     if kind == "value_error":
         # Raised by a formula, whose message is complete.
         return f"{path_of(keys)}: {context['error']}"
-    if kind == "missing":
-        given = "missing"
-    return f"{path_of(keys)}: {given}; accepted: {accepted}"
+    words = "missing" if kind == "missing" else _given(given)
+    return f"{path_of(keys)}: {words}; accepted: {accepted}"
+
+
+def _fault(keys: list[str], key: str, given: Any, accepted: str) -> str:
+    keys = [*keys, *key.split(".")]
+    if given is UNKNOWN:
+        options = accepted.split(", ")
+        hint = nearest(keys[-1], options, ", did you mean {}?")
+        return f"{path_of(keys)}: {UNKNOWN}{hint}; accepted: {listed(options)}"
+    return f"{path_of(keys)}: {_given(given)}; accepted: {accepted}"
 
 
 def _given(value: Any) -> str:
     if isinstance(value, Words):
         return str(value)
-    if isinstance(value, Mapping | Section):
+    if isinstance(value, Mapping | BaseModel):
         return "given a table"
     return f"given {shown(value)}"
 
 
-def _unknown(keys: list[str], accepted: Iterable[str], hint: str = "") -> str:
-    options = list(accepted)
-    near = difflib.get_close_matches(keys[-1], options, n=1)
-    if near and not hint:
-        hint = f", did you mean {near[0]}?"
-    return f"{path_of(keys)}: unknown key{hint}; accepted: {listed(options)}"
-
-
-def _hint(key: str, sections: list[type], others: list[type], root: type[Section]) -> str:
-    """Return what there is to say of an unknown key that has a meaning elsewhere.
+def _unknown(
+    keys: list[str], given: Any, sections: list[type], others: list[type], root: type[BaseModel]
+) -> str:
+    """Return the message for an unknown key, which may have a meaning elsewhere.
 
     Parameters
     ----------
-    key
-        The key.
+    keys, given
+        Its path and its value.
     sections, others
-        What it was given to; what could stand there as well.
+        The sections that read its table, and all that could stand there.
     root
         The whole case.
     """
+    key = keys[-1]
+    name, kinds = kinds_of(others)
+    owners = [shown(value) for value, kind in kinds.items() if key in keys_of(kind)]
+    if owners:
+        return f"{path_of(keys)}: {_given(given)}; accepted: {key} with {name} = {either(owners)}"
+    options = dict.fromkeys(key for section in sections for key in keys_of(section))
+    here = next((value for value, kind in kinds.items() if kind in sections), None)
+    hint = "" if here is None else f" with {name} = {shown(here)}"
     field = keys_of(root).get(key)
+    found = [getattr(section, "hints", {}).get(key) for section in sections]
+    hints = [hint for hint in found if hint is not None]
+    homes = dict.fromkeys(table for table, section in _tables(root) if key in keys_of(section))
     if field is not None and sections_of(field.annotation):
         table = _table(key, field.annotation)
-        return f" here: {table} is a table of its own, at the top level"
-    if Load in sections and key in FORCES:
-        return f": {FORCES[key]}"
-    kinds = {_kind(section): section for section in sections if _kind(section)}
-    for kind, section in kinds.items():
-        for other in others:
-            if other is not section and key in keys_of(other):
-                return f" with {kind}: it belongs to {_kind(other)}"
-    homes = dict.fromkeys(table for table, section in _tables(root) if key in keys_of(section))
-    if homes:
-        return f" here: it belongs to {' or '.join(homes)}"
-    if not kinds:
-        return ""
-    kind, section = next(iter(kinds.items()))
-    near = difflib.get_close_matches(key, keys_of(section), n=1)
-    return f" with {kind}" + (f", did you mean {near[0]}?" if near else "")
+        hint = f" here: {table} is a table of its own, at the top level"
+    elif hints:
+        hint = f": {hints[0]}"
+    elif homes:
+        hint = f" here: it belongs to {' or '.join(homes)}"
+    else:
+        hint += nearest(key, options, ", did you mean {}?")
+    return f"{path_of(keys)}: {UNKNOWN}{hint}; accepted: {listed(options)}"
 
 
-def _tables(root: type[Section]) -> Iterator[tuple[str, type]]:
+def _tables(root: type[BaseModel]) -> Iterator[tuple[str, type]]:
     """Give the tables of a case at its top level with the sections that read them."""
     for key, field in keys_of(root).items():
         for section in sections_of(field.annotation).values():
@@ -126,41 +276,35 @@ def _table(key: str, annotation: Any) -> str:
     return f"[[{key}]]" if get_origin(annotation) is tuple else f"[{key}]"
 
 
-def _kind(section: type) -> str:
-    """Return the key that tells a section from others in its place, with its value."""
-    for key, field in keys_of(section).items():
-        if get_origin(field.annotation) is Literal and len(get_args(field.annotation)) == 1:
-            return f"{key} = {shown(get_args(field.annotation)[0])}"
-    return ""
-
-
 def _locate(
-    location: tuple[int | str, ...], root: type[Section]
-) -> tuple[list[str], list[type], str]:
+    location: tuple[int | str, ...], root: type[BaseModel]
+) -> tuple[list[str], list[type], list[type], str]:
     """Follow a location of pydantic's through the sections.
 
     Returns
     -------
-    The keys as in the case file (without pydantic's tags of unions), the sections that can
-    stand there, and what is accepted there, in words.
+    The keys as in the case file (without pydantic's tags of unions), the sections that read the
+    table there, all that could stand there, and the accepted values in words.
     """
     keys: list[str] = []
-    options: Mapping[str, type] = {root.__name__: root}
+    here: list[type] = [root]
+    others: list[type] = []
     accepted = "tables"
     named = False  # the next item is a name chosen by the user
     for item in location:
+        kinds = kinds_of(here)[1]
         if isinstance(item, int) or named:
             keys.append(str(item))
             named = False
-        elif item in options:
-            options = {item: options[item]}
+        elif len(kinds) > 1 and item in kinds:
+            here = [kinds[item]]
         else:
-            fields = {k: f for s in options.values() for k, f in keys_of(s).items()}
+            fields = {key: field for section in here for key, field in keys_of(section).items()}
             if item not in fields:
                 continue
             field = fields[item]
             keys.append(item)
-            options = sections_of(field.annotation)
+            here = others = list(sections_of(field.annotation).values())
             accepted = accepted_by(field.annotation, field.metadata)
             named = get_origin(field.annotation) is dict
-    return keys, list(options.values()), accepted
+    return keys, here, others, accepted

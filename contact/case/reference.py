@@ -5,10 +5,9 @@
 
 from __future__ import annotations
 
+import argparse
 import inspect
-import sys
-from collections.abc import Iterator
-from collections.abc import Set as AbstractSet
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import is_dataclass
 from pathlib import Path
 
@@ -16,12 +15,10 @@ from pydantic.fields import FieldInfo
 
 import meshes
 from contact.case import formula as formulas
-from contact.case.accepted import accepted_by, either, keys_of, sections_of
 from contact.case.file import Case
+from contact.case.messages import accepted_by, either, keys_of, kinds_of, sections_of, shown
 from contact.case.solver import DEFAULT
 from contact.case.text import literal
-from contact.case.types import Section
-from contact.methods.options import OPTIONS
 from contact.settings import ReadWith
 
 PAGE = Path(__file__).parents[2] / "docs" / "case-file.md"
@@ -55,19 +52,19 @@ arguments or more. A comparison counts as 1 or 0. Formulas are parsed, never exe
 def page() -> str:
     """Return the reference page (Markdown)."""
     lines = [INTRODUCTION, "## Top level", "", *_rows(Case)]
-    described = [list(sections_of(field.annotation).values()) for field in keys_of(Case).values()]
-    top = {section for sections in described for section in sections}
-    for key, sections in zip(keys_of(Case), described, strict=True):
+    described = {key: list(sections_of(f.annotation).values()) for key, f in keys_of(Case).items()}
+    top = [section for sections in described.values() for section in sections]
+    for key, sections in described.items():
         if any(is_dataclass(section) for section in sections):
             lines += _options(key, sections)
-        else:
-            lines += [line for section in sections for line in _describe(section, top)]
+        for section in sections:
+            lines += _describe(section, top)
         if key == "mesh":
-            lines += _recipes()
+            lines += _generators()
     return "\n".join(lines) + "\n"
 
 
-def _describe(section: type[Section], elsewhere: AbstractSet[type]) -> Iterator[str]:
+def _describe(section: type, elsewhere: Collection[type]) -> Iterator[str]:
     """Describe a section and those in it. Its docstring is ``heading: text``.
 
     Parameters
@@ -77,11 +74,13 @@ def _describe(section: type[Section], elsewhere: AbstractSet[type]) -> Iterator[
     elsewhere
         Sections that have a place of their own.
     """
+    if is_dataclass(section):
+        return
     heading, text = (inspect.getdoc(section) or "").split(": ", 1)
     yield from ("", f"## {heading}", "", text[0].upper() + text[1:], "", *_rows(section))
-    for field in section.model_fields.values():
+    for field in keys_of(section).values():
         for inner in sections_of(field.annotation).values():
-            if inner not in elsewhere and not is_dataclass(inner):
+            if inner not in elsewhere:
                 yield from _describe(inner, elsewhere)
 
 
@@ -97,55 +96,48 @@ def _row(*cells: str) -> str:
 
 
 def _cells(field: FieldInfo) -> tuple[str, str, str]:
-    """Return what a key accepts, its default and its meaning."""
+    """Return the accepted values of a key, its default and its meaning."""
     accepted = accepted_by(field.annotation, field.metadata)
-    needs = "".join(
-        f" Read with `{mark.key} = {literal(mark.value)}` only."
-        for mark in field.metadata
-        if isinstance(mark, ReadWith)
-    )
-    return accepted, _default(field), (field.description or "") + needs
+    meaning = " ".join((field.description or "").split())
+    for mark in field.metadata:
+        if isinstance(mark, ReadWith) and mark.value is not None:
+            required = " and required by" if mark.required else ""
+            meaning += f" Read with{required} `{mark}` only."
+    return accepted, _default(field), meaning
 
 
-def _options(key: str, classes: list[type]) -> Iterator[str]:
+def _options(key: str, classes: Sequence[type]) -> Iterator[str]:
     """Describe a table that is read as options: of one class, or of one for each method."""
     yield from ("", f"## `[{key}]`", "")
-    if len(classes) == 1:
+    name, kinds = kinds_of(classes)
+    if not kinds:
         yield from ((inspect.getdoc(classes[0]) or "").split("\n")[0], "", *_rows(classes[0]))
         return
-    yield "Method, tolerances and limits. What the method does not read is refused."
+    yield "Method, tolerances and limits. A key that the method does not read is refused."
     yield from ("", "| method | |", "|---|---|")
     rows: dict[tuple[str, ...], list[str]] = {}
-    for options in classes:
-        keys = keys_of(options)
-        method = f"`{keys.pop('method').default}`"
-        yield _row(method, (inspect.getdoc(options) or "").split("\n")[0])
-        for name, field in keys.items():
-            rows.setdefault((f"`{name}`", *_cells(field)), []).append(method)
+    for value, options in kinds.items():
+        yield _row(f"`{value}`", (inspect.getdoc(options) or "").split("\n")[0])
+        for key, field in keys_of(options).items():
+            if key != name:
+                rows.setdefault((f"`{key}`", *_cells(field)), []).append(f"`{value}`")
     yield from ("", "| key | accepted | default | method | meaning |", "|---|---|---|---|---|")
-    default = literal(DEFAULT.method)
-    yield _row(
-        "`method`", either([literal(name) for name in OPTIONS]), f"`{default}`", "", "See above."
-    )
-    for (name, accepted, default, meaning), methods in rows.items():
-        which = "all" if len(methods) == len(classes) else ", ".join(methods)
-        yield _row(name, accepted, default, which, meaning)
+    accepted = either(map(shown, kinds))
+    yield _row(f"`{name}`", accepted, f"`{literal(DEFAULT.method)}`", "", "See above.")
+    for (key, accepted, default, meaning), methods in rows.items():
+        which = "all" if len(methods) == len(kinds) else ", ".join(methods)
+        yield _row(key, accepted, default, which, meaning)
 
 
 def _default(field: FieldInfo) -> str:
     if field.is_required():
         return "required"
-    if (
-        field.default is None
-        or isinstance(field.default, Section | dict | tuple)
-        or is_dataclass(field.default)
-    ):
-        return ""
-    return f"`{literal(field.default)}`"
+    value = getattr(field.default, "source", field.default)
+    return f"`{literal(value)}`" if isinstance(value, str | int | float) else ""
 
 
-def _recipes() -> Iterator[str]:
-    yield from ("", "### Mesh recipes", "")
+def _generators() -> Iterator[str]:
+    yield from ("", "### Parametric mesh generators", "")
     yield "Further values of `generator`, meshed by Gmsh. Their parameters stand in `[mesh]`."
     yield from ("", "| generator | body and parts | parameters and defaults |", "|---|---|---|")
     for name, recipe in meshes.RECIPES.items():
@@ -154,12 +146,16 @@ def _recipes() -> Iterator[str]:
         yield f"| `{name}` | {summary} | {defaults} |"
 
 
-def main(arguments: list[str]) -> None:
+def main(arguments: Sequence[str] | None = None) -> None:
     """Write the page to a file, by default docs/case-file.md."""
-    path = Path(arguments[0]) if arguments else PAGE
+    parser = argparse.ArgumentParser(
+        prog="python3 -m contact.case.reference", description=main.__doc__
+    )
+    parser.add_argument("path", nargs="?", type=Path, default=PAGE, help="default: %(default)s")
+    path: Path = parser.parse_args(arguments).path
     path.parent.mkdir(parents=True, exist_ok=True)
     path.write_text(page())
 
 
 if __name__ == "__main__":
-    main(sys.argv[1:])
+    main()

@@ -14,14 +14,14 @@ _BARE = re.compile(r"[A-Za-z0-9_-]+")
 
 
 def to_toml(case: Case, dimension: int | None = None, anchored: bool = False) -> str:
-    """Return a case file that gives the same case again, without what its method ignores.
+    """Return a case file that gives the same case again, without the keys that its method ignores.
 
     Parameters
     ----------
     case
         The case.
     dimension
-        Of its mesh, if it is known: what has no effect there is left out.
+        Of its mesh, if it is known: keys without effect there are left out.
     anchored
         Whether files are given with their whole paths, for a case that is read from anywhere.
     """

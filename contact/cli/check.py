@@ -10,13 +10,13 @@ import numpy as np
 from mpi4py import MPI
 
 from contact import _compat
-from contact.build import build_problem
+from contact.case.build import build_problem
 from contact.case.file import Case, load_case
-from contact.case.nesting import coarser_cases
 from contact.case.text import to_toml
 from contact.cli.ending import CONVERGED
 from contact.mesh.domain import Indices
 from contact.methods.options import NewtonOptions
+from contact.nesting import coarser_cases
 from contact.output import environment
 from contact.output.assumptions import fitting
 from contact.output.bodies import passing

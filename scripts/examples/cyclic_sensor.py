@@ -24,7 +24,7 @@ def main(
     solution = solve(case)
     if not solution.converged:
         raise SystemExit(f"not converged: {solution.outcome.reason}")
-    factor = case.evolution.amplitudes["cycle"].function
+    factor = case.evolution.amplitudes["cycle"]
     load = np.array([factor(step.row["t"]) for step in solution.steps])
     charge = np.array([step.row["charge_electrode"] for step in solution.steps])
     if MPI.COMM_WORLD.rank == 0:

@@ -8,14 +8,13 @@ import numpy as np
 from mpi4py import MPI
 
 from contact import Case, Solution
-from contact.case.nesting import has_coarser
 from contact.interface.multipliers import Multipliers
 from contact.methods.every import METHODS
 from contact.methods.method import Method
 from contact.methods.newton import Newton
 from contact.methods.options import NewtonOptions, Options
 from contact.methods.report import Outcome, Record
-from contact.nesting import nested_start
+from contact.nesting import has_coarser, nested_start
 from contact.output.review import review
 from contact.problem.kkt import KKT, evaluate
 from contact.problem.problem import ContactProblem

@@ -13,7 +13,6 @@ from mpi4py import MPI
 
 from contact import Solution, build_problem
 from contact.body.norms import errors
-from contact.building.meshing import make_domain
 from contact.mesh.transfer import carry
 from contact.methods.report import Outcome
 from contact.typing import Array
@@ -67,7 +66,7 @@ class Variant:
         if self.power == 1.0:
             return solved(case)
         lines = (0.0, 2.0, 4.0), (0.0, 1.0)
-        domain = grade(make_domain(case.mesh, MPI.COMM_WORLD), self.power, lines)
+        domain = grade(case.mesh.build(MPI.COMM_WORLD), self.power, lines)
         return solved(case, build_problem(case, domain=domain))
 
 

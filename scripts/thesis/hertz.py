@@ -13,7 +13,6 @@ from mpi4py import MPI
 
 from contact import Case, Solution, build_problem
 from contact.body.norms import volume
-from contact.building.meshing import make_domain
 from contact.output.figures.body import draw_plane
 from contact.output.figures.picture import picture
 from contact.output.table import contact_table
@@ -89,7 +88,7 @@ def run(case: Case, load: float) -> tuple[Solution, Found]:
     load
         Vertical force on the meshed part of the body.
     """
-    domain = make_domain(case.mesh, MPI.COMM_WORLD)
+    domain = case.mesh.build(MPI.COMM_WORLD)
     area = volume(domain, domain.ds("top"))
     first = case.load[0]
     assert first.traction is not None

@@ -21,7 +21,7 @@ def test_ends_of_the_steps():
 
 def test_an_amplitude_is_linear_between_its_values():
     case = parse_case(changed(evolution=evolution(), load__0__amplitude="press"))
-    function = case.evolution.amplitudes["press"].function
+    function = case.evolution.amplitudes["press"]
     assert [function(time) for time in (0.0, 1.5, 3.0)] == [0.0, 0.5, 1.0]
 
 

@@ -82,7 +82,7 @@ BAD = {
     "traction everywhere": ({"load__0": {"everywhere": True, "traction": [0, 1]}}, "body_force"),
     "unknown name": ({"load__0__traction": ["10*w", 0]}, 'load.0.traction.0: "10*w": unknown name'),
     "code": ({"contact__gap": "__import__('os')"}, "contact.gap: "),
-    "z in the plane": ({"load__0__traction": ["z", 0]}, "formulas in x and y in the plane"),
+    "z in the plane": ({"load__0__traction": ["z", 0]}, "formulas in x and y in 2-D"),
     "power": ({"contact__gap": "9**9**9"}, "not finite"),
     "negative gap": ({"contact__gap": -0.1}, "contact.gap: -0.1 is negative"),
     "gap and shape": (
@@ -107,7 +107,10 @@ BAD = {
     ),
     "tresca without bound": ({"friction": {"law": "tresca"}}, "friction.bound: missing"),
     "coulomb without mu": ({"friction": {"law": "coulomb"}}, "friction.mu: missing"),
-    "mu without friction": ({"friction__law": "none"}, 'friction.mu: given with law = "none"'),
+    "mu without friction": (
+        {"friction__law": "none"},
+        'friction.mu: given a table; accepted: mu with law = "coulomb"',
+    ),
     "negative mu": ({"friction__mu": -0.3}, "friction.mu: -0.3 is negative"),
     "slip law": ({"friction__mu": {"law": "rate", "rho": 1}}, 'accepted: "slip"'),
     "radius": ({"friction": {"law": "none", "radius": 1}}, "friction.radius: given 1.0"),
@@ -128,7 +131,7 @@ BAD = {
     ),
     "poling in the plane": (
         {"material__piezo": {**PIEZO, "poling": [0, 0, 1]}, "fixed": electrode},
-        "an angle in the plane",
+        "an angle in 2-D",
     ),
     "conductivity": (
         {"material__piezo": PIEZO, "fixed": electrode, "electric": {"k_e": -1}},
@@ -196,7 +199,7 @@ BAD = {
         {"solver__tolerence": 1},
         'solver.tolerence: unknown key with method = "newton", did you mean tolerance?',
     ),
-    "a setting of Python's": ({"solver__gamma": 1.0}, "solver.gamma: unknown key; accepted: met"),
+    "a setting of Python's": ({"solver__gamma": 1.0}, "solver.gamma: unknown key with method"),
     "nested meshes of another method": (
         {"solver": {"method": "penalty", "nested": True}},
         'solver.nested: given true; accepted: nested with method = "newton"',

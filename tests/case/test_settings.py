@@ -5,8 +5,8 @@ import tomllib
 import pytest
 
 from contact.case import reference
-from contact.case.accepted import keys_of, sections_of
 from contact.case.file import Case, parse_case
+from contact.case.messages import keys_of, sections_of
 from contact.case.text import to_toml
 from contact.methods.options import OPTIONS, NewtonOptions, with_method
 from tests.problems.bar import changed

@@ -16,7 +16,7 @@ BAD = {
     "key of another shape": (
         {"shape": "cone", "apex": [0, 0, 0], "axis": [0, 0, 1], "half_angle": 70.0, "inside": True},
         {},
-        'inside: unknown key with shape = "cone": it belongs to shape = "',
+        'inside: given true; accepted: inside with shape = "sphere" or "cylinder"',
     ),
     "edge": (
         {

@@ -6,9 +6,9 @@ import time
 import pytest
 from mpi4py import MPI
 
-from contact.building import meshing
+from contact.case import mesh
 from contact.case.file import parse_case
-from contact.case.showing import LIST, clipped, listed, path_of, shown
+from contact.case.messages import LIST, clipped, listed, path_of, shown
 from contact.cli.main import main
 
 TABLES = {
@@ -99,7 +99,7 @@ FILES = {
     ),
     "a key of another shape": (
         ('on = "bottom"', 'on = "bottom"\nfoundation = {shape = "sphere", point = [0, 0]}'),
-        'point: unknown key with shape = "sphere": it belongs to shape = "plane"; accepted: shape',
+        'point: given [0, 0]; accepted: point with shape = "plane" or "cylinder"',
     ),
     "a wrong key of a shape": (
         ('on = "bottom"', 'on = "bottom"\nfoundation = {shape = "sphere", raduis = 1}'),
@@ -131,7 +131,7 @@ FILES = {
     ),
     "friction of the contact": (
         ('on = "bottom"', 'on = "bottom"\nfriction = {mu = 0.3}'),
-        'contact.friction.mu: given with law = "none"; accepted: law = "coulomb"',
+        'contact.friction.mu: given 0.3; accepted: mu with law = "coulomb"',
     ),
     "friction twice": (
         ('on = "bottom"', 'on = "bottom"\nfriction = {law = "coulomb", mu = 0.3}'),
@@ -188,7 +188,7 @@ def test_absurd_overrides(name, tmp_path, capsys):
 
 
 def test_a_large_mesh_is_announced(monkeypatch, caplog):
-    monkeypatch.setattr(meshing, "MANY", 100)
+    monkeypatch.setattr(mesh, "MANY", 100)
     section = parse_case(
         {
             "mesh": {"generator": "rectangle", "size": [1, 1], "cells": [4, 4], "refine": 1},
@@ -198,7 +198,7 @@ def test_a_large_mesh_is_announced(monkeypatch, caplog):
         }
     ).mesh
     with caplog.at_level(logging.WARNING, "contact"):
-        meshing.make_domain(section, MPI.COMM_SELF)
+        section.build(MPI.COMM_SELF)
     assert "mesh.refine: 1 refinements of 32 cells, 128 cells: their mesh alone" in caplog.text
 
 

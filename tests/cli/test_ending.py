@@ -84,12 +84,12 @@ FAULTS = {
 def test_a_crash_has_a_status_of_its_own(ranks: int, kind: str, tmp_path: Path) -> None:
     """On any rank; 1 would say that a solve has not converged."""
     before = (
-        "import contact.build, contact.errors\n"
+        "import contact.case.build, contact.errors\n"
         "from mpi4py import MPI\n"
         "def build(*_, **__):\n"
         f"    if MPI.COMM_WORLD.rank == {ranks - 1}: {FAULTS[kind]}\n"
         "    MPI.COMM_WORLD.barrier()\n"
-        "contact.build.build_problem = build\n"
+        "contact.case.build.build_problem = build\n"
     )
     out = tmp_path / "out"
     status, text = run("solve", str(BAR), "--out", str(out), *SMALL, ranks=ranks, before=before)
@@ -110,13 +110,13 @@ def test_a_figure_that_fails_costs_nothing_else(tmp_path: Path) -> None:
 def test_ranks_end_with_a_killed_launcher(tmp_path: Path) -> None:
     """Nobody else would end them, and they have long to go."""
     before = (
-        "import contact.build, time\n"
+        "import contact.case.build, time\n"
         "from mpi4py import MPI\n"
         "def build(*_, **__):\n"
         "    MPI.COMM_WORLD.barrier()\n"
         "    print('building', flush=True)\n"
         "    time.sleep(1000)\n"
-        "contact.build.build_problem = build\n"
+        "contact.case.build.build_problem = build\n"
     )
     options = ["--out", str(tmp_path / "out")]
     process = start("solve", str(BAR), *options, ranks=2, before=before)

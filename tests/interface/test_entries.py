@@ -5,7 +5,7 @@ import pytest
 from mpi4py import MPI
 
 from contact import parse_case, solve
-from contact.build import build_problem
+from contact.case.build import build_problem
 from contact.errors import InputError
 from contact.output.table import contact_table, csv_columns
 from tests.problems.everywhere import displacements

@@ -7,7 +7,6 @@ from dolfinx import fem
 from dolfinx import mesh as dmesh
 from mpi4py import MPI
 
-from contact.building.meshing import make_domain
 from contact.case.mesh import Mesh as MeshSection
 from contact.errors import InputError
 from contact.mesh.domain import from_mesh
@@ -255,5 +254,5 @@ SECTIONS = {
 def test_domain_of_a_case_file_section(kind, monkeypatch, request):
     monkeypatch.chdir(request.config.rootpath)
     given, expected = SECTIONS[kind]
-    domain = make_domain(MeshSection.model_validate(given), COMM)
+    domain = MeshSection.model_validate(given).build(COMM)
     assert measures(domain) == pytest.approx(expected)

@@ -8,7 +8,7 @@ from contact import parse_case, solve
 from contact.body.description import Body, Fixed, Load, Material
 from contact.body.equilibrium import BodyEquilibrium
 from contact.body.norms import errors
-from contact.build import build_problem
+from contact.case.build import build_problem
 from contact.errors import InputError
 from contact.history import BodyState
 from contact.mesh.domain import from_mesh

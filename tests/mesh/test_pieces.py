@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from contact.build import build_problem
+from contact.case.build import build_problem
 from contact.case.file import parse_case
 from contact.errors import InputError
 from contact.mesh.pieces import connected_pieces

@@ -11,7 +11,7 @@ from dolfinx import mesh as dmesh
 from mpi4py import MPI
 
 import meshes
-from contact.build import build_problem
+from contact.case.build import build_problem
 from contact.case.file import parse_case
 from contact.cli.check import describe
 from contact.errors import InputError

@@ -5,7 +5,7 @@ from typing import Any, Literal
 import pytest
 from mpi4py import MPI
 
-from contact.build import build_problem
+from contact.case.build import build_problem
 from contact.case.file import Case, parse_case
 from contact.cli.main import main
 from contact.interface.friction import Friction

@@ -4,7 +4,6 @@ import pytest
 from mpi4py import MPI
 
 from contact import evolve
-from contact.body.amplitude import Tabulated
 from contact.body.description import Body, Load
 from contact.interface.friction import Friction
 from contact.mesh.grid import rectangle
@@ -18,6 +17,7 @@ from contact.solving import NotConvergedError, solve
 from forms.hencky import Linear
 from forms.laws import ConstantCoefficient
 from tests.problems.mechanics import constant, flat
+from tests.problems.shaken import tabulated
 
 TIMES = [0.5, 1.0, 1.5, 2.0, 2.5, 3.0]
 
@@ -36,7 +36,7 @@ def lying(comm, press, push) -> ContactProblem:
     """
 
     def amplitude(values):
-        return Tabulated((0.0, 1.0, 2.0, 3.0), (0.0, values[0], values[1], values[0]))
+        return tabulated((0.0, 1.0, 2.0, 3.0), (0.0, values[0], values[1], values[0]))
 
     loads = (
         Load("top", [constant(0.0, 2), constant(-0.01, 2)], amplitude=amplitude(press)),

@@ -7,15 +7,15 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from contact.build import build_problem
+from contact.case.build import build_problem
 from contact.case.file import Case, parse_case
-from contact.case.nesting import coarser_cases
 from contact.errors import InputError
 from contact.interface.friction import Friction
 from contact.interface.multipliers import Multipliers
 from contact.methods.fixed_point import FixedPoint
 from contact.methods.newton import Newton
 from contact.methods.options import FixedPointOptions, NewtonOptions
+from contact.nesting import coarser_cases
 from contact.problem.problem import ContactProblem
 from contact.problem.state import State
 from contact.solving import solve

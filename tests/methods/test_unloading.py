@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 
-from contact.body.amplitude import Tabulated
 from contact.body.description import Body, Fixed, Load
 from contact.interface.friction import Friction
 from contact.mesh.grid import rectangle
@@ -12,7 +11,7 @@ from contact.problem.contact import Contact
 from contact.problem.problem import ContactProblem
 from forms.hencky import Linear
 from tests.problems.mechanics import constant
-from tests.problems.shaken import SELF, steps_of
+from tests.problems.shaken import SELF, steps_of, tabulated
 
 AT_EASE = {"newton": NewtonOptions(tolerance=1e-8), "uzawa": FixedPointOptions(tolerance=1e-8)}
 
@@ -20,7 +19,7 @@ AT_EASE = {"newton": NewtonOptions(tolerance=1e-8), "uzawa": FixedPointOptions(t
 @pytest.mark.parametrize("left", [1e-8, 1e-12, 1e-16, 0.0])
 def test_what_is_unloaded_to_next_to_nothing_is_as_accurate(left):
     """Beside slips of the whole load the relaxation lost what it looked for."""
-    amplitude = Tabulated((0.0, 1.0, 2.0), (0.0, 1.0, left))
+    amplitude = tabulated((0.0, 1.0, 2.0), (0.0, 1.0, left))
     loads = [
         Load("top", [constant(0.0, 2), constant(-0.01, 2)], amplitude=amplitude),
         Load("right", [constant(0.002, 2), constant(0.0, 2)], amplitude=amplitude),
@@ -43,7 +42,7 @@ def test_what_is_unloaded_to_next_to_nothing_is_as_accurate(left):
 
 def test_a_penalised_body_that_is_unloaded_to_nothing_rests():
     """The last step was halved again and again, and the evolution ended before."""
-    amplitude = Tabulated((0.0, 1.0, 2.0), (0.0, 1.0, 0.0))
+    amplitude = tabulated((0.0, 1.0, 2.0), (0.0, 1.0, 0.0))
     pressed = Fixed("top", [constant(0.001, 2), constant(-0.002, 2)], amplitude=amplitude)
     problem = ContactProblem(
         rectangle(SELF, [0.0, 0.0], [1.0, 1.0], [4, 4]),

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from contact.build import build_problem
+from contact.case.build import build_problem
 from contact.history import BodyState
 from contact.output.fields import DerivedFields
 from contact.output.files import write_outputs

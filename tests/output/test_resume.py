@@ -11,7 +11,6 @@ import pytest
 from mpi4py import MPI
 
 from contact import solve
-from contact.building.meshing import make_domain
 from contact.case.text import to_toml
 from contact.cli.main import main
 from contact.errors import InputError
@@ -124,7 +123,7 @@ def test_all_steps_were_there(tmp_path):
 def test_another_mesh(tmp_path):
     solve(steps_case(), comm=SELF, folder=tmp_path)
     for cells in ([8, 4], [16, 2]):
-        domain = make_domain(steps_case(mesh__cells=cells).mesh, SELF)
+        domain = steps_case(mesh__cells=cells).mesh.build(SELF)
         with pytest.raises(InputError, match=r"--restart .*: given checkpoints of another mesh"):
             solve(steps_case(), comm=SELF, restart=tmp_path, domain=domain)
         with pytest.raises(InputError, match=r"--restart .*: the case has changed since"):

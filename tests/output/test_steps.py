@@ -8,7 +8,7 @@ import pytest
 from mpi4py import MPI
 
 from contact import parse_case, solve, write_outputs
-from contact.build import build_problem
+from contact.case.build import build_problem
 from contact.output.figures.saved import plot
 from contact.output.figures.steps import Course
 from contact.solving import evolve

@@ -13,7 +13,7 @@ import ufl
 from mpi4py import MPI
 
 from contact import evolve, parse_case, solve
-from contact.build import build_problem
+from contact.case.build import build_problem
 from contact.history import QUADRATURE_POINTS
 from contact.nesting import prolong
 from contact.output.fields import DerivedFields

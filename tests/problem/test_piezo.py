@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from contact.building.materials import piezo, rotation
-from contact.case.material import Material
+from contact.case.material import Material, piezo, rotation
 from contact.errors import InputError
 from contact.interface.friction import Friction
 from contact.methods.fixed_point import FixedPoint

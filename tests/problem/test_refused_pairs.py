@@ -6,7 +6,7 @@ from mpi4py import MPI
 
 from contact import parse_case, solve
 from contact.body.description import Body, Fixed
-from contact.build import build_problem
+from contact.case.build import build_problem
 from contact.cli.check import expectations
 from contact.errors import InputError
 from contact.interface.obstacle import GapFunction

@@ -8,7 +8,7 @@ import ufl
 from mpi4py import MPI
 
 from contact.body.description import Body, Fixed, Load
-from contact.build import build_problem
+from contact.case.build import build_problem
 from contact.interface.friction import Friction
 from contact.interface.obstacle import GapFunction, Plane
 from contact.mesh.domain import Domain

@@ -1,0 +1,164 @@
+"""From a case to a contact problem."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import replace
+from typing import Any
+
+from mpi4py import MPI
+
+from contact.body.description import Body, Material
+from contact.body.rigid import Rigid
+from contact.case.file import REPLACEABLE, Case
+from contact.errors import InputError
+from contact.interface.layer import Layer
+from contact.interface.obstacle import Obstacle
+from contact.kinds import check_range
+from contact.mesh.domain import Domain
+from contact.mesh.revolution import revolved
+from contact.problem.consistent import check_problem, check_supports
+from contact.problem.contact import Contact
+from contact.problem.problem import ContactProblem
+from forms.hencky import Law
+from forms.laws import FrictionCoefficient, FrictionLaw
+
+#: Arguments of `build_problem` that replace parts of a case.
+REPLACEMENTS = ("domain", "law", "coefficient", "friction", "foundation", "layer")
+
+
+def build_problem(
+    case: Case,
+    comm: MPI.Intracomm = MPI.COMM_WORLD,
+    *,
+    domain: Domain | None = None,
+    law: Law | None = None,
+    coefficient: FrictionCoefficient | None = None,
+    friction: FrictionLaw | None = None,
+    foundation: Obstacle | None = None,
+    layer: Layer | None = None,
+) -> ContactProblem:
+    """Build the problem that a case describes. Collective.
+
+    Parameters
+    ----------
+    case
+        The case.
+    comm
+        Communicator of the mesh.
+    domain, law, coefficient, friction, foundation, layer
+        Objects that replace the case's mesh, material law, Coulomb's mu(|u_tau|) or the whole
+        friction law, foundation and compliant layer (own p_nu and h_nu).
+
+    Raises
+    ------
+    InputError
+        If the case does not fit the mesh, a formula has no value at a node or a wrong sign,
+        or the body is not held.
+    """
+    with named(case.source):
+        given = {"domain": domain, "law": law, "coefficient": coefficient, "friction": friction}
+        _check_replaced(case.filled, given)
+        domain = case.mesh.build(comm) if domain is None else domain
+        if case.space.kinematics == "axisymmetric":
+            domain = revolved(domain)
+        check_range("mesh", domain.size)
+        case.check_mesh(domain.dim, domain.names)
+        body = Body(
+            _materials(case, domain, law),
+            [fixed.build(f"fixed.{i}", case, domain.comm) for i, fixed in enumerate(case.fixed)],
+            [load.build(f"load.{i}", case, domain.comm) for i, load in enumerate(case.load)],
+            rigid=_rigid(case, domain.dim),
+            electrodes=tuple(electrode.build(case) for electrode in case.electrode),
+        )
+        own = {"coefficient": coefficient, "law": friction}
+        contacts = _contacts(case, domain, foundation, layer, own)
+        problem = ContactProblem(domain, body, contacts, degree=case.space.degree)
+        for time in (1.0,) if case.evolution is None else case.evolution.times[1:]:
+            check_problem(problem.at(time))
+        for time in () if case.evolution is None else case.evolution.ends:
+            check_supports(problem.at(time))
+    return problem
+
+
+@contextmanager
+def named(source: str) -> Iterator[None]:
+    """Let messages name the case file, as those of the case itself do."""
+    try:
+        yield
+    except InputError as error:
+        text = str(error)
+        raise InputError(text if text.startswith(source) else f"{source}: {text}") from error
+
+
+def replaced_by(arguments: Collection[str]) -> tuple[str, ...]:
+    """Return the keys of a case that arguments of `build_problem` replace."""
+    return tuple(key for key, names in REPLACEABLE.items() if {*names} & {*arguments})
+
+
+def _check_replaced(filled: Collection[str], arguments: Mapping[str, Any]) -> None:
+    """Raise an InputError if a key that was filled in is replaced by nothing."""
+    for key in filled:
+        names = REPLACEABLE[key]
+        if all(arguments[name] is None for name in names):
+            raise InputError(
+                f"{key}: missing; accepted: it in the case, or {' or '.join(names)}=... in Python"
+            )
+
+
+def _materials(case: Case, domain: Domain, law: Law | None) -> list[Material]:
+    """Return the materials of a case in the axes of the body."""
+    if law is not None and len(case.materials) > 1:
+        raise InputError("law: a law given beside the case replaces one material, not several")
+    made = []
+    for key, section in case.materials:
+        if domain.revolved:
+            section.check_revolved(key)
+        given = section.build(domain.dim)
+        made.append(given if law is None else replace(given, law=law))
+        check_range(f"{key}.young", float(made[-1].law.young))
+    return made
+
+
+def _rigid(case: Case, dim: int) -> tuple[Rigid, ...]:
+    """Return the foundations and parts that move as rigid bodies."""
+    foundations = [
+        Rigid(contact.on, contact.rigid.motion(case, dim), foundation=True)
+        for _, contact in case.contacts
+        if contact.rigid is not None
+    ]
+    return (*foundations, *(Rigid(part.on, part.motion(case, dim)) for part in case.rigid))
+
+
+def _contacts(
+    case: Case,
+    domain: Domain,
+    foundation: Obstacle | None,
+    layer: Layer | None,
+    own: Mapping[str, Any],
+) -> list[Contact]:
+    """Return the contacts of a case; objects replace those of its only one."""
+    own = {name: law for name, law in own.items() if law is not None}
+    replaced = own or foundation is not None or layer is not None
+    if len(case.contacts) > 1 and replaced:
+        raise InputError(
+            "contact: foundation, layer, coefficient and friction given beside the case "
+            "replace those of one contact, not of several"
+        )
+    made = []
+    for key, contact in case.contacts:
+        place, friction = case.friction_of(key, contact)
+        electric = case.electric_of(key, contact)[1]
+        made.append(
+            Contact(
+                contact.on,
+                contact.obstacle(key, domain.comm) if foundation is None else foundation,
+                contact.compliant_layer() if layer is None else layer,
+                friction.build(place, domain.comm, **own),
+                None if electric is None else electric.build(case, domain, contact.on),
+                contact.overlap == "press",
+                contact.against,
+            )
+        )
+    return made
