@@ -164,6 +164,9 @@ class Outcome:
         if self.signal:
             return self.ended
         excess = self.kkt.excess(self.allowed)
+        if excess and self.ended:
+            # A failure is explained by the residual, any other end is contradicted.
+            return f"{self.ended}{': ' if 'not converged' in self.ended else ', but '}{excess}"
         if excess:
-            return f"{self.ended}, but {excess}" if self.ended else excess
+            return excess
         return self.ended or f"all residuals <= {self.allowed.largest:g}"

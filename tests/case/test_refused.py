@@ -44,6 +44,10 @@ BAD = {
     "neither": ({"mesh__generator": None}, "mesh.generator: neither generator nor file"),
     "flat mesh": ({"mesh__size": [4.0, 0.0]}, "mesh.size.1: given 0.0"),
     "no cells": ({"mesh__cells": None}, "mesh.cells: missing; accepted: a list of 2 numbers"),
+    "a billion cells": (
+        {"mesh__cells": [1_000_000_000, 1_000_000_000]},
+        "mesh.cells.0: given 1000000000; accepted: a list of 2 whole numbers from 1 to 10000000",
+    ),
     "half cells": ({"mesh__cells": [8, 2.5]}, "mesh.cells.1: given 2.5"),
     "3 sizes": ({"mesh__size": [1, 1, 1]}, "mesh.size: given [1.0, 1.0, 1.0]; accepted: a list"),
     "axis in the plane": ({"mesh__axis": [0, 0, 1]}, "mesh.axis"),

@@ -98,7 +98,7 @@ def test_not_converged_writes_outputs(
     status, lines = run(case, *options, capfd=capfd)
     assert status == NOT_CONVERGED
     if MPI.COMM_WORLD.rank == 0:  # --quiet is about progress alone
-        assert "contact: stopped: not converged in 1 outer iterations" in lines[-1]
+        assert "contact: stopped: not converged in 1 outer iterations: the " in lines[-1]
     summary = (shared_tmp_path / "out" / "summary.json").read_text()
     assert '"converged": false' in summary
     assert "not converged in 1 outer iterations" in summary
