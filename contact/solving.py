@@ -23,9 +23,8 @@ from contact.case.file import Case, load_case
 from contact.case.text import to_toml
 from contact.errors import InputError
 from contact.kinds import expect
-from contact.methods.every import METHODS
 from contact.methods.interrupt import SIGNALLED, stop_on_signal
-from contact.methods.method import Method
+from contact.methods.method import METHODS, Method
 from contact.methods.options import NewtonOptions, Options
 from contact.methods.report import History, Monitor, Outcome, tell
 from contact.methods.steps import Evolution, LoadStep, solve_step

@@ -27,13 +27,11 @@ from contact.case.file import Case, load_case, read_value
 from contact.case.text import literal, to_toml
 from contact.errors import InputError
 from contact.mesh.domain import Domain
-from contact.methods.every import METHODS
 from contact.methods.interrupt import Interrupted, stop_on_signal
-from contact.methods.method import Method
+from contact.methods.method import METHODS, Method
 from contact.methods.options import NewtonOptions, Options
-from contact.methods.predictor import Reached, predicted
 from contact.methods.report import Monitor, tell
-from contact.methods.steps import since, solve_step
+from contact.methods.steps import Reached, predicted, since, solve_step
 from contact.output.folder import on_root
 from contact.output.quantities import SWEEP, values_of
 from contact.output.rerun import difference

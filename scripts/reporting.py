@@ -23,7 +23,7 @@ from mpi4py import MPI
 from PIL import Image
 
 from contact import Case, InputError, Solution, solve
-from contact.methods.every import METHODS
+from contact.methods.method import METHODS
 from contact.methods.options import Options
 from contact.methods.report import Outcome, Record
 from contact.output.figures.figures import STYLE

@@ -20,7 +20,6 @@ from typing import TypeAlias
 import numpy as np
 
 from contact.interface.multipliers import Multipliers
-from contact.methods.acceleration import least_squares
 from contact.methods.line_search import FAR
 from contact.methods.newton_step import Iterate
 from contact.problem.state import State
@@ -139,3 +138,14 @@ def _with(state: State, values: Array) -> State:
     x, pressure, friction = np.split(values, [n, n + count])
     friction = friction.reshape(state.forces.friction.shape)
     return replace(state, x=x, forces=Multipliers(pressure, friction))
+
+
+def least_squares(gram: Array, load: Array) -> Array:
+    """Solve the normal equations of directions of length 1.
+
+    Combinations that change the residual less than a millionth of their length are left out:
+    what they do is rounding, as where a body moves that touches nothing.
+    """
+    values, vectors = np.linalg.eigh(gram)
+    kept = values > 1e-12
+    return vectors[:, kept] @ ((vectors[:, kept].T @ load) / values[kept])

@@ -1,11 +1,15 @@
-"""What every method is."""
+"""The protocol of all methods, and these by their names."""
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
 from typing import Any, Protocol
 
 from contact.linear.operator import Counters
-from contact.methods.report import History, Outcome
+from contact.methods.newton import Newton
+from contact.methods.report import History, Monitor, Outcome
+from contact.methods.thesis.fixed_point import FixedPoint
+from contact.methods.thesis.penalty import Penalty
 from contact.problem.problem import ContactProblem
 from contact.problem.state import State
 
@@ -15,7 +19,7 @@ class Method(Protocol):
 
     A new one is a class with these that is made of a problem, its options and a monitor; its
     options, with an entry in `contact.methods.options.OPTIONS`; and an entry in
-    `contact.methods.every.METHODS`. One that uses others makes their options by `with_method`,
+    `contact.methods.method.METHODS`. One that uses others makes their options by `with_method`,
     hands the monitor and the counters on to them, and its history has the records of all of them.
     """
 
@@ -49,3 +53,11 @@ class Method(Protocol):
         InputError
             If the linear system is singular.
         """
+
+
+#: Name of a method -> its class.
+METHODS: Mapping[str, Callable[[ContactProblem, Any, Monitor | None], Method]] = {
+    "uzawa": FixedPoint,
+    "penalty": Penalty,
+    "newton": Newton,
+}

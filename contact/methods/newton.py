@@ -49,9 +49,8 @@ from contact.methods.interior_point import INTERIOR_POINT, interior_point
 from contact.methods.newton_step import Iterate, NewtonStep, Search, Step
 from contact.methods.options import NewtonOptions
 from contact.methods.parameters import complementarity_parameters, far_softer
-from contact.methods.progress import Best, Stagnation
+from contact.methods.progress import Best, Stagnation, resting
 from contact.methods.report import History, Monitor, Outcome
-from contact.methods.resting import resting
 from contact.methods.restraint import Restraint
 from contact.problem.condensed import CondensedProblem, condensation, pays
 from contact.problem.kkt import KKT, evaluate

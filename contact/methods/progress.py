@@ -7,7 +7,14 @@ from typing import Generic, TypeVar
 
 import numpy as np
 
+from contact.problem.kkt import KKT, evaluate
+from contact.problem.protocols import Problem
+from contact.problem.state import State
+
 T = TypeVar("T")
+
+#: Residuals at rest that are rounding.
+ROUNDING = 1e-13
 
 
 @dataclass
@@ -70,3 +77,15 @@ class Stagnation:
         if gained or not self.together:
             self._reference = self.best
         return self._since >= (self.limit if limit is None else limit)
+
+
+def resting(problem: Problem) -> tuple[State, KKT] | None:
+    """Return the body at rest with its residuals, where it is in equilibrium. Collective.
+
+    Beside forces that vanish no residual is small, and only those that are 0 have none: a method
+    that comes nearer and nearer to them never ends. Asked where a method has failed: a body that
+    friction has locked in may be in equilibrium elsewhere.
+    """
+    state = problem.start()
+    residuals = evaluate(problem, state)
+    return (state, residuals) if residuals.largest <= ROUNDING else None

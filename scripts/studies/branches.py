@@ -9,8 +9,7 @@ from mpi4py import MPI
 
 from contact import Case, Solution
 from contact.interface.multipliers import Multipliers
-from contact.methods.every import METHODS
-from contact.methods.method import Method
+from contact.methods.method import METHODS, Method
 from contact.methods.newton import Newton
 from contact.methods.options import NewtonOptions, Options
 from contact.methods.report import Outcome, Record

@@ -14,8 +14,8 @@ from itertools import pairwise
 import numpy as np
 
 from contact import Case, InputError, build_problem, load_case
-from contact.methods.fixed_point import FixedPoint
 from contact.methods.options import FixedPointOptions
+from contact.methods.thesis.fixed_point import FixedPoint
 from contact.typing import Array
 from scripts.cases import CASES
 from scripts.reporting import TWO_COLUMNS, Report, append, iterates, options, subplots

@@ -11,7 +11,8 @@ import numpy as np
 
 from contact import Case, Solution, build_problem, load_case
 from contact.linear.operator import SparseOperator
-from contact.methods.augmentation import augmentation, automatic_r
+from contact.methods.parameters import automatic_r
+from contact.methods.thesis.uzawa import augmentation
 from contact.output.balances import charge_balance, force_balance
 from contact.problem.kkt import residual_forces
 from contact.problem.problem import ContactProblem

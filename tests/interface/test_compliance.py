@@ -13,9 +13,9 @@ from contact.body.description import Body, Fixed
 from contact.interface.friction import Friction
 from contact.interface.layer import Layer
 from contact.mesh.grid import box, rectangle
-from contact.methods.fixed_point import FixedPoint
 from contact.methods.newton import Newton
 from contact.methods.options import NewtonOptions, PenaltyOptions
+from contact.methods.thesis.fixed_point import FixedPoint
 from contact.problem.contact import Contact
 from contact.problem.problem import ContactProblem
 from forms.hencky import Linear

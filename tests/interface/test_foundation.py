@@ -11,7 +11,7 @@ from contact.interface.friction import Friction
 from contact.interface.obstacle import GapFunction, Plane, Sphere
 from contact.interface.penalised import Lagged, Regularisation
 from contact.mesh.grid import box, rectangle
-from contact.methods.augmentation import augmentation
+from contact.methods.thesis.uzawa import augmentation
 from contact.problem.contact import Contact
 from contact.problem.problem import ContactProblem
 from forms import foundation as forms

@@ -4,10 +4,10 @@ import numpy as np
 from mpi4py import MPI
 
 from contact.interface.friction import Friction
-from contact.methods.fixed_point import FixedPoint
 from contact.methods.following import Following
 from contact.methods.newton import Newton
 from contact.methods.options import FixedPointOptions, NewtonOptions
+from contact.methods.thesis.fixed_point import FixedPoint
 from forms.laws import SlipCoefficient
 from tests.problems.piezo import example, potential
 

@@ -5,7 +5,7 @@ from dataclasses import replace
 import pytest
 
 from contact import evolve
-from contact.methods.every import METHODS
+from contact.methods.method import METHODS
 from contact.methods.options import NewtonOptions
 from contact.methods.report import Outcome
 from contact.methods.steps import Evolution

@@ -12,9 +12,9 @@ from contact.case.file import Case, parse_case
 from contact.errors import InputError
 from contact.interface.friction import Friction
 from contact.interface.multipliers import Multipliers
-from contact.methods.fixed_point import FixedPoint
 from contact.methods.newton import Newton
 from contact.methods.options import FixedPointOptions, NewtonOptions
+from contact.methods.thesis.fixed_point import FixedPoint
 from contact.nesting import coarser_cases
 from contact.problem.problem import ContactProblem
 from contact.problem.state import State

@@ -15,9 +15,9 @@ from contact.interface.friction import Friction
 from contact.interface.obstacle import GapFunction, Plane
 from contact.interface.penalised import Implicit, Lagged, Regularisation
 from contact.mesh import grid as domain
-from contact.methods.fixed_point import FixedPoint
 from contact.methods.options import FixedPointOptions, PenaltyOptions
-from contact.methods.penalty import Penalty
+from contact.methods.thesis.fixed_point import FixedPoint
+from contact.methods.thesis.penalty import Penalty
 from contact.problem.contact import Contact
 from contact.problem.problem import ContactProblem
 from forms.hencky import Linear

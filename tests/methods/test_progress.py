@@ -5,10 +5,10 @@ import pytest
 from mpi4py import MPI
 
 from contact.interface.friction import Friction
-from contact.methods.fixed_point import FixedPoint
 from contact.methods.options import FixedPointOptions, PenaltyOptions
-from contact.methods.penalty import Penalty
 from contact.methods.progress import Best, Stagnation
+from contact.methods.thesis.fixed_point import FixedPoint
+from contact.methods.thesis.penalty import Penalty
 from contact.problem.kkt import evaluate
 from forms.laws import ConstantCoefficient
 from tests.problems import mechanics

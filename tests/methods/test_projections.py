@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from contact.interface.complementarity import disc_derivative, project_disc, project_half_line
-from contact.methods.acceleration import ResidualMinimiser
+from contact.methods.thesis.acceleration import ResidualMinimiser
 
 
 def test_projections():

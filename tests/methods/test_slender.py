@@ -6,9 +6,9 @@ from mpi4py import MPI
 
 from contact import build_problem
 from contact.case.file import parse_case
-from contact.methods.fixed_point import FixedPoint
 from contact.methods.options import FixedPointOptions
-from contact.methods.softness import softer
+from contact.methods.thesis.fixed_point import FixedPoint
+from contact.methods.thesis.spectrum import softer
 from contact.solving import solve
 
 SELF = MPI.COMM_SELF

@@ -5,9 +5,9 @@ import pytest
 from mpi4py import MPI
 
 from contact import build_problem, parse_case
-from contact.methods.fixed_point import FixedPoint
 from contact.methods.newton import Newton
 from contact.methods.options import FixedPointOptions, NewtonOptions
+from contact.methods.thesis.fixed_point import FixedPoint
 from tests.problems import pairs
 
 

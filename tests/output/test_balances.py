@@ -11,8 +11,8 @@ from contact import solve as solve_case
 from contact.body.description import Load
 from contact.errors import InputError
 from contact.interface.friction import Friction
-from contact.methods.fixed_point import FixedPoint
 from contact.methods.options import FixedPointOptions
+from contact.methods.thesis.fixed_point import FixedPoint
 from contact.output.balances import charge_balance, force_balance, mean_potential, sensor
 from contact.problem.problem import ContactProblem
 from tests.problems.mechanics import solve

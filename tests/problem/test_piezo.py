@@ -7,9 +7,9 @@ from mpi4py import MPI
 from contact.case.material import Material, piezo, rotation
 from contact.errors import InputError
 from contact.interface.friction import Friction
-from contact.methods.fixed_point import FixedPoint
 from contact.methods.newton import Newton
 from contact.methods.options import FixedPointOptions, NewtonOptions
+from contact.methods.thesis.fixed_point import FixedPoint
 from contact.output.balances import charge_balance
 from forms.laws import (
     RampConductivity,

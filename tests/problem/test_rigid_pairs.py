@@ -7,9 +7,9 @@ from mpi4py import MPI
 from contact.body.description import Body, Fixed
 from contact.body.rigid import Motion, Rigid
 from contact.interface.friction import Friction
-from contact.methods.fixed_point import FixedPoint
 from contact.methods.newton import Newton
 from contact.methods.options import FixedPointOptions, NewtonOptions
+from contact.methods.thesis.fixed_point import FixedPoint
 from contact.output.motions import movements
 from contact.problem.contact import Contact
 from contact.problem.held import check_held

@@ -10,7 +10,7 @@ from contact.errors import InputError, SingularError
 from contact.interface.friction import Friction
 from contact.interface.obstacle import GapFunction
 from contact.linear.operator import SparseOperator
-from contact.methods.every import METHODS
+from contact.methods.method import METHODS
 from contact.methods.options import OPTIONS
 from contact.output.balances import charge_balance
 from contact.output.table import contact_table

@@ -13,10 +13,10 @@ from contact.interface.friction import Friction
 from contact.interface.obstacle import GapFunction, Plane
 from contact.mesh.domain import Domain
 from contact.mesh.grid import box, rectangle
-from contact.methods.fixed_point import FixedPoint
 from contact.methods.newton import Newton
 from contact.methods.options import FixedPointOptions, NewtonOptions
 from contact.methods.report import Outcome
+from contact.methods.thesis.fixed_point import FixedPoint
 from contact.problem.contact import Contact
 from contact.problem.problem import ContactProblem
 from contact.typing import Array

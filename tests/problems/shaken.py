@@ -7,7 +7,7 @@ from contact.body.description import Body, Fixed
 from contact.interface.friction import Friction
 from contact.interface.obstacle import GapFunction
 from contact.mesh.grid import rectangle
-from contact.methods.every import METHODS
+from contact.methods.method import METHODS
 from contact.methods.options import FixedPointOptions, NewtonOptions
 from contact.methods.steps import Evolution, LoadStep
 from contact.problem.contact import Contact

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from contact.methods.fixed_point import FixedPoint
 from contact.methods.options import FixedPointOptions
+from contact.methods.thesis.fixed_point import FixedPoint
 from contact.problem.problem import ContactProblem
 from tests.problems.piezo import PERMITTIVITY, SCALED, SI, Column, potential
 

@@ -8,9 +8,10 @@ from mpi4py import MPI
 
 from contact.interface.friction import Friction
 from contact.linear.operator import SparseOperator
-from contact.methods.augmentation import augmentation, automatic_r
-from contact.methods.fixed_point import FixedPoint
 from contact.methods.options import FixedPointOptions
+from contact.methods.parameters import automatic_r
+from contact.methods.thesis.fixed_point import FixedPoint
+from contact.methods.thesis.uzawa import augmentation
 from contact.output.balances import charge_balance
 from contact.problem.kkt import residual_forces
 from forms.laws import ConstantCoefficient, SlipCoefficient

@@ -12,8 +12,8 @@ from mpi4py import MPI
 
 from contact.body.description import Body, Fixed, Load
 from contact.mesh.grid import box, rectangle
-from contact.methods.fixed_point import FixedPoint
 from contact.methods.options import FixedPointOptions
+from contact.methods.thesis.fixed_point import FixedPoint
 from contact.problem.contact import Contact
 from contact.problem.problem import ContactProblem
 from forms.hencky import Hencky, Log, stress

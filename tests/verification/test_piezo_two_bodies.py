@@ -7,9 +7,9 @@ from mpi4py import MPI
 from contact.body.description import Body, Fixed, Material
 from contact.body.rigid import Electrode
 from contact.interface.current import Conductor
-from contact.methods.fixed_point import FixedPoint
 from contact.methods.newton import Newton
 from contact.methods.options import FixedPointOptions, NewtonOptions
+from contact.methods.thesis.fixed_point import FixedPoint
 from contact.output.balances import charge_balance
 from contact.output.motions import movements
 from contact.problem.contact import Contact

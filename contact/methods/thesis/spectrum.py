@@ -21,8 +21,8 @@ from mpi4py import MPI
 from contact.errors import InputError
 from contact.interface.jump import Jump
 from contact.linear.operator import Operator
-from contact.methods.augmentation import augmentation, automatic_r, split
-from contact.methods.uzawa import Relaxation
+from contact.methods.parameters import automatic_r
+from contact.methods.thesis.uzawa import Relaxation, augmentation, split
 from contact.problem.kkt import residual_forces
 from contact.problem.protocols import Problem
 from contact.typing import Array

@@ -24,16 +24,15 @@ import numpy as np
 from contact.body.equilibrium import BodyEquilibrium
 from contact.body.norms import domain_norm
 from contact.linear.operator import Counters, Operator
-from contact.methods import uzawa
-from contact.methods.augmentation import augmentation, automatic_r, split
 from contact.methods.following import Following
-from contact.methods.frozen import linearised
 from contact.methods.options import FixedPointOptions
-from contact.methods.progress import Best, Stagnation
+from contact.methods.parameters import automatic_r
+from contact.methods.progress import Best, Stagnation, resting
 from contact.methods.report import History, Monitor, Outcome, Record
-from contact.methods.resting import resting
 from contact.methods.restraint import Restraint
-from contact.methods.softness import Softer, softer, spectrum
+from contact.methods.thesis import uzawa
+from contact.methods.thesis.spectrum import Softer, softer, spectrum
+from contact.methods.thesis.uzawa import augmentation, linearised, split
 from contact.problem.kkt import KKT, evaluate
 from contact.problem.problem import ContactProblem
 from contact.problem.protocols import Problem
