@@ -1,4 +1,4 @@
-"""What the command line shows of a solve: a bar on a terminal, plain lines elsewhere, a log."""
+"""The console output of a solve: a table of its iterations, a bar on a terminal, and a log."""
 
 from __future__ import annotations
 
@@ -17,20 +17,41 @@ from contact.errors import InputError
 from contact.methods.report import Monitor, Record
 from contact.output.folder import on_root
 
-#: Seconds between two words on inner iterations: on a terminal, and in plain lines.
+#: Seconds between two reports of inner iterations: on a terminal, and in plain lines.
 OFTEN, SELDOM = 0.2, 10.0
-#: Loggers of what is within another: the iterations of a solve, its steps, the cases of a sweep.
+#: Loggers, each within the next: the iterations of a solve, its steps, the cases of a sweep.
 RANKS = ("contact.inner", "contact.solver", "contact.steps", "contact.sweep")
 OUTER = "contact.solver"
 #: The bar of many solves.
 SHARES = "{percentage:3.0f}%|{bar}| {elapsed}<{remaining}{postfix}"
+#: Head of the table of iterations: linear solves, residuals and sizes of the active sets. Newton
+#: iterations on the condensed problem, within step 2, are 2.1, 2.2, ...
+HEAD = "   step solves  equilibrium  contact friction   open  stick   slip  note"
+
+
+def table(record: Record, within: str = "") -> list[str]:
+    """Return the rows of an outer iteration and of those within it, below `HEAD`."""
+    if not shown(record.iteration):
+        return []
+    kkt, sets, number = record.kkt, record.sizes or ("", "", ""), f"{within}{record.iteration}"
+    row = (
+        f"{number:>7} {record.inner:6}  {kkt.equilibrium:11.1e} {kkt.contact:8.1e} "
+        f"{kkt.friction:8.1e} {sets[0]:6} {sets[1]:6} {sets[2]:6}  {record.note}"
+    )
+    inner = [line for step in record.steps for line in table(step, f"{number}.")]
+    return [*inner, row.rstrip()]
+
+
+def shown(iteration: int) -> bool:
+    """Tell whether an iteration has a row: all up to 30, then each tenth, from 100 each 100th."""
+    return iteration <= 30 or iteration % 10 ** (len(str(iteration)) - 1) == 0
 
 
 @contextmanager
 def progress(
     comm: MPI.Intracomm, quiet: bool = False, log: str | None = None
 ) -> Iterator[Monitor | None]:
-    """Show the logs of ``contact`` on rank 0 and yield a monitor for the outer iterations.
+    """Show the logs of ``contact`` on rank 0 and yield the monitor that shows the iterations.
 
     Parameters
     ----------
@@ -39,7 +60,7 @@ def progress(
     quiet
         Show warnings alone.
     log
-        A file, to whose end all of it is written with the time, inner iterations too.
+        A file, to whose end all records are written with the time, inner iterations too.
 
     Raises
     ------
@@ -48,14 +69,14 @@ def progress(
     """
     handlers: list[logging.Handler] = [logging.NullHandler()] if comm.rank > 0 else []
     on_root(comm, lambda: handlers.append(_log(log)) if log is not None else None)
-    bar = None
+    monitor: _Bar | _Lines | None = None
     if comm.rank == 0 and not quiet and sys.stderr.isatty():
         from tqdm import tqdm
 
-        bar = _Bar(tqdm(unit=" iterations", file=sys.stderr))
-        handlers.append(bar)
+        monitor = _Bar(tqdm(unit=" iterations", file=sys.stderr))
     elif comm.rank == 0:
-        handlers.append(_Lines(quiet))
+        monitor = _Lines(quiet)
+    handlers += [monitor] if monitor is not None else []
     logger = logging.getLogger("contact")
     level = logger.level
     for handler in handlers:
@@ -63,7 +84,7 @@ def progress(
     detailed = comm.rank == 0 and (log is not None or not quiet)
     logger.setLevel(logging.DEBUG if detailed else logging.WARNING)
     try:
-        yield bar
+        yield monitor
     finally:
         logger.setLevel(level)
         for handler in handlers:
@@ -81,16 +102,17 @@ class _Named(logging.Formatter):
 
 
 class _Ranked(logging.Handler):
-    """Follows what leads, the highest of the loggers in `RANKS` that has spoken so far."""
+    """Follows the leading logger: the highest of those in `RANKS` that has spoken so far."""
 
     def __init__(self, level: int) -> None:
         super().__init__(level)
         self.setFormatter(_Named())
         self._lead = RANKS.index(OUTER)
         self._last = time.monotonic()
+        self._rows = 0
 
     def _leads(self, name: str) -> bool:
-        """Note who speaks; tell whether it is what leads, or none of the ranks."""
+        """Note a logger that speaks; tell whether it leads, or is none of the ranks."""
         if name not in RANKS:
             return True
         self._lead = max(self._lead, RANKS.index(name))
@@ -104,22 +126,38 @@ class _Ranked(logging.Handler):
             self._last = now
         return silent
 
+    def _table(self, record: Record) -> list[str]:
+        """Return the lines of the table for an iteration, where iterations lead."""
+        if RANKS[self._lead] != OUTER:
+            return []
+        self._rows += 1
+        return [*[HEAD] * (self._rows == 1), *table(record)]
+
 
 class _Lines(_Ranked):
-    """Plain lines; of iterations within what leads one now and then, where nothing else is said."""
+    """Plain lines; of iterations within a step or case one now and then, in long silence."""
 
     def __init__(self, quiet: bool) -> None:
         super().__init__(logging.WARNING if quiet else logging.DEBUG)
+        self._quiet = quiet
+
+    def __call__(self, record: Record) -> None:
+        """Show an outer iteration."""
+        if not self._quiet:
+            for line in self._table(record):
+                print(line, file=sys.stderr, flush=True)
 
     def emit(self, record: logging.LogRecord) -> None:
-        """Write a line."""
+        """Write a line; that of a leading iteration stands in the table."""
         leads = self._leads(record.name) and record.levelno >= logging.INFO
-        if self._silent_for(0.0 if leads else SELDOM) and (leads or record.name in RANKS):
+        if leads and record.name == OUTER and record.levelno < logging.WARNING:
+            self._last = time.monotonic()
+        elif self._silent_for(0.0 if leads else SELDOM) and (leads or record.name in RANKS):
             print(self.format(record), file=sys.stderr, flush=True)
 
 
 class _Bar(_Ranked):
-    """A bar over outer iterations, or over the share of many solves that is done."""
+    """A bar over outer iterations below their table, or over the finished share of many solves."""
 
     def __init__(self, bar: Any) -> None:
         super().__init__(logging.DEBUG)
@@ -127,16 +165,12 @@ class _Bar(_Ranked):
 
     def __call__(self, record: Record) -> None:
         """Show an outer iteration."""
-        kkt = record.kkt
-        self._bar.set_postfix_str(
-            f"{record.inner} solves, residuals {kkt.equilibrium:.1e} {kkt.contact:.1e} "
-            f"{kkt.friction:.1e} {record.note}",
-            refresh=False,
-        )
+        for line in self._table(record):
+            self._bar.write(line, file=sys.stderr)
         self._bar.update(1 if RANKS[self._lead] == OUTER else 0)
 
     def emit(self, record: logging.LogRecord) -> None:
-        """Show in the bar what leads and what is within it, and other lines above it."""
+        """Show the leading logger and those within it in the bar, and other lines above it."""
         leads = self._leads(record.name)
         if record.name not in RANKS:
             if record.levelno >= logging.INFO:
@@ -155,7 +189,7 @@ class _Bar(_Ranked):
 
 
 def _log(name: str) -> logging.Handler:
-    """Open a log, and write who runs what where."""
+    """Open a log, and write the command line and its process there."""
     try:
         handler = logging.FileHandler(name, encoding="utf-8", errors="backslashreplace")
     except OSError as error:

@@ -8,6 +8,7 @@ import signal
 import sys
 from pathlib import Path
 
+import numpy as np
 from mpi4py import MPI
 
 from contact.case.file import Case, load_case
@@ -20,12 +21,13 @@ from contact.output.files import write_outputs
 from contact.output.folder import on_root, result_folder
 from contact.output.rerun import check_kept, check_rerun, check_restart
 from contact.output.resume import case_of, discard, kept_case
+from contact.output.solution import Solution
 from contact.output.transaction import check_foreign
 from contact.solving import SolveInterrupted, solve
 from contact.sweeping import TABLE, Axis, sweep
 
 #: Seconds after a signal from which on a second one ends the writing of results too.
-PATIENCE = 2.0
+GRACE = 2.0
 
 
 def run(options: argparse.Namespace, comm: MPI.Intracomm) -> int:
@@ -55,15 +57,16 @@ def _solve(options: argparse.Namespace, comm: MPI.Intracomm) -> int:
         if outcome.signal and not solution.begun and earlier:  # which are worth more
             raise Terminated if outcome.signal == signal.SIGTERM else KeyboardInterrupt
         # Results that have taken long to compute are written, signal or not.
-        with signals_held(PATIENCE) as caught:
+        with signals_held(GRACE) as caught:
             write_outputs(solution, folder, figures=options.plot)
             if outcome.converged:
                 on_root(comm, lambda: discard(folder.path))
             number = comm.allreduce(caught[0] if caught else 0, op=MPI.MAX)
             caught.clear()
+    results = [] if options.quiet else _results(solution)
     if comm.rank == 0 and not (options.quiet and outcome.converged):
         state = "converged" if outcome.converged else "stopped"
-        text = f"{state}: {outcome.reason}; results in {folder.path}"
+        text = "\n".join([f"{state}: {outcome.reason}; results in {folder.path}", *results])
         print(
             f"contact: {text}" if options.quiet else text,
             file=sys.stderr if options.quiet else None,
@@ -72,6 +75,23 @@ def _solve(options: argparse.Namespace, comm: MPI.Intracomm) -> int:
     if outcome.signal or number:
         return SIGNALLED + (outcome.signal or number)
     return CONVERGED if outcome.converged else NOT_CONVERGED
+
+
+def _results(solution: Solution) -> list[str]:
+    """Return the main results in lines. Collective."""
+    nodes, status = solution.problem.nodes, solution.status
+    area, sticks = solution.contact_area, nodes.sum(np.where(status == "stick", 1.0, 0.0))
+    force = ", ".join(f"{component:.6g}" for component in solution.contact_force)
+    seconds = ", ".join(f"{name} {value:.2f}" for name, value in solution.seconds.items())
+    share = f"{sticks / area:.1%} of the contact area" if area > 0 else "nothing touches"
+    rows = {
+        "contact force": f"({force})",
+        "contact area": f"{area:.6g}",
+        "largest pressure": f"{nodes.maximum(solution.pressure):.6g} {solution.units.stress or ''}",
+        "sticking": share,
+        "seconds": seconds,
+    }
+    return [f"  {name:18}{value}".rstrip() for name, value in rows.items()]
 
 
 def _load(options: argparse.Namespace) -> Case:

@@ -158,6 +158,22 @@ class Interface:
             return ActiveSet.without_slip(closed, False)
         return ActiveSet.of(closed, forces.friction, self.slip(nodal), bound, c, rounding)
 
+    def sizes(self, nodal: Array, active: ActiveSet) -> tuple[int, int, int]:
+        """Return the numbers of nodes that are open, stick and slip. Collective.
+
+        Parameters
+        ----------
+        nodal
+            Unknowns: a node that presses the layer alone is not open.
+        active
+            The active set.
+        """
+        closed = active.closed | (self.response.layer_pressure(nodal) > 0)
+        sticks = closed & active.sticks
+        local = np.array([np.sum(~closed), np.sum(sticks), np.sum(closed & ~sticks)])
+        opened, stick, slip = self.comm.allreduce(local, op=MPI.SUM).tolist()
+        return opened, stick, slip
+
     def add_forces(self, residual: Array, x: Array, forces: Multipliers) -> None:
         """Add all that the foundation does to the body at local unknowns, to owned values."""
         jump, nodal = self.jump, self.jump.apply(x)

@@ -133,7 +133,7 @@ class CondensedStep:
         notes = [record.note for record in history.records]
         taken = [word for word in self._fallbacks if any(word in note for note in notes)]
         note = ", ".join([*["kept"] * keep, *["lengthened"] * (length > 1), *taken])
-        return Taken(replace(end, state=new), note, solves, length > 1)
+        return Taken(replace(end, state=new), note, length > 1, tuple(history.records))
 
     def _length(self, new: State, state: State, increment: Array) -> float:
         """Return how far to go along a step that leads from one state to another. Collective."""

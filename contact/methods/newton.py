@@ -263,6 +263,14 @@ def _solve_condensed(
     return method.run(iterate)
 
 
+def _sizes(iterate: Iterate, problem: Problem) -> tuple[int, int, int] | None:
+    """Return the numbers of nodes that are open, stick and slip, if they are known. Collective."""
+    if iterate.active_set is None:
+        return None
+    interface = problem.interface
+    return interface.sizes(interface.jump.apply(iterate.state.x), iterate.active_set)
+
+
 @dataclass
 class NewtonLoop:
     """Steps of one kind, until the residuals say that they have converged or stagnate.
@@ -316,7 +324,9 @@ class NewtonLoop:
             search.see(iterate, residuals)
             words = (note, taken.note, "tangent" * tangent, "taken back" * worse)
             said = " ".join(word for word in words if word)
-            search.history.record(residuals, said, contact=taken.solves)
+            search.history.record(
+                residuals, said, sizes=_sizes(iterate, problem), steps=taken.inner
+            )
             if worse:
                 iterate = kept
                 residuals = evaluate(problem, iterate.state)

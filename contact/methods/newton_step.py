@@ -24,7 +24,7 @@ from contact.linear.operator import Counters, Operator
 from contact.methods.following import Following
 from contact.methods.options import NewtonOptions
 from contact.methods.progress import Best
-from contact.methods.report import History
+from contact.methods.report import History, Record
 from contact.problem.kkt import KKT, residual_forces
 from contact.problem.protocols import Problem
 from contact.problem.state import State
@@ -80,16 +80,16 @@ class Taken:
         Where it led.
     note
         What was special about it.
-    solves
-        Dense solves at the contact nodes that it took.
     lengthened
         Whether it has gone on to where the energy is least along it.
+    inner
+        Newton iterations on the condensed problem that it took.
     """
 
     iterate: Iterate
     note: str = ""
-    solves: int = 0
     lengthened: bool = False
+    inner: tuple[Record, ...] = ()
 
 
 @dataclass

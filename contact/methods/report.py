@@ -38,8 +38,10 @@ class Record:
         Since the start of the solve.
     note
         What was special about it, for instance "tangent".
-    contact
-        Dense solves at the contact nodes that it took, with the body condensed onto these.
+    sizes
+        Numbers of nodes that are open, stick and slip after it; None where nothing is known.
+    steps
+        Newton iterations on the condensed problem that it took.
     """
 
     iteration: int
@@ -48,7 +50,13 @@ class Record:
     change: float
     seconds: float
     note: str = ""
-    contact: int = 0
+    sizes: tuple[int, int, int] | None = None
+    steps: tuple[Record, ...] = ()
+
+    @property
+    def contact(self) -> int:
+        """Linear systems of the condensed problem that were solved."""
+        return sum(step.inner for step in self.steps)
 
 
 class Monitor(Protocol):
@@ -100,10 +108,18 @@ class History:
         """Count the seconds from now on."""
         self._begin = time.perf_counter()
 
-    def record(self, kkt: KKT, note: str, inner: int = 1, contact: int = 0) -> None:
-        """Append a record of the next step, with what it took; see `Record`."""
+    def record(
+        self,
+        kkt: KKT,
+        note: str,
+        inner: int = 1,
+        sizes: tuple[int, int, int] | None = None,
+        steps: tuple[Record, ...] = (),
+    ) -> None:
+        """Append a record of the next step; see `Record`."""
         seconds = time.perf_counter() - self._begin
-        self.add(Record(len(self.records) + 1, inner, kkt, np.nan, seconds, note, contact))
+        number = len(self.records) + 1
+        self.add(Record(number, inner, kkt, np.nan, seconds, note, sizes, steps))
 
     def quiet(self) -> Monitor:
         """Return a monitor for a loop within a step: it looks whether the solve is to end."""

@@ -13,6 +13,7 @@ import pytest
 from contact.case.file import load_case, parse_case
 from contact.cli.arguments import parse
 from contact.cli.main import main
+from contact.cli.progress import HEAD
 from contact.output.environment import identify
 
 
@@ -70,7 +71,7 @@ def test_exit_status_and_outputs_of_a_solve(bar, capsys, monkeypatch, limit, sta
     assert written == [(status == 0, bar.parent / "out")]
     shown = capsys.readouterr()
     assert shown.out.startswith("stopped: " if status else "converged: ")
-    assert "iteration 0" in shown.err
+    assert HEAD in shown.err
 
 
 @pytest.mark.parametrize("stage", ["setup", "nested"])

@@ -1,5 +1,6 @@
 """What is shown of a run: lines of what leads, a bar over steps on a terminal, a log of all."""
 
+import json
 import logging
 import re
 from pathlib import Path
@@ -8,7 +9,7 @@ from typing import Any
 import pytest
 
 from contact.cli.main import main
-from contact.cli.progress import _Bar
+from contact.cli.progress import HEAD, _Bar, shown
 from contact.methods.report import tell
 from scripts.cases import CASES
 
@@ -22,15 +23,35 @@ def test_an_evolution_has_a_line_a_step(tmp_path: Path, capsys: pytest.CaptureFi
     shown = capsys.readouterr().err
     found = re.findall(r"^t = ([\d.]+) of 6: iterations \d+, residual \S+e-\d+$", shown, re.M)
     assert [float(time) for time in found] == [1.0, 1.5, 2.0, 4.0, 6.0]
-    assert "iteration 1:" not in shown and "iteration 1:" in log.read_text()
+    assert HEAD not in shown and "iteration 1:" in log.read_text()
 
 
 def test_a_static_solve_has_a_line_an_iteration(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     case = str(CASES / "bar.toml")
-    assert main(["solve", case, "--out", str(tmp_path), "--set", "mesh.cells=[8,2]"]) == 0
-    assert "iteration 1:" in capsys.readouterr().err
+    changes = ["--set", "mesh.cells=[8,2]", "--set", "solver.method=newton"]
+    assert main(["solve", case, "--out", str(tmp_path), *changes]) == 0
+    shown = capsys.readouterr()
+    head, *rows = [line for line in shown.err.splitlines() if not line.startswith("warning")]
+    assert head == HEAD
+    summary = json.loads((tmp_path / "summary.json").read_text())
+    steps = [row.split()[0] for row in rows]
+    assert steps[:2] == ["1.1", "1.2"]
+    assert [step for step in steps if "." not in step] == [
+        str(i + 1) for i in range(summary["outer_iterations"])
+    ]
+    counts = [int(count) for count in rows[-1].split()[5:8]]
+    assert counts[1:] == [summary["stick_nodes"], summary["slip_nodes"]]
+    assert sum(counts) == 8
+    force, _, pressure = (line.split() for line in shown.out.splitlines()[1:4])
+    assert float(force[-1].strip("()")) == pytest.approx(summary["contact_force"][1], rel=1e-5)
+    assert float(pressure[2]) == pytest.approx(summary["max_pressure"], rel=1e-5)
+
+
+def test_long_tables_are_thinned() -> None:
+    assert [i for i in range(1000) if shown(i)] == [*range(31), *range(40, 100, 10),
+                                                    *range(100, 1000, 100)]  # fmt: skip
 
 
 def test_a_sweep_has_a_line_a_case(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -39,7 +60,7 @@ def test_a_sweep_has_a_line_a_case(tmp_path: Path, capsys: pytest.CaptureFixture
     assert main(["sweep", case, "--out", str(tmp_path), *arguments]) == 0
     shown = capsys.readouterr().err
     assert re.findall(r"^friction.mu=(\S+): all residuals", shown, re.M) == ["0.1", "0.3"]
-    assert "iteration 1:" not in shown
+    assert HEAD not in shown
 
 
 class Tqdm:
