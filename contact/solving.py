@@ -29,9 +29,9 @@ from contact.methods.options import NewtonOptions, Options
 from contact.methods.report import History, Monitor, Outcome, tell
 from contact.methods.steps import Evolution, LoadStep, solve_step
 from contact.nesting import nested_start, pays
+from contact.output.checkpoint import Checkpoints, kept_digest, read_steps
 from contact.output.folder import on_root
 from contact.output.record import StepRecord
-from contact.output.resume import Checkpoints, kept_digest, read_steps
 from contact.output.review import announce
 from contact.output.solution import Solution
 from contact.output.steps import StepRecorder

@@ -17,10 +17,10 @@ from contact.cli.ending import CONVERGED, NOT_CONVERGED
 from contact.cli.progress import progress
 from contact.errors import InputError
 from contact.methods.interrupt import SIGNALLED, Terminated, signals_held
+from contact.output.checkpoint import case_of, discard, kept_case
 from contact.output.files import write_outputs
 from contact.output.folder import on_root, result_folder
 from contact.output.rerun import check_kept, check_rerun, check_restart
-from contact.output.resume import case_of, discard, kept_case
 from contact.output.solution import Solution
 from contact.output.transaction import check_foreign
 from contact.solving import SolveInterrupted, solve

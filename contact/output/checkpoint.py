@@ -1,239 +1,482 @@
-"""Checkpoints: mesh, parts and solution in one file, readable on any number of ranks."""
+"""Checkpoints: the state of a solution, and of each step of an evolution, for any number of ranks.
+
+A file a step, written under another name and renamed when it is whole: whatever ends a run, the
+steps before remain. Nodes are found again by where they are, on other ranks too. A manifest names
+the files with their checksums: it alone says which of them belong to a run.
+"""
 
 from __future__ import annotations
 
+import hashlib
+import io
+import json
+import logging
 import os
+import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from contextlib import suppress
 from pathlib import Path
-from types import ModuleType
+from typing import Any
+from zipfile import BadZipFile
 
 import numpy as np
 from dolfinx import fem
-from dolfinx import mesh as dmesh
+from dolfinx.la import InsertMode
 from mpi4py import MPI
+from numpy.typing import NDArray
+from scipy.spatial import cKDTree
 
+from contact import _compat
 from contact.errors import InputError
+from contact.history import CONTACT_NODES, QUADRATURE_POINTS
 from contact.interface.multipliers import Multipliers
-from contact.mesh.domain import Domain, from_mesh
-from contact.mesh.entities import Indices, combinations, exterior_facets
-from contact.mesh.revolution import revolved
-from contact.output.disk import OVERHEAD, claim_room, library_errors
-from contact.output.fields import nodal_function, unknowns
-from contact.output.folder import settle
+from contact.output.folder import on_root, settle
+from contact.output.record import StepRecord
 from contact.output.solution import Solution
+from contact.output.transaction import kind
 from contact.problem.problem import ContactProblem
 from contact.problem.state import State
 from contact.typing import Array
 
-#: Groups of attributes. adios4dolfinx 0.9 strips the letters of the group's name from the start
-#: of the attributes' names, so that the former are digits and the latter begin with letters.
-PARTS, KIND, REGIONS, NAME = "1", "2", "3", "name "
+#: Folder of the checkpoints in that of the results, that of a run which has not ended a step yet,
+#: and the case in it.
+FOLDER, FRESH, CASE = "checkpoints", "checkpoints.new", "case.toml"
+#: File with the digests of what they were computed from.
+_DIGEST = "digest.json"
+#: The list of the files in a folder of checkpoints, and a file before it has its name.
+MANIFEST, DRAFT = "manifest.json", ".contact-draft"
+_NODES = "nodes.npz"
+#: Names that a manifest may have: it is data of whoever wrote it.
+_LISTED = re.compile(r"\d{5}\.npz|case\.toml|digest\.json|nodes\.npz")
+#: Begin of the names of the arrays of a history in a checkpoint.
+HISTORY = "history "
+#: How near a node has to be to where it was, over the size of the body.
+_NEAR = 1e-9
+
+logger = logging.getLogger("contact.steps")
 
 
-@dataclass(frozen=True)
-class Checkpoint:
-    """What a checkpoint holds.
+class Checkpoints:
+    """The checkpoints that a run writes. Collective.
 
-    Attributes
+    Parameters
     ----------
-    domain
-        Mesh and parts, to build the problem on: `build_problem(case, domain=checkpoint.domain)`.
-    displacement, contact_forces, potential
-        The solution; the contact forces lambda_c nu + lambda_f at the contact nodes, 0 elsewhere.
-    motion
-        The global unknowns, see `contact.body.masters`.
+    folder
+        The folder of the results.
+    problem
+        The problem of the evolution.
+    case
+        The case, as `contact check` prints it.
+    kept
+        Records of earlier steps. Where those are already in the folder, the next one follows
+        them; else they are written there first.
+    here
+        Whether they are.
+    digest
+        Digests of what the problem is made of, by names; None where nothing is known of them.
+
+    Raises
+    ------
+    InputError
+        If something stands under the name of the folder that no run has left there.
     """
 
-    domain: Domain
-    displacement: fem.Function
-    contact_forces: fem.Function
-    potential: fem.Function | None
-    motion: Array
+    def __init__(
+        self,
+        folder: Path,
+        problem: ContactProblem,
+        case: str,
+        kept: Sequence[StepRecord] = (),
+        here: bool = False,
+        digest: Mapping[str, str] | None = None,
+    ) -> None:
+        self._folder, self._problem, self._case = folder, problem, case
+        self._digest = digest or {}
+        self._count, self._fresh = 0, not here
+        if here:
+            self._count, self._where = len(kept), _where(folder, problem)
+            on_root(problem.comm, lambda: _cut(_files(folder)[0].parent, self._count))
+            return
+        points = _places(problem)
+        #: Rows of the owned nodes in the files.
+        self._where = (problem.comm.exscan(len(points)) or 0) + np.arange(len(points))
+        gathered = problem.comm.gather(points)
+        on_root(problem.comm, lambda: self._begin(np.concatenate(gathered or [points])))
+        for record in kept:
+            self._gather(record)
 
-    def restore(self, problem: ContactProblem) -> State:
-        """Return the state of a problem on the checkpoint's domain.
+    def _begin(self, points: Array) -> None:
+        fresh = self._folder / FRESH
+        _check_own(self._folder)
+        _remove(fresh)
+        fresh.mkdir(parents=True, exist_ok=True)
+        _put(fresh / MANIFEST, json.dumps({}).encode())
+        _save(fresh, CASE, self._case.encode())
+        _save(fresh, _DIGEST, json.dumps(self._digest, indent=1).encode())
+        _save(fresh, _NODES, _packed({"points": points}))
 
-        Raises
-        ------
-        InputError
-            If the problem lives on another mesh, or has another degree or kind of unknowns.
-        """
-        given = self.displacement.function_space
-        same = given.ufl_element().embedded_superdegree == problem.equilibrium.degree
-        same &= problem.domain.mesh is self.domain.mesh
-        same &= problem.equilibrium.masters.size == self.motion.size
-        if not same or problem.piezoelectric != (self.potential is not None):
-            raise InputError(
-                "the checkpoint does not fit the problem; accepted: one built on the checkpoint's "
-                "domain, with the degree, the kind of material and the rigid parts that it was "
-                "written with"
-            )
-        body, d = problem.equilibrium, problem.dim
-        nodes = body.space.dofmap.list
-        x = body.nodal(body.rest())
-        x[nodes, :d] = self.displacement.x.array.reshape(-1, d)[given.dofmap.list]
-        if self.potential is not None:
-            dofs = self.potential.function_space.dofmap.list
-            x[nodes, d] = self.potential.x.array[dofs] / body.phi_scale
-        vectors = np.zeros((x.shape[0], d))
-        vectors[nodes] = self.contact_forces.x.array.reshape(-1, d)[given.dofmap.list]
-        jump = problem.nodes
-        local = vectors[jump.nodes]
-        forces = Multipliers.of(jump, jump.normal_component(local), local)
-        owned = np.concatenate([x.ravel()[: body.owned], self.motion])
-        return State(body.local(owned), forces)
+    def keep(self, record: StepRecord) -> None:
+        """Write the checkpoint of the next step; the first replaces those of an earlier run."""
+        self._gather(record)
+        if self._fresh:
+            on_root(self._problem.comm, self._settle)
+        self._fresh = False
+
+    def _settle(self) -> None:
+        _check_own(self._folder)
+        _remove(self._folder / FOLDER)
+        os.rename(self._folder / FRESH, self._folder / FOLDER)
+
+    def _gather(self, record: StepRecord) -> None:
+        self._count += 1
+        problem, arrays = self._problem, _gathered(self._problem, record.state, self._where)
+        said = {"enthalpy": record.enthalpy, "unloaded": record.unloaded}
+        said["rounding"] = record.rounding
+        arrays |= {"said": np.array(json.dumps(said)), "row": np.array(json.dumps(record.row))}
+        arrays |= {f"table {name}": column for name, column in (record.table or {}).items()}
+        place = self._folder / (FRESH if self._fresh else FOLDER)
+        on_root(problem.comm, lambda: _save(place, _name(self._count), _packed(arrays)))
+
+
+def _gathered(problem: ContactProblem, state: State, where: NDArray[np.intp]) -> dict[str, Any]:
+    """Return the arrays of a state on rank 0, the owned nodes in given rows. Collective."""
+    body, history = problem.equilibrium, state.history or problem.initial
+    values = {
+        "where": where,
+        "x": body.nodal(state.x)[: where.size],
+        "contact": where[problem.nodes.nodes],
+        "pressure": state.forces.pressure,
+        "friction": state.forces.friction,
+    }
+    values |= {HISTORY + name: array for name, array in history.arrays().items()}
+    if QUADRATURE_POINTS in history.places:
+        values[QUADRATURE_POINTS] = problem.points(QUADRATURE_POINTS)
+    arrays: dict[str, Any] = {"motion": body.motion(state.x), "t": np.array(state.time)}
+    for name, own in values.items():
+        parts = problem.comm.gather(own)
+        arrays[name] = own if parts is None else np.concatenate(parts)
+    if problem.comm.rank == 0:
+        arrays["x"] = arrays["x"][np.argsort(arrays.pop("where"))]
+    return arrays
 
 
 def write_checkpoint(solution: Solution, path: str | Path) -> None:
-    """Write a checkpoint. Collective.
+    """Write the state of a solution into a file. Collective.
 
     Raises
     ------
     InputError
-        If adios4dolfinx is missing, or there is no room for it.
-    OSError
-        On a rank where the library fails all the same; others may wait for it.
+        If that is refused.
     """
-    adios, problem, path = _adios(), solution.problem, Path(path)
-    domain, d = problem.domain, problem.dim
-    sets = {PARTS: _combined(domain, PARTS, domain.parts)}
-    sets[REGIONS] = _combined(domain, REGIONS, domain.regions)
-    body, state = problem.equilibrium, solution.state
-    vectors = np.zeros((body.nodal(state.x).shape[0], d))
-    vectors[problem.nodes.nodes] = state.forces.vectors(problem.nodes)
-    forces = nodal_function("contact_forces", body.space, vectors, (d,))
-    functions = {**unknowns(body, state.x), "contact_forces": forces}
-    kind = {"degree": np.array([body.degree]), "size": np.array([domain.size])}
-    kind["piezoelectric"] = np.array([int(problem.piezoelectric)])
-    kind["revolved"] = np.array([int(domain.revolved)])
-    # An empty attribute cannot be written.
-    kind["motion"] = np.append(body.motion(state.x), 0.0)
-    for function in functions.values():
-        function.x.scatter_forward()
-    written = [*functions.values(), *(numbers for numbers, _ in sets.values())]
-    claim_room(domain.comm, path.parent, _bytes(domain, written))
-    with library_errors(path):
-        adios.write_mesh(path, domain.mesh)
-        for group, (numbers, names) in sets.items():
-            _write_sets(path, group, numbers, names)
-        adios.write_attributes(path, domain.comm, KIND, kind)
-        for name, function in functions.items():
-            adios.write_function(path, function, name=name)
+    problem, points = solution.problem, _places(solution.problem)
+    begin = problem.comm.exscan(len(points)) or 0
+    arrays = _gathered(problem, solution.state, begin + np.arange(len(points)))
+    whole = problem.comm.gather(points)
+    if whole is not None:
+        arrays["points"] = np.concatenate(whole)
+    on_root(problem.comm, lambda: Path(path).write_bytes(_packed(arrays)))
 
 
-def _bytes(domain: Domain, functions: Sequence[fem.Function]) -> int:
-    """Bound what this rank adds to a checkpoint."""
-    mesh = domain.mesh
-    cells = mesh.topology.index_map(mesh.topology.dim).size_local
-    numbers = mesh.geometry.x.size + cells * (mesh.topology.dim + 2)
-    for function in functions:
-        links = function.function_space.dofmap
-        size = links.list.shape[1] * links.index_map_bs
-        numbers += function.x.array.size + cells * (size + 2)
-    # A function is written by itself, with names and offsets of its own.
-    return 8 * numbers + (len(functions) + 2) * OVERHEAD
-
-
-def read_checkpoint(path: str | Path, comm: MPI.Intracomm = MPI.COMM_WORLD) -> Checkpoint:
-    """Read a checkpoint on as many ranks as there are. Collective.
+def read_checkpoint(path: str | Path, problem: ContactProblem) -> State:
+    """Return the state in a file that `write_checkpoint` wrote, on any number of ranks. Collective.
 
     Raises
     ------
     InputError
-        If there is no such checkpoint, or adios4dolfinx is missing.
+        If there is none, or it is of another problem.
     """
-    adios, path = _adios(), Path(path)
-    if comm.rank == 0:
-        settle(path.parent)
-    if not comm.bcast(path.is_dir() if comm.rank == 0 else None):
-        raise InputError(f"{path}: there is no checkpoint; accepted: a folder checkpoint.bp")
-    mesh = adios.read_mesh(path, comm, ghost_mode=dmesh.GhostMode.none)
-    kind = adios.read_attributes(path, comm, KIND)
-    parts, regions = (_read_sets(path, mesh, group) for group in (PARTS, REGIONS))
-    domain = from_mesh(mesh, parts, float(kind["size"][0]), regions)
-    if kind.get("revolved", [0])[0]:
-        domain = revolved(domain)
-    degree = int(kind["degree"][0])
 
-    def function(name: str, shape: tuple[int, ...]) -> fem.Function:
-        made = fem.Function(fem.functionspace(mesh, ("Lagrange", degree, shape)), name=name)
-        adios.read_function(path, made, name=name)
-        return made
+    def load() -> dict[str, NDArray[Any]]:
+        settle(Path(path).parent)
+        try:
+            return _unpacked(Path(path).read_bytes())
+        except (ValueError, KeyError, EOFError, BadZipFile) as error:
+            raise InputError(f"{path}: no checkpoint ({error}); accepted: one of a run") from None
 
-    return Checkpoint(
-        domain,
-        function("displacement", (domain.dim,)),
-        function("contact_forces", (domain.dim,)),
-        function("potential", ()) if kind["piezoelectric"][0] else None,
-        np.asarray(kind["motion"], dtype=float)[:-1],
+    arrays = on_root(problem.comm, load)
+    fits = arrays.keys() >= {"points", "x", "contact", "pressure", "friction"}
+    where = _rows(problem, arrays["points"]) if fits else None
+    if where is None or arrays["contact"].size != problem.nodes.size:
+        raise InputError(
+            f"{path}: the checkpoint does not fit the problem; accepted: that of the same case"
+        )
+    return _state(problem, arrays, where)
+
+
+def read_steps(folder: Path, problem: ContactProblem) -> list[StepRecord]:
+    """Return the records of the steps that a run has left in a folder, up to a damaged one.
+
+    Collective.
+
+    Raises
+    ------
+    InputError
+        If there are none, or they belong to another mesh.
+    """
+    where = _where(folder, problem)
+    files: list[Path] = on_root(problem.comm, lambda: _intact(folder))
+    return [_read(problem, path, where) for path in files]
+
+
+def _where(folder: Path, problem: ContactProblem) -> NDArray[np.intp]:
+    """Return the rows of the owned nodes in the files of a folder. Collective."""
+    points = on_root(problem.comm, lambda: _load(_files(folder)[0].parent / _NODES)["points"])
+    where = _rows(problem, points)
+    if where is None:
+        raise InputError(
+            f"--restart {folder}: given checkpoints of another mesh; accepted: those of the same "
+            "case"
+        )
+    return where
+
+
+def _rows(problem: ContactProblem, points: Array) -> NDArray[np.intp] | None:
+    """Return the rows of the owned nodes among those of a file; None if it is another mesh."""
+    comm, mine = problem.comm, _places(problem)
+    where = np.zeros(len(mine), dtype=np.intp)
+    fits = points.shape == (comm.allreduce(len(mine), op=MPI.SUM), mine.shape[1])
+    if fits and len(mine):
+        distance, where = cKDTree(points).query(mine)
+        fits = bool(distance.max() <= _NEAR * problem.domain.size)
+    return where if comm.allreduce(fits, op=MPI.LAND) else None
+
+
+def _read(problem: ContactProblem, path: Path, where: NDArray[np.intp]) -> StepRecord:
+    table = None
+    arrays = on_root(problem.comm, lambda: _load(path))
+    if problem.comm.rank == 0:
+        table = {
+            name.removeprefix("table "): column
+            for name, column in arrays.items()
+            if name.startswith("table ")
+        }
+    said, row = json.loads(str(arrays["said"])), json.loads(str(arrays["row"]))
+    state = _state(problem, arrays, where)
+    return StepRecord(state, row, table, said["enthalpy"], said["unloaded"], said["rounding"])
+
+
+def _state(
+    problem: ContactProblem, arrays: Mapping[str, NDArray[Any]], where: NDArray[np.intp]
+) -> State:
+    """Return this rank's share of a state."""
+    order = np.argsort(arrays["contact"])
+    own = np.searchsorted(arrays["contact"], where[problem.nodes.nodes], sorter=order)
+    here = {CONTACT_NODES: order[own]}
+    if QUADRATURE_POINTS in arrays:
+        points = problem.points(QUADRATURE_POINTS)
+        nearest = cKDTree(arrays[QUADRATURE_POINTS]).query(points)[1] if len(points) else []
+        here[QUADRATURE_POINTS] = np.asarray(nearest, dtype=np.intp)
+    history = {
+        name: arrays[HISTORY + name][here[place]]
+        for place in problem.initial.places
+        for name in problem.initial.arrays(place)
+    }
+    return State(
+        problem.equilibrium.local(np.concatenate([arrays["x"][where].ravel(), arrays["motion"]])),
+        Multipliers.of(
+            problem.nodes, arrays["pressure"][order[own]], arrays["friction"][order[own]]
+        ),
+        float(arrays["t"]),
+        problem.initial.replaced(history),
     )
 
 
-def _combined(
-    domain: Domain, group: str, sets: Mapping[str, Indices]
-) -> tuple[fem.Function, dict[str, Indices]]:
-    """Return which of named sets of facets or cells meet, a number each entity. Collective.
+def case_of(folder: Path) -> Path:
+    """Return where the case of an interrupted evolution stands. On one rank.
 
-    Returns
-    -------
-    The numbers, and those that belong to each name. A function carries the former: adios4dolfinx
-    0.9 divides by zero where it writes tags and a rank has none.
+    Raises
+    ------
+    InputError
+        If there is none.
     """
-    numbers, dofs = _numbers(domain.mesh, group)
-    labels, here = combinations(dofs.size, sets.values())
-    there = sorted(set().union(*domain.comm.allgather(here)))
-    numbers.x.array[dofs] = np.array([there.index(combined) for combined in here])[labels]
-    numbers.x.scatter_forward()
-    return numbers, {
-        NAME + name: np.array(
-            [k for k, combined in enumerate(there) if i in combined], dtype=np.int32
-        )
-        for i, name in enumerate(sets)
-    }
+    return _files(folder)[0].parent / CASE
 
 
-def _write_sets(
-    path: Path, group: str, numbers: fem.Function, names: Mapping[str, Indices]
-) -> None:
-    """Write what `_combined` returned. Collective."""
-    adios = _adios()
-    adios.write_function(path, numbers, name=group)
-    adios.write_attributes(path, numbers.function_space.mesh.comm, group, names)
+def kept_digest(folder: Path) -> dict[str, str]:
+    """Return the digests of what the checkpoints in a folder were computed from. On one rank.
 
-
-def _read_sets(path: Path, mesh: dmesh.Mesh, group: str) -> dict[str, Indices]:
-    """Read what `_write_sets` wrote. Collective."""
-    numbers, dofs = _numbers(mesh, group)
-    adios = _adios()
-    adios.read_function(path, numbers, name=group)
-    labels = np.rint(numbers.x.array[dofs])
-    names = adios.read_attributes(path, mesh.comm, group)
-    return {
-        name.removeprefix(NAME): np.flatnonzero(np.isin(labels, names[name])).astype(np.int32)
-        for name in sorted(names)
-    }
-
-
-def _numbers(mesh: dmesh.Mesh, group: str) -> tuple[fem.Function, Indices]:
-    """Return a function with one value a facet or cell, and where that of each owned one is."""
-    tdim = mesh.topology.dim
-    dim, element = (tdim - 1, ("CR", 1)) if group == PARTS else (tdim, ("DG", 0))
-    exterior_facets(mesh)
-    mesh.topology.create_connectivity(tdim, dim)
-    space = fem.functionspace(mesh, element)
-    entities = mesh.topology.connectivity(tdim, dim).array
-    index_map = mesh.topology.index_map(dim)
-    dofs = np.empty(index_map.size_local + index_map.num_ghosts, dtype=np.int32)
-    dofs[entities] = space.dofmap.list.ravel()
-    return fem.Function(space), dofs[: index_map.size_local]
-
-
-def _adios() -> ModuleType:
-    # Debian's adios2 takes its serial library in a run without mpirun, which will not do.
-    os.environ.setdefault("ADIOS2_ALWAYS_USE_MPI", "1")
+    Raises
+    ------
+    InputError
+        If there are none.
+    """
+    path = _files(folder)[0].parent / _DIGEST
     try:
-        import adios4dolfinx
-    except ImportError as error:
-        raise InputError(f"checkpoints need adios4dolfinx ({error})") from None
-    return adios4dolfinx
+        given = json.loads(path.read_bytes())
+    except (OSError, ValueError, RecursionError):
+        given = None
+    if not isinstance(given, dict):
+        raise InputError(f"{path}: no digests; accepted: checkpoints of this program")
+    return given
+
+
+def kept_case(folder: Path) -> str | None:
+    """Return the case of the checkpoints in a folder; None without any. On one rank."""
+    try:
+        return case_of(folder).read_text(encoding="utf-8")
+    except InputError:
+        return None
+
+
+def discard(folder: Path) -> None:
+    """Remove the checkpoints of a run that has come to its end. On one rank."""
+    for name in (FOLDER, FRESH):
+        if _manifest(folder / name) is not None:
+            _remove(folder / name)
+
+
+def _files(folder: Path) -> list[Path]:
+    """Return the checkpoints in a folder, one after the other."""
+    for name in (FOLDER, FRESH):  # where a run was ended between removal and renaming
+        listed, found = _manifest(folder / name) or {}, list[Path]()
+        while (path := folder / name / _name(len(found) + 1)).is_file() and path.name in listed:
+            found.append(path)
+        if found:
+            return found
+    raise InputError(
+        f"--restart {folder}: no checkpoints there; accepted: the folder of an evolution that was "
+        "ended before its last step"
+    )
+
+
+def _intact(folder: Path) -> list[Path]:
+    """Return the checkpoints before the first one that is damaged or missing, and say so."""
+    files = _files(folder)
+    for count, path in enumerate(files):
+        try:
+            _load(path)
+        except InputError as error:
+            if count == 0:
+                raise
+            logger.warning("%s; going on from step %d, the last one intact", error, count)
+            return files[:count]
+    later = [*files[0].parent.glob("0*.npz")]
+    if len(later) > len(files):
+        missing = files[0].parent / _name(len(files) + 1)
+        logger.warning("%s is missing; going on from step %d", missing, len(files))
+    return files
+
+
+def _name(count: int) -> str:
+    return f"{count:05d}.npz"
+
+
+def _manifest(place: Path) -> dict[str, str] | None:
+    """Return the checksums of the files that a run has left in a folder; None without a list."""
+    if kind(place) != "a folder" or kind(place / MANIFEST) != "a file":
+        return None
+    with suppress(ValueError, RecursionError):
+        listed = json.loads((place / MANIFEST).read_bytes())
+        if isinstance(listed, dict):
+            return {name: str(sum_) for name, sum_ in listed.items() if _LISTED.fullmatch(name)}
+    return None
+
+
+def _check_own(folder: Path) -> None:
+    """Refuse to replace checkpoints that no run has left.
+
+    Raises
+    ------
+    InputError
+        If there are files that no manifest names, or something else than a folder.
+    """
+    for place in (folder / FOLDER, folder / FRESH):
+        given = kind(place)
+        if given == "a folder":
+            listed = _manifest(place)
+            own = {DRAFT} if listed is None else {DRAFT, MANIFEST, *listed}
+            given = next((path.name for path in place.iterdir() if path.name not in own), None)
+        if given is not None:
+            raise InputError(
+                f"{place}: given {given}, which no run has left there; accepted: a folder of "
+                "results without it, checkpoints of the evolution go there"
+            )
+
+
+def _remove(place: Path) -> None:
+    """Remove what a manifest names, the first step first, and the folder where nothing is left."""
+    for name in (*sorted(_manifest(place) or ()), DRAFT):
+        (place / name).unlink(missing_ok=True)
+    (place / MANIFEST).unlink(missing_ok=True)
+    with suppress(OSError):  # it is not there, or not empty
+        place.rmdir()
+
+
+def _cut(place: Path, count: int) -> None:
+    """Remove the checkpoints after a step, which those of another course are to replace."""
+    listed = _manifest(place) or {}
+    later = [name for name in sorted(listed) if name[0].isdigit() and name > _name(count)]
+    for name in later:
+        (place / name).unlink(missing_ok=True)
+    kept = {name: sum_ for name, sum_ in listed.items() if name not in later}
+    _put(place / MANIFEST, json.dumps(kept).encode())
+
+
+def _packed(arrays: dict[str, Any]) -> bytes:
+    file = io.BytesIO()
+    np.savez(file, **arrays)
+    return file.getvalue()
+
+
+def _save(place: Path, name: str, data: bytes) -> None:
+    """Write a file and its name in the manifest, which comes first: no file is without one."""
+    if name not in (listed := _manifest(place) or {}) and kind(place / name) is not None:
+        raise InputError(f"{place / name}: no run has left it; accepted: a folder without it")
+    listed[name] = hashlib.sha256(data).hexdigest()
+    _put(place / MANIFEST, json.dumps(listed).encode())
+    _put(place / name, data)
+
+
+def _put(path: Path, data: bytes) -> None:
+    draft = path.with_name(DRAFT)
+    with draft.open("wb") as file:
+        file.write(data)
+        file.flush()
+        os.fsync(file.fileno())
+    os.replace(draft, path)
+
+
+def _bytes(path: Path) -> bytes:
+    """Return what is in a file of the manifest.
+
+    Raises
+    ------
+    InputError
+        If it is not what has been written.
+    """
+    data = path.read_bytes() if path.is_file() else b""
+    if hashlib.sha256(data).hexdigest() != (_manifest(path.parent) or {}).get(path.name):
+        raise InputError(f"{path}: no checkpoint, or a damaged one; accepted: as a run has left it")
+    return data
+
+
+def _load(path: Path) -> dict[str, NDArray[Any]]:
+    return _unpacked(_bytes(path))
+
+
+def _unpacked(data: bytes) -> dict[str, NDArray[Any]]:
+    with np.load(io.BytesIO(data), allow_pickle=False) as arrays:
+        return dict(arrays)
+
+
+def _places(problem: ContactProblem) -> Array:
+    """Return what tells the owned nodes apart: their points, and the means of the cells around.
+
+    Nodes of two bodies that touch may have the same point, but not the same cells. Shape
+    (nodes, 2 d). Collective.
+    """
+    body, d = problem.equilibrium, problem.dim
+    mesh, space = body.domain.mesh, body.space
+    cells = mesh.topology.index_map(d).size_local
+    corners = mesh.geometry.x[_compat.geometry_dofmap(mesh)][:cells, : d + 1, :d]
+    sums = fem.Function(fem.functionspace(mesh, ("Lagrange", body.degree, (d + 1,))))
+    own = np.concatenate([corners.mean(axis=1), np.ones((cells, 1))], axis=1)
+    links = sums.function_space.dofmap.list
+    np.add.at(sums.x.array.reshape(-1, d + 1), links[:cells], own[:, None, :])
+    sums.x.scatter_reverse(InsertMode.add)
+    sums.x.scatter_forward()
+    at_nodes = np.empty((len(body.nodal(body.rest())), d + 1))
+    at_nodes[space.dofmap.list] = sums.x.array.reshape(-1, d + 1)[links]
+    owned = body.owned // body.block_size
+    means = at_nodes[:owned, :d] / at_nodes[:owned, d:]
+    return np.concatenate([body.layout.points, means], axis=1)

@@ -86,7 +86,7 @@ def _replace(solution: Solution, folder: ResultFolder, figures: bool) -> None:
         if solution.output.checkpoint:
             from contact.output.checkpoint import write_checkpoint
 
-            write_checkpoint(solution, new / "checkpoint.bp")
+            write_checkpoint(solution, new / "checkpoint.npz")
         if figures:
             from contact.output.figures.figures import collect
 

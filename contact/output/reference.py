@@ -36,7 +36,7 @@ INTRODUCTION = """\
 | `fields.pvd` | of an evolution: its steps, for ParaView and pyvista |
 | `fields.bp`, `cells.bp` | instead of `fields.vtu`, with `output.fields = "vtx"`: needs ADIOS2 |
 | `fields.xdmf`, `fields.h5` | likewise with `output.fields = "xdmf"`: degree 1 at most |
-| `checkpoint.bp` | with `output.checkpoint = true` |
+| `checkpoint.npz` | with `output.checkpoint = true` |
 | `figure-*.png` | with `--plot`, and by `contact plot DIR` |
 | `animation-*.gif` | of an evolution, by `contact plot DIR --animate` |
 

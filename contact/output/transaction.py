@@ -37,7 +37,7 @@ ROOM = "room"
 MANIFEST = "files"
 
 #: What runs may write. A summary is data of whoever wrote it: no other names are taken from it.
-_MEMBER = re.compile(r"[A-Za-z0-9][\w-]*\.(json|csv|bp|xdmf|h5|vtkhdf|pvd|vtu|png|pdf|svg|gif)")
+_MEMBER = re.compile(r"[A-Za-z0-9][\w-]*\.(json|csv|bp|npz|xdmf|h5|vtkhdf|pvd|vtu|png|pdf|svg|gif)")
 #: What ADIOS2 leaves in a folder of fields.
 _ADIOS = re.compile(r"(data|md|mmd)\.(\d+|idx)|profiling\.json|active")
 
@@ -57,7 +57,7 @@ MEMBERS = (
     "cells.bp",
     "fields.xdmf",
     "fields.h5",
-    "checkpoint.bp",
+    "checkpoint.npz",
     "figure-contact.png",
     "figure-loop.png",
     "figure-zones.png",

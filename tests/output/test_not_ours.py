@@ -12,9 +12,9 @@ from mpi4py import MPI
 from contact import solve
 from contact.case.text import to_toml
 from contact.cli.main import main
+from contact.output.checkpoint import Checkpoints
 from contact.output.figures.saved import plot
 from contact.output.files import write_outputs
-from contact.output.resume import Checkpoints
 from tests.output.test_steps import case_of as steps_case
 from tests.problems.written import block
 

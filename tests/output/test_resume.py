@@ -16,7 +16,7 @@ from contact.cli.main import main
 from contact.errors import InputError
 from contact.methods.newton import Newton
 from contact.methods.report import History
-from contact.output.resume import Checkpoints, case_of, discard, read_steps
+from contact.output.checkpoint import Checkpoints, case_of, discard, read_steps
 from tests.output.test_steps import case_of as steps_case
 
 SELF = MPI.COMM_SELF

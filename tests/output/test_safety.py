@@ -105,7 +105,7 @@ def test_a_full_disk_keeps_the_earlier_results(
         ballast.unlink()
         status, text = run(*arguments)
         assert status == 0, text
-        assert whole(out) and not (out / "checkpoint.bp").exists()
+        assert whole(out) and not (out / "checkpoint.npz").exists()
 
 
 @RANKS

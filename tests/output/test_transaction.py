@@ -43,7 +43,7 @@ def held(folder: Path) -> dict[str, str]:
     return found
 
 
-EARLIER = ("contact.csv", "fields.bp", "checkpoint.bp", "figure-contact.png")
+EARLIER = ("contact.csv", "fields.bp", "cells.bp", "checkpoint.npz", "figure-contact.png")
 LATER = ("contact.csv", "fields.bp", "cells.bp", "figure-deformed.png")
 
 
@@ -80,7 +80,7 @@ def count_steps(monkeypatch: pytest.MonkeyPatch, fail: Callable[[int], None]) ->
 
 def test_members_are_replaced_and_others_left_alone(tmp_path: Path) -> None:
     earlier, later = two_runs(tmp_path)
-    assert "checkpoint.bp/data.0" in earlier and "figure-mine.png" in earlier
+    assert "checkpoint.npz" in earlier and "figure-mine.png" in earlier
     folder = tmp_path / "earlier"
     write(folder, "later", LATER)
     assert {k: v for k, v in held(folder).items() if not k.startswith(STAGE)} == earlier
@@ -194,7 +194,7 @@ WRONG = [
       for make in (_fifo, _link, _folder, _file) if (name, make) not in {
           ("summary.json", _file), ("contact.csv", _file), (LOCK, _file)}),
     ("figure-contact.png", _fifo),
-    ("checkpoint.bp", _link),
+    ("checkpoint.npz", _link),
 ]  # fmt: skip
 
 

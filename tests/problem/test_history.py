@@ -16,8 +16,8 @@ from contact import evolve, parse_case, solve
 from contact.case.build import build_problem
 from contact.history import QUADRATURE_POINTS
 from contact.nesting import prolong
+from contact.output.checkpoint import read_steps
 from contact.output.fields import DerivedFields
-from contact.output.resume import read_steps
 from forms.hencky import Isotropic, Linear, secant_stress
 from forms.kinematics import embed
 from forms.ops import maximum
