@@ -290,5 +290,5 @@ def _follow_pressure(
     rate = interface.friction.by_pressure(total, length)
     gradient = np.zeros((length.size, interface.jump.block_size))
     gradient[:, : interface.dim] = rate[:, None] * slope
-    gradient += rate[:, None] * interface.response.layer_gradient(nodal)
+    gradient += rate[:, None] * interface.law.layer_gradient(nodal)
     return np.where(closed, -rate * parameters.gamma * opening, 0.0), gradient

@@ -12,9 +12,9 @@ from contact.interface.active_set import ActiveSet, touching
 from contact.interface.current import HeldCurrent
 from contact.interface.friction import NodalFriction
 from contact.interface.history import SlipHistory
+from contact.interface.law import InterfaceLaw
 from contact.interface.multipliers import Multipliers
 from contact.interface.nodes import ContactNodes
-from contact.interface.response import FoundationResponse
 from contact.linear.constraint import Change
 from contact.mesh.pieces import sums
 from contact.tolerances import EPS
@@ -31,7 +31,7 @@ class Interface:
     ----------
     jump
         The contact nodes; their gap is that of the unilateral constraint.
-    response
+    law
         Layer and current.
     friction
         Friction.
@@ -50,7 +50,7 @@ class Interface:
     """
 
     jump: ContactNodes
-    response: FoundationResponse
+    law: InterfaceLaw
     friction: NodalFriction
     held: HeldCurrent | None
     stiffness: float
@@ -73,7 +73,7 @@ class Interface:
         """Return the interface of a step that ends at a time and remembers what was before."""
         return replace(
             self,
-            response=self.response.at(time),
+            law=self.law.at(time),
             friction=replace(self.friction, history=history),
             held=None if self.held is None else self.held.at(time),
         )
@@ -124,7 +124,7 @@ class Interface:
 
     def pressure(self, nodal: Array, forces: Multipliers) -> Array:
         """Return -sigma_nu, the multiplier and the layer's pressure, shape (n,)."""
-        return forces.pressure + self.response.layer_pressure(nodal)
+        return forces.pressure + self.law.layer_pressure(nodal)
 
     def bound(self, nodal: Array, forces: Multipliers) -> Array:
         """Return the friction bound s, shape (n,). Collective."""
@@ -168,27 +168,27 @@ class Interface:
         active
             The active set.
         """
-        closed = active.closed | (self.response.layer_pressure(nodal) > 0)
+        closed = active.closed | (self.law.layer_pressure(nodal) > 0)
         sticks = closed & active.sticks
         local = np.array([np.sum(~closed), np.sum(sticks), np.sum(closed & ~sticks)])
         opened, stick, slip = self.comm.allreduce(local, op=MPI.SUM).tolist()
         return opened, stick, slip
 
     def add_forces(self, residual: Array, x: Array, forces: Multipliers) -> None:
-        """Add all that the foundation does to the body at local unknowns, to owned values."""
+        """Add the contact forces and the current at local unknowns to owned values."""
         jump, nodal = self.jump, self.jump.apply(x)
         jump.transpose(jump.weight[:, None] * forces.vectors(jump), residual)
-        answer = self.response.force(nodal, self.pressure(nodal, forces))
-        jump.transpose(jump.weight[:, None] * answer, residual)
+        density = self.law.force(nodal, self.pressure(nodal, forces))
+        jump.transpose(jump.weight[:, None] * density, residual)
         if self.held is not None:
             self.held.add_force(residual, x)
 
     def add_current(self, residual: Array, x: Array, change: Array, forces: Multipliers) -> None:
         """Add what a change of local unknowns does to the current, psi frozen, to owned values."""
         jump, nodal = self.jump, self.jump.apply(x)
-        block = self.response.current_block(nodal, self.pressure(nodal, forces))
-        answer = np.einsum("nij,nj->ni", block, jump.apply(change))
-        jump.transpose(jump.weight[:, None] * answer, residual)
+        block = self.law.current_block(nodal, self.pressure(nodal, forces))
+        density = np.einsum("nij,nj->ni", block, jump.apply(change))
+        jump.transpose(jump.weight[:, None] * density, residual)
 
     @property
     def change(self) -> Change | None:

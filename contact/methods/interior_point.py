@@ -205,10 +205,10 @@ class InteriorPoint:
     def _update(self, blocks: Array) -> None:
         """Assemble the operator with given blocks, and those of layer and current. Collective."""
         interface, body, x = self.problem.interface, self.problem.equilibrium, self._state.x
-        if interface.response.active:
+        if interface.law.active:
             nodal = interface.jump.apply(x)
             pressure = interface.pressure(nodal, self._state.forces)
-            blocks = blocks + interface.response.block(nodal, pressure)
+            blocks = blocks + interface.law.block(nodal, pressure)
         weighted = interface.weighted(blocks, x)
         at = replace(self._state, x=x)
         self._whole.operator.update("secant", at, weighted, constant=body.linear)

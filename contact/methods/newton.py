@@ -227,12 +227,12 @@ class Newton:
     def _conducting(self, problem: CondensedProblem) -> tuple[Iterate, Outcome] | None:
         """Follow solutions from a foundation that hardly conducts, if it conducts."""
         interface = problem.interface
-        if interface.response.conductor is None:
+        if interface.law.conductor is None:
             return None
 
         def solve(part: float, iterate: Iterate) -> tuple[Iterate, Outcome]:
-            response = interface.response.conducting(part)
-            less = replace(problem, interface=replace(interface, response=response))
+            law = interface.law.conducting(part)
+            less = replace(problem, interface=replace(interface, law=law))
             search = self.search if part == 1 else replace(self.search, problem=less, best=Best())
             step = NewtonStep(search.problem, self.options, self._parameters, self.counters)
             loop = NewtonLoop(search, step, self.options.secant_until, SHORT)

@@ -205,7 +205,7 @@ class NewtonStep:
         """The operator of the linear systems."""
         if self._operator is None:
             interface = self.problem.interface
-            asymmetric = interface.friction.acts or interface.response.active
+            asymmetric = interface.friction.acts or interface.law.active
             self._operator = self.problem.equilibrium.operator(
                 interface.coupled,
                 interface.jump.carried,
@@ -257,7 +257,7 @@ class NewtonStep:
         vectors = contact.forces.vectors(jump) + change[:, : interface.dim]
         forces = Multipliers.of(jump, jump.normal_component(vectors), vectors)
         pressed = jump.normal_component(np.einsum("nij,nj->ni", layer, moved))
-        known = interface.response.layer_pressure(nodal) + shift + pressed
+        known = interface.law.layer_pressure(nodal) + shift + pressed
         # What follows a rigid part that has flown far and comes back follows it but for rounding.
         x = body.prescribe(body.moved(state.x, increment), state.time)
         new = replace(state, x=x, forces=forces)
@@ -266,13 +266,13 @@ class NewtonStep:
     def _current(self, nodal: Array, contact: LinearisedContact, reached: float) -> Array | float:
         """Return the derivative of the current, with psi followed or frozen."""
         interface = self.problem.interface
-        response = interface.response
-        if not response.active:
+        law = interface.law
+        if not law.active:
             return 0.0
         follow = contact.unchanged or reached < NEAR
-        if response.follows_gap:
+        if law.follows_gap:
             follow = self.following(reached, follow)
-        current = response.current_jacobian if follow else response.current_block
+        current = law.current_jacobian if follow else law.current_block
         return current(nodal, interface.pressure(nodal, contact.forces))
 
 
@@ -289,15 +289,15 @@ def linearised_layer(
     before together, as the active set is. Linearised about the displacement
     alone, a layer stiffer than the body cycles between its regimes.
     """
-    response, jump, c = interface.response, interface.jump, parameters.c
-    law = response.normal_law(nodal)
-    if law is None:
-        return response.layer_block(nodal, full), np.zeros(nodal.shape[0])
-    u_n, layer = jump.normal_component(nodal), response.layer_pressure(nodal)
+    law, jump, c = interface.law, interface.jump, parameters.c
+    graph = law.normal_law(nodal)
+    if graph is None:
+        return law.layer_block(nodal, full), np.zeros(nodal.shape[0])
+    u_n, layer = jump.normal_component(nodal), law.layer_pressure(nodal)
     known = layer if iterate.layer_pressure is None else iterate.layer_pressure
-    place = law.displacement(iterate.state.forces.pressure + known + c * u_n, c)
+    place = graph.displacement(iterate.state.forces.pressure + known + c * u_n, c)
     about = nodal.copy()
     about[:, : interface.dim] += (place - u_n)[:, None] * jump.normal
-    block = response.layer_block(about, full)
+    block = law.layer_block(about, full)
     back = jump.normal_component(np.einsum("nij,nj->ni", block, nodal - about))
-    return block, response.layer_pressure(about) + back - layer
+    return block, law.layer_pressure(about) + back - layer

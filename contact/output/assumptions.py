@@ -182,10 +182,10 @@ def fitting(problem: ContactProblem) -> Remark:
 def preload(solution: Solution) -> Remark:
     """Say where a layer is thicker than the gap, and presses on the body at rest."""
     problem = solution.problem
-    response = problem.interface.response
-    if response.layer is None:
+    law = problem.interface.law
+    if law.layer is None:
         return "", True
-    least = -problem.nodes.maximum(-response.touch, -np.inf)
+    least = -problem.nodes.maximum(-law.touch, -np.inf)
     if least >= -1e-9 * problem.domain.size:
         return "", True
     return (

@@ -176,7 +176,7 @@ def _foundation_charges(problem: ContactProblem, state: State) -> Array:
     interface, nodal, body = problem.interface, problem.nodal(state), problem.equilibrium
     pressure = interface.pressure(nodal, state.forces)
     density = np.zeros((nodal.shape[0], body.block_size))
-    density[:, -1] = problem.nodes.weight * interface.response.charge(nodal, pressure)
+    density[:, -1] = problem.nodes.weight * interface.law.charge(nodal, pressure)
     leaving = np.zeros_like(body.external(state.time))
     problem.nodes.transpose(density, leaving)
     if interface.held is not None:

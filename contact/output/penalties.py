@@ -27,7 +27,7 @@ def giving_way(solution: Solution) -> Remark:
     held = size < BELOW * solution.friction_bound
     slip = np.linalg.norm(solution.slip[held], axis=1)
     depth = (solution.normal_displacement - problem.nodes.gap)[solution.pressure > 0]
-    if problem.interface.response.layer is not None:
+    if problem.interface.law.layer is not None:
         depth = depth[:0]  # it gives way by itself
     deep, far = (
         problem.comm.allreduce(float(values.max(initial=0.0)), op=MPI.MAX)

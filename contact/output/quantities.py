@@ -329,7 +329,7 @@ _NODES = (
     ),
     Quantity(
         "gap", "length", "Distance to the foundation at rest, along the contact direction ν.",
-        lambda n: n.response.jump.gap, (NODES,),
+        lambda n: n.law.jump.gap, (NODES,),
     ),
     Quantity(
         "u_n", "length", "Displacement along ν, out of the body; gap - u_n is the open gap. Where "

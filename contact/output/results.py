@@ -86,7 +86,7 @@ class Results:
         """How far in front of the closed gap the foundation conducts, 1/delta (length)."""
         if not self._electric:
             return ABSENT
-        conductor = self.problem.interface.response.conductor
+        conductor = self.problem.interface.law.conductor
         return 1 / conductor.psi.delta if conductor and conductor.psi.follows_gap else None
 
     @cached_property

@@ -286,7 +286,7 @@ class Solution:
         interface, nodal = self.problem.interface, self.nodal
         rounding = 1e-9 * interface.jump.maximum(self.pressure)
         active = interface.active_set(nodal, self.forces, self.friction_bound, rounding=rounding)
-        layer = interface.response.layer_pressure(nodal) > rounding
+        layer = interface.law.layer_pressure(nodal) > rounding
         touches = active.closed | layer
         sticks = active.sticks & (self.friction_bound > 0)
         return np.where(touches, np.where(sticks, "stick", "slip"), "open")

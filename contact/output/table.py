@@ -15,8 +15,8 @@ from scipy import sparse
 from scipy.sparse import csgraph
 
 from contact.interface.candidates import candidates
+from contact.interface.law import InterfaceLaw
 from contact.interface.nodes import ContactNodes as Nodes
-from contact.interface.response import FoundationResponse
 from contact.mesh.entities import cells_at
 from contact.output.quantities import NODES, quantities, values_of
 from contact.output.solved import Solved
@@ -51,9 +51,9 @@ class ContactNodes:
         return self._problem.nodes
 
     @property
-    def response(self) -> FoundationResponse:
+    def law(self) -> InterfaceLaw:
         """Layer and current; the gap without a rigid part is that of the layer's first touch."""
-        return self._problem.interface.response
+        return self._problem.interface.law
 
     @property
     def entry(self) -> NDArray[np.intp]:
@@ -91,7 +91,7 @@ class ContactNodes:
         """Charge D.nu that leaves a piezoelectric body through the foundation."""
         if not self._problem.piezoelectric:
             return None
-        return self.response.charge(self.solution.nodal, self.solution.pressure)
+        return self.law.charge(self.solution.nodal, self.solution.pressure)
 
 
 def contact_table(solution: Solved) -> Table | None:

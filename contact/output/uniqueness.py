@@ -21,7 +21,7 @@ from forms.laws import PerfectConductivity, RampConductivity, ShiftedConductivit
 def theorem(solution: Solution) -> Remark:
     """Name the theorem on uniqueness that is for such a problem, and what its condition adds up."""
     problem = solution.problem
-    friction, layered = _friction(solution), problem.interface.response.layer is not None
+    friction, layered = _friction(solution), problem.interface.law.layer is not None
     conductor = _conductor(solution)
     terms = [*_layer_terms(solution)]
     if friction is not None:
@@ -63,7 +63,7 @@ def theorem(solution: Solution) -> Remark:
 
 def _conductor(solution: Solution) -> Conductor | None:
     """Return the foundation's electric contact; None where nothing is conducted."""
-    conductor = solution.problem.interface.response.conductor
+    conductor = solution.problem.interface.law.conductor
     if conductor is None or not solution.problem.piezoelectric or conductor.psi.k_e == 0:
         return None
     return conductor
@@ -82,7 +82,7 @@ def _friction(solution: Solution) -> tuple[float, float] | None:
 def _layer_terms(solution: Solution) -> Iterator[tuple[str, str]]:
     """Yield M_h L_p + L_h M_p, (h6) and (h7), for the potentials and depths that can occur."""
     problem, largest = solution.problem, 0.0
-    conductor = problem.interface.response.conductor
+    conductor = problem.interface.law.conductor
     difference = 0.0
     if problem.piezoelectric:
         difference = _largest_difference(solution, conductor)

@@ -128,9 +128,9 @@ def _flows(
 ) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
     """Tell through which contact nodes current flows, or could, and through which held ones."""
     interface = problem.interface
-    response, held = interface.response, interface.held
+    law, held = interface.law, interface.held
     if state is None:
-        conductors = response.conductor, None if held is None else held.conductor
+        conductors = law.conductor, None if held is None else held.conductor
         sizes = interface.jump.nodes.size, 0 if held is None else held.jump.nodes.size
         at_contact, among_held = (
             np.zeros(size, dtype=bool)
@@ -142,7 +142,7 @@ def _flows(
     nodal = problem.nodal(state)
     pressure = interface.pressure(nodal, state.forces)
     slope = np.zeros(0) if held is None else held.slope(state.x)
-    return response.jacobian(nodal, pressure)[:, -1, -1] != 0, slope != 0
+    return law.jacobian(nodal, pressure)[:, -1, -1] != 0, slope != 0
 
 
 def _conducts(conductor: Conductor, count: int, deep: float) -> NDArray[np.bool_]:

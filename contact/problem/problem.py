@@ -28,11 +28,11 @@ from contact.interface.entries import (
 from contact.interface.friction import Friction
 from contact.interface.history import SlipHistory
 from contact.interface.interface import Interface
+from contact.interface.law import InterfaceLaw
 from contact.interface.multipliers import Multipliers
 from contact.interface.nodes import ContactNodes
 from contact.interface.pairing import find_pair
 from contact.interface.placing import find_nodes
-from contact.interface.response import FoundationResponse
 from contact.kinds import expect, several
 from contact.mesh.domain import Domain
 from contact.mesh.entities import elongation
@@ -177,14 +177,14 @@ class ContactProblem:
         found = joined_nodes(self.entries, body.layout.index_map, body.free, body.masters.ties)
         layer, conductor = joined_layer(self.entries), joined_conductor(self.entries)
         stiffness = self._young_of_contacts() / size
-        response = FoundationResponse(found, layer, conductor, body.phi_scale, stiffness)
+        law = InterfaceLaw(found, layer, conductor, body.phi_scale, stiffness)
         friction = joined_friction(self.entries, found)
         held = joined_held(self.entries, body.layout.index_map.local_range[0], found.links)
         mesh = self.domain.mesh
         longer = max(elongation(mesh, self.domain.facets(contact.on)) for contact in self.contacts)
         piece, pieces = body.shares.piece[found.nodes], body.shares.count
         return Interface(
-            response.constrained, response, friction, held, stiffness, size, longer, piece, pieces
+            law.constrained, law, friction, held, stiffness, size, longer, piece, pieces
         )
 
     def _young_of_contacts(self) -> float:

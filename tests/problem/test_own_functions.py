@@ -187,12 +187,12 @@ def test_a_layer_is_named() -> None:
     )
     deep = np.zeros((problem.nodes.nodes.size, 2))
     deep[:, 1] = -1.0
-    response = problem.interface.response
-    assert np.isfinite(response.layer_pressure(0 * deep)).all()
-    law = response.normal_law(0 * deep)
-    assert law is not None
+    law = problem.interface.law
+    assert np.isfinite(law.layer_pressure(0 * deep)).all()
+    graph = law.normal_law(0 * deep)
+    assert graph is not None
     with pytest.raises(InputError, match=r"^layer: p_nu: .* LookupError: beyond"):
-        law.layer(np.full(len(deep), 1.0))
+        graph.layer(np.full(len(deep), 1.0))
 
 
 def test_a_modulus() -> None:

@@ -10,7 +10,7 @@ and piezoelectric bodies, rigid and compliant foundations differ in what there i
 - Algorithm 8, Problem (PV1): as Algorithm 6 without friction and current.
 
 Their inner Algorithms 2, 5, 7 and 9 are `uzawa.block_relaxation`; what differs is
-`Interface.response`. Where it fails, the best iterate is left, by the thesis's rules the last.
+`Interface.law`. Where it fails, the best iterate is left, by the thesis's rules the last.
 """
 
 from __future__ import annotations
@@ -159,7 +159,7 @@ class FixedPoint:
             return self._solve(z, bound, first, problem.equilibrium.rest())
         self.state, nodal = start, jump.apply(start.x)
         pressure = start.forces.pressure
-        if interface.response.normal_law(nodal) is not None:
+        if interface.law.normal_law(nodal) is not None:
             pressure = interface.pressure(nodal, start.forces)
         z = np.column_stack([pressure, start.forces.friction])
         return self._solve(z, interface.bound(nodal, start.forces), 1, start.x)
@@ -244,7 +244,7 @@ class FixedPoint:
         problem, interface, state = self.problem, self.problem.interface, self.state
         body, nodal = problem.equilibrium, interface.jump.apply(state.x)
         blocks = augmentation(interface.jump, self.r, friction)
-        if interface.response.active:
+        if interface.law.active:
             pressure = interface.pressure(nodal, state.forces)
             blocks = blocks + self._current_block(nodal, pressure)
         about = secant_at if kind == "secant" else state.x
@@ -264,12 +264,12 @@ class FixedPoint:
 
         Frozen, a steep ramp costs many iterations there; followed from afar, it overshoots.
         """
-        response = self.problem.interface.response
-        if not response.follows_gap or not self._following(self._residual):
-            return response.current_block(nodal, pressure)
+        law = self.problem.interface.law
+        if not law.follows_gap or not self._following(self._residual):
+            return law.current_block(nodal, pressure)
         if self.operator.symmetric:
             self.operator = self._new_operator(symmetric=False)
-        return response.current_jacobian(nodal, pressure)
+        return law.current_jacobian(nodal, pressure)
 
     def _update_bound(self, old: Array, start: bool) -> tuple[float, Array]:
         """Return the relative change (3.46) and the new friction bound.

@@ -104,7 +104,7 @@ class PenalisedProblem:
         name = "penalty_snes_linesearch_type"
         default = not given.hasName(name)
         if default:
-            layer = problem.interface.response.layer
+            layer = problem.interface.law.layer
             given[name] = "basic" if symmetric and (layer is None or layer.lagged) else "bt"
         try:
             with petsc_options("penalty_"):
@@ -154,9 +154,9 @@ class PenalisedProblem:
         self._state = state
         self._assembled = body.linear
         pressure = interface.pressure(nodal, state.forces)
-        self._response = interface.response.force(nodal, pressure)
-        self._current_block = interface.response.current_block(nodal, pressure)
-        self._layer = interface.response.normal_law(nodal)
+        self._response = interface.law.force(nodal, pressure)
+        self._current_block = interface.law.current_block(nodal, pressure)
+        self._layer = interface.law.normal_law(nodal)
         if self._layer is not None:
             # Like the unilateral [.]^+ it is that of the new iterate, but for h_nu.
             self._response[:, : body.dim] = 0.0
@@ -191,7 +191,7 @@ class PenalisedProblem:
         body, interface, nodal = self._body, self._interface, self._nodal
         jump, state = interface.jump, self._state
         # Of the rigid part, or without one of the layer.
-        opening = jump.normal_component(nodal) - interface.response.jump.gap
+        opening = jump.normal_component(nodal) - interface.law.jump.gap
         closest = jump.maximum(opening, -np.inf)
         if closest >= 0:
             return np.zeros_like(body.owned_part(state.x))

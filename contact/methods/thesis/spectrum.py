@@ -81,7 +81,7 @@ def softer(problem: Problem, operator: Operator, friction: bool) -> Softer | Non
     interface, body, state = problem.interface, problem.equilibrium, problem.start()
     jump, star = interface.jump, automatic_r(problem.scales)
     nodal, shift = jump.apply(state.x), SHIFT * star
-    current = interface.response.current_block(nodal, interface.pressure(nodal, state.forces))
+    current = interface.law.current_block(nodal, interface.pressure(nodal, state.forces))
     blocks = interface.weighted(current + augmentation(jump, shift, False), state.x)
 
     def solve(traction: Array) -> Array:

@@ -116,11 +116,11 @@ def linearised(
     """
     interface, jump = problem.interface, problem.interface.jump
     nodal = jump.apply(state.x)
-    law = interface.response.normal_law(nodal)
+    law = interface.law.normal_law(nodal)
     residual = residual_forces(problem, state, secant_at)
     unknown = state.forces.vectors(jump)
     if law is not None:
-        unknown += interface.response.layer_pressure(nodal)[:, None] * jump.normal
+        unknown += interface.law.layer_pressure(nodal)[:, None] * jump.normal
     jump.transpose(-jump.weight[:, None] * unknown, residual)
     owned = problem.equilibrium.owned_part(state.x)
     return Linearised(operator, residual, owned, nodal, bound, law, friction)

@@ -11,9 +11,9 @@ from dolfinx import fem
 from mpi4py import MPI
 
 from contact.interface.current import Conductor
+from contact.interface.law import InterfaceLaw
 from contact.interface.layer import Layer
 from contact.interface.nodes import ContactNodes
-from contact.interface.response import FoundationResponse
 from forms.foundation import compliance, electric_contact
 from forms.laws import (
     Compliance,
@@ -49,9 +49,9 @@ def test_a_part_of_the_conductivity_is_that_of_a_smaller_k_e():
     nodes, x = random_nodes(50, 2, 3, rng), rng.standard_normal((50, 3))
     pressure = rng.uniform(-1.0, 1.0, 50)
 
-    def foundation(k_e: float) -> FoundationResponse:
+    def foundation(k_e: float) -> InterfaceLaw:
         conductor = Conductor(ShiftedConductivity(k_e, 2.0), 1.5, Truncation(1.0))
-        return FoundationResponse(nodes, None, conductor, 1.7, 1.0)
+        return InterfaceLaw(nodes, None, conductor, 1.7, 1.0)
 
     less, small = foundation(4.0).conducting(0.25), foundation(1.0)
     assert np.abs(less.charge(x, pressure)).max() > 0.1
@@ -65,17 +65,17 @@ def test_jacobian_is_the_derivative_of_the_force(dim, psi):
     rng = np.random.default_rng(3)
     nodes = random_nodes(200, dim, dim + 1, rng)
     layer = Layer(0.2, Compliance(0.3), PotentialFactor(5.0, 2.0, 3.0))
-    response = FoundationResponse(nodes, layer, Conductor(psi, 1.5, Truncation(4.0)), 1.7, 1.0)
+    law = InterfaceLaw(nodes, layer, Conductor(psi, 1.5, Truncation(4.0)), 1.7, 1.0)
     x = rng.standard_normal((200, dim + 1))
-    pressure = response.layer_pressure(x) - 100.0  # no node presses on the rigid part
-    jacobian = response.jacobian(x, pressure)
+    pressure = law.layer_pressure(x) - 100.0  # no node presses on the rigid part
+    jacobian = law.jacobian(x, pressure)
     assert np.count_nonzero(jacobian[:, 0, -1]) > 20  # layer reached, h_nu rising
     assert np.count_nonzero(jacobian[:, -1, 0]) > 20
     h = 1e-7
     for k in range(dim + 1):
         step = np.zeros(dim + 1)
         step[k] = h
-        slope = (response.force(x + step, pressure) - response.force(x - step, pressure)) / (2 * h)
+        slope = (law.force(x + step, pressure) - law.force(x - step, pressure)) / (2 * h)
         assert np.abs(jacobian[:, :, k] - slope).max() < 1e-6
 
 
@@ -84,24 +84,24 @@ def test_block_is_the_symmetric_part_without_the_frozen_factors():
     nodes = random_nodes(50, 2, 3, rng)
     layer = Layer(0.2, Compliance(0.3), PotentialFactor(5.0, 1.0))
     conductor = Conductor(ShiftedConductivity(0.7, 0.0), 1.5)
-    response = FoundationResponse(nodes, layer, conductor, 1.7, 1.0)
+    law = InterfaceLaw(nodes, layer, conductor, 1.7, 1.0)
     x = rng.standard_normal((50, 3))
-    block = response.block(x, np.zeros(50))
+    block = law.block(x, np.zeros(50))
     assert np.allclose(block, block.transpose(0, 2, 1), rtol=1e-14)
     # Without dependence of h_nu on the potential and of psi on the gap nothing is left out.
-    assert np.allclose(block, response.jacobian(x, np.zeros(50)), rtol=1e-14)
+    assert np.allclose(block, law.jacobian(x, np.zeros(50)), rtol=1e-14)
 
 
 def test_what_rounding_leaves_of_a_multiplier_conducts_nothing():
     """A body that hung free was said to have a known potential, after 1e-19 of a pressure."""
     nodes = random_nodes(3, 2, 3, np.random.default_rng(5))
-    response = FoundationResponse(nodes, None, Conductor(PerfectConductivity(0.7), 1.5), 1.0, 1.0)
+    law = InterfaceLaw(nodes, None, Conductor(PerfectConductivity(0.7), 1.5), 1.0, 1.0)
     # Open, pressed, and deep in but without a pressure: the constraint is about to press there.
     depth = nodes.gap + np.array([-0.5, 0.0, 0.1])
     x = np.column_stack([depth[:, None] * nodes.normal, np.zeros(3)])
-    charge = response.charge(x, np.array([1e-19, 0.1, 0.0]))
+    charge = law.charge(x, np.array([1e-19, 0.1, 0.0]))
     assert charge == pytest.approx([0.0, -0.7 * 1.5, -0.7 * 1.5], abs=0)
-    layered = replace(response, layer=Layer(0.2, Compliance(0.3), PotentialFactor(5.0, 1.0)))
+    layered = replace(law, layer=Layer(0.2, Compliance(0.3), PotentialFactor(5.0, 1.0)))
     x = np.column_stack([(nodes.gap - 0.1)[:, None] * nodes.normal, np.zeros(3)])
     assert layered.charge(x, layered.layer_pressure(x)) == pytest.approx([-0.7 * 1.5] * 3)
 
@@ -117,11 +117,11 @@ def test_the_forms_j_1_and_l_are_the_nodal_force_and_charge():
     j_1 = compliance(u, v, nu, column.p_nu, column.h_nu, column.touch, phi - column.phi_f)
     psi, phi_l = ShiftedConductivity(column.k_e, column.delta), Truncation(np.inf)
     current = electric_contact(u, phi, xi, nu, psi, phi_l, column.gap, column.phi_f)
-    nodes, response, nodal = problem.nodes, problem.interface.response, problem.nodal(state)
-    pressure = response.layer_pressure(nodal)
+    nodes, law, nodal = problem.nodes, problem.interface.law, problem.nodal(state)
+    pressure = law.layer_pressure(nodal)
     at_nodes = np.zeros((2, *nodal.shape))
     at_nodes[0, :, :2] = pressure[:, None] * nodes.normal
-    at_nodes[1, :, 2] = body.phi_scale * response.charge(nodal, pressure)
+    at_nodes[1, :, 2] = body.phi_scale * law.charge(nodal, pressure)
     for form, given in zip((j_1, current), at_nodes, strict=True):
         vector = fem.assemble_vector(fem.form(form * ds)).array
         expected = np.zeros_like(vector)

@@ -1,4 +1,4 @@
-"""What the foundation answers besides the unilateral constraint: a layer and a current.
+"""The interface law: layer and current, beside the unilateral constraint and friction.
 
 The compliant layer presses with h_nu(phi - phi_F) p_nu(u_nu - rho_0), section 8.1.2, and the
 conductive foundation draws the charge psi(u_nu - rho) phi_L(phi - phi_F), (1.30). Both act
@@ -25,7 +25,7 @@ from contact.typing import Array
 
 
 @dataclass(frozen=True)
-class FoundationResponse:
+class InterfaceLaw:
     """Layer and conductor at the contact nodes; potentials come divided by `phi_scale`.
 
     `contact_scale` (stress/length) weighs penetrations against pressures.
@@ -65,13 +65,13 @@ class FoundationResponse:
         depth = self.layer.thickness
         return self.jump.gap - np.where(np.isfinite(depth), depth, 0.0)
 
-    def at(self, time: float) -> FoundationResponse:
+    def at(self, time: float) -> InterfaceLaw:
         """Return the foundation at a time."""
         if self.conductor is None:
             return self
         return replace(self, conductor=self.conductor.at(time))
 
-    def conducting(self, part: float) -> FoundationResponse:
+    def conducting(self, part: float) -> InterfaceLaw:
         """Return the foundation with a part of its conductivity."""
         assert self.conductor is not None
         return replace(self, conductor=self.conductor.part(part))
