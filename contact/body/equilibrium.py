@@ -43,7 +43,7 @@ from contact.linear.layout import Layout
 from contact.linear.multigrid import is_large
 from contact.linear.operator import Counters, SparseOperator
 from contact.mesh.domain import Domain
-from contact.mesh.pieces import connected_pieces
+from contact.mesh.entities import components
 from contact.tolerances import MOST_ROUNDING
 from contact.typing import Array
 
@@ -89,8 +89,8 @@ class BodyEquilibrium:
         self.unsupported = free_components(self.space, self.supports)
         self.masters = make_masters(domain, self.space, body, self.unsupported)
         #: Which forces are compared with each other.
-        self.pieces = connected_pieces(self.space)
-        self.shares = shares_of(domain, self.space, self.masters, self.pieces)
+        self.components = components(self.space)
+        self.shares = shares_of(domain, self.space, self.masters, self.components)
         self.layout = Layout(
             domain.comm,
             index_map,
@@ -278,7 +278,7 @@ class BodyEquilibrium:
         options: dict[str, Any] = {"symmetric": symmetric, "counters": counters, "kind": kind}
         masters = self.masters
         if change is None and masters.size == 0:
-            return SparseOperator(self, nodes, pieces=self.shares.apart, **options)
+            return SparseOperator(self, nodes, components=self.shares.apart, **options)
         motions = masters.ties
         if motion is not None:
             dofs = nodes[: motion.shape[0], None] * self.block_size + np.arange(self.block_size)
@@ -303,7 +303,7 @@ class BodyEquilibrium:
         return np.asarray(own + ones[behind:].T @ others[behind:])
 
     def sizes(self, values: Array) -> Array:
-        """Return the norms of forces, and of charges, of each piece apart. Collective."""
+        """Return the norms of forces, and of charges, of each component apart. Collective."""
         return self.shares.sizes(values)
 
     def load_sizes(self, time: float = 1.0) -> Array:

@@ -11,9 +11,8 @@ from mpi4py import MPI
 from contact.body.constants import law_with_constants, piezo_with_constants
 from contact.body.description import Material
 from contact.errors import InputError
-from contact.mesh.domain import Domain, Indices
+from contact.mesh.domain import Domain, Indices, Measure
 from contact.mesh.entities import cells_at
-from contact.mesh.measure import Measure
 from forms.hencky import Law
 from forms.piezo import Piezo
 

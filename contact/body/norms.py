@@ -15,8 +15,7 @@ from ufl.core.expr import Expr
 from contact.body.constants import constant
 from contact.body.equilibrium import BodyEquilibrium
 from contact.body.materials import pieces
-from contact.mesh.domain import Domain
-from contact.mesh.measure import Measure
+from contact.mesh.domain import Domain, Measure
 from contact.typing import Array
 from forms.hencky import secant_form
 

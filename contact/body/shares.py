@@ -1,7 +1,7 @@
 """The sizes of forces that are compared with each other, and with no others.
 
 Forces and charges have no common unit. And what is connected by nothing has nothing in common:
-beside the loads of another piece of the mesh any error of a piece may be small.
+beside the loads of another component of the mesh any error of one may be small.
 """
 
 from __future__ import annotations
@@ -14,29 +14,29 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 
 from contact.body.masters import Masters
-from contact.linear.refinement import Pieces
+from contact.linear.refinement import Components
 from contact.mesh.domain import Domain
-from contact.mesh.pieces import joined, sums
+from contact.mesh.entities import component_sums, graph_components
 from contact.typing import Array
 
 
 @dataclass(frozen=True)
 class Shares:
-    """The forces, and the charges, of each of k pieces.
+    """The forces, and the charges, of each of k connected components.
 
-    Pieces are one where something that moves freely joins them: a plate, a foundation, or an
-    electrode. Those that touch each other are not: contact forces act on both.
+    Components count as one where something that moves freely joins them: a plate, a foundation,
+    or an electrode. Those that touch each other are not: contact forces act on both.
 
     Attributes
     ----------
     comm
         Communicator.
-    piece
-        The piece of each owned node, shape (nodes,).
+    component
+        The component of each owned node, shape (nodes,).
     behind
         That of each global unknown, shape (m,).
     count
-        How many pieces there are.
+        How many components there are.
     block_size, dim
         Unknowns a node, and how many of them are displacements.
     global_mechanical
@@ -44,7 +44,7 @@ class Shares:
     """
 
     comm: MPI.Intracomm
-    piece: NDArray[np.intp]
+    component: NDArray[np.intp]
     behind: NDArray[np.intp]
     count: int
     block_size: int
@@ -54,25 +54,25 @@ class Shares:
     @property
     def mechanical(self) -> NDArray[np.bool_]:
         """Which of owned values, global ones behind them, are displacements or forces."""
-        nodal = np.tile(np.arange(self.block_size) < self.dim, self.piece.size)
+        nodal = np.tile(np.arange(self.block_size) < self.dim, self.component.size)
         return np.concatenate([nodal, self.global_mechanical])
 
     def at(self, nodes: NDArray[np.int32]) -> Shares:
         """Return those of some owned nodes alone."""
         none = np.zeros(0, dtype=np.intp)
-        piece = self.piece[nodes]
+        component = self.component[nodes]
         return Shares(
-            self.comm, piece, none, self.count, self.block_size, self.dim, none.astype(bool)
+            self.comm, component, none, self.count, self.block_size, self.dim, none.astype(bool)
         )
 
     @property
-    def apart(self) -> Pieces | None:
-        """The pieces of owned unknowns; None where there is one."""
-        of = np.repeat(self.piece, self.block_size)
-        return Pieces(self.comm, of, self.count) if self.count > 1 else None
+    def apart(self) -> Components | None:
+        """The components of owned unknowns; None where there is one."""
+        of = np.repeat(self.component, self.block_size)
+        return Components(self.comm, of, self.count) if self.count > 1 else None
 
     def sizes(self, values: Array) -> Array:
-        """Return the Euclidean norms of owned values, by field and piece. Collective.
+        """Return the Euclidean norms of owned values, by field and component. Collective.
 
         Returns
         -------
@@ -89,39 +89,39 @@ class Shares:
         if self.count == 1:
             square = self.comm.allreduce(np.dot(own, own), op=MPI.SUM) + np.dot(other, other)
             return np.array([np.sqrt(square)])
-        piece = np.repeat(self.piece, self.block_size)
-        squares = sums(self.comm, piece, own**2, self.count)
+        component = np.repeat(self.component, self.block_size)
+        squares = component_sums(self.comm, component, own**2, self.count)
         return np.sqrt(squares + np.bincount(self.behind, other**2, minlength=self.count))
 
     def spread(self, sizes: Array) -> Array:
         """Return for each owned value the size of what it is compared with."""
-        piece = np.concatenate([np.repeat(self.piece, self.block_size), self.behind])
-        return np.where(self.mechanical, sizes[0, piece], sizes[-1, piece])
+        component = np.concatenate([np.repeat(self.component, self.block_size), self.behind])
+        return np.where(self.mechanical, sizes[0, component], sizes[-1, component])
 
 
 def shares_of(
     domain: Domain,
     space: fem.FunctionSpace,
     masters: Masters,
-    pieces: tuple[NDArray[np.int32], int],
+    components: tuple[NDArray[np.int32], int],
 ) -> Shares:
-    """Return what is compared with each other in a body, of given pieces. Collective."""
-    (piece, count), members, d = pieces, masters.members, domain.dim
+    """Return what is compared with each other in a body, of given components. Collective."""
+    (component, count), members, d = components, masters.members, domain.dim
     if count > 1 and members:
         touched = np.zeros((len(members), count), dtype=np.intc)
         for member, at in zip(members, touched, strict=True):
             if member.free.any():
                 nodes = fem.locate_dofs_topological(space, d - 1, domain.facets(member.what.on))
-                at[piece[nodes[nodes < piece.size]]] = 1
+                at[component[nodes[nodes < component.size]]] = 1
         domain.comm.Allreduce(MPI.IN_PLACE, touched, op=MPI.MAX)
         member_of, piece_of = np.nonzero(touched)
         # What moves as is given joins nothing: what holds it there is of its own.
-        count, label = joined(member_of, len(members) + piece_of, len(members) + count)
-        piece, of_members = label[len(members) + piece], label[: len(members)]
+        count, label = graph_components(member_of, len(members) + piece_of, len(members) + count)
+        component, of_members = label[len(members) + component], label[: len(members)]
     else:
         of_members = np.zeros(len(members), dtype=np.intp)
     behind = np.repeat(of_members, [member.free.size for member in members]).astype(np.intp)
     block_size = space.dofmap.index_map_bs
     return Shares(
-        domain.comm, piece.astype(np.intp), behind, count, block_size, d, masters.mechanical
+        domain.comm, component.astype(np.intp), behind, count, block_size, d, masters.mechanical
     )

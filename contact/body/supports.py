@@ -15,8 +15,7 @@ from contact._compat import collapse
 from contact.body.amplitude import Amplitude, Moving, steady, values_at
 from contact.body.description import Body, Field
 from contact.errors import InputError
-from contact.mesh.domain import Domain
-from contact.mesh.revolution import on_axis
+from contact.mesh.domain import Domain, on_axis
 from contact.typing import Array
 
 

@@ -16,8 +16,7 @@ from contact.errors import InputError
 from contact.interface.layer import Layer
 from contact.interface.obstacle import Obstacle
 from contact.kinds import check_range
-from contact.mesh.domain import Domain
-from contact.mesh.revolution import revolved
+from contact.mesh.domain import Domain, revolved
 from contact.problem.consistent import check_problem, check_supports
 from contact.problem.contact import Contact
 from contact.problem.problem import ContactProblem

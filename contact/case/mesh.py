@@ -28,9 +28,9 @@ from contact.case.section import (
 from contact.errors import InputError
 from contact.mesh import grid
 from contact.mesh.domain import Domain
+from contact.mesh.grid import rotate
 from contact.mesh.reader import from_msh, from_recipe
-from contact.mesh.refinement import refined
-from contact.mesh.rotation import rotate
+from contact.mesh.transfer import refined
 from contact.methods.interrupt import deaf
 from contact.settings import Accepted, Count, Positive
 from meshes.grading import memory

@@ -10,8 +10,7 @@ from contact.interface.mortar.coupling import couple
 from contact.interface.mortar.surface import Surface, surface_of
 from contact.interface.pairing import CHORDS, REACH
 from contact.mesh.domain import Domain
-from contact.mesh.entities import owned_among
-from contact.mesh.pieces import connected_pieces
+from contact.mesh.entities import components, owned_among
 
 
 def facing_parts(domain: Domain) -> list[tuple[str, str]]:
@@ -20,7 +19,7 @@ def facing_parts(domain: Domain) -> list[tuple[str, str]]:
     The finer side is the first of a pair. Parts that belong to several bodies are left out.
     """
     space = fem.functionspace(domain.mesh, ("Lagrange", 1))
-    piece, count = connected_pieces(space)
+    piece, count = components(space)
     if count == 1:
         return []
     comm = domain.comm

@@ -16,7 +16,7 @@ from contact.interface.law import InterfaceLaw
 from contact.interface.multipliers import Multipliers
 from contact.interface.nodes import ContactNodes
 from contact.linear.constraint import Change
-from contact.mesh.pieces import sums
+from contact.mesh.entities import component_sums
 from contact.tolerances import EPS
 from contact.typing import Array
 
@@ -44,9 +44,9 @@ class Interface:
     elongation
         How many times longer than usual the cells behind Gamma_3 are, across it
         (`contact.mesh.entities.elongation`); residuals take c so many times as large.
-    piece, pieces
-        The piece of the body that each contact node belongs to, shape (n,), and how many there are
-        (`contact.body.shares`).
+    component, components
+        The connected component of the mesh that each contact node belongs to, shape (n,), and how
+        many there are (`contact.body.shares`).
     """
 
     jump: ContactNodes
@@ -56,8 +56,8 @@ class Interface:
     stiffness: float
     size: float
     elongation: float
-    piece: NDArray[np.intp]
-    pieces: int
+    component: NDArray[np.intp]
+    components: int
 
     @property
     def comm(self) -> MPI.Intracomm:
@@ -79,27 +79,29 @@ class Interface:
         )
 
     def norms(self, values: Array) -> Array:
-        """Return the norms in L2(Gamma_3) of scalars or vectors on each piece, (k,). Collective."""
-        if self.pieces == 1:
+        """Return the norms in L2(Gamma_3) of values on each component, shape (k,). Collective."""
+        if self.components == 1:
             return np.array([self.jump.norm(values)])
         squares = values**2 if values.ndim == 1 else np.einsum("ni,ni->n", values, values)
-        return np.sqrt(sums(self.comm, self.piece, self.jump.weight * squares, self.pieces))
+        return np.sqrt(
+            component_sums(self.comm, self.component, self.jump.weight * squares, self.components)
+        )
 
-    def piece_norms(self, values: Array) -> Array:
-        """Return at each node how large values are on its piece, 1 for a single one. Collective."""
+    def component_norms(self, values: Array) -> Array:
+        """Return the norms on the components of the nodes, 1 for a single one. Collective."""
         norms = self.norms(values)
-        if self.pieces == 1 or not norms.max() > 0:
+        if self.components == 1 or not norms.max() > 0:
             return np.ones_like(self.jump.weight)
-        return np.maximum(norms, EPS * norms.max())[self.piece]
+        return np.maximum(norms, EPS * norms.max())[self.component]
 
     @property
     def extents(self) -> tuple[Array, Array]:
-        """The number of contact nodes of each piece, and their area, shape (k,). Collective."""
+        """The number of contact nodes of each component, and their area, shape (k,). Collective."""
         jump, ones = self.jump, np.ones_like(self.jump.weight)
-        if self.pieces == 1:
+        if self.components == 1:
             return np.array([float(jump.size)]), np.array([jump.sum(ones)])
-        count = sums(self.comm, self.piece, ones, self.pieces)
-        return count, sums(self.comm, self.piece, jump.weight, self.pieces)
+        count = component_sums(self.comm, self.component, ones, self.components)
+        return count, component_sums(self.comm, self.component, jump.weight, self.components)
 
     def opening(self, nodal: Array) -> Array:
         """Return gap - u_nu, shape (n,): the distance that is left."""

@@ -237,7 +237,7 @@ def _apart(
 
 def _connected(body: BodyEquilibrium, coupling: Coupling) -> bool:
     """Tell whether both sides are on the same piece of the mesh. Collective."""
-    piece, count = body.pieces
+    piece, count = body.components
     found = np.zeros((2, count), dtype=np.intc)
     for k, nodes in enumerate((coupling.slaves, coupling.masters)):
         found[k, piece[owned_among(body.layout.index_map, nodes)[1]]] = 1

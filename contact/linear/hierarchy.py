@@ -10,7 +10,7 @@ from petsc4py import PETSc
 
 from contact.linear.faults import petsc_options
 from contact.linear.products import quick_products
-from contact.linear.refinement import Pieces, refine
+from contact.linear.refinement import Components, refine
 from contact.linear.stiff_nodes import StiffNodes
 from contact.typing import Array
 
@@ -35,14 +35,14 @@ class Hierarchy:
         A solver with GAMG, set up with the body's operator.
     nodes
         Owned nodes that may have contact blocks, local numbers, shape (n,).
-    pieces
+    components
         As of `refine`.
     """
 
     def __init__(
-        self, ksp: PETSc.KSP, nodes: NDArray[np.int32], pieces: Pieces | None = None
+        self, ksp: PETSc.KSP, nodes: NDArray[np.int32], components: Components | None = None
     ) -> None:
-        self._ksp, self._pieces = ksp, pieces
+        self._ksp, self._components = ksp, components
         self._stiff = StiffNodes(ksp.getPC(), nodes)
         self._most = ksp.getTolerances()[3]
         self._lost = np.inf
@@ -90,7 +90,7 @@ class Hierarchy:
         """
         self._taken, self._renewed = 0, False
         self._solve(rhs.copy(), solution)
-        refine(self._ksp, rhs, solution, self._correct, self._pieces)
+        refine(self._ksp, rhs, solution, self._correct, self._components)
         return self._taken, self._renewed
 
     def _correct(self, rhs: PETSc.Vec, correction: PETSc.Vec) -> None:

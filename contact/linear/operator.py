@@ -23,7 +23,7 @@ from contact.linear.hierarchy import Hierarchy
 from contact.linear.layout import Layout
 from contact.linear.nodal import insert_blocks, nodal_blocks
 from contact.linear.products import quick_products
-from contact.linear.refinement import Pieces, refine
+from contact.linear.refinement import Components, refine
 from contact.linear.rigid import held_motions
 from contact.linear.stiff_nodes import TOUCH
 from contact.linear.workspace import set_up_with_workspace
@@ -99,7 +99,7 @@ class SparseOperator:
     kind
         "lu", "iterative", or "auto": iterative for large problems. "many": where hundreds of
         solves with one matrix are to come, iterative for those alone that are too large for LU.
-    pieces
+    components
         Bodies that nothing couples, each of which an iterative solver has to solve for; None for
         one, or where blocks couple them.
     """
@@ -113,7 +113,7 @@ class SparseOperator:
         prefix: str = "contact_",
         counters: Counters | None = None,
         kind: str = "auto",
-        pieces: Pieces | None = None,
+        components: Components | None = None,
     ) -> None:
         self.bulk, self.layout, self._nodes = bulk, bulk.layout, nodes
         self.counters = counters or Counters()
@@ -123,7 +123,7 @@ class SparseOperator:
         self.system = self.matrix
         self._kind = ""
         self._blocks: Array | None = None
-        self._pieces = pieces
+        self._components = components
         self._rhs, self._solution = self.matrix.createVecs()
         self.ksp = PETSc.KSP().create(self.layout.comm)
         self.ksp.setOptionsPrefix(prefix)
@@ -186,7 +186,7 @@ class SparseOperator:
                 if inserts:
                     insert_blocks(self.matrix, nodes, own + TOUCH * rest)
                 self.set_up(symmetric=True)
-            self._hierarchy = Hierarchy(self.ksp, nodes, self._pieces)
+            self._hierarchy = Hierarchy(self.ksp, nodes, self._components)
         if inserts:
             insert_blocks(self.matrix, nodes, own + rest)
         if self._hierarchy is None:
@@ -265,7 +265,7 @@ class SparseOperator:
             self.ksp.solve(rhs, correction)
             taken += self.ksp.getIterationNumber()
 
-        refine(self.ksp, self._rhs, self._solution, solve, self._pieces)
+        refine(self.ksp, self._rhs, self._solution, solve, self._components)
         return taken
 
     def solve_all(self, sides: Array) -> Array:

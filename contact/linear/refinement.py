@@ -15,7 +15,7 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 from petsc4py import PETSc
 
-from contact.mesh.pieces import sums
+from contact.mesh.entities import component_sums
 from contact.typing import Array
 
 #: How often a solution is corrected, at most, by a solve for what it leaves.
@@ -23,7 +23,7 @@ CORRECTIONS = 3
 
 
 @dataclass(frozen=True)
-class Pieces:
+class Components:
     """Systems that nothing couples.
 
     Attributes
@@ -42,7 +42,7 @@ class Pieces:
 
     def norms(self, vector: PETSc.Vec) -> Array:
         """Return the norm of a vector in each of them, shape (count,). Collective."""
-        return np.sqrt(sums(self.comm, self.of, vector.array_r**2, self.count))
+        return np.sqrt(component_sums(self.comm, self.of, vector.array_r**2, self.count))
 
 
 def refine(
@@ -50,7 +50,7 @@ def refine(
     rhs: PETSc.Vec,
     solution: PETSc.Vec,
     solve: Callable[[PETSc.Vec, PETSc.Vec], None],
-    pieces: Pieces | None = None,
+    components: Components | None = None,
 ) -> None:
     """Correct a solution while it leaves far too much and corrections help. Collective.
 
@@ -66,10 +66,10 @@ def refine(
         The system's; the latter is corrected.
     solve
         Solves for another right-hand side, from zero.
-    pieces
+    components
         Systems that nothing couples; None where there is one.
     """
-    norms = (lambda vector: np.array([vector.norm()])) if pieces is None else pieces.norms
+    norms = (lambda vector: np.array([vector.norm()])) if components is None else components.norms
     matrix, asked_for = ksp.getOperators()[0], ksp.getTolerances()[0]
     allowed = asked_for**0.5 * norms(rhs)
     left = rhs - matrix * solution
@@ -79,8 +79,8 @@ def refine(
         if not beyond.any():
             return
         correction, asked = left.duplicate(), left.copy()
-        if pieces is not None:
-            asked.array[~beyond[pieces.of]] = 0.0
+        if components is not None:
+            asked.array[~beyond[components.of]] = 0.0
         ksp.setInitialGuessNonzero(False)
         # No more than is missing, by what norms may differ.
         missing = float(allowed[beyond].min() / np.linalg.norm(before[beyond]))
@@ -93,8 +93,8 @@ def refine(
         gained = norms(corrected) < before
         if not np.any(gained & beyond):
             return
-        if pieces is not None:
-            lost = ~gained[pieces.of]
+        if components is not None:
+            lost = ~gained[components.of]
             correction.array[lost], corrected.array[lost] = 0.0, left.array_r[lost]
         solution.axpy(1.0, correction)
         left = corrected

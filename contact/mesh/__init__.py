@@ -1,8 +1,8 @@
 """Meshes with names: parts of their boundary and regions of their cells.
 
-`domain`: `Domain`, and `from_mesh` for a dolfinx mesh; `grid`: `rectangle`, `box`, their `Piece`;
-`reader`: `from_msh` for Gmsh files and `from_recipe` for the package `meshes`; `refinement`:
-`refined`; `transfer`: `carry`; `pieces`: `connected_pieces`.
+`domain`: `Domain`, `from_mesh` for a dolfinx mesh, and `revolved`; `grid`: `rectangle`, `box`,
+their `Piece`; `reader`: `from_msh` for Gmsh files and `from_recipe` for the package `meshes`;
+`transfer`: `refined` and `carry`; `entities`: facets, connected components.
 
 Imports: `contact.errors`, `contact.typing`, `contact._compat`.
 """

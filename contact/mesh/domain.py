@@ -1,13 +1,14 @@
 """A mesh with names: parts of its boundary and regions of its cells.
 
 Each name stands for one set of indices, so that parts, and regions, may overlap (the side
-``top`` and a piece ``loaded`` of it).
+``top`` and a piece ``loaded`` of it). Of a body of revolution the mesh is the half plane, x the
+radius and y the axis.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any, TypeAlias
 
@@ -16,13 +17,46 @@ import numpy.typing as npt
 import ufl
 from dolfinx import mesh as dmesh
 from mpi4py import MPI
+from numpy.typing import NDArray
+from ufl.core.expr import Expr
 
 from contact import _compat
 from contact.errors import InputError
 from contact.mesh.entities import Indices, extent, exterior_facets
-from contact.mesh.measure import ExtendedMeasure, Measure
 from contact.mesh.together import known, members, pieces
+from contact.typing import Array
 from forms.kinematics import CARTESIAN, Axisymmetric, Kinematics
+
+
+@dataclass(frozen=True)
+class ExtendedMeasure:
+    """A measure of UFL over a half plane, times the extent of the body there.
+
+    It is used like a measure of UFL: it multiplies an integrand from the right.
+
+    Attributes
+    ----------
+    measure
+        dx or ds of the mesh.
+    extent
+        2 pi r, the length of the ring through a point.
+    """
+
+    measure: ufl.Measure
+    extent: Expr
+
+    def __call__(self, *arguments: Any, **settings: Any) -> ExtendedMeasure:
+        """Return the measure with a subdomain or metadata of its own."""
+        return ExtendedMeasure(self.measure(*arguments, **settings), self.extent)
+
+    def __rmul__(self, integrand: Any) -> ufl.Form:
+        """Return the integral over the whole body."""
+        return (self.extent * integrand) * self.measure
+
+
+#: What integrates over a body or a part of its boundary.
+Measure: TypeAlias = ufl.Measure | ExtendedMeasure
+
 
 #: Indices of facets or cells that this rank owns, ascending.
 Marker: TypeAlias = Callable[[npt.NDArray[np.float64]], npt.NDArray[np.bool_]]
@@ -56,7 +90,7 @@ class Domain:
         What else the source of the mesh held, one sentence each.
     revolved
         Whether the mesh is the half plane of a body of revolution, x its radius and y its axis
-        (see `contact.mesh.revolution`). Measures then are those of the whole body.
+        (see `contact.mesh.domain`). Measures then are those of the whole body.
     """
 
     mesh: dmesh.Mesh
@@ -297,3 +331,38 @@ def with_names(
         if empty:
             raise InputError(f"the {what} {empty[0]!r} contains no {of_it}")
     return Domain(mesh, parts, regions, extent(mesh) if size is None else size)
+
+
+#: Nodes nearer to the axis than this, in units of the size of the body, are on it.
+ON_AXIS = 1e-9
+
+
+def on_axis(domain: Domain, points: Array) -> NDArray[np.bool_]:
+    """Return which points, shape (n, 2), lie on the axis of a body of revolution."""
+    return np.asarray(np.abs(points[:, 0]) <= ON_AXIS * domain.size)
+
+
+def revolved(domain: Domain) -> Domain:
+    """Return the body of revolution whose half plane a domain is. Collective.
+
+    Nodes that lie on the axis up to rounding are moved onto it.
+
+    Raises
+    ------
+    InputError
+        If the mesh is not plane, or lies on the other side of the axis.
+    """
+    if domain.dim != 2:
+        raise InputError(
+            'space.kinematics: "axisymmetric" with a mesh in space; accepted: a mesh in the plane, '
+            "x the radius and y the axis"
+        )
+    radius = domain.mesh.geometry.x[:, 0]
+    least = domain.comm.allreduce(float(radius.min(initial=np.inf)), op=MPI.MIN)
+    if least < -ON_AXIS * domain.size:
+        raise InputError(
+            f'space.kinematics: "axisymmetric", and the mesh goes to x = {least:.4g}; accepted: '
+            "a mesh with x >= 0, the half plane of the body"
+        )
+    radius[on_axis(domain, domain.mesh.geometry.x)] = 0.0
+    return replace(domain, revolved=True)

@@ -1,4 +1,4 @@
-"""Facets, what this rank owns, groups of indices, and the extent of a mesh."""
+"""Facets, what this rank owns, groups of indices, connected components, and extents."""
 
 from __future__ import annotations
 
@@ -11,6 +11,10 @@ from dolfinx import fem, la
 from dolfinx import mesh as dmesh
 from dolfinx.common import IndexMap
 from mpi4py import MPI
+from scipy import sparse
+from scipy.sparse.csgraph import connected_components
+
+from contact._compat import lasting
 
 Indices: TypeAlias = npt.NDArray[np.int32]
 
@@ -100,3 +104,43 @@ def exterior_facets(mesh: dmesh.Mesh) -> Indices:
     mesh.topology.create_connectivity(tdim, tdim - 1)
     mesh.topology.create_connectivity(tdim - 1, 0)
     return np.sort(dmesh.exterior_facet_indices(mesh.topology))
+
+
+def components(space: fem.FunctionSpace) -> tuple[Indices, int]:
+    """Return the connected component of each owned node, shape (n,), and how many there are.
+
+    Collective. Nodes of one cell are connected; regions that share no nodes are not.
+    """
+    comm, index_map, cells = lasting(space.mesh.comm), space.dofmap.index_map, space.dofmap.list
+    owned = index_map.size_local
+    first = np.repeat(cells[:, 0], cells.shape[1] - 1)
+    count, here = graph_components(first, cells[:, 1:].ravel(), owned + index_map.num_ghosts)
+    here = here + comm.scan(count) - count
+    total = comm.allreduce(count, op=MPI.SUM)
+    # The numbers that a ghost has here and at its owner are of one component.
+    names = la.vector(index_map)
+    names.array[:] = here
+    names.scatter_forward()
+    there = names.array[owned:].astype(np.int64)
+    pairs = np.unique(np.column_stack([here[owned:], there]), axis=0)
+    both = np.concatenate(comm.allgather(pairs))
+    count, labels = graph_components(both[:, 0], both[:, 1], total)
+    return labels[here[:owned]], count
+
+
+def component_sums(
+    comm: MPI.Intracomm, component: npt.NDArray[Any], values: npt.NDArray[np.float64], count: int
+) -> npt.NDArray[np.float64]:
+    """Return the sums of the values of all ranks over each component, (count,). Collective."""
+    # Of no values at all numpy makes integers.
+    own = np.bincount(component, values, minlength=count).astype(np.float64)
+    return np.asarray(comm.allreduce(own, op=MPI.SUM))
+
+
+def graph_components(
+    one: npt.NDArray[Any], other: npt.NDArray[Any], size: int
+) -> tuple[int, Indices]:
+    """Return the number of components of a graph given by its edges, and that of each vertex."""
+    graph = sparse.coo_array((np.ones(one.size, dtype=bool), (one, other)), shape=(size, size))
+    count, labels = connected_components(graph, directed=False)
+    return int(count), labels

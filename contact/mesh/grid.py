@@ -1,6 +1,10 @@
-"""Grids of a rectangle or a box, with sides and pieces of sides as parts."""
+"""Grids of a rectangle or a box, with sides and pieces of sides as parts.
 
-from collections.abc import Mapping, Sequence
+Ranks have blocks of a grid with straight cuts: a general partitioner cuts along jagged lines, a
+quarter longer, and the dense matrix of the nodes at cuts is as much larger.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -9,10 +13,21 @@ import numpy.typing as npt
 from dolfinx import mesh as dmesh
 from mpi4py import MPI
 
+from contact import _compat
 from contact.errors import InputError
-from contact.mesh.cutting import grid_partitioner
 from contact.mesh.domain import Domain, exterior_facets, with_names
-from contact.mesh.rotation import rotate
+
+
+def rotate(mesh: dmesh.Mesh, degrees: float, axis: Sequence[float] = (0.0, 1.0, 0.0)) -> None:
+    """Turn a mesh in place about an axis through the origin (Rodrigues' formula)."""
+    if degrees == 0.0:
+        return
+    a, b, c = np.asarray(axis, dtype=np.float64) / np.linalg.norm(axis)
+    cross = np.array([[0.0, -c, b], [c, 0.0, -a], [-b, a, 0.0]])
+    angle = np.deg2rad(degrees)
+    turn = np.eye(3) + np.sin(angle) * cross + (1.0 - np.cos(angle)) * cross @ cross
+    mesh.geometry.x[:] = mesh.geometry.x @ turn.T
+
 
 #: Sides of the generators: name -> (axis, end), end 0 at the lower coordinate.
 RECTANGLE_SIDES = {"left": (0, 0), "right": (0, 1), "bottom": (1, 0), "top": (1, 1)}
@@ -281,3 +296,72 @@ def _name_grid(mesh: dmesh.Mesh, grid: _Grid, parts: Mapping[str, list[_Patch]])
             )
         chosen[name] = facets[inside]
     return with_names(mesh, chosen, {})
+
+
+Ints = npt.NDArray[np.int64]
+
+
+def blocks(positions: Ints, cells: Sequence[int], size: Sequence[float], ranks: int) -> Ints:
+    """Return the rank of each square or cube of a grid.
+
+    The grid is cut across its longest side in proportion to the ranks on both sides, and so are
+    the pieces, until each has one rank.
+
+    Parameters
+    ----------
+    positions
+        Number along each axis, shape (squares, dim).
+    cells, size
+        Squares along the axes, and lengths.
+    ranks
+        How many there are.
+    """
+    owner = np.zeros(len(positions), dtype=np.int64)
+    edges = np.asarray(size, dtype=float) / np.asarray(cells)
+
+    def share(here: Ints, low: Ints, high: Ints, first: int, count: int) -> None:
+        if count == 1:
+            owner[here] = first
+            return
+        axis = int(np.argmax((high - low) * edges))
+        few = count // 2
+        cut = low[axis] + round((high - low)[axis] * few / count)
+        below = positions[here, axis] < cut
+        end, begin = high.copy(), low.copy()
+        end[axis] = begin[axis] = cut
+        share(here[below], low, end, first, few)
+        share(here[~below], begin, high, first + few, count - few)
+
+    everything = np.arange(len(positions))
+    share(everything, np.zeros(len(cells), dtype=np.int64), np.array(cells), 0, ranks)
+    return owner
+
+
+def _squares(simplices: Ints, cells: Sequence[int]) -> Ints:
+    """Return the square or cube of each simplex, shape (simplices, dim).
+
+    Vertices are numbered along the first axis first; those in the middle of squares follow all
+    others.
+    """
+    corners = np.asarray(cells) + 1
+    inner = simplices - np.prod(corners)
+    at = np.stack(np.unravel_index(np.minimum(simplices, np.prod(corners) - 1), corners, "F"))
+    middle = np.stack(np.unravel_index(np.maximum(inner, 0) % np.prod(cells), cells, "F")) + 0.5
+    return np.floor(np.where(inner < 0, at, middle).mean(axis=2)).astype(np.int64).T
+
+
+def grid_partitioner(cells: Sequence[int], size: Sequence[float]) -> Callable[..., Any]:
+    """Return what dolfinx asks for the ranks of a grid's simplices.
+
+    Parameters
+    ----------
+    cells, size
+        Squares or cubes along the axes, and lengths.
+    """
+
+    def partition(_comm: Any, ranks: int, _types: Any, vertices: Sequence[Ints]) -> Any:
+        simplices = np.asarray(vertices[0]).reshape(-1, len(cells) + 1)
+        owner = blocks(_squares(simplices, cells), cells, size, ranks)
+        return _compat.destinations(owner)
+
+    return partition

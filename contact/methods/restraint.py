@@ -13,7 +13,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from contact.mesh.pieces import sums
+from contact.mesh.entities import component_sums
 from contact.problem.kkt import residual_forces
 from contact.problem.mobility import held_at_rest, held_by_friction, held_by_supports
 from contact.problem.problem import ContactProblem
@@ -77,8 +77,8 @@ def _loads(problem: Problem) -> Array:
     body, shares = problem.equilibrium, problem.equilibrium.shares
     residual = residual_forces(problem, problem.start())
     forces = np.abs(body.unbalanced(residual)) * shares.mechanical
-    own = np.repeat(shares.piece, body.block_size)
-    found = sums(body.comm, own, forces[: body.owned], shares.count)
+    own = np.repeat(shares.component, body.block_size)
+    found = component_sums(body.comm, own, forces[: body.owned], shares.count)
     return found + np.bincount(shares.behind, forces[body.owned :], shares.count)
 
 
@@ -86,4 +86,6 @@ def _loose(problem: ContactProblem) -> NDArray[np.bool_]:
     """Return which pieces no support holds anywhere, shape (k,). Collective."""
     body, shares = problem.equilibrium, problem.equilibrium.shares
     supported = ~body.unsupported[:, : body.dim].all(axis=1)
-    return sums(problem.comm, shares.piece, supported.astype(float), shares.count) == 0
+    return (
+        component_sums(problem.comm, shares.component, supported.astype(float), shares.count) == 0
+    )

@@ -124,8 +124,8 @@ def regions(solution: Solution) -> tuple[str, bool]:
 
 
 def passing(problem: ContactProblem) -> tuple[str, bool]:
-    """Warn where pieces of the mesh are in no contact with another: nothing keeps them apart."""
-    piece, count = problem.equilibrium.pieces
+    """Warn where components of the mesh are in no contact, so that nothing keeps them apart."""
+    piece, count = problem.equilibrium.components
     if count == 1:
         return "", True
     met = np.zeros(count, dtype=np.intc)
@@ -138,7 +138,7 @@ def passing(problem: ContactProblem) -> tuple[str, bool]:
     if alone == 0:
         return "", True
     return (
-        f"the mesh has {count} pieces that share no nodes, and {alone} of them can pass through "
-        "the others: contact between two pieces is asked for by [[contact]] with `on` one and "
+        f"the mesh has {count} connected components, and {alone} of them can pass through "
+        "the others: contact between two is asked for by [[contact]] with `on` one and "
         "`against` the other"
     ), False

@@ -22,7 +22,7 @@ BISECTIONS = 20
 
 @dataclass(frozen=True)
 class Grip:
-    """What contact forces can hold of pieces of the mesh, whose supports leave motions free.
+    """What contact forces can hold of components of the mesh, whose supports leave motions free.
 
     Attributes
     ----------

@@ -9,7 +9,6 @@ from scipy import linalg
 
 from contact.errors import InputError
 from contact.interface.current import Conductor
-from contact.mesh.pieces import connected_pieces
 from contact.problem.grip import Grip
 from contact.problem.mobility import Group, described, groups, middle, null_space
 from contact.problem.problem import ContactProblem
@@ -35,7 +34,7 @@ def check_held(problem: ContactProblem) -> None:
 
 
 def _check_group(problem: ContactProblem, group: Group) -> None:
-    """Check pieces of the mesh. Collective."""
+    """Check components of the mesh. Collective."""
     free = null_space(group.supports)
     if free.shape[1] == 0:
         return
@@ -60,7 +59,7 @@ def _what_is_loose(problem: ContactProblem, group: Group, loose: Array) -> str:
         moves = own.reshape(len(group.pieces), -1).max(axis=1) > 1e-6
         where = " and ".join(f"({', '.join(f'{x:.4g}' for x in c)})" for c in group.centres[moves])
         which = "the one" if np.count_nonzero(moves) == 1 else "what is"
-        whole = f"the mesh has {count} pieces that share no nodes, and {which} about {where}"
+        whole = f"the mesh has {count} connected components, and {which} about {where}"
     return (
         f"{whole} is not held: it can move as a rigid body ({described(loose, group.names)}); "
         "accepted: displacement components fixed so that it cannot"
@@ -92,7 +91,7 @@ def check_potential(problem: ContactProblem, state: State | None = None) -> None
     if not problem.piezoelectric:
         return
     body, interface = problem.equilibrium, problem.interface
-    piece, count = connected_pieces(body.space)
+    piece, count = body.components
     # Constants by which the potential may be raised: of each piece, and of each electrode.
     raised = np.zeros((*body.free.shape, count))
     raised[np.arange(piece.size), -1, piece] = 1.0

@@ -170,7 +170,7 @@ def evaluate(problem: Problem, state: State) -> KKT:
     unbalanced = body.sizes(body.unbalanced(residual))
     most, acted = body.most_rounding * scale, loads > 0
     asked = ~acted | (unbalanced <= most)
-    rounding, unknown = np.zeros_like(scale), np.zeros(interface.pieces)
+    rounding, unknown = np.zeros_like(scale), np.zeros(interface.components)
     if asked.any():
         rounding = np.where(asked, force_rounding(problem, state, internal), 0.0)
         unknown = np.minimum(rounding, most)[0]

@@ -89,12 +89,12 @@ class Group:
 
 
 def groups(problem: ContactProblem) -> Iterator[Group]:
-    """Give the pieces of the mesh one by one, but those together that something joins. Collective.
+    """Give the components of the mesh one by one, joined ones together. Collective.
 
     That is for those that touch each other, or that a rigid part or a foundation joins: they are
     looked at together, with its motion.
     """
-    piece, count = problem.equilibrium.pieces
+    piece, count = problem.equilibrium.components
     joined = _joined(problem, piece, count)
     for k in map(int, np.flatnonzero(~joined)):
         yield _group(problem, piece, [k], count)
@@ -158,7 +158,7 @@ def _group(
     count: int,
     moving: Mapping[int, str] = MappingProxyType({}),
 ) -> Group:
-    """Return pieces of the mesh with their motions. Collective.
+    """Return components of the mesh with their motions. Collective.
 
     Parameters
     ----------

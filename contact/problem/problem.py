@@ -182,7 +182,7 @@ class ContactProblem:
         held = joined_held(self.entries, body.layout.index_map.local_range[0], found.links)
         mesh = self.domain.mesh
         longer = max(elongation(mesh, self.domain.facets(contact.on)) for contact in self.contacts)
-        piece, pieces = body.shares.piece[found.nodes], body.shares.count
+        piece, pieces = body.shares.component[found.nodes], body.shares.count
         return Interface(
             law.constrained, law, friction, held, stiffness, size, longer, piece, pieces
         )

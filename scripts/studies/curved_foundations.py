@@ -41,7 +41,7 @@ from contact import (
     load_case,
     solve,
 )
-from contact.mesh.revolution import revolved
+from contact.mesh.domain import revolved
 from contact.methods.options import NewtonOptions
 from contact.typing import Array
 from scripts.cases import CASES
@@ -69,7 +69,9 @@ NOTE = (
     "Hertz's cylinder: nodes within 0.7 a. All others: the body shrinks by 0.001 under hydrostatic "
     "pressure. Errors of gaps are multiplied by E/h: at degree 2 gaps in the middle of edges are "
     "those of the curved surface, by curvatures fitted to the vertices; before they were those of "
-    "the chord. The triangles are chords of the sphere themselves, by 2e-6."
+    "the chord. The triangles are chords of the sphere themselves, by 2e-6. "
+    "In space, where the curvature jumps at the edge of the punch's face, nodes of degree 2 beside "
+    "it stay off by up to 95 % at h = 0.05."
 )
 
 #: Ratios and weights of the nodes, given a mesh size and a degree.

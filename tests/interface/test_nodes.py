@@ -11,7 +11,7 @@ from contact.interface.friction import Friction
 from contact.interface.obstacle import GapFunction, Level, Plane, Sphere
 from contact.mesh.domain import from_mesh
 from contact.mesh.grid import rectangle
-from contact.mesh.refinement import refined
+from contact.mesh.transfer import refined
 from contact.problem.contact import Contact
 from contact.problem.problem import ContactProblem
 from forms.hencky import Linear

@@ -5,7 +5,7 @@ import pytest
 from mpi4py import MPI
 from petsc4py import PETSc
 
-from contact.linear.refinement import Pieces, refine
+from contact.linear.refinement import Components, refine
 
 SIZE = np.array([2.0, 3.0, 4.0, 5.0])
 
@@ -28,14 +28,14 @@ def test_each_piece_takes_the_corrections_that_help_it(wrong):
         found.array[:] = asked.array_r / SIZE * np.array([1.0, 1.0, wrong, wrong])
 
     solution = vector([0.1, 0.2, 0.3, 0.4])
-    refine(ksp, vector(SIZE), solution, solve, Pieces(MPI.COMM_SELF, np.array([0, 0, 1, 1]), 2))
+    refine(ksp, vector(SIZE), solution, solve, Components(MPI.COMM_SELF, np.array([0, 0, 1, 1]), 2))
     assert np.allclose(solution.array_r, [1.0, 1.0, 0.3, 0.4], rtol=0, atol=1e-12)
 
 
 RTOL = 1e-8
 
 
-def refined(sizes, off, pieces=None):
+def refined(sizes, off, components=None):
     """Return what is left over each right-hand side, and the tolerance of each correction.
 
     Solutions of unit systems are a part `off` wrong, and the solver is as bad as norms may differ:
@@ -56,7 +56,7 @@ def refined(sizes, off, pieces=None):
         found.array[:] = np.sign(values) * np.maximum(np.abs(values) - unseen, 0.0)
 
     solution = vector(sizes * (1 - np.array(off)))
-    refine(ksp, vector(sizes), solution, solve, pieces)
+    refine(ksp, vector(sizes), solution, solve, components)
     assert ksp.getTolerances()[0] == RTOL
     return np.abs(1 - solution.array_r / sizes), asked_for
 
@@ -72,5 +72,5 @@ def test_a_correction_is_asked_for_the_digits_that_are_missing(off, digits):
 def test_no_piece_waits_for_its_correction_because_another_is_larger():
     """Each of four took a correction of its own, and the last one got none."""
     sizes, count = [1.0, 1e-2, 1e-4, 1e-6], 4
-    left, _ = refined(sizes, 4 * [1e-2], Pieces(MPI.COMM_SELF, np.arange(count), count))
+    left, _ = refined(sizes, 4 * [1e-2], Components(MPI.COMM_SELF, np.arange(count), count))
     assert left.max() <= RTOL**0.5

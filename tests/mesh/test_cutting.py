@@ -5,7 +5,7 @@ import pytest
 from dolfinx import mesh as dmesh
 from mpi4py import MPI
 
-from contact.mesh.cutting import blocks, grid_partitioner
+from contact.mesh.grid import blocks, grid_partitioner
 
 
 def all_positions(*cells):

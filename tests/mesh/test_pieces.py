@@ -10,7 +10,7 @@ from mpi4py import MPI
 from contact.case.build import build_problem
 from contact.case.file import parse_case
 from contact.errors import InputError
-from contact.mesh.pieces import connected_pieces
+from contact.mesh.entities import components
 
 COMM = MPI.COMM_WORLD
 
@@ -56,7 +56,7 @@ def squares(folder: Path, *, share: bool, friction: bool = True) -> dict:
 @pytest.mark.parametrize("share", [True, False])
 def test_nodes_of_one_piece(share: bool, shared_tmp_path: Path) -> None:
     problem = build_problem(parse_case(squares(shared_tmp_path, share=share)), COMM)
-    labels, count = connected_pieces(problem.equilibrium.space)
+    labels, count = components(problem.equilibrium.space)
     assert count == (1 if share else 2)
     x = problem.equilibrium.space.tabulate_dof_coordinates()[: labels.size, 0]
     inner = np.abs(x - 1) > 1e-9
@@ -67,6 +67,7 @@ def test_nodes_of_one_piece(share: bool, shared_tmp_path: Path) -> None:
 @pytest.mark.parallel
 def test_a_piece_that_nothing_holds_sideways_is_refused(shared_tmp_path: Path) -> None:
     case = squares(shared_tmp_path, share=False, friction=False)
-    with pytest.raises(InputError, match=r"2 pieces .* about \(1.5, 0.5\) is not held.*along x"):
+    said = r"2 connected components.* about \(1.5, 0.5\) is not held.*along x"
+    with pytest.raises(InputError, match=said):
         build_problem(parse_case(case), COMM)
     build_problem(parse_case(squares(shared_tmp_path, share=True, friction=False)), COMM)

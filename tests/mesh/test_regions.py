@@ -8,7 +8,7 @@ from mpi4py import MPI
 from contact.errors import InputError
 from contact.mesh.domain import from_mesh
 from contact.mesh.grid import Piece, box, rectangle
-from contact.mesh.refinement import refined
+from contact.mesh.transfer import refined
 from tests.problems.sizes import integral, measures
 
 COMM = MPI.COMM_WORLD

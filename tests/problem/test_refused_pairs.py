@@ -135,7 +135,10 @@ def test_bodies_that_may_pass_through_each_other_are_named():
     assert solution.converged
     assert any("2 of them can pass through the others" in w for w in solution.warnings)
     checked = "\n".join(expectations(solution.problem))
-    assert "# warning: the mesh has 2 pieces" in checked and "2 of them can pass through" in checked
+    assert (
+        "# warning: the mesh has 2 connected components" in checked
+        and "2 of them can pass through" in checked
+    )
     apart = solve(parse_case(case()))
     assert not any("pass through" in w for w in (*apart.warnings, *expectations(apart.problem)))
 

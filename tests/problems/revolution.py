@@ -12,9 +12,8 @@ from mpi4py import MPI
 from contact.body.description import Body, Fixed, Load
 from contact.interface.friction import Friction
 from contact.interface.obstacle import GapFunction
-from contact.mesh.domain import Domain
+from contact.mesh.domain import Domain, revolved
 from contact.mesh.grid import rectangle
-from contact.mesh.revolution import revolved
 from contact.problem.contact import Contact
 from contact.problem.problem import ContactProblem
 from forms.hencky import Hencky, Linear, Log

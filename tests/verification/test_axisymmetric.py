@@ -16,9 +16,9 @@ from contact.case.file import parse_case
 from contact.errors import InputError
 from contact.history import BodyState
 from contact.interface.smoothing import Smoothing
+from contact.mesh.domain import revolved
 from contact.mesh.grid import box, rectangle
-from contact.mesh.refinement import refined
-from contact.mesh.revolution import revolved
+from contact.mesh.transfer import refined
 from contact.methods.newton import Newton
 from contact.methods.options import FixedPointOptions, NewtonOptions, PenaltyOptions
 from contact.output.balances import charge_balance, force_balance

@@ -11,8 +11,7 @@ from mpi4py import MPI
 
 from contact.body.norms import errors
 from contact.mesh.grid import rectangle
-from contact.mesh.refinement import refined
-from contact.mesh.transfer import carry
+from contact.mesh.transfer import carry, refined
 from forms.hencky import energy_density
 from forms.kinematics import strain
 from scripts.reporting import Report

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from contact import Body, Contact, Fixed, Linear, Problem, Sphere, solve
-from contact.mesh.refinement import refined
+from contact.mesh.transfer import refined
 from scripts.studies import curved_foundations as study
 
 

@@ -12,7 +12,7 @@ from scipy.spatial import cKDTree
 from contact.body.description import Body, Fixed, Load, Material
 from contact.interface.friction import Friction
 from contact.interface.obstacle import GapFunction
-from contact.mesh.revolution import revolved
+from contact.mesh.domain import revolved
 from contact.methods.newton import Newton
 from contact.methods.options import NewtonOptions
 from contact.output.balances import force_balance

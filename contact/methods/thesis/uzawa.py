@@ -357,7 +357,7 @@ def block_relaxation(
         # q + r (u - u_0) is the force that the foundation exerted in this very solve.
         total = q + way
         if iteration == 1:
-            beside = interface.piece_norms(total)
+            beside = interface.component_norms(total)
         layer = 0.0 if law is None else law.layer(jump.normal_component(nodal))
         forces = Multipliers.of(jump, total[:, 0] - layer, total[:, 1:])
         if parameters.single_loop and step.friction:
