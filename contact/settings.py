@@ -14,7 +14,7 @@ import json
 from dataclasses import dataclass
 from typing import Annotated, Any, TypeAlias, get_args, get_type_hints
 
-from annotated_types import Ge, Gt, Le, Lt
+from annotated_types import Ge, Gt, Le, Len, Lt, Predicate
 
 from contact.tolerances import PRECISION
 
@@ -63,7 +63,23 @@ class Internal:
     """Marks a setting that is for Python alone: the case file does not offer it."""
 
 
+#: Marks a list with as many numbers as space.
+SPATIAL = "spatial"
+
 Positive: TypeAlias = Annotated[float, Gt(0), Accepted("a number > 0")]
+NonNegative: TypeAlias = Annotated[float, Ge(0), Accepted("a number >= 0")]
+Number: TypeAlias = Annotated[float, Accepted("a number")]
+Vector: TypeAlias = Annotated[
+    tuple[Number, ...], Len(2, 3), SPATIAL, Accepted("a list of 2 numbers in 2-D, 3 in 3-D")
+]
+#: A vector along which something points: of any length.
+Direction: TypeAlias = Annotated[
+    tuple[Number, ...],
+    Len(2, 3),
+    Predicate(any),
+    SPATIAL,
+    Accepted("a vector that is not zero, of 2 numbers in 2-D, 3 in 3-D"),
+]
 Tolerance: TypeAlias = Annotated[
     float,
     Ge(PRECISION),

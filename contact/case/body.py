@@ -11,7 +11,6 @@ from contact.body import description
 from contact.case.formula import as_field
 from contact.case.messages import Words, fault
 from contact.case.section import (
-    SPATIAL,
     AmplitudeName,
     Component,
     Formula,
@@ -21,7 +20,7 @@ from contact.case.section import (
     as_tuple,
     few,
 )
-from contact.settings import Accepted, Switch
+from contact.settings import SPATIAL, Accepted, Switch
 
 #: `contact.case.file.Case`, of which these are sections.
 Case: TypeAlias = Any

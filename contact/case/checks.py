@@ -8,8 +8,14 @@ from typing import Any, TypeAlias
 
 from contact.case.formula import Expression
 from contact.case.messages import Words, fault, listed, nearest
-from contact.case.section import AMPLITUDE, PART, SPATIAL, as_given, walk
+from contact.case.section import (
+    AMPLITUDE,
+    PART,
+    as_given,
+    walk,
+)
 from contact.mesh.together import meet, members
+from contact.settings import SPATIAL
 from contact.tolerances import HUGE
 
 #: `contact.case.file.Case`, which calls these checks.

@@ -9,8 +9,8 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from contact.case.messages import fault
-from contact.case.section import Number, Section, Text, as_tuple
-from contact.settings import Accepted, Count
+from contact.case.section import Section, Text, as_tuple
+from contact.settings import Accepted, Count, Number
 
 Increasing: TypeAlias = Annotated[
     tuple[Number, ...],

@@ -20,41 +20,17 @@ from contact.body.amplitude import Amplitude, steady
 from contact.case.body import Fixed, Load, Space
 from contact.case.checks import check_mesh, check_sections
 from contact.case.evolution import Evolution
-from contact.case.formula import Expression
-from contact.case.interface import Contact, Electric, Friction, SlipLaw
-from contact.case.material import Material, Piezo
-from contact.case.mesh import Mesh, Piece
+from contact.case.interface import Contact, Electric, Friction
+from contact.case.material import Material
+from contact.case.mesh import Mesh
 from contact.case.messages import clipped, describe, describe_fault, path_of, shown
 from contact.case.rigid import Electrode, Moving, RigidPart
 from contact.case.section import FromTable, Section, Text, as_tuple, one_or_many
-from contact.case.shapes import Plane, Sphere
 from contact.case.solver import DEFAULT, Solver
 from contact.errors import InputError
 from contact.output.options import OutputOptions
 from contact.output.units import Units
 from contact.settings import Accepted
-
-__all__ = [
-    "Case",
-    "Contact",
-    "Electric",
-    "Evolution",
-    "Expression",
-    "Fixed",
-    "Friction",
-    "Load",
-    "Material",
-    "Mesh",
-    "Piece",
-    "Piezo",
-    "Plane",
-    "SlipLaw",
-    "Solver",
-    "Space",
-    "Sphere",
-    "load_case",
-    "parse_case",
-]
 
 #: Key of the case -> the arguments of `build_problem` of which one replaces it.
 REPLACEABLE = {

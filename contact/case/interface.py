@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Annotated, Any, Literal, Self, TypeAlias
 
 import numpy as np
@@ -17,7 +18,6 @@ from contact.case.rigid import Rigid
 from contact.case.section import (
     AmplitudeName,
     Direction,
-    NonNegative,
     NonNegativeFormula,
     Part,
     Section,
@@ -31,7 +31,7 @@ from contact.interface.layer import Layer
 from contact.interface.obstacle import GapFunction, Obstacle
 from contact.mesh.domain import Domain
 from contact.mesh.together import meet
-from contact.settings import Accepted, Positive, ReadWith, Switch
+from contact.settings import Accepted, NonNegative, Positive, ReadWith, Switch
 from forms import laws
 
 #: `contact.case.file.Case`, of which these are sections.
@@ -225,10 +225,12 @@ class Contact(Section):
 
     def obstacle(self, key: str, comm: MPI.Intracomm) -> Obstacle:
         """Return the rigid foundation itself; ``key`` is the section's own."""
-        if self.foundation is not None:
-            return self.foundation.obstacle(self.direction, self.axis or ())
-        assert self.gap is not None  # filled in
-        return GapFunction(NodalField(f"{key}.gap", self.gap, comm).numpy)
+        if self.foundation is None:
+            assert self.gap is not None  # filled in
+            return GapFunction(NodalField(f"{key}.gap", self.gap, comm).numpy)
+        given = self.foundation
+        shape = given.build() if isinstance(given, Section) else given
+        return replace(shape, direction=self.direction, along=self.axis or ())
 
     def compliant_layer(self) -> Layer | None:
         """Return the layer in front of the rigid foundation; None without one."""

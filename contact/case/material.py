@@ -14,22 +14,19 @@ from pydantic import Field, Tag, ValidationError, model_validator
 from contact.body import description
 from contact.case.messages import Words, describe, fault
 from contact.case.section import (
+    Axis,
     File,
     Names,
-    NonNegative,
-    Number,
     Section,
     Text,
-    Triple,
     as_tuple,
-    not_zero,
     one_or_many,
 )
 from contact.errors import InputError
 from contact.kinds import expect
 from contact.library.entry import Entry
 from contact.library.reading import PACKAGED, find
-from contact.settings import Accepted, Positive, ReadWith
+from contact.settings import Accepted, NonNegative, Number, Positive, ReadWith
 from contact.typing import Array
 from forms.crystal import in_plane, isotropic_about_x3, stiffness_tensor, to_axis
 from forms.elasticity import Anisotropic, hexagonal
@@ -48,7 +45,7 @@ PIEZO = ("e31", "e33", "e15", "beta11", "beta33")
 CONSTANTS = ("law", "young", "poisson", "stiffness", *SHORT, "yield_strain", "piezo")
 
 Poling: TypeAlias = Annotated[
-    Annotated[Number, Tag("one")] | Annotated[Triple, not_zero, Tag("many")],
+    Annotated[Number, Tag("one")] | Annotated[Axis, Tag("many")],
     one_or_many,
     Accepted("an angle in 2-D, a list of 3 numbers in 3-D"),
 ]

@@ -14,15 +14,13 @@ from pydantic import Field, PrivateAttr, Tag, model_validator
 import meshes
 from contact.case.messages import UNKNOWN, Words, fault
 from contact.case.section import (
+    Axis,
     File,
     Name,
-    Number,
     Section,
-    Triple,
     Vector,
     as_tuple,
     few,
-    not_zero,
     one_or_many,
 )
 from contact.errors import InputError
@@ -32,7 +30,7 @@ from contact.mesh.grid import rotate
 from contact.mesh.reader import from_msh, from_recipe
 from contact.mesh.transfer import refined
 from contact.methods.interrupt import deaf
-from contact.settings import Accepted, Count, Positive
+from contact.settings import Accepted, Count, Number, Positive
 from meshes.grading import memory
 
 #: Keys of `[mesh]` that go with every generator and file.
@@ -119,7 +117,7 @@ class Mesh(Section):
     rotation: Number = 0.0
     """Angle (degrees) by which the mesh is turned about the origin of coordinates,
     counter-clockwise; in 3-D about `axis`."""
-    axis: Annotated[Triple, not_zero] | None = None
+    axis: Axis | None = None
     """Axis of the rotation in 3-D. Default: y, `[0, 1, 0]`."""
     refine: Annotated[int, Field(ge=0, le=10), Accepted("a whole number from 0 to 10")] = 0
     """Uniform refinements of the mesh after it is made or read."""

@@ -10,13 +10,13 @@ import difflib
 import json
 import types
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import is_dataclass
+from dataclasses import MISSING, is_dataclass
 from functools import cache
 from typing import Annotated, Any, Literal, Union, get_args, get_origin
 
 from pydantic import BaseModel, ValidationError
 from pydantic.fields import FieldInfo
-from pydantic_core import ErrorDetails, PydanticCustomError
+from pydantic_core import ErrorDetails, PydanticCustomError, PydanticUndefined
 
 from contact.settings import Accepted, settings_of
 
@@ -123,7 +123,8 @@ def keys_of(section: type) -> Mapping[str, FieldInfo]:
         return {field.alias or name: field for name, field in section.model_fields.items()}
     keys = {}
     for name, setting in settings_of(section).items():
-        keys[name] = FieldInfo.from_annotated_attribute(setting.annotation, setting.default)
+        default = PydanticUndefined if setting.default is MISSING else setting.default
+        keys[name] = FieldInfo.from_annotated_attribute(setting.annotation, default)
         keys[name].description = setting.meaning
     return keys
 
@@ -204,8 +205,10 @@ def _message(error: ErrorDetails, root: type[BaseModel]) -> str:
         name, kinds = kinds_of(sections)
         return _fault(keys, name, given.get(name, Words("missing")), either(map(shown, kinds)))
     if kind == "value_error":
-        # Raised by a formula, whose message is complete.
-        return f"{path_of(keys)}: {context['error']}"
+        # Raised by a formula or a dataclass, whose message is complete.
+        text = str(context["error"])
+        own = [f"{section.__name__}: " for section in sections if section.__name__ in text]
+        return f"{path_of(keys)}{'.' if own else ': '}{text.removeprefix(own[0] if own else '')}"
     words = "missing" if kind == "missing" else _given(given)
     return f"{path_of(keys)}: {words}; accepted: {accepted}"
 

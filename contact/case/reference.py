@@ -57,31 +57,37 @@ def page() -> str:
     for key, sections in described.items():
         if any(is_dataclass(section) for section in sections):
             lines += _options(key, sections)
+            continue
         for section in sections:
-            lines += _describe(section, top)
+            lines += _describe(key, section, top)
         if key == "mesh":
             lines += _generators()
     return "\n".join(lines) + "\n"
 
 
-def _describe(section: type, elsewhere: Collection[type]) -> Iterator[str]:
+def _describe(key: str, section: type, elsewhere: Collection[type]) -> Iterator[str]:
     """Describe a section and those in it. Its docstring is ``heading: text``.
 
     Parameters
     ----------
-    section
-        The section.
+    key, section
+        The section and its key.
     elsewhere
         Sections that have a place of their own.
     """
+    text = (inspect.getdoc(section) or "").partition("\n\nAttributes\n")[0]
     if is_dataclass(section):
-        return
-    heading, text = (inspect.getdoc(section) or "").split(": ", 1)
+        name, kinds = kinds_of([section])
+        if not kinds:
+            return
+        heading = f"`{key} = {{ {name} = {shown(*kinds)}, ... }}`"
+    else:
+        heading, text = text.split(": ", 1)
     yield from ("", f"## {heading}", "", text[0].upper() + text[1:], "", *_rows(section))
-    for field in keys_of(section).values():
+    for name, field in keys_of(section).items():
         for inner in sections_of(field.annotation).values():
             if inner not in elsewhere:
-                yield from _describe(inner, elsewhere)
+                yield from _describe(name, inner, elsewhere)
 
 
 def _rows(section: type) -> Iterator[str]:

@@ -12,7 +12,6 @@ from contact.body import rigid
 from contact.case.formula import Expression, as_number
 from contact.case.messages import Words, fault
 from contact.case.section import (
-    SPATIAL,
     AmplitudeName,
     Part,
     Section,
@@ -24,7 +23,7 @@ from contact.case.section import (
     few,
     one_or_many,
 )
-from contact.settings import Accepted
+from contact.settings import SPATIAL, Accepted
 
 #: `contact.case.file.Case`, of which these are sections.
 Case: TypeAlias = Any

@@ -11,6 +11,7 @@ from dataclasses import is_dataclass
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, Literal, Self, TypeAlias, TypeVar, get_args, get_origin
 
+from annotated_types import Predicate
 from pydantic import (
     AfterValidator,
     BaseModel,
@@ -29,11 +30,12 @@ from pydantic import (
 from pydantic.fields import FieldInfo
 from pydantic_core import PydanticCustomError, core_schema
 
+from contact import settings
 from contact.case.formula import Expression
 from contact.case.messages import Words, accepted_by, fault, keys_of, shown
 from contact.errors import InputError
 from contact.mesh import together
-from contact.settings import Accepted, ReadWith
+from contact.settings import SPATIAL, Accepted, Number, ReadWith
 
 Table = TypeVar("Table")
 
@@ -104,7 +106,14 @@ class FromTable:
         while "fields" not in inner:
             inner = inner["schema"]
         inner["fields"] = [field for field in inner["fields"] if field["name"] in keys_of(source)]
-        return schema  # type: ignore[no-any-return]
+        return core_schema.no_info_before_validator_function(_with_tuples, schema)
+
+
+def _with_tuples(given: Any) -> Any:
+    # TOML has lists, and strict fields take tuples alone.
+    if not isinstance(given, Mapping):
+        return given
+    return {key: tuple(v) if isinstance(v, list) else v for key, v in given.items()}
 
 
 def walk(
@@ -181,12 +190,6 @@ def _of_time(given: Any) -> Any:
     return given
 
 
-def _not_zero(vector: tuple[float, ...]) -> tuple[float, ...]:
-    if not any(vector):
-        raise InputError(f"given {shown(vector)}; accepted: a vector that is not zero")
-    return vector
-
-
 def _part(given: Any) -> str:
     try:
         return together.part(given)
@@ -207,12 +210,10 @@ formula_or_table = Discriminator(
 as_tuple = BeforeValidator(lambda given: tuple(given) if isinstance(given, list) else given)
 _as_source = PlainSerializer(lambda value: getattr(value, "source", value))
 
-#: Marks: as many components as space; a part of the mesh; a name below evolution.amplitudes.
-SPATIAL, PART, AMPLITUDE = "spatial", "part", "amplitude"
+#: Marks of a part of the mesh, and of a name below evolution.amplitudes.
+PART, AMPLITUDE = "part", "amplitude"
 few = Field(min_length=2, max_length=3)
 
-Number: TypeAlias = Annotated[float, Accepted("a number")]
-NonNegative: TypeAlias = Annotated[float, Field(ge=0), Accepted("a number >= 0")]
 Text: TypeAlias = Annotated[str, Accepted("a text")]
 Name: TypeAlias = Annotated[str, Field(min_length=1), Accepted("the name of a part")]
 Names: TypeAlias = Annotated[
@@ -234,22 +235,18 @@ Part: TypeAlias = Annotated[
 AmplitudeName: TypeAlias = Annotated[
     str, Field(min_length=1), AMPLITUDE, Accepted("a name below evolution.amplitudes")
 ]
-Vector: TypeAlias = Annotated[
-    tuple[Number, ...],
-    few,
-    as_tuple,
-    SPATIAL,
-    Accepted("a list of 2 numbers in 2-D, 3 in 3-D"),
-]
+Vector: TypeAlias = Annotated[settings.Vector, as_tuple]
+Direction: TypeAlias = Annotated[settings.Direction, as_tuple]
 Triple: TypeAlias = Annotated[
     tuple[Number, ...],
     Field(min_length=3, max_length=3),
     as_tuple,
     Accepted("a list of 3 numbers"),
 ]
-not_zero = AfterValidator(_not_zero)
-#: A vector along which something points: of any length.
-Direction: TypeAlias = Annotated[Vector, not_zero]
+#: One that is not zero.
+Axis: TypeAlias = Annotated[
+    Triple, Predicate(any), Accepted("a vector that is not zero, of 3 numbers")
+]
 
 Formula: TypeAlias = Annotated[
     Expression, PlainValidator(_expression), _as_source, Accepted("a number or a formula")

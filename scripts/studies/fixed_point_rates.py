@@ -9,7 +9,7 @@ import numpy as np
 
 from contact import InputError, build_problem
 from contact.body.norms import errors
-from contact.case.file import Friction
+from contact.case.interface import Friction
 from contact.history import BodyState
 from contact.methods.options import FixedPointOptions, Options, PenaltyOptions
 from contact.output.fields import DerivedFields

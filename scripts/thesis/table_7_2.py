@@ -12,7 +12,7 @@ import numpy as np
 
 from contact import Case, InputError, build_problem, solve
 from contact.body.norms import errors
-from contact.case.file import Friction
+from contact.case.interface import Friction
 from contact.output.solution import Solution
 from contact.problem.problem import ContactProblem
 from scripts.cases import bar

@@ -6,10 +6,12 @@ import tomllib
 import numpy as np
 import pytest
 
-from contact.case.file import SlipLaw, Sphere, load_case, parse_case
+from contact.case.file import load_case, parse_case
 from contact.case.formula import Expression
+from contact.case.interface import SlipLaw
 from contact.case.text import to_toml
 from contact.errors import InputError
+from contact.interface.obstacle import Sphere
 from tests.problems.bar import BAR, changed
 
 PIEZO = {"e31": -5.4, "e33": 15.8, "e15": 12.3, "beta11": 8.13866, "beta33": 7.37455}

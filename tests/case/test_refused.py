@@ -102,7 +102,7 @@ BAD = {
             "contact__gap": None,
             "contact__foundation": {"shape": "plane", "point": [0, 0], "normal": [0, 0]},
         },
-        "contact.foundation.normal: given [0.0, 0.0]; accepted: a vector that is not zero",
+        "contact.foundation.normal: given [0, 0]; accepted: a vector that is not zero",
     ),
     "layer": ({"contact__layer": 0.1}, 'contact.layer: given 0.1; accepted: layer with law = "com'),
     "potential factor": (

@@ -27,7 +27,7 @@ BAD = {
             "edge_radius": 2.0,
         },
         {},
-        "at most the radius",
+        "edge_radius: given 2.0; accepted: a length from 0 to the radius",
     ),
     "no axis": (
         {"shape": "punch", "centre": [0, 0, 0], "axis": [0, 0, 0], "radius": 1.0},
@@ -37,7 +37,7 @@ BAD = {
     "two and three": (
         {"shape": "cone", "apex": [0, 0, 0], "axis": [0, 1], "half_angle": 70.0},
         {},
-        "3 numbers, as apex has",
+        "axis: given [0.0, 1.0]; accepted: 3 components in 3-D",
     ),
     "angle": (
         {"shape": "cone", "apex": [0, 0, 0], "axis": [0, 0, 1], "half_angle": 90.0},

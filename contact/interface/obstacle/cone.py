@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from typing import Annotated, Literal
 
 import numpy as np
+from annotated_types import Gt, Lt
 
 from contact.interface.obstacle.protocol import Shape, split
 from contact.kinds import expect, names_arguments
+from contact.settings import Accepted, Direction, Vector
 from contact.typing import Array
 
 
@@ -16,19 +19,22 @@ from contact.typing import Array
 class Cone(Shape):
     """A rigid cone without end; in 2-D a wedge.
 
-    Parameters
+    Attributes
     ----------
-    apex, axis
-        Its tip, and the axis from there into the cone, of any length.
+    apex
+        Its tip.
+    axis
+        From the tip into the cone, of any length.
     half_angle
-        Between the axis and the side (degrees), above 0 and below 90.
+        Between the axis and the side (degrees).
     """
 
-    vectors = ("apex", "axis")
-
-    apex: tuple[float, ...]
-    axis: tuple[float, ...]
-    half_angle: float
+    apex: Vector
+    axis: Direction
+    half_angle: Annotated[
+        float, Gt(0), Lt(90), Accepted("an angle between 0 and 90 degrees, both excluded")
+    ]
+    shape: Literal["cone"] = field(default="cone", kw_only=True)
 
     def __post_init__(self) -> None:
         """Refuse an angle that is none of a cone."""

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from typing import Literal
 
 import numpy as np
 
 from contact.interface.obstacle.protocol import Shape, sagitta, split
 from contact.kinds import names_arguments
+from contact.settings import Direction, Positive, Switch, Vector
 from contact.typing import Array
 
 
@@ -16,21 +18,25 @@ from contact.typing import Array
 class Cylinder(Shape):
     """A rigid cylinder without ends (`inside` false), or the bore that holds the body (true).
 
-    Parameters
+    In 2-D the axis lies in the plane: a strip, or about the axis of a body of revolution a shaft.
+
+    Attributes
     ----------
-    point, axis, radius
-        A point of its axis, the axis, of any length and either sense, and the radius > 0. In 2-D
-        the axis lies in the plane: a strip, or about the axis of a body of revolution a shaft.
+    point
+        A point of its axis.
+    axis
+        Its axis, of any length and either sense.
+    radius
+        Radius.
     inside
-        Whether the body lies inside.
+        Whether the body lies in the bore.
     """
 
-    vectors = ("point", "axis")
-
-    point: tuple[float, ...]
-    axis: tuple[float, ...]
-    radius: float
-    inside: bool = False
+    point: Vector
+    axis: Direction
+    radius: Positive
+    inside: Switch = False
+    shape: Literal["cylinder"] = field(default="cylinder", kw_only=True)
 
     def distance(self, points: Array) -> tuple[Array, Array]:
         """Return distances and normals."""

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from typing import Literal
 
 import numpy as np
 
 from contact.interface.obstacle.protocol import Shape, sagitta, split
 from contact.kinds import names_arguments
+from contact.settings import Direction, Positive, Vector
 from contact.typing import Array
 
 
@@ -16,19 +18,20 @@ from contact.typing import Array
 class Paraboloid(Shape):
     """A rigid paraboloid, h >= r^2/(2 R) at the height h and the distance r; in 2-D a parabola.
 
-    Parameters
+    Attributes
     ----------
-    apex, axis
-        Its tip, and the axis from there into the paraboloid, of any length.
+    apex
+        Its tip.
+    axis
+        From the tip into the paraboloid, of any length.
     radius
-        Radius of curvature R > 0 at the tip.
+        Radius of curvature R at the tip.
     """
 
-    vectors = ("apex", "axis")
-
-    apex: tuple[float, ...]
-    axis: tuple[float, ...]
-    radius: float
+    apex: Vector
+    axis: Direction
+    radius: Positive
+    shape: Literal["paraboloid"] = field(default="paraboloid", kw_only=True)
 
     def distance(self, points: Array) -> tuple[Array, Array]:
         """Return distances and normals, by the cubic equation of the nearest point.

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from typing import Literal
 
 import numpy as np
 
 from contact.interface.obstacle.protocol import GRAZING, Shape
 from contact.kinds import names_arguments
+from contact.settings import Direction, Vector
 from contact.typing import Array
 
 
@@ -16,16 +18,17 @@ from contact.typing import Array
 class Plane(Shape):
     """A half space: the foundation lies below the plane through `point`.
 
-    Parameters
+    Attributes
     ----------
-    point, normal
-        A point of the plane and its normal towards the body, length d.
+    point
+        A point of the plane.
+    normal
+        Normal towards the body, of any length.
     """
 
-    vectors = ("point", "normal")
-
-    point: tuple[float, ...]
-    normal: tuple[float, ...]
+    point: Vector
+    normal: Direction
+    shape: Literal["plane"] = field(default="plane", kw_only=True)
 
     def chord_depth(self, length: float, points: Array) -> float:
         """Return 0: chords of a plane lie in it."""

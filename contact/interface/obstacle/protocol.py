@@ -5,11 +5,12 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import ClassVar, Protocol
+from typing import Annotated, ClassVar, Protocol
 
 import numpy as np
 
 from contact.kinds import expect
+from contact.settings import Internal
 from contact.typing import Array
 
 #: Cosine of the steepest angle at which a ray still leads to a surface.
@@ -63,22 +64,24 @@ class Obstacle(Protocol):
 class Shape(ABC):
     """What shapes share: the contact direction, and gaps along rays.
 
-    Parameters
+    Attributes
     ----------
     direction
         "foundation": contact along the shape's normal (default); "body": along the body's;
         "axis": along a given direction.
     along
         That direction, from the body towards the foundation, of any length.
+    shape
+        Name of the shape in the case file, where it has one.
     """
 
-    direction: str = "foundation"
-    along: tuple[float, ...] = ()
+    direction: Annotated[str, Internal()] = "foundation"
+    along: Annotated[tuple[float, ...], Internal()] = ()
 
     is_shape = True
 
-    #: Names of the attributes that are points or directions; dimension of space, if only one.
-    vectors: ClassVar[tuple[str, ...]] = ()
+    #: Names of attributes that are points or directions; dimension of space, if only one.
+    vectors: ClassVar[tuple[str, ...]] = ("point", "centre", "apex", "normal", "axis")
     only: ClassVar[int | None] = None
 
     def __post_init__(self) -> None:
@@ -101,7 +104,7 @@ class Shape(ABC):
         name = type(self).__name__
         expect(f"{name}: dimension", dim, f"{self.only}", self.only in (None, dim))
         along = ("along",) if self.direction == "axis" else ()
-        for key in (*self.vectors, *along):
+        for key in (*(key for key in self.vectors if hasattr(self, key)), *along):
             given = getattr(self, key)
             try:
                 vector = np.asarray(given, dtype=float)

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from typing import Literal
 
 import numpy as np
 
 from contact.interface.obstacle.protocol import Shape, sagitta, split
 from contact.kinds import expect, names_arguments
+from contact.settings import Direction, NonNegative, Positive, Vector
 from contact.typing import Array
 
 
@@ -16,22 +18,23 @@ from contact.typing import Array
 class Punch(Shape):
     """A rigid cylinder with a flat face; in 2-D a rectangle.
 
-    Parameters
+    Attributes
     ----------
-    centre, axis
-        Centre of the face, and the axis from there into the punch, of any length.
+    centre
+        Centre of the face.
+    axis
+        From the face into the punch, of any length.
     radius
-        Of the punch, > 0.
+        Radius of the punch.
     edge_radius
-        By which its edge is rounded, at most the radius; 0: sharp.
+        Radius by which its edge is rounded, at most that of the punch; 0: sharp.
     """
 
-    vectors = ("centre", "axis")
-
-    centre: tuple[float, ...]
-    axis: tuple[float, ...]
-    radius: float
-    edge_radius: float = 0.0
+    centre: Vector
+    axis: Direction
+    radius: Positive
+    edge_radius: NonNegative = 0.0
+    shape: Literal["punch"] = field(default="punch", kw_only=True)
 
     def __post_init__(self) -> None:
         """Refuse an edge that is rounder than the punch."""

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from typing import Literal
 
 import numpy as np
 
 from contact.interface.obstacle.protocol import Shape, sagitta
 from contact.kinds import names_arguments
+from contact.settings import Positive, Switch, Vector
 from contact.typing import Array
 
 
@@ -16,19 +18,20 @@ from contact.typing import Array
 class Sphere(Shape):
     """A rigid ball (`inside` false), or the outside of a ball that holds the body (true).
 
-    Parameters
+    Attributes
     ----------
-    centre, radius
-        Centre, length d, and radius > 0 (a circle in 2-D).
+    centre
+        Centre.
+    radius
+        Radius.
     inside
         Whether the body lies inside the sphere.
     """
 
-    vectors = ("centre",)
-
-    centre: tuple[float, ...]
-    radius: float
-    inside: bool = False
+    centre: Vector
+    radius: Positive
+    inside: Switch = False
+    shape: Literal["sphere"] = field(default="sphere", kw_only=True)
 
     def distance(self, points: Array) -> tuple[Array, Array]:
         """Return distances and normals."""
