@@ -26,7 +26,7 @@ from contact import Case, InputError, Solution, solve
 from contact.methods.method import METHODS
 from contact.methods.options import Options
 from contact.methods.report import Outcome, Record
-from contact.output.figures.figures import STYLE
+from contact.output.figures.style import STYLE
 from contact.problem.problem import ContactProblem
 from contact.problem.state import State
 

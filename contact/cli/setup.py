@@ -15,7 +15,6 @@ from contact import _compat
 from contact.case.file import Case
 from contact.mesh.domain import Domain, Indices
 from contact.mesh.entities import exterior_facets
-from contact.output.figures.figures import STYLE, axes_of, heading
 from contact.output.figures.setup import (
     ELECTRODE,
     FOUNDATION,
@@ -26,6 +25,7 @@ from contact.output.figures.setup import (
     draw_plane,
     draw_space,
 )
+from contact.output.figures.style import STYLE, axes_of, heading
 from contact.problem.problem import ContactProblem
 from contact.typing import Array
 

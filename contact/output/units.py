@@ -7,7 +7,7 @@ from typing import Annotated, Literal, TypeAlias
 
 from contact.settings import Accepted
 
-#: What a label says of a quantity.
+#: Quantities whose unit a label names.
 Quantity: TypeAlias = Literal["length", "stress", "potential", "charge"]
 
 Name: TypeAlias = Annotated[str, Accepted('a text, such as "mm"')]
@@ -35,9 +35,9 @@ class Units:
     charge: Name | None = None
 
     def label(self, words: str, quantity: Quantity) -> str:
-        """Return words with the unit of a quantity, or with what is known of it."""
-        unknown = "mesh units" if quantity == "length" else "units of the case"
-        return f"{words} ({getattr(self, quantity) or unknown})"
+        """Return words with the unit of a quantity, where it has a name."""
+        unit = getattr(self, quantity)
+        return f"{words} ({unit})" if unit else words
 
     @property
     def given(self) -> dict[str, str]:

@@ -14,9 +14,8 @@ from mpi4py import MPI
 from contact import Solution, build_problem, load_case
 from contact.interface.complementarity import project_disc
 from contact.interface.layer import NormalLaw
-from contact.output.figures.body import draw_plane
+from contact.output.figures.body import Picture, draw_plane, picture
 from contact.output.figures.contact import draw_line
-from contact.output.figures.picture import Picture, picture
 from contact.output.table import Table, contact_table, csv_columns, tangent_of
 from contact.typing import Array
 from forms.foundation import contact_multiplier

@@ -12,9 +12,8 @@ import numpy as np
 from mpi4py import MPI
 
 from contact import Case, Solution
-from contact.output.figures.body import draw_plane
+from contact.output.figures.body import draw_plane, picture
 from contact.output.figures.contact import draw_line
-from contact.output.figures.picture import picture
 from contact.output.table import Table, contact_table, csv_columns
 from scripts.cases import bar
 from scripts.reporting import TWO_COLUMNS, Report, options, solved, subplots

@@ -17,8 +17,7 @@ from mpi4py import MPI
 
 from contact.body.equilibrium import BodyEquilibrium
 from contact.mesh.transfer import carry
-from contact.output.figures.body import draw_plane
-from contact.output.figures.picture import picture
+from contact.output.figures.body import draw_plane, picture
 from contact.output.table import contact_table
 from contact.typing import Array
 from forms.kinematics import strain

@@ -13,8 +13,7 @@ from mpi4py import MPI
 
 from contact import Case, Solution, build_problem
 from contact.body.norms import volume
-from contact.output.figures.body import draw_plane
-from contact.output.figures.picture import picture
+from contact.output.figures.body import draw_plane, picture
 from contact.output.table import contact_table
 from scripts.reporting import TWO_COLUMNS, Report, append, options, solved, subplots
 from scripts.thesis.hertz_problems import Cylinder, Sphere, cylinder, sphere
@@ -174,9 +173,7 @@ def figure_7_2(report: Report, solutions: Mapping[tuple[object, ...], Solution])
         "(7.16), body's normal": (1600.0, "(7.16)", "body", "quarter_disc"),
     }
     tables = {label: contact_table(solutions[key]) for label, key in shown.items()}
-    deformed = picture(
-        solutions[shown["(7.16), rho = 1e4"]], "von_mises", "von Mises stress (units of the case)"
-    )
+    deformed = picture(solutions[shown["(7.16), rho = 1e4"]], "von_mises", "von Mises stress")
     if MPI.COMM_WORLD.rank > 0:
         return
     x = np.linspace(0, 1.25 * hertz.half_width, 400)
@@ -195,9 +192,9 @@ def figure_7_2(report: Report, solutions: Mapping[tuple[object, ...], Solution])
             bound = f"{label}: bound $-s$"
             axes[1].plot(where, -table["bound"][near], ":", color=colour, label=bound)
             data |= {f"tau, {label}": table["tau"][near], f"bound, {label}": table["bound"][near]}
-    axes[0].set_ylabel(r"$-\sigma_\nu$ (units of the case)")
-    axes[1].set_xlabel(r"$x$ along $\Gamma_3$ (mesh units)")
-    axes[1].set_ylabel(r"$-\sigma_\tau\cdot t$ (units of the case)")
+    axes[0].set_ylabel(r"$-\sigma_\nu$")
+    axes[1].set_xlabel(r"$x$ along $\Gamma_3$")
+    axes[1].set_ylabel(r"$-\sigma_\tau\cdot t$")
     for ax in axes:
         ax.legend()
     report.figure(

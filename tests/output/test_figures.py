@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from contact.output.figures.picture import widened
+from contact.output.figures.style import widened
 from contact.output.table import contact_table, held_points
 from contact.solving import solve
 from tests.problems.written import block, electric
@@ -32,9 +32,8 @@ def test_figures(dim: int, shared_tmp_path: Path) -> None:
 
 def test_figures_begin_at_the_edge_of_the_body() -> None:
     """The clamped corner is no contact node, but the axis and the foundation reach it."""
-    from contact.output.figures.body import draw_plane
+    from contact.output.figures.body import draw_plane, picture
     from contact.output.figures.contact import draw_line
-    from contact.output.figures.picture import picture
 
     case = block(
         2,
@@ -60,7 +59,8 @@ def test_words_are_within_the_figure(dim: int, inches: float) -> None:
     from matplotlib import rc_context
     from matplotlib.backends.backend_agg import FigureCanvasAgg
 
-    from contact.output.figures.figures import collect, style
+    from contact.output.figures.figures import collect
+    from contact.output.figures.style import style
 
     solution = solve(electric(dim))
     solution.title = "A body that a load of some size presses on what is conductive"
@@ -86,9 +86,8 @@ def test_the_lines_of_a_title_are_above_the_body(height: float, lines: int) -> N
     from matplotlib import rc_context
     from matplotlib.backends.backend_agg import FigureCanvasAgg
 
-    from contact.output.figures.body import draw_plane
-    from contact.output.figures.figures import style
-    from contact.output.figures.picture import picture
+    from contact.output.figures.body import draw_plane, picture
+    from contact.output.figures.style import style
 
     solution = solve(
         block(2, mesh={"generator": "rectangle", "size": [2, height], "cells": [8, 4]})

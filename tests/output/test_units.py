@@ -18,8 +18,8 @@ def test_labels_name_units_where_they_are_given():
     units = Units(length="mm", stress="MPa")
     assert units.label("x", "length") == "x (mm)"
     assert units.label("p", "stress") == "p (MPa)"
-    assert units.label("phi", "potential") == "phi (units of the case)"
-    assert Units().label("x", "length") == "x (mesh units)"
+    assert units.label("phi", "potential") == "phi"
+    assert Units().label("x", "length") == "x"
 
 
 def test_units_reach_figures_and_summary(tmp_path):

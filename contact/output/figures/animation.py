@@ -16,14 +16,12 @@ from PIL import Image
 from scipy.spatial import KDTree
 
 from contact.errors import InputError
-from contact.output.figures.body import OUTLIERS, draw_plane
-from contact.output.figures.figures import Drawing, named, style
-from contact.output.figures.picture import Picture, drawn, extent, farthest, magnification
+from contact.output.figures.body import Picture, displacement, drawn, magnification
+from contact.output.figures.figures import Drawing
 from contact.output.figures.saved import added, read, read_drawing
-from contact.output.figures.space import draw_space
+from contact.output.figures.style import OUTLIERS, named, style
 from contact.output.table import Table
 from contact.output.vtu import VTU, read_vtu
-from contact.typing import Array
 
 #: Dots per inch, and most frames: a file that a page can show.
 DPI, MOST = 90, 100
@@ -104,12 +102,18 @@ def _animation(
     drawing: Drawing, frames: Sequence[Frame], field: str, folder: Path, width: float | None
 ) -> Path:
     name, label = named(field, drawing.units)
-    scale = magnification(extent(frames[-1].body), max(farthest(frame.body) for frame in frames))
+    diameter = float(np.ptp(frames[-1].body.grid.points, axis=0).max())
+    largest = [np.linalg.norm(displacement(frame.body), axis=1).max() for frame in frames]
+    scale = magnification(diameter, float(max(largest)))
     pictures = [drawn(frame.body, drawing.held, field, label, scale) for frame in frames]
-    box, limits = _box(pictures), _limits(pictures)
+    boxes = np.array([picture.box for picture in pictures])
+    box = np.array([boxes[:, 0].min(axis=0), boxes[:, 1].max(axis=0)])
+    # Colours of all frames, without values far beyond the others.
+    limits = np.array([np.quantile(picture.values, OUTLIERS) for picture in pictures])
+    same: dict[str, Any] = {"box": box, "limits": (limits[:, 0].min(), limits[:, 1].max())}
     with matplotlib.rc_context(style(width) | {"figure.dpi": DPI}):
         figures = [
-            _figure(drawing, frame, replace(picture, box=box, limits=limits))
+            _figure(drawing, frame, replace(picture, **same))
             for frame, picture in zip(frames, pictures, strict=True)
         ]
         if drawing.plane:
@@ -123,30 +127,11 @@ def _animation(
     return path
 
 
-def _box(pictures: Sequence[Picture]) -> Array:
-    boxes = np.array([picture.box for picture in pictures])
-    return np.array([boxes[:, 0].min(axis=0), boxes[:, 1].max(axis=0)])
-
-
-def _limits(pictures: Sequence[Picture]) -> tuple[float, float]:
-    """Return the ends of the colours: of all frames, without values far beyond the others."""
-    ends = []
-    for picture in pictures:
-        values = picture.values if picture.image is None else picture.image
-        ends.append(np.nanquantile(values, OUTLIERS))
-    low, high = np.min(ends, axis=0)[0], np.max(ends, axis=0)[1]
-    return float(low), float(high)
-
-
 def _figure(drawing: Drawing, frame: Frame, picture: Picture) -> Figure:
     title = f"{drawing.title}, t = {frame.time:.3g}" if drawing.title else f"t = {frame.time:.3g}"
-    if drawing.plane:
-        return draw_plane(
-            picture, frame.table, title, drawing.axes, drawing.mirrored, drawing.units
-        )
-    figure = draw_space(picture, title)
+    figure = drawing.body(picture, frame.table, title)
     if figure is None:
-        raise InputError("--animate: pyvista cannot draw here; accepted: pyvista with a display")
+        raise InputError("--animate: pyvista cannot draw here; accepted: a display, or Xvfb")
     return figure
 
 

@@ -1,36 +1,189 @@
-"""The drawing of plane bodies, deformed and coloured."""
+"""Pictures of deformed bodies, coloured by a field: in 2-D by matplotlib, in 3-D by pyvista."""
 
 from __future__ import annotations
 
+import logging
+import os
+from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Any
 
 import matplotlib
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.collections import LineCollection, PolyCollection
+from matplotlib.cm import ScalarMappable
+from matplotlib.collections import LineCollection
+from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
+from matplotlib.tri import Triangulation
 from mpl_toolkits.axes_grid1 import make_axes_locatable
 
-from contact.output.figures.contact import BLUE, UNNAMED, ends, fitted
-from contact.output.figures.picture import Picture, widened
-from contact.output.table import Table, by_contact
+from contact.errors import InputError
+from contact.output.field_files import body_share
+from contact.output.figures.contact import ends, triangles
+from contact.output.figures.style import (
+    BLUE,
+    NARROW,
+    UNNAMED,
+    colour_range,
+    fitted,
+    page_width,
+    sheet,
+)
+from contact.output.solved import Solved
+from contact.output.table import Table, by_contact, held_points
 from contact.output.units import Units
+from contact.output.vtu import KINDS, ORDER, VTU, gathered
 from contact.typing import Array
 
-#: Quantiles of the values at which colours end where some values lie far beyond.
-OUTLIERS = (0.005, 0.995)
+logger = logging.getLogger("contact.plots")
 
-#: Openings of less than this part of the drawing are not seen in it.
+#: Openings of less than this part of the drawing are not seen in it,
 SEEN = 0.005
-
-#: Part of the drawing's width from which on a boundary has a strip of its own.
-WIDE = 0.25
-
+#: and are drawn beneath, in a strip of this height (inches), where Gamma_3 is wide enough.
+STRIP, WIDE = 0.75, 0.25
 #: Scaled gaps up to this part of Gamma_3 are drawn.
 FAR = 0.2
 
-#: Height of the strip beneath that shows them (inches).
-STRIP = 0.75
+
+@dataclass(frozen=True)
+class Picture:
+    """A deformed body, coloured by a field.
+
+    Attributes
+    ----------
+    body
+        The body in the reference configuration with its fields, shape (n, d) of the nodes.
+    values
+        Values to colour by, one a node or one a cell.
+    in_cells
+        Whether they are those of the cells.
+    label
+        Of the colours.
+    held
+        Nodes of Gamma_3 that are no contact nodes, shape (n, d).
+    scale
+        Factor of the displacements in the drawing.
+    box
+        Lower and upper corner of the drawn body, shape (2, d).
+    limits
+        Values at which the colours end; None for those that suit this picture alone.
+    """
+
+    body: VTU
+    values: Array
+    in_cells: bool
+    label: str
+    held: Array
+    scale: float
+    box: Array
+    limits: tuple[float, float] | None = None
+
+    @property
+    def points(self) -> Array:
+        """Nodes in the reference configuration, shape (n, d)."""
+        return self.body.grid.points[:, : self.body.grid.dimension]
+
+    @property
+    def places(self) -> Array:
+        """Nodes as they are drawn, shape (n, d)."""
+        return self.points + self.scale * displacement(self.body)
+
+    def colours(self) -> tuple[Normalize, str]:
+        """Return the range of the colours, and their label."""
+        if self.limits is not None:
+            return Normalize(*self.limits), self.label
+        return colour_range(self.values, self.label)
+
+    def titled(self, title: str) -> str:
+        """Return a title with the factor of the displacements."""
+        times = f"displacements $\\times$ {self.scale:g}"
+        times = times if self.scale != 1 else "displacements to scale"
+        return fitted(f"{title} ({times})" if title else times)
+
+
+def displacement(body: VTU) -> Array:
+    """Return the displacement of the nodes of a body, shape (n, d)."""
+    return np.asarray(body.at_points["displacement"])[:, : body.grid.dimension]
+
+
+def magnification(diameter: float, largest: float) -> float:
+    """Return 1, 2 or 5 times a power of ten that makes displacements about 5 % of the body.
+
+    Displacements that are visible anyway are drawn as they are.
+    """
+    if not 0 < largest < 0.02 * diameter:
+        return 1.0
+    wanted = 0.05 * diameter / largest
+    power = 10.0 ** np.floor(np.log10(wanted))
+    return float(power * max(k for k in (1, 2, 5) if k * power <= wanted))
+
+
+def picture(solution: Solved, field: str, label: str) -> Picture | None:
+    """Make a picture of a solution on rank 0; None elsewhere. Collective.
+
+    The field is one that `scalar` takes, and the label that of the colours.
+    """
+    problem = solution.problem
+    names = ("displacement", field, field.rpartition("_")[0])
+    share = body_share(problem, solution.state, names)
+    if not share.at_points.keys() & names[1:] and field != "displacement":
+        share = body_share(problem, solution.state)  # for the message, which lists all fields
+    body, held = gathered(problem.comm, share), held_points(problem)
+    return None if body is None else drawn(body, held, field, label)
+
+
+def drawn(body: VTU, held: Array, field: str, label: str, scale: float | None = None) -> Picture:
+    """Make a picture of a body coloured by a field that `scalar` takes. On one rank.
+
+    The scale is by default that of `magnification`; the other arguments are those of `Picture`.
+    """
+    values, in_cells = scalar(body, field)
+    u, points = displacement(body), body.grid.points[:, : body.grid.dimension]
+    if scale is None:
+        largest = float(np.linalg.norm(u, axis=1).max())
+        scale = magnification(float(np.ptp(points, axis=0).max()), largest)
+    places = points + scale * u
+    box = np.array([places.min(axis=0), places.max(axis=0)])
+    return Picture(body, values, in_cells, label, held, scale, box)
+
+
+def scalar(body: VTU, field: str) -> tuple[Array, bool]:
+    """Return a scalar field of a body, and whether its values are those of the cells.
+
+    Derived fields are taken as they are in cells of degree 1, and averaged at the nodes of
+    others. ``displacement``, ``stress``... are the lengths of these vectors and tensors, and
+    ``displacement_y``, ``stress_xy``... their components.
+
+    Raises
+    ------
+    InputError
+        If the body has no such field.
+    """
+    name, _, component = field.rpartition("_")
+    linear = body.grid.cells.shape[1] == body.grid.dimension + 1
+    for whole, part in ((field, ""), (name, component)):
+        in_cells = linear and f"{whole}_cell" in body.in_cells
+        fields, key = (body.in_cells, f"{whole}_cell") if in_cells else (body.at_points, whole)
+        if key not in fields or not set(part) <= set("xyz"):
+            continue
+        values = np.asarray(fields[key])
+        if not part:
+            return (np.linalg.norm(values, axis=1) if values.ndim > 1 else values), in_cells
+        if values.ndim > 1 and len(part) == (2 if values.shape[1] == 9 else 1):
+            return values[:, int("".join(str("xyz".index(i)) for i in part), 3)], in_cells
+    endings = {1: "", 2: "[_x, ...]", 3: "[_x, ...]", 9: "[_xx, ...]"}
+    accepted = [
+        f"{name}{endings.get(np.size(v) // len(v), '')}" for name, v in body.at_points.items()
+    ]
+    raise InputError(f"--field {field}: no such field; accepted: {', '.join(sorted(accepted))}")
+
+
+def boundary(points: Array, cells: Any) -> Array:
+    """Return the edges of a plane mesh that belong to one triangle, shape (m, 2, 2)."""
+    mesh = Triangulation(*points.T, cells)
+    at, edge = np.nonzero(mesh.neighbors < 0)
+    return np.asarray(points[np.stack([mesh.triangles[at, (edge + k) % 3] for k in (0, 1)], 1)])
 
 
 def draw_plane(
@@ -41,7 +194,7 @@ def draw_plane(
     mirrored: bool = False,
     units: Units = UNNAMED,
 ) -> Figure:
-    """Draw a plane body over its outline at rest and the foundation.
+    """Draw a plane body over its outline in the reference configuration, and the foundation.
 
     Where it lifts off by less than can be seen at the scale of the displacements, the opening is
     drawn beneath at its own.
@@ -62,27 +215,26 @@ def draw_plane(
     width, height = picture.box[1] - picture.box[0]
     if mirrored:
         width = 2 * picture.box[1, 0]
-    inches = float(matplotlib.rcParams["figure.figsize"][0])
     tall = float(np.clip(0.92 * height / width, 0.19, 0.87))
     lifted = None if mirrored else _lift_off(picture, table)
-    strip = 0.0 if lifted is None else STRIP
-    head = with_scale(title, picture.scale)
+    head = picture.titled(title)
     more = 0.02 * float(matplotlib.rcParams["font.size"]) * head.count("\n")
-    size = inches, tall * inches + 1.4 + strip + more
+    strip = 0.0 if lifted is None else STRIP
+    figure = sheet(tall + (1.4 + strip + more) / page_width())
     # Made for axes of equal scale, whose title it leaves room for; it knows of no strip beneath.
-    figure = Figure(figsize=size, layout="compressed" if lifted is None else "constrained")
+    figure.set_layout_engine("compressed" if lifted is None else "constrained")
     ax = figure.subplots()
-    # Dashes would be those of an edge each: none where edges are short.
-    rest = {"colors": "black", "lw": 0.5}
+    outline = boundary(picture.points, triangles(picture.body.grid.cells))
+    norm, label = picture.colours()
     for side in (-1, 1) if mirrored else (1,):
-        shown = _body(ax, picture, side)
-        shown.set_cmap("viridis")
-        label = _ranged(shown, picture)
-        ax.add_collection(LineCollection(list(picture.outline * [side, 1]), **rest))
+        _body(ax, picture, side, norm)
+        # Dashes would be those of an edge each: none where edges are short.
+        ax.add_collection(LineCollection(list(outline * [side, 1]), colors="black", lw=0.5))
         for part in by_contact(table):
             if np.all(part.get("rigid", True)):
                 _foundation(ax, part, picture.scale, ends(part, picture.held), side)
-    figure.colorbar(shown, ax=ax, location="bottom", label=label, aspect=40, shrink=0.8)
+    colours = ScalarMappable(norm, "viridis")
+    figure.colorbar(colours, ax=ax, location="bottom", label=label, aspect=40, shrink=0.8)
     ax.set_aspect("equal")
     ax.use_sticky_edges = False
     ax.margins(0.02)
@@ -95,14 +247,23 @@ def draw_plane(
     return figure
 
 
+def _body(ax: Axes, picture: Picture, side: int, norm: Normalize) -> None:
+    """Draw the coloured body, or its mirror image where the side is -1."""
+    mesh = Triangulation(*(picture.places * [side, 1]).T, triangles(picture.body.grid.cells))
+    shown: dict[str, Any] = {"norm": norm, "cmap": "viridis", "rasterized": True}
+    if picture.in_cells:
+        ax.tripcolor(mesh, facecolors=picture.values, **shown)
+    else:
+        ax.tripcolor(mesh, picture.values, shading="gouraud", **shown)
+
+
 def _strip(ax: Axes, where: Array, opening: Array, units: Units) -> None:
     """Draw an opening beneath the body, at a scale of its own."""
     below = make_axes_locatable(ax).append_axes("bottom", STRIP - 0.1, pad=0.1, sharex=ax)
     below.fill_between(where, opening, color=BLUE, lw=0.8)
-    most = opening.max()
     below.set_yticks([])  # their labels have no room: the axes stands outside of the layout
-    below.set_ylim(0.0, 2.0 * most)
-    said = f"{units.label('opening', 'length')}, at most {most:.2g}"
+    below.set_ylim(0.0, 2.0 * opening.max())
+    said = f"{units.label('opening', 'length')}, at most {opening.max():.2g}"
     below.text(0.01, 0.93, said, transform=below.transAxes, va="top", fontsize="small")
     below.set_xlabel(ax.get_xlabel())
     ax.set_xlabel("")
@@ -110,7 +271,7 @@ def _strip(ax: Axes, where: Array, opening: Array, units: Units) -> None:
 
 
 def _lift_off(picture: Picture, table: Table) -> tuple[Array, Array] | None:
-    """Return x and how far a straight Gamma_3 is open there, if that is too little to be seen."""
+    """Return x and the opening of a straight Gamma_3, if it is too little to be seen."""
     x, opening = np.asarray(table["x"]), np.asarray(table["gap"] - table["u_n"])
     opening = np.where(table["status"] == "open", np.maximum(opening, 0.0), 0.0)
     seen = picture.scale * opening.max(initial=0.0) / np.ptp(picture.box, axis=0).max()
@@ -120,46 +281,6 @@ def _lift_off(picture: Picture, table: Table) -> tuple[Array, Array] | None:
     return (x, opening) if alone and 0 < seen < SEEN else None
 
 
-def _ranged(shown: Any, picture: Picture) -> str:
-    """Keep singular corners from spending all the colours; return the label, which says so."""
-    if picture.limits is not None:
-        shown.set_clim(*picture.limits)
-        return picture.label
-    values = picture.values if picture.image is None else picture.image[np.isfinite(picture.image)]
-    low, high = (float(end) for end in np.quantile(values, OUTLIERS))
-    ends = float(values.min()), float(values.max())
-    range_, peaks = list(ends), []
-    if ends[1] - high > 0.2 * (high - low) > 0:
-        range_[1] = high
-        peaks.append(f"peak {ends[1]:.3g}")
-    if low - ends[0] > 0.2 * (high - low) > 0:
-        range_[0] = low
-        peaks.insert(0, f"least {ends[0]:.3g}")
-    shown.set_clim(*widened(*range_))
-    return ", ".join([picture.label, *peaks])
-
-
-def _body(ax: Axes, picture: Picture, side: int) -> Any:
-    """Draw the coloured body, or its mirror image where the side is -1."""
-    if picture.image is not None:
-        (left, low), (right, top) = picture.box
-        extent = (side * left, side * right, low, top)
-        return ax.imshow(picture.image, extent=extent, origin="lower")
-    drawn = (picture.corners + picture.scale * picture.displacement) * [side, 1]
-    if picture.values.ndim == 1:
-        shown = ax.add_collection(
-            PolyCollection(list(drawn), array=picture.values, lw=0, rasterized=True)
-        )
-        # Smoothed edges of neighbours would let the background shine through.
-        shown.set_antialiased(False)
-        return shown
-    points = drawn.reshape(-1, 2)
-    triangles = np.arange(len(points)).reshape(-1, 3)
-    return ax.tripcolor(
-        *points.T, triangles, picture.values.ravel(), shading="gouraud", rasterized=True
-    )
-
-
 def _foundation(ax: Axes, table: Table, scale: float, edges: Array, side: int) -> None:
     """Draw the foundation as far as it faces Gamma_3, moved as the displacements are scaled.
 
@@ -167,10 +288,9 @@ def _foundation(ax: Axes, table: Table, scale: float, edges: Array, side: int) -
     """
     points = np.column_stack([table["x"], table["y"]])
     normal, gap = np.column_stack([table["nu_x"], table["nu_y"]]), table["gap"] + table["moved"]
-    points = np.concatenate([edges[:1], points, edges[1:]])
-    normal = np.concatenate([normal[:1], normal, normal[-1:]])
+    points = np.concatenate([edges[:1], points, edges[1:]]) * [side, 1]
+    normal = np.concatenate([normal[:1], normal, normal[-1:]]) * [side, 1]
     gap = np.concatenate([gap[:1], gap, gap[-1:]])
-    points, normal = points * [side, 1], normal * [side, 1]
     surface = points + scale * gap[:, None] * normal
     extent = np.ptp(points, axis=0).max()
     near = np.flatnonzero((scale == 1) | (scale * gap <= max(FAR * extent, 2 * scale * gap.min())))
@@ -180,7 +300,71 @@ def _foundation(ax: Axes, table: Table, scale: float, edges: Array, side: int) -
         ax.fill(*band.T, facecolor="none", edgecolor=BLUE, hatch="////", lw=0)
 
 
-def with_scale(title: str, scale: float) -> str:
-    """Return a title that says by what displacements are multiplied."""
-    times = rf"displacements $\times$ {scale:g}" if scale != 1 else "displacements to scale"
-    return fitted(f"{title} ({times})" if title else times)
+def draw_space(picture: Picture, title: str = "") -> Figure | None:
+    """Draw the surface of a body in 3-D, from above and from below; None without a display."""
+    norm, label = picture.colours()
+    grid, kind = picture.body.grid, (3, picture.body.grid.cells.shape[1])
+    nodes = grid.cells[:, ORDER.get(kind, range(kind[1]))]
+
+    def add(plotter: Any) -> None:
+        import pyvista
+
+        body = pyvista.UnstructuredGrid({KINDS[kind]: nodes}, picture.places)
+        (body.cell_data if picture.in_cells else body.point_data)["values"] = picture.values
+        surface = body.extract_surface(nonlinear_subdivision=1)
+        edges = surface.n_cells < 5000
+        plotter.add_mesh(
+            surface, scalars="values", cmap="viridis", clim=[norm.vmin, norm.vmax],
+            show_edges=edges, line_width=0.5, edge_opacity=0.3, ambient=0.6, diffuse=0.4,
+            show_scalar_bar=False,
+        )  # fmt: skip
+
+    images = [rendered(add, (1.0, -1.6, height), picture.box) for height in (0.8, -0.8)]
+    narrow = page_width() < NARROW
+    figure = sheet(1.9 if narrow else 0.6)
+    figure.set_layout_engine("compressed")
+    axes = figure.subplots(*((2, 1) if narrow else (1, 2)))
+    for ax, name, image in zip(axes, ("from above", "from below"), images, strict=True):
+        if image is None:
+            return None
+        ax.imshow(image)
+        ax.set_title(name, fontsize="medium")
+        ax.axis("off")
+    colours = ScalarMappable(norm, "viridis")
+    figure.colorbar(colours, ax=axes, location="bottom", label=label, aspect=40, shrink=0.8)
+    figure.suptitle(picture.titled(title), fontsize="large")
+    return figure
+
+
+def rendered(
+    add: Callable[[Any], None], view: tuple[float, float, float], box: Array
+) -> Array | None:
+    """Return an image of a 3-D scene by pyvista, without a window; None without a display.
+
+    Parameters
+    ----------
+    add
+        Adds the meshes of the scene to a ``pyvista.Plotter``.
+    view
+        Direction from the scene to the eye.
+    box
+        Lower and upper corner of the scene, shape (2, 3).
+    """
+    import pyvista
+
+    if not os.environ.get("DISPLAY") and pyvista.vtk_version_info < (9, 4):
+        try:
+            pyvista.start_xvfb()
+        except OSError:
+            logger.warning("the body is not drawn: VTK before 9.4 needs a display or Xvfb")
+            return None
+    plotter = pyvista.Plotter(off_screen=True, window_size=(1000, 1000))
+    plotter.set_background("white")
+    plotter.enable_parallel_projection()
+    add(plotter)
+    plotter.add_axes(viewport=(0.0, 0.0, 0.2, 0.2))
+    plotter.view_vector(view)
+    plotter.reset_camera(bounds=box.T.ravel())
+    image = plotter.screenshot(return_img=True)
+    plotter.close()
+    return np.asarray(image)

@@ -1,41 +1,38 @@
-"""The contact figure: stresses on Gamma_3, friction bound, stick and slip."""
+"""The contact figure: stresses on Gamma_3, friction bound, stick and slip, in 2-D and in 3-D."""
 
 from __future__ import annotations
 
-import textwrap
 from collections.abc import Iterable, Iterator
 from typing import Any
 
-import matplotlib
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.collections import PolyCollection
+from matplotlib.colors import ListedColormap
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
+from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
+from contact.output.figures.style import (
+    BLUE,
+    GREY,
+    NARROW,
+    ORANGE,
+    UNNAMED,
+    ZONES,
+    fitted,
+    page_width,
+    sheet,
+)
+from contact.output.surface import STATUS
 from contact.output.table import Table, by_contact
 from contact.output.units import Units
 from contact.output.vtu import VTU
 from contact.typing import Array
 
-#: Okabe and Ito's palette: told apart by colour-blind readers, and in grey.
-BLUE, ORANGE, GREY = "#0072B2", "#D55E00", "#555555"
-#: Figures narrower than this (inches) have small letters and legends of two columns.
-NARROW = 4.5
-#: Where no units are named.
-UNNAMED = Units()
-ZONES = {
-    "stick": ("#CDE7F0", "sticking"),
-    "slip": ("#FBE3C8", "sliding"),
-    "open": ("#F2F2F2", "open"),
-}
-
-
-def fitted(title: str) -> str:
-    """Return a title in lines that fit on a figure as wide as the settings say."""
-    letter = 0.6 * 1.2 * float(matplotlib.rcParams["font.size"]) / 72
-    width = float(matplotlib.rcParams["figure.figsize"][0])
-    return "\n".join(textwrap.wrap(title, int(width / letter)))
+#: Colours of the nodes of Gamma_3 in 3-D by their status, in the order of its numbers.
+STATES = {"open": "#C8C8C8", "stick": BLUE, "slip": ORANGE}
 
 
 def position(table: Table, axes: str = "xy") -> tuple[Array, str]:
@@ -53,7 +50,7 @@ def position(table: Table, axes: str = "xy") -> tuple[Array, str]:
 
 
 def ends(table: Table, held: Array) -> Array:
-    """Return where Gamma_3 begins and ends in the plane, shape (2, 2).
+    """Return the first and the last point of Gamma_3 in 2-D, shape (2, 2).
 
     Parameters
     ----------
@@ -110,9 +107,8 @@ def draw_line(
     """
     parts = by_contact(table)
     frictional = bool(np.any(table["bound"] > 0))
-    width = float(matplotlib.rcParams["figure.figsize"][0])
-    tall = 0.8 if frictional else 0.48
-    figure = Figure(figsize=(width, (tall if width > NARROW else 1.5 * tall) * width))
+    narrow = page_width() <= NARROW
+    figure = sheet((0.8 if frictional else 0.48) * (1.5 if narrow else 1.0))
     size = (2 if frictional else 1, len(parts))
     grid = figure.subplots(*size, sharex="col", sharey="row", squeeze=False)
     for rows, part in zip(grid.T, parts, strict=True):
@@ -125,7 +121,7 @@ def draw_line(
         for ax in grid[:, 0]:
             handles = _handles([ax])
             # A page has room for four beside each other.
-            columns = 2 if width <= NARROW else len(handles) if len(handles) <= 4 else 3
+            columns = 2 if narrow else len(handles) if len(handles) <= 4 else 3
             ax.legend(handles=handles, ncols=columns, loc="lower left", bbox_to_anchor=(0, 1))
     else:
         for ax, part in zip(grid[0], parts, strict=True):
@@ -167,8 +163,13 @@ def _draw_rows(rows: Any, table: Table, held: Array | None, axes: str, units: Un
         rows[1].axhline(0.0, color="black", lw=0.4)
         rows[1].set_ylabel(units.label(r"$-\sigma_\tau\cdot t$", "stress"))
     rows[-1].set_xlabel(units.label(f"${name}$ along $\\Gamma_3$", "length"))
-    before, after = _margins(table, held)
-    rows[0].set_xlim(where.min() - before, where.max() + after)
+    outer = np.column_stack([table["x"], table["y"]])[[0, -1]]
+    # The rows begin where x, then y is smaller, and so does the axis.
+    beyond = np.linalg.norm((outer if held is None else ends(table, held)) - outer, axis=1)
+    whole = np.array([where.min() - beyond[0], where.max() + beyond[1]])
+    low, high = _window(where[:, None], table["status"] != "open", 0.0)
+    cut = low[0] > where.min() or high[0] < where.max()
+    rows[0].set_xlim(*(np.clip([low[0], high[0]], *whole) if cut else whole))
     _focus(rows[0], table["pressure"], 0.0)
     if frictional:
         _focus(rows[1], bound, -1.0)
@@ -191,16 +192,6 @@ def _draw_opposite(ax: Axes, table: Table, opposite: VTU) -> None:
     ax.plot(there[order], pressure, ":", color=GREY, lw=1.0, label="pressure on the other side")
 
 
-def _margins(table: Table, held: Array | None) -> tuple[float, float]:
-    """Return how far Gamma_3 goes on beyond its contact nodes, at either end of the axis."""
-    if held is None:
-        return 0.0, 0.0
-    outer = np.column_stack([table["x"], table["y"]])[[0, -1]]
-    # The rows begin where x, then y is smaller, and so does the axis.
-    first, last = np.linalg.norm(ends(table, held) - outer, axis=1)
-    return float(first), float(last)
-
-
 def _focus(ax: Axes, values: Array, low: float) -> None:
     """Limit the axis where a singular corner would hide all else, and say what is cut off."""
     largest = float(values.max(initial=0.0))
@@ -212,3 +203,141 @@ def _focus(ax: Axes, values: Array, low: float) -> None:
     if top < largest:
         text = f"peak {largest:.3g}, cut off"
         ax.annotate(text, (0.99, 0.97), xycoords="axes fraction", ha="right", va="top", fontsize=7)
+
+
+def triangles(cells: Any) -> Any:
+    """Return triangles by their corners, those of degree 2 as four each, shape (n, 3)."""
+    if cells.shape[1] == 3:
+        return cells
+    quarters = [[0, 5, 4], [5, 1, 3], [4, 3, 2], [3, 4, 5]]
+    return np.concatenate([cells[:, corners] for corners in quarters])
+
+
+def draw_surface(
+    surface: VTU, title: str = "", units: Units = UNNAMED, opposite: VTU | None = None
+) -> Figure:
+    """Draw pressure, status and friction arrows on Gamma_3 in 3-D, along the contact direction.
+
+    The arguments are those of `draw_line`.
+    """
+    view, names = _view(surface)
+    sides = [(surface, "contact pressure")]
+    if opposite is not None:
+        sides.append((opposite, "on the other side"))
+    touching = np.asarray(surface.at_points["status"]) > STATUS["open"]
+    low, high = _window(surface.grid.points @ view.T, touching, 0.13)  # room for the arrows
+    stacked, count = page_width() < NARROW, len(sides) + 1
+    rows, columns = (count, 1) if stacked else (1, count)
+    aspect = float(np.clip((high - low)[1] / (high - low)[0], 0.25, 0.8 if stacked else 1.25))
+    figure = sheet(rows * (aspect / columns + 0.02) + (2.0 if stacked else 1.5) / page_width())
+    figure.set_layout_engine("compressed")
+    grid = figure.subplots(rows, columns, sharey=not stacked, sharex=stacked)
+    *lefts, right = grid.ravel()
+    highest = float(np.nanmax(surface.at_points["pressure"], initial=0.0))
+    for ax, (side, _) in zip(lefts, sides, strict=True):
+        shown = _draw_pressure(ax, side, view, highest)
+    status = _draw_status(right, surface, view, 0.1 * float((high - low).max()))
+    words = [*(name for _, name in sides), "status, friction (arrows)"]
+    for ax, name in zip(grid.ravel(), words, strict=True):
+        ax.set_aspect("equal")
+        ax.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]))
+        ax.set_title(name, fontsize="medium")
+        if not stacked or ax is right:
+            ax.set_xlabel(units.label(f"${names[0]}$", "length"))
+        if stacked or ax is lefts[0]:
+            ax.set_ylabel(units.label(f"${names[1]}$", "length"))
+    label = units.label(r"$-\sigma_\nu$", "stress")
+    figure.colorbar(shown, ax=lefts, location="bottom", label=label, aspect=25)
+    bar = figure.colorbar(status, ax=right, location="bottom", aspect=25, ticks=range(len(STATES)))
+    bar.ax.set_xticklabels([ZONES[zone][1] for zone in STATES])
+    bar.ax.tick_params(length=0)
+    if title:
+        figure.suptitle(fitted(title), fontsize="large")
+    return figure
+
+
+def _draw_pressure(ax: Axes, side: VTU, view: Array, highest: float) -> Any:
+    """Draw the pressure on one side; return what its colours are."""
+    flat, facets = side.grid.points @ view.T, triangles(side.grid.cells)
+    pressure = np.asarray(side.at_points["pressure"])
+    ax.add_collection(PolyCollection(list(flat[facets]), facecolor="#F2F2F2", lw=0))
+    known = np.isfinite(pressure[facets]).all(axis=1)
+    drawn = facets[known] if known.any() else facets
+    values = np.nan_to_num(pressure)
+    colours = {"shading": "gouraud", "cmap": "viridis", "vmin": 0.0, "vmax": highest or 1.0}
+    return ax.tripcolor(*flat.T, drawn, values, **colours)
+
+
+def _draw_status(ax: Axes, surface: VTU, view: Array, reach: float) -> Any:
+    """Draw the status of the nodes, and friction as arrows of a length at most; return colours."""
+    flat, facets = surface.grid.points @ view.T, triangles(surface.grid.cells)
+    ax.add_collection(PolyCollection(list(flat[facets]), facecolor="#F2F2F2", lw=0))
+    status = np.asarray(surface.at_points["status"])
+    known = status >= STATUS["open"]
+    size = float(np.clip(2e3 / len(flat), 0.5, 12))
+    colours = {"cmap": ListedColormap(list(STATES.values())), "vmin": -0.5, "vmax": 2.5}
+    shown = ax.scatter(*flat[known].T, c=status[known], s=size, lw=0, **colours)
+    _arrows(ax, surface, flat, view, reach)
+    return shown
+
+
+def _arrows(ax: Axes, surface: VTU, flat: Array, view: Array, reach: float) -> None:
+    """Draw the friction stress, its largest arrow of a given length."""
+    traction, normal = (np.asarray(surface.at_points[name]) for name in ("traction", "normal"))
+    along = traction - np.einsum("ni,ni->n", traction, normal)[:, None] * normal
+    friction = np.nan_to_num(along @ view.T)
+    size = np.linalg.norm(friction, axis=1)
+    # Rounding of the pressures is no friction.
+    rounding = 1e-9 * np.nan_to_num(np.linalg.norm(traction, axis=1)).max(initial=0.0)
+    acting = np.flatnonzero(size > max(1e-6 * size.max(initial=0.0), rounding))
+    if not acting.size:
+        return
+    chosen = acting[_thinned(flat[acting], 16)]
+    exact = {"angles": "xy", "scale_units": "xy", "scale": size[chosen].max() / reach}
+    ax.quiver(*flat[chosen].T, *friction[chosen].T, color="black", width=0.004, **exact)
+
+
+def _view(surface: VTU) -> tuple[Array, tuple[str, str]]:
+    """Return two directions across the mean contact direction, shape (2, 3), and their names.
+
+    These are axes where it lies along the third, else directions x_1, x_2.
+    """
+    normal = np.asarray(surface.at_points["normal"])
+    touching = np.asarray(surface.at_points["status"]) > STATUS["open"]
+    mean = np.nanmean(normal[touching if touching.any() else slice(None)], axis=0)
+    mean = mean / np.linalg.norm(mean)
+    thin = int(np.argmax(np.abs(mean)))
+    kept = [k for k in range(3) if k != thin]
+    if abs(mean[thin]) > 0.98:
+        return np.eye(3)[kept], ("xyz"[kept[0]], "xyz"[kept[1]])
+    first = np.cross(np.eye(3)[kept[0]], mean)
+    first /= np.linalg.norm(first)
+    return np.array([first, np.cross(mean, first)]), ("x_1", "x_2")
+
+
+def _window(places: Array, touching: NDArray[np.bool_], margin: float) -> tuple[Array, Array]:
+    """Return the corners of the part that is shown: all, or a small contact zone's vicinity.
+
+    Parameters
+    ----------
+    places
+        Nodes of Gamma_3, shape (n, k).
+    touching
+        Which of them are in contact, shape (n,).
+    margin
+        About all, in shares of the extent.
+    """
+    extent = float(np.ptp(places, axis=0).max())
+    zone = float(np.ptp(places[touching], axis=0).max()) if touching.any() else extent
+    if zone < 0.3 * extent:
+        places, room = places[touching], max(0.4 * zone, 0.02 * extent)
+    else:
+        room = margin * extent
+    return places.min(axis=0) - room, places.max(axis=0) + room
+
+
+def _thinned(flat: Array, count: int) -> NDArray[np.intp]:
+    """Return the first point of each cell of a grid of count x count cells."""
+    span = np.ptp(flat, axis=0).max() or 1.0
+    cells = np.floor((flat - flat.min(axis=0)) / span * count)
+    return np.unique(cells, axis=0, return_index=True)[1]

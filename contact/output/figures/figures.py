@@ -1,4 +1,4 @@
-"""Figures of a solution: contact, deformed body, potential."""
+"""Figures of a solution: contact, deformed body, potential, steps."""
 
 from __future__ import annotations
 
@@ -7,56 +7,26 @@ import io
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import matplotlib
 from matplotlib.figure import Figure
 
-from contact.output.figures.body import draw_plane
-from contact.output.figures.contact import NARROW, UNNAMED, draw_line
-from contact.output.figures.facets import draw_surface
-from contact.output.figures.picture import Picture, picture
-from contact.output.figures.space import draw_space
+from contact.output.figures.body import Picture, draw_plane, draw_space, picture
+from contact.output.figures.contact import draw_line, draw_surface
 from contact.output.figures.steps import Course
+from contact.output.figures.style import DEFORMED, STYLE, UNNAMED, axes_of, heading, named, style
 from contact.output.opposite import opposite_surface
 from contact.output.solved import Solved
 from contact.output.surface import contact_surface
 from contact.output.table import Table, contact_table, held_points
-from contact.output.units import Quantity, Units
+from contact.output.units import Units
 from contact.output.vtu import VTU
 from contact.typing import Array
-
-#: Quantities drawn on the deformed body: name of the figure, field, label, what it is measured in.
-DEFORMED: tuple[tuple[str, str, str, Quantity], ...] = (
-    ("deformed", "von_mises", "von Mises stress", "stress"),
-    ("potential", "potential", r"potential $\varphi$", "potential"),
-)
-
-#: Fields, with their components, whose unit has a name.
-KINDS: dict[str, Quantity] = {"displacement": "length", "stress": "stress"}
-
-#: Characters of a title that fit on a figure.
-WIDTH = 70
-
-#: Settings of all figures.
-STYLE: dict[str, Any] = {
-    "figure.figsize": (6.3, 4.0),
-    "font.size": 9,
-    "font.family": "serif",
-    "mathtext.fontset": "dejavuserif",
-    "axes.linewidth": 0.6,
-    "lines.linewidth": 1.2,
-    "legend.frameon": False,
-    "legend.fontsize": 8,
-    "figure.dpi": 200,
-    "savefig.dpi": 200,
-    "figure.constrained_layout.use": True,
-}
 
 
 @dataclass(frozen=True)
 class Drawing:
-    """What the figures show, from all ranks.
+    """The data of all figures, from all ranks.
 
     Attributes
     ----------
@@ -67,9 +37,9 @@ class Drawing:
     table, held
         The contact nodes, and the other nodes of Gamma_3.
     surface, opposite
-        Gamma_3 with its fields, drawn in space, and the other sides of contacts between bodies.
+        Gamma_3 with its fields, drawn in 3-D, and the other sides of contacts between bodies.
     pictures
-        Names of the figures of the deformed body, and what they show.
+        The figures of the deformed body by name.
     axes
         Names of the coordinates of a plane mesh.
     mirror
@@ -109,13 +79,13 @@ class Drawing:
         Parameters
         ----------
         folder
-            Where to.
+            The folder.
         formats
             Endings of the files: png, pdf or svg.
         width
             Of the figures (inches); by default that of a page.
         contact
-            Whether to draw the contact part too.
+            Whether to draw the contact part and the steps too.
 
         Returns
         -------
@@ -130,32 +100,29 @@ class Drawing:
             ]
 
     def figures(self, width: float | None = None, contact: bool = True) -> Gallery:
-        """Return the figures by name. On one rank.
-
-        Parameters
-        ----------
-        width, contact
-            As `draw` takes them.
-        """
+        """Return the figures by name, as `draw` takes their width and choice. On one rank."""
+        figures: dict[str, Figure | None] = {}
         with matplotlib.rc_context(style(width)):
-            figures: dict[str, Figure | None] = {}
             if contact:
-                figures["contact"] = (
-                    draw_line(
-                        self.table, self.title, self.held, self.axes, self.units, self.opposite
-                    )
-                    if self.plane
-                    else draw_surface(self.surface, self.title, self.units, self.opposite)
-                )
+                figures["contact"] = self._contact()
             if contact and self.course is not None:
                 figures |= self.course.draw(self.plane, self.title, self.axes, self.units)
             for name, made in self.pictures:
-                figures[name] = (
-                    draw_plane(made, self.table, self.title, self.axes, self.mirrored, self.units)
-                    if self.plane
-                    else draw_space(made, self.title)
-                )
+                figures[name] = self.body(made, self.table, self.title)
         return Gallery({name: figure for name, figure in figures.items() if figure is not None})
+
+    def _contact(self) -> Figure:
+        if self.plane:
+            return draw_line(
+                self.table, self.title, self.held, self.axes, self.units, self.opposite
+            )
+        return draw_surface(self.surface, self.title, self.units, self.opposite)
+
+    def body(self, made: Picture, table: Table, title: str) -> Figure | None:
+        """Draw a deformed body with its contact nodes; None where pyvista has no display."""
+        if self.plane:
+            return draw_plane(made, table, title, self.axes, self.mirrored, self.units)
+        return draw_space(made, title)
 
 
 class Gallery(dict[str, Figure]):
@@ -172,23 +139,12 @@ class Gallery(dict[str, Figure]):
         return "".join(images)
 
 
-def style(width: float | None) -> dict[str, Any]:
-    """Return the settings of figures of a width (inches); None for that of a page."""
-    return STYLE | ({} if width is None else sized(width))
-
-
-def sized(width: float) -> dict[str, Any]:
-    """Return the settings of figures of another width (inches): narrow ones have small letters."""
-    small = {"font.size": 7, "legend.fontsize": 6} if width < NARROW else {}
-    return {"figure.figsize": (width, width)} | small
-
-
 def collect(solution: Solved, fields: Sequence[str] = ()) -> Drawing | None:
-    """Gather on rank 0 what the figures of a solution show; None elsewhere. Collective.
+    """Gather on rank 0 the data of the figures of a solution; None elsewhere. Collective.
 
-    In the plane the contact figure shows the stresses along Gamma_3 with the friction bound
+    In 2-D the contact figure shows the stresses along Gamma_3 with the friction bound
     and the zones of stick and slip, as Figure 7.4 of the thesis does, and the deformed body is
-    coloured by the von Mises stress, as in Figure 7.5. In space the contact nodes are seen
+    coloured by the von Mises stress, as in Figure 7.5. In 3-D the contact nodes are seen
     along the mean contact direction, and the deformed surface from the side.
 
     Parameters
@@ -201,7 +157,7 @@ def collect(solution: Solved, fields: Sequence[str] = ()) -> Drawing | None:
     table, held = contact_table(solution), held_points(solution.problem)
     surface, opposite = contact_surface(solution, table), opposite_surface(solution)
     pictures: list[tuple[str, Picture]] = []
-    usual = [f for _, f, *_ in DEFORMED if f != "potential" or solution.problem.piezoelectric]
+    usual = [field for field in DEFORMED if field != "potential" or solution.problem.piezoelectric]
     for field in fields or usual:
         name, label = named(field, solution.units)
         made = picture(solution, field, label)
@@ -226,30 +182,6 @@ def collect(solution: Solved, fields: Sequence[str] = ()) -> Drawing | None:
         course=course,
         opposite=opposite,
     )
-
-
-def named(field: str, units: Units) -> tuple[str, str]:
-    """Return the name of the figure of a field, and the label of its colours."""
-    for name, known, words, quantity in DEFORMED:
-        if known == field:
-            return name, units.label(words, quantity)
-    words, base = field.replace("_", " "), field.partition("_")[0]
-    if base in KINDS:
-        return field, units.label(words, KINDS[base])
-    return field, words if field == "dev_strain" else f"{words} (units of the case)"
-
-
-def axes_of(revolved: bool) -> str:
-    """Return the names of the coordinates of a plane mesh, or of the half plane of a body."""
-    return "rz" if revolved else "xy"
-
-
-def heading(title: str) -> str:
-    """Return the title of a case as one line that fits on a figure, to be shown as it is."""
-    line = " ".join(title.split())
-    if len(line) > WIDTH:
-        line = line[: WIDTH - 1] + "…"
-    return line.replace("$", r"\$")
 
 
 def _save(figure: Figure, path: Path) -> Path:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import csv
 import json
 from collections.abc import Callable, Sequence
-from itertools import groupby
 from pathlib import Path
 from typing import Any
 
@@ -15,9 +14,10 @@ from numpy.typing import NDArray
 
 from contact.errors import InputError
 from contact.output import transaction
-from contact.output.figures.figures import DEFORMED, Drawing, axes_of, heading, named
-from contact.output.figures.picture import drawn
+from contact.output.figures.body import drawn
+from contact.output.figures.figures import Drawing
 from contact.output.figures.steps import Course
+from contact.output.figures.style import DEFORMED, axes_of, heading, named
 from contact.output.folder import refused, result_folder
 from contact.output.opposite import AGAINST
 from contact.output.table import Table
@@ -29,14 +29,14 @@ FORMATS = ("png", "pdf", "svg")
 
 
 def read_drawing(folder: Path, fields: Sequence[str] = (), mirror: bool = False) -> Drawing:
-    """Read what the figures of a run show. On one rank.
+    """Read the data of the figures of a run. On one rank.
 
     Parameters
     ----------
     folder
         The results of the run.
     fields
-        Fields to colour the body by, as `figures.picture.scalar` takes them; by default those of
+        Fields to colour the body by, as `figures.body.scalar` takes them; by default those of
         ``contact solve --plot``.
     mirror
         Whether to show both halves of a body of revolution.
@@ -53,7 +53,7 @@ def read_drawing(folder: Path, fields: Sequence[str] = (), mirror: bool = False)
     d = body.grid.dimension
     held = surface.grid.points[np.asarray(surface.at_points["row"]) < 0, :d]
     units = Units(**summary.get("units", {}))
-    usual = [field for _, field, *_ in DEFORMED if field in body.at_points]
+    usual = [field for field in DEFORMED if field in body.at_points]
     pictures = []
     for field in fields or usual:
         name, label = named(field, units)
@@ -168,31 +168,30 @@ def _rows(path: Path) -> list[dict[str, float]]:
         return [{k: float(v) for k, v in row.items()} for row in csv.DictReader(file)]
 
 
-def _tables(path: Path) -> list[Table]:
-    """Read ``contact-steps.csv``: a table a step."""
+def _columns(path: Path) -> dict[str, NDArray[Any]]:
+    """Read a table of contact nodes."""
     with path.open(newline="", encoding="utf-8") as file:
         header, *rows = csv.reader(file)
-    found: list[Table] = []
-    for _, group in groupby(rows, key=lambda row: row[0]):
-        columns = zip(*group, strict=True)
-        texts = {name: np.array(values) for name, values in zip(header, columns, strict=True)}
-        found.append({k: v if k in ("status", "on") else v.astype(float) for k, v in texts.items()})
-    return found
+    columns = {name: np.array(texts) for name, *texts in zip(header, *rows, strict=True)}
+    return {k: v if k in ("status", "on") else v.astype(float) for k, v in columns.items()}
+
+
+def _tables(path: Path) -> list[Table]:
+    """Read ``contact-steps.csv``: a table a step."""
+    columns = _columns(path)
+    starts = np.flatnonzero(np.diff(columns["t"])) + 1
+    parts = {name: np.split(values, starts) for name, values in columns.items()}
+    return [{name: values[k] for name, values in parts.items()} for k in range(len(starts) + 1)]
 
 
 def _table(path: Path, surface: VTU) -> Table:
     """Read ``contact.csv``, and the contact directions of its nodes from the surface."""
-    with path.open(newline="", encoding="utf-8") as file:
-        header, *rows = csv.reader(file)
-    columns: dict[str, NDArray[Any]] = {}
-    for name, *values in zip(header, *rows, strict=True):
-        texts = np.array(values)
-        columns[name] = texts if name in ("status", "on") else texts.astype(float)
-    row = np.asarray(surface.at_points["row"])
+    columns, fields = _columns(path), surface.at_points
+    row = np.asarray(fields["row"])
     nodes = np.argsort(row)[np.count_nonzero(row < 0) :]
-    normal = np.asarray(surface.at_points["normal"])[nodes]
-    columns["entry"] = np.asarray(surface.at_points["entry"])[nodes]
-    columns["rigid"] = np.asarray(surface.at_points["rigid"])[nodes] > 0
-    moved = np.asarray(surface.at_points["displacement"])[nodes, : normal.shape[1]]
+    normal = np.asarray(fields["normal"])[nodes]
+    columns["entry"] = np.asarray(fields["entry"])[nodes]
+    columns["rigid"] = np.asarray(fields["rigid"])[nodes] > 0
+    moved = np.asarray(fields["displacement"])[nodes, : normal.shape[1]]
     columns["moved"] = np.einsum("ni,ni->n", moved, normal) - columns["u_n"]
     return columns | {f"nu_{axis}": normal[:, i] for i, axis in enumerate("xyz")}

@@ -1,0 +1,117 @@
+"""The style of all figures: settings, colours, titles and the ends of colour bars."""
+
+from __future__ import annotations
+
+import textwrap
+from typing import Any
+
+import matplotlib
+import numpy as np
+from matplotlib.colors import Normalize
+from matplotlib.figure import Figure
+
+from contact.output.units import Quantity, Units
+from contact.typing import Array
+
+#: Settings of all figures.
+STYLE: dict[str, Any] = {
+    "figure.figsize": (6.3, 4.0),
+    "font.size": 9,
+    "font.family": "serif",
+    "mathtext.fontset": "dejavuserif",
+    "axes.linewidth": 0.6,
+    "lines.linewidth": 1.2,
+    "legend.frameon": False,
+    "legend.fontsize": 8,
+    "figure.dpi": 200,
+    "savefig.dpi": 200,
+    "figure.constrained_layout.use": True,
+}
+#: Figures narrower than this (inches) have small letters and panels below each other.
+NARROW = 4.5
+#: Characters of a title that fit on a figure.
+LONGEST_TITLE = 70
+#: Okabe and Ito's palette: told apart by colour-blind readers, and in grey.
+BLUE, SKY, ORANGE, GREEN, GREY = "#0072B2", "#56B4E9", "#D55E00", "#009E73", "#555555"
+#: Status of a node -> colour of its zone, and its name in legends.
+ZONES = {
+    "stick": ("#CDE7F0", "sticking"),
+    "slip": ("#FBE3C8", "sliding"),
+    "open": ("#F2F2F2", "open"),
+}
+#: Where no units are named.
+UNNAMED = Units()
+#: Fields of the deformed body that are drawn by default: name of the figure, label, quantity.
+DEFORMED: dict[str, tuple[str, str, Quantity]] = {
+    "von_mises": ("deformed", "von Mises stress", "stress"),
+    "potential": ("potential", r"potential $\varphi$", "potential"),
+}
+#: Other fields, with their components, whose unit may have a name.
+QUANTITIES: dict[str, Quantity] = {"displacement": "length", "stress": "stress"}
+#: Quantiles of the values at which colours end where some values lie far beyond.
+OUTLIERS = (0.005, 0.995)
+
+
+def style(width: float | None) -> dict[str, Any]:
+    """Return the settings of figures of a width (inches); None for that of a page."""
+    if width is None:
+        return STYLE
+    small = {"font.size": 7, "legend.fontsize": 6} if width < NARROW else {}
+    return STYLE | {"figure.figsize": (width, width)} | small
+
+
+def page_width() -> float:
+    """Return the width of figures by the present settings (inches)."""
+    return float(matplotlib.rcParams["figure.figsize"][0])
+
+
+def sheet(aspect: float) -> Figure:
+    """Return an empty figure of the present width, and of a height in shares of it."""
+    return Figure(figsize=(page_width(), aspect * page_width()))
+
+
+def heading(title: str) -> str:
+    """Return the title of a case as one line, not too long, to be shown as it is."""
+    line = " ".join(title.split())
+    if len(line) > LONGEST_TITLE:
+        line = line[: LONGEST_TITLE - 1] + "…"
+    return line.replace("$", r"\$")
+
+
+def fitted(title: str) -> str:
+    """Return a title in lines that fit on a figure of the present width."""
+    letter = 0.6 * 1.2 * float(matplotlib.rcParams["font.size"]) / 72
+    return "\n".join(textwrap.wrap(title, int(page_width() / letter)))
+
+
+def axes_of(revolved: bool) -> str:
+    """Return the names of the coordinates of a plane mesh, or of the half plane of a body."""
+    return "rz" if revolved else "xy"
+
+
+def named(field: str, units: Units) -> tuple[str, str]:
+    """Return the name of the figure of a field, and the label of its colours."""
+    if field in DEFORMED:
+        name, words, quantity = DEFORMED[field]
+        return name, units.label(words, quantity)
+    words, base = field.replace("_", " "), field.partition("_")[0]
+    return field, units.label(words, QUANTITIES[base]) if base in QUANTITIES else words
+
+
+def widened(low: float, high: float) -> tuple[float, float]:
+    """Return the ends of a colour bar: of a field that is constant to rounding a wide one."""
+    least = 1e-6 * max(abs(low), abs(high))
+    return (low, high) if high - low > least else (low - 0.05 * abs(low), high + 0.05 * abs(high))
+
+
+def colour_range(values: Array, label: str) -> tuple[Normalize, str]:
+    """Return the range of colours without singular peaks, and a label with the peaks cut off."""
+    low, high = (float(end) for end in np.quantile(values, OUTLIERS))
+    ends, peaks = [float(values.min()), float(values.max())], []
+    if low - ends[0] > 0.2 * (high - low) > 0:
+        peaks.append(f"least {ends[0]:.3g}")
+        ends[0] = low
+    if ends[1] - high > 0.2 * (high - low) > 0:
+        peaks.append(f"peak {ends[1]:.3g}")
+        ends[1] = high
+    return Normalize(*widened(*ends)), ", ".join([label, *peaks])
