@@ -32,7 +32,7 @@ from contact.nesting import nested_start, pays
 from contact.output.checkpoint import Checkpoints, kept_digest, read_steps
 from contact.output.folder import on_root
 from contact.output.record import StepRecord
-from contact.output.review import announce
+from contact.output.remarks import announce
 from contact.output.solution import Solution
 from contact.output.steps import StepRecorder
 from contact.problem.consistent import check_problem, check_supports

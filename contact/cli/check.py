@@ -18,9 +18,9 @@ from contact.mesh.domain import Indices
 from contact.methods.options import NewtonOptions
 from contact.nesting import coarser_cases
 from contact.output import environment
-from contact.output.assumptions import fitting
 from contact.output.bodies import passing
 from contact.output.folder import on_root
+from contact.output.remarks import fitting
 from contact.problem.expected import expected_displacements
 from contact.problem.problem import ContactProblem
 from contact.typing import Array

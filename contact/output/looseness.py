@@ -7,8 +7,7 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 from scipy import linalg
 
-from contact.output.assumptions import Remark
-from contact.output.solution import Solution
+from contact.output.solution import Remark, Solution
 from contact.problem.kkt import residual_forces
 from contact.problem.mobility import Group, described, groups, held_by_supports, null_space
 from contact.tolerances import EPS

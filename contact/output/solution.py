@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 from dolfinx import fem
@@ -30,6 +30,10 @@ from contact.typing import Array
 
 if TYPE_CHECKING:
     from contact.output.figures.figures import Gallery
+
+
+#: A text on a solution, empty for none, and whether it is a note rather than a warning.
+Remark: TypeAlias = tuple[str, bool]
 
 
 @dataclass(repr=False)

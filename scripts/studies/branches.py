@@ -14,7 +14,7 @@ from contact.methods.newton import Newton
 from contact.methods.options import NewtonOptions, Options
 from contact.methods.report import Outcome, Record
 from contact.nesting import has_coarser, nested_start
-from contact.output.review import review
+from contact.output.remarks import review
 from contact.problem.kkt import KKT, evaluate
 from contact.problem.problem import ContactProblem
 from contact.problem.state import State

@@ -57,7 +57,6 @@ def test_warning_and_review(tmp_path: Path) -> None:
     summary = json.loads((tmp_path / "summary.json").read_text())
     (warning,) = [text for text in summary["warnings"] if "friction falls" in text]
     assert "L_mu = 5000/length" in warning
-    assert any("mu* = 0.6 (a number), L_mu = 5000 (1/length)" in note for note in summary["notes"])
     assert "several solutions may exist" in warning
     assert any("(h1) holds" in note for note in summary["notes"])
     assert summary["max_dev_strain"] > 0.05
@@ -67,4 +66,4 @@ def test_gentle_slip_law_warns_of_nothing() -> None:
     """Where the sliding block has one solution, there is a note and no warning."""
     solution = solve(bar(4, -0.005, 100.0, "solver.method=uzawa"))
     assert solution.warnings == []
-    assert any("Theorem 3.1" in note for note in solution.notes)
+    assert any("a sliding block under" in note for note in solution.notes)

@@ -38,37 +38,9 @@ def test_a_material_of_ones_own_fits_its_constants(shear, warns):
     assert any(words in warning for warning in solution.warnings) == warns
 
 
-def test_each_problem_is_measured_by_its_own_theorem():
-    """Chapters 3, 5 and 6; what cannot conduct asks for nothing electric."""
-    bar = reviewed("bar", "mesh.cells=[16, 4]")
-    assert "mu* = 0.6 (a number), L_mu = 5000 (1/length)" in said(bar.notes, "Theorem 3.1")
-    cells = "mesh.cells=[16, 8]"
-    insulated = said(reviewed("piezo-8-1", cells).notes, "Theorem")
-    assert "Theorem 5.1" in insulated and "L_psi" not in insulated
-    conductive = reviewed("piezo-8-2", cells)
-    largest = np.abs(conductive.nodal[:, -1] * conductive.problem.equilibrium.phi_scale - 32).max()
-    text = said(conductive.notes, "Theorem 5.1")
-    assert f"L_psi L = k_e delta L = {2.5 * largest:.4g}" in text
-    assert "M_psi = k_e = 1 " in text
-    assert "electric.limit is not given" in text
-    limited = said(reviewed("piezo-8-2", cells, "electric.limit=100").notes, "Theorem 5.1")
-    assert "L_psi L = k_e delta L = 250" in limited and "is not given" not in limited
-
-
-def test_a_layer_adds_its_constants():
-    """M_h = 10, L_p = 1, L_h = 10/128, M_p = 0.1 with alpha_nu = 2 over |phi - phi_F| <= 32."""
-    cells = "mesh.cells=[24, 4]"
-    frictional = said(reviewed("compliance-8-4-layer", cells).notes, "Theorem 6.2")
-    m_h, l_h = 10 * (1 + 32 / 128), 10 / 128
-    assert f"(M_h L_p + L_h M_p) = {m_h + 0.1 * l_h:.4g}" in frictional
-    assert "L_mu" not in frictional
-    assert said(reviewed("compliance-8-3", cells).notes, "Theorem 6.1")
-
-
 @pytest.mark.parametrize(
     ("law", "good", "words"),
     [
-        ("shifted", True, "(h~5)(d)"),
         ("ramp", False, "k_e has no effect"),
         ("perfect", False, "(h~5)(e)"),
     ],

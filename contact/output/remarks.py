@@ -1,22 +1,28 @@
-"""What the theory assumes of material, strains, gap and layer, held against a solution."""
+"""Remarks on a solution: assumptions of the theory, and reasons to trust numbers less."""
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Iterator, Sequence
-from typing import TypeAlias
 
 import numpy as np
 from mpi4py import MPI
 
-from contact.output.solution import Solution
+from contact.interface.current import Conductor
+from contact.output import bodies
+from contact.output.deformation import deformation
+from contact.output.fields import DerivedFields
+from contact.output.looseness import adrift, looseness
+from contact.output.solution import Remark, Solution
 from contact.problem.kkt import left_as_pressures, residual_forces
 from contact.problem.problem import ContactProblem
+from contact.tolerances import LAWS_HOLD
 from forms.elasticity import Anisotropic
 from forms.hencky import Hencky
-from forms.monotonicity import MonotonicityReport, check_monotonicity
+from forms.laws import PerfectConductivity, RampConductivity
+from forms.monotonicity import check_monotonicity
 
-#: What there is to say, if anything, and whether it is good news.
-Remark: TypeAlias = tuple[str, bool]
+logger = logging.getLogger("contact.solve")
 
 #: Nodes across a contact zone from which on it is one.
 ACROSS = 5
@@ -37,6 +43,55 @@ SMALL = 0.1
 #: Share of contact forces that may be rounding without a warning.
 KNOWN = 1e-3
 
+#: Share of its bound below which friction lets nothing slip: the penalised one nears it slowly.
+BELOW = 0.9
+
+
+def announce(solution: Solution) -> None:
+    """Review a solution, and log the warnings. Collective."""
+    review(solution)
+    if solution.problem.comm.rank == 0:
+        for warning in solution.warnings:
+            logger.warning(warning)
+
+
+def review(solution: Solution) -> None:
+    """Add what there is to say to the notes and warnings of a solution. Collective."""
+    body, x = solution.problem.equilibrium, solution.state.x
+    extremes = DerivedFields(body, solution.state).extremes()
+    solution.max_dev_strain = max(largest.strain for largest in extremes)
+    solution.max_von_mises = max(largest.von_mises for largest in extremes)
+    if any(largest.yields for largest in extremes):
+        solution.share_beyond_yield = sum(largest.yielded for largest in extremes) / sum(
+            largest.volume for largest in extremes
+        )
+    solution.deformation = deformation(body, x)
+    for text, good in (
+        *monotonicity(solution, [largest.strain for largest in extremes]),
+        small_strain(solution),
+        chords(solution),
+        coarse_curves(solution),
+        fitting(solution.problem),
+        preload(solution),
+        falling(solution),
+        untouched(solution),
+        resolution(solution),
+        rounding(solution),
+        unknown_pressures(solution),
+        beside_loads(solution),
+        sliding(solution),
+        *conductivity(solution),
+        ramp(solution),
+        *bodies.choices(solution),
+        bodies.passing(solution.problem),
+        bodies.regions(solution),
+        looseness(solution),
+        adrift(solution),
+        giving_way(solution),
+    ):
+        if text:
+            (solution.notes if good else solution.warnings).append(text)
+
 
 def monotonicity(solution: Solution, strains: Sequence[float]) -> Iterator[Remark]:
     """Check (h1) on the strains that the solution has in each material."""
@@ -45,65 +100,48 @@ def monotonicity(solution: Solution, strains: Sequence[float]) -> Iterator[Remar
         # (h1) speaks of Hencky laws; a crystal's stiffness is positive definite, or refused.
         law = material.law
         if np.isfinite(strain) and not isinstance(law, Anisotropic):
-            yield _monotonicity(law, material.on, strain, dim)
-            yield _at_rest(law, material.on)
+            yield _monotonicity(law, _place(material.on), strain, dim)
+            yield _at_rest(law, _place(material.on))
 
 
-def _at_rest(law: Hencky, on: Sequence[str]) -> Remark:
+def _place(on: Sequence[str]) -> str:
+    return f" in {', '.join(on)}" if on else ""
+
+
+def _at_rest(law: Hencky, place: str) -> Remark:
     """Compare g(0) of a law with mu_1, which stands for it wherever a size is asked for."""
     modulus, shear = float(law.secant_modulus(np.zeros(1))[0]), float(law.shear)
     if abs(modulus - shear) <= OFF * abs(shear):
         return "", True
-    place = f" in {', '.join(on)}" if on else ""
-    text = (
+    return (
         f"the secant modulus{place} is {modulus:.4g} without strain, and Young's modulus and "
         f"Poisson's ratio say mu_1 = {shear:.4g}: the deviator follows the first, and changes of "
-        "volume those two"
+        "volume those two",
+        False,
     )
-    return text, False
 
 
-def _monotonicity(law: Hencky, on: Sequence[str], strain: float, dim: int) -> Remark:
+def _monotonicity(law: Hencky, place: str, strain: float, dim: int) -> Remark:
+    """Say whether (h1) holds: where g exceeds (d/2) k_0 alone the operator is still monotone."""
     report = check_monotonicity(law, strain, dim=dim)
-    place = f" in {', '.join(on)}" if on else ""
-    constants = (
+    said = [] if report.holds else [f"the theory does not cover the material{place}"]
+    if not report.hardens:
+        said = [f"the material softens{place}, alpha <= 0: there may be several solutions or none"]
+    if report.g_0 <= 0:
+        said.append(f"the material has no stiffness in shear{place}, g_0 <= 0")
+    if report.largest > report.ceiling:
+        least = (6 - 2 * dim) / (12 + 2 * dim)
+        said.append(
+            "g exceeds (d/2) k_0, as for any linear material with a Poisson's ratio below "
+            f"{least:.3g}"
+        )
+    said.append(
         f"assumption (h1) {'holds' if report.holds else 'does not hold'} on the strains of this "
         f"solution, |dev eps| <= {strain:.4g}: g_0 = {report.g_0:.4g} <= g <= "
         f"{report.largest:.4g}, (d/2) k_0 = {report.ceiling:.4g}, alpha = {report.alpha:.4g}, "
         f"beta = {report.beta:.4g}"
     )
-    said = []
-    if not report.hardens:
-        said.append(
-            f"the material softens{place}, alpha <= 0: there may be several solutions or none"
-        )
-    if report.g_0 <= 0:
-        said.append(f"the material has no stiffness in shear{place}, g_0 <= 0")
-    if report.largest > report.ceiling:
-        said.append(_above_ceiling(report, place, dim))
-    if not said:
-        said.append(f"the material is stable{place}")
-    return f"{'; '.join(said)}; {constants}", report.holds
-
-
-def _above_ceiling(report: MonotonicityReport, place: str, dim: int) -> str:
-    """Say what it means that g exceeds (d/2) k_0."""
-    text = (
-        f"the theory does not cover the material{place}: g exceeds (d/2) k_0, as for any linear "
-        f"material with a Poisson's ratio below {_least_poisson(dim):.3g}"
-    )
-    if not report.hardens:
-        return text
-    return (
-        f"{text}, and the proof of Theorem 3.1 is not for it as printed, though with the deviator "
-        "in three dimensions the operator is strongly monotone, with the constant "
-        f"min(3 k_0, 2 alpha) = {min(6 * report.ceiling / dim, 2 * report.alpha):.4g}"
-    )
-
-
-def _least_poisson(dim: int) -> float:
-    """Return nu where mu_1 = (d/2) k_0."""
-    return (6 - 2 * dim) / (12 + 2 * dim)
+    return "; ".join(said), report.holds
 
 
 def small_strain(solution: Solution) -> Remark:
@@ -315,5 +353,148 @@ def beside_loads(solution: Solution) -> Remark:
         f"about as far off: the supports bear {borne:.3g} times as much, beside which it "
         "is nothing; fewer cells along a slender body, linear elements, or a smaller tolerance "
         "where rounding allows it, bring them nearer",
+        False,
+    )
+
+
+def _friction(solution: Solution) -> tuple[float, float] | None:
+    """Return mu* and L_mu; None without friction, or with Tresca's. Collective."""
+    problem, law = solution.problem, solution.problem.interface.friction.law
+    if law is None:
+        return None
+    own = (law.maximum, law.lipschitz) if problem.nodes.nodes.size else (0.0, 0.0)
+    maximum, lipschitz = (problem.comm.allreduce(value, op=MPI.MAX) for value in own)
+    return (maximum, lipschitz) if np.isfinite(maximum) else None
+
+
+def _conductor(solution: Solution) -> Conductor | None:
+    """Return the foundation's electric contact; None where nothing is conducted."""
+    conductor = solution.problem.interface.law.conductor
+    if conductor is None or not solution.problem.piezoelectric or conductor.psi.k_e == 0:
+        return None
+    return conductor
+
+
+def sliding(solution: Solution) -> Remark:
+    """Set L_mu beside the bound that a sliding block gives.
+
+    A block of height H under the pressure p slides by s where G (U - s)/H = mu(s) p; the
+    left-hand side falls faster than the right for all s if L_mu < G/(p H), and only then is s
+    unique for every U. A pressure that is uneven is larger where most of it acts: there it counts
+    with its own weight, and half of G.
+    """
+    problem, friction = solution.problem, _friction(solution)
+    if friction is None or friction[1] == 0:
+        return "", True
+    nodes, pressure = problem.nodes, solution.pressure
+    total = nodes.sum(pressure)
+    mean = nodes.sum(pressure**2) / total if total > 0 else 0.0
+    if mean <= 0:
+        return "", True
+    bound = 0.5 * problem.scales.shear / (mean * problem.scales.height)
+    text = (
+        f"friction falls with the slip by up to L_mu = {friction[1]:.4g}/length of the pressure; a "
+        f"sliding block under the pressure {mean:.4g} has one solution where "
+        f"L_mu < {bound:.4g}/length"
+    )
+    if friction[1] < bound:
+        return text, True
+    return (
+        f"several solutions may exist, and this is one reached from {solution.start}: {text}; a "
+        "mu that falls more slowly (a smaller rho) has fewer of them",
+        False,
+    )
+
+
+def conductivity(solution: Solution) -> Iterator[Remark]:
+    """Say what of (h~5) each conductivity gives up."""
+    laws = {
+        type(contact.conductor.psi)
+        for contact in solution.problem.contacts
+        if contact.conductor is not None and _conductor(solution) is not None
+    }
+    if RampConductivity in laws:
+        yield (
+            'the foundation never conducts, k_e has no effect: electric.law = "ramp" conducts only '
+            'where u_nu > rho, and u_nu <= rho; "shifted" moves the ramp in front of the closing '
+            "gap",
+            False,
+        )
+    if PerfectConductivity in laws:
+        yield (
+            'the current jumps as the gap closes, electric.law = "perfect": (h~5)(e) fails, and no '
+            "theorem says that there is a solution or only one. Where contact ends within the "
+            "part, the place of its edge is not determined: a potential that lifts the body to the "
+            "foundation leaves an interval for it, with a pressure that is singular there, one "
+            'that pushes it off no place; "shifted" with a large delta is continuous and decides',
+            False,
+        )
+
+
+def ramp(solution: Solution) -> Remark:
+    """Set the ramp of psi beside the mesh, and what the current does beside the body's stiffness.
+
+    Of a column of height H with the stiffness C, coupling e and permittivity beta, the potential
+    follows a change of the current by the share Bi/(1 + Bi) of phi - phi_F, Bi = k_e H/beta, and
+    presses with e/H. A gap that opens by less than 1/delta thus opens itself further where
+    delta |phi - phi_F| (e/C) Bi/(1 + Bi) exceeds 1: several solutions may then exist.
+    """
+    problem = solution.problem
+    conductor, piezo = _conductor(solution), problem.body.piezo
+    if conductor is None or piezo is None or not conductor.psi.follows_gap:
+        return "", True
+    scales, psi = problem.scales, conductor.psi
+    width, text = 1 / psi.delta, ""
+    if width < 2 * scales.spacing:
+        text = (
+            f"the mesh decides which contact nodes conduct: psi rises within 1/delta = "
+            f"{width:.3g} of the gap, less than two of their spacings "
+            f"(2 h = {2 * scales.spacing:.3g}); take a finer mesh, or electric.delta below "
+            f"{0.5 / scales.spacing:.3g}"
+        )
+    potential = problem.equilibrium.phi_scale * solution.nodal[:, -1]
+    largest = problem.nodes.maximum(np.abs(conductor.phi_l(potential - conductor.phi_f)))
+    permittivity = float(np.trace(np.asarray(piezo.beta))) / 3
+    biot = psi.k_e * scales.height / permittivity
+    coupling = float(np.abs(np.asarray(piezo.e)).max()) / (scales.bulk + 4 / 3 * scales.shear)
+    number = psi.delta * largest * coupling * biot / (1 + biot)
+    if number >= 1:
+        text += (text and "; ") + (
+            f"several solutions may exist, and this is one reached from {solution.start}: the "
+            f"current changes within 1/delta = {width:.3g} of the gap by so much that it opens or "
+            f"closes gaps by itself (a column asks for a number below 1, and it is {number:.3g}); "
+            "a smaller delta has fewer of them"
+        )
+    return text, False
+
+
+def giving_way(solution: Solution) -> Remark:
+    """Say where penalties move contact nodes by much of the largest displacement. Collective.
+
+    The residuals weigh penetrations and slips by E/length, or more. A flat body is stiffer by far:
+    its displacements are those of the penalties where these are as small as the residuals ask for.
+    Later steps are not looked at: what has slipped before stays.
+    """
+    problem = solution.problem
+    if solution.method != "penalty" or problem.since is not None:
+        return "", True
+    size = np.linalg.norm(solution.friction, axis=1)
+    held = size < BELOW * solution.friction_bound
+    slip = np.linalg.norm(solution.slip[held], axis=1)
+    depth = (solution.normal_displacement - problem.nodes.gap)[solution.pressure > 0]
+    if problem.interface.law.layer is not None:
+        depth = depth[:0]  # it gives way by itself
+    deep, far = (
+        problem.comm.allreduce(float(values.max(initial=0.0)), op=MPI.MAX)
+        for values in (depth, slip)
+    )
+    largest = solution.max_displacement
+    if max(deep, far) <= LAWS_HOLD * largest:
+        return "", True
+    what, key = ("touch penetrate", "contact") if deep > far else ("should stick slip", "slip")
+    return (
+        f"the penalties give way: nodes that {what} by up to {max(deep, far):.2g}, where "
+        f"displacements reach {largest:.2g}; a smaller solver.eps_{key}, or another method, brings "
+        "these nearer to what they are",
         False,
     )
