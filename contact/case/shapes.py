@@ -13,7 +13,7 @@ from contact.case.section import File, Formula, FromTable, Section
 from contact.errors import InputError
 from contact.interface import obstacle
 from contact.interface.obstacle import Shape
-from contact.interface.obstacle.stl import read_stl
+from contact.interface.obstacle.triangles import read_stl
 from contact.settings import Accepted
 from contact.typing import Array
 

@@ -10,12 +10,11 @@ from numpy.typing import NDArray
 
 from contact.body.equilibrium import BodyEquilibrium
 from contact.errors import InputError
-from contact.interface.mortar.coupling import Coupling, couple
-from contact.interface.mortar.integration import NOTHING
+from contact.interface.mortar.coupling import NOTHING, Coupling, couple
 from contact.interface.mortar.surface import Surface, surface_of
 from contact.interface.nodes import ContactNodes, projectors
 from contact.interface.obstacle import Obstacle
-from contact.interface.obstacle.measuring import measured
+from contact.interface.obstacle.protocol import measured
 from contact.interface.placing import check_gap
 from contact.kinds import expect
 from contact.mesh.entities import owned_among

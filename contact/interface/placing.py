@@ -17,7 +17,7 @@ from contact.interface.candidates import Candidates, candidates
 from contact.interface.mortar.lumping import Mixing
 from contact.interface.nodes import ContactNodes, projectors
 from contact.interface.obstacle import Obstacle, Shape
-from contact.interface.obstacle.measuring import measured
+from contact.interface.obstacle.protocol import measured
 from contact.mesh.domain import Domain
 from contact.typing import Array
 

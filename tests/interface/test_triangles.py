@@ -17,7 +17,7 @@ from contact.interface.obstacle import (
     Sphere,
     Triangles,
 )
-from contact.interface.obstacle.stl import read_stl
+from contact.interface.obstacle.triangles import read_stl
 from contact.mesh.domain import from_mesh
 from contact.problem.contact import Contact
 from contact.problem.problem import ContactProblem

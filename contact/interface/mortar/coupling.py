@@ -9,6 +9,9 @@ node j is then
 S being the identity, but for quadratic triangles, where N~ = A N (`basis.positive_change`) and S
 is made of the inverse of A^T. Constants pass: rows of S and of P have the sum 1.
 
+`integrate` finds these integrals on the facets of one rank, `couple` sums them up. Where nodes
+carry no multiplier, their functions are handed over to others.
+
 References
 ----------
 Wohlmuth, SIAM J. Numer. Anal. 38 (2000) 989 (dual basis); Popp, Gitterle, Gee and Wall, Int. J.
@@ -18,18 +21,223 @@ Appl. Mech. Engrg. 200 (2011) 1317 (partly covered facets).
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
 from scipy import sparse
+from scipy.spatial import cKDTree
 
-from contact.interface.mortar.basis import positive_change
-from contact.interface.mortar.integration import LEAST_PIECE, NOTHING, Heirs, Parts, integrate
-from contact.interface.mortar.lumping import coefficients
+from contact.interface.mortar.basis import basis, positive_change
+from contact.interface.mortar.lumping import coefficients, integrals
+from contact.interface.mortar.segments import Points, common_points, facing_pairs
 from contact.interface.mortar.surface import Surface
 from contact.typing import Array
+
+#: Directions that differ less than this from the normals are these.
+FLAT = 1e-12
+
+#: Facets less than this share of which faces the master are left out: rounding.
+LEAST_PIECE = 1e-9
+
+#: Rows, columns and values of a sparse matrix.
+Entries = tuple[NDArray[np.int64], NDArray[np.int64], Array]
+
+#: No nodes.
+NOTHING: NDArray[np.int64] = np.zeros(0, dtype=np.int64)
+
+
+@dataclass(frozen=True)
+class Heirs:
+    """Whose functions act on facets, where some nodes carry no multiplier.
+
+    Attributes
+    ----------
+    nodes
+        Global numbers of the nodes whose multipliers act, shape (f, k).
+    shares
+        Their functions as combinations of the facet's own, shape (f, k, k).
+    """
+
+    nodes: NDArray[np.int64]
+    shares: Array
+
+    @staticmethod
+    def of(slave: Surface, without: NDArray[np.int64], comm: MPI.Intracomm) -> Heirs:
+        """Return who has the functions of some nodes. Collective.
+
+        They go in equal parts to the others of the facet, and all of those of a facet without
+        others to the nearest corner of another facet.
+
+        Parameters
+        ----------
+        slave, comm
+            Facets of this rank, and the communicator.
+        without
+            Global numbers of the nodes.
+        """
+        gone = np.isin(slave.nodes, without)
+        kept = ~gone
+        among = kept / np.maximum(kept.sum(axis=1, keepdims=True), 1)
+        shares = among[:, :, None] * gone[:, None, :] + kept[:, :, None] * np.eye(gone.shape[1])
+        nodes, corners = slave.nodes.copy(), kept[:, : slave.corners.shape[1]]
+        names = np.concatenate(comm.allgather(slave.nodes[:, : corners.shape[1]][corners]))
+        places = np.concatenate(comm.allgather(slave.corners[corners]))
+        alone = np.flatnonzero(gone.all(axis=1))
+        if alone.size and names.size:
+            nodes[alone, 0] = names[cKDTree(places).query(slave.centres[alone])[1]]
+            shares[alone, 0] = 1.0
+        return Heirs(nodes, shares)
+
+
+@dataclass(frozen=True)
+class Parts:
+    """What the facets of a rank add, by facet and function.
+
+    Attributes
+    ----------
+    nodes
+        Global numbers of the facets' nodes, shape (f, k).
+    heirs
+        Those of the nodes whose functions Phi these are, shape (f, k).
+    own
+        int Phi_i N~_j over what faces the master, shape (f, k, k).
+    whole
+        int Phi_i over all of the facet, shape (f, k).
+    normal
+        int Phi_i times the direction, shape (f, k, d).
+    gap
+        int Phi_i times the vector across, everywhere and where the sides do not cut each other,
+        shape (f, k, 2, d).
+    rows, columns, values
+        int Phi_i (N_l o Pi): numbers of the heir and of the master's node, shape (e,).
+    """
+
+    nodes: NDArray[np.int64]
+    heirs: NDArray[np.int64]
+    own: Array
+    whole: Array
+    normal: Array
+    gap: Array
+    rows: NDArray[np.int64]
+    columns: NDArray[np.int64]
+    values: Array
+
+    def gathered(self, comm: MPI.Intracomm) -> Parts:
+        """Return those of all ranks. Collective."""
+        arrays = (np.concatenate(comm.allgather(array)) for array in vars(self).values())
+        return Parts(*arrays)
+
+
+def integrate(slave: Surface, master: Surface, reach: float, heirs: Heirs) -> Parts:
+    """Integrate the dual functions of slave facets, alone and with what they face.
+
+    Parameters
+    ----------
+    slave, master
+        Slave facets of this rank, and all master facets.
+    reach
+        Largest distance at which facets face each other (length).
+    heirs
+        Whose functions act on the slave facets.
+    """
+    direction, found = _facing(slave, master, reach)
+    change = positive_change(slave.corners.shape[1], slave.degree)
+    dual, weight = _dual(slave, found, change)
+    dual, own = heirs.shares @ dual, heirs.shares * weight[:, None, :]
+    gap = np.zeros((*weight.shape, 2))
+    entries: list[Entries] = [(NOTHING, NOTHING, np.zeros(0))]
+    for points in found:
+        phi = np.einsum("pij,pj->pi", dual[points.slave], _functions(points, slave, change))
+        phi *= points.weight[:, None]
+        across = np.column_stack([points.gap, np.maximum(points.gap, 0.0)])
+        _add(gap, points.slave, phi[:, :, None] * across[:, None, :])
+        entries.append(_master_entries(points, phi, heirs.nodes, master))
+    return Parts(
+        slave.nodes,
+        heirs.nodes,
+        own,
+        np.einsum("fij,fj->fi", heirs.shares, integrals(slave)),
+        own.sum(axis=2)[:, :, None] * direction[:, None, :],
+        gap[:, :, :, None] * direction[:, None, None, :],
+        *(np.concatenate(part) for part in zip(*entries, strict=True)),
+    )
+
+
+def _facing(slave: Surface, master: Surface, reach: float) -> tuple[Array, list[Points]]:
+    """Return the directions along which facets look, (f, d), and the points where they meet."""
+    degree = 2 if slave.degree == master.degree == 1 and not slave.revolved else 4
+    pairs = list(facing_pairs(slave, master, reach))
+    direction = slave.normal
+    found = [common_points(slave, master, pair, direction, degree) for pair in pairs]
+    middle = _middle(slave, master, found)
+    if np.abs(middle - direction).max(initial=0.0) > FLAT:
+        direction = middle
+        found = [common_points(slave, master, pair, direction, degree) for pair in pairs]
+    return direction, found
+
+
+def _functions(points: Points, slave: Surface, change: Array) -> Array:
+    """Return the functions N~ of the slave facets at points, shape (p, k)."""
+    return basis(points.on_slave, slave.degree) @ change.T
+
+
+def _dual(slave: Surface, found: Sequence[Points], change: Array) -> tuple[Array, Array]:
+    """Return C of the dual functions Phi = C N~, (f, k, k), and int N~ over what faces, (f, k)."""
+    k = change.shape[0]
+    mass, weight = np.zeros((slave.count, k, k)), np.zeros((slave.count, k))
+    for points in found:
+        n = _functions(points, slave, change)
+        _add(mass, points.slave, points.weight[:, None, None] * n[:, :, None] * n[:, None, :])
+        _add(weight, points.slave, points.weight[:, None] * n)
+    faces = weight.sum(axis=1) > LEAST_PIECE * integrals(slave).sum(axis=1)
+    dual = np.zeros_like(mass)
+    dual[faces] = weight[faces, :, None] * np.linalg.inv(mass[faces])
+    return dual, np.where(faces[:, None], weight, 0.0)
+
+
+def _middle(slave: Surface, master: Surface, found: Sequence[Points]) -> Array:
+    """Return directions between the normals of slave facets and of what they face, shape (f, d).
+
+    Along them two curved sides see each other alike, whichever of them is the slave: the normals
+    of one alone would turn some of the closing of the gap into slip.
+    """
+    total = np.zeros_like(slave.normal)
+    for points in found:
+        _add(total, points.slave, points.weight[:, None] * master.normal[points.master])
+    length = np.linalg.norm(total, axis=1)
+    mean = total / np.where(length > 0, length, 1.0)[:, None]
+    direction = slave.normal - mean
+    return np.asarray(direction / np.linalg.norm(direction, axis=1)[:, None])
+
+
+def _add(total: Array, index: NDArray[np.intp], values: Array) -> None:
+    """Add values to rows of an array; several values may go to one row."""
+    count, columns = total.shape[0], int(np.prod(total.shape[1:]))
+    matrix = sparse.csr_array(
+        (np.ones(index.size), (index, np.arange(index.size))), shape=(count, index.size)
+    )
+    total += (matrix @ values.reshape(index.size, columns)).reshape(total.shape)
+
+
+def _master_entries(
+    points: Points, phi: Array, heirs: NDArray[np.int64], master: Surface
+) -> Entries:
+    """Return int Phi_j N_l as global row, global column, value."""
+    n = basis(points.on_master, master.degree)
+    new = np.ones(points.slave.size, dtype=bool)
+    new[1:] = (np.diff(points.slave) != 0) | (np.diff(points.master) != 0)
+    first = np.flatnonzero(new)
+    if first.size == 0:
+        return NOTHING, NOTHING, np.zeros(0)
+    values = np.add.reduceat(phi[:, :, None] * n[:, None, :], first, axis=0)
+    rows = heirs[points.slave[first]][:, :, None]
+    columns = master.nodes[points.master[first]][:, None, :]
+    rows, columns = np.broadcast_arrays(rows, columns)
+    return rows.ravel(), columns.ravel(), values.ravel()
+
 
 #: Nodes less than this share of whose function faces the master carry no multiplier.
 LEAST_COVERED = 1e-3

@@ -1,4 +1,4 @@
-"""What an obstacle is to the contact nodes, and what the shapes share."""
+"""What an obstacle is to the contact nodes, what shapes share, and a gap that is given."""
 
 from __future__ import annotations
 
@@ -8,7 +8,11 @@ from dataclasses import dataclass
 from typing import Annotated, ClassVar, Protocol
 
 import numpy as np
+from mpi4py import MPI
 
+from contact.body.fields import Given, field
+from contact.calling import naming, on_all_ranks, real
+from contact.errors import InputError
 from contact.kinds import expect
 from contact.settings import Internal
 from contact.typing import Array
@@ -232,3 +236,63 @@ def split(points: Array, origin: tuple[float, ...], axis: tuple[float, ...]) -> 
     radius = np.linalg.norm(across, axis=1)
     away = across / np.where(radius > 0, radius, 1.0)[:, None]
     return unit, along, radius, away
+
+
+@dataclass(frozen=True)
+class GapFunction:
+    """A gap given along the body's own normal.
+
+    Parameters
+    ----------
+    gap
+        Function of points of shape (n, d) that returns the gap, shape (n,) (length).
+        `GapFunction.of` takes numbers, functions of x, UFL and dolfinx Functions.
+    """
+
+    gap: Callable[[Array], Array]
+
+    @staticmethod
+    def of(value: Given) -> GapFunction:
+        """Return the gap that is given as `contact.body.fields.field` takes it."""
+        return GapFunction(field(value).numpy)
+
+    direction = "body"
+    is_shape = False
+
+    def chord_depth(self, length: float, points: Array) -> float:
+        """Return 0: given gaps are not those of a shape."""
+        return 0.0
+
+    def measure(self, points: Array, body_normal: Array) -> tuple[Array, Array]:
+        """Return the body's normals and the gap at the points."""
+        return body_normal, np.broadcast_to(self.gap(points), points.shape[:1]).astype(float)
+
+
+def measured(
+    obstacle: Obstacle, points: Array, normal: Array, comm: MPI.Intracomm, key: str
+) -> tuple[Array, Array]:
+    """Return the contact directions, (n, d), and gaps, (n,), at points of a body. Collective.
+
+    Parameters
+    ----------
+    obstacle, points, normal
+        As in `Obstacle.measure`.
+    comm, key
+        Who asks together, and what messages call the contact.
+
+    Raises
+    ------
+    InputError
+        On all ranks, if the obstacle is none in this space, or a function of it fails on one.
+    """
+    what = f"{key}.{'foundation' if obstacle.is_shape else 'gap'}"
+    if isinstance(obstacle, Shape):
+        try:
+            obstacle.check(points.shape[1])
+        except InputError as error:
+            raise InputError(f"{what}: {error}") from None
+    with on_all_ranks(comm), naming(what):
+        direction, gap = obstacle.measure(points, normal)
+        # What is no number is refused by those who know whether it is needed.
+        accepted = "a direction and a gap for each of the points"
+        return real(direction, points.shape, accepted), real(gap, points.shape[:1], accepted)

@@ -1,21 +1,119 @@
-"""Where two facets face each other: quadrature points on the pieces that they have in common.
+"""Segments of the mortar integration: pairs of facets, what they have in common, its quadrature.
 
 A master facet is projected onto the line or plane of a slave facet, along a direction that each
-slave facet has. What both have in common is a segment or a convex polygon, on which all integrands
-are polynomials: the rules are exact there.
+slave facet has. Both have in common a segment or a convex polygon, on which all integrands are
+polynomials: the rules are exact there.
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial import cKDTree
 
 from contact.interface.mortar.basis import rule, size_of
-from contact.interface.mortar.clipping import clipped
 from contact.interface.mortar.surface import Surface
 from contact.typing import Array
+
+#: Pairs that are looked at together: bounds the memory.
+CHUNK = 500_000
+
+#: Least cosine between a normal and the opposite of the other.
+FACING = 0.1
+
+#: How much farther than the nearest facet the one along the normal may be.
+DETOUR = 2.0
+
+
+def facing_pairs(
+    slave: Surface, master: Surface, reach: float
+) -> Iterator[tuple[NDArray[np.intp], NDArray[np.intp]]]:
+    """Yield pairs of a slave and a master facet whose shadows along the slave's normal may meet.
+
+    Parameters
+    ----------
+    slave, master
+        The two sides.
+    reach
+        Slave facets that are farther than this from all of the other side face none (length).
+    """
+    if slave.count == 0 or master.count == 0:
+        return
+    tree, radii = cKDTree(master.centres), master.radii
+    widest = radii.max()
+    centres, own = slave.centres, slave.radii
+    distance = tree.query(centres)[0]
+    near = np.flatnonzero(distance <= reach + widest + own)
+    radius = (own + widest + DETOUR * distance)[near]
+    counts = tree.query_ball_point(centres[near], radius, return_length=True)
+    ends = np.cumsum(counts) // CHUNK
+    for chosen in np.split(np.arange(near.size), np.flatnonzero(np.diff(ends)) + 1):
+        found = tree.query_ball_point(centres[near[chosen]], radius[chosen], return_sorted=True)
+        i = np.repeat(near[chosen], [len(f) for f in found])
+        j = np.array([m for f in found for m in f], dtype=np.intp)
+        offset = master.centres[j] - centres[i]
+        height = np.einsum("pd,pd->p", offset, slave.normal[i])
+        aside = np.sqrt(np.maximum(np.einsum("pd,pd->p", offset, offset) - height**2, 0.0))
+        opposite = -np.einsum("pd,pd->p", slave.normal[i], master.normal[j])
+        keep = (aside <= own[i] + radii[j]) & (opposite > FACING) & (np.abs(height) <= reach)
+        yield i[keep], j[keep]
+
+
+#: Corners of what two triangles can have in common.
+MOST = 6
+
+
+def clipped(triangles: Array) -> tuple[Array, NDArray[np.intp]]:
+    """Clip triangles by the reference triangle, on which all barycentric coordinates are >= 0.
+
+    Parameters
+    ----------
+    triangles
+        Barycentric coordinates of the corners of each, shape (n, 3, 3).
+
+    Returns
+    -------
+    polygons
+        Corners in their order, shape (n, 6, 3); those beyond the number of corners are 0.
+    count
+        Number of corners, 0 where nothing is common, shape (n,).
+    """
+    n = triangles.shape[0]
+    polygon: Array = np.zeros((n, MOST, 3))
+    polygon[:, :3] = triangles
+    count: NDArray[np.intp] = np.full(n, 3, dtype=np.intp)
+    for side in range(3):
+        polygon, count = _cut(polygon, count, side)
+    return polygon, count
+
+
+def _cut(polygon: Array, count: NDArray[np.intp], side: int) -> tuple[Array, NDArray[np.intp]]:
+    """Keep what of each polygon has a coordinate >= 0."""
+    n, most, _ = polygon.shape
+    present = np.arange(most)[None, :] < count[:, None]
+    following = np.where(
+        np.arange(1, most + 1)[None, :] < count[:, None], np.arange(1, most + 1), 0
+    )
+    after = np.take_along_axis(polygon, following[:, :, None], axis=1)
+    here, there = polygon[:, :, side], after[:, :, side]
+    inside = (here >= 0) & present
+    crosses = ((here >= 0) != (there >= 0)) & present
+    slope = np.where(crosses, here - there, 1.0)
+    crossing = polygon + (here / slope)[:, :, None] * (after - polygon)
+    # On the side itself, whatever rounding says.
+    crossing[:, :, side] = 0.0
+    # Of each edge its beginning where that is inside, then the crossing.
+    emitted = np.stack([inside, crosses], axis=2).reshape(n, 2 * most)
+    corners = np.stack([polygon, crossing], axis=2).reshape(n, 2 * most, 3)
+    order = np.argsort(~emitted, axis=1, kind="stable")[:, :most]
+    kept = np.take_along_axis(corners, order[:, :, None], axis=1)
+    left = emitted.sum(axis=1)
+    kept[np.arange(most)[None, :] >= left[:, None]] = 0.0
+    return kept, left
+
 
 #: Pieces smaller than this share of the slave facet are rounding.
 SMALLEST = 1e-12
