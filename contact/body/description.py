@@ -10,8 +10,7 @@ from typing import Protocol
 import numpy as np
 from ufl.core.expr import Expr
 
-from contact.body.amplitude import Amplitude, Moving, amplitude_of, own_amplitude
-from contact.body.fields import Given, field, vector
+from contact.body.fields import Amplitude, Given, Moving, amplitude_of, field, own_amplitude, vector
 from contact.body.rigid import Electrode, Rigid
 from contact.errors import InputError
 from contact.kinds import expect, is_law, names_arguments, several

@@ -23,14 +23,13 @@ from petsc4py import PETSc
 from ufl.core.expr import Expr
 
 from contact.body.description import Body
-from contact.body.internal import InternalForces
 from contact.body.loads import Loads
 from contact.body.masters import make_masters
 from contact.body.materials import cells_of
 from contact.body.pointwise import Pointwise
 from contact.body.shares import shares_of
 from contact.body.supports import free_components, supports_of, without_field
-from contact.body.weak_forms import WeakForms
+from contact.body.weak_forms import InternalForces, WeakForms
 from contact.errors import InputError
 from contact.history import BodyState, Evaluated, InternalVariables
 from contact.linear.constraint import (

@@ -16,8 +16,8 @@ from dolfinx import fem
 from numpy.typing import ArrayLike
 from ufl.core.expr import Expr
 
-from contact.body.constants import law_with_constants
 from contact.body.description import Material
+from contact.body.materials import law_with_constants
 from contact.body.pointwise import Pointwise
 from contact.errors import InputError
 from contact.history import QUADRATURE_POINTS, Evaluated, InternalVariables

@@ -21,8 +21,7 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from contact.body.description import Body
-from contact.body.motions import rigid_motions
-from contact.body.rigid import Electrode, Rigid
+from contact.body.rigid import Electrode, Rigid, rigid_motions
 from contact.errors import InputError
 from contact.mesh.domain import Domain
 from contact.typing import Array

@@ -3,21 +3,25 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import fields, is_dataclass, replace
 from typing import TypeAlias
 
 import numpy as np
+from dolfinx import fem
+from dolfinx.mesh import Mesh
 from mpi4py import MPI
 
-from contact.body.constants import law_with_constants, piezo_with_constants
 from contact.body.description import Material
+from contact.body.fields import constant
 from contact.errors import InputError
 from contact.mesh.domain import Domain, Indices, Measure
 from contact.mesh.entities import cells_at
+from forms.elasticity import Anisotropic
 from forms.hencky import Law
 from forms.piezo import Piezo
 
 #: A material with form constants for its numbers, and the measure of its cells.
-Piece: TypeAlias = tuple[Law, Piezo | None, Measure]
+MaterialMeasure: TypeAlias = tuple[Law, Piezo | None, Measure]
 
 
 def cells_of(domain: Domain, materials: Sequence[Material]) -> list[Indices]:
@@ -94,9 +98,9 @@ def _count(domain: Domain) -> int:
     return int(domain.mesh.topology.index_map(domain.dim).size_local)
 
 
-def pieces(
+def material_measures(
     domain: Domain, materials: Sequence[Material], cells: Sequence[Indices], degree: int
-) -> Iterator[Piece]:
+) -> Iterator[MaterialMeasure]:
     """Yield each material with the measure of its cells.
 
     Parameters
@@ -114,3 +118,25 @@ def pieces(
         piezo = material.piezo
         constants = None if piezo is None else piezo_with_constants(piezo, domain.mesh)
         yield law, constants, dx(metadata=metadata)
+
+
+def law_with_constants(law: Law, mesh: Mesh) -> Law:
+    """Return a law with form constants for its numbers."""
+    if isinstance(law, Anisotropic):
+        return Anisotropic(fem.Constant(mesh, np.asarray(law.stiffness, dtype=float)))
+    if not is_dataclass(law) or getattr(law, "g_min", 0.0) > 0:
+        return law
+    numbers = {
+        f.name: constant(mesh, getattr(law, f.name))
+        for f in fields(law)
+        if f.name != "g_min" and isinstance(getattr(law, f.name), int | float)
+    }
+    return replace(law, **numbers)
+
+
+def piezo_with_constants(piezo: Piezo, mesh: Mesh) -> Piezo:
+    """Return piezoelectric tensors as form constants."""
+    return Piezo(
+        fem.Constant(mesh, np.asarray(piezo.e, dtype=float)),
+        fem.Constant(mesh, np.asarray(piezo.beta, dtype=float)),
+    )

@@ -12,9 +12,9 @@ from dolfinx.fem.petsc import assemble_matrix
 from mpi4py import MPI
 from ufl.core.expr import Expr
 
-from contact.body.constants import constant
 from contact.body.equilibrium import BodyEquilibrium
-from contact.body.materials import pieces
+from contact.body.fields import constant
+from contact.body.materials import material_measures
 from contact.mesh.domain import Domain, Measure
 from contact.typing import Array
 from forms.hencky import secant_form
@@ -86,7 +86,9 @@ def errors(
         e = u
     else:
         e = u - other(ufl.SpatialCoordinate(body.domain.mesh))
-    materials = list(pieces(body.domain, body.body.materials, body.cells, 2 * body.degree + 4))
+    materials = list(
+        material_measures(body.domain, body.body.materials, body.cells, 2 * body.degree + 4)
+    )
     kinematics = body.domain.kinematics
     gradient = kinematics.gradient(e)
     squares = (

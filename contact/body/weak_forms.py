@@ -1,20 +1,32 @@
-"""The weak forms of the stresses in one body, each compiled when it is first asked for."""
+"""The weak forms of the stresses in one body, and their nodal forces: assembled, or by a matrix.
+
+The matrix of a linear body costs as much as a dozen assemblies of forces, which load steps need
+and static problems mostly do not.
+"""
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Sequence
 from functools import cached_property
 from typing import Any
 
+import numpy as np
 import ufl
 from dolfinx import fem
+from dolfinx.fem.petsc import assemble_matrix, create_matrix
+from mpi4py import MPI
+from petsc4py import PETSc
 from ufl.core.expr import Expr
 
 from contact.body.description import Body
 from contact.body.internal_variables import QuadratureVariables
-from contact.body.materials import pieces
+from contact.body.loads import assembled
+from contact.body.materials import material_measures
+from contact.history import InternalVariables
 from contact.mesh.domain import Domain
 from contact.mesh.entities import Indices
+from contact.typing import Array
 from forms.hencky import secant_form
 from forms.piezo import symmetrised_form
 
@@ -57,7 +69,7 @@ class WeakForms:
         self.variables = QuadratureVariables(domain, body.materials, cells, exact)
         self._materials = [
             (self.variables.law(law), piezo, dx)
-            for law, piezo, dx in pieces(domain, body.materials, cells, exact)
+            for law, piezo, dx in material_measures(domain, body.materials, cells, exact)
         ]
 
     def split(self, x: Any) -> tuple[Expr, Expr | None]:
@@ -101,3 +113,75 @@ class WeakForms:
             return self.secant
         law = self._internal(self.at, self.at)
         return fem.form(ufl.derivative(law, self.at, self._trial))
+
+
+class InternalForces:
+    """The forces of the stresses at given unknowns, supports and contact apart.
+
+    The last answers are kept, for those who ask for the same forces do not know of each other.
+
+    Parameters
+    ----------
+    comm
+        Ranks that ask together.
+    forms
+        The weak forms of the body.
+    owned
+        Number of unknowns of the nodes that this rank owns.
+    """
+
+    def __init__(self, comm: MPI.Intracomm, forms: WeakForms, owned: int) -> None:
+        self._comm, self._forms, self._owned = comm, forms, owned
+        # At a state, of its potential alone, and moved to see the effect of rounding.
+        self._known: deque[tuple[tuple[Array, ...], Array]] = deque(maxlen=3)
+        self._matrix: PETSc.Mat | None = None
+
+    def __call__(
+        self, at: Array, secant_at: Array | None, variables: InternalVariables | None
+    ) -> Array:
+        """Return the owned forces at local unknowns of the nodes, shape (owned,). Collective.
+
+        Parameters
+        ----------
+        at
+            The unknowns.
+        secant_at
+            Where the secant modulus is taken; None for there too: the material law itself.
+        variables
+            The internal variables at the beginning of the step.
+        """
+        asked: tuple[Array, ...] = (at,) if secant_at is None else (at, secant_at)
+        asked += () if variables is None else tuple(variables.arrays.values())
+        same = np.array([_equal(asked, before) for before, _ in self._known], dtype=bool)
+        self._comm.Allreduce(MPI.IN_PLACE, same, op=MPI.LAND)
+        if same.any():
+            return self._known[int(np.argmax(same))][1].copy()
+        found = self._found(at, secant_at, variables)
+        self._known.append((tuple(array.copy() for array in asked), found))
+        return found.copy()
+
+    def assemble(self) -> None:
+        """Keep the matrix of a linear body, by which forces are found from now on. Collective."""
+        if self._matrix is None:
+            self._matrix = create_matrix(self._forms.secant)
+            assemble_matrix(self._matrix, self._forms.secant)
+            self._matrix.assemble()
+
+    def _found(
+        self, at: Array, secant_at: Array | None, variables: InternalVariables | None
+    ) -> Array:
+        if self._matrix is not None:
+            vector, image = self._matrix.createVecs()
+            vector.array[:] = at[: self._owned]
+            self._matrix.mult(vector, image)
+            return np.asarray(image.array)
+        self._forms.variables.set(variables)
+        self._forms.at.x.array[:] = at
+        if secant_at is None:
+            return assembled(self._forms.law_forces, self._owned)
+        self._forms.secant_at.x.array[:] = secant_at
+        return assembled(self._forms.secant_forces, self._owned)
+
+
+def _equal(one: tuple[Array, ...], other: tuple[Array, ...]) -> bool:
+    return len(one) == len(other) and all(map(np.array_equal, one, other))

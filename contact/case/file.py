@@ -16,7 +16,7 @@ from typing import Annotated, Any, Self, TypeAlias, TypeVar
 from pydantic import Field, PrivateAttr, Tag, ValidationError, model_validator
 from pydantic_core import PydanticCustomError
 
-from contact.body.amplitude import Amplitude, steady
+from contact.body.fields import Amplitude, steady
 from contact.case.body import Fixed, Load, Space
 from contact.case.checks import check_mesh, check_sections
 from contact.case.evolution import Evolution

@@ -10,7 +10,7 @@ import numpy as np
 from mpi4py import MPI
 from pydantic import Field, Tag, model_validator
 
-from contact.body.amplitude import steady
+from contact.body.fields import steady
 from contact.body.norms import volume
 from contact.case.formula import Expression, NodalField, as_field, as_number
 from contact.case.messages import Words, fault

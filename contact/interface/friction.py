@@ -7,8 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from mpi4py import MPI
 
-from contact.body.amplitude import values_at
-from contact.body.fields import Given, field
+from contact.body.fields import Given, field, values_at
 from contact.calling import check_finite, naming, on_all_ranks, real
 from contact.errors import InputError
 from contact.interface.history import SlipHistory

@@ -18,7 +18,7 @@ from dolfinx.la import InsertMode
 from mpi4py import MPI
 
 from contact._compat import collapse
-from contact.body.constants import constant
+from contact.body.fields import constant
 from contact.body.loads import expression
 from contact.errors import InputError
 from contact.mesh.together import members

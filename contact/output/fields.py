@@ -18,9 +18,9 @@ from numpy.typing import NDArray
 from ufl.core.expr import Expr
 
 from contact import _compat
-from contact.body.constants import law_with_constants, piezo_with_constants
 from contact.body.description import Material
 from contact.body.equilibrium import BodyEquilibrium
+from contact.body.materials import law_with_constants, piezo_with_constants
 from contact.history import Evaluated
 from contact.output.quantities import BODY, values_of
 from contact.typing import Array

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from mpi4py import MPI
 
-from contact.body.amplitude import Moving, steady
+from contact.body.fields import Moving, steady
 from contact.history import BodyState
 from contact.methods.steps import LoadStep
 from contact.output.quantities import STEPS, values_of

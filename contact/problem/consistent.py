@@ -13,8 +13,8 @@ from dolfinx import fem
 from mpi4py import MPI
 from numpy.typing import NDArray
 
-from contact.body.amplitude import values_at
 from contact.body.description import Fixed
+from contact.body.fields import values_at
 from contact.body.loads import to_blame
 from contact.errors import InputError
 from contact.kinds import check_range

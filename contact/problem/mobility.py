@@ -11,8 +11,7 @@ import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
 
-from contact.body.motions import rigid_motions
-from contact.body.rigid import Rigid
+from contact.body.rigid import Rigid, rigid_motions
 from contact.problem.problem import ContactProblem
 from contact.typing import Array
 

@@ -32,7 +32,7 @@ PHASES = {
     "contact in multigrid": ("linear/stiff_nodes.py", "follow"),
     "iterations, solves": ("~", "<method 'solve' of 'petsc4py.PETSc.KSP' objects>"),
     "solves with the factors": ("~", "<method 'solve' of 'petsc4py.PETSc.Mat' objects>"),
-    "residual forces": ("body/internal.py", "_found"),
+    "residual forces": ("body/weak_forms.py", "_found"),
     "contact laws": ("interface/complementarity.py", "linearise"),
     "dense solves at contact nodes": ("methods/newton.py", "_solve_condensed"),
     "transfer from mesh to mesh": ("nesting.py", "prolong"),

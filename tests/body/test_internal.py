@@ -5,7 +5,7 @@ import pytest
 from mpi4py import MPI
 
 from contact import build_problem
-from contact.body import internal
+from contact.body import weak_forms
 from contact.history import BodyState
 from forms.hencky import Linear
 from tests.problems.mechanics import bar
@@ -31,8 +31,8 @@ def test_the_matrix_gives_the_forces_that_are_assembled(name, monkeypatch):
     random = np.random.default_rng(4)
     rows = [body.prescribe(random.standard_normal(body.rest().size)) for _ in range(5)]
     made = []
-    create = internal.create_matrix
-    monkeypatch.setattr(internal, "create_matrix", lambda form: made.append(1) or create(form))
+    create = weak_forms.create_matrix
+    monkeypatch.setattr(weak_forms, "create_matrix", lambda form: made.append(1) or create(form))
     assembled = [body.internal_forces(BodyState(x)) for x in rows]
     assert not made
     for _ in range(2):
@@ -48,7 +48,7 @@ def test_a_body_that_yields_has_no_matrix_of_its_own(monkeypatch):
     def refused(form):
         raise AssertionError
 
-    monkeypatch.setattr(internal, "create_matrix", refused)
+    monkeypatch.setattr(weak_forms, "create_matrix", refused)
     body = bar(SELF, 4, law=hencky()).equilibrium
     body.expect_many()
     body.internal_forces(BodyState(body.rest() + 1.0))
