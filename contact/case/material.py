@@ -66,9 +66,11 @@ def _either_way(section: Section, short: tuple[str, ...], full: tuple[str, ...])
     if set(given) in ({*short}, {*full}):
         return
     missing = [k for k in (full if {*given} & {*full} else short) if k not in given]
-    words = f"only {', '.join(given) or 'nothing'}" if missing else "both ways"
-    key = missing[0] if missing else given[-1]
-    raise fault(key, Words(words), f"either all of {', '.join(short)}, or {' and '.join(full)}")
+    raise fault(
+        missing[0] if missing else given[-1],
+        Words(f"only {', '.join(given) or 'nothing'}" if missing else "both ways"),
+        f"either all of {', '.join(short)}, or {' and '.join(full)}",
+    )
 
 
 class Piezo(Section):

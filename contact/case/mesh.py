@@ -243,18 +243,19 @@ class Mesh(Section):
         total = cells * 2 ** (dim * self.refine)
         least = comm.allreduce(memory(), op=MPI.MIN)
         needed = total * CELL_MEMORY / comm.size
-        before = f"mesh.refine: {self.refine} refinements of {cells:.3g} cells, "
-        number = f"{before if self.refine else 'mesh: '}{total:.3g} cells"
+        refined = f"mesh.refine: {self.refine} refinements of {cells:.3g} cells, "
+        place = refined if self.refine else "mesh: "
         if needed > least:
             raise InputError(
-                f"{number} take more memory, {needed / 1e9:.3g} GB a rank, than there is, "
-                f"{least / 1e9:.3g} GB; accepted: fewer cells (mesh.cells, mesh.refine), or more "
-                "ranks on more machines"
+                f"{place}{total:.3g} cells take more memory, {needed / 1e9:.3g} GB a rank, than "
+                f"there is, {least / 1e9:.3g} GB; accepted: fewer cells (mesh.cells, mesh.refine), "
+                "or more ranks on more machines"
             )
         if total > MANY and comm.rank == 0:
+            gigabytes, seconds = needed / 1e9, total * CELL_SECONDS / comm.size
             logger.warning(
-                f"{number}: their mesh alone takes some {needed / 1e9:.2g} GB a rank and "
-                f"{total * CELL_SECONDS / comm.size:.2g} s"
+                f"{place}{total:.3g} cells: their mesh alone takes some {gigabytes:.2g} GB a rank "
+                f"and {seconds:.2g} s"
             )
 
 
