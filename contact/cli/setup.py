@@ -42,16 +42,14 @@ def draw_setup(case: Case, problem: ContactProblem) -> Figure | None:
     for other in (0, domain.dim):
         domain.mesh.topology.create_connectivity(domain.dim - 1, other)
     roles = list(_roles(case, problem))
-    # Of a body in space its boundary is seen.
-    seen = (2, _owned(domain)) if domain.dim == 2 else (2, exterior_facets(domain.mesh))
-    simplices = _corners(domain, *seen)
-    surface = _foundation(problem)
-    if domain.comm.rank > 0 or simplices is None or any(role is None for role in roles):
+    boundary = _corners(domain, domain.dim - 1, exterior_facets(domain.mesh))
+    cells, surface = _corners(domain, domain.dim, _owned(domain)), _foundation(problem)
+    if boundary is None or cells is None:
         return None
     given = [role for role in roles if role is not None]
     with matplotlib.rc_context(STYLE):
         draw = draw_plane if domain.dim == 2 else draw_space
-        figure = draw(simplices, given, surface, case.case.units, axes_of(domain.revolved))
+        figure = draw(boundary, cells, given, surface, case.case.units, axes_of(domain.revolved))
         figure.suptitle(heading(case.title), fontsize="medium")
     return figure
 

@@ -1,4 +1,4 @@
-"""The drawing of a set-up: what is given on the parts of a body, and what it may touch."""
+"""The set-up of a case: parts of the boundary with their data, foundations, dimensions."""
 
 from __future__ import annotations
 
@@ -10,32 +10,33 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
-from mpl_toolkits.mplot3d.art3d import Poly3DCollection  # type: ignore[import-untyped]
 from numpy.typing import NDArray
 
+from contact.output.figures.body import rendered
+from contact.output.figures.style import BLUE, GREEN, ORANGE, SKY
 from contact.output.units import Units
 from contact.typing import Array
 
-#: Okabe and Ito's palette, as in the other figures.
-HELD, ELECTRODE, LOADED, TOUCHED, FOUNDATION = "#000000", "#009E73", "#D55E00", "#0072B2", "#56B4E9"
+#: Colours of supports, electrodes, loads, contact parts and foundations.
+HELD, ELECTRODE, LOADED, TOUCHED, FOUNDATION = "#000000", GREEN, ORANGE, BLUE, SKY
 
 #: Cells up to which the mesh is drawn.
 MOST_CELLS = 20_000
 
-#: Arrows of a load on one part.
-ARROWS = 12
+#: Arrows of a load on one part, and strokes along a support.
+ARROWS, STROKES = 12, 40
 
 
 @dataclass(frozen=True)
 class Role:
-    """A part of the boundary and what is given there.
+    """A part of the boundary and its data.
 
     Attributes
     ----------
     facets
         Its facets by their corners, shape (n, d, d).
     colour, words
-        How it is drawn, and what the legend says.
+        How it is drawn, and its entry in the legend.
     hatched
         Whether it is held.
     force
@@ -50,30 +51,31 @@ class Role:
 
 
 def draw_plane(
-    cells: Array, roles: Sequence[Role], surface: Array, units: Units, axes: str
+    boundary: Array, cells: Array, roles: Sequence[Role], surface: Array, units: Units, axes: str
 ) -> Figure:
-    """Draw a plane body: mesh, what is given on its parts, foundation and dimensions.
+    """Draw a plane body: mesh, data of its parts, foundation and dimensions.
 
     Parameters
     ----------
-    cells
-        Corners of the cells, shape (n, 3, 2).
+    boundary, cells
+        Corners of the edges on the boundary and of the cells, shapes (m, 2, 2) and (n, 3, 2).
     roles
-        What is given, and where.
+        The parts with their data.
     surface
         Points of rigid foundations, shape (m, 2).
     units, axes
         Names of the units and of the coordinates.
     """
-    low, high = cells.min(axis=(0, 1)), cells.max(axis=(0, 1))
+    low, high = boundary.min(axis=(0, 1)), boundary.max(axis=(0, 1))
     extent = high - low
-    size = float(extent.max())
+    diameter = float(extent.max())
     figure = Figure(figsize=(6.9, float(np.clip(6.0 * extent[1] / extent[0], 1.6, 6.0)) + 1.6))
     ax = figure.subplots()
+    ax.add_collection(LineCollection(list(boundary), colors="0.4", lw=0.6))
     if len(cells) <= MOST_CELLS:
-        edges = cells[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2, 2)
-        mesh = LineCollection(list(edges), colors="0.75", lw=0.3, rasterized=len(edges) > 5000)
-        ax.add_collection(mesh)
+        corners = np.arange(3 * len(cells)).reshape(-1, 3)
+        thin = {"color": "0.75", "lw": 0.3, "rasterized": len(cells) > 2000}
+        ax.triplot(*cells.reshape(-1, 2).T, corners, **thin)
     middle = cells.reshape(-1, 2).mean(axis=0)
     for role in roles:
         wide = 3.0 if role.colour in (TOUCHED, ELECTRODE) else 1.5
@@ -81,9 +83,9 @@ def draw_plane(
         lines.set_alpha(0.6 if role.colour == ELECTRODE else 1.0)
         ax.add_collection(lines)
         if role.hatched:
-            _hatch(ax, role, middle, 0.02 * size)
+            _hatch(ax, role, middle, 0.02 * diameter)
         if role.force is not None:
-            _arrows(ax, role, middle, 0.12 * size)
+            _arrows(ax, role, middle, 0.12 * diameter)
     if surface.size:
         order = np.lexsort(surface.T[::-1])
         ax.plot(*surface[order].T, ".", ms=2, color=FOUNDATION, label="foundation")
@@ -107,8 +109,9 @@ def _outwards(facets: Array, middle: Array) -> Array:
 
 
 def _hatch(ax: Axes, role: Role, middle: Array, length: float) -> None:
-    """Draw short strokes outwards from what is held."""
-    out, centre = _outwards(role.facets, middle), role.facets.mean(axis=1)
+    """Draw short strokes outwards from a support."""
+    facets = role.facets[_spread(role.facets, STROKES)]
+    out, centre = _outwards(facets, middle), facets.mean(axis=1)
     skew = out + 0.6 * np.column_stack([-out[:, 1], out[:, 0]])
     ax.add_collection(
         LineCollection(
@@ -121,7 +124,7 @@ def _arrows(ax: Axes, role: Role, middle: Array, reach: float) -> None:
     """Draw a load's arrows outside the body, the longest of a given length."""
     assert role.force is not None
     centre = role.facets.mean(axis=1)
-    chosen = _spread(role.facets)
+    chosen = _spread(role.facets, ARROWS)
     force = role.force[chosen]
     largest = float(np.linalg.norm(role.force, axis=1).max(initial=0.0))
     if largest == 0:
@@ -136,11 +139,11 @@ def _arrows(ax: Axes, role: Role, middle: Array, reach: float) -> None:
         ax.plot(*ends[seen].T, ls="", marker="")
 
 
-def _spread(facets: Array) -> NDArray[np.intp]:
-    """Return edges about as far from each other on each of the pieces of a part, some `ARROWS`."""
+def _spread(facets: Array, count: int) -> NDArray[np.intp]:
+    """Return about so many edges of a part, as far from each other on each segment of it."""
     centre = facets.mean(axis=1)
     centre = centre[order := np.lexsort(centre.T)]
-    apart = np.linalg.norm(facets[:, 1] - facets[:, 0], axis=1).sum() / ARROWS
+    apart = np.linalg.norm(facets[:, 1] - facets[:, 0], axis=1).sum() / count
     chosen: list[np.intp] = []
     left = np.ones(len(centre), dtype=bool)
     while left.any():
@@ -167,36 +170,50 @@ def _dimensions(ax: Axes, low: Array, high: Array, units: Units) -> None:
 
 
 def draw_space(
-    boundary: Array, roles: Sequence[Role], surface: Array, units: Units, axes: str
+    boundary: Array, cells: Array, roles: Sequence[Role], surface: Array, units: Units, axes: str
 ) -> Figure:
-    """Draw a body in space by the facets of its boundary; see `draw_plane`."""
-    figure = Figure(figsize=(6.9, 6.0))
-    figure.set_layout_engine("none")
-    ax: Any = figure.add_axes((0.05, 0.22, 0.9, 0.7), projection="3d")
-    faint = {"facecolor": (0.9, 0.9, 0.9, 0.25), "edgecolor": "0.75", "linewidths": 0.15}
-    ax.add_collection3d(Poly3DCollection(list(boundary), **faint))
-    seen = [boundary.reshape(-1, 3)]
+    """Draw a body in 3-D by the facets of its boundary, shape (m, 3, 3); see `draw_plane`."""
+    corners = [boundary.reshape(-1, 3), surface.reshape(-1, 3)]
+    reach = 0.2 * float(np.ptp(corners[0], axis=0).max())
+    arrows = []
     for role in roles:
-        colour = "0.6" if role.hatched else role.colour
-        edge = {"edgecolor": "0.3", "linewidths": 0.2, "alpha": 0.15 if role.hatched else 0.5}
-        ax.add_collection3d(Poly3DCollection(list(role.facets), facecolor=colour, **edge))
-        ax.plot([], [], "s", color=colour, label=role.words)
         if role.force is not None and np.any(role.force):
-            centre = role.facets.mean(axis=1)
-            reach = 0.2 * float(np.ptp(boundary.reshape(-1, 3), axis=0).max())
             step = reach * role.force / np.linalg.norm(role.force, axis=1).max()
-            chosen = np.linspace(0, len(centre) - 1, min(ARROWS, len(centre))).astype(int)
-            start = (centre - step)[chosen]
-            ax.quiver(*start.T, *step[chosen].T, color=LOADED, lw=0.8)
-            seen.append(start)
+            chosen = np.linspace(0, len(step) - 1, min(ARROWS, len(step))).astype(int)
+            arrows.append(((role.facets.mean(axis=1) - step)[chosen], step[chosen]))
+            corners.append(arrows[-1][0])
+
+    def add(plotter: Any) -> None:
+        import pyvista
+
+        def facets(given: Array) -> Any:
+            corners = np.arange(3 * len(given)).reshape(-1, 3)
+            return pyvista.PolyData.from_regular_faces(given.reshape(-1, 3), corners)
+
+        edges = {"show_edges": len(boundary) <= MOST_CELLS, "edge_opacity": 0.4, "line_width": 0.5}
+        plotter.add_mesh(facets(boundary), color="#EEEEEE", opacity=0.3, **edges)
+        for role in roles:
+            if not role.hatched:
+                lit = {"opacity": 0.7, "ambient": 0.6, "diffuse": 0.4}
+                plotter.add_mesh(facets(role.facets), color=role.colour, **lit)
+        for start, step in arrows:
+            plotter.add_arrows(start, step, color=LOADED)
+        if surface.size:
+            plotter.add_points(surface, color=FOUNDATION, point_size=5.0)
+
+    seen = np.concatenate(corners)
+    image = rendered(add, (1.0, -1.6, 0.5), np.array([seen.min(axis=0), seen.max(axis=0)]))
+    figure = Figure(figsize=(6.9, 6.0))
+    ax = figure.subplots()
+    ax.axis("off")
+    if image is not None:
+        ax.imshow(image)
+    sides = r" $\times$ ".join(f"{side:.4g}" for side in np.ptp(corners[0], axis=0))
+    ax.set_title(f"{sides}{f' {units.length}' if units.length else ''}", y=-0.02, fontsize=8)
+    for role in roles:
+        face = "none" if role.hatched else role.colour
+        ax.plot([], [], "s", color="0.6", markerfacecolor=face, label=role.words)
     if surface.size:
-        ax.plot(*surface.T, ".", ms=2, color=FOUNDATION, label="foundation")
-    points = np.concatenate(seen)
-    low, high = points.min(axis=0), points.max(axis=0)
-    ax.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), zlim=(low[2], high[2]))
-    ax.set_box_aspect(high - low)
-    for name in "xyz":
-        getattr(ax, f"set_{name}label")(units.label(f"${name}$", "length"))
-    ax.locator_params(nbins=4)
-    figure.legend(loc="lower center", ncols=2, fontsize=7)
+        ax.plot([], [], "o", ms=3, color=FOUNDATION, label="foundation")
+    figure.legend(loc="outside lower center", ncols=2, fontsize=7)
     return figure
