@@ -35,8 +35,7 @@ from contact.output.record import StepRecord
 from contact.output.remarks import announce
 from contact.output.solution import Solution
 from contact.output.steps import StepRecorder
-from contact.problem.consistent import check_problem, check_supports
-from contact.problem.held import check_potential
+from contact.problem.checks import check_potential, check_problem, check_supports
 from contact.problem.kkt import evaluate
 from contact.problem.problem import ContactProblem
 from contact.problem.state import State

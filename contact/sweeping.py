@@ -38,7 +38,7 @@ from contact.output.rerun import difference
 from contact.output.results import Results
 from contact.output.solution import Solution
 from contact.output.table import contact_table, write_csv
-from contact.problem.held import check_potential
+from contact.problem.checks import check_potential
 from contact.problem.problem import ContactProblem
 from contact.solving import Schedule, run_schedule
 

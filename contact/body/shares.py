@@ -14,7 +14,7 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 
 from contact.body.masters import Masters
-from contact.linear.refinement import Components
+from contact.linear.krylov import Components
 from contact.mesh.domain import Domain
 from contact.mesh.entities import component_sums, graph_components
 from contact.typing import Array

@@ -17,7 +17,7 @@ from contact.interface.layer import Layer
 from contact.interface.obstacle import Obstacle
 from contact.kinds import check_range
 from contact.mesh.domain import Domain, revolved
-from contact.problem.consistent import check_problem, check_supports
+from contact.problem.checks import check_problem, check_supports
 from contact.problem.contact import Contact
 from contact.problem.problem import ContactProblem
 from forms.hencky import Law

@@ -21,7 +21,7 @@ from contact.output import environment
 from contact.output.bodies import passing
 from contact.output.folder import on_root
 from contact.output.remarks import fitting
-from contact.problem.expected import expected_displacements
+from contact.problem.checks import expected_displacements
 from contact.problem.problem import ContactProblem
 from contact.typing import Array
 

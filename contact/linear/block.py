@@ -18,7 +18,7 @@ from petsc4py import PETSc
 
 from contact.linear import multigrid
 from contact.linear.layout import Layout
-from contact.linear.rigid import rigid_motions
+from contact.linear.multigrid import rigid_motions
 
 #: Options of the displacement's block where the user gives none, under ``fieldsplit_u_``. The
 #: W-cycle keeps the counts flat at a small price: coarse levels have few unknowns.

@@ -34,8 +34,8 @@ from scipy.sparse import csgraph
 
 from contact.history import Evaluated
 from contact.linear.layout import Layout
+from contact.linear.multigrid import quick_products
 from contact.linear.operator import Bulk, Counters, SparseOperator
-from contact.linear.products import quick_products
 from contact.mesh.entities import owned_among
 from contact.typing import Array
 

@@ -1,13 +1,27 @@
-"""Algebraic multigrid for elastic contact problems: GAMG with rigid-body near-nullspace."""
+"""Algebraic multigrid for contact problems: GAMG with the rigid-body modes as near null space.
+
+Three things are added to it: interpolation that knows contact nodes (`StiffNodes`), coarse levels
+that are renewed when iterations say so (`Hierarchy`), and interpolation made for bodies apart where
+bodies touch (`set_up_apart`).
+"""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from math import ceil, log10
+from typing import Protocol
 
+import numpy as np
+from mpi4py import MPI
+from numpy.typing import NDArray
 from petsc4py import PETSc
 
 from contact._compat import keeps_inverted_blocks
-from contact.linear.layout import Layout
+from contact.linear.faults import petsc_options
+from contact.linear.krylov import Components, refine
+from contact.linear.layout import Layout, balance
+from contact.typing import Array
 
 #: Unknowns from which an iterative solver pays, by dimension and whether the body is piezoelectric
 #: (seen in `make bench`).
@@ -89,3 +103,336 @@ def set_defaults(prefix: str, values: Mapping[str, str]) -> None:
     for name, value in values.items():
         if not options.hasName(name):
             options[name] = value
+
+
+#: The option that says how one rank does it; it has no prefix.
+OPTION = "matptap_via"
+
+#: Unknowns up to which it is done by way of A P, in two thirds of the time or less: that takes a
+#: kilobyte an unknown.
+MOST = 1_000_000
+
+
+@contextmanager
+def quick_products(matrix: PETSc.Mat) -> Iterator[None]:
+    """Have products with a matrix, and with what it is coarsened to, made in the quick way.
+
+    Of several ranks, or where the user says how, nothing changes.
+    """
+    options = PETSc.Options()
+    quick = matrix.comm.size == 1 and matrix.getSize()[0] <= MOST and not options.hasName(OPTION)
+    if quick:
+        options[OPTION] = "rap"
+    try:
+        yield
+    finally:
+        if quick:
+            options.delValue(OPTION)
+
+
+def rigid_motions(layout: Layout) -> PETSc.NullSpace:
+    """Return the rigid motions of the displacement, orthonormalised, fixed or not. Collective."""
+    d, index_map = layout.dim, layout.index_map
+    if layout.revolved:
+        return _along_axis(layout)
+    size = (index_map.size_local * d, index_map.size_global * d)
+    coordinates = PETSc.Vec().createMPI(size, d, layout.comm)
+    # Rotations about the middle, in units of the size: far from the origin they would be lost.
+    total = layout.comm.allreduce(layout.points.sum(axis=0), op=MPI.SUM)
+    middle = total / index_map.size_global
+    coordinates.array[:] = ((layout.points - middle) / layout.size).ravel()
+    return PETSc.NullSpace().createRigidBody(coordinates)
+
+
+def _along_axis(layout: Layout) -> PETSc.NullSpace:
+    """Return the only rigid motion of a body of revolution."""
+    size = (layout.index_map.size_local * 2, layout.index_map.size_global * 2)
+    motion = PETSc.Vec().createMPI(size, 2, layout.comm)
+    motion.array[1::2] = 1.0
+    motion.normalize()
+    return PETSc.NullSpace().create(vectors=[motion], comm=layout.comm)
+
+
+def held_motions(layout: Layout) -> PETSc.NullSpace:
+    """Return the rigid motions, 0 where the displacement is fixed, orthonormalised. Collective."""
+    free = layout.free[:, : layout.dim].ravel()
+    vectors: list[PETSc.Vec] = []
+    for motion in rigid_motions(layout).getVecs():
+        vector = motion.copy()  # PETSc locks those of a null space
+        vector.array[:] *= free
+        for other in vectors:
+            vector.axpy(-vector.dot(other), other)
+        vector.normalize()
+        vectors.append(vector)
+    return PETSc.NullSpace().create(vectors=vectors, comm=layout.comm)
+
+
+#: Part of the contact blocks that is there when the interpolation is made: it alters nothing, but
+#: where contact alone holds the body the coarsest operator would be singular without it.
+TOUCH = 1e-8
+
+
+class StiffNodes:
+    """The contact nodes of a system that GAMG preconditions.
+
+    Left to itself, GAMG takes a sliding node for one that is cut off, because its gamma outweighs
+    all couplings, and leaves its motion along the foundation out of the coarse spaces; and a
+    coarse function that moves one node against gamma is lost whole. Either way nothing but the
+    smoother acts in a layer at the sliding zone, and the counts grow with its area in elements.
+
+    So the interpolation is made for the body alone, once. At a contact node, where K is the
+    body's nodal block and B the contact's, it is then multiplied by (K + |B|)^-1 K: the motion
+    that is in equilibrium with the same neighbours. |B|, the root of B^T B, takes friction that
+    falls with the slip for a stiffness too, and what it is multiplied by stays bounded.
+
+    Parameters
+    ----------
+    pc
+        GAMG, set up with the body's operator.
+    nodes
+        Owned nodes that may have contact blocks, local numbers, shape (n,).
+    """
+
+    def __init__(self, pc: PETSc.PC, nodes: NDArray[np.int32]) -> None:
+        self._nodes = nodes
+        self._interpolation: PETSc.Mat | None = None
+        if pc.getMGLevels() == 1:
+            return
+        finest = self._interpolation = pc.getMGInterpolation(pc.getMGLevels() - 1)
+        first, bs = finest.getOwnershipRange()[0], finest.getBlockSizes()[0]
+        self._rows = (first + bs * nodes[:, None] + np.arange(bs)).astype(PETSc.IntType).ravel()
+        chosen = PETSc.IS().createGeneral(self._rows, finest.comm)
+        of_body = finest.createSubMatrix(chosen, None)
+        self._starts, self._columns, self._values = of_body.getValuesCSR()
+
+    def follow(self, own: Array, blocks: Array) -> None:
+        """Adapt the interpolation to contact blocks. Collective.
+
+        Parameters
+        ----------
+        own, blocks
+            What the body and contact have at the nodes, zero where an unknown is fixed, shape
+            (n, block size, block size).
+        """
+        # Of K its diagonal will do.
+        root = np.sqrt(np.abs(np.einsum("nii->ni", own)))
+        scaled = blocks / root[:, :, None] / root[:, None, :]
+        # Where numbers overflow the solver itself will say so.
+        left, size, right = np.linalg.svd(np.where(np.isfinite(scaled), scaled, 0.0))
+        yielding = np.einsum("nki,nk,nkj->nij", right, 1 / (1 + size), right)
+        self._inverse = np.einsum("nki,nk,njk->nij", right, size / (1 + size**2), left)
+        self._inverse /= root[:, :, None] * root[:, None, :]
+        if self._interpolation is not None:
+            values = self._mixed(yielding * root[:, None, :] / root[:, :, None])
+            self._interpolation.setValuesIJV(self._starts, self._columns, values, rowmap=self._rows)
+            self._interpolation.assemble()
+
+    def _mixed(self, factor: Array) -> Array:
+        """Return the values of the rows, those of each node multiplied by a matrix."""
+        bs = factor.shape[1]
+        row = np.repeat(np.arange(self._rows.size), np.diff(self._starts))
+        within = np.arange(row.size) - self._starts[row]
+        values = np.zeros_like(self._values)
+        for k in range(bs):
+            # The rows of a node have the same columns.
+            same = self._starts[row // bs * bs + k] + within
+            values += factor[row // bs, row % bs, k] * self._values[same]
+        return values
+
+    def jump(self, rhs: PETSc.Vec) -> PETSc.Vec:
+        """Return a vector that balances what the stiff blocks alone can carry of a right-hand side.
+
+        With friction they carry forces in other directions than those in which they are stiff.
+        These would pass to the coarse levels, where nothing resists them, and the first
+        correction would be so large that a residual relative to it said nothing.
+        """
+        vector = rhs.duplicate()
+        values = vector.array.reshape(-1, self._inverse.shape[1])
+        values[self._nodes] = np.einsum(
+            "nij,nj->ni", self._inverse, rhs.array.reshape(values.shape)[self._nodes]
+        )
+        return vector
+
+
+#: What it costs to renew the coarse levels, in iterations (seen in `scripts.benchmarks.phases`).
+PRICE = 8
+
+
+class Hierarchy:
+    """The levels of GAMG, which follow an operator at little cost.
+
+    To multiply out all coarse operators takes as long as `PRICE` iterations, and from one step of
+    Newton's method to the next little changes. So the smoother of the finest level and the
+    interpolation at the contact nodes follow the operator in each of them, the coarse levels only
+    once the iterations that have been lost without them would have paid for that: the rule of
+    those who do not know how often they will ski, and buy when they have paid as much for
+    hiring. A solve that loses as many by itself goes on with new ones. No solve takes more
+    iterations than `ksp_max_it` allows.
+
+    Parameters
+    ----------
+    ksp
+        A solver with GAMG, set up with the body's operator.
+    nodes
+        Owned nodes that may have contact blocks, local numbers, shape (n,).
+    components
+        As of `refine`.
+    """
+
+    def __init__(
+        self, ksp: PETSc.KSP, nodes: NDArray[np.int32], components: Components | None = None
+    ) -> None:
+        self._ksp, self._components = ksp, components
+        self._stiff = StiffNodes(ksp.getPC(), nodes)
+        self._most = ksp.getTolerances()[3]
+        self._lost = np.inf
+        #: Iterations a digit with coarse levels of the operator itself, and whether they are that.
+        self._rate, self._fresh = 0.0, False
+        self._taken, self._renewed = 0, False
+
+    def follow(self, own: Array, blocks: Array) -> bool:
+        """Follow the operator, and tell whether its coarse levels are renewed. Collective.
+
+        Parameters
+        ----------
+        own, blocks
+            What the body and contact have at the nodes, zero where an unknown is fixed, shape
+            (n, block size, block size).
+        """
+        self._stiff.follow(own, blocks)
+        if self._lost >= PRICE:
+            self._renew()
+            return True
+        self._fresh = False
+        pc = self._ksp.getPC()
+        pc.setReusePreconditioner(True)
+        self._set_up()
+        pc.getMGSmoother(pc.getMGLevels() - 1).getPC().setUp()
+        return False
+
+    def _renew(self) -> None:
+        self._ksp.getPC().setReusePreconditioner(False)
+        self._set_up()
+        self._lost, self._rate, self._fresh, self._renewed = 0.0, 0.0, True, True
+
+    def _set_up(self) -> None:
+        self._ksp.setOperators(*self._ksp.getOperators())
+        matrix = self._ksp.getOperators()[1]
+        with petsc_options(self._ksp.getOptionsPrefix()), quick_products(matrix):
+            self._ksp.setUp()
+
+    def solve(self, rhs: PETSc.Vec, solution: PETSc.Vec) -> tuple[int, bool]:
+        """Solve. Collective.
+
+        Returns
+        -------
+        The number of iterations, and whether the coarse levels have been renewed on the way.
+        """
+        self._taken, self._renewed = 0, False
+        self._solve(rhs.copy(), solution)
+        refine(self._ksp, rhs, solution, self._correct, self._components)
+        return self._taken, self._renewed
+
+    def _correct(self, rhs: PETSc.Vec, correction: PETSc.Vec) -> None:
+        """Solve for what a solution has left, which old coarse levels may not see."""
+        if self._taken >= self._most:
+            return
+        if not self._fresh:
+            self._renew()
+        self._solve(rhs, correction)
+
+    def _solve(self, rhs: PETSc.Vec, solution: PETSc.Vec) -> None:
+        jump = self._stiff.jump(rhs)
+        rhs.axpy(-1.0, self._ksp.getOperators()[0] * jump)
+        solution.axpy(-1.0, jump)
+        self._taken += self._iterate(rhs, solution, self._most - self._taken)
+        solution.axpy(1.0, jump)
+
+    def _iterate(self, rhs: PETSc.Vec, solution: PETSc.Vec, most: int) -> int:
+        ksp, digits = self._ksp, -log10(self._ksp.getTolerances()[0])
+        if self._fresh:
+            ksp.setTolerances(max_it=most)
+            ksp.setConvergenceHistory(length=most + 1, reset=True)
+            ksp.solve(rhs, solution)
+            taken, norms = ksp.getIterationNumber(), ksp.getConvergenceHistory()
+            # What was asked for is not what was gained: of few digits, or from a start.
+            if not self._rate and taken > 0 and norms.size > 0 and norms[-1] > 0:
+                self._rate = taken / max(log10(norms[0] / norms[-1]), 1.0)
+            return taken
+        fresh = self._rate * digits
+        ksp.setTolerances(max_it=min(ceil(fresh) + PRICE, most))
+        ksp.solve(rhs, solution)
+        taken = ksp.getIterationNumber()
+        if ksp.getConvergedReason() > 0 or taken >= most:
+            self._lost += max(taken - fresh, 0.0)
+            return taken
+        begun = ksp.getConvergedReason() == PETSc.KSP.ConvergedReason.DIVERGED_MAX_IT
+        self._renew()
+        ksp.setInitialGuessNonzero(begun)
+        return taken + self._iterate(rhs, solution, most - taken)
+
+
+class Coupled(Protocol):
+    """A body, or several, whose matrices can be had without what couples them."""
+
+    @property
+    def layout(self) -> Layout:
+        """The unknowns."""
+
+    def take_apart(self, matrix: PETSc.Mat) -> PETSc.Mat | None:
+        """Fill a matrix with bodies that do not touch; see `operator.Bulk`."""
+
+
+class Solver(Protocol):
+    """A linear system with its solver, which GAMG preconditions."""
+
+    matrix: PETSc.Mat
+    ksp: PETSc.KSP
+
+    @property
+    def bulk(self) -> Coupled:
+        """What is solved for."""
+
+    def set_up(self, symmetric: bool) -> None:
+        """Set up the solver for the matrix as it is."""
+
+
+def set_up_apart(solver: Solver) -> bool:
+    """Set multigrid up for bodies that do not touch; False where none touch each other. Collective.
+
+    Motions of each body are then what is interpolated, and the jumps follow from them. Made for
+    jumps the interpolation would mix the sides of a pair, and it would take twice as many coarse
+    functions to follow both.
+
+    Parameters
+    ----------
+    solver
+        Has the matrix of bodies that touch, and has it again afterwards.
+    """
+    matrix, layout = solver.matrix, solver.bulk.layout
+    coupled = matrix.copy()
+    jumps = solver.bulk.take_apart(matrix)
+    if jumps is None:
+        return False
+    balance(matrix, layout)
+    # Bodies that nothing but contact holds would give a singular coarse matrix.
+    diagonal = matrix.getDiagonal()
+    diagonal.scale(1 + TOUCH)
+    matrix.setDiagonal(diagonal)
+    solver.set_up(symmetric=True)
+    pc = solver.ksp.getPC()
+    if pc.getMGLevels() > 1:
+        finest = pc.getMGLevels() - 1
+        plain = pc.getMGInterpolation(finest).copy()
+        made = jumps.matMult(plain)
+        own = made.createVecLeft()
+        own.array[:] = layout.free.ravel()
+        made.diagonalScale(L=own)
+        # Where an unknown is fixed all is as it was: coarse functions of these alone remain some.
+        own.array[:] = ~layout.free.ravel()
+        plain.diagonalScale(L=own)
+        made.axpy(1.0, plain)
+        pc.setMGInterpolation(finest, made)
+        pc.setMGRestriction(finest, made)
+    coupled.copy(matrix, PETSc.Mat.Structure.SAME_NONZERO_PATTERN)
+    return True

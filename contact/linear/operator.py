@@ -15,18 +15,11 @@ from petsc4py import PETSc
 
 from contact.history import Evaluated
 from contact.linear import multigrid
-from contact.linear.apart import set_up_apart
-from contact.linear.balance import balance
 from contact.linear.block import BlockPreconditioner
-from contact.linear.faults import check_overflow, no_solution, petsc_options
-from contact.linear.hierarchy import Hierarchy
-from contact.linear.layout import Layout
-from contact.linear.nodal import insert_blocks, nodal_blocks
-from contact.linear.products import quick_products
-from contact.linear.refinement import Components, refine
-from contact.linear.rigid import held_motions
-from contact.linear.stiff_nodes import TOUCH
-from contact.linear.workspace import set_up_with_workspace
+from contact.linear.faults import check_overflow, no_solution, petsc_options, set_up_with_workspace
+from contact.linear.krylov import Components, refine
+from contact.linear.layout import Layout, balance, insert_blocks, nodal_blocks
+from contact.linear.multigrid import TOUCH, Hierarchy, held_motions, quick_products, set_up_apart
 from contact.typing import Array
 
 

@@ -1,23 +1,260 @@
-"""The body seen from a few of its nodes: a dense Schur complement by static substructuring.
+"""Static condensation: a dense Schur complement at kept nodes, by substructuring.
 
 Each rank eliminates the nodes that are coupled to its own and to kept ones only, by a sparse
-factorisation; what is left between the ranks is eliminated by the first one, and what is left then
-is dense, small, and the same on all ranks. In the plane the kept nodes are so few that the dense
-matrix has about as many entries as the mesh has nodes.
+factorisation of MUMPS that stops before the others; the first rank adds up the remainders and
+eliminates the nodes between the ranks. The result is dense, small, and the same on all ranks. In
+2-D the kept nodes are so few that the dense matrix has about as many entries as the mesh has nodes.
 """
 
 from __future__ import annotations
+
+import ctypes
 
 import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
 from petsc4py import PETSc
+from scipy.linalg import lu_factor, lu_solve
+from scipy.linalg.blas import dgemm
 
 from contact._compat import lasting
+from contact.linear.faults import MOST_WORKSPACE, TOO_SMALL, WORKSPACE
 from contact.linear.first_rank import from_first
-from contact.linear.leftover import Leftover, send_to_first
-from contact.linear.partial import PartialFactorisation
 from contact.typing import Array
+
+#: MUMPS's ICNTL(26): 0 solves with the eliminated unknowns, the kept ones being 0.
+INTERIOR_SOLVE = (26, 0)
+
+#: Columns that are copied at a time.
+COLUMNS = 128
+
+# petsc4py has no Schur complements of factorisations.
+_petsc = ctypes.CDLL(PETSc.__file__)
+
+
+def _check(code: int) -> None:
+    if code != 0:
+        raise PETSc.Error(code)
+
+
+def _set_kept(factor: PETSc.Mat, kept: PETSc.IS) -> None:
+    _check(_petsc.MatFactorSetSchurIS(ctypes.c_void_p(factor.handle), ctypes.c_void_p(kept.handle)))
+
+
+def _complement(factor: PETSc.Mat, size: int) -> Array:
+    """Return a copy of the Schur complement that a factorisation holds, stored by columns."""
+    if size == 0:
+        return np.zeros((0, 0))
+    handle, values, status = ctypes.c_void_p(), ctypes.c_void_p(), ctypes.c_int()
+    held = ctypes.c_void_p(factor.handle), ctypes.byref(handle)
+    _check(_petsc.MatFactorGetSchurComplement(*held, ctypes.byref(status)))
+    _check(_petsc.MatDenseGetArrayRead(handle, ctypes.byref(values)))
+    pointer = ctypes.cast(values, ctypes.POINTER(ctypes.c_double))
+    matrix = np.ctypeslib.as_array(pointer, (size, size)).copy().T
+    _check(_petsc.MatDenseRestoreArrayRead(handle, ctypes.byref(values)))
+    _check(_petsc.MatFactorRestoreSchurComplement(*held, status))
+    _mirror(matrix)
+    return matrix
+
+
+def _mirror(matrix: Array) -> None:
+    """Copy what is below the diagonal, all that MUMPS writes, above it."""
+    for begin in range(0, len(matrix), COLUMNS):
+        end = begin + COLUMNS
+        matrix[begin:end, end:] = matrix[end:, begin:end].T
+        corner = np.tril(matrix[begin:end, begin:end])
+        matrix[begin:end, begin:end] = corner + np.tril(corner, -1).T
+
+
+def _range(begin: int, end: int) -> PETSc.IS:
+    """Return the numbers from one to before another."""
+    return PETSc.IS().createStride(end - begin, begin, 1, PETSc.COMM_SELF)
+
+
+def _dense(matrix: PETSc.Mat) -> Array:
+    """Return a small local matrix as an array."""
+    dense = matrix.convert("dense", out=PETSc.Mat())
+    return np.array(dense.getDenseArray(), order="F")
+
+
+class PartialFactorisation:
+    """The first unknowns of a symmetric matrix of this rank, eliminated.
+
+    Parameters
+    ----------
+    first
+        How many they are.
+    prefix
+        Prefix of PETSc options of the factorisation.
+    """
+
+    def __init__(self, first: int, prefix: str) -> None:
+        self._first, self._prefix = first, prefix
+        self._factor: PETSc.PC | None = None
+
+    def factorise(self, matrix: PETSc.Mat) -> Array:
+        """Eliminate them; return the Schur complement, which is no number if they are singular.
+
+        Another matrix has the same pattern.
+        """
+        first, end = self._first, matrix.getSize()[0]
+        inside, rest = (_range(*ends) for ends in ((0, first), (first, end)))
+        (self._coupling,) = matrix.createSubMatrices([rest], [inside])
+        if self._first == 0:
+            return _dense(matrix)
+        factor = self._factorised(matrix)
+        factor.setMumpsIcntl(*INTERIOR_SOLVE)
+        left = _complement(factor, end - first)
+        return np.full_like(left, np.nan) if factor.getMumpsInfog(1) < 0 else left
+
+    def _factorised(self, matrix: PETSc.Mat) -> PETSc.Mat:
+        """Factorise the local matrix with as much workspace as it takes.
+
+        MUMPS's estimate is far too low where few unknowns are eliminated and many kept.
+        """
+        if self._factor is None:
+            self._factor = self._analysed(matrix)
+        workspace = WORKSPACE
+        while True:
+            self._factor.setOperators(matrix)
+            self._factor.setUp()
+            factor = self._factor.getFactorMatrix()
+            workspace = 4 * max(workspace, factor.getMumpsIcntl(14))
+            if factor.getMumpsInfog(1) not in TOO_SMALL or workspace > MOST_WORKSPACE:
+                return factor
+            # PETSc does not factorise again with one that has failed for want of memory.
+            self._factor = self._analysed(matrix)
+            self._factor.getFactorMatrix().setMumpsIcntl(14, workspace)
+
+    def _analysed(self, matrix: PETSc.Mat) -> PETSc.PC:
+        """Return a factorisation that keeps the last unknowns of a local matrix."""
+        pc = PETSc.PC().create(PETSc.COMM_SELF)
+        pc.setOptionsPrefix(self._prefix)
+        pc.setOperators(matrix)
+        pc.setType("cholesky")
+        pc.setFactorSolverType("mumps")
+        pc.setFromOptions()
+        pc.setFactorSetUpSolverType()
+        kept = _range(self._first, matrix.getSize()[0])
+        if kept.getSize() > 0:
+            _set_kept(pc.getFactorMatrix(), kept)
+        return pc
+
+    def solve(self, values: Array) -> Array:
+        """Solve with the first unknowns alone, the others being 0."""
+        if self._first == 0:
+            return values
+        assert self._factor is not None
+        factor = self._factor.getFactorMatrix()
+        solution, rhs = factor.createVecs()
+        rhs.array[: self._first] = values
+        factor.solve(rhs, solution)
+        return solution.array[: self._first].copy()
+
+    def to_last(self, first: Array) -> Array:
+        """Return what values of the first unknowns are in the last rows."""
+        vector, image = self._coupling.createVecs()
+        vector.array[:] = first
+        self._coupling.mult(vector, image)
+        return np.asarray(image.array)
+
+    def to_first(self, last: Array) -> Array:
+        """Return what values of the last unknowns are in the first rows."""
+        image, vector = self._coupling.createVecs()
+        vector.array[:] = last
+        self._coupling.multTranspose(vector, image)
+        return np.asarray(image.array)
+
+
+#: Rows that are sent and added at a time.
+ROWS = 128
+
+
+def send_to_first(comm: MPI.Intracomm, share: Array) -> None:
+    """Send a symmetric share to the first rank, which calls `Remainder.receive`.
+
+    Parameters
+    ----------
+    comm
+        The ranks.
+    share
+        Stored by columns.
+    """
+    for begin in range(0, share.shape[0], ROWS):
+        comm.Send(share.T[begin : begin + ROWS], 0)
+
+
+class Remainder:
+    """A symmetric dense matrix, of which the first unknowns are kept and the others eliminated.
+
+    Parameters
+    ----------
+    kept, others
+        How many they are.
+    """
+
+    def __init__(self, kept: int, others: int) -> None:
+        self._kept = np.zeros((kept, kept), order="F")
+        self._coupling = np.zeros((kept, others), order="F")
+        self._among = np.zeros((others, others), order="F")
+
+    def set(self, rows: NDArray[np.int64], columns: NDArray[np.int64], values: Array) -> None:
+        """Set entries, which have been zero."""
+        k = self._kept.shape[0]
+        for block, of_kept, with_kept in (
+            (self._kept, True, True),
+            (self._coupling, True, False),
+            (self._among, False, False),
+        ):
+            here = ((rows < k) == of_kept) & ((columns < k) == with_kept)
+            first, second = 0 if of_kept else k, 0 if with_kept else k
+            block[rows[here] - first, columns[here] - second] = values[here]
+
+    def add(self, at: NDArray[np.int64], share: Array) -> None:
+        """Add a symmetric share of the unknowns at ascending places, stored by columns."""
+        for begin in range(0, at.size, ROWS):
+            self._add(at, begin, share.T[begin : begin + ROWS])
+
+    def receive(self, comm: MPI.Intracomm, rank: int, at: NDArray[np.int64]) -> None:
+        """Add what another rank sends of the unknowns at ascending places."""
+        rows = np.empty((ROWS, at.size))
+        for begin in range(0, at.size, ROWS):
+            part = rows[: at.size - begin]
+            comm.Recv(part, rank)
+            self._add(at, begin, part)
+
+    def _add(self, at: NDArray[np.int64], begin: int, rows: Array) -> None:
+        k, here = self._kept.shape[0], at[begin : begin + len(rows)]
+        split, above = np.searchsorted(at, k), np.searchsorted(here, k)
+        # Matrix and share are symmetric: rows are added as columns, which lie together.
+        self._kept.T[np.ix_(here[:above], at[:split])] += rows[:above, :split]
+        self._coupling.T[np.ix_(here[above:] - k, at[:split])] += rows[above:, :split]
+        self._among.T[np.ix_(here[above:] - k, at[split:] - k)] += rows[above:, split:]
+
+    def eliminate(self) -> Array:
+        """Return what is left of the kept unknowns once the others are eliminated.
+
+        That is done in place: the matrix is gone then. The result is stored by columns.
+        """
+        if self._among.size == 0:
+            return self._kept
+        self._factors = lu_factor(self._among, overwrite_a=True, check_finite=False)
+        through = self.solve(self._coupling.T)
+        left = dgemm(-1.0, self._coupling, through, 1.0, self._kept, overwrite_c=True)
+        del self._kept, self._among
+        return np.asarray(left)
+
+    def solve(self, values: Array) -> Array:
+        """Solve with the others, once they are eliminated; what is no number remains none."""
+        return np.asarray(lu_solve(self._factors, values, check_finite=False))
+
+    def to_kept(self, others: Array) -> Array:
+        """Return what values of the others are in the rows of the kept unknowns."""
+        return np.asarray(self._coupling @ others)
+
+    def to_others(self, kept: Array) -> Array:
+        """Return what values of the kept unknowns are in the rows of the others."""
+        return np.asarray(self._coupling.T @ kept)
 
 
 def _staying(
@@ -148,13 +385,13 @@ class SchurComplement:
         total = self._inner.factorise(self._part)
         if self.comm.size == 1:
             return total
-        self._leftover = self._added(matrix, total)
+        self._remainder = self._added(matrix, total)
         del total
         k = self.size
         # Both are stored by columns, and sent as what they are by rows.
-        return from_first(self.comm, lambda: self._leftover.eliminate().T, k, k).T
+        return from_first(self.comm, lambda: self._remainder.eliminate().T, k, k).T
 
-    def _added(self, matrix: PETSc.Mat, own: Array) -> Leftover:
+    def _added(self, matrix: PETSc.Mat, own: Array) -> Remainder:
         """Add up what the ranks have eliminated, and what they have left, on the first one.
 
         The others have nothing of it. Collective.
@@ -171,13 +408,13 @@ class SchurComplement:
         own[row[both], column[both]] -= values[both]
         if self._mets is None:
             send_to_first(self.comm, own)
-            return Leftover(0, 0)
-        leftover = Leftover(self.size, self._between)
-        leftover.set(rows, columns, values)
-        leftover.add(self._met, own)
+            return Remainder(0, 0)
+        remainder = Remainder(self.size, self._between)
+        remainder.set(rows, columns, values)
+        remainder.add(self._met, own)
         for rank, met in enumerate(self._mets[1:], 1):
-            leftover.receive(self.comm, rank, met)
-        return leftover
+            remainder.receive(self.comm, rank, met)
+        return remainder
 
     def condense(self, rhs: Array, rounding: Array | None = None) -> Array:
         """Return what an owned right-hand side becomes on the kept unknowns, on all ranks.
@@ -203,10 +440,10 @@ class SchurComplement:
         if self._between == 0:
             return total
         kept, self._rhs_between = np.split(total, [self.size])
-        leftover = self._leftover
+        remainder = self._remainder
         return from_first(
             self.comm,
-            lambda: kept - leftover.to_kept(leftover.solve(self._rhs_between)),
+            lambda: kept - remainder.to_kept(remainder.solve(self._rhs_between)),
             self.size,
         )
 
@@ -214,10 +451,10 @@ class SchurComplement:
         """Return the owned solution that goes with values of the kept unknowns on all ranks."""
         left = kept
         if self._between > 0:
-            leftover = self._leftover
+            remainder = self._remainder
             between = from_first(
                 self.comm,
-                lambda: leftover.solve(self._rhs_between - leftover.to_others(kept)),
+                lambda: remainder.solve(self._rhs_between - remainder.to_others(kept)),
                 self._between,
             )
             left = np.concatenate([kept, between])

@@ -9,8 +9,7 @@ from mpi4py import MPI
 
 from contact.interface.complementarity import ComplementarityParameters
 from contact.problem.kkt import residual_forces
-from contact.problem.protocols import Problem
-from contact.problem.scales import Scales
+from contact.problem.protocols import Problem, Scales
 from contact.problem.state import State
 
 #: Forces that c makes of the first penetration, over the loads, from which on the body is far

@@ -15,9 +15,9 @@ from numpy.typing import NDArray
 
 from contact.mesh.entities import component_sums
 from contact.problem.kkt import residual_forces
-from contact.problem.mobility import held_at_rest, held_by_friction, held_by_supports
 from contact.problem.problem import ContactProblem
 from contact.problem.protocols import Problem
+from contact.problem.rigid_modes import held_at_rest, held_by_friction, held_by_supports
 from contact.tolerances import EPS
 from contact.typing import Array
 

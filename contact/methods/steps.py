@@ -19,9 +19,9 @@ from contact.linear.operator import Counters
 from contact.methods.interrupt import Interrupted
 from contact.methods.method import Method
 from contact.methods.report import History, Outcome
-from contact.problem.grip import grips, let_go
 from contact.problem.kkt import KKT, evaluate
 from contact.problem.problem import ContactProblem
+from contact.problem.rigid_modes import released, unilateral_supports
 from contact.problem.state import State
 from contact.typing import Array
 
@@ -87,7 +87,7 @@ class Evolution:
     ) -> None:
         self.problem, self.method = problem, method
         self._last, self._before = start, before
-        self._grips = grips(problem)
+        self._unilateral = unilateral_supports(problem)
 
     def run(self, times: Sequence[float], begin: float = 0.0) -> Iterator[LoadStep]:
         """Take the steps; the last one given has not converged if that has ended them. Collective.
@@ -126,7 +126,7 @@ class Evolution:
         sizes = [whole / 2**k for k in range(HALVINGS + 1)]
         for size in [size for size in sizes if size <= left * (1 + 1e-9)] or [left]:
             time = end if size >= left * (1 - 1e-9) else now + size
-            lost = let_go(self._grips, now, time)
+            lost = released(self._unilateral, now, time)
             step = self._lost(time, lost) if lost else self._solve(time)
             if step.outcome.converged or step.outcome.signal:
                 break

@@ -9,7 +9,7 @@ from scipy import linalg
 
 from contact.output.solution import Remark, Solution
 from contact.problem.kkt import residual_forces
-from contact.problem.mobility import Group, described, groups, held_by_supports, null_space
+from contact.problem.rigid_modes import Group, described, groups, held_by_supports, null_space
 from contact.tolerances import EPS
 from contact.typing import Array
 

@@ -22,15 +22,15 @@ from contact.history import BodyState, Evaluated
 from contact.interface.interface import Interface
 from contact.interface.multipliers import Multipliers
 from contact.linear import multigrid
-from contact.linear.balance import balance
 from contact.linear.constraint import Change, ConstrainedBulk, Constraint
 from contact.linear.dense import DenseOperator, Factors
 from contact.linear.faults import check_overflow, petsc_options
+from contact.linear.layout import balance
 from contact.linear.operator import Counters
 from contact.linear.schur import SchurComplement
 from contact.mesh.entities import between_ranks, owned_among
 from contact.problem.problem import ContactProblem
-from contact.problem.scales import Scales
+from contact.problem.protocols import Scales
 from contact.problem.state import State
 from contact.typing import Array
 

@@ -6,11 +6,13 @@ from collections.abc import Sequence
 from copy import copy
 from dataclasses import replace
 
+import numpy as np
 from mpi4py import MPI
 
 from contact.body.description import Body
 from contact.body.equilibrium import BodyEquilibrium
 from contact.body.internal_variables import VARIABLES
+from contact.body.masters import Masters
 from contact.body.materials import young_behind
 from contact.body.norms import volume
 from contact.errors import InputError
@@ -36,11 +38,47 @@ from contact.interface.placing import find_nodes
 from contact.kinds import expect, several
 from contact.mesh.domain import Domain
 from contact.mesh.entities import elongation
-from contact.problem.approach import approached
 from contact.problem.contact import Contact, check_laws
-from contact.problem.scales import Scales
+from contact.problem.protocols import Scales
 from contact.problem.state import State
 from contact.typing import Array
+
+
+def approached(nodes: ContactNodes, x: Array, masters: Masters, time: float) -> Array:
+    """Return unknowns with each free foundation moved by its force to where it first touches.
+
+    Where it touches nothing, nothing resists its force: the first linear system would be singular.
+    Collective.
+
+    Parameters
+    ----------
+    nodes
+        The contact nodes.
+    x
+        Local unknowns, the global ones behind them.
+    masters
+        The global unknowns.
+    time
+        When: forces are those of this time.
+    """
+    forces = masters.forces(time)
+    for member in masters.members:
+        push = np.zeros(masters.size)
+        push[member.columns] = forces[member.columns]
+        if nodes.motion is None or not member.foundation or not push.any():
+            continue
+        opening = nodes.gap - nodes.normal_component(nodes.apply(x))
+        closing = -nodes.normal_component(nodes.motion @ push)
+        mine = np.abs(nodes.motion[:, :, member.columns]).max(axis=(1, 2), initial=0.0) > 0
+        way = np.full(opening.size, np.inf)
+        there = mine & (closing > 0)
+        way[there] = opening[there] / closing[there]
+        least = nodes.comm.allreduce(float(way.min(initial=np.inf)), op=MPI.MIN)
+        if 0 < least < np.inf:
+            x = x.copy()
+            x[x.size - masters.size :] += least * push
+    return x
+
 
 #: Part of the history of each problem.
 SLIP = "slip"

@@ -1,10 +1,11 @@
-"""What joins the packages: the protocols that methods are written against.
+"""Protocols that methods are written against, and the scales of a problem.
 
 `Jump` is in `contact.interface.jump`, for the laws of the interface need it too.
 """
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
@@ -16,9 +17,41 @@ from contact.history import Evaluated
 from contact.interface.interface import Interface
 from contact.linear.constraint import Change
 from contact.linear.operator import Counters, Operator
-from contact.problem.scales import Scales
 from contact.problem.state import State
 from contact.typing import Array
+
+
+@dataclass(frozen=True)
+class Scales:
+    """Sizes that fit a body in any units.
+
+    Attributes
+    ----------
+    young, poisson, bulk, shear
+        Elastic constants of small strains (stress, none, stress, stress).
+    size
+        Largest extent (length).
+    height
+        Volume over the area of Gamma_3 (length).
+    area
+        Of Gamma_3 (length^(d - 1)); of a body of revolution over the full turn (length^2).
+    spacing
+        Of the contact nodes (length).
+    """
+
+    young: float
+    poisson: float
+    bulk: float
+    shear: float
+    size: float
+    height: float
+    area: float
+    spacing: float
+
+    @property
+    def plane_modulus(self) -> float:
+        """E' = E/(1 - nu^2) (stress)."""
+        return self.young / (1 - self.poisson**2)
 
 
 class Equilibrium(Protocol):

@@ -29,7 +29,7 @@ PHASES = {
     "assembly of matrices": ("body/equilibrium.py", "assemble"),
     "set-up of multigrid, factorisation": ("~", "<method 'setUp' of 'petsc4py.PETSc.KSP' objects>"),
     "Schur complement, factorisation": ("linear/schur.py", "factorise"),
-    "contact in multigrid": ("linear/stiff_nodes.py", "follow"),
+    "contact in multigrid": ("linear/multigrid.py", "follow"),
     "iterations, solves": ("~", "<method 'solve' of 'petsc4py.PETSc.KSP' objects>"),
     "solves with the factors": ("~", "<method 'solve' of 'petsc4py.PETSc.Mat' objects>"),
     "residual forces": ("body/weak_forms.py", "_found"),

@@ -15,8 +15,8 @@ from petsc4py import PETSc
 from contact.errors import InputError
 from contact.history import BodyState
 from contact.linear import multigrid
-from contact.linear.hierarchy import PRICE
 from contact.linear.layout import Layout
+from contact.linear.multigrid import PRICE
 from contact.linear.operator import Counters, SparseOperator
 from contact.methods.newton import Newton
 from contact.methods.options import NewtonOptions
@@ -233,7 +233,7 @@ def test_a_factorisation_takes_the_workspace_it_needs(degree: int) -> None:
 
 def test_a_failed_factorisation_solves_for_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
     """Several right-hand sides are refused with the words of one."""
-    monkeypatch.setattr("contact.linear.workspace.MOST_WORKSPACE", 0)
+    monkeypatch.setattr("contact.linear.faults.MOST_WORKSPACE", 0)
     problem = mechanics.bar(SELF, 16)
     operator = operator_of(problem, "lu")
     operator.ksp.setOperators(operator.matrix)

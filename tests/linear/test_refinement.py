@@ -5,7 +5,7 @@ import pytest
 from mpi4py import MPI
 from petsc4py import PETSc
 
-from contact.linear.refinement import Components, refine
+from contact.linear.krylov import Components, refine
 
 SIZE = np.array([2.0, 3.0, 4.0, 5.0])
 

@@ -8,7 +8,7 @@ from mpi4py import MPI
 
 from contact import build_problem, nesting
 from contact.history import BodyState
-from contact.linear import hierarchy, multigrid
+from contact.linear import multigrid
 from contact.linear.operator import SparseOperator
 from contact.output.solution import Solution
 from contact.solving import solve
@@ -72,7 +72,7 @@ def test_coarse_levels_that_are_new_are_not_renewed_for_a_correction(monkeypatch
     def correct(_, rhs, solution, solve, __) -> None:
         solve(rhs.copy(), solution.duplicate())
 
-    monkeypatch.setattr(hierarchy, "refine", correct)
+    monkeypatch.setattr(multigrid, "refine", correct)
     problem = build_problem(block(6))
     body, nodes = problem.equilibrium, problem.nodes.nodes
     operator, x = SparseOperator(body, nodes), problem.start().x
@@ -104,6 +104,6 @@ def test_the_iterations_a_digit_are_those_that_were_gained(monkeypatch, rtol):
             "secant", BodyState(x), stiffness * np.stack(nodes.size * [np.eye(3)]), constant=True
         )
         operator.solve(body.external(), 1e-8)
-        monkeypatch.setattr(hierarchy, "refine", correct)
+        monkeypatch.setattr(multigrid, "refine", correct)
     assert operator.counters.factorizations == 2
     assert operator._hierarchy._rate < 4

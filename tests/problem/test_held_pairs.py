@@ -11,8 +11,8 @@ from contact.interface.friction import Friction
 from contact.methods.newton import Newton
 from contact.methods.options import NewtonOptions
 from contact.output.balances import force_balance
+from contact.problem.checks import check_rigid_modes
 from contact.problem.contact import Contact
-from contact.problem.held import check_held
 from contact.problem.problem import ContactProblem
 from forms.hencky import Linear
 from forms.laws import ConstantCoefficient
@@ -37,7 +37,7 @@ def blocks(held, traction, mu=0.0):
 @pytest.mark.parametrize("condense", [True, False])
 def test_a_body_that_lies_on_another_is_held_by_friction(condense):
     problem = blocks((0.0, 0.0), (0.001, -0.01), mu=0.5)
-    check_held(problem)
+    check_rigid_modes(problem)
     method = Newton(problem, NewtonOptions(tolerance=1e-9, condense=condense))
     state, outcome = method.solve()
     assert outcome.converged
@@ -57,7 +57,7 @@ def test_a_body_that_lies_on_another_is_held_by_friction(condense):
 )
 def test_pairs_that_fly_away_are_refused(held, traction, mu, words):
     with pytest.raises(InputError, match=words):
-        check_held(blocks(held, traction, mu))
+        check_rigid_modes(blocks(held, traction, mu))
 
 
 @pytest.mark.parametrize(

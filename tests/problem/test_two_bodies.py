@@ -14,8 +14,8 @@ from contact.methods.method import METHODS
 from contact.methods.options import OPTIONS
 from contact.output.balances import charge_balance
 from contact.output.table import contact_table
+from contact.problem.checks import check_rigid_modes
 from contact.problem.contact import Contact
-from contact.problem.held import check_held
 from contact.problem.problem import ContactProblem
 from forms.hencky import Linear
 from forms.laws import ConstantCoefficient
@@ -135,14 +135,14 @@ PRESS, PULL = (Load("top", [ZERO, constant(force, 2)]) for force in (-0.01, 0.01
 def test_a_body_may_be_held_by_contact_alone(pair):
     """It is where loads press it on; supports, or friction, have to do the rest."""
     clamped, guided = Fixed("bottom", [ZERO, ZERO]), Fixed("upper_left", [ZERO, None])
-    check_held(held([clamped, guided], PRESS, pair=pair))
-    check_held(held([clamped], PRESS, mu=0.2, pair=pair))
+    check_rigid_modes(held([clamped, guided], PRESS, pair=pair))
+    check_rigid_modes(held([clamped], PRESS, mu=0.2, pair=pair))
     with pytest.raises(InputError, match=r"not held: it can move as a rigid body"):
-        check_held(held([clamped], PRESS, pair=pair))
+        check_rigid_modes(held([clamped], PRESS, pair=pair))
     with pytest.raises(InputError, match="the loads pull the body off"):
-        check_held(held([clamped, guided], PULL, pair=pair))
+        check_rigid_modes(held([clamped, guided], PULL, pair=pair))
     with pytest.raises(InputError, match=r"not held: it can move as a rigid body"):
-        check_held(held([guided], PRESS, mu=0.0, pair=pair))
+        check_rigid_modes(held([guided], PRESS, mu=0.0, pair=pair))
 
 
 def test_two_pairs_have_two_laws():

@@ -25,8 +25,8 @@ from contact.output.balances import charge_balance, force_balance
 from contact.output.fields import DerivedFields
 from contact.output.figures.body import draw_plane
 from contact.output.figures.figures import collect
+from contact.problem.checks import check_rigid_modes
 from contact.problem.contact import Contact
-from contact.problem.held import check_held
 from contact.problem.problem import ContactProblem
 from forms.hencky import Linear
 from tests.problems.mechanics import Affine, constant, flat
@@ -183,7 +183,7 @@ def test_a_body_that_nothing_holds_along_its_axis(comm):
     domain = half_plane(comm, 1.0, 2.0, 1.0, 3)
     body = Body(Linear(1.0, 0.3), [Fixed("left", [constant(0.0, 2), None])])
     with pytest.raises(InputError, match="translation along y"):
-        check_held(ContactProblem(domain, body, Contact("right", flat())))
+        check_rigid_modes(ContactProblem(domain, body, Contact("right", flat())))
 
 
 def test_the_case_file_and_its_figures(tmp_path):

@@ -37,16 +37,16 @@ from contact.interface.penalised import (
     penalised_forces,
 )
 from contact.linear.faults import petsc_options
+from contact.linear.krylov import Packing, shell
 from contact.linear.operator import Counters
-from contact.linear.packing import Packing, shell
 from contact.methods.interrupt import Interrupted
 from contact.methods.options import PenaltyOptions
 from contact.methods.progress import Best, Stagnation, resting
 from contact.methods.report import History, Monitor, Outcome, Record
-from contact.problem.expected import expected_displacements
+from contact.problem.checks import expected_displacements
 from contact.problem.kkt import KKT, evaluate, residual_forces
-from contact.problem.mobility import held_by_friction
 from contact.problem.problem import ContactProblem
+from contact.problem.rigid_modes import held_by_friction
 from contact.problem.state import State
 from contact.tolerances import LAWS_HOLD
 from contact.typing import Array

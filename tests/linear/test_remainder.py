@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from contact.linear import leftover
-from contact.linear.leftover import Leftover, send_to_first
+from contact.linear import schur
+from contact.linear.schur import Remainder, send_to_first
 
 WORLD = MPI.COMM_WORLD
 KEPT, OTHERS = 7, 6
@@ -14,7 +14,7 @@ KEPT, OTHERS = 7, 6
 @pytest.mark.parallel
 def test_shares_of_all_ranks_are_added_and_the_others_eliminated(monkeypatch):
     """Shares of unknowns that differ from rank to rank, sent three rows at a time."""
-    monkeypatch.setattr(leftover, "ROWS", 3)
+    monkeypatch.setattr(schur, "ROWS", 3)
     size = KEPT + OTHERS
     expected, shares = np.diag(np.arange(10.0, 10 + size)), []
     for rank in range(WORLD.size):
@@ -26,7 +26,7 @@ def test_shares_of_all_ranks_are_added_and_the_others_eliminated(monkeypatch):
     if WORLD.rank > 0:
         send_to_first(WORLD, shares[WORLD.rank][1])
         return
-    found = Leftover(KEPT, OTHERS)
+    found = Remainder(KEPT, OTHERS)
     diagonal = np.arange(size)
     found.set(diagonal, diagonal, np.arange(10.0, 10 + size))
     found.add(*shares[0])

@@ -1,0 +1,299 @@
+"""Checks of a problem before anything is solved: loads, supports, rigid-body modes, potential.
+
+Cases and problems that are put together in Python are checked here alike.
+"""
+
+from __future__ import annotations
+
+from itertools import combinations, product
+from typing import Any
+
+import numpy as np
+from dolfinx import fem
+from mpi4py import MPI
+from numpy.typing import NDArray
+from scipy import linalg
+
+from contact.body.description import Fixed
+from contact.body.fields import values_at
+from contact.body.loads import to_blame
+from contact.errors import InputError
+from contact.interface.current import Conductor
+from contact.kinds import check_range
+from contact.problem.problem import ContactProblem
+from contact.problem.rigid_modes import (
+    Group,
+    UnilateralSupport,
+    described,
+    groups,
+    middle,
+    null_space,
+)
+from contact.problem.state import State
+from contact.tolerances import HUGE
+from contact.typing import Array
+
+
+def expected_displacements(
+    problem: ContactProblem, loads: Array, prescribed: Array
+) -> tuple[float, float]:
+    """Return what loads, as a stress on Gamma_3, do to a block of the body's size. Collective.
+
+    Parameters
+    ----------
+    problem
+        The problem.
+    loads
+        Owned nodal loads, those on global unknowns behind them.
+    prescribed
+        Local unknowns with what is prescribed, 0 elsewhere.
+
+    Returns
+    -------
+    That displacement, and the largest one that is prescribed.
+    """
+    body, scales = problem.equilibrium, problem.scales
+    nodal = np.abs(body.nodal(loads)[:, : body.dim]).sum()
+    force = body.comm.allreduce(float(nodal), op=MPI.SUM) + np.abs(body.motion(loads)).sum()
+    given = np.abs(np.append(body.nodal(prescribed)[:, : body.dim], body.motion(prescribed)))
+    largest = body.comm.allreduce(float(given.max(initial=0.0)), op=MPI.MAX)
+    return float(force / scales.area / scales.young * scales.size), largest
+
+
+#: Share of values up to which they are the same.
+ROUNDING = 1e-9
+
+#: Of numbers of the size of the body, or of the potential at strains of 1.
+EPS = float(np.finfo(float).eps)
+
+
+def check_problem(problem: ContactProblem) -> None:
+    """Check loads, supports and what holds the body, at the time of a problem. Collective.
+
+    Raises
+    ------
+    InputError
+        If a load acts on a contact part or is no finite number, two supports contradict each
+        other, or `check_rigid_modes` finds that the body can move.
+    """
+    _check_loads(problem)
+    check_supports(problem)
+    check_rigid_modes(problem)
+
+
+def _shared(problem: ContactProblem, one: str, other: str) -> tuple[NDArray[np.int32], bool]:
+    """Return the facets of this rank that two parts share, and whether any rank has some."""
+    domain = problem.domain
+    shared = np.intersect1d(domain.facets(one), domain.facets(other))
+    return shared, domain.comm.allreduce(shared.size > 0, op=MPI.LOR)
+
+
+def _check_loads(problem: ContactProblem) -> None:
+    """Refuse loads on Gamma_3, where the foundation alone acts: Gamma_2 and Gamma_b exclude it."""
+    for contact, (i, load) in product(problem.contacts, enumerate(problem.body.loads)):
+        if load.on is not None and _shared(problem, load.on, contact.on)[1]:
+            raise InputError(
+                f"load.{i}.on: {load.on} shares facets with the contact part {contact.on}; "
+                "accepted: parts beside it, or body forces"
+            )
+    _check_sizes(problem)
+
+
+def _check_sizes(problem: ContactProblem) -> None:
+    """Refuse loads that are no numbers, or too large for them. Collective."""
+    given, domain, time = problem.body.loads, problem.domain, problem.time
+    loads = problem.equilibrium.external(time)
+    if not domain.comm.allreduce(bool(np.isfinite(loads).all()), op=MPI.LAND):
+        key = to_blame(given, domain, time)
+        raise InputError(
+            f"{key}: a formula is not finite everywhere on its part; accepted: a formula, or a "
+            "function, that is"
+        )
+    largest = domain.comm.allreduce(float(np.abs(loads).max(initial=0.0)), op=MPI.MAX)
+    if largest > HUGE:
+        check_range(to_blame(given, domain, time), largest)
+
+
+def check_supports(problem: ContactProblem) -> None:
+    """Refuse different values for one component of what is part of two supports. Collective.
+
+    Where parts meet at an edge values may differ: there the last one counts.
+
+    Raises
+    ------
+    InputError
+        If they differ at the time of the problem by more than rounding.
+    """
+    d, space, time = problem.dim, problem.equilibrium.space, problem.time
+    for (i, first), (j, last) in combinations(enumerate(problem.body.fixed), 2):
+        one, other = _prescribed(first), _prescribed(last)
+        names = one.keys() & other.keys()
+        facets, shared = _shared(problem, first.on, last.on)
+        if not shared:
+            continue
+        nodes = fem.locate_dofs_topological(space, d - 1, facets)
+        points = space.tabulate_dof_coordinates()[nodes, :d]
+        for name in sorted(names):
+            values = np.column_stack(
+                [
+                    fixed.factor(time)
+                    * values_at(given[name], points, time, f"fixed.{n}.{name}", problem.comm)
+                    for n, fixed, given in ((i, first, one), (j, last, other))
+                ]
+            )
+            size = float(np.abs(values).max(initial=0.0))
+            size = problem.comm.allreduce(size, op=MPI.MAX)
+            # Rounding of what could be, such as sin(pi), is no value.
+            unit = problem.equilibrium.phi_scale if name == "potential" else 1.0
+            allowed = ROUNDING * size + EPS * unit * problem.domain.size
+            differ = np.ptp(values, axis=1) > allowed
+            found = np.concatenate(problem.comm.allgather(values[differ][:1])) + 0.0  # no -0
+            if found.size > 0:
+                when = "" if time == 1.0 else f" at t = {time:g}"
+                raise InputError(
+                    f"fixed.{j}.{name}: {found[0, 1]:g} on {last.on}; accepted: {found[0, 0]:g}, "
+                    f"as fixed.{i} has there{when}"
+                )
+
+
+def _prescribed(fixed: Fixed) -> dict[str, Any]:
+    """Return the fields of a support by their keys."""
+    given = {f"displacement.{k}": field for k, field in enumerate(fixed.displacement or ())}
+    given["potential"] = fixed.potential
+    return {name: field for name, field in given.items() if field is not None}
+
+
+def check_rigid_modes(problem: ContactProblem) -> None:
+    """Check that no rigid motion is free, before anything is factorised. Collective.
+
+    Three things are asked for: supports and contact (in the tangential directions too if there
+    is friction) leave no rigid motion at all, the loads do not pull the body off the foundation
+    where that alone holds it, and its potential is known or could be if it conducted everywhere.
+
+    Raises
+    ------
+    InputError
+        If the body can move freely or is pulled off, or its potential cannot be determined.
+    """
+    for group in groups(problem):
+        _check_group(problem, group)
+    check_potential(problem)
+
+
+def _check_group(problem: ContactProblem, group: Group) -> None:
+    """Check components of the mesh. Collective."""
+    free = null_space(group.supports)
+    if free.shape[1] == 0:
+        return
+    unconstrained = null_space(group.held(problem.frictional))
+    if unconstrained.shape[1] > 0:
+        raise InputError(_unconstrained(problem, group, unconstrained))
+    support = UnilateralSupport.of(group)
+    if support is not None and not support.bears(problem.time):
+        raise InputError(
+            f"the loads pull the body off the foundation{support.besides}, and no support holds it "
+            "there; accepted: loads that press it on, or more displacement components fixed"
+        )
+
+
+def _unconstrained(problem: ContactProblem, group: Group, unconstrained: Array) -> str:
+    """Say which pieces can move, and how."""
+    count = group.count
+    whole = "the body, or what is rigid," if group.moving else "the body"
+    if count > 1:
+        one = 1 if problem.domain.revolved else 3 * (problem.dim - 1)
+        own = np.linalg.norm(unconstrained[: len(group.pieces) * one], axis=1)
+        moves = own.reshape(len(group.pieces), -1).max(axis=1) > 1e-6
+        where = " and ".join(f"({', '.join(f'{x:.4g}' for x in c)})" for c in group.centres[moves])
+        which = "the one" if np.count_nonzero(moves) == 1 else "what is"
+        whole = f"the mesh has {count} connected components, and {which} about {where}"
+    modes = described(unconstrained, group.names)
+    return (
+        f"{whole} is not held: it can move as a rigid body ({modes}); "
+        "accepted: displacement components fixed so that it cannot"
+        + (", or regions that share the nodes between them" if count > 1 else "")
+    )
+
+
+def check_potential(problem: ContactProblem, state: State | None = None) -> None:
+    """Check that the potential is more than known but for constants. Collective.
+
+    Parameters
+    ----------
+    problem
+        The problem.
+    state
+        A solution; before there is one, contact may be anywhere and conduct there.
+
+    Notes
+    -----
+    It is where it is prescribed, and where current flows, also through nodes that cannot move: to
+    a foundation, or to another piece whose potential is known. Electrodes join what they lie on.
+
+    Raises
+    ------
+    InputError
+        If no potential is prescribed and no current flows, as on a foundation that is conductive
+        but touched nowhere, or on a body that touches another one and does not conduct.
+    """
+    if not problem.piezoelectric:
+        return
+    body, interface = problem.equilibrium, problem.interface
+    piece, count = body.components
+    # Constants by which the potential may be raised: of each piece, and of each electrode.
+    raised = np.zeros((*body.free.shape, count))
+    raised[np.arange(piece.size), -1, piece] = 1.0
+    electrodes = np.eye(body.masters.size)[:, ~body.masters.mechanical]
+    follows = (body.masters.ties @ electrodes)[body.block_size - 1 :: body.block_size]
+    rows = [np.hstack([raised[:, -1], -follows])[~body.free[:, -1]]]
+    columns = linalg.block_diag(raised.reshape(body.owned, count), electrodes)
+    locally = [body.local(column) for column in columns.T]
+    flows, among_held = _flows(problem, state)
+    rows.append(np.column_stack([problem.nodes.apply(x)[flows, -1] for x in locally]))
+    if interface.held is not None:
+        jump = interface.held.jump
+        rows.append(np.column_stack([jump.apply(x)[among_held, -1] for x in locally]))
+    gram = sum(problem.comm.allreduce(part.T @ part, op=MPI.SUM) for part in rows)
+    floating = null_space(gram / max(np.trace(gram), 1.0))
+    if floating.shape[1] == 0:
+        return
+    where, known = "", "a conductive foundation"
+    if count > 1:
+        alone = np.flatnonzero(np.linalg.norm(floating[:count], axis=1) > 1e-6)
+        middles = (middle(problem, body.layout.points[piece == k])[0] for k in alone)
+        found = " and ".join(f"({', '.join(f'{x:.4g}' for x in c)})" for c in middles)
+        where = f" of the piece of the mesh about {found}"
+        known += ", or with a body that conducts and whose potential is known"
+    raise InputError(
+        f"the potential{where} is not determined: it is prescribed nowhere, and the foundation "
+        f"conducts nowhere; accepted: a potential fixed on a part, or contact with {known}"
+    )
+
+
+def _flows(
+    problem: ContactProblem, state: State | None
+) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+    """Tell through which contact nodes current flows, or could, and through which held ones."""
+    interface = problem.interface
+    law, held = interface.law, interface.held
+    if state is None:
+        conductors = law.conductor, None if held is None else held.conductor
+        sizes = interface.jump.nodes.size, 0 if held is None else held.jump.nodes.size
+        at_contact, among_held = (
+            np.zeros(size, dtype=bool)
+            if conductor is None
+            else _conducts(conductor, size, interface.size)
+            for conductor, size in zip(conductors, sizes, strict=True)
+        )
+        return at_contact, among_held
+    nodal = problem.nodal(state)
+    pressure = interface.pressure(nodal, state.forces)
+    slope = np.zeros(0) if held is None else held.slope(state.x)
+    return law.jacobian(nodal, pressure)[:, -1, -1] != 0, slope != 0
+
+
+def _conducts(conductor: Conductor, count: int, deep: float) -> NDArray[np.bool_]:
+    """Tell which nodes conduct where they are pressed, and far into what is in front of them."""
+    closed = np.ones(count, dtype=bool)
+    psi = conductor.psi.at(np.full(count, deep), ~closed, closed)
+    return np.broadcast_to(psi, (count,)) > 0
