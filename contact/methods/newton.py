@@ -310,6 +310,10 @@ class NewtonLoop:
         linear, patience = problem.equilibrium.linear, self.patience or options.patience
         residuals = evaluate(problem, iterate.state)
         stagnation = Stagnation(patience, PROGRESS, together=True)
+        if iterate.active_set is not None and residuals.largest <= options.tolerance:
+            search.see(iterate, residuals)
+            search.history.record(residuals, f"{note} initial guess".strip(), inner=0)
+            return iterate, self._end(residuals)
         self.step.begin()
         # A start from elsewhere is near the solution; zero displacement has no better tangent.
         tangent = iterate.active_set is not None and not linear

@@ -175,8 +175,9 @@ def evaluate(problem: Problem, state: State) -> KKT:
         rounding = np.where(asked, force_rounding(problem, state, internal), 0.0)
         unknown = np.minimum(rounding, most)[0]
         acted |= answers > rounding
-        # Of a body that flies away all forces are rounding.
-        rounding = np.minimum(np.where(acted, np.minimum(rounding, most), rounding), unbalanced)
+        # Where nothing acts on a body all of its forces are rounding, its own or that of others.
+        largest = rounding.max(axis=1, keepdims=True)
+        rounding = np.minimum(np.where(acted, np.minimum(rounding, most), largest), unbalanced)
     # Of a piece on which nothing acts there is what rounding of the others makes of it.
     scale = np.maximum(scale, EPS * scale.max(axis=1, keepdims=True))
     size = np.where(scale > 0, scale, 1.0)
