@@ -13,7 +13,7 @@ from contact.case.mesh import Mesh
 from contact.errors import InputError
 from contact.history import History
 from contact.interface.complementarity import project_half_line
-from contact.interface.multipliers import Multipliers
+from contact.interface.jump import Multipliers
 from contact.linear import multigrid
 from contact.mesh import grid
 from contact.mesh.transfer import carry

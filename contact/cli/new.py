@@ -12,7 +12,7 @@ from mpi4py import MPI
 from contact.case.text import literal
 from contact.cli.ending import CONVERGED
 from contact.errors import InputError
-from contact.interface.facing import facing_parts
+from contact.interface.pairing import facing_parts
 from contact.mesh.domain import Domain
 from contact.mesh.reader import from_msh
 from contact.output.folder import on_root

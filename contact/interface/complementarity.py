@@ -27,7 +27,7 @@ from numpy.typing import NDArray
 
 from contact.interface.active_set import ActiveSet
 from contact.interface.interface import Interface
-from contact.interface.multipliers import Multipliers
+from contact.interface.jump import Multipliers
 from contact.tolerances import EPS
 from contact.typing import Array
 

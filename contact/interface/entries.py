@@ -1,12 +1,16 @@
 """Several obstacles in front of one body: their nodes as one array, their laws as one law.
 
-What is built on it (`contact.interface.interface`) knows no number of obstacles.
+All laws of Gamma_3 act node by node. The nodes of one obstacle follow each other in the array, and
+each law of a group acts on its own nodes. The interface (`contact.interface.interface`), which is
+built on it, knows no number of obstacles.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
+from contextlib import nullcontext
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -15,22 +19,16 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 from scipy import sparse
 
+from contact.calling import naming, real
 from contact.errors import InputError
 from contact.interface.current import Conductor, HeldCurrent
 from contact.interface.friction import Friction, NodalFriction
-from contact.interface.history import SlipHistory
+from contact.interface.jump import SlipHistory
 from contact.interface.layer import Layer
-from contact.interface.links import Links, make_links
 from contact.interface.mortar.coupling import Coupling
 from contact.interface.mortar.lumping import Mixing
+from contact.interface.mortar.operator import CouplingOperator, coupling_operator
 from contact.interface.nodes import ContactNodes
-from contact.interface.piecewise import (
-    ConductivityPieces,
-    FrictionPieces,
-    Pieces,
-    PointwisePieces,
-    SmoothingPieces,
-)
 from contact.interface.smoothing import Smoothing
 from contact.typing import Array
 from forms.laws import (
@@ -41,6 +39,127 @@ from forms.laws import (
     PotentialFactor,
     Truncation,
 )
+
+
+@dataclass(frozen=True)
+class Grouped:
+    """Several laws in place of one.
+
+    Attributes
+    ----------
+    laws
+        The law of each group.
+    bounds
+        Where the groups begin on this rank, and the number of all nodes.
+    what
+        What messages call a law that may be the user's own, and fail or return no numbers.
+    """
+
+    laws: tuple[Any, ...]
+    bounds: tuple[int, ...]
+    what: str = ""
+
+    @staticmethod
+    def bounds_of(sizes: Iterable[int]) -> tuple[int, ...]:
+        """Return the bounds of groups of given sizes."""
+        return tuple(int(bound) for bound in np.cumsum([0, *sizes]))
+
+    def _each(self, name: str, *arguments: Array) -> Array:
+        """Return a method of each law at its own nodes."""
+        parts, what = [], self.what
+        if what and name != "__call__":
+            what = f"{what}: {name}"
+        for law, (begin, end) in zip(self.laws, pairwise(self.bounds), strict=True):
+            here = [argument[begin:end] for argument in arguments]
+            with naming(what) if what else nullcontext():
+                values = getattr(law, name)(*here)
+                parts.append(real(values, (end - begin,), "one number for each node"))
+        return np.concatenate(parts) if len(parts) > 1 else parts[0]
+
+
+@dataclass(frozen=True)
+class GroupedPointwise(Grouped):
+    """p_nu, h_nu or phi_L."""
+
+    def __call__(self, s: Array) -> Array:
+        """Return the law at all nodes."""
+        return self._each("__call__", s)
+
+    def derivative(self, s: Array) -> Array:
+        """Return the derivative at all nodes."""
+        return self._each("derivative", s)
+
+
+@dataclass(frozen=True)
+class GroupedFriction(Grouped):
+    """Friction bounds, see `forms.laws.FrictionLaw`."""
+
+    @property
+    def maximum(self) -> float:
+        """Upper bound of s/p."""
+        return max(law.maximum for law in self.laws)
+
+    @property
+    def lipschitz(self) -> float:
+        """Lipschitz constant of s/p in the slip (1/length)."""
+        return max(law.lipschitz for law in self.laws)
+
+    def __call__(self, slip: Array, pressure: Array) -> Array:
+        """Return the bound at all nodes."""
+        return self._each("__call__", slip, pressure)
+
+    def by_slip(self, slip: Array, pressure: Array) -> Array:
+        """Return ds/d|u_tau|."""
+        return self._each("by_slip", slip, pressure)
+
+    def by_pressure(self, slip: Array, pressure: Array) -> Array:
+        """Return ds/dp."""
+        return self._each("by_pressure", slip, pressure)
+
+
+@dataclass(frozen=True)
+class GroupedConductivity(Grouped):
+    """Conductivities, see `forms.laws.Conductivity`."""
+
+    @property
+    def k_e(self) -> float:
+        """The largest conductivity."""
+        return max(law.k_e for law in self.laws)
+
+    @property
+    def delta(self) -> float:
+        """The largest slope of psi over k_e (1/length)."""
+        return max(law.delta for law in self.laws)
+
+    @property
+    def follows_gap(self) -> bool:
+        """Whether one of them does."""
+        return any(law.follows_gap for law in self.laws)
+
+    def at(self, s: Array, pressed: Array, loaded: Array) -> Array:
+        """Return the conductivity at all nodes."""
+        return self._each("at", s, pressed, loaded)
+
+    def gap_slope(self, s: Array, pressed: Array) -> Array:
+        """Return the derivative by s."""
+        return self._each("gap_slope", s, pressed)
+
+
+@dataclass(frozen=True)
+class GroupedSmoothing(Grouped):
+    """R within each group: the pressure on one obstacle does not bound friction on another."""
+
+    laws: tuple[Smoothing, ...]
+
+    @property
+    def radius(self) -> float:
+        """The largest radius."""
+        return max(law.radius for law in self.laws)
+
+    def __call__(self, values: Array) -> Array:
+        """Return R applied to nodal values, shape (n,). Collective."""
+        return self._each("__call__", values)
+
 
 #: What an obstacle has that has none of these.
 NO_FRICTION = Coulomb(ConstantCoefficient(0.0))
@@ -104,20 +223,23 @@ def joined_nodes(
     nodes = _side_by_side([entry.nodes for entry in entries])
     given = [entry.coupling or entry.mixing for entry in entries]
     rows = [jumps for jumps in given if jumps is not None]
-    links = make_links(nodes.comm, index_map, rows, nodes.nodes, free)
-    return replace(nodes, links=links, carried=_carried(nodes, links, ties, free))
+    coupling = coupling_operator(nodes.comm, index_map, rows, nodes.nodes, free)
+    return replace(nodes, coupling=coupling, carried=_carried(nodes, coupling, ties, free))
 
 
 def _carried(
-    nodes: ContactNodes, links: Links | None, ties: sparse.csr_array, free: NDArray[np.bool_]
+    nodes: ContactNodes,
+    coupling: CouplingOperator | None,
+    ties: sparse.csr_array,
+    free: NDArray[np.bool_],
 ) -> Array | None:
     """Return how nodes move with the global unknowns where no jump changes. Collective."""
-    if nodes.motion is None or links is None:
+    if nodes.motion is None or coupling is None:
         return nodes.motion
     carried = nodes.motion.copy()
     for k, column in enumerate(ties.toarray().T):
-        beside = links.apply(column.reshape(free.shape))
-        carried[links.places, :, k] -= beside * free[nodes.nodes[links.places]]
+        beside = coupling.apply(column.reshape(free.shape))
+        carried[coupling.places, :, k] -= beside * free[nodes.nodes[coupling.places]]
     return carried
 
 
@@ -159,8 +281,8 @@ def joined_friction(entries: Sequence[Entry], nodes: ContactNodes) -> NodalFrict
     if any(laws):
         every = tuple(NO_FRICTION if own is None else own for own in laws)
         own = any(entry.friction.law is not None for entry in entries)
-        law = FrictionPieces(every, bounds, "Friction: law" if own else "Friction: mu")
-    return NodalFriction(law, SmoothingPieces(smoothing, bounds), SlipHistory.rest(nodes))
+        law = GroupedFriction(every, bounds, "Friction: law" if own else "Friction: mu")
+    return NodalFriction(law, GroupedSmoothing(smoothing, bounds), SlipHistory.rest(nodes))
 
 
 def joined_layer(entries: Sequence[Entry]) -> Layer | None:
@@ -177,8 +299,8 @@ def joined_layer(entries: Sequence[Entry]) -> Layer | None:
     layers, bounds = [layer or NO_LAYER for layer in given], _bounds(entries)
     return Layer(
         np.repeat([layer.thickness for layer in layers], np.diff(bounds)),
-        PointwisePieces(tuple(layer.p_nu for layer in layers), bounds, "layer: p_nu"),
-        PointwisePieces(tuple(layer.h_nu for layer in layers), bounds, "layer: h_nu"),
+        GroupedPointwise(tuple(layer.p_nu for layer in layers), bounds, "layer: p_nu"),
+        GroupedPointwise(tuple(layer.h_nu for layer in layers), bounds, "layer: h_nu"),
         _alike([layer.lagged for layer in given if layer is not None]),
     )
 
@@ -203,11 +325,11 @@ def _joined_conductors(
 
     moving = any(conductor.phi_f_at is not None for conductor in conductors)
     return Conductor(
-        ConductivityPieces(
+        GroupedConductivity(
             tuple(conductor.psi for conductor in conductors), bounds, "Conductor: psi"
         ),
         np.repeat([conductor.phi_f for conductor in conductors], np.diff(bounds)),
-        PointwisePieces(
+        GroupedPointwise(
             tuple(conductor.phi_l for conductor in conductors), bounds, "Conductor: phi_l"
         ),
         _alike([conductor.lagged for conductor in given if conductor is not None]),
@@ -215,7 +337,9 @@ def _joined_conductors(
     )
 
 
-def joined_held(entries: Sequence[Entry], begin: int, links: Links | None) -> HeldCurrent | None:
+def joined_held(
+    entries: Sequence[Entry], begin: int, coupling: CouplingOperator | None
+) -> HeldCurrent | None:
     """Return the current through the held nodes of all entries.
 
     Parameters
@@ -224,23 +348,23 @@ def joined_held(entries: Sequence[Entry], begin: int, links: Links | None) -> He
         The entries.
     begin
         Global number of the first node of this rank.
-    links
-        Jumps that are no nodal values.
+    coupling
+        The mortar coupling operator.
     """
     given = [entry.held for entry in entries if entry.held is not None]
     if not given:
         return None
     nodes = _side_by_side([held.jump for held in given])
-    if links is not None:
-        nodes = replace(nodes, links=links.at(nodes.nodes.astype(np.int64) + begin))
-    bounds = Pieces.bounds_of(held.jump.nodes.size for held in given)
+    if coupling is not None:
+        nodes = replace(nodes, coupling=coupling.at(nodes.nodes.astype(np.int64) + begin))
+    bounds = Grouped.bounds_of(held.jump.nodes.size for held in given)
     conductor = _joined_conductors([held.conductor for held in given], bounds)
     assert conductor is not None
     return replace(given[0], jump=nodes, conductor=conductor)
 
 
 def _bounds(entries: Sequence[Entry]) -> tuple[int, ...]:
-    return Pieces.bounds_of(entry.nodes.nodes.size for entry in entries)
+    return Grouped.bounds_of(entry.nodes.nodes.size for entry in entries)
 
 
 def _alike(lagged: Sequence[bool]) -> bool:

@@ -10,10 +10,9 @@ from mpi4py import MPI
 from contact.body.fields import Given, field, values_at
 from contact.calling import check_finite, naming, on_all_ranks, real
 from contact.errors import InputError
-from contact.interface.history import SlipHistory
+from contact.interface.jump import SlipHistory
 from contact.interface.nodes import ContactNodes
-from contact.interface.piecewise import SmoothingPieces
-from contact.interface.smoothing import Smoothing
+from contact.interface.smoothing import Smoother
 from contact.kinds import expect, names_arguments
 from contact.typing import Array
 from forms.laws import ConstantCoefficient, Coulomb, FrictionCoefficient, FrictionLaw, Tresca
@@ -149,7 +148,7 @@ class NodalFriction:
     """
 
     law: FrictionLaw | None
-    smoothing: Smoothing | SmoothingPieces
+    smoothing: Smoother
     history: SlipHistory
 
     @property

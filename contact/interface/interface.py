@@ -11,9 +11,8 @@ from numpy.typing import NDArray
 from contact.interface.active_set import ActiveSet, touching
 from contact.interface.current import HeldCurrent
 from contact.interface.friction import NodalFriction
-from contact.interface.history import SlipHistory
+from contact.interface.jump import Multipliers, SlipHistory
 from contact.interface.law import InterfaceLaw
-from contact.interface.multipliers import Multipliers
 from contact.interface.nodes import ContactNodes
 from contact.linear.constraint import Change
 from contact.mesh.entities import component_sums
@@ -195,7 +194,7 @@ class Interface:
     @property
     def change(self) -> Change | None:
         """The change of unknowns that makes the jumps unknowns; None where they are."""
-        return None if self.jump.links is None else self.jump.links.change
+        return None if self.jump.coupling is None else self.jump.coupling.change
 
     @property
     def coupled(self) -> NDArray[np.int32]:

@@ -13,7 +13,7 @@ import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
 
-from contact.interface.links import Links
+from contact.interface.mortar.operator import CouplingOperator
 from contact.typing import Array
 
 
@@ -46,9 +46,10 @@ class ContactNodes:
     points
         Coordinates, shape (n, d) (length).
     weight
-        Integrals of the nodal basis functions over Gamma_3, shape (n,): they reproduce the
-        nodal forces of a constant pressure (vertex rule for P1, Simpson's for P2 edges; on P2
-        triangles of the functions of `contact.interface.mortar.lumping`).
+        Lumped surface mass, the tributary area of each node: integrals of the nodal basis
+        functions over Gamma_3, shape (n,). They reproduce the nodal forces of a constant pressure
+        (vertex rule for P1, Simpson's for P2 edges; on P2 triangles of the functions of
+        `contact.interface.mortar.lumping`).
     normal
         Contact direction, a unit vector out of the body, shape (n, d).
     tangent
@@ -70,8 +71,9 @@ class ContactNodes:
     carried
         How the nodes move with these unknowns where no jump changes, likewise: as the foundation
         does, and against nodes beside them that follow a rigid part.
-    links
-        Jumps that are no nodal values, between bodies and on quadratic triangles; None for none.
+    coupling
+        The operator of jumps that are no nodal values, between bodies and on quadratic triangles;
+        None for none.
     held
         What supports have taken from the contact direction, shape (n, d): times what they
         prescribe at time 1 it is off the gap. None for nothing.
@@ -90,7 +92,7 @@ class ContactNodes:
     revolved: bool = False
     motion: Array | None = None
     carried: Array | None = None
-    links: Links | None = None
+    coupling: CouplingOperator | None = None
     held: Array | None = None
 
     @property
@@ -106,8 +108,8 @@ class ContactNodes:
         """
         values = self._nodal(x)
         nodal = values[self.nodes]
-        if self.links is not None:
-            nodal[self.links.places] = self.links.apply(values)
+        if self.coupling is not None:
+            nodal[self.coupling.places] = self.coupling.apply(values)
         if self.motion is None:
             return nodal
         return nodal - self.motion @ x[x.size - self.motion.shape[2] :]
@@ -125,9 +127,9 @@ class ContactNodes:
         size = nodal.shape[1]
         values = self._nodal(into)[:, :size]
         own = np.ones(self.nodes.size, dtype=bool)
-        if self.links is not None:
-            own[self.links.places] = False
-            self.links.transpose(nodal[self.links.places], values)
+        if self.coupling is not None:
+            own[self.coupling.places] = False
+            self.coupling.transpose(nodal[self.coupling.places], values)
         values[self.nodes[own]] += nodal[own]
         if self.motion is not None:
             total = np.einsum("ni,nim->m", nodal, self.motion[:, :size])

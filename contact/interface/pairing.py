@@ -1,10 +1,11 @@
-"""Contact nodes in front of another body: where they are, and what is opposite of them."""
+"""Contact nodes in front of another body: where they are, and which parts face each other."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
 import numpy as np
+from dolfinx import fem
 from mpi4py import MPI
 from numpy.typing import NDArray
 
@@ -17,7 +18,8 @@ from contact.interface.obstacle import Obstacle
 from contact.interface.obstacle.protocol import measured
 from contact.interface.placing import check_gap
 from contact.kinds import expect
-from contact.mesh.entities import owned_among
+from contact.mesh.domain import Domain
+from contact.mesh.entities import components, owned_among
 from contact.typing import Array
 
 #: Share of the mesh's extent up to which facets are taken to face each other.
@@ -242,3 +244,36 @@ def _connected(body: BodyEquilibrium, coupling: Coupling) -> bool:
         found[k, piece[owned_among(body.layout.index_map, nodes)[1]]] = 1
     body.comm.Allreduce(MPI.IN_PLACE, found, op=MPI.MAX)
     return bool(found.all(axis=0).any())
+
+
+def facing_parts(domain: Domain) -> list[tuple[str, str]]:
+    """Return pairs of parts of different bodies that face each other, nearest first. Collective.
+
+    The finer side is the first of a pair. Parts that belong to several bodies are left out.
+    """
+    space = fem.functionspace(domain.mesh, ("Lagrange", 1))
+    piece, count = components(space)
+    if count == 1:
+        return []
+    comm = domain.comm
+    sides: list[tuple[float, str, Surface, Surface, int]] = []
+    for name in sorted(domain.parts):
+        own = surface_of(domain, space, name)
+        every = own.gathered(comm)
+        _, local = owned_among(space.dofmap.index_map, every.nodes.ravel())
+        there = np.zeros(count, dtype=np.intc)
+        there[piece[local]] = 1
+        comm.Allreduce(MPI.IN_PLACE, there, op=MPI.MAX)
+        if there.sum() == 1:
+            sides.append((float(every.radii.mean()), name, own, every, int(there.argmax())))
+    found = []
+    sides.sort(key=lambda side: side[:2])
+    for i, (_, on, slave, fine, body) in enumerate(sides):
+        for _, against, _, master, other in sides[i + 1 :]:
+            if other == body:
+                continue
+            gap = couple(slave, master, REACH * domain.size, comm).gap
+            # They look away from each other where it is negative.
+            if gap.size and gap.min() > -2 * CHORDS * float(fine.radii.max()):
+                found.append((float(gap.min()), on, against))
+    return [(on, against) for _, on, against in sorted(found)]

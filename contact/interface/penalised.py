@@ -13,7 +13,7 @@ from typing import Protocol
 import numpy as np
 
 from contact.interface.interface import Interface
-from contact.interface.multipliers import Multipliers
+from contact.interface.jump import Multipliers
 from contact.typing import Array
 from forms.foundation import penalty_friction_modulus, penalty_pressure
 

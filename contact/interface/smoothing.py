@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Protocol
+
 import numpy as np
 from scipy import sparse
 from scipy.spatial import cKDTree
@@ -11,6 +13,17 @@ from contact.typing import Array
 
 #: Angles at which omega is taken on a ring; it is smooth.
 ANGLES = 32
+
+
+class Smoother(Protocol):
+    """R at all contact nodes, of one part or of several."""
+
+    @property
+    def radius(self) -> float:
+        """The largest radius (length)."""
+
+    def __call__(self, values: Array) -> Array:
+        """Return R applied to nodal values, shape (n,). Collective."""
 
 
 class Smoothing:

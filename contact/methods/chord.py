@@ -19,7 +19,7 @@ from typing import TypeAlias
 
 import numpy as np
 
-from contact.interface.multipliers import Multipliers
+from contact.interface.jump import Multipliers
 from contact.methods.line_search import FAR
 from contact.methods.newton_step import Iterate
 from contact.problem.state import State

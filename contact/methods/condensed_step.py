@@ -12,7 +12,7 @@ from collections.abc import Callable
 from dataclasses import replace
 
 from contact.interface.complementarity import ComplementarityParameters
-from contact.interface.multipliers import Multipliers
+from contact.interface.jump import Multipliers
 from contact.linear.operator import Counters
 from contact.methods.chord import WORTH, Kept
 from contact.methods.following import Following

@@ -27,7 +27,7 @@ import numpy as np
 from mpi4py import MPI
 
 from contact.errors import InputError
-from contact.interface.multipliers import Multipliers
+from contact.interface.jump import Multipliers
 from contact.methods.cones import Array, Cones, Step
 from contact.methods.newton_step import Iterate, NewtonStep, Search
 from contact.methods.report import Outcome

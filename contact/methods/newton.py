@@ -41,7 +41,7 @@ import numpy as np
 
 from contact.interface.active_set import touching
 from contact.interface.complementarity import ComplementarityParameters
-from contact.interface.multipliers import Multipliers
+from contact.interface.jump import Multipliers
 from contact.linear.operator import Counters
 from contact.methods.condensed_step import SECANT_UNTIL, CondensedStep
 from contact.methods.continuation import CONTINUATION, continuation

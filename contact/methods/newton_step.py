@@ -19,7 +19,7 @@ from contact.interface.complementarity import (
     linearise,
 )
 from contact.interface.interface import Interface
-from contact.interface.multipliers import Multipliers
+from contact.interface.jump import Multipliers
 from contact.linear.operator import Counters, Operator
 from contact.methods.following import Following
 from contact.methods.options import NewtonOptions

@@ -29,7 +29,7 @@ from scipy.spatial import cKDTree
 from contact import _compat
 from contact.errors import InputError
 from contact.history import CONTACT_NODES, QUADRATURE_POINTS
-from contact.interface.multipliers import Multipliers
+from contact.interface.jump import Multipliers
 from contact.output.folder import on_root, settle
 from contact.output.record import StepRecord
 from contact.output.solution import Solution

@@ -12,7 +12,7 @@ from dolfinx import fem
 from mpi4py import MPI
 
 from contact.errors import InputError
-from contact.interface.multipliers import Multipliers
+from contact.interface.jump import Multipliers
 from contact.linear.operator import Counters
 from contact.methods.report import History, Outcome
 from contact.output.balances import ChargeBalance, charge_balance

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Protocol
 
-from contact.interface.multipliers import Multipliers
+from contact.interface.jump import Multipliers
 from contact.output.options import OutputOptions
 from contact.output.record import StepRecord
 from contact.output.units import Units

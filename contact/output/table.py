@@ -14,9 +14,9 @@ from numpy.typing import NDArray
 from scipy import sparse
 from scipy.sparse import csgraph
 
-from contact.interface.candidates import candidates
 from contact.interface.law import InterfaceLaw
 from contact.interface.nodes import ContactNodes as Nodes
+from contact.interface.placing import candidates
 from contact.mesh.entities import cells_at
 from contact.output.quantities import NODES, quantities, values_of
 from contact.output.solved import Solved

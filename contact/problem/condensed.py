@@ -20,7 +20,7 @@ from contact.body.equilibrium import BodyEquilibrium
 from contact.body.shares import Shares
 from contact.history import BodyState, Evaluated
 from contact.interface.interface import Interface
-from contact.interface.multipliers import Multipliers
+from contact.interface.jump import Multipliers
 from contact.linear import multigrid
 from contact.linear.constraint import Change, ConstrainedBulk, Constraint
 from contact.linear.dense import DenseOperator, Factors
@@ -313,11 +313,11 @@ def at_kept_nodes(interface: Interface) -> Interface:
     positions = np.arange(interface.coupled.size, dtype=np.int32)
     held = interface.held
     if held is not None:
-        held = replace(held, jump=replace(held.jump, nodes=positions[count:], links=None))
+        held = replace(held, jump=replace(held.jump, nodes=positions[count:], coupling=None))
     return replace(
         interface,
         jump=replace(
-            interface.jump, nodes=positions[:count], motion=None, carried=None, links=None
+            interface.jump, nodes=positions[:count], motion=None, carried=None, coupling=None
         ),
         held=held,
     )

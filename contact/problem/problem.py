@@ -17,7 +17,6 @@ from contact.body.materials import young_behind
 from contact.body.norms import volume
 from contact.errors import InputError
 from contact.history import CONTACT_NODES, History, InternalVariables, Part
-from contact.interface.candidates import candidates
 from contact.interface.current import Conductor, HeldCurrent, held_current
 from contact.interface.entries import (
     Entry,
@@ -28,13 +27,12 @@ from contact.interface.entries import (
     joined_nodes,
 )
 from contact.interface.friction import Friction
-from contact.interface.history import SlipHistory
 from contact.interface.interface import Interface
+from contact.interface.jump import Multipliers, SlipHistory
 from contact.interface.law import InterfaceLaw
-from contact.interface.multipliers import Multipliers
 from contact.interface.nodes import ContactNodes
 from contact.interface.pairing import find_pair
-from contact.interface.placing import find_nodes
+from contact.interface.placing import candidates, find_nodes
 from contact.kinds import expect, several
 from contact.mesh.domain import Domain
 from contact.mesh.entities import elongation
@@ -217,7 +215,7 @@ class ContactProblem:
         stiffness = self._young_of_contacts() / size
         law = InterfaceLaw(found, layer, conductor, body.phi_scale, stiffness)
         friction = joined_friction(self.entries, found)
-        held = joined_held(self.entries, body.layout.index_map.local_range[0], found.links)
+        held = joined_held(self.entries, body.layout.index_map.local_range[0], found.coupling)
         mesh = self.domain.mesh
         longer = max(elongation(mesh, self.domain.facets(contact.on)) for contact in self.contacts)
         piece, pieces = body.shares.component[found.nodes], body.shares.count

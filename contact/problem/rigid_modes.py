@@ -150,8 +150,8 @@ def _joined(problem: ContactProblem, piece: NDArray[np.int32], count: int) -> ND
         touched[piece[nodes.nodes[moves]]] = 1
         rows = np.flatnonzero(np.abs(ties[:, free]).sum(axis=1) > 0)
         touched[piece[rows // problem.equilibrium.block_size]] = 1
-    if nodes.links is not None and nodes.links.between:
-        touched[piece[nodes.links.local]] = 1
+    if nodes.coupling is not None and nodes.coupling.between:
+        touched[piece[nodes.coupling.local]] = 1
     problem.comm.Allreduce(MPI.IN_PLACE, touched, op=MPI.MAX)
     return touched > 0
 

@@ -8,7 +8,7 @@ import numpy as np
 from mpi4py import MPI
 
 from contact import Case, Solution
-from contact.interface.multipliers import Multipliers
+from contact.interface.jump import Multipliers
 from contact.methods.method import METHODS, Method
 from contact.methods.newton import Newton
 from contact.methods.options import NewtonOptions, Options

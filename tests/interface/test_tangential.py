@@ -12,7 +12,7 @@ import pytest
 from mpi4py import MPI
 
 import meshes
-from contact.interface.multipliers import Multipliers
+from contact.interface.jump import Multipliers
 from contact.problem.kkt import evaluate
 from contact.solving import solve
 from tests.problems.rings import between_plates, squeezed

@@ -9,7 +9,7 @@ from mpi4py import MPI
 from contact import write_outputs
 from contact.case.file import parse_case
 from contact.errors import InputError
-from contact.interface.multipliers import Multipliers
+from contact.interface.jump import Multipliers
 from contact.methods.newton import Newton
 from contact.methods.options import FixedPointOptions, NewtonOptions, PenaltyOptions
 from contact.output.figures.saved import plot

@@ -18,9 +18,8 @@ from mpi4py import MPI
 
 from contact.interface.complementarity import disc_derivative, interface_residuals, project_disc
 from contact.interface.interface import Interface
-from contact.interface.jump import Jump
+from contact.interface.jump import Jump, Multipliers
 from contact.interface.layer import NormalLaw
-from contact.interface.multipliers import Multipliers
 from contact.interface.nodes import ContactNodes
 from contact.linear.multigrid import TOLERANCE
 from contact.linear.operator import Operator

@@ -1,4 +1,7 @@
-"""Jumps that are sums over nodes: of another body, or of the same facet; on whatever rank."""
+"""The mortar coupling operator: jumps that are sums over nodes of both bodies, on whatever rank.
+
+So are the jumps on quadratic triangles in front of a rigid foundation.
+"""
 
 from __future__ import annotations
 
@@ -48,8 +51,8 @@ class Rows(Protocol):
 
 
 @dataclass(frozen=True)
-class Links:
-    """The jumps at contact nodes that are no nodal values.
+class CouplingOperator:
+    """The operator from nodal values to the jumps at contact nodes that are no nodal values.
 
     Attributes
     ----------
@@ -81,8 +84,8 @@ class Links:
     here: NDArray[np.intp]
     local: NDArray[np.int32]
 
-    def at(self, numbers: NDArray[np.int64]) -> Links:
-        """Return the links at other nodes of this rank, given their global numbers."""
+    def at(self, numbers: NDArray[np.int64]) -> CouplingOperator:
+        """Return the operator at other nodes of this rank, given their global numbers."""
         order = np.argsort(self.numbers)
         found = np.searchsorted(self.numbers, numbers, sorter=order)
         rows = order[np.minimum(found, self.numbers.size - 1)]
@@ -108,14 +111,14 @@ class Links:
         into[self.local] += forces[self.here]
 
 
-def make_links(
+def coupling_operator(
     comm: MPI.Intracomm,
     index_map: IndexMap,
     given: Sequence[Rows],
     nodes: NDArray[np.int32],
     free: NDArray[np.bool_],
-) -> Links | None:
-    """Return the links of all contacts; None where there are none. Collective.
+) -> CouplingOperator | None:
+    """Return the operator of all contacts; None where there are none. Collective.
 
     Parameters
     ----------
@@ -153,8 +156,10 @@ def make_links(
     comm.Allreduce(MPI.IN_PLACE, flags, op=MPI.SUM)
     change = Change.of(every, replaced, jumps, flags > 0)
     none = np.zeros(0, dtype=np.intp)
-    links = Links(comm, jumps, change, slaves, masters.size > 0, none, none, here, local)
-    return links.at(index_map.local_to_global(nodes))
+    operator = CouplingOperator(
+        comm, jumps, change, slaves, masters.size > 0, none, none, here, local
+    )
+    return operator.at(index_map.local_to_global(nodes))
 
 
 def _over(rows: Rows, every: NDArray[np.int64]) -> sparse.csr_array:
