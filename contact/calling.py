@@ -1,4 +1,4 @@
-"""Functions that a user has given: what they raise and return, in words that name the argument."""
+"""Functions of a user: their errors and values, in messages that name the argument."""
 
 from __future__ import annotations
 
@@ -17,20 +17,20 @@ from contact.typing import Array
 
 
 class _Returned(ValueError):
-    """What a function has returned, and what it may."""
+    """A function has returned a value that is not accepted."""
 
 
 def real(values: Any, shape: tuple[int, ...], each: str) -> Array:
-    """Return what a function has returned as numbers, inside `naming`.
+    """Return the value of a function as numbers, inside `naming`.
 
     Parameters
     ----------
     values
-        What has been returned; a number stands for itself everywhere.
+        The value; a number stands for itself everywhere.
     shape
-        What it is broadcast to.
+        The shape to broadcast it to.
     each
-        What is accepted: "one number ...".
+        The accepted values in words: "one number ...".
     """
     if type(values) is np.ndarray and values.dtype == float and values.shape == shape:
         return values.copy()
@@ -50,14 +50,14 @@ def real(values: Any, shape: tuple[int, ...], each: str) -> Array:
 
 
 def check_finite(values: Array, where: Callable[[int], str]) -> None:
-    """Refuse infinity and what is no number, inside `naming`.
+    """Refuse infinity and NaN, inside `naming`.
 
     Parameters
     ----------
     values
         Of a function, shape (n,).
     where
-        What says where the i-th of them is.
+        A function that says where the i-th of them is.
     """
     bad = np.flatnonzero(~np.isfinite(values))
     if bad.size > 0:
@@ -67,23 +67,23 @@ def check_finite(values: Array, where: Callable[[int], str]) -> None:
 
 
 @contextmanager
-def naming(what: str) -> Iterator[None]:
-    """Let what fails in a user's function say which argument that is."""
+def naming(name: str) -> Iterator[None]:
+    """Let errors in a user's function name the argument."""
     try:
         yield
     except InputError:
         raise
     except _Returned as error:
-        raise InputError(f"{what}: {error}") from None
+        raise InputError(f"{name}: {error}") from None
     except Exception as error:
         raise InputError(
-            f"{what}: the function raises {type(error).__name__}: {shorten(str(error))}"
+            f"{name}: the function raises {type(error).__name__}: {shorten(str(error))}"
         ) from error
 
 
 @contextmanager
 def on_all_ranks(comm: MPI.Intracomm) -> Iterator[None]:
-    """Raise on all ranks what one of them refuses, which alone may know. Collective."""
+    """Raise on all ranks the error of one of them. Collective."""
     failure = None
     try:
         yield
@@ -105,16 +105,16 @@ class OfTime:
     ----------
     function
         The function.
-    what
-        What messages call it.
+    name
+        Its name in messages.
     """
 
     function: Callable[[float], Any]
-    what: str = field(compare=False)
+    name: str = field(compare=False)
 
     def __call__(self, time: float) -> float:
         """Return its value at a time."""
-        with naming(self.what):
+        with naming(self.name):
             value = real(self.function(time), (), "a number")
             check_finite(value.reshape(1), lambda _: f"at t = {time:g}")
             return float(value)

@@ -2,7 +2,7 @@
 
 
 class InputError(ValueError):
-    """Bad input: the message names what is wrong and what is accepted.
+    """Bad input: the message names the fault and the accepted values.
 
     The command line prints the message alone and leaves with exit status 2.
     """

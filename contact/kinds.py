@@ -1,4 +1,4 @@
-"""What Python gives, checked where it comes in: kinds of objects, and names of arguments."""
+"""Checks of arguments in Python: kinds of objects, ranges, and names of arguments."""
 
 from __future__ import annotations
 
@@ -16,19 +16,19 @@ T = TypeVar("T")
 #: Elastic constants that a law has; sizes and starts are taken from them.
 CONSTANTS = ("young", "poisson", "bulk", "shear")
 
-#: Most letters of what was given that a message repeats.
+#: Most letters of a given value that a message repeats.
 LONGEST = 80
 
 
-def expect(what: str, given: Any, accepted: str, fits: object) -> None:
-    """Refuse what does not fit.
+def expect(name: str, given: Any, accepted: str, fits: object) -> None:
+    """Refuse a value that does not fit.
 
     Parameters
     ----------
-    what, given
+    name, given
         Name and value.
     accepted
-        What messages say is accepted.
+        The accepted values in words.
     fits
         Whether it fits.
 
@@ -38,7 +38,7 @@ def expect(what: str, given: Any, accepted: str, fits: object) -> None:
         If it does not.
     """
     if not fits:
-        raise InputError(f"{what}: given {shorten(repr(given))}; accepted: {accepted}")
+        raise InputError(f"{name}: given {shorten(repr(given))}; accepted: {accepted}")
 
 
 def check_range(key: str, value: float, least: float = 1 / HUGE) -> None:
@@ -56,7 +56,7 @@ def shorten(text: str) -> str:
     return line if len(line) <= LONGEST else f"{line[:LONGEST]}..."
 
 
-def several(what: str, given: Any, kind: type[T], accepted: str) -> tuple[T, ...]:
+def several(name: str, given: Any, kind: type[T], accepted: str) -> tuple[T, ...]:
     """Return one object of a kind, or several, as a tuple.
 
     Raises
@@ -66,7 +66,7 @@ def several(what: str, given: Any, kind: type[T], accepted: str) -> tuple[T, ...
     """
     every = tuple(given) if isinstance(given, list | tuple) else (given,)
     for one in every:
-        expect(what, one, accepted, isinstance(one, kind))
+        expect(name, one, accepted, isinstance(one, kind))
     return every
 
 

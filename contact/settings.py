@@ -1,4 +1,4 @@
-"""Settings: kinds of values with their bounds, in words too, and what a class of options offers.
+"""Settings: kinds of values with their bounds, in words too, and the settings of a class of options.
 
 A class of options is a frozen dataclass that states each setting once: name, type with bounds and
 default in its field, the meaning under "Attributes" in its docstring. Python builds it without
@@ -21,7 +21,7 @@ from contact.tolerances import PRECISION
 
 @dataclass(frozen=True)
 class Accepted:
-    """What a kind of value accepts, in words."""
+    """The accepted values of a kind, in words."""
 
     text: str
 
@@ -103,7 +103,7 @@ class Setting:
     default
         Its default.
     meaning
-        What it is, in words.
+        Its meaning, in words.
     condition
         When it is read; None for always.
     """
@@ -140,7 +140,7 @@ def read_by(options: Any) -> dict[str, Any]:
 
 
 def _meanings(options: type) -> dict[str, str]:
-    """Return what the docstring of one class says under "Attributes", by name."""
+    """Return the meanings in a class's docstring, under "Attributes", by name."""
     _, _, attributes = inspect.cleandoc(options.__doc__ or "").partition("Attributes\n----------\n")
     found: dict[str, str] = {}
     for line in attributes.splitlines():

@@ -3,7 +3,7 @@
 import sys
 
 #: Residual of contact and friction above which a penalised solution approximates nothing.
-LAWS_HOLD = 0.1
+LARGEST_VIOLATION = 0.1
 
 #: Distance of 1 from the next larger number.
 EPS = sys.float_info.epsilon

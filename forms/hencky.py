@@ -115,7 +115,7 @@ class Log(Isotropic):
     g_min: float = field(default=0.0, kw_only=True)
 
     def __post_init__(self) -> None:
-        """Refuse what (7.8) has no meaning for."""
+        """Refuse constants for which (7.8) has no meaning."""
         if self.argument not in ("norm", "square"):
             raise ValueError(f"argument must be 'norm' or 'square'; given: {self.argument!r}")
         # Without a floor the constants may be UFL expressions.
@@ -199,7 +199,7 @@ class UserLaw(Isotropic):
     modulus: Callable[[Value], Value] = field(kw_only=True)
 
     def __post_init__(self) -> None:
-        """Refuse what UFL cannot take, before it stands in a form."""
+        """Refuse constants that UFL cannot take, before they stand in a form."""
         accepted = (
             "accepted: a function of t = |dev eps| by arithmetic and the functions of forms.ops, "
             "for UFL and NumPy alike"

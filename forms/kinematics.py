@@ -1,8 +1,8 @@
 """Kinematics: small strains, the deviator, and the normal/tangential split.
 
-Strains are 3 x 3 tensors whatever the body: in space, in plane strain, or of a body of revolution,
+Strains are 3 x 3 tensors whatever the body: in 3-D, in plane strain, or of a body of revolution,
 whose half plane is meshed. How a displacement is differentiated there, and how much of the body
-a piece of the mesh stands for, is what a `Kinematics` says.
+a piece of the mesh stands for, is stated by a `Kinematics`.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ class Kinematics(Protocol):
 
 @dataclass(frozen=True)
 class Cartesian:
-    """A body in space, or a plane one in plane strain, of thickness 1."""
+    """A body in 3-D, or a plane one in plane strain, of thickness 1."""
 
     added_degree = 0
 

@@ -99,7 +99,7 @@ class Piezo:
         if np.abs(e[:2, :2, 2]).max() > 1e-10 * np.abs(e).max():
             raise ValueError(
                 "the crystal couples fields in the plane with shear out of it: plane strain "
-                "does not hold; turn the crystal or solve in space"
+                "does not hold; turn the crystal or solve in 3-D"
             )
 
     def in_plane(self) -> Piezo:

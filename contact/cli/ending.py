@@ -27,7 +27,7 @@ _kept: list[object] = []
 
 
 def end(comm: MPI.Intracomm, text: str, status: int) -> int:
-    """Say what has ended the run on this rank, and end the other ranks too."""
+    """Print the reason for the end on this rank, and end the other ranks too."""
     if comm.size > 1 and comm.rank > 0:
         time.sleep(1)  # rank 0, if it ends for the same reason, says it for all
     print(f"contact: {text}", file=sys.stderr, flush=True)

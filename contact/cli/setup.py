@@ -76,7 +76,7 @@ def save_setup(case: Case, problem: ContactProblem, folder: Path) -> list[Path]:
 
 
 def _roles(case: Case, problem: ContactProblem) -> Iterable[Role | None]:
-    """Yield what is given where, None on ranks other than 0. Collective."""
+    """Yield the conditions on each part, None on ranks other than 0. Collective."""
     domain = problem.domain
     for key, section in case.contacts:
         yield _role(domain, section.on, TOUCHED, _contact_words(case, key, section))
@@ -98,7 +98,7 @@ def _roles(case: Case, problem: ContactProblem) -> Iterable[Role | None]:
 
 
 def _contact_words(case: Case, key: str, section: Any) -> str:
-    """Return what may touch, and what is said of friction and current."""
+    """Return the contact parts, with friction and current, in words."""
     words = [f"contact: {section.on}"]
     if section.against is not None:
         words[0] += f" against {section.against}"
@@ -123,7 +123,7 @@ def _said(value: Any) -> str:
 
 
 def _load_words(given: Any) -> str:
-    """Return what is given of a load that is not zero."""
+    """Return the components of a load that are not zero."""
     said = []
     if given.traction is not None:
         said.append(f"traction ({_listed(given.traction)})")

@@ -1,4 +1,4 @@
-"""One material of a library: its constants, where they come from, and what follows from them."""
+"""One material of a library: its constants, their source, and the constants that follow."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ class Entry:
     Attributes
     ----------
     name, source, temperature, condition
-        What it is called, where its constants stand, and for which temperature and conditions.
+        Its name, the source of its constants, and the temperature and conditions of these.
     symmetry
         Crystal class, or "isotropic".
     stiffness
@@ -31,7 +31,7 @@ class Entry:
     isotropic
         Young's modulus (Pa) and Poisson's ratio; None for crystals.
     coupling
-        e, shape (3, 6) (C/m2); None for what is not piezoelectric.
+        e, shape (3, 6) (C/m2); None for a material that is not piezoelectric.
     permittivity
         At constant strain, shape (3, 3) (F/m); None likewise.
     published
@@ -98,7 +98,7 @@ class Entry:
         ------
         ValueError
             If stiffness or permittivity are not positive definite, a crystal of class 6mm is not
-            the same all around, d = e s is not what is published, or k_33 is not below 1.
+            the same all around, d = e s differs from the published values, or k_33 is not below 1.
         """
         Anisotropic(self.stiffness).check()
         tensors = [stiffness_tensor(self.stiffness)]

@@ -20,10 +20,10 @@ from forms.piezo import hexagonal_voigt
 #: The library of the package.
 PACKAGED = Path(__file__).with_name("materials.toml")
 
-#: What every entry says in words.
+#: Texts of every entry.
 WORDS = ("class", "source", "temperature", "condition")
 
-#: What it may say besides: where else its numbers were found.
+#: An optional text: the other places where its numbers were found.
 CHECKED = "checked"
 
 #: Keys of which an entry has one set or another.
@@ -74,9 +74,9 @@ def _entry(path: Path, name: str, table: Any) -> Entry:
         made = _read(name, table)
         made.check()
     except (ValueError, TypeError, KeyError, IndexError, AttributeError) as error:
-        what = f"{error} is missing" if isinstance(error, KeyError) else str(error)
+        fault = f"{error} is missing" if isinstance(error, KeyError) else str(error)
         raise InputError(
-            f"{path}: {name}: {what}; accepted: class, source, temperature, condition, and young "
+            f"{path}: {name}: {fault}; accepted: class, source, temperature, condition, and young "
             "and poisson, c or stiffness, with e or coupling and permittivity, as in the "
             "package's own library"
         ) from None
@@ -121,7 +121,7 @@ def _read(name: str, table: Mapping[str, Any]) -> Entry:
 
 
 def _electric(table: Mapping[str, Any]) -> tuple[Array | None, Array | None]:
-    """Return the coupling and the permittivity, None for what is not piezoelectric."""
+    """Return the coupling and the permittivity, None for a material that is not piezoelectric."""
     if not {"e", "coupling", "permittivity"} & set(table):
         return None, None
     if ("e" in table) == ("coupling" in table):

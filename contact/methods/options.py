@@ -16,7 +16,7 @@ from contact.errors import InputError
 from contact.kinds import names_arguments
 from contact.problem.kkt import KKT
 from contact.settings import Accepted, Count, Internal, Positive, ReadWith, Switch, Tolerance
-from contact.tolerances import LAWS_HOLD
+from contact.tolerances import LARGEST_VIOLATION
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -148,7 +148,7 @@ class PenaltyOptions(LoopOptions):
     @property
     def allowed(self) -> KKT:
         """How large each residual may be at the end."""
-        return KKT(self.tolerance, LAWS_HOLD, LAWS_HOLD)
+        return KKT(self.tolerance, LARGEST_VIOLATION, LARGEST_VIOLATION)
 
 
 @names_arguments

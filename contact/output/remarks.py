@@ -16,7 +16,7 @@ from contact.output.looseness import adrift, looseness
 from contact.output.solution import Remark, Solution
 from contact.problem.kkt import left_as_pressures, residual_forces
 from contact.problem.problem import ContactProblem
-from contact.tolerances import LAWS_HOLD
+from contact.tolerances import LARGEST_VIOLATION
 from forms.elasticity import Anisotropic
 from forms.hencky import Hencky
 from forms.laws import PerfectConductivity, RampConductivity
@@ -489,7 +489,7 @@ def giving_way(solution: Solution) -> Remark:
         for values in (depth, slip)
     )
     largest = solution.max_displacement
-    if max(deep, far) <= LAWS_HOLD * largest:
+    if max(deep, far) <= LARGEST_VIOLATION * largest:
         return "", True
     what, key = ("touch penetrate", "contact") if deep > far else ("should stick slip", "slip")
     return (

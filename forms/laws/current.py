@@ -11,7 +11,7 @@ from forms.ops import Value, absolute, clip, is_unlimited, less, less_equal, whe
 
 
 class PotentialLaw(Protocol):
-    """phi_L: what drives the current at the potential difference s = phi - phi_F."""
+    """phi_L: the drive of the current at the potential difference s = phi - phi_F."""
 
     def __call__(self, s: Value) -> Value:
         """Return phi_L at the potential difference."""

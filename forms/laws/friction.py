@@ -61,14 +61,14 @@ class SlipCoefficient:
     Parameters
     ----------
     a, b
-        Limit for large slip, and twice the excess at rest (no unit).
+        Limit for large slip, and twice the excess at zero slip (no unit).
     rho
         Decay rate (1/length), rho >= 0.
 
     Raises
     ------
     ValueError
-        If mu is negative at rest or for large slip, or rho is.
+        If mu is negative at zero slip or for large slip, or rho is.
     """
 
     a: float
@@ -76,7 +76,7 @@ class SlipCoefficient:
     rho: float
 
     def __post_init__(self) -> None:
-        """Refuse what does not resist at every slip."""
+        """Refuse coefficients that do not resist at every slip."""
         if not (self.a >= 0 and self.a + self.b / 2 >= 0 and self.rho >= 0):
             raise ValueError(f"a, a + b/2 and rho must be >= 0; given: {self}")
 

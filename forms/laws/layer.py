@@ -1,4 +1,4 @@
-"""The compliant layer: p_nu, what it answers to its penetration, and h_nu, its stiffness."""
+"""The compliant layer: p_nu, its pressure at a penetration, and h_nu, its stiffness."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from forms.ops import Value, absolute, is_unlimited, less_equal, minimum, positi
 
 
 class PenetrationLaw(Protocol):
-    """p_nu: what a layer answers to its penetration s = u_nu - rho_0, assumption (h6).
+    """p_nu: the pressure of a layer at its penetration s = u_nu - rho_0, assumption (h6).
 
     It vanishes for s <= 0 and should not fall: else several solutions may coexist.
     """

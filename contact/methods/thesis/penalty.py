@@ -11,7 +11,7 @@ Convergence. A penalty run solves the penalised problem: it has converged when t
 residual with the forces of the regularised laws at the final displacement is below the
 tolerance (those laws then hold by construction). The residuals `contact` and `friction` of the
 reported KKT are those of the Signorini-Coulomb laws themselves; they measure how far the
-penalised solution is from the limit, and fall like eps. Where they are above `LAWS_HOLD`, what
+penalised solution is from the limit, and fall like eps. Where they are above `LARGEST_VIOLATION`, what
 has been solved says nothing of contact, and the run has not converged.
 """
 
@@ -48,7 +48,7 @@ from contact.problem.kkt import KKT, evaluate, residual_forces
 from contact.problem.problem import ContactProblem
 from contact.problem.rigid_modes import held_by_friction
 from contact.problem.state import State
-from contact.tolerances import LAWS_HOLD
+from contact.tolerances import LARGEST_VIOLATION
 from contact.typing import Array
 
 logger = logging.getLogger("contact.inner")
@@ -445,6 +445,6 @@ class Penalty:
         words = words or f"the residual of the penalised problem is <= {options.tolerance:g}"
         if residuals.equilibrium <= options.tolerance:
             words += f"; the contact laws hold to {limit:.1e}"
-        if limit > LAWS_HOLD:
+        if limit > LARGEST_VIOLATION:
             words += "; a smaller eps_contact or eps_slip brings them nearer"
         return Outcome(residuals, options.allowed, words)
