@@ -1,4 +1,4 @@
-"""Nested meshes: the solution of a case on coarser ones, each from the one before."""
+"""Nested iteration: solutions of a case on coarser meshes, each the initial guess of the next."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ from contact.typing import Array
 #: Tolerance on the coarser levels: their discretisation error is larger by far.
 COARSE_TOLERANCE = 1e-3
 
-#: Unknowns, in the plane and in space, from which a start on coarser meshes saves more time than
+#: Unknowns, in 2-D and in 3-D, from which a start on coarser meshes saves more time than
 #: it takes.
 MANY = {2: 100_000, 3: 40_000}
 
@@ -40,7 +40,7 @@ SMALL = 500
 def pays(case: Case, problem: ContactProblem) -> bool:
     """Tell whether a start from coarser meshes saves time: where Newton's steps are many solves.
 
-    In space those of a body that is condensed onto its contact nodes are few in any case. In the
+    In 3-D those of a body that is condensed onto its contact nodes are few in any case. In the
     plane they are where it is linear; else the tangent is factorised near the solution, once.
     """
     body = problem.equilibrium
@@ -63,7 +63,7 @@ def _levels(case: Case, problem: ContactProblem) -> int | None:
 def _linear(case: Case, problem: ContactProblem) -> Literal["auto", "lu", "iterative"]:
     """Return how the systems of the coarser meshes are solved: by multigrid where the finest are.
 
-    In space that takes a quarter of the time of a factorisation from 2,000 unknowns on. Where it
+    In 3-D that takes a quarter of the time of a factorisation from 2,000 unknowns on. Where it
     fails a start is lost, and no solution.
     """
     layout, linear = problem.equilibrium.layout, case.solver.linear
@@ -156,7 +156,7 @@ def coarser_cases(case: Case, levels: int | None = None) -> list[Case]:
         mesh = _coarser(mesh)
     if not found or (levels is not None and len(found) < levels - 1):
         raise InputError(
-            f"{case.source}: solver.nested: there are {len(found) + 1} nested meshes only; "
+            f"{case.source}: solver.nested: there are {len(found) + 1} nested levels only; "
             f"accepted: at least {2 * COARSEST} cells along each edge and parts that end at "
             "positions of the grid of half as many, or mesh.refine > 0"
         )

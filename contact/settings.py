@@ -1,4 +1,4 @@
-"""Settings: kinds of values with their bounds, in words too, and the settings of a class of options.
+"""Settings: kinds of values with their bounds in words, and the settings of a class of options.
 
 A class of options is a frozen dataclass that states each setting once: name, type with bounds and
 default in its field, the meaning under "Attributes" in its docstring. Python builds it without

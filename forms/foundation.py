@@ -1,4 +1,4 @@
-"""What the foundation does to the body: pointwise laws and boundary integrands.
+"""The action of the foundation on the body: pointwise laws and boundary integrands.
 
 The pointwise laws serve UFL and NumPy alike; the solver applies them at the contact nodes.
 The integrands are those of the weak forms, to be integrated over Gamma_3 with the vertex

@@ -24,7 +24,7 @@ from forms.ops import Value, is_symbolic, log, maximum, sqrt
 
 
 class Hencky(Protocol):
-    """What the forms need of a material: two elastic constants and a secant shear modulus."""
+    """A material as the forms see it: two elastic constants and a secant shear modulus."""
 
     @property
     def young(self) -> float:
@@ -236,7 +236,7 @@ class UserLaw(Isotropic):
         return total
 
 
-#: What the forms take for the law of the stress.
+#: Laws of the stress that the forms take.
 Law: TypeAlias = Hencky | Anisotropic
 
 

@@ -20,7 +20,7 @@ class Kinematics(Protocol):
 
     @property
     def added_degree(self) -> int:
-        """What the extent adds to the degree that a quadrature rule must integrate."""
+        """The degree that the extent adds to that of a quadrature rule."""
 
     def gradient(self, u: Expr) -> Expr:
         """Return the displacement gradient, a 3 x 3 tensor."""

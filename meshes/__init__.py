@@ -1,7 +1,7 @@
-"""Mesh recipes: bodies built with Gmsh, their boundary parts as named physical groups.
+"""Parametric mesh generators: bodies by Gmsh, their boundary parts as named physical groups.
 
-A recipe is a function with keyword parameters (lengths, all positive) that fills the current
-Gmsh model and meshes it with straight-sided triangles or tetrahedra. ``RECIPES`` lists them by
+A generator is a function with keyword parameters (lengths, all positive) that fills the current
+Gmsh model and meshes it with straight-sided triangles or tetrahedra. ``GENERATORS`` lists them by
 name. In a case file::
 
     [mesh]
@@ -31,11 +31,11 @@ from meshes.pairs import (
     two_spheres,
 )
 
-__all__ = ["RECIPES", "build", "parameters", "write"]
+__all__ = ["GENERATORS", "build", "parameters", "write"]
 
-RECIPES: Mapping[str, Callable[..., None]] = {
-    recipe.__name__: recipe
-    for recipe in (
+GENERATORS: Mapping[str, Callable[..., None]] = {
+    generator.__name__: generator
+    for generator in (
         quarter_disc,
         half_disc,
         disc,
@@ -59,40 +59,42 @@ RECIPES: Mapping[str, Callable[..., None]] = {
 
 
 def parameters(name: str) -> dict[str, float]:
-    """Return the parameters of a recipe with their defaults.
+    """Return the parameters of a generator with their defaults.
 
     Raises
     ------
     InputError
-        If there is no such recipe.
+        If there is no such generator.
     """
-    if name not in RECIPES:
-        raise InputError(_unknown("mesh recipe", name, RECIPES))
-    signature = inspect.signature(RECIPES[name])
+    if name not in GENERATORS:
+        raise InputError(_unknown("mesh generator", name, GENERATORS))
+    signature = inspect.signature(GENERATORS[name])
     return {key: parameter.default for key, parameter in signature.parameters.items()}
 
 
 def build(name: str, **given: float) -> None:
-    """Fill the current Gmsh model by a recipe and mesh it; Gmsh must be initialised.
+    """Fill the current Gmsh model by a generator and mesh it; Gmsh must be initialised.
 
     Raises
     ------
     InputError
-        For an unknown recipe or parameter, for a length that is not positive, and for sizes
+        For an unknown generator or parameter, for a length that is not positive, and for sizes
         that would give too many cells.
     """
     defaults = parameters(name)
     for key, value in given.items():
         if key not in defaults:
-            raise InputError(_unknown(f"parameter of the mesh recipe {name!r}", key, defaults))
+            raise InputError(_unknown(f"parameter of the mesh generator {name!r}", key, defaults))
         number = isinstance(value, int | float) and not isinstance(value, bool)
         if not number or not 0.0 < value < math.inf:
-            raise InputError(f"{key} of the mesh recipe must be a positive number; given: {value}")
-    RECIPES[name](**given)
+            raise InputError(
+                f"{key} of the mesh generator must be a positive number; given: {value}"
+            )
+    GENERATORS[name](**given)
 
 
 def write(name: str, path: str | Path, *, version: float = 4.1, **given: float) -> None:
-    """Write a recipe's mesh to a ``.msh`` file of format 4.1 or 2.2.
+    """Write a generator's mesh to a ``.msh`` file of format 4.1 or 2.2.
 
     Raises
     ------
@@ -112,7 +114,7 @@ def write(name: str, path: str | Path, *, version: float = 4.1, **given: float) 
         gmsh.finalize()
 
 
-def _unknown(what: str, given: str, accepted: Mapping[str, object]) -> str:
+def _unknown(kind: str, given: str, accepted: Mapping[str, object]) -> str:
     near = difflib.get_close_matches(given, accepted, n=1)
     hint = f"; did you mean {near[0]!r}?" if near else ""
-    return f"unknown {what}: {given!r}{hint} (accepted: {', '.join(accepted)})"
+    return f"unknown {kind}: {given!r}{hint} (accepted: {', '.join(accepted)})"

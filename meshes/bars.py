@@ -87,7 +87,7 @@ def block(
     size: float = 0.25,
     contact_size: float = 0.25,
 ) -> None:
-    """Block in space, unstructured, with one corner at the origin.
+    """Block in 3-D, unstructured, with one corner at the origin.
 
     Parts: ``left``, ``right`` (x), ``front``, ``back`` (y), ``bottom``, ``top`` (z). The
     elements have ``contact_size`` at the bottom, ``size`` far away.
@@ -114,5 +114,5 @@ def column(
     size: float = 0.4,
     contact_size: float = 0.4,
 ) -> None:
-    """Column of square section in space; parts as in `block`."""
+    """Column of square section in 3-D; parts as in `block`."""
     block(width=width, depth=width, height=height, size=size, contact_size=contact_size)

@@ -12,10 +12,10 @@ from contact.errors import InputError
 CELL_MEMORY, CELL_SECONDS = 800, 2e-5
 
 #: Cells in a square or a cube of their size, in a body that fills little of its box (a disc and a
-#: ball: 1.8 and 4.4; what fills it: 2.3 and 8.5).
+#: ball: 1.8 and 4.4; a filled one: 2.3 and 8.5).
 CELLS = {2: 1.5, 3: 3.0}
 
-#: Seconds from which on there is a word on them: what is done with such a mesh takes far longer.
+#: Seconds from which on there is a word on them: a solve on such a mesh takes far longer.
 LONG = 5.0
 
 logger = logging.getLogger("contact.mesh")
@@ -52,7 +52,7 @@ def grade(
 ) -> None:
     """Set the element size by the distance to some entities.
 
-    At ``edges``, points in the plane and curves in space, it is ``edge_size``, and grows from
+    At ``edges``, points in the plane and curves in 3-D, it is ``edge_size``, and grows from
     there.
 
     Raises
@@ -135,7 +135,7 @@ def memory() -> int:
 
 
 def check_cells(count: float, dim: int | None = None) -> None:
-    """Refuse more cells than the memory holds, and say what many take.
+    """Refuse more cells than the memory holds, and say how long many take.
 
     Parameters
     ----------
@@ -162,7 +162,7 @@ def check_cells(count: float, dim: int | None = None) -> None:
         time = f"{seconds / 60:.2g} min" if seconds > 60 else f"{seconds:.2g} s"
         logger.warning(
             f"mesh: the sizes ask for some {10**count:.1e} cells or more, which take Gmsh {time} "
-            f"or more, and {10**count * CELL_MEMORY / 1e9:.2g} GB; what follows takes far more"
+            f"or more, and {10**count * CELL_MEMORY / 1e9:.2g} GB; a solve takes far more"
         )
 
 

@@ -1,4 +1,4 @@
-"""Round bodies that touch the plane y = 0 (z = 0 in space) at the origin (Example 7.1)."""
+"""Round bodies that touch the plane y = 0 (z = 0 in 3-D) at the origin (Example 7.1)."""
 
 import math
 

@@ -1,4 +1,4 @@
-"""Half spaces for indentation: cylinders, their half planes and halves of them in space."""
+"""Half spaces for indentation: cylinders, their half planes and halves of them in 3-D."""
 
 import math
 

@@ -48,7 +48,7 @@ def two_boxes(
     lower_size: float = 0.35,
     upper_size: float = 0.25,
 ) -> None:
-    """Box on the middle of another one, in space, both with square bases; z = 0 is between them.
+    """Box on the middle of another one, in 3-D, both with square bases; z = 0 is between them.
 
     Regions: ``upper``, ``lower``. Parts: ``upper_bottom`` on ``lower_top``; of both, as
     ``upper_top``, ``lower_bottom``, the other sides: ``left``, ``right`` (x), ``front``, ``back``
@@ -189,7 +189,7 @@ def two_spheres(
     import gmsh
 
     if quarters not in (1, 2):
-        raise InputError(f"quarters of the mesh recipe must be 1 or 2; given: {quarters:g}")
+        raise InputError(f"quarters of the mesh generator must be 1 or 2; given: {quarters:g}")
     bodies: dict[str, list[int]] = {}
     parts: dict[str, list[int]] = {}
     touching = []

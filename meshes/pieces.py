@@ -1,4 +1,4 @@
-"""Pieces of bodies that recipes put together: polygons, and round bodies that touch the origin."""
+"""Pieces of bodies for the generators: polygons, and round bodies that touch the origin."""
 
 from collections.abc import Sequence
 from typing import Any, NamedTuple
@@ -20,7 +20,7 @@ class Cap(NamedTuple):
     Attributes
     ----------
     body, round, cut
-        What it is made of, its round boundary, and the plane through the centre.
+        Its entity, its round boundary, and the plane through the centre.
     sides
         Its planes or lines of symmetry.
     low

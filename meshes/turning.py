@@ -1,4 +1,4 @@
-"""Half of a body of revolution in space, from the mesh of its half plane."""
+"""Half of a body of revolution in 3-D, from the mesh of its half plane."""
 
 import math
 from typing import Any
@@ -24,7 +24,7 @@ def turn(gmsh: Any, sectors: int) -> None:
     Circles become polygons of the same area: nodes are a little outside. The prism between two
     half planes is cut into tetrahedra along the diagonals from the lower number in the first plane
     to the higher in the second, on which neighbours agree (J. Dompierre et al., 8th International
-    Meshing Roundtable, 1999); what collapses on the axis is dropped.
+    Meshing Roundtable, 1999); cells that collapse on the axis are dropped.
 
     Raises
     ------

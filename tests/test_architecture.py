@@ -124,6 +124,6 @@ def test_forms_need_no_mesh_and_no_solver(name):
 
 
 @pytest.mark.parametrize("name", modules("meshes"))
-def test_recipes_need_the_solver_for_its_errors_alone(name):
+def test_generators_need_the_solver_for_its_errors_alone(name):
     used = {i for i in imports(modules("meshes")[name]) if i.split(".")[0] in ("contact", "forms")}
     assert used <= {"contact.errors.InputError"}

@@ -27,7 +27,7 @@ from contact.errors import InputError
 from contact.mesh import grid
 from contact.mesh.domain import Domain
 from contact.mesh.grid import rotate
-from contact.mesh.reader import from_msh, from_recipe
+from contact.mesh.reader import from_generator, from_msh
 from contact.mesh.transfer import refined
 from contact.methods.interrupt import deaf
 from contact.settings import Accepted, Count, Number, Positive
@@ -213,8 +213,8 @@ class Mesh(Section):
         Raises
         ------
         InputError
-            As `rectangle`, `box`, `from_msh` and `from_recipe`, and if the mesh does not fit into
-            the memory.
+            As `rectangle`, `box`, `from_msh` and `from_generator`, and if the mesh does not
+            fit into the memory.
         """
         if self.file is not None:
             domain = from_msh(comm, self.file)
@@ -228,7 +228,7 @@ class Mesh(Section):
         else:
             assert self.generator is not None
             with deaf():
-                domain = from_recipe(comm, self.generator, **self.parameters)
+                domain = from_generator(comm, self.generator, **self.parameters)
         axis = self.axis or (0.0, 1.0, 0.0)
         rotate(domain.mesh, self.rotation, axis if domain.dim == 3 else (0.0, 0.0, 1.0))
         if not self.sides:
@@ -260,8 +260,8 @@ class Mesh(Section):
 
 
 def _check_parameters(name: str, parameters: Mapping[str, Any]) -> None:
-    if name not in meshes.RECIPES:
-        raise fault("generator", name, ", ".join((*grid.SIDES, *meshes.RECIPES)))
+    if name not in meshes.GENERATORS:
+        raise fault("generator", name, ", ".join((*grid.SIDES, *meshes.GENERATORS)))
     accepted = meshes.parameters(name)
     for key, value in parameters.items():
         if key not in accepted:

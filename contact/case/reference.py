@@ -146,8 +146,8 @@ def _generators() -> Iterator[str]:
     yield from ("", "### Parametric mesh generators", "")
     yield "Further values of `generator`, meshed by Gmsh. Their parameters stand in `[mesh]`."
     yield from ("", "| generator | body and parts | parameters and defaults |", "|---|---|---|")
-    for name, recipe in meshes.RECIPES.items():
-        summary = " ".join((inspect.getdoc(recipe) or "").split("\n\n")[0].split())
+    for name, generator in meshes.GENERATORS.items():
+        summary = " ".join((inspect.getdoc(generator) or "").split("\n\n")[0].split())
         defaults = ", ".join(f"`{k} = {v:g}`" for k, v in meshes.parameters(name).items())
         yield f"| `{name}` | {summary} | {defaults} |"
 

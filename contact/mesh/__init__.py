@@ -1,7 +1,7 @@
 """Meshes with names: parts of their boundary and regions of their cells.
 
 `domain`: `Domain`, `from_mesh` for a dolfinx mesh, and `revolved`; `grid`: `rectangle`, `box`,
-their `Piece`; `reader`: `from_msh` for Gmsh files and `from_recipe` for the package `meshes`;
+their `Piece`; `reader`: `from_msh` for Gmsh files and `from_generator` for the package `meshes`;
 `transfer`: `refined` and `carry`; `entities`: facets, connected components.
 
 Imports: `contact.errors`, `contact.typing`, `contact._compat`.

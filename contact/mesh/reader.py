@@ -1,4 +1,4 @@
-"""Meshes from Gmsh: ``.msh`` files and recipes, with physical groups as parts.
+"""Meshes from Gmsh: ``.msh`` files and generators, with physical groups as parts.
 
 Gmsh runs for rank 0 alone. What it finds is checked there, the verdict is broadcast, and
 all ranks go on or raise together.
@@ -136,13 +136,13 @@ def _plain_name(file: Path) -> Iterator[Path]:
         yield plain
 
 
-def from_recipe(comm: MPI.Intracomm, name: str, **parameters: Any) -> Domain:
-    """Build a recipe of the package `meshes`, by name. Collective.
+def from_generator(comm: MPI.Intracomm, name: str, **parameters: Any) -> Domain:
+    """Build a generator of the package `meshes`, by name. Collective.
 
     Raises
     ------
     InputError
-        For an unknown recipe or wrong parameters.
+        For an unknown generator or wrong parameters.
     """
     import meshes
 

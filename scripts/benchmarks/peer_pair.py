@@ -2,7 +2,7 @@
 
 python3 -m scripts.benchmarks.peer_pair [--out DIR] [--coarse]
 
-The meshes of the recipe `two_blocks` for both, P1. GetFEM integrates its augmented Lagrangian at
+The meshes of the generator `two_blocks` for both, P1. GetFEM integrates its augmented Lagrangian at
 Gauss points of the upper block's facets, with continuous multipliers: displacements agree to the
 order of the mesh, not to rounding.
 """
@@ -27,7 +27,7 @@ SIZES = {"lower_size": 0.08, "upper_size": 0.06}
 YOUNG, POISSON = {"upper": 1.0, "lower": 3.0}, 0.3
 TOP = [0.001, -0.012]
 
-#: Numbers of the physical groups of the recipe: bodies, then their parts.
+#: Numbers of the physical groups of the generator: bodies, then their parts.
 BODIES = {"lower": 1, "upper": 2}
 LOWER_BOTTOM, LOWER_TOP, UPPER_BOTTOM, UPPER_TOP = 3, 5, 7, 9
 

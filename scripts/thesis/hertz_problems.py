@@ -101,7 +101,7 @@ def cylinder(
     direction
         Of contact: "foundation" or "body".
     shape
-        Mesh recipe: "quarter_disc", "half_disc" or "disc". The latter two are pressed by a
+        Mesh generator: "quarter_disc", "half_disc" or "disc". The latter two are pressed by a
         platen that they stick to sideways: nothing else holds them there.
     fineness
         Elements on Hertz's half-width.

@@ -70,7 +70,7 @@ def test_the_rest_of_the_keys():
     assert again == case
 
 
-def test_recipes_take_their_parameters_in_the_mesh_section():
+def test_generators_take_their_parameters_in_the_mesh_section():
     case = parse_case(changed(mesh={"generator": "quarter_disc", "contact_size": 0.1}))
     assert case.mesh.parameters == {"contact_size": 0.1}
     assert case.mesh.dimension is None and case.mesh.sides == ()

@@ -60,12 +60,12 @@ BAD = {
         "mesh.parts.loaded.1.to: given 0.3; accepted: positions of the grid on its side (nearest",
     ),
     "part named as a side": ({"mesh__parts__top": {"side": "left"}}, "a name that no side has"),
-    "recipe key": (
+    "generator key": (
         {"mesh": {"generator": "quarter_disc", "radios": 1}},
         "mesh.radios: unknown key, did you mean radius?",
     ),
-    "recipe value": ({"mesh": {"generator": "quarter_disc", "radius": -1}}, "mesh.radius"),
-    "infinite recipe": (
+    "generator value": ({"mesh": {"generator": "quarter_disc", "radius": -1}}, "mesh.radius"),
+    "infinite generator": (
         {"mesh": {"generator": "quarter_disc", "size": float("inf")}},
         "mesh.size: given inf; accepted: a number > 0",
     ),

@@ -59,7 +59,7 @@ FILES = {
         ("cells = [8, 2]", "cells = [800, 200]\nrefine = 10"),
         "mesh.refine: 10 refinements of 3.2e+05 cells, 3.36e+11 cells take more memory",
     ),
-    "nine refinements of a recipe": (
+    "nine refinements of a generator": (
         (
             *(TABLES["mesh"], 'generator = "half_disc"\ncontact_size = 0.05\nrefine = 9'),
             *(f"[mesh.parts.loaded]\n{TABLES['mesh.parts.loaded']}", ""),

@@ -238,7 +238,7 @@ SECTIONS = {
         },
         {**BRICK, "a": 4.0},
     ),
-    "recipe": (
+    "generator": (
         {"generator": "bar", "length": 6.0, "contact_size": 0.2, "size": 0.5},
         {**BAR, "bottom": 6.0, "top": 6.0, "loaded": 4.0},
     ),

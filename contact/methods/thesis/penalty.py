@@ -11,8 +11,8 @@ Convergence. A penalty run solves the penalised problem: it has converged when t
 residual with the forces of the regularised laws at the final displacement is below the
 tolerance (those laws then hold by construction). The residuals `contact` and `friction` of the
 reported KKT are those of the Signorini-Coulomb laws themselves; they measure how far the
-penalised solution is from the limit, and fall like eps. Where they are above `LARGEST_VIOLATION`, what
-has been solved says nothing of contact, and the run has not converged.
+penalised solution is from the limit, and fall like eps. Where they are above
+`LARGEST_VIOLATION`, the solution says nothing of contact, and the run has not converged.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Recipes of meshes: what they make and what they refuse."""
+"""Generators of meshes: what they make and what they refuse."""
 
 import re
 
@@ -11,7 +11,7 @@ from mpi4py import MPI
 
 import meshes
 from contact.errors import InputError
-from contact.mesh.reader import from_msh, from_recipe
+from contact.mesh.reader import from_generator, from_msh
 from meshes import grading
 from meshes.__main__ import main
 from tests.problems.sizes import integral, measures
@@ -38,7 +38,7 @@ def test_a_running_gmsh_is_left_as_it_was():
     if COMM.rank == 0:
         gmsh.initialize(interruptible=False)
         gmsh.model.add("mine")
-    from_recipe(COMM, "bar")
+    from_generator(COMM, "bar")
     if COMM.rank == 0:
         assert gmsh.isInitialized()
         assert gmsh.model.getCurrent() == "mine"
@@ -46,7 +46,7 @@ def test_a_running_gmsh_is_left_as_it_was():
 
 
 ARC = np.pi * 8.0
-RECIPES = {
+GENERATORS = {
     "quarter_disc": (np.pi * 16, {"symmetry": 8.0, "top": 8.0, "contact": ARC / 2}),
     "half_disc": (np.pi * 32, {"top": 16.0, "contact": ARC}),
     "disc": (np.pi * 64, {"contact": ARC, "top": ARC / 3}),
@@ -146,10 +146,10 @@ RECIPES = {
 
 
 @pytest.mark.parallel
-@pytest.mark.parametrize("name", meshes.RECIPES)
-def test_recipes_make_their_parts(name):
-    volume, expected = RECIPES[name]
-    domain = from_recipe(COMM, name)
+@pytest.mark.parametrize("name", meshes.GENERATORS)
+def test_generators_make_their_parts(name):
+    volume, expected = GENERATORS[name]
+    domain = from_generator(COMM, name)
     # Straight sides miss a little of a round body.
     assert measures(domain) == pytest.approx(expected, rel=1e-2)
     assert integral(domain, domain.dx) == pytest.approx(volume, rel=2e-2)
@@ -166,7 +166,7 @@ PLANES = {
 
 
 def test_faces_of_a_block_have_the_right_names():
-    domain = from_recipe(COMM, "block", width=2.0, depth=3.0, size=0.6)
+    domain = from_generator(COMM, "block", width=2.0, depth=3.0, size=0.6)
     nu = ufl.FacetNormal(domain.mesh)
     for name, normal in PLANES.items():
         area = integral(domain, domain.ds(name))
@@ -177,7 +177,7 @@ def test_faces_of_a_block_have_the_right_names():
 @pytest.mark.parametrize("name", ["half_cylinder", "half_space", "sphere"])
 def test_cells_have_positive_volumes(name):
     """As other programs ask for, which read the files that are written."""
-    mesh = from_recipe(COMM, name).mesh
+    mesh = from_generator(COMM, name).mesh
     dim = mesh.topology.dim
     corners = mesh.geometry.x[mesh.geometry.dofmap][..., :dim]
     assert np.linalg.det(corners[:, 1:] - corners[:, :1]).min() > 0
@@ -186,7 +186,7 @@ def test_cells_have_positive_volumes(name):
 @pytest.mark.parametrize("name", ["quarter_disc", "half_disc", "disc", "sphere"])
 def test_nodes_of_round_parts_lie_on_the_circle(name):
     radius = 5.0
-    domain = from_recipe(COMM, name, radius=radius)
+    domain = from_generator(COMM, name, radius=radius)
     centre = np.array([0, 0, radius] if domain.dim == 3 else [0, radius, 0])
     x = vertices_of(domain, "contact")
     assert np.allclose(np.linalg.norm(x - centre, axis=1), radius, rtol=1e-9)
@@ -194,7 +194,7 @@ def test_nodes_of_round_parts_lie_on_the_circle(name):
 
 
 def test_sphere_is_graded_towards_the_contact():
-    domain = from_recipe(COMM, "sphere", contact_size=0.1)
+    domain = from_generator(COMM, "sphere", contact_size=0.1)
     assert nodes(domain) < 30_000
     x = vertices_of(domain, "contact")
     inside = np.count_nonzero(np.linalg.norm(x, axis=1) < 0.88)
@@ -204,7 +204,7 @@ def test_sphere_is_graded_towards_the_contact():
 
 @pytest.mark.parametrize(("half_width", "contact_size"), [(2.72, 0.2), (0.86, 0.07)])
 def test_quarter_disc_resolves_the_hertz_contact(half_width, contact_size):
-    domain = from_recipe(
+    domain = from_generator(
         COMM, "quarter_disc", contact_size=contact_size, contact_width=1.5 * half_width
     )
     x = np.sort(vertices_of(domain, "contact")[:, 0])
@@ -213,19 +213,19 @@ def test_quarter_disc_resolves_the_hertz_contact(half_width, contact_size):
     assert nodes(domain) < 3000
 
 
-@pytest.mark.parametrize("name", meshes.RECIPES)
+@pytest.mark.parametrize("name", meshes.GENERATORS)
 def test_smaller_sizes_give_more_nodes(name):
     sizes = {k: 0.7 * v for k, v in meshes.parameters(name).items() if k.endswith("size")}
-    assert nodes(from_recipe(COMM, name, **sizes)) > nodes(from_recipe(COMM, name))
+    assert nodes(from_generator(COMM, name, **sizes)) > nodes(from_generator(COMM, name))
 
 
 @pytest.mark.parallel
 @pytest.mark.parametrize(
     ("name", "given", "message"),
     [
-        ("quarter_disk", {}, "unknown mesh recipe: 'quarter_disk'; did you mean 'quarter_disc'"),
+        ("quarter_disk", {}, "unknown mesh generator: 'quarter_disk'; did you mean 'quarter_disc'"),
         ("bar", {"lenght": 3.0}, "'lenght'; did you mean 'length'"),
-        ("bar", {"size": -1.0}, "size of the mesh recipe must be a positive number; given: -1"),
+        ("bar", {"size": -1.0}, "size of the mesh generator must be a positive number; given: -1"),
         ("bar", {"size": "fine"}, "must be a positive number; given: fine"),
         ("bar", {"size": float("inf")}, "must be a positive number; given: inf"),
         ("bar", {"contact_size": 1e-8}, r"cells, which .* accepted: sizes that give at most"),
@@ -243,22 +243,22 @@ def test_smaller_sizes_give_more_nodes(name):
         ),
     ],
 )
-def test_wrong_recipes_are_refused(name, given, message):
+def test_wrong_generators_are_refused(name, given, message):
     with pytest.raises(InputError, match=message):
-        from_recipe(COMM, name, **given)
+        from_generator(COMM, name, **given)
 
 
 def test_a_long_meshing_says_so_first(monkeypatch, caplog):
     monkeypatch.setattr(grading, "LONG", 1e-3)
-    from_recipe(COMM, "bar")
+    from_generator(COMM, "bar")
     assert "take Gmsh" in caplog.text
 
 
-@pytest.mark.parametrize("name", RECIPES)
+@pytest.mark.parametrize("name", GENERATORS)
 def test_the_cells_that_are_foreseen_are_too_few_but_not_by_far(name, monkeypatch, caplog):
     """Sizes are refused by that number, and no mesh that fits may be."""
     monkeypatch.setattr(grading, "LONG", 0.0)
-    domain = from_recipe(COMM, name)
+    domain = from_generator(COMM, name)
     foreseen = max(float(count) for count in re.findall(r"ask for some (\S+) cells", caplog.text))
     cells = domain.mesh.topology.index_map(domain.dim).size_global
     assert foreseen < 1.1 * cells  # what is turned loses some at the axis
@@ -282,9 +282,9 @@ def test_command_line_refuses_wrong_sizes(tmp_path, capsys):
 
 def test_spheres_of_two_quarters():
     """Twice as much of all, and one plane of symmetry."""
-    domain = from_recipe(COMM, "two_spheres", quarters=2)
-    _, expected = RECIPES["two_spheres"]
+    domain = from_generator(COMM, "two_spheres", quarters=2)
+    _, expected = GENERATORS["two_spheres"]
     twice = {name: 2 * area for name, area in expected.items() if name != "symmetry_x"}
     assert measures(domain) == pytest.approx(twice, rel=1e-2)
-    with pytest.raises(InputError, match="quarters of the mesh recipe must be 1 or 2; given: 3"):
-        from_recipe(COMM, "two_spheres", quarters=3)
+    with pytest.raises(InputError, match="quarters of the mesh generator must be 1 or 2; given: 3"):
+        from_generator(COMM, "two_spheres", quarters=3)
