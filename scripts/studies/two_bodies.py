@@ -237,11 +237,13 @@ def partial_slip(report: Report, size: float) -> None:
     near = np.abs(x) < 1.3 * a
     fine = np.linspace(-1.3 * a, 1.3 * a, 1001)
     figure, ax = subplots(size=(4.5, 2.8))
-    ax.plot(fine / a, cattaneo(fine, force, share)[2], "k-", lw=0.8, label="Cattaneo, Mindlin")
-    ax.plot(x[near] / a, tau[near], "o", ms=3, label="computed")
-    ax.plot(x[near] / a, bound[near], "--", lw=0.8, label=r"$\mu p$, computed")
+    unit = MU * half_width(force, MODULUS, RELATIVE)[1]
+    exact = cattaneo(fine, force, share)[2]
+    ax.plot(fine / a, exact / unit, "k-", lw=0.8, label="Cattaneo, Mindlin")
+    ax.plot(x[near] / a, tau[near] / unit, "o", ms=3, label="computed")
+    ax.plot(x[near] / a, bound[near] / unit, "--", lw=0.8, label=r"$\mu p$, computed")
     ax.set_xlabel("$x/a$")
-    ax.set_ylabel(r"tangential stress")
+    ax.set_ylabel(r"$\tau/(\mu p_0)$")
     ax.legend()
     report.figure(
         "two-bodies-slip",

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 import ufl
 from dolfinx import fem
+from matplotlib import colormaps
 from matplotlib.figure import Figure
 from matplotlib.ticker import FormatStrFormatter, LogLocator, NullFormatter, NullLocator
 from mpi4py import MPI
@@ -84,9 +85,10 @@ def potentials(
         if table is not None:
             data.setdefault("x", table["x"])
             data[curve.label] = table["phi"]
-            # Thinner from curve to curve: those that coincide are all seen.
-            width = 0.8 + 2.0 * (1 - k / max(len(curves) - 1, 1))
-            axes.plot(table["x"], table["phi"], lw=width, label=curve.label)
+            # Broken in turn: of those that coincide two at least are seen.
+            colour = colormaps["viridis"](0.9 * k / max(len(curves) - 1, 1))
+            dashes = ("-", "--", "-.", ":")[k % 4]
+            axes.plot(table["x"], table["phi"], dashes, color=colour, label=curve.label)
     if MPI.COMM_WORLD.rank > 0:
         return
     axes.set(xlabel=ALONG, ylabel=POTENTIAL)

@@ -24,7 +24,7 @@ HELD, ELECTRODE, LOADED, TOUCHED, FOUNDATION = "#000000", GREEN, ORANGE, BLUE, S
 MOST_CELLS = 20_000
 
 #: Arrows of a load on one part, and strokes along a support.
-ARROWS, STROKES = 12, 40
+ARROWS, STROKES = 12, 30
 
 
 @dataclass(frozen=True)
@@ -140,16 +140,16 @@ def _arrows(ax: Axes, role: Role, middle: Array, reach: float) -> None:
 
 
 def _spread(facets: Array, count: int) -> NDArray[np.intp]:
-    """Return about so many edges of a part, as far from each other on each segment of it."""
+    """Return about so many edges of a part, each in turn the farthest from those before."""
     centre = facets.mean(axis=1)
-    centre = centre[order := np.lexsort(centre.T)]
     apart = np.linalg.norm(facets[:, 1] - facets[:, 0], axis=1).sum() / count
-    chosen: list[np.intp] = []
-    left = np.ones(len(centre), dtype=bool)
-    while left.any():
-        chosen.append(np.argmax(left))
-        left &= np.linalg.norm(centre - centre[chosen[-1]], axis=1) >= (1 - 1e-9) * apart
-    return order[np.asarray(chosen, dtype=np.intp)]
+    chosen, distance = [np.lexsort(centre.T)[0]], np.full(len(centre), np.inf)
+    while True:
+        last = np.linalg.norm(centre - centre[chosen[-1]], axis=1)
+        distance = np.minimum(distance, last)
+        if distance.max() < (1 - 1e-9) * apart:
+            return np.asarray(chosen, dtype=np.intp)
+        chosen.append(np.argmax(distance))
 
 
 def _dimensions(ax: Axes, low: Array, high: Array, units: Units) -> None:
