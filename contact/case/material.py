@@ -49,6 +49,8 @@ Poling: TypeAlias = Annotated[
     one_or_many,
     Accepted("an angle in 2-D, a list of 3 numbers in 3-D"),
 ]
+POSITIVE = "a symmetric, positive definite matrix"
+
 ISOTROPIC = ReadWith("law", ("linear", "log"), required=True)
 CRYSTAL = ReadWith("law", "anisotropic")
 LOG = ReadWith("law", "log")
@@ -109,11 +111,10 @@ class Piezo(Section):
     @model_validator(mode="after")
     def _check(self) -> Self:
         _either_way(self, PIEZO, ("e", "beta"))
-        beta = self.voigt[1]
-        if not np.allclose(beta, beta.T, rtol=1e-10, atol=0):
-            raise fault("beta", self.beta, "a symmetric matrix")
-        if not np.linalg.eigvalsh(beta)[0] > 0:
-            raise fault("beta", self.beta, "a positive definite matrix")
+        try:
+            from_voigt(*self.voigt)
+        except ValueError as error:
+            raise fault("beta", Words(error), POSITIVE) from None
         return self
 
 
@@ -256,8 +257,7 @@ class Material(Section):
             Anisotropic(self.voigt).check()
         except ValueError as error:
             key = "c11" if self.stiffness is None else "stiffness"
-            accepted = "a symmetric, positive definite matrix"
-            raise fault(key, Words(error), accepted) from None
+            raise fault(key, Words(error), POSITIVE) from None
 
     def build(self, dim: int) -> description.Material:
         """Return the material itself in the axes of a body in 2-D or 3-D."""

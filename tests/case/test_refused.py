@@ -127,11 +127,11 @@ BAD = {
     "piezo matrix": ({"material__piezo": {**full, "e": [[0] * 5] * 3}}, "3 rows of 6 numbers"),
     "permittivity asymmetric": (
         {"material__piezo": {**full, "beta": [[1, 1, 0], [0, 1, 0], [0, 0, 1]]}},
-        "a symmetric matrix",
+        "material.piezo.beta: the permittivity beta must be symmetric; accepted: a symmetric",
     ),
     "permittivity indefinite": (
         {"material__piezo": {**full, "beta": [[1, 0, 0], [0, -1, 0], [0, 0, 1]]}},
-        "a positive definite matrix",
+        "the permittivity beta must be positive definite; accepted",
     ),
     "poling in the plane": (
         {"material__piezo": {**PIEZO, "poling": [0, 0, 1]}, "fixed": electrode},

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from contact.case.material import Material, piezo, rotation
+from contact.case.material import Material
 from contact.errors import InputError
 from contact.interface.friction import Friction
 from contact.methods.newton import Newton
@@ -33,7 +33,7 @@ CRYSTAL = SCALED.crystal()
 def crystal_of(dim: int, **changes) -> Piezo:
     constants = {**COUPLING, **PERMITTIVITY, **changes}
     section = Material(young=1.0, poisson=0.3, piezo=constants)
-    made = piezo(section, rotation(section.axis[1], dim))
+    made = section.build(dim).piezo
     assert made is not None
     return made
 

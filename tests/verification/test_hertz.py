@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 pytest.importorskip("gmsh")
-from contact.case.shapes import Sphere
+from contact.interface.obstacle import Sphere
 from contact.methods.options import OPTIONS, with_method
 from scripts.thesis import hertz
 
