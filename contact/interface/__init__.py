@@ -1,4 +1,30 @@
-"""Gamma_3: the contact nodes and their jump, obstacles, layer, current, friction, and their laws.
+"""Gamma_3: the contact nodes and their jump, rigid shapes, mortar coupling, and the laws.
 
-Imports: `contact.body` and what that may import. Every law is stated once, node by node.
+Imports: `contact.body` and the packages above it. Every law is stated once, node by node.
+
+Where to find
+-------------
+complementarity functions, their residuals and generalised derivative
+    `complementarity`, with the parameters c and gamma (`ComplementarityParameters`).
+active set (open, stick, slip)
+    `active_set`: `ActiveSet` and `touching` are its only definition.
+all laws together
+    `interface.Interface`: opening, slip, pressure, friction bound, forces on the body.
+friction
+    `friction`, with the coefficients of `forms.laws`; `smoothing` has the non-local operator R.
+layer and current
+    `law.InterfaceLaw`; `layer` and `current` describe each.
+penalised laws
+    `penalised`.
+jump, contact forces, slip history
+    `jump`; `nodes.ContactNodes` is the jump of both kinds of contact, and holds the lumped surface
+    mass.
+contact nodes
+    in front of a rigid foundation `placing`, of another body `pairing`; of several contacts
+    `entries`.
+mortar coupling
+    `mortar`: `coupling` integrates the dual operator over `segments`, `operator` applies it on all
+    ranks, `lumping` has the areas of nodes, `deviation` the distance of a curve from its chords.
+rigid shapes
+    `obstacle`: `protocol` is the base class of shapes, which `shapes` and `triangles` are.
 """

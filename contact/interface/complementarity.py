@@ -92,7 +92,7 @@ def interface_residuals(
 ) -> tuple[float, float]:
     """Return the relative contact and friction residuals at nodal unknowns. Collective.
 
-    Each piece of the body has its own, relative to what presses it; the largest are returned.
+    Those of each connected component are relative to its pressures; the largest are returned.
 
     Parameters
     ----------
@@ -102,15 +102,15 @@ def interface_residuals(
         Norm of pressures in L2(Gamma_3) that nothing can tell from zero, of each piece: both are
         less it.
     """
-    # What a gap between neighbouring nodes costs is E/h: where a body is that long only because its
+    # A gap between neighbouring nodes costs E/h: where a body is that long only because its
     # cells are stretched, E/size hides errors of the pressure far above the tolerance.
     c = interface.elongation * interface.stiffness
     opening = interface.opening(nodal)
     contact = forces.pressure - project_half_line(forces.pressure - c * opening)
-    # What friction has along the normal is against the law wherever a node sticks or slips.
+    # Friction along the normal violates the law wherever a node sticks or slips.
     trial = interface.jump.tangential_component(forces.friction) + c * interface.slip(nodal)
     friction = forces.friction - project_disc(trial, bound)
-    friction[np.isnan(bound)] = np.nan  # nothing is beyond what is no number
+    friction[np.isnan(bound)] = np.nan  # no comparison with NaN is true
     # Where next to nothing presses, rounding is compared with the stress that closing would take,
     # but not of gaps far wider than nodes move: these say nothing of the loads.
     before = np.linalg.norm(interface.friction.history.jump, axis=1)

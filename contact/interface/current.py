@@ -61,7 +61,7 @@ class Conductor:
 
 @dataclass(frozen=True)
 class Part:
-    """A part of what a law of the potential lets through.
+    """A share of a law of the potential.
 
     Attributes
     ----------
@@ -90,7 +90,7 @@ class HeldCurrent:
     Attributes
     ----------
     jump
-        The nodes: what is seen of them is seen as at contact nodes. No tangential directions.
+        The nodes, as contact nodes. No tangential directions.
     conductor
         The conductive foundation.
     phi_scale

@@ -51,13 +51,13 @@ class Grouped:
         The law of each group.
     bounds
         Where the groups begin on this rank, and the number of all nodes.
-    what
-        What messages call a law that may be the user's own, and fail or return no numbers.
+    label
+        Name in messages of a law that may be the user's own, and fail or return no numbers.
     """
 
     laws: tuple[Any, ...]
     bounds: tuple[int, ...]
-    what: str = ""
+    label: str = ""
 
     @staticmethod
     def bounds_of(sizes: Iterable[int]) -> tuple[int, ...]:
@@ -66,12 +66,12 @@ class Grouped:
 
     def _each(self, name: str, *arguments: Array) -> Array:
         """Return a method of each law at its own nodes."""
-        parts, what = [], self.what
-        if what and name != "__call__":
-            what = f"{what}: {name}"
+        parts, label = [], self.label
+        if label and name != "__call__":
+            label = f"{label}: {name}"
         for law, (begin, end) in zip(self.laws, pairwise(self.bounds), strict=True):
             here = [argument[begin:end] for argument in arguments]
-            with naming(what) if what else nullcontext():
+            with naming(label) if label else nullcontext():
                 values = getattr(law, name)(*here)
                 parts.append(real(values, (end - begin,), "one number for each node"))
         return np.concatenate(parts) if len(parts) > 1 else parts[0]
@@ -161,7 +161,7 @@ class GroupedSmoothing(Grouped):
         return self._each("__call__", values)
 
 
-#: What an obstacle has that has none of these.
+#: Laws of an obstacle without friction, layer or current.
 NO_FRICTION = Coulomb(ConstantCoefficient(0.0))
 NO_LAYER = Layer(0.0, Compliance(np.inf), PotentialFactor(0.0))
 NO_CONDUCTOR = Conductor(PerfectConductivity(0.0), 0.0, Truncation(np.inf))
@@ -178,11 +178,11 @@ class Entry:
     nodes
         Its contact nodes.
     friction, layer, conductor
-        What acts there.
+        The laws there.
     held
         The current through nodes of the part that cannot move; None without.
     coupling
-        What is opposite of the nodes, where that is another body; None for a rigid foundation.
+        The other side of the nodes, where that is another body; None for a rigid foundation.
     mixing
         The jumps in front of a rigid foundation, where these are no nodal values; else None.
     """

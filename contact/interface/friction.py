@@ -17,7 +17,7 @@ from contact.kinds import expect, names_arguments
 from contact.typing import Array
 from forms.laws import ConstantCoefficient, Coulomb, FrictionCoefficient, FrictionLaw, Tresca
 
-#: What is asked of a coefficient, and of a law of friction.
+#: Attributes of a coefficient, and of a law of friction.
 COEFFICIENT = ("maximum", "lipschitz", "__call__", "derivative")
 LAW = ("maximum", "lipschitz", "__call__", "by_slip", "by_pressure")
 
@@ -25,7 +25,7 @@ LAW = ("maximum", "lipschitz", "__call__", "by_slip", "by_pressure")
 @names_arguments
 @dataclass(frozen=True)
 class Friction:
-    """Friction on the contact part: none, or what one of these says, and a radius.
+    """Friction on the contact part: none or one of these, and a radius.
 
     Attributes
     ----------
@@ -55,7 +55,7 @@ class Friction:
     law: FrictionLaw | None = None
 
     def __post_init__(self) -> None:
-        """Make fields of what is given."""
+        """Make fields of the given values."""
         if isinstance(self.coefficient, int | float):
             raise InputError(
                 f"Friction({self.coefficient}): accepted: Friction(mu={self.coefficient}), a "
@@ -102,7 +102,7 @@ class Friction:
             return Coulomb(ConstantCoefficient(mu)) if nodes.maximum(mu) > 0 else None
         if self.coefficient is None:
             return self.law
-        # Ranks without nodes ask too: what is wrong is found by all.
+        # Ranks without nodes ask too: mistakes are found by all.
         rest, words = np.zeros(3), "one number for each slip"
         with on_all_ranks(nodes.comm), naming("Friction: mu"):
             resists = real(self.coefficient(rest), rest.shape, words)
@@ -115,14 +115,14 @@ class Friction:
 
 
 def _at(name: str, given: Given, nodes: ContactNodes) -> Array:
-    """Return what resists at contact nodes. Collective."""
+    """Return a bound or coefficient at contact nodes. Collective."""
     values = values_at(given, nodes.points, 1.0, f"Friction: {name}", nodes.comm)
     _check(name, values, nodes)
     return values
 
 
 def _check(name: str, values: Array, nodes: ContactNodes) -> None:
-    """Refuse what does not resist, on all ranks together. Collective."""
+    """Refuse negative values and NaN, on all ranks together. Collective."""
     bad = values[~((values >= 0) & np.isfinite(values))]
     worst = np.concatenate(nodes.comm.allgather(bad[:1]))
     if worst.size > 0:
@@ -144,7 +144,7 @@ class NodalFriction:
     smoothing
         The operator R.
     history
-        What has slipped before the step.
+        The slip before the step.
     """
 
     law: FrictionLaw | None
@@ -158,11 +158,11 @@ class NodalFriction:
 
     @property
     def local(self) -> bool:
-        """Whether the bound at a node depends on what happens there alone: R = identity."""
+        """Whether the bound at a node depends on the values there alone: R = identity."""
         return self.smoothing.radius == 0
 
     def _all(self, slip: Array) -> Array:
-        """Return what has slipped at the end of a step with this slip, shape (n,)."""
+        """Return the accumulated slip at the end of a step with this slip, shape (n,)."""
         return self.history.accumulated + slip
 
     def bound(self, pressure: Array, slip: Array) -> Array:

@@ -37,7 +37,8 @@ class Interface:
     held
         The current through nodes that cannot move; None without.
     stiffness
-        c = E/size, which weighs displacements against stresses (stress/length); E of what touches.
+        c = E/size, which weighs displacements against stresses (stress/length); E of the regions
+        that touch.
     size
         Largest extent of the body (length).
     elongation
@@ -69,7 +70,7 @@ class Interface:
         return self.jump.dim
 
     def at(self, time: float, history: SlipHistory) -> Interface:
-        """Return the interface of a step that ends at a time and remembers what was before."""
+        """Return the interface of a step that ends at a time with the slip history before it."""
         return replace(
             self,
             law=self.law.at(time),
@@ -107,10 +108,9 @@ class Interface:
         return self.jump.gap - self.jump.normal_component(nodal)
 
     def slip(self, nodal: Array) -> Array:
-        """Return what slips in the step, u_tau less that at its beginning, shape (n, d).
+        """Return the slip of the step, u_tau less that at its beginning, shape (n, d).
 
-        All that friction does looks at this. For a static problem, one step from rest, it is
-        u_tau itself.
+        Friction depends on this alone. For a static problem, one step from zero, it is u_tau.
         """
         return self.jump.tangential_component(nodal[:, : self.dim] - self.friction.history.jump)
 
@@ -185,7 +185,7 @@ class Interface:
             self.held.add_force(residual, x)
 
     def add_current(self, residual: Array, x: Array, change: Array, forces: Multipliers) -> None:
-        """Add what a change of local unknowns does to the current, psi frozen, to owned values."""
+        """Add the change of the current with local unknowns, psi frozen, to owned values."""
         jump, nodal = self.jump, self.jump.apply(x)
         block = self.law.current_block(nodal, self.pressure(nodal, forces))
         density = np.einsum("nij,nj->ni", block, jump.apply(change))

@@ -1,9 +1,9 @@
 """The jump, and the values at the contact nodes that go with it: contact forces and slip history.
 
 All laws of Gamma_3 are written in the jump T x of the unknowns. `Multipliers` are dual to it, and
-`SlipHistory` is the part of it that friction remembers between the steps of an evolution: friction
-acts against the slip since the end of the last step, and a coefficient mu(slip) looks at all slip
-so far. A static problem is one step from rest.
+`SlipHistory` is its history between the steps of an evolution: friction acts against the slip since
+the end of the last step, and a coefficient mu(slip) looks at all slip so far. A static problem is
+one step from zero.
 """
 
 from __future__ import annotations
@@ -96,8 +96,7 @@ class Multipliers:
     def of(jump: Jump, pressure: Array, friction: Array) -> Multipliers:
         """Return contact forces with the tangential part of vectors of shape (n, d).
 
-        All methods hand over theirs by this: what their arithmetic leaves along the normal is no
-        friction.
+        All methods hand over theirs by this: rounding along the normal is no friction.
         """
         return Multipliers(pressure, jump.tangential_component(friction))
 

@@ -107,7 +107,7 @@ class InterfaceLaw:
     def _depth(self, x: Array) -> Array:
         """Return how deep the layer is pressed in: not deeper than to the rigid part.
 
-        An iterate may go beyond; what it then takes belongs to the multiplier alone.
+        An iterate may go beyond; the excess pressure belongs to the multiplier alone.
         """
         return np.minimum(self.jump.normal_component(x), self.constrained.gap) - self.touch
 
@@ -120,7 +120,7 @@ class InterfaceLaw:
     def _conductivity(self, x: Array, pressure: Array) -> Array:
         assert self.conductor is not None
         pressed = self._pressed(x, pressure)
-        # What rounding leaves of a multiplier on an open node is no pressure.
+        # A multiplier of the size of rounding on an open node is no pressure.
         loaded = pressed | (self.layer_pressure(x) > 0)
         return self.conductor.psi.at(self._penetration(x), pressed, loaded)
 

@@ -17,7 +17,7 @@ from contact.typing import Array
 from forms.laws import PenetrationLaw, StiffnessLaw
 from forms.ops import Value
 
-#: What a law of a layer returns.
+#: Values that a law of a layer returns.
 EACH = "one number for each penetration or difference"
 
 
@@ -137,7 +137,7 @@ class NormalLaw:
     def pressure(self, z: Array, r: float) -> Array:
         """Return the total pressure P for which (phi, P) is on the graph and P + r phi = z.
 
-        This is what (3.43) becomes with a layer. The graph rises, so that P is unique for any
+        This is (3.43) with a layer. The graph rises, so that P is unique for any
         r > 0; where p_nu falls, r must exceed its slope.
         """
         low, high = self.touch, np.minimum(self.gap, z / r)

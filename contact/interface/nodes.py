@@ -62,7 +62,7 @@ class ContactNodes:
         How the foundation moves here with the m global unknowns (`contact.body.masters`), which
         are behind those of the nodes, shape (n, block_size, m); None where nothing moves.
     cut
-        Largest depth in the foundation, at rest, of a node on a straight facet of a curved
+        Largest depth in the foundation, undeformed, of a node on a straight facet of a curved
         part; the gap of these nodes is 0 (length).
     deviation
         Largest deviation of a curved surface from its facets that the gaps do not have (length).
@@ -75,8 +75,8 @@ class ContactNodes:
         The operator of jumps that are no nodal values, between bodies and on quadratic triangles;
         None for none.
     held
-        What supports have taken from the contact direction, shape (n, d): times what they
-        prescribe at time 1 it is off the gap. None for nothing.
+        The part of the contact direction that supports have taken, shape (n, d): times the
+        displacement that they prescribe at time 1 it is off the gap. None for nothing.
     """
 
     comm: MPI.Comm
@@ -103,7 +103,7 @@ class ContactNodes:
     def apply(self, x: Array) -> Array:
         """Return the jumps, shape (n, block_size), of a local dof array. Collective.
 
-        In front of a foundation at rest these are the nodal unknowns; they are relative to one
+        In front of a foundation that stays these are the nodal unknowns; they are relative to one
         that moves.
         """
         values = self._nodal(x)
@@ -115,7 +115,7 @@ class ContactNodes:
         return nodal - self.motion @ x[x.size - self.motion.shape[2] :]
 
     def _nodal(self, values: Array) -> Array:
-        """Return a view of what belongs to nodes; the global unknowns are behind that."""
+        """Return a view of the nodal values; the global unknowns are behind them."""
         count = values.size // self.block_size
         return values[: count * self.block_size].reshape(count, self.block_size)
 
@@ -142,7 +142,7 @@ class ContactNodes:
     def tangential_component(self, u: Array) -> Array:
         """Return u_tau in the free tangential directions, shape (n, d).
 
-        What is left along the normal is rounding of u_tau: the projector is applied twice, since
+        Its part along the normal is rounding of u_tau: the projector is applied twice, since
         once leaves that of u, beside which u_tau may be small.
         """
         once = np.einsum("nij,nj->ni", self.tangent, u[:, : self.dim])

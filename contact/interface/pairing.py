@@ -68,28 +68,28 @@ def find_pair(
     distance
         Gap that is added to that between the meshes.
     key
-        What messages call the contact.
+        Name of the contact in messages.
     press
-        Whether the bodies may overlap at rest, and press each other out.
+        Whether the bodies may overlap in the reference configuration, and press each other out.
     friction
         Whether there is friction between them.
 
     Raises
     ------
     InputError
-        If the parts share nodes or overlap, follow what is rigid, do not face each other, no
+        If the parts share nodes or overlap, follow a rigid part, do not face each other, no
         node can move, or supports along the part would take friction off the other side.
     """
-    what = f"{key}.against: {part!r} and {against!r}"
+    label = f"{key}.against: {part!r} and {against!r}"
     slave = surface_of(body.domain, body.space, part)
     master = surface_of(body.domain, body.space, against).gathered(body.comm)
-    coupling = _coupled(body, slave, master, what, part if friction else None)
+    coupling = _coupled(body, slave, master, label, part if friction else None)
     here, local = owned_among(body.layout.index_map, coupling.nodes)
     d = body.dim
     points, normal = body.space.tabulate_dof_coordinates()[local, :d], coupling.normal[here]
     gap, cut = coupling.gap[here], 0.0
     if not press:
-        gap, cut = _apart(here, slave, body, coupling, what)
+        gap, cut = _apart(here, slave, body, coupling, label)
     expect(f"{key}.foundation", distance, "a gap with against", not distance.is_shape)
     _, added = measured(distance, points, normal, body.comm, key)
     check_gap(body.domain, added, key, press)
@@ -117,21 +117,21 @@ def find_pair(
 
 
 def _coupled(
-    body: BodyEquilibrium, slave: Surface, master: Surface, what: str, rough: str | None
+    body: BodyEquilibrium, slave: Surface, master: Surface, label: str, rough: str | None
 ) -> Coupling:
     """Return the operator without slave nodes that carry no multiplier. Collective.
 
     Parameters
     ----------
-    body, slave, master, what
-        The sides, and what messages call them.
+    body, slave, master, label
+        The sides, and their name in messages.
     rough
         The part that the slave side is, if there is friction.
     """
     common = np.intersect1d(slave.nodes, master.nodes).size
     if body.comm.allreduce(common, op=MPI.SUM) > 0:
         raise InputError(
-            f"{what} share nodes; accepted: parts of two bodies whose meshes are apart"
+            f"{label} share nodes; accepted: parts of two bodies whose meshes are apart"
         )
     reach = REACH * body.domain.size
     coupling = couple(slave, master, reach, body.comm)
@@ -139,27 +139,27 @@ def _coupled(
     if rough is not None:
         one_sided = _one_sided(body, coupling)
         one_sided[np.isin(coupling.nodes, stuck)] = False
-        _check_rim(body, slave, rough, [coupling.nodes[lost] for lost in one_sided.T], what)
+        _check_rim(body, slave, rough, [coupling.nodes[lost] for lost in one_sided.T], label)
         stuck = np.union1d(stuck, coupling.nodes[one_sided.any(axis=1)])
     if stuck.size:
         coupling = couple(slave, master, reach, body.comm, stuck)
     if coupling.nodes.size == 0:
         raise InputError(
-            f"{what} have no facets that face each other within {reach:.3g}, or their nodes are "
+            f"{label} have no facets that face each other within {reach:.3g}, or their nodes are "
             "held there; accepted: sides of two bodies that look at each other"
         )
-    _check_apart(body, coupling, what)
+    _check_apart(body, coupling, label)
     return coupling
 
 
-def _check_apart(body: BodyEquilibrium, coupling: Coupling, what: str) -> None:
+def _check_apart(body: BodyEquilibrium, coupling: Coupling, label: str) -> None:
     """Refuse jumps of nodes that follow something rigid or an electrode. Collective."""
     sides = (coupling.slaves, coupling.own), (coupling.masters, coupling.other)
     taking = np.concatenate([every[abs(part).sum(axis=0) > 0] for every, part in sides])
     _, local = owned_among(body.layout.index_map, taking)
     if body.comm.allreduce(bool(body.masters.tied[local].any()), op=MPI.LOR):
         raise InputError(
-            f"{what}: their nodes follow a rigid part or an electrode of unknown potential; "
+            f"{label}: their nodes follow a rigid part or an electrode of unknown potential; "
             "accepted: parts that end before these"
         )
 
@@ -185,14 +185,14 @@ def _one_sided(body: BodyEquilibrium, coupling: Coupling) -> NDArray[np.bool_]:
 
 
 def _check_rim(
-    body: BodyEquilibrium, slave: Surface, part: str, lost: list[NDArray[np.int64]], what: str
+    body: BodyEquilibrium, slave: Surface, part: str, lost: list[NDArray[np.int64]], label: str
 ) -> None:
     """Refuse supports that hold facets, not only a rim, where the other side is free. Collective.
 
     Parameters
     ----------
-    body, slave, part, what
-        The slave side, and what messages call the contact.
+    body, slave, part, label
+        The slave side, and the name of the contact in messages.
     lost
         Its nodes where a component is fixed, but free on the other side, for each of them.
     """
@@ -204,18 +204,18 @@ def _check_rim(
                 filled |= bool((held & np.isin(slave.nodes, nodes).all(axis=1)).any())
     if body.comm.allreduce(filled, op=MPI.LOR):
         raise InputError(
-            f"{what}: supports hold the first along its surface, where friction would pull at "
+            f"{label}: supports hold the first along its surface, where friction would pull at "
             "the second; accepted: on and against exchanged, supports on its rim, no friction"
         )
 
 
 def _apart(
-    here: NDArray[np.intp], slave: Surface, body: BodyEquilibrium, coupling: Coupling, what: str
+    here: NDArray[np.intp], slave: Surface, body: BodyEquilibrium, coupling: Coupling, label: str
 ) -> tuple[Array, float]:
     """Refuse bodies that overlap; return gaps without depths, and the largest depth. Collective.
 
-    Facets are chords of what is curved: those of two sides that lie on each other cut each other
-    by h^2/8 times the difference of the curvatures. That is taken off; what is negative between
+    Facets are chords of a curved surface: those of two sides that lie on each other cut each other
+    by h^2/8 times the difference of the curvatures. That is taken off; a negative gap between
     sides that are apart remains, as in front of foundations, for the mean of a gap that touches 0
     within a facet is.
     """
@@ -227,11 +227,11 @@ def _apart(
         return np.maximum(gap, least), cut if cut > 1e-5 * body.domain.size else 0.0
     if _connected(body, coupling):
         raise InputError(
-            f"{what} are sides of one body that look away from each other; accepted: parts of two "
+            f"{label} are sides of one body that look away from each other; accepted: parts of two "
             "bodies whose meshes are apart"
         )
     raise InputError(
-        f"{what}: the bodies overlap at rest, by up to {cut:.3g}; accepted: meshes that are "
+        f"{label}: the bodies overlap at rest, by up to {cut:.3g}; accepted: meshes that are "
         "apart or touch, but for what straight facets take off a curve"
     )
 

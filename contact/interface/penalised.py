@@ -108,7 +108,7 @@ class Lagged:
 class Implicit:
     """The laws of (4.3) themselves.
 
-    With a smoothing radius > 0 the derivative leaves out what the smoothed pressure adds: it
+    With a smoothing radius > 0 the derivative leaves out the terms of the smoothed pressure: they
     would couple the nodes.
     """
 

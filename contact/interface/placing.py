@@ -145,12 +145,12 @@ def _place(
     gap: Array,
     press: bool,
 ) -> tuple[Array, float]:
-    """Refuse a foundation behind or around the contact part, or one that the body cuts at rest.
+    """Refuse a foundation behind or around the contact part, or one that the body cuts already.
 
     Nodes that face away are not looked at: all of a disc may be the contact part. Nodes on
     straight facets of a curved part may lie in a ball that the facets' corners touch: they
     would be on its surface if the facets were curved, and their gap is 0. Where the foundation
-    is to press on the body at rest, gaps are what they are.
+    is to press on the body from the beginning, gaps are left as they are.
 
     Returns
     -------
@@ -192,7 +192,7 @@ def _refuse_within(
 ) -> None:
     """Refuse nodes in a shape from which the contact direction leads on through it. Collective.
 
-    It then meets a far side, or nothing, and what touches would seem to be free.
+    It then meets a far side, or nothing, and nodes that touch would seem to be free.
     """
     if not isinstance(obstacle, Shape):
         return
@@ -230,24 +230,24 @@ def find_nodes(
 
     A node whose contact direction is fixed by a Dirichlet condition, or that follows a rigid part,
     is left out; a fixed tangential component is removed from its tangent projector. On a symmetry
-    line the direction is turned into the free components, and what the fixed ones contribute to
+    line the direction is turned into the free components, and the contribution of the fixed ones to
     u_nu is taken off the gap. So it is with a foundation that moves.
 
     Parameters
     ----------
     body, part, obstacle
-        Whose nodes, and what they may touch.
+        Whose nodes, and the obstacle in front of them.
     key
-        What messages call the contact.
+        Name of the contact in messages.
     press
-        Whether a shape may cut the body at rest.
+        Whether a shape may cut the body in the reference configuration.
 
     Raises
     ------
     InputError
         If no contact node is left on any rank, none sees the foundation, one has no contact
         direction or a gap that is no number, or the foundation lies behind the contact part or
-        cuts the body at rest.
+        cuts the body in the reference configuration.
     """
     domain, space, d = body.domain, body.space, body.dim
     found = candidates(domain, space, part)
@@ -319,15 +319,16 @@ def _motion(
     body, part, points
         The body, and the contact nodes of its part.
     direction
-        What is left of the contact direction, of length 1, shape (n, d).
+        The admissible part of the contact direction, of length 1, shape (n, d).
     supports
-        Components that no support holds, and what they have taken from the direction, (n, d).
+        Components that no support holds, and the part of the direction that supports have
+        taken, (n, d).
     """
     masters, (free, held) = body.masters, supports
     motion, member = masters.still(len(points), body.block_size), masters.member(part)
     if motion is not None and member is not None:
         own, d = member.motion(points, body.block_size), body.dim
-        # Along the supports nothing is seen of it but what closes the gap.
+        # Along the supports the motion counts as far as it closes the gap.
         towards = np.einsum("ni,nik->nk", held, own[:, :d])
         own[:, :d] *= free[:, :, None]
         own[:, :d] += direction[:, :, None] * towards[:, None, :]

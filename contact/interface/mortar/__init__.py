@@ -1,4 +1,5 @@
-"""Two surfaces that face each other, integrated exactly piece by piece: the dual mortar method.
+"""Dual mortar method: two surfaces that face each other, integrated exactly on their segments.
 
-Nothing here but NumPy arrays of facets; `surface` alone knows the mesh that they come from.
+Nothing here but NumPy arrays of facets; `surface` knows the mesh that they come from, `operator`
+the ranks.
 """

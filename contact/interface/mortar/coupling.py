@@ -1,8 +1,8 @@
 """The dual mortar operator of two surfaces: jump, weights, normals and gaps at the slave nodes.
 
 The multiplier is sum_j lambda_j Phi_j with functions Phi_j that are dual to the slave's,
-int Phi_j N~_k = delta_jk int N~_k over what of the slave faces the master. The jump at the slave
-node j is then
+int Phi_j N~_k = delta_jk int N~_k over the part of the slave that faces the master. The jump at
+the slave node j is then
 
     j_j = (S u)_j - sum_l P_jl u_l,     P_jl = int Phi_j (N_l o Pi) / int N~_j,
 
@@ -15,7 +15,7 @@ carry no multiplier, their functions are handed over to others.
 References
 ----------
 Wohlmuth, SIAM J. Numer. Anal. 38 (2000) 989 (dual basis); Popp, Gitterle, Gee and Wall, Int. J.
-Numer. Methods Engrg. 83 (2010) 1428 (segments in space); Cichosz and Bischoff, Comput. Methods
+Numer. Methods Engrg. 83 (2010) 1428 (segments in 3-D); Cichosz and Bischoff, Comput. Methods
 Appl. Mech. Engrg. 200 (2011) 1317 (partly covered facets).
 """
 
@@ -94,7 +94,7 @@ class Heirs:
 
 @dataclass(frozen=True)
 class Parts:
-    """What the facets of a rank add, by facet and function.
+    """Contributions of the facets of a rank, by facet and function.
 
     Attributes
     ----------
@@ -103,7 +103,7 @@ class Parts:
     heirs
         Those of the nodes whose functions Phi these are, shape (f, k).
     own
-        int Phi_i N~_j over what faces the master, shape (f, k, k).
+        int Phi_i N~_j over the part that faces the master, shape (f, k, k).
     whole
         int Phi_i over all of the facet, shape (f, k).
     normal
@@ -132,7 +132,7 @@ class Parts:
 
 
 def integrate(slave: Surface, master: Surface, reach: float, heirs: Heirs) -> Parts:
-    """Integrate the dual functions of slave facets, alone and with what they face.
+    """Integrate the dual functions of slave facets, alone and with the facets opposite.
 
     Parameters
     ----------
@@ -185,7 +185,7 @@ def _functions(points: Points, slave: Surface, change: Array) -> Array:
 
 
 def _dual(slave: Surface, found: Sequence[Points], change: Array) -> tuple[Array, Array]:
-    """Return C of the dual functions Phi = C N~, (f, k, k), and int N~ over what faces, (f, k)."""
+    """Return C of the dual functions Phi = C N~, (f, k, k), and int N~ where they face, (f, k)."""
     k = change.shape[0]
     mass, weight = np.zeros((slave.count, k, k)), np.zeros((slave.count, k))
     for points in found:
@@ -199,7 +199,7 @@ def _dual(slave: Surface, found: Sequence[Points], change: Array) -> tuple[Array
 
 
 def _middle(slave: Surface, master: Surface, found: Sequence[Points]) -> Array:
-    """Return directions between the normals of slave facets and of what they face, shape (f, d).
+    """Return directions between the normals of slave facets and of those opposite, shape (f, d).
 
     Along them two curved sides see each other alike, whichever of them is the slave: the normals
     of one alone would turn some of the closing of the gap into slip.
@@ -254,14 +254,14 @@ class Coupling:
     nodes
         Global numbers of the slave nodes, shape (n,).
     weight
-        int Phi_j over what faces the master, int N~_j, shape (n,) (length^(d - 1)).
+        int Phi_j over the part that faces the master, int N~_j, shape (n,) (length^(d - 1)).
     normal
         Unit vectors from the slave to the master, between their normals, shape (n, d).
     gap
         Mean distance along them, shape (n,) (length).
     apart
-        What it would be if the sides did not cut each other, shape (n,). It may be negative too:
-        means are taken with functions that change their sign.
+        The gap as it would be if the sides did not cut each other, shape (n,). It may be negative
+        too: means are taken with functions that change their sign.
     covered
         Share of int N~_j that faces the master, shape (n,).
     slaves

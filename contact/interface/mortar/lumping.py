@@ -84,13 +84,13 @@ class Mixing:
 
     @property
     def other(self) -> sparse.csr_array:
-        """What these do to the jumps, shape (n, 0)."""
+        """Their share of the jumps, shape (n, 0)."""
         return sparse.csr_array((self.nodes.size, 0))
 
     def apply(self, comm: MPI.Intracomm, numbers: NDArray[np.int64], values: Array) -> Array:
         """Return S times nodal values of owned nodes, shape (k, m). Collective.
 
-        What is made of infinite values is no number.
+        Jumps made of infinite values are NaN.
 
         Parameters
         ----------

@@ -105,7 +105,7 @@ class CouplingOperator:
         return np.asarray(self._here @ values)
 
     def transpose(self, nodal: Array, into: Array) -> None:
-        """Add what vectors at `places` are to owned nodes, (nodes, k). Collective."""
+        """Add the transpose of vectors at `places` to owned nodes, (nodes, k). Collective."""
         forces = np.asarray(self._here.T @ nodal)
         self.comm.Allreduce(MPI.IN_PLACE, forces, op=MPI.SUM)
         into[self.local] += forces[self.here]

@@ -1,4 +1,4 @@
-"""Segments of the mortar integration: pairs of facets, what they have in common, its quadrature.
+"""Segments of the mortar integration: pairs of facets, their intersections, and quadrature there.
 
 A master facet is projected onto the line or plane of a slave facet, along a direction that each
 slave facet has. Both have in common a segment or a convex polygon, on which all integrands are
@@ -62,7 +62,7 @@ def facing_pairs(
         yield i[keep], j[keep]
 
 
-#: Corners of what two triangles can have in common.
+#: Corners of the intersection of two triangles, at most.
 MOST = 6
 
 
@@ -91,7 +91,7 @@ def clipped(triangles: Array) -> tuple[Array, NDArray[np.intp]]:
 
 
 def _cut(polygon: Array, count: NDArray[np.intp], side: int) -> tuple[Array, NDArray[np.intp]]:
-    """Keep what of each polygon has a coordinate >= 0."""
+    """Keep the part of each polygon where a coordinate is >= 0."""
     n, most, _ = polygon.shape
     present = np.arange(most)[None, :] < count[:, None]
     following = np.where(
@@ -115,7 +115,7 @@ def _cut(polygon: Array, count: NDArray[np.intp], side: int) -> tuple[Array, NDA
     return kept, left
 
 
-#: Pieces smaller than this share of the slave facet are rounding.
+#: Segments smaller than this share of the slave facet are rounding.
 SMALLEST = 1e-12
 
 
@@ -150,7 +150,7 @@ def common_points(
     direction: Array,
     degree: int,
 ) -> Points:
-    """Return quadrature points on what pairs of facets have in common.
+    """Return quadrature points on the intersections of pairs of facets.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""What an obstacle is to the contact nodes, what shapes share, and a gap that is given."""
+"""Obstacles as the contact nodes see them: the base class of shapes, and given gaps."""
 
 from __future__ import annotations
 
@@ -36,9 +36,9 @@ class Obstacle(Protocol):
 
     @property
     def is_shape(self) -> bool:
-        """Whether the gaps are those of a body in space, which the mesh must not cut at rest.
+        """Whether the gaps are those of a rigid body, which the undeformed mesh must not cut.
 
-        Gaps that are given as such are what was asked for.
+        Gaps that are given as such may be negative.
         """
 
     def chord_depth(self, length: float, points: Array) -> float:
@@ -66,7 +66,7 @@ class Obstacle(Protocol):
 
 @dataclass(frozen=True, kw_only=True)
 class Shape(ABC):
-    """What shapes share: the contact direction, and gaps along rays.
+    """Base class of shapes: the contact direction, and gaps along rays.
 
     Attributes
     ----------
@@ -130,7 +130,7 @@ class Shape(ABC):
         """Return how deep straight facets reach into the obstacle that their corners touch.
 
         As far as the distance rises from the nodes along the surface, up to the corners: a ball
-        has its sagitta. What is known in closed form says it without the nodes.
+        has its sagitta. Closed forms need no nodes.
         """
         if len(points) == 0:
             return 0.0
@@ -191,7 +191,7 @@ def trace(distance: Callable[[Array], tuple[Array, Array]], points: Array, rays:
         done = towards & (np.abs(move) <= 1e-13 * np.maximum(size, np.abs(value)))
         at[left] += move
         found[left[done]] = at[left[done]]
-        # What is outside and moves away for good is lost.
+        # A ray that is outside and moves away for good is lost.
         gone = ~done & ~(np.abs(at[left]) <= reach[left])
         left = left[~done & ~gone]
         if left.size == 0:
@@ -278,21 +278,21 @@ def measured(
     obstacle, points, normal
         As in `Obstacle.measure`.
     comm, key
-        Who asks together, and what messages call the contact.
+        The ranks that ask together, and the name of the contact in messages.
 
     Raises
     ------
     InputError
         On all ranks, if the obstacle is none in this space, or a function of it fails on one.
     """
-    what = f"{key}.{'foundation' if obstacle.is_shape else 'gap'}"
+    label = f"{key}.{'foundation' if obstacle.is_shape else 'gap'}"
     if isinstance(obstacle, Shape):
         try:
             obstacle.check(points.shape[1])
         except InputError as error:
-            raise InputError(f"{what}: {error}") from None
-    with on_all_ranks(comm), naming(what):
+            raise InputError(f"{label}: {error}") from None
+    with on_all_ranks(comm), naming(label):
         direction, gap = obstacle.measure(points, normal)
-        # What is no number is refused by those who know whether it is needed.
+        # NaN is refused by those who know whether the value is needed.
         accepted = "a direction and a gap for each of the points"
         return real(direction, points.shape, accepted), real(gap, points.shape[:1], accepted)

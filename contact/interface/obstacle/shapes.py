@@ -315,7 +315,7 @@ class Level(Shape):
     function: Callable[[Array], Array]
 
     def __post_init__(self) -> None:
-        """Refuse what is no function."""
+        """Refuse an object that is no function."""
         super().__post_init__()
         words = "a function of points of shape (n, d)"
         expect("Level: function", self.function, words, callable(self.function))
@@ -335,7 +335,7 @@ class Level(Shape):
 
     def _values(self, points: Array) -> Array:
         count, d = points.shape
-        # A rank without points asks too: what is wrong is found by all.
+        # A rank without points asks too: mistakes are found by all.
         asked = points if count > 0 else np.zeros((d + 1, d))
         words = f"one number for each of the points, an array of shape {asked.shape}"
         return real(self.function(asked), asked.shape[:1], words)[:count]

@@ -115,7 +115,7 @@ class Triangles(Shape):
                 beyond[chunk] = far[:, -1]
                 row, column = np.nonzero(far - radius[near] < best[chosen, None])
                 at, tried = chosen[row], near[row, column]
-                where, what = _nearest_points(points[at], self.corners[tried])
+                where, kind = _nearest_points(points[at], self.corners[tried])
                 length = np.linalg.norm(points[at] - where, axis=1)
                 # The nearest of each point comes first; a later one has to be nearer still.
                 order = np.lexsort((length, at))
@@ -123,7 +123,7 @@ class Triangles(Shape):
                 order = order[length[order] < best[at[order]]]
                 to = at[order]
                 best[to], triangle[to] = length[order], tried[order]
-                nearest[to], feature[to] = where[order], what[order]
+                nearest[to], feature[to] = where[order], kind[order]
             left = left[beyond < best[left] + radius.max()] if k < count else left[:0]
             seen, k = k, min(2 * k, count)
         return triangle, nearest, feature
