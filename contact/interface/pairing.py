@@ -97,8 +97,8 @@ def find_pair(
     admissible = normal * moves
     length = np.linalg.norm(admissible, axis=1)
     direction = admissible / length[:, None]
-    levels = body.domain.levels
-    unknown = max(side.unknown_deviation(levels) for side in (slave, master))
+    sides = (side.largest_deviation for side in (slave, master) if not side.follows)
+    unknown = max(sides, default=0.0)
     nodes = ContactNodes(
         body.comm,
         local,

@@ -38,7 +38,7 @@ class Candidates:
         Points of the curved surface in front of the nodes, shape (n, d) (length): nodes in the
         middle of straight edges are on chords, and gaps to a shape are measured from the surface.
     deviation
-        As in `ContactNodes`, in front of a shape.
+        Largest deviation of the curved surface from the facets (length).
     numbers
         Global numbers of the nodes, shape (n,).
     mixing
@@ -82,8 +82,6 @@ def candidates(domain: Domain, space: fem.FunctionSpace, part: str) -> Candidate
     """Collect the nodes of a boundary part whose area is not zero. Collective."""
     facets = surface_of(domain, space, part).gathered(domain.comm)
     lumped = Lumping.of(facets)
-    # Vertices are on the curved surface, unless they are in the middle of refined edges.
-    deviation = facets.unknown_deviation(domain.levels) if domain.levels > 0 else 0.0
     # Nodes whose function has no mean on Gamma_3 carry none: P2 vertices of edges where they meet
     # the axis of a body of revolution.
     heavy = lumped.weight > 1e-9 * lumped.weight.sum() / max(lumped.weight.size, 1)
@@ -100,7 +98,7 @@ def candidates(domain: Domain, space: fem.FunctionSpace, part: str) -> Candidate
         weight,
         normal,
         surface,
-        deviation,
+        facets.largest_deviation,
         numbers,
         lumped.mixing,
     )
@@ -111,20 +109,6 @@ def _corners(space: fem.FunctionSpace) -> NDArray[np.int32]:
     layout, cells = space.dofmap.dof_layout, space.dofmap.list
     corners = [layout.entity_dofs(0, i) for i in range(space.mesh.topology.dim + 1)]
     return np.unique(cells[:, np.concatenate(corners)])
-
-
-def _chord_depth(domain: Domain, part: str, obstacle: Obstacle, points: Array) -> float:
-    """Return how deep nodes on straight facets of a curved part may lie in the obstacle.
-
-    `points` are those of this rank that do.
-    """
-    facets = domain.facets(part)
-    longest = np.max(domain.mesh.h(domain.dim - 1, facets), initial=0.0) if facets.size else 0.0
-    length = 2**domain.levels * float(domain.comm.allreduce(longest, op=MPI.MAX))
-    # The contact direction may be the body's, a little aside.
-    with on_all_ranks(domain.comm), naming("foundation"):
-        depth = obstacle.chord_depth(length, points)
-    return 1.1 * float(domain.comm.allreduce(depth, op=MPI.MAX))
 
 
 @contextmanager
@@ -139,7 +123,7 @@ def _naming(key: str) -> Iterator[None]:
 def _place(
     domain: Domain,
     space: fem.FunctionSpace,
-    contact: tuple[str, Obstacle],
+    obstacle: Obstacle,
     found: Candidates,
     direction: Array,
     gap: Array,
@@ -148,8 +132,8 @@ def _place(
     """Refuse a foundation behind or around the contact part, or one that the body cuts already.
 
     Nodes that face away are not looked at: all of a disc may be the contact part. Nodes on
-    straight facets of a curved part may lie in a ball that the facets' corners touch: they
-    would be on its surface if the facets were curved, and their gap is 0. Where the foundation
+    straight facets of a curved part may lie in a ball that the facets' corners touch, by
+    the deviation of the curve from these, and their gap is 0. Where the foundation
     is to press on the body from the beginning, gaps are left as they are.
 
     Returns
@@ -167,12 +151,13 @@ def _place(
             "of it, or inside = true for a body within"
         )
     rounding = 1e-5 * domain.size  # that of mesh files
-    _refuse_within(domain, contact[1], found.surface[facing > 0], gap[facing > 0], rounding)
+    _refuse_within(domain, obstacle, found.surface[facing > 0], gap[facing > 0], rounding)
     if press:
         return gap, 0.0
     tolerance = np.full_like(gap, rounding)
     depth = np.where(facing > 0, -gap, 0.0)
-    chord = max(rounding, _chord_depth(domain, *contact, found.surface[depth > rounding]))
+    # The contact direction may be the body's, a little aside.
+    chord = max(rounding, 1.1 * found.deviation)
     if domain.levels > 0:
         tolerance[:] = chord
     elif space.ufl_element().embedded_superdegree > 1:
@@ -262,7 +247,7 @@ def find_nodes(
     cut = 0.0
     if obstacle.is_shape:
         with _naming(key):
-            gap, cut = _place(domain, space, (part, obstacle), found, direction, gap, press)
+            gap, cut = _place(domain, space, obstacle, found, direction, gap, press)
     else:
         check_gap(domain, gap, key, press)
     free = body.free[nodes, :d]
@@ -293,7 +278,7 @@ def find_nodes(
         gap,
         space.dofmap.index_map_bs,
         cut if cut > 1e-5 * domain.size else 0.0,
-        found.deviation if obstacle.is_shape else 0.0,
+        found.deviation if obstacle.is_shape and domain.levels > 0 else 0.0,
         domain.revolved,
         _motion(body, part, points, direction, (free, held)),
         held=held,

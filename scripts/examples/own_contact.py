@@ -53,10 +53,6 @@ class Waves:
     direction = "foundation"
     is_shape = True
 
-    def chord_depth(self, length: float, points: np.ndarray) -> float:
-        """Return how deep edges of a length reach into a crest between their ends."""
-        return self.depth * (np.pi * length / self.length) ** 2 / 2
-
     def measure(self, points: np.ndarray, body_normal: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return directions into the foundation, shape (n, d), and the gaps along them."""
         top = -self.depth * (1 - np.cos(2 * np.pi * points[:, 0] / self.length))

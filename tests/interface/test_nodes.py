@@ -194,11 +194,3 @@ def test_straight_facets_around_a_circle_touch_it(degree, levels, direction, sha
 def test_a_circle_larger_than_its_hole_is_refused(degree, levels, shape):
     with pytest.raises(InputError, match="cuts it at rest"):
         around_a_circle(1.01, degree, levels, shape=shape)
-
-
-def test_chords_do_not_reach_into_a_sphere_around_the_body():
-    none, solid = np.zeros((0, 2)), np.zeros((0, 3))
-    assert Sphere((0.0, 0.0), 1.0).chord_depth(0.2, none) == pytest.approx(1 - np.sqrt(1 - 0.01))
-    ball = Sphere((0.0, 0.0, 0.0), 1.0)
-    assert ball.chord_depth(0.3, solid) == pytest.approx(1 - np.sqrt(1 - 0.03))
-    assert Sphere((0.0, 0.0), 1.0, inside=True).chord_depth(0.2, none) == 0.0

@@ -14,7 +14,6 @@ from contact.body.description import Body, Fixed
 from contact.errors import InputError
 from contact.interface.obstacle import (
     Level,
-    Sphere,
     Triangles,
 )
 from contact.interface.obstacle.triangles import read_stl
@@ -49,21 +48,6 @@ def test_a_surface_of_triangles_is_second_order():
         surface = points - distance[:, None] * normal
         assert np.abs(np.linalg.norm(surface, axis=1) - 1).max() < (2 / n) ** 2
     assert np.log2(errors[0] / errors[2]) / 2 == pytest.approx(2, abs=0.15)
-
-
-def test_surfaces_and_formulas_reach_into_facets_as_deep_as_the_ball():
-    points = np.random.default_rng(3).normal(size=(50, 3))
-    points /= np.linalg.norm(points, axis=1)[:, None] * 1.001
-    known = Sphere((0.0, 0.0, 0.0), 1.0).chord_depth(0.3, points)
-    formula = Level(lambda x: x[:, 0] ** 2 + x[:, 1] ** 2 + x[:, 2] ** 2 - 1)
-    assert Triangles(ball(40)).chord_depth(0.3, points) == pytest.approx(known, rel=0.1)
-    exact = Level(lambda x: np.linalg.norm(x, axis=1) - 1)
-    assert exact.chord_depth(0.3, points) == pytest.approx(known, rel=0.02)
-    # A distance that is not quite one says it nearly.
-    assert formula.chord_depth(0.3, points) == pytest.approx(known, rel=0.1)
-    room = Level(lambda x: 1 - np.linalg.norm(x, axis=1))
-    assert room.chord_depth(0.3, points) == 0.0
-    assert room.chord_depth(0.3, points[:0]) == 0.0
 
 
 def test_signs_at_edges_and_corners():

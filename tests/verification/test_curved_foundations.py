@@ -70,4 +70,4 @@ def test_refined_chords_are_warned_of(levels):
     found = warnings(solve(problem))
     assert len(found) == levels
     if found:
-        assert "by up to 0.0012 " in found[0]
+        assert "by up to 0.00119 " in found[0]

@@ -42,7 +42,11 @@ def pairs_of(corners: int) -> list[tuple[int, int]]:
 
 
 def deviations(
-    names: NDArray[np.int64], corners: Array, normal: Array, comm: MPI.Intracomm
+    names: NDArray[np.int64],
+    corners: Array,
+    normal: Array,
+    comm: MPI.Intracomm,
+    levels: int = 0,
 ) -> Array:
     """Return c of the edges of each facet, positive outwards, shape (f, edges). Collective.
 
@@ -54,16 +58,19 @@ def deviations(
         Their coordinates, shape (f, d, d), and the facets' normals, shape (f, d).
     comm
         Communicator; the facets are those of this rank.
+    levels
+        How often straight edges have been cut in two: c is then that of the edges at first, beside
+        those of their ends at which the polygon turns.
     """
     counts = comm.allgather(len(names))
     names, corners, normal = (
         np.concatenate(comm.allgather(array)) for array in (names, corners, normal)
     )
     first = sum(counts[: comm.rank])
-    return _deviations(names, corners, normal)[first : first + counts[comm.rank]]
+    return _deviations(names, corners, normal, levels)[first : first + counts[comm.rank]]
 
 
-def _deviations(names: NDArray[np.int64], corners: Array, normal: Array) -> Array:
+def _deviations(names: NDArray[np.int64], corners: Array, normal: Array, levels: int) -> Array:
     """Return them, given all facets."""
     vertices, place = np.unique(names, return_inverse=True)
     place = place.reshape(names.shape)
@@ -85,7 +92,14 @@ def _deviations(names: NDArray[np.int64], corners: Array, normal: Array) -> Arra
     sure = np.zeros(found.shape, dtype=bool)
     for k, (i, j) in enumerate(edges):
         ends = place[:, [i, j]]
-        found[:, k] = _between(points, curvature, pairs, ends, known)
+        edge = points[ends[:, 1]] - points[ends[:, 0]]
+        value = np.where(known[ends], _sagitta(edge[:, None], curvature[ends]), 0.0)
+        if levels == 0:
+            found[:, k] = _between(points, curvature, pairs, ends, known, edge, value)
+        else:
+            # All of the turn of the first edges is at their ends.
+            larger = np.argmax(np.abs(value), axis=1)[:, None]
+            found[:, k] = 2.0**levels * np.take_along_axis(value, larger, axis=1)[:, 0]
         sure[:, k] = known[ends].any(axis=1)
     return np.where(sure, found, _likewise(found, sure, corners, edges))
 
@@ -147,15 +161,19 @@ def _curvatures(points: Array, normal: Array, pairs: Numbers, weight: Array) -> 
 
 
 def _between(
-    points: Array, curvature: Array, pairs: Numbers, ends: Numbers, known: NDArray[np.bool_]
+    points: Array,
+    curvature: Array,
+    pairs: Numbers,
+    ends: Numbers,
+    known: NDArray[np.bool_],
+    edge: Array,
+    value: Array,
 ) -> Array:
-    """Return c of edges between two vertices each, shape (e,).
+    """Return c of edges between two vertices each, given that of each end, shape (e,).
 
     Where the curvature jumps, as from a side to a rounded edge, the end counts beyond which it
     stays as it is.
     """
-    edge = points[ends[:, 1]] - points[ends[:, 0]]
-    value = np.where(known[ends], _sagitta(edge[:, None], curvature[ends]), 0.0)
     largest = np.abs(value).max(axis=1)
     largest[largest == 0] = 1.0
     begin = np.searchsorted(pairs[0], np.arange(len(points) + 1))

@@ -37,6 +37,8 @@ class Surface:
         Of the space.
     revolved
         Whether the facets stand for the rings through them, about the axis x = 0.
+    refined
+        Whether straight edges have been cut in two since the mesh met a curved boundary.
     """
 
     nodes: NDArray[np.int64]
@@ -45,6 +47,7 @@ class Surface:
     deviation: Array
     degree: int
     revolved: bool = False
+    refined: bool = False
 
     @property
     def count(self) -> int:
@@ -67,32 +70,35 @@ class Surface:
         arrays: dict[str, Any] = {
             f.name: np.concatenate(comm.allgather(getattr(self, f.name)))
             for f in fields(self)
-            if f.name not in ("degree", "revolved")
+            if f.name not in ("degree", "revolved", "refined")
         }
         return replace(self, **arrays)
 
-    def unknown_deviation(self, levels: int) -> float:
-        """Return the largest one (length) that gaps do not have, on this rank.
+    @property
+    def largest_deviation(self) -> float:
+        """The largest deviation (length), on this rank."""
+        return float(np.abs(self.deviation).max(initial=0.0)) / 4
 
-        Parameters
-        ----------
-        levels
-            How often straight edges have been cut in two: their parts lie on the same chord.
+    @property
+    def follows(self) -> bool:
+        """Whether gaps are those of the curved surface.
+
+        At degree 1 displacements cannot follow a curve, and parts of an edge that has been refined
+        lie on one chord.
         """
-        known = self.degree == 2 and levels == 0
-        return 0.0 if known else float(np.abs(self.deviation).max(initial=0.0)) * 4.0**levels / 4
+        return self.degree == 2 and not self.refined
 
     def height(self, facets: NDArray[np.intp], barycentric: Array) -> Array:
         """Return how far the surface is above facets at points, (p, q), along their normals.
 
-        At degree 1 nothing: displacements of that degree cannot follow a curve.
+        Nothing where gaps are those of the facets.
 
         Parameters
         ----------
         facets, barycentric
             The facets, and points on each, shapes (p,) and (p, q, d).
         """
-        if self.degree == 1:
+        if not self.follows:
             return np.zeros(barycentric.shape[:2])
         edges = pairs_of(self.corners.shape[1])
         products = np.stack([barycentric[..., i] * barycentric[..., j] for i, j in edges], axis=2)
@@ -147,7 +153,7 @@ def surface_of(domain: Domain, space: fem.FunctionSpace, part: str) -> Surface:
     numbers = space.dofmap.index_map.local_to_global(nodes.ravel().astype(np.int32))
     names = np.asarray(numbers, dtype=np.int64).reshape(nodes.shape)
     normal = _outward(corners, inside)
-    deviation = deviations(names[:, :d], corners, normal, domain.comm)
+    deviation = deviations(names[:, :d], corners, normal, domain.comm, domain.levels)
     return Surface(
         names,
         corners,
@@ -155,6 +161,7 @@ def surface_of(domain: Domain, space: fem.FunctionSpace, part: str) -> Surface:
         deviation,
         degree,
         domain.revolved,
+        domain.levels > 0,
     )
 
 

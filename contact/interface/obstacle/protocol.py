@@ -27,7 +27,7 @@ STEPS = 100
 class Obstacle(Protocol):
     """A rigid obstacle, seen from the contact nodes.
 
-    A new shape is a class with these four.
+    A new shape is a class with these three.
     """
 
     @property
@@ -39,17 +39,6 @@ class Obstacle(Protocol):
         """Whether the gaps are those of a rigid body, which the undeformed mesh must not cut.
 
         Gaps that are given as such may be negative.
-        """
-
-    def chord_depth(self, length: float, points: Array) -> float:
-        """Return how deep straight facets reach into the obstacle that their corners touch.
-
-        Parameters
-        ----------
-        length
-            Longest edge of the facets.
-        points
-            Nodes that lie in the obstacle, on this rank, shape (n, d).
         """
 
     def measure(self, points: Array, body_normal: Array) -> tuple[Array, Array]:
@@ -126,26 +115,6 @@ class Shape(ABC):
         Normals are those of the nearest points; NaN where there is none.
         """
 
-    def chord_depth(self, length: float, points: Array) -> float:
-        """Return how deep straight facets reach into the obstacle that their corners touch.
-
-        As far as the distance rises from the nodes along the surface, up to the corners: a ball
-        has its sagitta. Closed forms need no nodes.
-        """
-        if len(points) == 0:
-            return 0.0
-        distance, normal = self.distance(points)
-        dim = points.shape[1]
-        # The last vectors of an orthonormal basis that begins with the normal.
-        tangents = np.linalg.svd(np.nan_to_num(normal)[:, None, :])[2][:, 1:]
-        rise = [
-            sum(self.distance(points + sign * reach(length, dim) * tangent)[0] for sign in (-1, 1))
-            / 2
-            - distance
-            for tangent in np.moveaxis(tangents, 1, 0)
-        ]
-        return float(np.max(np.nan_to_num(rise), initial=0.0))
-
     def ray(self, points: Array, rays: Array) -> Array:
         """Return how far the surface is along unit vectors, shape (n,): infinite if never met."""
         return trace(self.distance, points, rays)
@@ -199,28 +168,6 @@ def trace(distance: Callable[[Array], tuple[Array, Array]], points: Array, rays:
     return found
 
 
-def sagitta(length: float, radius: float, dim: int) -> float:
-    """Return how deep straight facets reach into a ball that their corners touch.
-
-    Parameters
-    ----------
-    length
-        Longest edge of the facets.
-    radius
-        Of the ball.
-    dim
-        Of space.
-    """
-    # Facets of a curve that are longer than its radius do not represent it.
-    sine = min(reach(length, dim) / radius, 0.5)
-    return float(radius * sine**2 / (1 + np.sqrt(1 - sine**2)))
-
-
-def reach(length: float, dim: int) -> float:
-    """Return the radius of a ball that holds a facet with a longest edge (Jung's theorem)."""
-    return float(length * np.sqrt((dim - 1) / (2 * dim)))
-
-
 def split(points: Array, origin: tuple[float, ...], axis: tuple[float, ...]) -> tuple[Array, ...]:
     """Split points into parts along and across an axis.
 
@@ -258,10 +205,6 @@ class GapFunction:
 
     direction = "body"
     is_shape = False
-
-    def chord_depth(self, length: float, points: Array) -> float:
-        """Return 0: given gaps are not those of a shape."""
-        return 0.0
 
     def measure(self, points: Array, body_normal: Array) -> tuple[Array, Array]:
         """Return the body's normals and the gap at the points."""

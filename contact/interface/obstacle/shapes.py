@@ -14,7 +14,7 @@ import numpy as np
 from annotated_types import Gt, Lt
 
 from contact.calling import real
-from contact.interface.obstacle.protocol import GRAZING, Shape, sagitta, split
+from contact.interface.obstacle.protocol import GRAZING, Shape, split
 from contact.kinds import expect, names_arguments
 from contact.settings import Accepted, Direction, NonNegative, Positive, Switch, Vector
 from contact.typing import Array
@@ -36,10 +36,6 @@ class Plane(Shape):
     point: Vector
     normal: Direction
     shape: Literal["plane"] = field(default="plane", kw_only=True)
-
-    def chord_depth(self, length: float, points: Array) -> float:
-        """Return 0: chords of a plane lie in it."""
-        return 0.0
 
     def distance(self, points: Array) -> tuple[Array, Array]:
         """Return distances and normals."""
@@ -97,10 +93,6 @@ class Sphere(Shape):
         away = (along > 0) & (distance > self.radius) & (not self.inside)
         return np.where((root >= 0) & ~away, gap, np.inf)
 
-    def chord_depth(self, length: float, points: Array) -> float:
-        """Return the sagitta of facets outside of the ball; within it they keep off."""
-        return 0.0 if self.inside else sagitta(length, self.radius, len(self.centre))
-
 
 @names_arguments
 @dataclass(frozen=True)
@@ -148,11 +140,6 @@ class Cylinder(Shape):
         leaving = (b > 0) & (radius > self.radius) & (not self.inside)
         return np.where(met & ~leaving, gap, np.inf)
 
-    def chord_depth(self, length: float, points: Array) -> float:
-        """Return the sagitta of a chord across the axis; of a strip there is none."""
-        flat = self.inside or len(self.axis) == 2
-        return 0.0 if flat else sagitta(length, self.radius, 2)
-
 
 @names_arguments
 @dataclass(frozen=True)
@@ -197,10 +184,6 @@ class Cone(Shape):
         radial = radial + np.where(length > 0, along / tip[:, 0], -1.0)[:, None] * unit
         return np.where(beyond, length, side), np.where(beyond[:, None], radial, normal)
 
-    def chord_depth(self, length: float, points: Array) -> float:
-        """Return how deep the tip reaches beyond a facet that it divides in two."""
-        return float(0.5 * length / np.tan(np.deg2rad(self.half_angle)))
-
 
 @names_arguments
 @dataclass(frozen=True)
@@ -243,10 +226,6 @@ class Paraboloid(Shape):
         length = np.hypot(s / big, 1.0)
         normal = (s / big / length)[:, None] * away - unit / length[:, None]
         return (across * s / big - up) / length, normal
-
-    def chord_depth(self, length: float, points: Array) -> float:
-        """Return the sagitta at the tip, where the curvature is largest."""
-        return sagitta(length, self.radius, len(self.apex))
 
 
 @names_arguments
@@ -291,10 +270,6 @@ class Punch(Shape):
         first = np.where(out, np.maximum(side, 0.0) / scale, side > face)
         second = np.where(out, np.maximum(face, 0.0) / scale, side <= face)
         return outside + within - e, first[:, None] * away - second[:, None] * unit
-
-    def chord_depth(self, length: float, points: Array) -> float:
-        """Return the sagitta at the edge, across it; a sharp one fits into no facets."""
-        return 0.0 if self.edge_radius == 0 else sagitta(length, self.edge_radius, 2)
 
 
 #: Step of the central differences, over the size of the coordinates: the third root of rounding.
