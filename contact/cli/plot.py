@@ -11,8 +11,7 @@ from mpi4py import MPI
 from contact.cli.ending import CONVERGED
 from contact.errors import InputError
 from contact.methods.interrupt import signals_held
-from contact.output.figures.animation import animate
-from contact.output.figures.saved import FORMATS, plot
+from contact.output.figures.saved import FORMATS, animate, plot
 from contact.output.folder import on_root
 
 _LENGTH = re.compile(r"(\d+(?:\.\d*)?)\s*(mm|cm|in)")

@@ -7,7 +7,7 @@ import pytest
 from PIL import Image
 
 from contact.cli.main import main
-from contact.output.figures.animation import read_frames
+from contact.output.figures.saved import read_frames
 from scripts.cases import CASES
 
 SMALL = ["--set", "mesh.cells=[8,4]", "--set", "evolution.steps=[1,2,1,1]", "--quiet"]

@@ -16,7 +16,6 @@ from matplotlib.collections import LineCollection
 from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 from matplotlib.tri import Triangulation
-from mpl_toolkits.axes_grid1 import make_axes_locatable
 
 from contact.errors import InputError
 from contact.output.field_files import body_share
@@ -38,10 +37,6 @@ from contact.typing import Array
 
 logger = logging.getLogger("contact.plots")
 
-#: Openings of less than this part of the drawing are not seen in it,
-SEEN = 0.005
-#: and are drawn beneath, in a strip of this height (inches), where Gamma_3 is wide enough.
-STRIP, WIDE = 0.75, 0.25
 #: Scaled gaps up to this part of Gamma_3 are drawn.
 FAR = 0.2
 
@@ -196,9 +191,6 @@ def draw_plane(
 ) -> Figure:
     """Draw a plane body over its outline in the reference configuration, and the foundation.
 
-    Where it lifts off by less than can be seen at the scale of the displacements, the opening is
-    drawn beneath at its own.
-
     Parameters
     ----------
     picture, table
@@ -216,13 +208,10 @@ def draw_plane(
     if mirrored:
         width = 2 * picture.box[1, 0]
     tall = float(np.clip(0.92 * height / width, 0.19, 0.87))
-    lifted = None if mirrored else _lift_off(picture, table)
     head = picture.titled(title)
     more = 0.02 * float(matplotlib.rcParams["font.size"]) * head.count("\n")
-    strip = 0.0 if lifted is None else STRIP
-    figure = sheet(tall + (1.4 + strip + more) / page_width())
-    # Made for axes of equal scale, whose title it leaves room for; it knows of no strip beneath.
-    figure.set_layout_engine("compressed" if lifted is None else "constrained")
+    figure = sheet(tall + (1.4 + more) / page_width())
+    figure.set_layout_engine("compressed")  # made for axes of equal scale
     ax = figure.subplots()
     outline = boundary(picture.points, triangles(picture.body.grid.cells))
     norm, label = picture.colours()
@@ -242,8 +231,6 @@ def draw_plane(
     ax.set_xlabel(units.label(f"${axes[0]}$", "length"))
     ax.set_ylabel(units.label(f"${axes[1]}$", "length"))
     ax.set_title(head, fontsize="medium")
-    if lifted is not None:
-        _strip(ax, *lifted, units)
     return figure
 
 
@@ -255,30 +242,6 @@ def _body(ax: Axes, picture: Picture, side: int, norm: Normalize) -> None:
         ax.tripcolor(mesh, facecolors=picture.values, **shown)
     else:
         ax.tripcolor(mesh, picture.values, shading="gouraud", **shown)
-
-
-def _strip(ax: Axes, where: Array, opening: Array, units: Units) -> None:
-    """Draw an opening beneath the body, at a scale of its own."""
-    below = make_axes_locatable(ax).append_axes("bottom", STRIP - 0.1, pad=0.1, sharex=ax)
-    below.fill_between(where, opening, color=BLUE, lw=0.8)
-    below.set_yticks([])  # their labels have no room: the axes stands outside of the layout
-    below.set_ylim(0.0, 2.0 * opening.max())
-    said = f"{units.label('opening', 'length')}, at most {opening.max():.2g}"
-    below.text(0.01, 0.93, said, transform=below.transAxes, va="top", fontsize="small")
-    below.set_xlabel(ax.get_xlabel())
-    ax.set_xlabel("")
-    ax.tick_params(labelbottom=False)
-
-
-def _lift_off(picture: Picture, table: Table) -> tuple[Array, Array] | None:
-    """Return x and the opening of a straight Gamma_3, if it is too little to be seen."""
-    x, opening = np.asarray(table["x"]), np.asarray(table["gap"] - table["u_n"])
-    opening = np.where(table["status"] == "open", np.maximum(opening, 0.0), 0.0)
-    seen = picture.scale * opening.max(initial=0.0) / np.ptp(picture.box, axis=0).max()
-    width = np.ptp(picture.box[:, 0])
-    level = np.ptp(x) > WIDE * width and np.ptp(table["y"]) <= 1e-9 * np.ptp(x) and "entry" in table
-    alone = level and np.ptp(table["entry"]) == 0 and np.all(table["rigid"])
-    return (x, opening) if alone and 0 < seen < SEEN else None
 
 
 def _foundation(ax: Axes, table: Table, scale: float, edges: Array, side: int) -> None:

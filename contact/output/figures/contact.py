@@ -220,12 +220,12 @@ def draw_surface(
 
     The arguments are those of `draw_line`.
     """
-    view, names = _view(surface)
+    view = _across(surface)
     sides = [(surface, "contact pressure")]
     if opposite is not None:
         sides.append((opposite, "on the other side"))
     touching = np.asarray(surface.at_points["status"]) > STATUS["open"]
-    low, high = _window(surface.grid.points @ view.T, touching, 0.13)  # room for the arrows
+    low, high = _window(surface.grid.points[:, view], touching, 0.13)  # room for the arrows
     stacked, count = page_width() < NARROW, len(sides) + 1
     rows, columns = (count, 1) if stacked else (1, count)
     aspect = float(np.clip((high - low)[1] / (high - low)[0], 0.25, 0.8 if stacked else 1.25))
@@ -243,9 +243,9 @@ def draw_surface(
         ax.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]))
         ax.set_title(name, fontsize="medium")
         if not stacked or ax is right:
-            ax.set_xlabel(units.label(f"${names[0]}$", "length"))
+            ax.set_xlabel(units.label(f"${'xyz'[view[0]]}$", "length"))
         if stacked or ax is lefts[0]:
-            ax.set_ylabel(units.label(f"${names[1]}$", "length"))
+            ax.set_ylabel(units.label(f"${'xyz'[view[1]]}$", "length"))
     label = units.label(r"$-\sigma_\nu$", "stress")
     figure.colorbar(shown, ax=lefts, location="bottom", label=label, aspect=25)
     bar = figure.colorbar(status, ax=right, location="bottom", aspect=25, ticks=range(len(STATES)))
@@ -256,9 +256,9 @@ def draw_surface(
     return figure
 
 
-def _draw_pressure(ax: Axes, side: VTU, view: Array, highest: float) -> Any:
+def _draw_pressure(ax: Axes, side: VTU, view: list[int], highest: float) -> Any:
     """Draw the pressure on one side; return what its colours are."""
-    flat, facets = side.grid.points @ view.T, triangles(side.grid.cells)
+    flat, facets = side.grid.points[:, view], triangles(side.grid.cells)
     pressure = np.asarray(side.at_points["pressure"])
     ax.add_collection(PolyCollection(list(flat[facets]), facecolor="#F2F2F2", lw=0))
     known = np.isfinite(pressure[facets]).all(axis=1)
@@ -268,9 +268,9 @@ def _draw_pressure(ax: Axes, side: VTU, view: Array, highest: float) -> Any:
     return ax.tripcolor(*flat.T, drawn, values, **colours)
 
 
-def _draw_status(ax: Axes, surface: VTU, view: Array, reach: float) -> Any:
+def _draw_status(ax: Axes, surface: VTU, view: list[int], reach: float) -> Any:
     """Draw the status of the nodes, and friction as arrows of a length at most; return colours."""
-    flat, facets = surface.grid.points @ view.T, triangles(surface.grid.cells)
+    flat, facets = surface.grid.points[:, view], triangles(surface.grid.cells)
     ax.add_collection(PolyCollection(list(flat[facets]), facecolor="#F2F2F2", lw=0))
     status = np.asarray(surface.at_points["status"])
     known = status >= STATUS["open"]
@@ -281,11 +281,11 @@ def _draw_status(ax: Axes, surface: VTU, view: Array, reach: float) -> Any:
     return shown
 
 
-def _arrows(ax: Axes, surface: VTU, flat: Array, view: Array, reach: float) -> None:
+def _arrows(ax: Axes, surface: VTU, flat: Array, view: list[int], reach: float) -> None:
     """Draw the friction stress, its largest arrow of a given length."""
     traction, normal = (np.asarray(surface.at_points[name]) for name in ("traction", "normal"))
     along = traction - np.einsum("ni,ni->n", traction, normal)[:, None] * normal
-    friction = np.nan_to_num(along @ view.T)
+    friction = np.nan_to_num(along[:, view])
     size = np.linalg.norm(friction, axis=1)
     # Rounding of the pressures is no friction.
     rounding = 1e-9 * np.nan_to_num(np.linalg.norm(traction, axis=1)).max(initial=0.0)
@@ -297,22 +297,10 @@ def _arrows(ax: Axes, surface: VTU, flat: Array, view: Array, reach: float) -> N
     ax.quiver(*flat[chosen].T, *friction[chosen].T, color="black", width=0.004, **exact)
 
 
-def _view(surface: VTU) -> tuple[Array, tuple[str, str]]:
-    """Return two directions across the mean contact direction, shape (2, 3), and their names.
-
-    These are axes where it lies along the third, else directions x_1, x_2.
-    """
-    normal = np.asarray(surface.at_points["normal"])
-    touching = np.asarray(surface.at_points["status"]) > STATUS["open"]
-    mean = np.nanmean(normal[touching if touching.any() else slice(None)], axis=0)
-    mean = mean / np.linalg.norm(mean)
-    thin = int(np.argmax(np.abs(mean)))
-    kept = [k for k in range(3) if k != thin]
-    if abs(mean[thin]) > 0.98:
-        return np.eye(3)[kept], ("xyz"[kept[0]], "xyz"[kept[1]])
-    first = np.cross(np.eye(3)[kept[0]], mean)
-    first /= np.linalg.norm(first)
-    return np.array([first, np.cross(mean, first)]), ("x_1", "x_2")
+def _across(surface: VTU) -> list[int]:
+    """Return the two axes that are the most across the mean contact direction."""
+    mean = np.nanmean(np.asarray(surface.at_points["normal"]), axis=0)
+    return sorted(int(k) for k in np.argsort(np.abs(mean))[:2])
 
 
 def _window(places: Array, touching: NDArray[np.bool_], margin: float) -> tuple[Array, Array]:
