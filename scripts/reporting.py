@@ -33,7 +33,7 @@ from contact.problem.state import State
 #: Widths of figures of one column, 85 mm, and of two (inches).
 ONE_COLUMN, TWO_COLUMNS = 85 / 25.4, 175 / 25.4
 
-#: Dots per inch of pictures, and of what is an image in a PDF.
+#: Dots per inch of pictures, and of images in a PDF.
 DPI, PDF_DPI = 300, 200
 
 rcParams.update(STYLE)
@@ -168,7 +168,7 @@ def parser(text: str, script: str) -> argparse.ArgumentParser:
     made = argparse.ArgumentParser(description=text.splitlines()[0])
     made.add_argument("--out", type=Path, default=Path("results") / script)
     made.add_argument("--coarse", action="store_true", help="coarse meshes: quick, for tests")
-    # A table solves a hundred problems; what each is worth is told by `contact solve`.
+    # A table solves a hundred problems; `contact solve` tells the warnings of each.
     logging.getLogger("contact").setLevel(logging.ERROR)
     return made
 

@@ -30,7 +30,7 @@ from scripts.benchmarks.processes import Run, columns, command, measured, run, s
 from scripts.reporting import Report, parser, subplots
 
 #: Seconds after which a run of the peer is ended: it is then shown as one of infinite length.
-PATIENCE = 150.0
+TIMEOUT = 150.0
 
 
 @dataclass(frozen=True)
@@ -83,7 +83,7 @@ def against_one_solve(bench: Bench) -> None:
         "bench-ratio",
         "Nonlinear solve against one linear elasticity solve",
         columns(rows),
-        "Example 7.2 with Hencky's law and friction, and a block in space, from zero. Cold: on the "
+        "Example 7.2 with Hencky's law and friction, and a block in 3-D, from zero. Cold: on the "
         "mesh itself alone; as it chooses: where that is faster from coarser meshes, whose time "
         "counts. `one` is assembly, set-up and solve of linear elasticity with the same solver.",
     )
@@ -131,7 +131,7 @@ def ranks(bench: Bench) -> None:
 
 
 def memory(bench: Bench) -> None:
-    """Part (h): what ranks hold."""
+    """Part (h): memory of ranks."""
     held = []
     for dimension, n in ((2, 32), (3, 8)) if bench.coarse else ((2, 128), (3, 20)):
         first, least = np.nan, np.nan
@@ -157,7 +157,7 @@ def memory(bench: Bench) -> None:
         "bench-memory",
         "Memory of all ranks together",
         columns(held),
-        "Peaks of the whole run, beyond what the libraries take once they are loaded; and those of "
+        "Peaks of the whole run, beyond that of the libraries once they are loaded; and those of "
         "one linear solve by dolfinx and PETSc alone.",
     )
 
@@ -179,10 +179,10 @@ def against_getfem(bench: Bench) -> None:
         rows.append({"problem": "block", "cells": n, "mu": "0.3", **pair("block", str(n), "0.3")})
     bench.report.table(
         "bench-getfem",
-        "Against GetFEM: Example 7.2 with a linear material, Example 7.1, and a block in space",
+        "Against GetFEM: Example 7.2 with a linear material, Example 7.1, and a block in 3-D",
         columns(rows),
         "Cells a unit length of the bar and the block, and on Hertz's half-width. Seconds of the "
-        f"whole Newton solve, both warm; a run of GetFEM that took more than {PATIENCE:.0f} s is "
+        f"whole Newton solve, both warm; a run of GetFEM that took more than {TIMEOUT:.0f} s is "
         "shown as inf. GetFEM: integral contact brick, augmented Lagrangian, r = E, residual "
         "1e-10; its contact integrals and our nodal multipliers are different discretisations of "
         "order h.",
@@ -195,7 +195,7 @@ def pair(problem: str, mesh: str, mu: str) -> Run:
     ours = run(problem, mesh, mu)
     try:
         words = [*command("peer_getfem"), problem, mesh, mu, "--rounds", "1"]
-        theirs = measured(words, limit=PATIENCE)
+        theirs = measured(words, limit=TIMEOUT)
     except subprocess.TimeoutExpired:
         theirs = dict.fromkeys(("steps", "converged", "assembly", "max_displacement"), np.nan)
         theirs["solve"] = np.inf
@@ -215,7 +215,7 @@ def pair(problem: str, mesh: str, mu: str) -> Run:
 
 
 def against_plain_dolfinx(bench: Bench) -> None:
-    """Part (e): what a user of dolfinx writes without this code."""
+    """Part (e): a user's own program in dolfinx without this code."""
     bench.script("peer_plain")
 
 
@@ -239,7 +239,7 @@ def phases(bench: Bench) -> None:
 
 
 def two_bodies(bench: Bench) -> None:
-    """Part (g): two boxes in space that touch each other beside one."""
+    """Part (g): two boxes in 3-D that touch each other beside one."""
     bench.script("pair_space")
 
 
@@ -248,7 +248,7 @@ def load_steps(bench: Bench) -> None:
     bench.script("steps")
 
 
-#: Part -> what runs it, and the tables and figures that it writes.
+#: Part -> its function, and the tables and figures that it writes.
 PARTS: dict[str, tuple[Callable[[Bench], None], tuple[str, ...]]] = {
     "a": (by_method, ("bench-tables",)),
     "b": (against_one_solve, ("bench-ratio", "bench-ratio-plot")),
@@ -286,7 +286,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
             print(f"part {part}: {error}", file=sys.stderr)
             failed.append(part)
         print(f"part {part}: {time.perf_counter() - begin:.0f} s since the start", flush=True)
-        # What has been measured stays, whatever becomes of the rest.
+        # Measurements stay, whatever becomes of the rest.
         if not given.coarse or given.page != made.get_default("page"):
             write_page(given.out, names, given.page)
             write_readme(given.out, given.readme)

@@ -4,7 +4,7 @@ Start it as `python3 -m scripts.benchmarks.bench_one` with one of::
 
     bar N MU                       Example 7.2, linear material, constant mu
     hertz DISC.msh MU              Example 7.1 on a mesh file, constant mu
-    block N MU                     a block in space, linear material, constant mu
+    block N MU                     a block in 3-D, linear material, constant mu
     ratio DIM N [cold]             a nonlinear solve and one linear solve; cold: on that mesh alone
 """
 
@@ -38,7 +38,7 @@ HENCKY = {**LINEAR, "law": "log", "yield_strain": 0.02}
 
 
 def block(n: int, material: Mapping[str, Any] = HENCKY, mu: float = 0.3, **solver: Any) -> Case:
-    """Return a block of 2 x 1 x 1 with Coulomb friction, in space."""
+    """Return a block of 2 x 1 x 1 with Coulomb friction, in 3-D."""
     return parse_case(
         {
             "title": "block",
@@ -54,7 +54,7 @@ def block(n: int, material: Mapping[str, Any] = HENCKY, mu: float = 0.3, **solve
 
 
 def problem_case(dimension: int, n: int, *changes: str) -> Case:
-    """Return the bar of Example 7.2 in the plane, the block in space."""
+    """Return the bar of Example 7.2 in the plane, the block in 3-D."""
     if dimension == 3:
         return block(n)
     return bar(n, -0.05, 1e5, "friction.mu=0.5", *changes)
@@ -62,7 +62,7 @@ def problem_case(dimension: int, n: int, *changes: str) -> Case:
 
 def memory() -> float:
     """Return the peak memory of all ranks (bytes)."""
-    # Not that of `getrusage`: it is at least what the process held that has started this one.
+    # Not that of `getrusage`: it is at least that of the process that has started this one.
     status = Path("/proc/self/status").read_text()
     peak = float(status.split("VmHWM:")[1].split()[0]) * 1024
     return float(COMM.allreduce(peak, op=MPI.SUM))
@@ -74,7 +74,7 @@ def unknowns(problem: ContactProblem) -> int:
 
 
 def described(solution: Solution) -> dict[str, Any]:
-    """Return what the tables show of a solution."""
+    """Return the columns of a solution in the tables."""
     body = solution.problem.equilibrium
     u = solution.state.x.reshape(-1, body.block_size)[:, : body.dim]
     largest = float(np.linalg.norm(u, axis=1).max(initial=0.0))
@@ -170,7 +170,7 @@ MEASUREMENTS = {
 
 
 def main() -> None:
-    """Measure what the command line names."""
+    """Make the measurement that the command line names."""
     import logging
 
     logging.getLogger("contact").setLevel(logging.ERROR)

@@ -43,7 +43,7 @@ def rows_of_tables(coarse: bool) -> Iterator[tuple[str, str, str, list[str], flo
 
 
 def measured(case: Case) -> dict[str, Any]:
-    """Solve a case; return what it took."""
+    """Solve a case; return its costs."""
     problem = build_problem(case)
     begin = time.process_time()
     nested = isinstance(case.solver, NewtonOptions) and case.solver.nested

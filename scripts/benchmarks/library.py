@@ -1,8 +1,8 @@
-"""What ranks hold in one linear solve by dolfinx and PETSc alone, on the meshes of `ranks`.
+"""Memory of ranks in one linear solve by dolfinx and PETSc alone, on the meshes of `ranks`.
 
 ``mpirun -n P python3 -m scripts.benchmarks.library DIM N``: linear elasticity, in the plane by
-MUMPS, in space by GAMG with the options of this code. Nothing else of this code is on the way: what
-its own solves hold beyond that is its own.
+MUMPS, in 3-D by GAMG with the options of this code. Nothing else of this code is on the way: the
+memory that its own solves hold beyond that is its own.
 """
 
 from __future__ import annotations

@@ -14,7 +14,7 @@ from contact.output.environment import versions
 #: The table of the README: its header, and the lines below.
 README_TABLE = re.compile(r"^\| \| unknowns \|.*\n(?:\|.*\n)+", re.MULTILINE)
 
-#: The table of what ranks hold, likewise.
+#: The table of the ranks' memory, likewise.
 MEMORY_TABLE = re.compile(r"^\| \| unknowns \| ranks \|.*\n(?:\|.*\n)+", re.MULTILINE)
 
 INTRODUCTION = """\
@@ -46,7 +46,7 @@ def write_page(folder: Path, names: Sequence[str], page: Path) -> None:
 def readme_table(rows: Sequence[Mapping[str, str]]) -> str:
     """Return the table of the README, of the program's own choice of a start."""
     lines = [
-        "| | unknowns | solves of the whole body | dense solves at the contact nodes | "
+        "| | unknowns | solves of the whole body | iterations on the condensed problem | "
         "time / one linear solve |",
         "|---|---|---|---|---|",
     ]
@@ -75,7 +75,7 @@ def write_readme(folder: Path, readme: Path) -> None:
 
 
 def write_memory(folder: Path, page: Path) -> None:
-    """Put what ranks hold into the page on many ranks, where it has been measured."""
+    """Put the ranks' memory into the page on many ranks, where it has been measured."""
     rows = _rows(folder / "bench-memory.csv")
     names = ("bytes an unknown", "over one rank", "linear solve", "its over one rank")
     if not rows or not rows[0].keys() >= set(names):  # or one that was written earlier

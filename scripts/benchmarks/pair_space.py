@@ -1,4 +1,4 @@
-"""Two boxes on each other in space beside one box of the same size: iterations and time.
+"""Two boxes on each other in 3-D beside one box of the same size: iterations and time.
 
 ``python3 -m scripts.benchmarks.pair_space [--out DIR] [--coarse] [--size SIZE]``: SIZE is that of
 the elements, 0.06 for some 25 000 unknowns, 0.028 for 230 000, 0.0212 for 500 000. Both are pressed
@@ -53,7 +53,7 @@ def two(size: float) -> dict[str, Any]:
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
-    """Solve both, and write what they took."""
+    """Solve both, and write their costs."""
     made = parser(__doc__, "pair_space")
     made.add_argument("--size", type=float, default=0.06)
     given = made.parse_args(arguments)
@@ -76,7 +76,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
         )
     Report(given.out).table(
         "pair-space",
-        "Two boxes in space that are pressed and pushed, beside one of the same size",
+        "Two boxes in 3-D that are pressed and pushed, beside one of the same size",
         {key: [row[key] for row in rows] for key in rows[0]},
         "Friction, linear materials, meshes that do not match. Seconds of the processor.",
     )

@@ -1,4 +1,4 @@
-"""The peer of the benchmark: GetFEM on the bar of Example 7.2, Hertz's cylinder, a block in space.
+"""The peer of the benchmark: GetFEM on the bar of Example 7.2, Hertz's cylinder, a block in 3-D.
 
 Start it as `python3 -m scripts.benchmarks.peer_getfem` with `bar N MU [--rounds K]`, linear
 material, N cells per unit length, the same triangles as ours; or with `hertz DISC.msh MU`,
@@ -6,7 +6,7 @@ Example 7.1 on a mesh file of format 2.2; or with `block N MU`, that of `bench_o
 material, the same tetrahedra as ours. `--solver gmres/ilu` takes another linear solver. Prints
 one line of JSON: seconds of assembly and of the whole Newton solve (the fastest of K rounds in one
 warm process), steps, and values to compare with. Integral contact brick with an augmented
-Lagrangian, r = E; in space its unsymmetric version with De Saxce's projection (option 4), as the
+Lagrangian, r = E; in 3-D its unsymmetric version with De Saxce's projection (option 4), as the
 first one does not converge there.
 """
 
@@ -29,7 +29,7 @@ HELD, CONTACT, LOADED = 1, 2, 3
 
 @dataclass(frozen=True)
 class Setting:
-    """A mesh with its regions, and what it is made of and loaded with.
+    """A mesh with its regions, and its material and loads.
 
     Attributes
     ----------
@@ -90,7 +90,7 @@ def hertz(path: str) -> Setting:
 
 
 def block(cells: str) -> Setting:
-    """Return the block in space of `bench_one`, with a linear material."""
+    """Return the block in 3-D of `bench_one`, with a linear material."""
     n = int(cells)
     ours = box(MPI.COMM_SELF, (0.0, 0.0, 0.0), (2.0, 1.0, 1.0), (2 * n, n, n)).mesh.geometry
     mesh = gf.Mesh("empty", 3)
@@ -105,7 +105,7 @@ def block(cells: str) -> Setting:
 
 
 def model(setting: Setting, mu: float) -> tuple[gf.Model, tuple[object, ...]]:
-    """Return the contact problem as a GetFEM model, and what has to live as long as it."""
+    """Return the contact problem as a GetFEM model, and the objects that it needs."""
     mesh, young, poisson, dim = setting.mesh, setting.young, 0.3, len(setting.traction)
     u, obstacle = gf.MeshFem(mesh, dim), gf.MeshFem(mesh, 1)
     for space in (u, obstacle):
@@ -137,7 +137,7 @@ def model(setting: Setting, mu: float) -> tuple[gf.Model, tuple[object, ...]]:
 
 
 def main() -> None:
-    """Solve, and print what it took."""
+    """Solve, and print the costs."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("problem", choices=("bar", "hertz", "block"))
     parser.add_argument("mesh", help="cells per unit length, or the mesh file")

@@ -81,7 +81,7 @@ def model(path: Path, mu: float) -> tuple[gf.Model, dict[str, Any]]:
 
 
 def compare(mu: float, finer: int) -> dict[str, Any]:
-    """Solve with both on one mesh; return what they took, and how far apart they are."""
+    """Solve with both on one mesh; return their costs, and how far apart they are."""
     sizes = {name: size / finer for name, size in SIZES.items()}
     case = given(mu, sizes)
     own_problem = build_problem(case)

@@ -5,8 +5,8 @@ python3 -m scripts.benchmarks.peer_plain [--out DIR] [--coarse]
 Example 7.2 with Hencky's law and a constant coefficient of friction, on one mesh for both. Contact
 is kappa <-u_nu>_+, friction Coulomb's law with u_tau/|u_tau| made smooth, the load is applied in
 steps where Newton's method does not converge otherwise; the forms are derived by
-UFL, and MUMPS solves. What the penalty changes is measured against the solution of this code on the
-same mesh, whose contact conditions hold to its tolerance.
+UFL, and MUMPS solves. The effect of the penalty is measured against the solution of this code on
+the same mesh, whose contact conditions hold to its tolerance.
 """
 
 from __future__ import annotations
@@ -129,7 +129,7 @@ class Plain:
         return MOST_STEPS if size <= enough else None
 
     def _size(self) -> float:
-        """Assemble what is left of equilibrium, and return its norm."""
+        """Assemble the residual of equilibrium, and return its norm."""
         left = self._left.x.array
         left[:] = 0.0
         fem.assemble_vector(left, self._residual)
@@ -138,7 +138,7 @@ class Plain:
 
 
 def compare(ours: Solution, seconds: float, kappa: float) -> dict[str, Any]:
-    """Solve with a penalty; return what it takes, and how far it is from our solution."""
+    """Solve with a penalty; return its costs, and how far it is from our solution."""
     problem = ours.problem
     plain = Plain(problem, kappa)
     begin = time.process_time()

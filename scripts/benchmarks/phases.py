@@ -1,8 +1,8 @@
 """Where the time of a nonlinear solve goes, beside one linear solve on the same mesh.
 
 ``python3 -m scripts.benchmarks.phases DIM N [cold]``: seconds of this process by phase, with how
-often each has been gone through; cold: without coarser meshes. Nothing but what the profiler sees
-is measured: a phase is a function of the program. The last line is the same as JSON.
+often each has been gone through; cold: without coarser meshes. Calls alone that the profiler sees
+are measured: a phase is a function of the program. The last line is the same as JSON.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ PHASES = {
     "solves with the factors": ("~", "<method 'solve' of 'petsc4py.PETSc.Mat' objects>"),
     "residual forces": ("body/weak_forms.py", "_found"),
     "contact laws": ("interface/complementarity.py", "linearise"),
-    "dense solves at contact nodes": ("methods/newton.py", "_solve_condensed"),
+    "iterations on the condensed problem": ("methods/newton.py", "_solve_condensed"),
     "transfer from mesh to mesh": ("nesting.py", "prolong"),
 }
 
@@ -42,7 +42,7 @@ Result = TypeVar("Result")
 
 
 def profiled(action: Callable[[], Result]) -> tuple[Result, float, dict[str, tuple[int, float]]]:
-    """Return what an action returns, its seconds, and counts and seconds of the phases."""
+    """Return the value of an action, its seconds, and counts and seconds of the phases."""
     profile = cProfile.Profile(time.process_time)
     result = profile.runcall(action)
     stats: Any = pstats.Stats(profile)

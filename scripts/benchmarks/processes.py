@@ -1,4 +1,4 @@
-"""Measurements are processes of their own, and print what they have measured."""
+"""Measurements are processes of their own, and print their measurements."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ def command(script: str) -> list[str]:
 
 
 def started(words: Sequence[str], ranks: int = 1, limit: float | None = None) -> str:
-    """Return what a process prints, within a limit (seconds).
+    """Return the output of a process, within a limit (seconds).
 
     Raises
     ------
@@ -36,7 +36,7 @@ def started(words: Sequence[str], ranks: int = 1, limit: float | None = None) ->
 
 
 def measured(words: Sequence[str], ranks: int = 1, limit: float | None = None) -> Run:
-    """Return what a process prints as JSON in its last line."""
+    """Return the JSON in the last line of a process's output."""
     found: Run = json.loads(started(words, ranks, limit).strip().splitlines()[-1])
     return found
 

@@ -1,7 +1,7 @@
-"""What ranks hold and what they tell each other, in a nonlinear solve.
+"""Memory and messages of ranks in a nonlinear solve.
 
 ``mpirun -n P python3 -m scripts.benchmarks.ranks DIM N``: the sum of the ranks' peak memory beyond
-what the libraries take once they are loaded, and in space the messages and reductions of the linear
+that of the libraries once they are loaded, and in 3-D the messages and reductions of the linear
 solves, as PETSc counts them. Counts do not depend on the machine, nor on how many cores it has.
 """
 
@@ -21,7 +21,7 @@ COMM = MPI.COMM_WORLD
 
 
 def told(event: str) -> dict[str, float]:
-    """Return what a rank tells others on average in all calls of one of PETSc's events."""
+    """Return the bytes that a rank sends on average in all calls of one of PETSc's events."""
     info = PETSc.Log.Event(event).getPerfInfo()
     sums = {
         name: COMM.allreduce(float(info[name]), op=MPI.SUM) / COMM.size

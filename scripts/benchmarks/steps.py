@@ -1,8 +1,8 @@
 """Load steps beside one static solve: `python3 -m scripts.benchmarks.steps [--out DIR] [--coarse]`.
 
-Example 7.2 in 100 steps and a block in space in 20, both of linear material with friction, loaded
+Example 7.2 in 100 steps and a block in 3-D in 20, both of linear material with friction, loaded
 from nothing to all. Then Example 7.2 by Hencky's law under 20 loads, swept from one solution to the
-next and each from rest. Seconds of the processor, with the problem's making; all in one process.
+next and each from zero. Seconds of the processor, with the problem's making; all in one process.
 `--only steps` or `--only sweep` measures the one.
 """
 
@@ -32,7 +32,7 @@ REPEATED = 2
 
 
 def measured(case: Case, count: int) -> dict[str, Any]:
-    """Return what an evolution in so many steps takes."""
+    """Return the costs of an evolution in so many steps."""
     begin = time.process_time()
     problem = build_problem(case)
     method = Newton(problem, case.solver)
@@ -52,7 +52,7 @@ def measured(case: Case, count: int) -> dict[str, Any]:
 
 
 def swept(cells: int, warm: bool) -> dict[str, Any]:
-    """Return what Example 7.2 under `LOADS` loads takes, each from the one before or from rest."""
+    """Return the costs of Example 7.2 under `LOADS` loads, with a warm start or from zero."""
     loads = tuple(f"[0.0, {-0.005 * (k + 1) / LOADS}]" for k in range(LOADS))
     settings = [f"mesh.cells=[{4 * cells}, {cells}]", "solver.method=newton"]
     with tempfile.TemporaryDirectory() as folder:
@@ -61,7 +61,7 @@ def swept(cells: int, warm: bool) -> dict[str, Any]:
         rows = sweep(CASES / "bar.toml", axes, Path(folder), settings, warm=warm)
         seconds = time.process_time() - begin
     return {
-        "": "from the last" if warm else "from rest",
+        "": "from the last" if warm else "from the zero initial guess",
         "converged": all(row["converged"] for row in rows),
         "loads": len(rows),
         "set-ups": sum(int(row["factorizations"]) for row in rows),
@@ -70,7 +70,7 @@ def swept(cells: int, warm: bool) -> dict[str, Any]:
 
 
 def stepped(coarse: bool) -> list[dict[str, Any]]:
-    """Return what the evolutions take beside static solves."""
+    """Return the costs of the evolutions beside static solves."""
     rows = []
     for name, case, small, count in (
         ("plane", bar(16 if coarse else 128, -0.005, 1e5, "material.law=linear"),
@@ -87,7 +87,7 @@ def stepped(coarse: bool) -> list[dict[str, Any]]:
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
-    """Measure both, and write what they took."""
+    """Measure both, and write their costs."""
     options = parser(__doc__, "steps")
     options.add_argument("--only", choices=["steps", "sweep"], help="measure this alone")
     given = options.parse_args(arguments)
@@ -98,7 +98,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
             "bench-steps",
             "Load steps beside one static solve",
             {key: [row[key] for row in rows] for key in rows[0]},
-            "Example 7.2 and a block in space, linear material, friction. `static` is one step to "
+            "Example 7.2 and a block in 3-D, linear material, friction. `static` is one step to "
             f"the full load, the mean of {REPEATED} before the steps and {REPEATED} after them; "
             "seconds of the processor, of one process.",
         )
@@ -108,7 +108,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
         share = rows[1]["seconds"] / rows[0]["seconds"]
         report.table(
             "bench-sweep",
-            f"{LOADS} loads swept, each from the one before or from rest",
+            f"{LOADS} loads swept, each from the one before or from the zero initial guess",
             {key: [row[key] for row in rows] for key in rows[0]},
             f"Example 7.2, Hencky's law; {share:.2f} of the seconds of the processor.",
         )

@@ -15,7 +15,7 @@ BAR = Path(__file__).parents[1] / "cases" / "bar.toml"
 
 
 def main(out: Path = Path("results/bar_pressure"), cells: tuple[int, int] = (128, 32)) -> Solution:
-    """Solve Example 7.2 and draw what the foundation bears."""
+    """Solve Example 7.2 and draw the pressure on the foundation."""
     # Any key of the file can be given another value, as by --set on the command line.
     case = load_case(BAR, [f"mesh.cells={list(cells)}", "solver.method=newton"])
     solution = solve(case)

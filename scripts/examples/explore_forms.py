@@ -15,7 +15,7 @@
 #
 # `forms` is plain UFL: it makes no mesh, starts no solver and initialises no MPI. This notebook
 # (open it with jupytext, or run it as a script) prints the weak forms, checks by assembly on a
-# tiny mesh what the theory says of them, and draws the constitutive laws.
+# tiny mesh the statements of the theory on them, and draws the constitutive laws.
 
 # %%
 # ruff: noqa: D100, E402
@@ -65,9 +65,9 @@ B = secant_form(hencky, u, v, w) * ufl.dx
 print("arguments:", B.arguments(), "coefficients:", B.coefficients())
 
 # %% [markdown]
-# ## What assembly tells
+# ## Assembly
 #
-# The same integrands on a real, tiny mesh, with a random displacement well beyond yield.
+# The same integrands on a real, tiny mesh, with a random displacement well in the plastic range.
 
 # %%
 from dolfinx import fem, mesh
@@ -115,8 +115,8 @@ hessian = matrix(ufl.derivative(ufl.derivative(energy, u, w), u, v))
 assert np.linalg.norm(hessian - tangent) < 1e-12
 
 # %% [markdown]
-# The tangent is softer than the secant beyond yield. This is why the first Newton step from a
-# state near zero goes too far, and Kacanov's does not.
+# The tangent is softer than the secant in the plastic range. This is why the first Newton step from
+# a state near zero goes too far, and Kacanov's does not.
 
 # %%
 plastic = np.sort(np.linalg.eigvalsh(tangent))[3:]  # without the rigid motions
@@ -130,7 +130,7 @@ axes.set(xlabel="mode", ylabel="eigenvalue")
 _ = axes.legend()
 
 # %% [markdown]
-# ## What the foundation does
+# ## The foundation
 #
 # The integrands of section 3.4 on $\Gamma_3$, here the whole boundary. Step 1 of Algorithm 2
 # balances where its auxiliary unknowns are those of the body: its two sides differ by the
@@ -155,11 +155,11 @@ pressed = ufl.conditional(ufl.gt(normal, gap), normal - gap, 0.0)
 by_ufl = vector(ufl.derivative(pressed**2 / (2 * eps) * ufl.ds, u, w))
 assert np.linalg.norm(vector(contact) - by_ufl) < 1e-12 * np.linalg.norm(by_ufl)
 bound = 0.3 * penalty_pressure(normal, gap, eps)
-frozen_friction = matrix(penalty_friction(u, v, w, nu, bound, eps) * ufl.ds)
+fixed_bound = matrix(penalty_friction(u, v, w, nu, bound, eps) * ufl.ds)
 friction = ufl.derivative(penalty_friction(u, u, w, nu, bound, eps) * ufl.ds, u, v)
-print(f"friction, frozen: asymmetry {asymmetry(frozen_friction):.1e}")
+print(f"friction, frozen: asymmetry {asymmetry(fixed_bound):.1e}")
 print(f"its derivative:   asymmetry {asymmetry(matrix(friction)):.2f}")
-assert asymmetry(frozen_friction) < 1e-14
+assert asymmetry(fixed_bound) < 1e-14
 
 # %% [markdown]
 # The layer $j_1$ of section 6.2 presses the harder the further the potential is from that of the
@@ -217,7 +217,7 @@ assert np.linalg.eigvalsh(saddle + saddle.T).min() > -1e-9
 # %% [markdown]
 # ## The laws
 #
-# Hencky's law (7.8): the modulus falls beyond yield while the stress keeps rising, which is
+# Hencky's law (7.8): the modulus falls in the plastic range while the stress keeps rising, which is
 # assumption (h1). Read with the *square* of the norm as its argument, it softens.
 
 # %%

@@ -1,4 +1,4 @@
-"""Load steps in Python: a block is pressed, then moved to and fro; what friction remembers.
+"""Load steps in Python: a block is pressed, then moved back and forth; the history of friction.
 
 `python3 -m scripts.examples.fretting`, also under mpirun.
 """
@@ -20,7 +20,7 @@ def main(cells: Sequence[int] = (64, 32), steps: int = 8) -> np.ndarray:
     times = [stage + (k + 1) / steps for stage in range(6) for k in range(steps)]
     rows = []
     for state in evolve(problem, times, case.solver):
-        # The state is a value: the problem at its time, with what friction remembered, reads it.
+        # The state is a value: the problem at its time, with the history of friction, reads it.
         step = problem.at(state.time, state.history)
         interface, nodal = step.interface, step.nodal(state)
         force = [step.nodes.sum(component) for component in state.forces.friction.T]

@@ -30,7 +30,7 @@ class Weakening:
 
     @property
     def lipschitz(self) -> float:
-        """Lipschitz constant, reached at rest."""
+        """Lipschitz constant, reached at zero slip."""
         return (self.static - self.kinetic) / self.length
 
     def __call__(self, slip: Value) -> Value:

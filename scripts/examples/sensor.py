@@ -77,7 +77,7 @@ def opened(case: Case, electrode: str) -> Case:
 
 
 def readings(case: Case, electrode: str, factors: Sequence[float]) -> list[Reading]:
-    """Return what the electrode reads at multiples of the load. Collective."""
+    """Return the electrode's potentials at multiples of the load. Collective."""
     base = build_problem(case)
     found = []
     for factor in factors:

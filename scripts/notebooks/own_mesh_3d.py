@@ -5,7 +5,7 @@
 # ---
 
 # %% [markdown]
-# # A part of one's own in space
+# # A part of one's own in 3-D
 #
 # A bracket with a fillet and a bolt hole, made by Gmsh's OpenCASCADE kernel, is screwed down on a
 # rigid table: the washer presses on it, a load pulls at its upright. Does the foot lift off?

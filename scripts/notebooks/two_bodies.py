@@ -63,7 +63,7 @@ print(f"largest pressure {contact.pressure.max():.0f} MPa, Hertz {p0:.0f} MPa")
 assert abs(contact.pressure.max() / p0 - 1) < 0.1
 
 # %% [markdown]
-# What one body exerts on the other balances the load of its half:
+# The force of one body on the other balances the load of its half:
 
 # %%
 print(solution.contact_force, solution.reaction("block_bottom"))

@@ -1,4 +1,4 @@
-"""Do the methods agree? Newton's, block relaxation and, as eps -> 0, the penalty method.
+"""Do the methods agree? Newton's, Uzawa block relaxation and, as eps -> 0, the penalty method.
 
 Every case file is solved by each of them. Where two find different solutions, each method is
 started from the other's, to show that both are solutions of the same discrete problem.
@@ -23,13 +23,13 @@ from scripts.studies.branches import AGREE, DISTURBANCE, SOLVES, Branches
 #: Tolerance on the residual of the penalised problem: rounding is magnified by 1/eps.
 PENALISED = 1e-9
 
-#: eps of the penalty method, relative to what the solution is like.
+#: eps of the penalty method, relative to the size of the solution.
 EPS = {f"eps 1e-{k}": 10.0**-k for k in range(3, 8)}
 
 
 @dataclass
 class Compared:
-    """What the methods have found of one example.
+    """Results of the methods on one example.
 
     Attributes
     ----------
@@ -77,7 +77,7 @@ def compare(example: Example, coarse: bool) -> Compared:
 
 
 def relaxed(newton: Options) -> Options:
-    """Return the settings of block relaxation: hundreds of solves by one factorisation."""
+    """Return the settings of Uzawa block relaxation: hundreds of solves by one factorisation."""
     return with_method(newton, FixedPointOptions, linear="lu")
 
 
@@ -97,7 +97,7 @@ def penalised(branches: Branches, solution: Solution, eps: float) -> Options:
 
 
 def agreement(report: Report, compared: Sequence[Compared]) -> None:
-    """Tabulate the differences between Newton's method and block relaxation. Collective."""
+    """Tabulate the differences between Newton's method and Uzawa block relaxation. Collective."""
     names = (
         "example", "unknowns", "newton", "uzawa", "solves", "uzawa's", "u", "phi", "energy",
         "p", "tau", "verdict", "solutions", "warned",
@@ -126,7 +126,7 @@ def agreement(report: Report, compared: Sequence[Compared]) -> None:
         )
     report.table(
         "agreement",
-        f"Newton's method and block relaxation, both to residuals of {TOLERANCE:g}",
+        f"Newton's method and Uzawa block relaxation, both to residuals of {TOLERANCE:g}",
         columns,
         "newton, uzawa: the largest residual at the end, computed from scratch. Then the linear "
         "solves of the whole body, and the relative differences of the two: u and phi, largest "
@@ -134,13 +134,13 @@ def agreement(report: Report, compared: Sequence[Compared]) -> None:
         "and friction stress in L2 of Gamma_3, both over the pressure. The verdict is `agree` "
         f"where all are at most {AGREE:g}, else the letters of the two solutions in the last "
         "table. solutions: how many different ones have been found by any start or method here; "
-        "warned: whether the program itself says that there may be several. Block relaxation is "
+        "warned: whether the program itself says that there may be several. Uzawa's method is "
         f"given up after {SOLVES} solves, and the verdict is then `not converged`.",
     )
 
 
 def verdict(one: Compared, apart: float) -> str:
-    """Return in words whether Newton's method and block relaxation agree."""
+    """Return in words whether Newton's method and Uzawa block relaxation agree."""
     letters = one.letters["newton"], one.letters["uzawa"]
     if "—" in letters:
         return "not converged"
@@ -244,7 +244,7 @@ def solutions(report: Report, compared: Sequence[Compared]) -> None:
 
 
 def held(one: Compared, found: Solution) -> tuple[object, ...]:
-    """Return what both methods make of a solution and of a start beside it. Collective."""
+    """Return the ends of both methods from a solution and from a start beside it. Collective."""
     branches = one.branches
     stays, back = [], []
     for settings in (one.newton, relaxed(one.newton)):

@@ -29,17 +29,17 @@ AGREE = 1e-6
 #: Part of the unknowns and forces by which a disturbed start differs from a solution.
 DISTURBANCE = 1e-4
 
-#: Linear solves after which block relaxation is given up: the slowest example takes 950.
+#: Linear solves after which Uzawa block relaxation is given up: the slowest example takes 950.
 SOLVES = 3000
 
 
 class TooManyError(Exception):
-    """A block relaxation has taken all of its solves."""
+    """A Uzawa block relaxation has taken all of its solves."""
 
 
 @dataclass
 class Limit:
-    """A monitor that ends block relaxation after so many linear solves.
+    """A monitor that ends Uzawa block relaxation after so many linear solves.
 
     Attributes
     ----------
@@ -180,7 +180,7 @@ class Branches:
         return self._largest(u), self._largest(found.pressure)
 
     def nested_start(self, case: Case) -> State | None:
-        """Return what nested meshes start from; None where there are none. Collective."""
+        """Return the initial guess of nested iteration; None where there is none. Collective."""
         return nested_start(case, self.problem) if has_coarser(case) else None
 
     def disturbed(self, found: Solution) -> State:
@@ -189,7 +189,7 @@ class Branches:
         points = body.space.tabulate_dof_coordinates() / problem.domain.size
         wave = 1 + DISTURBANCE * np.cos(points @ [70.0, 30.0, 50.0])
         x = found.state.x.copy()
-        self._nodal(x)[:] *= wave[:, None]  # what is global, behind the nodes, stays
+        self._nodal(x)[:] *= wave[:, None]  # global unknowns, behind the nodes, stay
         factor, forces = wave[problem.nodes.nodes], found.forces
         disturbed = Multipliers(forces.pressure * factor, forces.friction / factor[:, None])
         return State(body.prescribe(x), disturbed)

@@ -1,4 +1,4 @@
-"""Cantilevers over a stop: what contact costs beside linear solves of the same mesh.
+"""Cantilevers over a stop: costs of contact beside linear solves of the same mesh.
 
 `python3 -m scripts.studies.cantilevers [--out DIR] [--coarse]`, on one rank. A beam 100 x 1 bends
 over a gap of half its height, under a load at its tip or all along it. Each problem has been solved
@@ -82,7 +82,7 @@ def plain(problem: ContactProblem, load: dict[str, Any]) -> fem.Function:
 
 
 def median(work: Callable[[], Any]) -> float:
-    """Return the processor's seconds of what is repeated."""
+    """Return the processor's seconds of a repeated action."""
     taken = []
     for _ in range(TIMES):
         begin = time.process_time()
@@ -94,7 +94,7 @@ def median(work: Callable[[], Any]) -> float:
 def compare(
     name: str, load: dict[str, Any], cells: list[int], degree: int, mu: float
 ) -> dict[str, Any]:
-    """Solve a problem, and time what stands beside it."""
+    """Solve a problem, and time the linear solves beside it."""
     near, far = (parse_case(cantilever(load, cells, degree, mu, gap)) for gap in (GAP, FAR))
     problem, free = build_problem(near), build_problem(far)
     solution = solve(problem, near.solver)
@@ -115,7 +115,7 @@ def compare(
         "converged": solution.converged,
         "factorisations": solution.counters.factorizations,
         "solves": solution.counters.linear_solves,
-        "dense solves": solution.counters.contact_solves,
+        "condensed iterations": solution.counters.contact_solves,
         "ms": 1e3 * seconds,
         **{f"over {other}": seconds / taken for other, taken in others.items()},
     }

@@ -52,7 +52,7 @@ def figure_7_6(report: Report, coarse: bool) -> dict[str, Array]:
 
 
 def graded_meshes(report: Report, coarse: bool) -> dict[str, Array]:
-    """Show what meshes graded towards the corners give back. Collective."""
+    """Show the orders on meshes graded towards the corners. Collective."""
     load, power = -0.005, exponent(POISSON)
     series: tuple[tuple[int, tuple[float, ...], tuple[int, ...], int], ...]
     series = ((1, (1.0, 1.5), (4, 8, 16), 128), (2, (1.0, 3.0), (2, 4, 8), 64))
@@ -71,7 +71,7 @@ def graded_meshes(report: Report, coarse: bool) -> dict[str, Array]:
         f"At the corners u ~ r^{power:.3f} by theory (next section). Grids are pulled towards the "
         "sides and the end of the load with a power q: elements are of the size r^(1 - 1/q) h. "
         f"P1 asks for q > 1/lambda = {1 / power:.2f} and then has order 1 in H1, which uniform "
-        f"meshes miss; P2 for q > 2/lambda = {2 / power:.2f}, and it is what remains in the body, "
+        f"meshes miss; P2 for q > 2/lambda = {2 / power:.2f}, and this remains in the body, "
         "where contact begins and friction changes over (u ~ r^(3/2)), that then limits its "
         "order to 3/2. References are graded alike; interpolation between meshes whose diagonals "
         "differ adds a little to the errors.",
@@ -98,7 +98,7 @@ def theorem_4_3(report: Report, coarse: bool) -> dict[str, Array]:
         "theorem-4-3",
         "Theorem 4.3: the penalised solution as h -> 0, Example 7.2, rho = 1e4",
         "Both solutions belong to the same eps. A large eps smooths contact and friction, and "
-        "with them the solution; what is left are the singular corners of the bar.",
+        "with them the solution; there remain the singular corners of the bar.",
         variants,
     )
 

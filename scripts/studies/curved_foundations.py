@@ -56,7 +56,7 @@ PRESSURE = ALPHA * YOUNG / (1 - 2 * POISSON)
 #: Point (r, z) towards which they shrink; not the tip of the cone, which then would not move.
 CENTRE = (0.0, -0.5)
 
-#: Mesh sizes in the plane, also that of bodies of revolution, and in space.
+#: Mesh sizes in the plane, also that of bodies of revolution, and in 3-D.
 PLANE, SPACE = (0.1, 0.05, 0.025), (0.1, 0.05)
 
 
@@ -70,7 +70,7 @@ NOTE = (
     "pressure. Errors of gaps are multiplied by E/h: at degree 2 gaps in the middle of edges are "
     "those of the curved surface, by curvatures fitted to the vertices; before they were those of "
     "the chord. The triangles are chords of the sphere themselves, by 2e-6. "
-    "In space, where the curvature jumps at the edge of the punch's face, nodes of degree 2 beside "
+    "In 3-D, where the curvature jumps at the edge of the punch's face, nodes of degree 2 beside "
     "it stay off by up to 95 % at h = 0.05."
 )
 
@@ -219,7 +219,7 @@ def _write(profiles: Sequence[Profile], h: float, dim: int, path: str) -> None:
         for behind, profile in zip(("", "1"), profiles, strict=False):
             sides, face = _outline(model, profile, dim)
             if dim == 3:
-                # What is swept from a side is its surface; on the axis there is none.
+                # A surface is swept from a side; on the axis there is none.
                 swept = model.revolve([(2, face)], 0, 0, 0, 0, 0, 1, np.pi / 2)
                 model.synchronize()
                 body += [tag for d, tag in swept if d == 3]
@@ -420,7 +420,7 @@ def ratios(solution: Solution, exact: float) -> Array:
 
 
 def series(coarse: bool) -> Iterator[tuple[str, str, tuple[float, ...], Measured]]:
-    """Return problems with their kind, mesh sizes, and what measures one of a size and degree."""
+    """Return problems with their kind and sizes, and the measure of one of a size and degree."""
     for name in ("ring on a shaft", "ring in a bore"):
         yield name, "2-D", PLANE, partial(rings, name)
     yield "Hertz's cylinder on a plane", "2-D", HERTZ, hertz

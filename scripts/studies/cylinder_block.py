@@ -155,7 +155,7 @@ def ordered(x: Array, chosen: Array) -> Array:
 
 
 def areas(points: Array, degree: int) -> Array:
-    """Return what nodes of a chain stand for: the trapezoidal rule, or Simpson's."""
+    """Return the weights of the nodes of a chain: the trapezoidal rule, or Simpson's."""
     lengths = np.linalg.norm(np.diff(points[::degree], axis=0), axis=1)
     weights = np.zeros(len(points))
     for begin in (0, degree):
@@ -236,7 +236,7 @@ def half_planes(mu: float, count: int) -> tuple[float, float, float]:
             break
         closed, sticks, sign = new
     else:
-        raise RuntimeError("the contact has not settled")
+        raise RuntimeError("the active set still changes")
     a = 2 * np.sqrt(np.sum(p * x**2) / np.sum(p))
     return float(a), float(p.max()), float(np.sum(closed & sticks) / np.sum(closed))
 

@@ -12,7 +12,7 @@ from contact.typing import Array
 
 
 class DualNorm:
-    """sup <q, v_nu> / |v|_V over the discrete displacements v, with |v|_V the energy at rest.
+    """sup <q, v_nu> / |v|_V over the discrete displacements v, with |v|_V the linear energy.
 
     The supremum is reached by the displacement w under the pressure q alone, and is its energy:
     |q|^2 = <q, w_nu>. On Gamma_3 that is the inverse of the body condensed onto it, the discrete
@@ -43,7 +43,7 @@ class DualNorm:
         return self._root(load, self._operator.solve(load))
 
     def displacement(self, x: Array, other: Array) -> float:
-        """Return |u - v|_V of local unknowns, the energy at rest. Collective."""
+        """Return |u - v|_V of local unknowns, the energy of the linear body. Collective."""
         body = self.problem.equilibrium
         forces = (body.internal_forces(BodyState(y), self._rest) for y in (x, other))
         difference = (x - other)[: body.owned]

@@ -130,7 +130,7 @@ def fixed_points(report: Report, coarse: bool) -> dict[str, float]:
     note = (
         "Kacanov's bound is ln(t/xi_0)/(1 + ln(t/xi_0)) at the largest strain t of the body, the "
         "local rate of the secant iteration there; the observed rate is smaller, as most of the "
-        "body is strained less, and larger only where friction is what converges last. "
+        "body is strained less, and larger only where friction converges last. "
         "Friction: constant mu, for which no second solution has been found (last section)."
     )
     caption = "Theorems 3.2 and 4.5: errors of the fixed points per iteration, Example 7.2"

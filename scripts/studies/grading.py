@@ -31,7 +31,7 @@ def grade(domain: Domain, power: float, places: Sequence[Sequence[float]]) -> Do
     power
         1 for the grid as it is.
     places
-        Where the lines are, for each coordinate: both sides and what is between.
+        Where the lines are, for each coordinate: both sides and the middle.
     """
     points = domain.mesh.geometry.x
     for axis, lines in enumerate(places):

@@ -84,7 +84,7 @@ class HalfSpace:
 
 @dataclass(frozen=True)
 class Indentation:
-    """What an indenter feels.
+    """Force and moment on an indenter.
 
     Attributes
     ----------

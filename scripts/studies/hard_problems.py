@@ -70,7 +70,7 @@ def clamped(rng: Rng) -> Case:
 
 
 def lifted(rng: Rng) -> Case:
-    """Draw a long beam at rest, unloaded, half loaded, lifted at its end, pushed or sheared."""
+    """Draw a long beam, unloaded, half loaded, lifted at its end, pushed or sheared."""
     slender = _one(rng, 20.0, 100.0, 600.0)
     case = _beam(rng, slender, ("left",))
     side, traction = _one(
@@ -99,7 +99,7 @@ def bimorph(rng: Rng) -> Case:
 
 
 def plate(rng: Rng) -> Case:
-    """Draw a plate in space, clamped on one or two sides, over a gap."""
+    """Draw a plate in 3-D, clamped on one or two sides, over a gap."""
     wide = _one(rng, 10.0, 30.0)
     n = _one(rng, 8, 12)
     gap = _one(rng, 0.05, 0.5)
@@ -151,7 +151,7 @@ def rough(rng: Rng) -> Case:
 
 
 def few(rng: Rng) -> Case:
-    """Draw a disc that touches at a few nodes, or at none."""
+    """Draw a disc that touches at single nodes, or at none."""
     return {
         "mesh": {"generator": "quarter_disc", "radius": 8.0, "contact_size": 0.8},
         "material": {"young": 2000.0, "poisson": 0.3},
@@ -183,7 +183,7 @@ def units(rng: Rng) -> Case:
 
 
 def layers(rng: Rng) -> Case:
-    """Draw a block on a layer from far softer to far stiffer than itself."""
+    """Draw a block on a layer much softer to much stiffer than itself."""
     case = _block(rng, [32, 8], [4.0, 1.0])
     case["contact"] |= {
         "law": "compliance",
@@ -220,7 +220,7 @@ def corners(rng: Rng) -> Case:
     return case
 
 
-def loose(rng: Rng) -> Case:
+def unsupported(rng: Rng) -> Case:
     """Draw a block that contact alone holds up; its top, or a side, is guided."""
     case = _block(rng, [_one(rng, 32, 64), 8], [4.0, 1.0])
     side = _one(rng, "top", "left")
@@ -255,7 +255,7 @@ FAMILIES = {
         layers,
         yielding,
         corners,
-        loose,
+        unsupported,
     )
 }
 
@@ -274,5 +274,5 @@ COUNTS = {
     "layers": 20,
     "yielding": 10,
     "corners": 20,
-    "loose": 20,
+    "unsupported": 20,
 }

@@ -1,6 +1,6 @@
 """Hertz's contacts inside a half space: exact displacements, pressures and gaps.
 
-The body is cut out of the half space, and what the cut-off part did to it is prescribed: nothing is
+The body is cut out of the half space, the action of the cut-off part is prescribed: nothing is
 left of Hertz's assumptions, and all errors are those of the discretisation.
 """
 

@@ -1,7 +1,7 @@
 """Indentation of half spaces beside closed forms: punch, cone and ball, insulating and conducting.
 
 `python3 -m scripts.studies.indentation [--out DIR] [--coarse]`, also under mpirun. Each problem is
-solved in two boxes; what is off by the box is of first order in the contact radius over its size,
+solved in two boxes; the error by the box is of first order in the contact radius over its size,
 and is extrapolated to none. `indentation_figures.py` draws pressure, and the current of an
 experiment.
 """
@@ -150,12 +150,12 @@ def _foundation(shape: str) -> str:
 
 @dataclass(frozen=True)
 class Found:
-    """What a solution says, in GPa, m, GV and C: ratios to the closed form at its own radius.
+    """Results of a solution, in GPa, m, GV and C: ratios to the closed form at its own radius.
 
     Attributes
     ----------
     force, depth, charge, potential
-        P, delta, Q, and phi(0) of an insulating indenter; NaN for what there is not.
+        P, delta, Q, and phi(0) of an insulating indenter; NaN for those that do not exist.
     radius
         a, of the second moment of the pressure.
     unknowns
@@ -201,7 +201,7 @@ def measure(setting: Setting, solution: Solution) -> Found:
 
 
 def extrapolated(setting: Setting, extent: float = 30.0) -> tuple[Found, list[Found]]:
-    """Return what is left without a box, and what the two boxes gave. Collective."""
+    """Return the extrapolation to no box, and the results of the two boxes. Collective."""
     boxes = [extent, 2 * extent]
     found = [measure(setting, solved(setting.case(box))) for box in boxes]
 
@@ -247,7 +247,7 @@ def table(report: Report, fineness: float, materials: Sequence[str] = MATERIALS)
 
 
 def units_and_poling(report: Report, fineness: float) -> None:
-    """Tabulate what a ball on PZT-4 knows of its poling, and of the units. Collective."""
+    """Tabulate the effects of poling and units on a ball on PZT-4. Collective."""
     names = ("indenter", "given", "P", "Q or phi", "largest difference of p", "of phi")
     columns: dict[str, list[object]] = {name: [] for name in names}
     for potential in (None, 0.0):

@@ -103,7 +103,7 @@ def currents(report: Report, fineness: float, steps: int) -> None:
     data: dict[str, Sequence[float]] = {"t": middle}
     found = []
     for velocity, colour in zip(VELOCITIES, ("#0072B2", "#D55E00", "#009E73"), strict=True):
-        # What is off by the box is of first order in its size.
+        # The error by the box is of first order in its size.
         small, large = (charges(velocity, times, fineness, box) for box in (30.0, 60.0))
         current = np.abs(np.diff(2 * large - small)) / np.diff(times)
         theory = coefficient * velocity**1.5 * middle**0.5

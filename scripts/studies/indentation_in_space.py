@@ -1,4 +1,4 @@
-"""Indentation in space: a ball beside its body of revolution, and a punch that a moment tilts.
+"""Indentation in 3-D: a ball beside its body of revolution, and a punch that a moment tilts.
 
 `python3 -m scripts.studies.indentation_in_space [--out DIR] [--coarse]`, also under mpirun.
 """
@@ -119,7 +119,7 @@ def rotation(solution: Solution) -> float:
 
 
 def tilted_punch(report: Report, coarse: bool) -> None:
-    """Tabulate rotations, and what a solve takes condensed and by itself. Collective."""
+    """Tabulate rotations, and the costs of a solve, condensed and not. Collective."""
     names = "n", "extent", "unknowns", "theta", "order", "solves", "seconds"
     columns: dict[str, list[object]] = {name: [] for name in (*names, "solves, lu", "seconds, lu")}
     sizes = (0.25, 0.5) if coarse else (0.5, 1.0, 2.0, 2.5)

@@ -3,7 +3,7 @@
 Lagging the charge psi phi_L(phi - phi_F) makes the potential on Gamma_3 a fixed point of
 phi -> A - k_e S phi, S the inverse of the body's electric Steklov operator. It contracts by
 k_e |S|, whose size is k_e H/beta, and thus for small k_e only. With phi implicit there is no
-such limit, and what is left is friction's and the material's fixed point.
+such limit; the remaining rates are those of friction's and the material's fixed point.
 """
 
 from __future__ import annotations

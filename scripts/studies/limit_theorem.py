@@ -1,4 +1,4 @@
-"""Chapter 6's theorems in numbers: what the proofs promise, and the orders that are observed.
+"""Chapter 6's theorems in numbers: the proven and the observed orders.
 
 Theorem 6.3: the solution x(mu, k_e) of Problem (PV2) tends to that of (PV1) like mu + k_e.
 Theorems 6.4 and 6.5: the fixed points (6.29) and (6.30), Algorithms 8 and 6, converge.
@@ -30,7 +30,7 @@ from scripts.studies.product_norm import ProductNorm
 SMALLEST = TABLE_8_4[-1]
 VALUES = tuple(sorted({*TABLE_8_4, 2e-2, 1.5e-3, 2e-4, 6e-5, 4e-6}, reverse=True))
 
-#: The norms, and what the theorem asks beside.
+#: The norms, and the theorem's assumptions.
 NORMS = "V: |eps(u)|, W: |grad(phi)| in L2(Omega), as differences; orders are those of both, in X."
 OF_6_3 = (
     "The bound of the proof has the limit L of phi_L in it; here phi_L is the identity, as it is "

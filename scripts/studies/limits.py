@@ -26,7 +26,7 @@ class Errors:
     Attributes
     ----------
     name
-        What was varied.
+        The varied parameter.
     parameter
         Its values, shape (k,).
     norms

@@ -56,7 +56,7 @@ class Variant:
 
     @property
     def penalised(self) -> bool:
-        """Whether the penalty method is used, which knows no nested meshes."""
+        """Whether the penalty method is used, which knows no nested iteration."""
         return any("penalty" in change for change in self.changes)
 
     def solve(self, n: int, nested: bool = False) -> Solution:

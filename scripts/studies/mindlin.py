@@ -1,9 +1,9 @@
-"""Two balls, or cylinders, pressed on each other and moved to and fro: Mindlin and Deresiewicz.
+"""Two balls, or cylinders, pressed on each other and moved back and forth: Mindlin and Deresiewicz.
 
 python3 -m scripts.studies.mindlin [--out DIR] [--coarse]
 
-One half, y >= 0, of two half balls in space, or two half cylinders in the plane. Their cuts stay at
-a distance while one is moved along x and back: what friction takes of a turn is the area of the
+One half, y >= 0, of two half balls in 3-D, or two half cylinders in the plane. Their cuts stay at
+a distance while one is moved along x and back: the dissipation of a turn is the area of the
 loop, and both have a closed form.
 """
 
@@ -21,7 +21,7 @@ from scripts.reporting import ONE_COLUMN, Report, options, solved, subplots
 
 RADIUS, YOUNG, MU = 50.0, 20e3, 0.3
 
-#: What is said of a step.
+#: Results of a step.
 Row = Mapping[str, Any]
 
 #: How far the cuts approach each other, and half the way along x.
@@ -49,7 +49,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
             shown = loop
     report.table(
         "mindlin",
-        "Two balls: area of the loop, and what friction takes, over the closed form",
+        "Two balls: area of the loop, and dissipation, over the closed form",
         rows,
         "The closed form takes all friction to act along x, which is exact for nu = 0.",
     )
@@ -62,7 +62,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
             plane["dissipation"].append(turn_of_cylinders(elements, 3, degree))
     report.table(
         "mindlin-plane",
-        "Two cylinders: what friction takes of a turn, over the closed form",
+        "Two cylinders: dissipation of a turn, over the closed form",
         plane,
         "In twelve steps; with 24 of them it is the same to 1e-4.",
     )
@@ -75,9 +75,9 @@ class Loop:
     Attributes
     ----------
     way, force
-        Displacement of the cut along x, and what drives it, at the ends of steps.
+        Displacement of the cut along x, and its driving force, at the ends of steps.
     dissipation
-        What friction takes in the turn.
+        Dissipation of friction in the turn.
     normal, width, compliance
         P, Hertz's a, and k = sum (2 - nu)/G.
     """
@@ -189,11 +189,11 @@ def moved(case: dict[str, Any], steps: int) -> tuple[list[Row], list[Row]]:
 
 
 def turn_of_cylinders(elements: float, steps: int, degree: int = 1) -> float:
-    """Return what friction takes of a turn of two cylinders over the closed form.
+    """Return the dissipation of a turn of two cylinders over the closed form.
 
-    What is pushed along is Q = mu (P - P_c), at the way mu (d(P) - d(P_c)) of the normal problem
+    The tangential force is Q = mu (P - P_c), at the way mu (d(P) - d(P_c)) of the normal problem
     (Jaeger, Ciavarella), whose stiffness is constant but for -ln(P)/(pi E*): the loop is eight
-    times mu^2 what is between d(P) and its chord (Masing).
+    times mu^2 the area between d(P) and its chord (Masing).
 
     Parameters
     ----------
@@ -247,10 +247,10 @@ def draw(report: Report, loop: Loop) -> None:
     ax.legend()
     report.figure(
         "mindlin-loop",
-        "Two balls moved to and fro: force over displacement",
+        "Two balls moved back and forth: force over displacement",
         figure,
         {"way": own, "force": loop.force},
-        f"Of the way {share:.3g} a unit force, what the half balls yield elsewhere, is left out: "
+        f"Of the way {share:.3g} a unit force, the half balls' deformation elsewhere, is left out: "
         "one number, fitted, that no area depends on.",
     )
 

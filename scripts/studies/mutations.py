@@ -1,6 +1,6 @@
 """Damaged case files: each has to end with status 0, 1 or 2, in one line, within its time.
 
-Or to say beforehand that it takes long: a mesh of millions of cells may be what is wanted.
+Or to say beforehand that it takes long: a mesh of millions of cells may be wanted.
 
 `python3 -m scripts.studies.mutations [--out DIR] [--coarse] [--count N] [--seed S] [--first K]`.
 The shipped cases, on small meshes, are damaged by one to three random mutations each, and solved.
@@ -31,14 +31,14 @@ COUNT, COARSE_COUNT, SEED = 9000, 60, 19
 LIMIT, LONGEST = 60, 900.0
 
 CASES = sorted(Path(__file__).parents[1].glob("cases/*.toml"))
-#: What makes the shipped meshes small.
+#: Changes that make the shipped meshes small.
 SMALL = (
     (re.compile(r"^cells = \[\d+, \d+\]", re.M), "cells = [12, 4]"),
     (re.compile(r"^cells = \[\d+, \d+, \d+\]", re.M), "cells = [4, 2, 2]"),
     (re.compile(r"^(contact_)?size = 0\.\d+", re.M), r"\1size = 0.8"),
     (re.compile(r"^(contact_size) = [\d.]+", re.M), r"\1 = 0.8"),
 )
-#: What is said before a mesh is made that takes long.
+#: The words before a mesh is made that takes long.
 FORESEEN = re.compile(r"^warning: mesh: .* take", re.M)
 TOO_LONG = "too long"
 
@@ -185,7 +185,7 @@ def damaged(number: int, seed: int) -> tuple[str, str]:
 
 
 def run(file: Path, folder: Path) -> tuple[int | str, str, float]:
-    """Solve a case in a child; return its status, or what ended it, its messages and seconds."""
+    """Solve a case in a child; return its status or its signal, its messages and seconds."""
     begin = time.monotonic()
     with tempfile.TemporaryFile() as said:
         child = os.fork()
@@ -222,7 +222,7 @@ def run(file: Path, folder: Path) -> tuple[int | str, str, float]:
 
 
 def fault(status: int | str, text: str) -> str:
-    """Say what is wrong with an ending; nothing if it is one of those that are accepted."""
+    """Return the fault of an ending; nothing if it is one of those that are accepted."""
     if status == TOO_LONG and FORESEEN.search(text):
         return ""
     if status not in (0, 1, 2):
@@ -238,7 +238,7 @@ def fault(status: int | str, text: str) -> str:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Damage cases, solve them, and list what ended otherwise than it may."""
+    """Damage cases, solve them, and list endings that are not accepted."""
     command = parser(__doc__, "mutations")
     command.add_argument("--count", type=int, help="number of damaged cases")
     command.add_argument("--seed", type=int, default=SEED)

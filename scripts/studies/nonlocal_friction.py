@@ -91,7 +91,7 @@ def study(report: Report, n: int, load: float) -> dict[str, Solution]:
         "bar and at the ends of the contact zones, the bound is spread over the radius. It is then "
         "positive on open nodes too, where friction acts by the letter of (3.6): this is "
         "the price of a law for which existence is proved, and uniqueness where friction is small. "
-        "Radius 0 is what the thesis computes with, a positive radius what its theorems are about; "
+        "The thesis computes with radius 0; its theorems are about a positive radius; "
         "a radius up to h is no smoothing on the mesh."
     )
     report.table(f"{name}-table", f"Smoothing radius of R: {where}", columns, note)

@@ -62,7 +62,7 @@ def random_case(seed: int) -> dict[str, Any]:
 
 
 def converges(given: Mapping[str, Any], compared: bool) -> tuple[bool, str]:
-    """Solve a pair; return whether all is well, and what there is to say."""
+    """Solve a pair; return whether all is well, and the remarks."""
     case = parse_case({**given, "solver": {"tolerance": 1e-10}})
     solution = solve(case)
     words = f"{len(solution.history.records)} iterations, {solution.outcome.reason}"
@@ -79,7 +79,7 @@ def main(arguments: list[str]) -> None:
     """Solve pairs, and say which fail."""
     count = int(arguments[0]) if arguments else 100
     compared = int(arguments[1]) if len(arguments) > 1 else 30
-    # What each is worth is told by `contact solve`.
+    # `contact solve` tells the warnings of each.
     logging.getLogger("contact").setLevel(logging.ERROR)
     failed = 0
     for seed in range(count):

@@ -1,6 +1,6 @@
 """How the contact pressure converges in L2 and in the discrete H^-1/2, against exact solutions.
 
-Closed form 4, in the plane and in space, and Hertz's cylinder and ball.
+Closed form 4, in the plane and in 3-D, and Hertz's cylinder and ball.
 
 `python3 -m scripts.studies.pressure_convergence [--out DIR] [--coarse]`, also under mpirun.
 """
@@ -40,7 +40,7 @@ NOTE = (
     "degree 1, and Hueeber, Mair and Wohlmuth (Appl. Numer. Math. 54 (2005) 555) treat degree 2. "
     "On quadratic triangles the functions are those of Popp, Wohlmuth, Gee and Wall (SIAM J. Sci. "
     "Comput. 34 (2012) B421), alpha = 1/5, so that vertices carry forces; see docs/theory.md. "
-    "With constraints at mid-edges alone errors there are smaller (closed form 4 in space, 4 and "
+    "With constraints at mid-edges alone errors there are smaller (closed form 4 in 3-D, 4 and "
     "8 cells: 0.0763 and 0.0306 in L2; ball, 4 cells: 0.0617), and vertices penetrate."
 )
 
@@ -82,7 +82,7 @@ IN_PLANE = {1: (8, 16, 32, 64), 2: (8, 16, 32, 64)}
 
 SERIES = {
     "closed form 4": _singular(lambda s, n, k: s.problem(n, k), IN_PLANE),
-    "closed form 4 in space": _singular(
+    "closed form 4 in 3-D": _singular(
         lambda s, n, k: s.in_space(n, k), {1: (8, 16, 32), 2: (4, 8, 16)}
     ),
     "Hertz's cylinder": _hertz(Line, IN_PLANE),

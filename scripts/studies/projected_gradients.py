@@ -1,11 +1,11 @@
-"""Plates over a gap in space: the interior point beside projected gradients, both by multigrid.
+"""Plates over a gap in 3-D: the interior point beside projected gradients, both by multigrid.
 
 `python3 -m scripts.studies.projected_gradients [--out DIR] [--coarse] [--cells N]`, on one rank.
 A plate clamped at one side is pressed onto a rigid plane, without friction: a quadratic programme
 with the bounds u_n <= g. Modified proportioning with reduced gradient projections (Dostal) takes
 conjugate gradients on the unknowns that are free, projects a step that meets a bound, and frees
-nodes where these are what is left. The hierarchy of the body is kept: as it is, or with its finest
-level adapted to the nodes that are held, as Newton's method has it.
+nodes where these dominate the residual. The hierarchy of the body is kept: as it is, or with its
+finest level adapted to the nodes that are held, as Newton's method has it.
 
 References
 ----------
@@ -36,11 +36,11 @@ from scripts.reporting import Report, parser
 #: Cells along each side of the plate, and with --coarse.
 SIZES, COARSE = (12, 20, 40, 100), (8,)
 
-#: What is left of the load where projected gradients are done, and the V-cycles that they are given
+#: Residual over the load where projected gradients are done, and the V-cycles that they are given
 #: for each one of the interior point.
 TOLERANCE, MOST = 1e-8, 10
 
-#: Nodes are freed where what holds them outweighs what is left elsewhere by this.
+#: Nodes are freed where their reactions outweigh the residual elsewhere by this.
 GAMMA = 1.0
 
 #: Stiffness at held nodes, beside the body's, that the adapted hierarchy is told.
@@ -63,7 +63,7 @@ def plate(n: int) -> dict[str, Any]:
 
 @dataclass
 class Counted:
-    """What a solve took.
+    """The costs of a solve.
 
     Attributes
     ----------
@@ -140,7 +140,7 @@ class ProjectedGradients:
         return self._sign * np.where(self._free, self._out.array, 0.0)
 
     def _precondition(self, gradient: Array, held: Array) -> Array:
-        """Return a cycle's answer on what is not held."""
+        """Return a cycle's answer on free unknowns."""
         self.cycles += 1
         self._in.array[:] = self._sign * gradient
         self._operator.ksp.getPC().apply(self._in, self._out)
@@ -161,7 +161,7 @@ class ProjectedGradients:
         return 1.1 * value
 
     def solve(self, most: int) -> Array:
-        """Minimise from rest, by at most so many cycles; return the owned unknowns."""
+        """Minimise from zero by at most so many cycles; return the owned unknowns."""
         load, bound = self._sign * self._load, self._bound
         short, size = 1.9 / self._largest(), float(np.linalg.norm(load))
         x = np.zeros_like(load)
@@ -203,7 +203,7 @@ class ProjectedGradients:
 
 
 def by_interior_point(problem: ContactProblem) -> tuple[Counted, Array]:
-    """Solve as the program does; return what it took, and the owned unknowns."""
+    """Solve as the program does; return its costs, and the owned unknowns."""
     begin = time.process_time()
     found = solve(problem, NewtonOptions(linear="iterative"))
     took, cycles = time.process_time() - begin, found.counters.linear_iterations
@@ -216,7 +216,7 @@ def by_interior_point(problem: ContactProblem) -> tuple[Counted, Array]:
 def by_projected_gradients(
     problem: ContactProblem, adapted: bool, most: int
 ) -> tuple[Counted, Array]:
-    """Solve by projected gradients; return what it took, and the owned unknowns."""
+    """Solve by projected gradients; return its costs, and the owned unknowns."""
     begin = time.process_time()
     method = ProjectedGradients(problem, adapted)
     x = method.solve(most)
@@ -227,7 +227,7 @@ def by_projected_gradients(
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
-    """Solve the plates by both and say what it took."""
+    """Solve the plates by both and print the costs."""
     command = parser(__doc__, "projected_gradients")
     command.add_argument("--cells", type=int, nargs="+", help="along each side, in place of all")
     command.add_argument("--most", type=int, default=MOST, help="cycles for one of the other's")
@@ -242,12 +242,12 @@ def main(arguments: Sequence[str] | None = None) -> None:
             off = float(np.abs(x - reference).max() / np.abs(reference).max())
             name = "projected gradients" + adapted * ", adapted"
             _add(rows, n, name, found, off)
-    caption = "Plates over a gap in space, without friction, by multigrid"
+    caption = "Plates over a gap in 3-D, without friction, by multigrid"
     Report(given.out).table("projected-gradients", caption, rows)
 
 
 def _add(rows: dict[str, list[Any]], n: int, method: str, took: Counted, off: float) -> None:
-    """Enter what a solve took in a table, and print it."""
+    """Enter the costs of a solve in a table, and print it."""
     row = {"cells": n, "method": method, **asdict(took), "difference": off}
     print(*row.values(), flush=True)
     for key, value in row.items():

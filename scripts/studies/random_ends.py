@@ -2,11 +2,11 @@
 
 `python3 -m scripts.studies.random_ends [--out DIR] [--coarse] [--count N] [--first K]`. Cases of
 both sweeps, and charged bodies with weak and strong couplings under potentials of all sizes, are
-solved by a random method and linear solver with a random `max_outer`. What `summary.json` then says
-is held against the residuals of the state in a problem that was built anew, at the whole load, and
-against the forces and charges that its numbers leave out of balance (`raw_balance`). What takes
-longer than `LIMIT`, such as thousands of block relaxations of a beam 600 x 1, is ended by a signal,
-and what it leaves is judged like the rest.
+solved by a random method and linear solver with a random `max_outer`. Each `summary.json` is held
+against the residuals of the state in a problem that was built anew, at the whole load, and against
+the forces and charges that its numbers leave out of balance (`raw_balance`). A run that takes
+longer than `LIMIT`, such as thousands of Uzawa block relaxations of a beam 600 x 1, is ended by a
+signal, and its results are judged like the rest.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ METHODS, SOLVERS = ("newton", "uzawa", "penalty"), ("auto", "auto", "iterative")
 #: Seconds of processor after which a solve is ended.
 LIMIT = 10.0
 #: Rounding of a residual that is computed once more, and of rounding that is seen by other means:
-#: that which was granted, or what moving the unknowns by their own makes of the raw forces.
+#: that which was granted, or the change of the raw forces where unknowns move by their own.
 ROUNDING, OTHER = 1.01, 2.0
 
 
@@ -52,7 +52,7 @@ def charged(rng: np.random.Generator) -> dict[str, Any]:
     for name in ("e31", "e33", "e15"):
         case["material"]["piezo"][name] *= coupling
     strain = float(rng.choice([1e-6, 1e-2, 1.0]))
-    # Up to what strains the body as much as the loads do, and to any size.
+    # Up to values that strain the body as much as the loads do, and to any size.
     potential = float(rng.choice([0.0, 1e-3, 1.0, 1e3, 1e6, 1e9, strain * 4.0 / coupling]))
     where = str(rng.choice(["right", "top"]))
     case["fixed"].append({"on": where, "potential": potential})
@@ -105,7 +105,7 @@ def solved(case: Case, settings: Options) -> Solution | None:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Solve random cases and list what is said to have converged and has not."""
+    """Solve random cases and list those that claim to have converged and have not."""
     command = parser(__doc__, "random_ends")
     command.add_argument("--count", type=int, help="number of cases")
     command.add_argument("--first", type=int, default=0, help="number of the first case")
@@ -130,15 +130,15 @@ def main(arguments: Sequence[str] | None = None) -> int:
             pairs = [(getattr(residuals, name), getattr(allowed, name)) for name in summary["kkt"]]
             holds = all(value <= ROUNDING * most for value, most in pairs)
             raw = imbalance(solution)
-            for loose, size, unsure in zip(*raw.all, strict=True):
+            for unbalanced, size, unsure in zip(*raw.all, strict=True):
                 rounding = OTHER * max(summary["rounding"] * size, unsure)
-                holds &= loose <= ROUNDING * allowed.equilibrium * size + rounding
+                holds &= unbalanced <= ROUNDING * allowed.equilibrium * size + rounding
             if summary["converged"] and not holds:
                 shown = [" ".join(f"{pair[i]:.2e}" for pair in pairs) for i in (0, 1)]
                 left = f"{raw.force:.2e} of {raw.applied:.2e}, "
                 left += f"{raw.charge:.2e} of {raw.electrified:.2e}"
-                what = (case.source, method, settings.max_outer, summary["rounding"])
-                row = (*what, shown[0], left, shown[1])
+                topic = (case.source, method, settings.max_outer, summary["rounding"])
+                row = (*topic, shown[0], left, shown[1])
                 print(*row, flush=True)
                 append(rows, *row)
     print("endings:", dict(sorted(ends.items())))

@@ -2,7 +2,7 @@
 
 Stresses and electric displacements are integrated cell by cell, tractions facet by facet, contact
 forces and charges are those of the contact table. For a body of one isotropic material, `linear` or
-`log`, in plane strain (there also piezoelectric) or in space, under tractions, on one rank.
+`log`, in plane strain (there also piezoelectric) or in 3-D, under tractions, on one rank.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from contact.body.description import Material
 from contact.tolerances import EPS
 from contact.typing import Array
 
-#: Part of an unknown by which it is moved to see what the forces owe to its rounding.
+#: Part of an unknown by which it is moved to see the effect of its rounding on the forces.
 SHAKE = 1e-9
 
 CELLS = {2: basix.CellType.triangle, 3: basix.CellType.tetrahedron}
@@ -28,18 +28,18 @@ FACETS = {2: basix.CellType.interval, 3: basix.CellType.triangle}
 
 @dataclass(frozen=True)
 class Imbalance:
-    """What is left at the nodes where nothing holds the body, and what acts on it.
+    """Residual forces at the free nodes, and the forces on the body.
 
     Attributes
     ----------
     force, applied
         Euclidean norms over the nodes: of the forces left; of loads, contact forces, reactions
-        and what the potential exerts on the body at rest, added up (force).
+        and the forces of the potential on the undeformed body, added up (force).
     charge, electrified
-        The same of charges, those of the strain among them, but for what flows through nodes that a
-        support holds; 0 without a potential (charge).
+        The same of charges, those of the strain among them, but for charges that flow through nodes
+        that a support holds; 0 without a potential (charge).
     unsure
-        What the rounding of each unknown makes of `force` and `charge`: moved up or down at random.
+        Effect of the rounding of each unknown on `force` and `charge`: moved up or down at random.
     """
 
     force: float
@@ -50,12 +50,12 @@ class Imbalance:
 
     @property
     def all(self) -> tuple[tuple[float, float], ...]:
-        """What is left of forces and of charges, what acts, and what is unsure of the former."""
+        """Residuals of forces and of charges, their scales, and the rounding of the former."""
         return (self.force, self.charge), (self.applied, self.electrified), self.unsure
 
 
 def imbalance(solution: Solution) -> Imbalance:
-    """Return what the numbers of a solution leave out of balance."""
+    """Return the imbalance of the numbers of a solution."""
     problem = solution.problem
     body, d = problem.equilibrium, problem.dim
     nodal = body.nodal(solution.state.x)
@@ -63,30 +63,30 @@ def imbalance(solution: Solution) -> Imbalance:
     inner, charges = _internal(solution, nodal[:, :d], phi)
     loads, (touch, flux) = _tractions(solution), _contact(solution)
     left, charge = inner - loads + touch, charges - flux
-    free, loose = np.ones(left.shape, dtype=bool), np.full(len(phi), problem.piezoelectric)
+    free, floating = np.ones(left.shape, dtype=bool), np.full(len(phi), problem.piezoelectric)
     for fixed in problem.body.fixed:
         facets = problem.domain.facets(fixed.on)
         nodes = fem.locate_dofs_topological(body.space, d - 1, facets)
         for i, value in enumerate(fixed.displacement or ()):
             free[nodes, i] &= value is None
-        loose[nodes] &= fixed.potential is None
+        floating[nodes] &= fixed.potential is None
     # Nodes that a support holds conduct as well, but are no contact nodes: they have no row.
     for contact in problem.contacts:
         facets = problem.domain.facets(contact.on)
         nodes = fem.locate_dofs_topological(body.space, d - 1, facets)
-        loose[np.setdiff1d(nodes, problem.nodes.nodes)] = False
+        floating[np.setdiff1d(nodes, problem.nodes.nodes)] = False
     norm = np.linalg.norm
     of_field, _ = _internal(solution, np.zeros_like(inner), phi)
     _, of_strain = _internal(solution, nodal[:, :d], np.zeros_like(phi))
     applied = norm(loads) + norm(touch) + norm(left[~free]) + norm(of_field)
-    electrified = norm(flux) + norm(charge[~loose]) + norm(of_strain)
+    electrified = norm(flux) + norm(charge[~floating]) + norm(of_strain)
     up_or_down = 1 + SHAKE * np.random.default_rng(0).choice((-1.0, 1.0), nodal.shape)
     shaken = _internal(solution, (nodal * up_or_down)[:, :d], phi * up_or_down[:, -1])
-    unsure = norm((shaken[0] - inner)[free]), norm((shaken[1] - charges)[loose])
+    unsure = norm((shaken[0] - inner)[free]), norm((shaken[1] - charges)[floating])
     return Imbalance(
         float(norm(left[free])),
         float(applied),
-        float(norm(charge[loose])),
+        float(norm(charge[floating])),
         float(electrified),
         (EPS / SHAKE * float(unsure[0]), EPS / SHAKE * float(unsure[1])),
     )
@@ -168,7 +168,7 @@ def _tractions(solution: Solution) -> Array:
 
 
 def _contact(solution: Solution) -> tuple[Array, Array]:
-    """Return what the body exerts on the foundation at its nodes, and what charge leaves it."""
+    """Return the body's forces on the foundation at its nodes, and the charge that leaves it."""
     problem, table = solution.problem, solution.contact
     body, nodes, d = problem.equilibrium, problem.nodes, problem.dim
     _, row = KDTree(table.points).query(nodes.points)

@@ -1,4 +1,4 @@
-"""Refinement of chapter 8: what Examples 8.1 to 8.4 come to on finer and finer meshes.
+"""Refinement of chapter 8: results of Examples 8.1 to 8.4 on finer and finer meshes.
 
 `python3 -m scripts.studies.refinement_8 [--out DIR] [--coarse]`, also under mpirun. Beside the
 default ramp of psi, 0.4 wide in Examples 8.1 and 8.2 and 0.3 in 8.4, stands a steep one of 1/1000
@@ -38,11 +38,11 @@ STEEP = 1e3
 #: Part of the largest extent that "force inside" leaves out at either end of Gamma_3.
 AWAY = 0.1
 
-#: What is to be seen.
+#: Observations.
 ALL_CLOSED = (
     "All of Gamma_3 is in contact, and the ramp of psi makes no difference. The largest pressure "
     "is that at the free end x = 8, where the bar stands on its edge: it grows from mesh to mesh, "
-    "without bound where nothing yields. The force is what the load does not leave to the clamp, "
+    "without bound where nothing yields. The force is the load less the part of the clamp, "
     "to rounding, and so can be no better than the reaction of the clamp, at whose corner x = 0 a "
     "node is held whose own reaction counts as the clamp's: it falls like h^0.5 only (-10.9, -7.6, "
     "-5.3 on 48, 96, 192 cells), against the rest of the error, so that the force is within 0.4 % "
@@ -55,7 +55,7 @@ NOTES = {
     "8.2": ALL_CLOSED,
     "8.3": "Nothing is conducted.",
     "8.4": "Crossed diagonals, as symmetric as the bar. With the default ramp there is one patch, "
-    "and charge and potential settle like h. The force is settled to 0.06 %, and its changes "
+    "and charge and potential settle like h. The force has converged to 0.06 %, and its changes "
     "within that have no order yet. The largest pressure is that of the middle, where the bar "
     "sticks between slips to either side, once the mesh shows this zone, which is 0.06 wide: one "
     "node sticks on 192 cells, three on 384. On 576 cells force, charge and largest pressure are "
@@ -64,15 +64,15 @@ NOTES = {
     "8.4, k_e = 0.6": "As before, with less current; the changes of the force are 0.05 % of it.",
 }
 
-#: Of what the table shows the change from level to level.
+#: Columns of which the table shows the change from level to level.
 WATCHED = ("force", "moment", "force inside", "charge")
 
-#: Finest mesh for the steep ramp: beyond, most time would go into what only the mesh makes.
+#: Finest mesh for the steep ramp: beyond, most time would go into effects of the mesh alone.
 FINEST_STEEP = 96
 
 
 def measured(solution: Solution) -> dict[str, object]:
-    """Return what is looked at. Collective."""
+    """Return the observed quantities. Collective."""
     problem, nodes = solution.problem, solution.problem.nodes
     touching = nodes.gather((solution.status != "open").astype(float))
     where, pressure = nodes.gather(nodes.points[:, 0]), nodes.gather(solution.pressure)
@@ -128,7 +128,7 @@ def refined(report: Report, example: str, levels: Sequence[int]) -> None:
         f"refinement-{example.split(',')[0].replace('.', '-')}{'-weak' * (',' in example)}",
         f"Example {example} on finer meshes",
         columns,
-        "Newton's method from rest. The moment is that of the pressure about x = 0. Patches are "
+        "Newton's method from zero. The moment is that of the pressure about x = 0. Patches are "
         "runs of neighbouring contact nodes; the charge "
         "goes through the foundation; several: the program warns that there may be more "
         "solutions. The force inside leaves out a tenth of the bar's length at either end of "

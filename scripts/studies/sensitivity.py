@@ -23,7 +23,7 @@ class Sweep:
     Attributes
     ----------
     words
-        What it is, for the axis.
+        Its name, for the axis.
     example
         Of the thesis.
     case, key
@@ -35,7 +35,7 @@ class Sweep:
     log
         Whether the axis is logarithmic.
     note
-        What is to be seen.
+        The observation.
     """
 
     words: str
@@ -57,7 +57,7 @@ SWEEPS: Mapping[str, Sweep] = {
         (1e0, 1e1, 1e2, 1e3, 1e4, 1e5, 1e6, 1e7, 6e7), (128, 32),
         note="The thesis prints rho for its tables and for Figures 7.7 and 7.8; it decides 0.1 % "
         "of the force and 0.2 % of the largest pressure. Of several solutions with a large rho "
-        "this is the one that Newton's method finds from rest (last section).",
+        "this is the one that Newton's method finds from the zero initial guess (last section).",
     ),
     "rho": Sweep(
         r"$\rho$ of (7.16)", "8.2", "piezo-8-2", "friction.mu.rho",

@@ -141,7 +141,7 @@ def disturbed(
 
 
 def fault(folder: Path, accepted: set[int]) -> str:
-    """Say what is wrong with what stands in a folder; nothing if it is one run's whole result."""
+    """Return the fault of a folder; nothing if it holds one run's whole result."""
     transaction.recover(folder)
     try:
         summary = json.loads((folder / transaction.SUMMARY).read_text())
@@ -161,7 +161,7 @@ def fault(folder: Path, accepted: set[int]) -> str:
 
 
 def table(path: Path) -> dict[str, NDArray[Any]]:
-    """Return the columns of a CSV file; those of what it took to solve are left out."""
+    """Return the columns of a CSV file; those of the costs are left out."""
     with path.open() as stream:
         rows = list(csv.DictReader(stream))
     counts = "linear_solves", "factorizations", "kkt"
@@ -229,7 +229,7 @@ def ended(folder: Path, count: int, rng: np.random.Generator) -> dict[str, list[
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Disturb runs and look at what they leave."""
+    """Disturb runs and look at their results."""
     options = parser(__doc__, "signals")
     options.add_argument("--count", type=int, help="number of signals to the bar")
     options.add_argument("--first", type=int, default=0, help="number of the first of them")
@@ -253,8 +253,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         status, left = disturbed(command(folder, number, ranks), kind, delay, wait)
         wrong = fault(folder, {before, number}) or (f"{left} processes left" if left else "")
         before = int(json.loads((folder / "summary.json").read_text())["title"].split()[1])
-        what = "new result" if before == number else "earlier result"
-        ends[f"{ranks} rank(s), {kind.name}, status {status}, {what}"] += 1
+        topic = "new result" if before == number else "earlier result"
+        ends[f"{ranks} rank(s), {kind.name}, status {status}, {topic}"] += 1
         if wrong:
             row = (number, ranks, kind.name, writing, status, wrong)
             print(*row, flush=True)

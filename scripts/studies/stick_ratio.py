@@ -61,18 +61,18 @@ def ball(mu: float, cells: int = 160) -> ContactProblem:
 
 
 def cylinder_alone(k: float, mu: float) -> float:
-    """Return what is 0 at the cylinder's ratio without the shear's effect on the pressure."""
+    """Return 0 at the cylinder's ratio, without the shear's effect on the pressure."""
     return float(ellipk(1 - k * k) / ellipk(k * k) - GAMMA / mu)
 
 
 def ball_alone(k: float, mu: float) -> float:
-    """Return what is 0 at the ball's."""
+    """Return 0 at the ball's ratio."""
     return float(np.arctanh(k) / k - mu / GAMMA * ellipk(1 - k * k))
 
 
 @dataclass(frozen=True)
 class Pressed:
-    """What is pressed.
+    """A pressed body.
 
     Attributes
     ----------

@@ -1,4 +1,4 @@
-"""Robustness sweep: some 300 problems, how many converge by each method, and at what cost.
+"""Robustness sweep: some 300 problems, how many converge by each method, and their costs.
 
 `python3 -m scripts.studies.sweep [--out DIR] [--coarse] [--methods newton uzawa] [--only NAME]
 [--hard]`, also under mpirun. The problems are drawn once, with a fixed seed, from the ranges
@@ -177,7 +177,7 @@ def hertz(rng: np.random.Generator) -> dict[str, Any]:
 
 
 def block(rng: np.random.Generator) -> dict[str, Any]:
-    """Draw a block in space, clamped on one side, pressed and pushed aside on top."""
+    """Draw a block in 3-D, clamped on one side, pressed and pushed aside on top."""
     n = int(rng.choice([4, 6]))
     push, press = 0.005 * float(rng.choice([0, 1, 2])), -0.01 * float(rng.choice([1, 3]))
     return {
@@ -214,7 +214,7 @@ def problems(
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
-    """Solve all problems by all methods and write what came of it."""
+    """Solve all problems by all methods and write the results."""
     command = parser(__doc__, "sweep")
     command.add_argument("--methods", nargs="+", default=list(METHODS), choices=METHODS)
     command.add_argument("--only", help="a family, or one problem such as bar-7")

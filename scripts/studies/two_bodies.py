@@ -90,7 +90,7 @@ def middle(solution: Solution) -> float:
 
 @dataclass(frozen=True)
 class Pressed:
-    """Two equal round bodies, each cut in half and moved by its cut: what Hertz says of them.
+    """Two equal round bodies, each cut in half and moved by its cut, and Hertz's values for them.
 
     Attributes
     ----------
@@ -163,7 +163,7 @@ def summit(table: Table, a: float) -> float:
 
 
 def approach(small: Pressed, large: Pressed, kinematics: str) -> float:
-    """Return the approach of two bodies over Hertz's, what is far from the contact left out.
+    """Return the approach of two bodies over Hertz's, without the deformation far from the contact.
 
     Hertz's is that of half spaces; bodies of finite size move too where they are held. For balls
     that share is proportional to the force, against force^(2/3): two forces tell both apart. Two
@@ -207,7 +207,7 @@ def round_bodies(report: Report, counts: Sequence[float]) -> None:
         "Two equal balls (SSNV104) and cylinders over Hertz",
         rows,
         "a by the second moment of the pressure, p_0 by the ellipse fitted to it, at the force "
-        "that acts; the approach by two forces, without what the cuts do far from the contact.",
+        "that acts; the approach by two forces, without the cuts' effect far from the contact.",
     )
 
 

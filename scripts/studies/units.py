@@ -61,7 +61,7 @@ def numbers(solution: Solution, length: float, stress: float) -> Array:
 
 
 def counts(solution: Solution) -> tuple[int, ...]:
-    """Return what must not depend on the units."""
+    """Return the quantities that must not depend on the units."""
     k = solution.counters
     return (len(solution.history.records), k.factorizations, k.linear_solves, k.contact_solves)
 

@@ -44,7 +44,7 @@ SHORTEST_ARROW = 0.02
 
 
 def normal_graph(p_nu: Compliance, touch: float, gap: float, stiffness: float) -> tuple[Array, ...]:
-    """Return u_nu and -sigma_nu as the block relaxation projects onto the law (r = 1)."""
+    """Return u_nu and -sigma_nu as the Uzawa block relaxation projects onto the law (r = 1)."""
     z = np.linspace(-1.0, 2.0, 601)
     law = NormalLaw(p_nu, np.full_like(z, stiffness), np.full_like(z, touch), np.full_like(z, gap))
     pressure = law.pressure(z, 1.0)
@@ -80,15 +80,17 @@ def laws(report: Report) -> None:
         ),
         "1-7": ("Coulomb's law, bound 1", coulomb_graph(1.0)),
     }
-    for number, (what, (u, force)) in graphs.items():
+    for number, (topic, (u, force)) in graphs.items():
         figure, axes = subplots(size=(ONE_COLUMN, 2.4))
         axes.axhline(0.0, color="0.7", lw=0.6)
         axes.axvline(0.0, color="0.7", lw=0.6)
         axes.plot(u, force, "k", lw=1.6)
         part = r"\tau" if number == "1-7" else r"\nu"
         axes.set(xlabel=rf"$u_{part}$ (arb. units)", ylabel=rf"$-\sigma_{part}$ (arb. units)")
-        caption = f"Figure {number.replace('-', '.')}: {what}"
-        note = "Drawn from the projection that the block relaxation applies at a contact node."
+        caption = f"Figure {number.replace('-', '.')}: {topic}"
+        note = (
+            "Drawn from the projection that the Uzawa block relaxation applies at a contact node."
+        )
         report.figure(f"figure-{number}", caption, figure, {"u": u, "-sigma": force}, note)
 
     figure, (left, middle, right) = subplots(1, 3, size=(TWO_COLUMNS, 2.4))
@@ -117,7 +119,7 @@ def example(
     report: Report,
     number: str,
     name: str,
-    what: str,
+    topic: str,
     cells: tuple[int, int],
     variant: str = "",
     changes: Sequence[str] = (),
@@ -131,8 +133,8 @@ def example(
         Where to.
     number, name
         Of the figure, with a hyphen, and of the case file.
-    what
-        What is shown, for the captions.
+    topic
+        Its title, for the captions.
     cells
         Of the mesh.
     variant
@@ -155,7 +157,7 @@ def example(
         stress = "normal stress (the tangential one is zero)"
     report.figure(
         f"figure-{number}a{ending}",
-        f"Figure {dotted} (a){of}: {stress} on Gamma_3, {what}",
+        f"Figure {dotted} (a){of}: {stress} on Gamma_3, {topic}",
         draw_line(table, held=deformed.held, units=solution.units),
         csv_columns(table),
         f"{remark(solution, table)}{yielding(solution.max_dev_strain, share)} {note}".rstrip(),
@@ -163,7 +165,7 @@ def example(
     report.figure(
         f"figure-{number}b{ending}",
         f"Figure {dotted} (b){of}: deformed bar, potential and contact forces on it (arrows), "
-        f"{what}",
+        f"{topic}",
         with_forces(draw_plane(deformed, table, units=solution.units), deformed, table),
         {"smallest potential": [float(values.min())], "largest potential": [float(values.max())]},
     )
@@ -221,12 +223,12 @@ def series(report: Report, cells: tuple[int, int]) -> None:
         changes = f"friction.mu={value}", f"electric.k_e={value}"
         solution = solution_of("compliance-8-4", cells, *changes, domain=domain)
         tables[f"mu = k_e = {value:g}"] = contact_table(solution)
-    # Last, to lie on top of what tends to it.
+    # Last, to lie on top of the curves that tend to it.
     tables["Problem (PV1)"] = contact_table(limit)
     names = [*(rf"$\mu = k_e = {words}$" for words in VALUES.values()), "Problem (PV1)"]
     if MPI.COMM_WORLD.rank > 0:
         return
-    for number, key, what, ylabel in (
+    for number, key, topic, ylabel in (
         ("8-11a", "pressure", "normal stress", r"$-\sigma_\nu$ (GPa)"),
         ("8-11b", "tau", "tangential stress", r"$-\sigma_\tau\cdot t$ (GPa)"),
         ("8-12", "phi", "potential", POTENTIAL),
@@ -237,12 +239,12 @@ def series(report: Report, cells: tuple[int, int]) -> None:
             assert table is not None
             data.setdefault("x", table["x"])
             data[label] = table[key]
-            style = "k--" if label.startswith("P") else "-"  # dashes: what the others tend to
+            style = "k--" if label.startswith("P") else "-"  # dashes: the limit of the others
             axes.plot(table["x"], table[key], style, lw=1.0, label=name)
         axes.set(xlabel=ALONG, ylabel=ylabel)
         axes.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
         caption = (
-            f"Figure {number.replace('-', '.')}: {what} on Gamma_3, phi_F = 32, for mu = k_e -> 0"
+            f"Figure {number.replace('-', '.')}: {topic} on Gamma_3, phi_F = 32, for mu = k_e -> 0"
         )
         report.figure(f"figure-{number}", caption, figure, data)
 
@@ -255,14 +257,14 @@ def main(arguments: Sequence[str] | None = None) -> None:
         laws(report)
     example(report, "8-9", "compliance-8-3", "Example 8.3", cells)
     data = "Example 8.4, mu = 0.6, k_e = 1"
-    crossed, what = ["mesh.diagonal=crossed"], f"{data}, crossed diagonals"
+    crossed, topic = ["mesh.diagonal=crossed"], f"{data}, crossed diagonals"
     symmetric = (
         "The mesh is symmetric, and so are bar, loads and this solution. The bump in the middle is "
-        "where slips to either side meet: friction changes its sign there within a few nodes, and "
+        "where slips to either side meet: friction changes its sign there within some nodes, and "
         "on finer meshes the peak is 11.4 (*Chapter 8 on finer meshes*). The thesis has sticking "
-        "and sliding zones clearly identified; here what sticks is this middle alone, 0.06 wide."
+        "and sliding zones clearly identified; here this middle alone sticks, 0.06 wide."
     )
-    example(report, "8-10", "compliance-8-4", what, cells, "", crossed, note=symmetric)
+    example(report, "8-10", "compliance-8-4", topic, cells, "", crossed, note=symmetric)
     leaning = (
         "All triangles lean to one side here; with the default ramp of psi the solution differs "
         "little from that of the symmetric mesh, and less on finer ones."
@@ -272,8 +274,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
         "The ramp of psi of earlier versions, 1000 over the largest extent: far below the spacing "
         "of the nodes, so that the mesh decides where the bar touches. Shown to warn."
     )
-    ramp, what = [*crossed, "electric.delta=83.3333"], f"{data}, delta = 83.3"
-    example(report, "8-10", "compliance-8-4", what, cells, "steep", ramp, note=steep)
+    ramp, topic = [*crossed, "electric.delta=83.3333"], f"{data}, delta = 83.3"
+    example(report, "8-10", "compliance-8-4", topic, cells, "steep", ramp, note=steep)
     layer = "layer of thickness 0.1"
     example(report, "8-9", "compliance-8-3-layer", f"Example 8.3, {layer}", cells, "layer")
     example(report, "8-10", "compliance-8-4-layer", f"Example 8.4, {layer}", cells, "layer")

@@ -22,7 +22,7 @@ RHO = 1e4
 EPS = 1.05e-5
 PENALTY = ("solver.method=penalty", f"solver.eps_contact={EPS}")
 
-#: What is not printed, and what is seen at the free end of the bar.
+#: The unprinted values, and the appearance of the free end of the bar.
 OF_7_4 = (
     "For Figures 7.4 to 7.6 the thesis prints no rho; taken is that of Figures 7.7 and 7.8. "
     "At the corner x = 4 the bar stands on its edge and the stresses are singular: the value at "
@@ -32,7 +32,7 @@ OF_7_4 = (
     "lean to the left or are crossed."
 )
 
-#: Figure -> load, changes of the case, what it shows.
+#: Figure -> load, changes of the case, title.
 FIGURES: Mapping[str, tuple[float, tuple[str, ...], str]] = {
     "7-4": (-0.005, (), "multipliers"),
     "7-5": (-0.05, (), "multipliers"),
@@ -68,7 +68,7 @@ def draw(report: Report, number: str, case: Case, text: str, load: float) -> Tab
 
 
 def _remark(solution: Solution, table: Table) -> str:
-    """Return what the solver says of itself and what can be seen."""
+    """Return the solver's residuals and the visible quantities."""
     kkt = solution.outcome.kkt
     counts = {kind: np.count_nonzero(table["status"] == kind) for kind in ("stick", "slip", "open")}
     return (

@@ -64,12 +64,12 @@ def figure_8_2a(report: Report, cells: tuple[int, int]) -> None:
         {"smallest potential": [float(values.min())], "largest potential": [float(values.max())]},
         f"{remark(solution, table)} The body presses on the foundation with ({along:.4g}, "
         f"{across:.4g}): to the right, as the thesis says of the contact force; the arrows are "
-        "what acts on the body, the other way round.",
+        "its reaction on the body.",
     )
 
 
 def potentials(
-    report: Report, number: str, what: str, name: str, curves: Sequence[Curve],
+    report: Report, number: str, topic: str, name: str, curves: Sequence[Curve],
     cells: tuple[int, int], rises: bool = True,
 ) -> None:  # fmt: skip
     """Draw the potential on Gamma_3 for several data, with which it rises or not. Collective."""
@@ -101,7 +101,7 @@ def potentials(
     )
     report.figure(
         f"figure-{number}",
-        f"Figure {number.replace('-', '.', 1)[:3]} ({number[-1]}): potential on Gamma_3, {what}",
+        f"Figure {number.replace('-', '.', 1)[:3]} ({number[-1]}): potential on Gamma_3, {topic}",
         figure,
         data,
         f"Largest residual {residual:.1e}. {claim if rises else ''}".rstrip(),
@@ -207,9 +207,9 @@ def main(arguments: Sequence[str] | None = None) -> None:
     chosen = options(__doc__, "figures_piezo", arguments)
     report, cells = Report(chosen.out), (16, 8) if chosen.coarse else (128, 64)
     figure_8_2a(report, cells)
-    what = "k_e = 1, phi_F = 32"
-    example(report, "8-3", "piezo-8-1-conductive", f"Example 8.1, {what}", cells)
-    example(report, "8-5", "piezo-8-2", f"Example 8.2, {what}", cells)
+    topic = "k_e = 1, phi_F = 32"
+    example(report, "8-3", "piezo-8-1-conductive", f"Example 8.1, {topic}", cells)
+    example(report, "8-5", "piezo-8-2", f"Example 8.2, {topic}", cells)
     all_potentials(report, cells)
     theorem_5_2(report, chosen.coarse)
     figure_8_7(report, chosen.coarse)

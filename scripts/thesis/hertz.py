@@ -21,7 +21,7 @@ from scripts.thesis.hertz_problems import Cylinder, Sphere, cylinder, sphere
 
 @dataclass(frozen=True)
 class Found:
-    """What a contact solution says of Hertz's quantities.
+    """Hertz's quantities of a contact solution.
 
     Attributes
     ----------
@@ -62,7 +62,7 @@ def measure(solution: Solution, load: float) -> Found:
     slope, offset = np.polyfit(r[outer] ** 2, pressure[outer] ** 2, 1)
     inner = r <= radius / 2
     centre = np.polyfit(r[inner] ** 2, pressure[inner] ** 2, 1)[1]
-    # Hertz's pressure has <r^2> = b^2/4 in the plane and 2 a^2/5 in space.
+    # Hertz's pressure has <r^2> = b^2/4 in the plane and 2 a^2/5 in 3-D.
     factor = 4.0 if d == 2 else 2.5
     moment = np.sqrt(factor * (weight @ (pressure * r**2)) / (weight @ pressure))
     force = -solution.contact_force[-1]

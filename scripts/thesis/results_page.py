@@ -2,7 +2,7 @@
 
 `python3 -m scripts.thesis.results_page [--page docs/results.md] [--out results] [--coarse]
 [--gather] [--only SCRIPT...]`. With --gather nothing is computed: the page is put together from
-what earlier runs of `make tables` and `make figures` have left in the folder of results. Sections
+the results of earlier runs of `make tables` and `make figures` in the folder of results. Sections
 that are not among --only, or of which nothing is left there, stay as they are on the page.
 """
 
@@ -31,10 +31,10 @@ the numbers behind every picture are in the CSV file of the same name. Every run
 residuals, computed from scratch after the solve: *residual* is the largest of equilibrium, contact
 and friction, and 0 where forces balance to their rounding. A penalty solution is judged by the
 residual of the penalised problem (PV_eps) instead. A script stops if a run does not converge, so
-that no table holds numbers of one that has not, unless it says so. A dash, —, stands for what is
-not defined or was not reached; dashed and dotted lines are bounds, limits and references.
+that no table holds numbers of one that has not, unless it says so. A dash, —, stands for a value
+that is not defined or was not reached; dashed and dotted lines are bounds, limits and references.
 
-**What was re-read.** The printed numbers of chapter 8 in SI units (E = 58.7 GPa, loads of 10 to 120
+**Read again.** The printed numbers of chapter 8 in SI units (E = 58.7 GPa, loads of 10 to 120
 N/m^2, a gap of 0.5 m, phi_F = 32 V) cannot touch the foundation, nor yield. They are consistent in
 GPa, m, C/m^2 and GV: E = 58.7102, loads and phi_F as printed, permittivities times 1e9. All
 examples of chapter 8 are in these units, and their strains are then of the order of 1, in cells at
@@ -43,8 +43,8 @@ a formal model there, and the program warns of it. The thesis's rho = 0.5 of Exa
 the gap, varrho elsewhere. The decay rho of (7.16) it prints for chapter 7 alone: here it is 1 in
 Examples 8.1 and 8.2, see *Sensitivity*. The thesis's delta "is small": here psi rises within
 1/delta, a tenth of the body's volume over the area of its contact part, 0.4 in Examples 8.1 and 8.2
-and 0.3 in 8.4, which meshes resolve; earlier versions took a thousandth of its size, and what that
-did is shown beside. c_nu = 10, alpha_nu = 2 and n_nu = 0.1 are not printed either.
+and 0.3 in 8.4, which meshes resolve; earlier versions took a thousandth of its size, with the
+effect shown beside. c_nu = 10, alpha_nu = 2 and n_nu = 0.1 are not printed either.
 
 Formulas too: (1.13) has g of |dev eps|^2, and (7.8) by the letter would yield where that is xi_0.
 Such a material softens beyond |dev eps|^2 = e xi_0, against (h1)(b), and in Example 7.2 next to
@@ -90,7 +90,7 @@ def section(part: Part, folder: Path, place: str) -> str:
     part
         The script.
     folder
-        What it has written.
+        Its results.
     place
         Folder of the pictures, relative to the page.
     """
@@ -135,9 +135,9 @@ def gather(results: Path, page: Path, only: Sequence[str] | None = None) -> None
     Parameters
     ----------
     results
-        What scripts have written, a folder each.
+        Results of scripts, a folder each.
     page
-        The page; what it says of scripts that are not gathered stays.
+        The page; its sections on scripts that are not gathered stay.
     only
         Names of the scripts to gather; all by default.
     """

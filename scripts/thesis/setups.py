@@ -14,7 +14,7 @@ from contact.cli.setup import draw_setup
 from scripts.cases import CASES
 from scripts.reporting import Report, options
 
-#: Figure -> case file, changes of its mesh for a drawing, what it shows.
+#: Figure -> case file, changes of its mesh for a drawing, title.
 FIGURES: Mapping[str, tuple[str, tuple[str, ...], str]] = {
     "7-1": ("hertz", (), "Example 7.1, also the mechanical framework of Figure 1.1"),
     "7-3": ("bar", ("mesh.cells=[64, 16]",), "Example 7.2, also that of Figure 1.1"),
@@ -31,7 +31,7 @@ VACUUM, GIGA = 8.885e-12, 1e9
 
 
 def constants(report: Report) -> None:
-    """Print Table 8.1 beside what the case files have."""
+    """Print Table 8.1 beside the values of the case files."""
     case = load_case(CASES / "piezo-8-2.toml")
     (_, material), *_ = case.materials
     piezo = material.piezo
@@ -67,7 +67,7 @@ def constants(report: Report) -> None:
 def main(arguments: Sequence[str] | None = None) -> None:
     """Draw the set-ups and print the constants. Collective."""
     report = Report(options(__doc__, "setups", arguments).out)
-    for number, (name, changes, what) in FIGURES.items():
+    for number, (name, changes, topic) in FIGURES.items():
         case = load_case(CASES / f"{name}.toml", changes)
         problem = build_problem(case)
         figure, nodes = draw_setup(case, problem), problem.nodes
@@ -75,7 +75,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
         if figure is not None:
             report.figure(
                 f"figure-{number}",
-                f"Figure {number.replace('-', '.')}: set-up of {what}",
+                f"Figure {number.replace('-', '.')}: set-up of {topic}",
                 figure,
                 {"x": x, "y": y, "gap": gap},
                 f"Drawn from the case file `{name}.toml`, on a coarse mesh, by the function behind "

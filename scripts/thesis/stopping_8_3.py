@@ -40,7 +40,7 @@ def count(body: BodyEquilibrium, states: Sequence[State], phi_scale: float) -> f
     Parameters
     ----------
     body, states
-        The body, and what each iteration has left.
+        The body, and the iterate of each iteration.
     phi_scale
         Unit of the potential in the norm: that of the unknowns for our norm of scaled potentials,
         1 for that of the thesis, in which u and phi are added as they are.
@@ -68,23 +68,23 @@ def main(arguments: Sequence[str] | None = None) -> None:
     )  # fmt: skip
     columns: dict[str, list[object]] = {name: [] for name in names}
     stopping = ("solver.stopping=thesis", "solver.max_outer=20", "solver.eps_fp=1e-13")
-    for what, name in CASES.items():
+    for topic, name in CASES.items():
         for rule, changes in RULES.items():
             case = case_of(name, cells, *LAGGED[:1], *LAGGED[2:], *stopping, *changes)
             problem = build_problem(case)
             body = problem.equilibrium
-            # The start is at rest; the iteration after which nothing moves is the last that counts.
+            # From zero; the iteration after which nothing moves is the last that counts.
             states, solves, outcome = iterates(problem, case.solver)
             counts = [count(body, states, scale) for scale in (1.0, body.phi_scale)]
             last = solves[int(np.nan_to_num(counts[0], nan=len(solves))) - 1]
-            append(columns, what, rule, THESIS, *counts, solves[0], last, outcome.kkt.largest)
+            append(columns, topic, rule, THESIS, *counts, solves[0], last, outcome.kkt.largest)
     Report(chosen.out).table(
         "stopping-8-3",
         f"Example 8.3: iterations of Algorithm 8 until (6.40) with eps_fp = 1e-5, {cells[0]} x "
         f"{cells[1]} cells",
         columns,
         "By the thesis's words Algorithm 9 stops after 2 iterations: its inner loop, which (6.41) "
-        "ends. Table 8.4 counts outer ones, and 2 of Algorithm 8 are what (6.40) gives here if "
+        "ends. Table 8.4 counts outer ones, and 2 of Algorithm 8 follow from (6.40) here if "
         "inner loops are solved; so the 2 is taken for these. By the letter it is found too, but "
         "of the last inner loop: with r = 0.25 E and eps = 1e-5 it ends after 2 solves, as soon "
         "as one moves little, and leaves its work to the outer loop. (6.40) asks for a relative "

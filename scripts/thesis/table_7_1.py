@@ -28,19 +28,19 @@ PER_MILLIMETRE, LITERAL = 25.0, 2.5e4
 SECANT = 'solver.material_step="secant"'
 STOPPING = ("solver.method=uzawa", 'solver.stopping="thesis"', SECANT)
 PLAIN = 'solver.acceleration="none"'
-HONEST = ("solver.method=uzawa", SECANT)
+CONVERGED = ("solver.method=uzawa", SECANT)
 
 
 @dataclass(frozen=True)
 class Run:
-    """What one solution took.
+    """The costs of one solution.
 
     Attributes
     ----------
     outer
         Iterations after the frictionless start.
     inner, solves, factorizations
-        Iterations of the block relaxation, linear solves and factorisations.
+        Iterations of the Uzawa block relaxation, linear solves and factorisations.
     residual
         The largest KKT residual at the end.
     change, square
@@ -99,10 +99,10 @@ def runs_of(n: int) -> list[dict[str, Run]]:
         runs = {
             "thesis": run(n, load, rho, *STOPPING),
             "printed": run(n, load, rho, *STOPPING, PLAIN, f"solver.r={PER_MILLIMETRE}"),
-            "honest": run(n, load, rho, *HONEST),
+            "converged": run(n, load, rho, *CONVERGED),
             "single": run(n, load, rho, "solver.method=uzawa", "solver.single_loop=true"),
         }
-        for name in ("honest", "single"):
+        for name in ("converged", "single"):
             if not runs[name].converged:
                 raise RuntimeError(f"f2 = {load}, rho = {rho:g}: {name} has not converged")
         found.append(runs)
@@ -119,8 +119,8 @@ def tables(report: Report, n: int, found: Sequence[Mapping[str, Run]]) -> None:
         }
         return first | others
 
-    def of(name: str, what: str) -> list[object]:
-        return [getattr(runs[name], what) for runs in found]
+    def of(name: str, topic: str) -> list[object]:
+        return [getattr(runs[name], topic) for runs in found]
 
     where = f"Example 7.2, {4 * n} x {n} cells"
     report.table(
@@ -129,9 +129,9 @@ def tables(report: Report, n: int, found: Sequence[Mapping[str, Run]]) -> None:
         columns(
             **{
                 "(3.45), (3.46)": of("thesis", "outer"),
-                "honest, (3.46)": of("honest", "change"),
-                "square": of("honest", "square"),
-                "to 1e-8": of("honest", "outer"),
+                "converged, (3.46)": of("converged", "change"),
+                "square": of("converged", "square"),
+                "to 1e-8": of("converged", "outer"),
             }
         ),
         "Counts leave out the frictionless start. First with the stopping rules of the thesis, "
@@ -142,13 +142,13 @@ def tables(report: Report, n: int, found: Sequence[Mapping[str, Run]]) -> None:
         "afterwards because its counts are of the thesis's size. It explains nothing: its counts "
         "do not follow the thesis's, which rise with rho. Tried and not found to explain the size "
         "of the counts either: the thesis's r read per metre, and per millimetre (--literal), with "
-        "plain and accelerated inner loops (next table). What rises "
+        "plain and accelerated inner loops (next table). Counts rise "
         "with rho as in the thesis are the counts under the rules (3.45), (3.46) "
         "themselves: the inner loop is left early, and the bound creeps.",
     )
     report.table(
         "table-7-1-rules",
-        f"What the rules of the thesis leave, {where}",
+        f"Residuals by the rules of the thesis, {where}",
         columns(
             **{
                 "iterations": of("thesis", "outer"),
@@ -160,25 +160,25 @@ def tables(report: Report, n: int, found: Sequence[Mapping[str, Run]]) -> None:
             }
         ),
         "The residual of equilibrium, contact and friction after a run that (3.45) and (3.46) "
-        "have ended: with our r and acceleration, and with the plain block relaxation and the "
-        "thesis's r read per metre, 25 E per mm.",
+        "have ended: with our r and acceleration, and with the plain Uzawa block relaxation and "
+        "the thesis's r read per metre, 25 E per mm.",
     )
     report.table(
-        "table-7-1-honest",
+        "table-7-1-converged",
         f"To residuals of 1e-8, {where}",
         columns(
             **{
-                "iterations": of("honest", "outer"),
-                "inner": of("honest", "inner"),
-                "factorizations": of("honest", "factorizations"),
-                "residual": of("honest", "residual"),
+                "iterations": of("converged", "outer"),
+                "inner": of("converged", "inner"),
+                "factorizations": of("converged", "factorizations"),
+                "residual": of("converged", "residual"),
                 "single loop": of("single", "outer"),
                 "its solves": of("single", "solves"),
                 "its residual": of("single", "residual"),
             }
         ),
         "Two loops with the inner one solved to 1e-9, and one loop that updates the bound in the "
-        "block relaxation itself, with tangent instead of secant steps near the solution.",
+        "Uzawa block relaxation itself, with tangent instead of secant steps near the solution.",
     )
     report.table(
         "table-7-1-times",
@@ -190,14 +190,14 @@ def tables(report: Report, n: int, found: Sequence[Mapping[str, Run]]) -> None:
                 ],
                 "(3.45), (3.46)": _ratios(of("thesis", "seconds")),
                 "its solves": _ratios(of("thesis", "solves")),
-                "honest": _ratios(of("honest", "seconds")),
-                "honest solves": _ratios(of("honest", "inner")),
+                "converged": _ratios(of("converged", "seconds")),
+                "converged solves": _ratios(of("converged", "inner")),
             }
         ),
         "The thesis's seconds (5.09 in its first row) are those of another machine and code: only "
         "how they grow can be compared. They grow like its iterations; ours, by the same rules, "
         "more slowly, for later iterations take few inner ones. The ratios of times depend on "
-        "what else the machine does; those of the solves do not.",
+        "the load of the machine; those of the solves do not.",
     )
 
 
@@ -207,7 +207,7 @@ def _ratios(values: list[object]) -> list[object]:
 
 
 def literal(report: Report, n: int, limit: int) -> list[Run]:
-    """Show what r = 2.5e4 E does when it is taken at its word. Collective."""
+    """Show the effect of r = 2.5e4 E, taken at its word. Collective."""
     columns: dict[str, list[object]] = {
         name: [] for name in ("f2", "rho", "outer", "solves", "residual", "seconds", "stopped by")
     }
@@ -220,7 +220,7 @@ def literal(report: Report, n: int, limit: int) -> list[Run]:
         found.append(one)
     report.table(
         "table-7-1-literal",
-        f"r = 2.5e4 E in millimetres, plain block relaxation, {4 * n} x {n} cells",
+        f"r = 2.5e4 E in millimetres, plain Uzawa block relaxation, {4 * n} x {n} cells",
         columns,
         f"At most {limit} inner and 6 outer iterations. With so large an r the auxiliary "
         "variables hardly move in one step, so that (3.45) is met far from the solution.",

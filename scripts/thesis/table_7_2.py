@@ -90,8 +90,8 @@ def table(report: Report, n: int) -> None:
             lagged = 'solver.material_step="secant"'
             stopped = penalty(problem, n, load, eps, 'solver.stopping="thesis"', lagged)
             alone = checked(penalty(problem, n, load, eps, lagged, "solver.max_outer=1000"))
-            honest = checked(penalty(problem, n, load, eps))
-            error, kkt = distance(reference, honest), honest.outcome.kkt
+            converged = checked(penalty(problem, n, load, eps))
+            error, kkt = distance(reference, converged), converged.outcome.kkt
             append(
                 counts,
                 load,
@@ -101,7 +101,7 @@ def table(report: Report, n: int) -> None:
                 stopped.outcome.kkt.equilibrium,
                 _counts(alone)[0],
                 alone.outcome.kkt.equilibrium,
-                *_counts(honest),
+                *_counts(converged),
                 kkt.equilibrium,
             )
             append(
@@ -136,8 +136,8 @@ def table(report: Report, n: int) -> None:
         "The penalised problems are solved to 1e-8, the ones with multipliers to 1e-10. The "
         "contact and friction residuals are those of the Signorini and Coulomb laws themselves. "
         "The first is the penetration and falls like eps; the second, like the errors, falls more "
-        "slowly: eps is also the slip length of the friction law, and what ought to stick creeps "
-        "by about as much (Theorem 4.2 below has smaller eps). The last three columns are "
+        "slowly: eps is also the slip length of the friction law, and nodes that ought to stick "
+        "creep by about as much (Theorem 4.2 below has smaller eps). The last three columns are "
         "relative errors of displacement and pressure (L2 of Gamma_3).",
     )
 
@@ -209,7 +209,7 @@ def study(report: Report, n: int, values: Sequence[float] = SMALL) -> dict[str, 
         "|sigma_nu(u^h) + [u_nu^h]^+/eps| in H^-1/2(Gamma_3) by C M_A |u^h - u_eps^h|_V. As "
         "printed the second pressure is zero, for u^h does not penetrate: [u_eps,nu^h]^+ of the "
         "penalised problem is meant. The last column is C M_A, in the norms "
-        "of the energy at rest. It does not grow as eps falls, so that both have one order. "
+        "of the energy of the linear body. It does not grow as eps falls: both have one order. "
         "Without friction it is the cosine between the error and the displacements that a "
         "pressure alone makes, and 1 for a linear material."
     )

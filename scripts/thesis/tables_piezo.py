@@ -29,7 +29,7 @@ THESIS: Mapping[str, tuple[str, Sequence[int]]] = {
     "8.3": ("piezo-8-2", (8, 9, 9, 9, 9, 9, 9)),
 }
 
-#: What is explained, and what is not.
+#: Explained and unexplained differences.
 NOTES = {
     "8.2": "The thesis's 4 or 5 iterations are near those of an implicit charge. That is no "
     "evidence: rho of (7.16), which the thesis does not print for this chapter, was chosen so; "
@@ -47,7 +47,7 @@ UZAWA, NEWTON = "solver.method=uzawa", "solver.method=newton"
 SECANT = (UZAWA, "solver.material_step=secant")
 LAGGED = ("electric.lagged=true", *SECANT)
 
-#: Counted by (3.46) alone: a change of the friction bound below 1e-5, after honest inner solves.
+#: Counted by (3.46) alone: a change of the friction bound below 1e-5, after converged inner solves.
 BY_CHANGE = ("solver.stopping=thesis", "solver.eps=1e-9", "solver.max_outer=100")
 
 #: The thesis's r = 0.25 E and its rules (3.46) and (5.38), which end both loops at 1e-5.

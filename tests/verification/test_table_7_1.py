@@ -9,18 +9,18 @@ def test_the_table(tmp_path, capsys):
     found = table_7_1.main(["--cells", "4", "--out", str(tmp_path)])
     assert len(found) == len(table_7_1.rows()) == 8
     for runs in found:
-        # The rules of the thesis leave residuals well above those of honest ones.
-        assert runs["honest"].residual <= 1e-8
+        # The rules of the thesis leave residuals well above those of converged ones.
+        assert runs["converged"].residual <= 1e-8
         assert runs["printed"].residual > 1e-7
         assert runs["thesis"].residual < 1e-4
-        assert 3 <= runs["honest"].outer <= 20
-        assert runs["honest"].square <= 9
+        assert 3 <= runs["converged"].outer <= 20
+        assert runs["converged"].square <= 9
         assert runs["single"].residual <= 1e-8
-        assert runs["single"].solves < 0.5 * runs["honest"].solves
+        assert runs["single"].solves < 0.5 * runs["converged"].solves
     with (tmp_path / "table-7-1.csv").open() as stream:
         rows = list(csv.DictReader(stream))
     assert [int(row["thesis"]) for row in rows] == [3, 3, 4, 6, 5, 5, 6, 8]
-    assert [int(row["to 1e-8"]) for row in rows] == [runs["honest"].outer for runs in found]
+    assert [int(row["to 1e-8"]) for row in rows] == [runs["converged"].outer for runs in found]
     assert "| f2 | rho | thesis |" in (tmp_path / "table-7-1.md").read_text()
     assert "Table 7.1" in capsys.readouterr().out
 
