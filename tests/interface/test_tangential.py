@@ -15,6 +15,7 @@ import meshes
 from contact.interface.jump import Multipliers
 from contact.problem.kkt import evaluate
 from contact.solving import solve
+from tests.problems.mechanics import bar, leaning_block
 from tests.problems.rings import between_plates, squeezed
 
 COMM = MPI.COMM_WORLD
@@ -93,3 +94,19 @@ def test_residual_sees_friction_along_the_normal(share):
         for taken in (state.forces.pressure, pressure):
             wrong = replace(state, forces=Multipliers(taken, friction))
             assert evaluate(problem, wrong).friction > 1e-5
+
+
+@pytest.mark.parametrize("dim", [2, 3])
+def test_tangential_part_of_a_displacement_nearly_along_the_normal(dim):
+    """Beside a large normal displacement the small tangential one has no part along the normal."""
+    nodes = leaning_block(MPI.COMM_SELF, 2).nodes if dim == 3 else bar(MPI.COMM_SELF, 4).nodes
+    rng = np.random.default_rng(dim)
+    normal = rng.standard_normal(nodes.normal.shape)
+    normal /= np.linalg.norm(normal, axis=1)[:, None]
+    tangent = np.eye(dim) - normal[:, :, None] * normal[:, None, :]
+    nodes = replace(nodes, normal=normal, tangent=tangent)
+    small = np.einsum("nij,nj->ni", tangent, rng.standard_normal(normal.shape))
+    part = nodes.tangential_component(normal + 1e-9 * small)
+    size = np.linalg.norm(part, axis=1)
+    assert np.all(np.abs(nodes.normal_component(part)) < 1e-15 * size)
+    np.testing.assert_allclose(part, 1e-9 * small, rtol=0, atol=1e-15)

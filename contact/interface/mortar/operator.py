@@ -8,7 +8,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Protocol
 
 import numpy as np
 from dolfinx.common import IndexMap
@@ -17,37 +16,11 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from contact.errors import InputError
+from contact.interface.mortar.coupling import Coupling
+from contact.interface.mortar.lumping import Mixing
 from contact.linear.constraint import Change, in_circles
 from contact.mesh.entities import owned_among
 from contact.typing import Array
-
-
-class Rows(Protocol):
-    """Jumps (S u)_j - sum_l P_jl u_l at some nodes; the same on all ranks.
-
-    `contact.interface.mortar.coupling.Coupling` between bodies, and
-    `contact.interface.mortar.lumping.Mixing` in front of a rigid foundation.
-    """
-
-    @property
-    def nodes(self) -> NDArray[np.int64]:
-        """Global numbers of these nodes, shape (n,)."""
-
-    @property
-    def slaves(self) -> NDArray[np.int64]:
-        """Global numbers of the nodes of their facets, shape (s,)."""
-
-    @property
-    def own(self) -> sparse.csr_array:
-        """S, shape (n, s)."""
-
-    @property
-    def masters(self) -> NDArray[np.int64]:
-        """Global numbers of nodes of the other body, shape (m,)."""
-
-    @property
-    def other(self) -> sparse.csr_array:
-        """P, shape (n, m)."""
 
 
 @dataclass(frozen=True)
@@ -114,7 +87,7 @@ class CouplingOperator:
 def coupling_operator(
     comm: MPI.Intracomm,
     index_map: IndexMap,
-    given: Sequence[Rows],
+    given: Sequence[Coupling | Mixing],
     nodes: NDArray[np.int32],
     free: NDArray[np.bool_],
 ) -> CouplingOperator | None:
@@ -162,7 +135,7 @@ def coupling_operator(
     return operator.at(index_map.local_to_global(nodes))
 
 
-def _over(rows: Rows, every: NDArray[np.int64]) -> sparse.csr_array:
+def _over(rows: Coupling | Mixing, every: NDArray[np.int64]) -> sparse.csr_array:
     """Return a contact's jumps by the values of the nodes of all contacts."""
     count = rows.nodes.size
     total = sparse.csr_array((count, every.size))
