@@ -11,6 +11,7 @@ given the state that it is about.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -319,3 +320,17 @@ class BodyEquilibrium:
             self.internal_forces(at) for at in (state, BodyState(alone, state.history))
         )
         return self.sizes(np.where(self.shares.mechanical, of_potential, of_all - of_potential))
+
+    def l2_norm(self) -> Callable[[Array], float]:
+        """Return the L2(Omega) norm of owned unknowns (displacement and scaled potential)."""
+        trial, test = ufl.TrialFunction(self.space), ufl.TestFunction(self.space)
+        mass = assemble_matrix(fem.form(ufl.inner(trial, test) * self.domain.dx))
+        mass.assemble()
+        vector, image = mass.createVecs()
+
+        def norm(values: Array) -> float:
+            vector.array[:] = values[: self.owned]
+            mass.mult(vector, image)
+            return float(np.sqrt(max(vector.dot(image), 0.0)))
+
+        return norm

@@ -11,7 +11,6 @@ from mpi4py import MPI
 from pydantic import Field, Tag, model_validator
 
 from contact.body.fields import steady
-from contact.body.norms import volume
 from contact.case.formula import Expression, NodalField, as_field, as_number
 from contact.case.messages import Words, fault
 from contact.case.rigid import Rigid
@@ -247,5 +246,5 @@ def conduction_ramp(domain: Domain, part: str) -> float:
     refined meshes resolve it and solutions have a limit. A fixed small number of the thesis's
     delta means a wide ramp too.
     """
-    height = volume(domain, domain.dx) / volume(domain, domain.ds(part))
+    height = domain.volume(domain.dx) / domain.volume(domain.ds(part))
     return RAMP * min(height, domain.size)

@@ -15,6 +15,7 @@ from typing import Any, TypeAlias
 import numpy as np
 import numpy.typing as npt
 import ufl
+from dolfinx import fem
 from dolfinx import mesh as dmesh
 from mpi4py import MPI
 from numpy.typing import NDArray
@@ -209,6 +210,11 @@ class Domain:
         Over the full turn radial forces cancel, and so do moments about a point of the axis.
         """
         return np.where([self.revolved, *[False] * (self.dim - 1)], 0.0, vector)
+
+    def volume(self, measure: Measure) -> float:
+        """Return the volume or area that a measure covers. Collective."""
+        one = fem.Constant(self.mesh, np.float64(1.0))
+        return float(self.comm.allreduce(fem.assemble_scalar(fem.form(one * measure)), op=MPI.SUM))
 
     def dx_in(self, name: str) -> Measure:
         """Measure over the cells of region ``name``; raises as `cells`."""

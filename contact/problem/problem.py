@@ -14,7 +14,6 @@ from contact.body.equilibrium import BodyEquilibrium
 from contact.body.internal_variables import VARIABLES
 from contact.body.masters import Masters
 from contact.body.materials import young_behind
-from contact.body.norms import volume
 from contact.errors import InputError
 from contact.history import CONTACT_NODES, History, InternalVariables, Part
 from contact.interface.current import Conductor, HeldCurrent, held_current
@@ -271,7 +270,7 @@ class ContactProblem:
 
     def _area(self, domain: Domain) -> float:
         """Return the area of Gamma_3. Collective."""
-        return sum(volume(domain, domain.ds(contact.on)) for contact in self.contacts)
+        return sum(domain.volume(domain.ds(contact.on)) for contact in self.contacts)
 
     def _scales(self) -> Scales:
         domain, law, d = self.domain, self.body.law, self.dim
@@ -284,7 +283,7 @@ class ContactProblem:
             bulk=float(law.bulk),
             shear=float(law.shear),
             size=domain.size,
-            height=volume(domain, domain.dx) / area,
+            height=domain.volume(domain.dx) / area,
             area=area,
             spacing=(mesh_area / self.nodes.size) ** (1 / (d - 1)),
         )

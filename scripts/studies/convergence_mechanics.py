@@ -10,12 +10,12 @@ from collections.abc import Sequence
 import numpy as np
 
 from contact import InputError
-from contact.body.norms import errors
 from contact.methods.newton import Newton
 from contact.methods.options import NewtonOptions
 from contact.typing import Array
 from scripts.reporting import Report, observed_orders, options
 from scripts.studies.corner import POISSON, exponent
+from scripts.studies.error_norms import errors
 from scripts.studies.exact_solutions import Singular, exact, manufactured
 from scripts.studies.fixed_point_rates import fixed_points
 from scripts.studies.mesh_series import NORMS, Variant, mesh_series

@@ -13,7 +13,6 @@ from dolfinx import fem
 from mpi4py import MPI
 
 from contact.body.description import Body, Fixed, Load
-from contact.body.norms import Errors, errors
 from contact.interface.obstacle import GapFunction
 from contact.mesh.grid import box, rectangle
 from contact.problem.contact import Contact
@@ -23,6 +22,7 @@ from contact.typing import Array
 from forms.hencky import Hencky, Linear, Log, stress
 from forms.kinematics import strain
 from forms.ops import cos, sin
+from scripts.studies.error_norms import Errors, errors
 
 
 @dataclass(frozen=True)

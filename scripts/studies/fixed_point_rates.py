@@ -8,7 +8,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from contact import InputError, build_problem
-from contact.body.norms import errors
 from contact.case.interface import Friction
 from contact.history import BodyState
 from contact.methods.options import FixedPointOptions, Options, PenaltyOptions
@@ -16,6 +15,7 @@ from contact.output.fields import DerivedFields
 from contact.typing import Array
 from scripts.cases import bar
 from scripts.reporting import TWO_COLUMNS, Report, append, iterates, subplots
+from scripts.studies.error_norms import errors
 from scripts.studies.mesh_series import RHO
 
 

@@ -12,12 +12,12 @@ from matplotlib.ticker import NullFormatter
 from mpi4py import MPI
 
 from contact import Solution, build_problem
-from contact.body.norms import errors
 from contact.mesh.transfer import carry
 from contact.methods.report import Outcome
 from contact.typing import Array
 from scripts.cases import bar
 from scripts.reporting import TWO_COLUMNS, Report, observed_orders, solved, subplots
+from scripts.studies.error_norms import errors
 from scripts.studies.grading import grade
 
 #: Decay of (7.16).

@@ -11,10 +11,10 @@ import numpy as np
 from mpi4py import MPI
 
 from contact import Solution
-from contact.body.norms import errors
 from contact.output.table import Table, contact_table
 from scripts.cases import bar
 from scripts.reporting import TWO_COLUMNS, Report, append, options, solved, subplots
+from scripts.studies.error_norms import errors
 
 RHO = 1e4
 LOADS = (-0.005, -0.05)

@@ -12,7 +12,6 @@ import numpy as np
 from mpi4py import MPI
 
 from contact import Case, Solution, build_problem
-from contact.body.norms import volume
 from contact.output.figures.body import draw_plane, picture
 from contact.output.table import contact_table
 from scripts.reporting import TWO_COLUMNS, Report, append, options, solved, subplots
@@ -88,7 +87,7 @@ def run(case: Case, load: float) -> tuple[Solution, Found]:
         Vertical force on the meshed part of the body.
     """
     domain = case.mesh.build(MPI.COMM_WORLD)
-    area = volume(domain, domain.ds("top"))
+    area = domain.volume(domain.ds("top"))
     first = case.load[0]
     assert first.traction is not None
     scaled = [0.0] * (domain.dim - 1) + [-load / area]

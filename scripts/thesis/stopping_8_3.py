@@ -11,7 +11,6 @@ import numpy as np
 
 from contact import build_problem
 from contact.body.equilibrium import BodyEquilibrium
-from contact.body.norms import domain_norm
 from contact.problem.state import State
 from scripts.reporting import Report, append, iterates, options
 from scripts.thesis.tables_compliance import EPS_FP, LAGGED, case_of
@@ -45,7 +44,7 @@ def count(body: BodyEquilibrium, states: Sequence[State], phi_scale: float) -> f
         Unit of the potential in the norm: that of the unknowns for our norm of scaled potentials,
         1 for that of the thesis, in which u and phi are added as they are.
     """
-    norm, factor = domain_norm(body), np.ones(body.block_size)
+    norm, factor = body.l2_norm(), np.ones(body.block_size)
     factor[-1] = body.phi_scale / phi_scale
     unknowns = [
         (state.x[: body.owned].reshape(-1, body.block_size) * factor).ravel() for state in states

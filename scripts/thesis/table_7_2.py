@@ -11,13 +11,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from contact import Case, InputError, build_problem, solve
-from contact.body.norms import errors
 from contact.case.interface import Friction
 from contact.output.solution import Solution
 from contact.problem.problem import ContactProblem
 from scripts.cases import bar
 from scripts.reporting import Report, append, observed_orders, options, solved, subplots
 from scripts.studies.dual_norm import DualNorm
+from scripts.studies.error_norms import errors
 
 LOADS = (-0.005, -0.05)
 EPS = (1e-2, 1e-3, 1e-4, 1e-5)

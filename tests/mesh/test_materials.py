@@ -7,7 +7,6 @@ from mpi4py import MPI
 from contact import parse_case, solve
 from contact.body.description import Body, Fixed, Load, Material
 from contact.body.equilibrium import BodyEquilibrium
-from contact.body.norms import errors
 from contact.case.build import build_problem
 from contact.errors import InputError
 from contact.history import BodyState
@@ -16,6 +15,7 @@ from contact.mesh.grid import rectangle
 from contact.output.fields import DerivedFields
 from forms.hencky import Linear
 from forms.piezo import hexagonal
+from scripts.studies.error_norms import errors
 from tests.problems.mechanics import constant
 
 COMM = MPI.COMM_WORLD

@@ -9,7 +9,6 @@ import pytest
 from dolfinx import fem
 from mpi4py import MPI
 
-from contact.body.norms import errors
 from contact.mesh.grid import rectangle
 from contact.mesh.transfer import carry, refined
 from forms.hencky import energy_density
@@ -17,6 +16,7 @@ from forms.kinematics import strain
 from scripts.reporting import Report
 from scripts.studies import convergence_mechanics as study
 from scripts.studies import nonlocal_friction
+from scripts.studies.error_norms import errors
 from scripts.studies.fixed_point_rates import fixed_points, secant_rate
 from scripts.studies.grading import grade, pulled
 from scripts.thesis import figures_mechanics, table_7_2

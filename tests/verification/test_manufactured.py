@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from contact.body.norms import errors
 from contact.history import BodyState
 from contact.methods.newton import Newton
 from contact.methods.options import NewtonOptions
 from contact.output.fields import DerivedFields
+from scripts.studies.error_norms import errors
 from scripts.studies.exact_solutions import HENCKY, Singular, exact, manufactured
 
 

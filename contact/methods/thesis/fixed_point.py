@@ -22,7 +22,6 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from contact.body.equilibrium import BodyEquilibrium
-from contact.body.norms import domain_norm
 from contact.linear.operator import Counters, Operator
 from contact.methods.following import Following
 from contact.methods.options import FixedPointOptions
@@ -109,7 +108,7 @@ class FixedPoint:
         self._norm: Callable[[Array], float] | None = None
         if thesis:
             assert isinstance(body, BodyEquilibrium)  # the thesis's rules are those of the whole
-            self._norm = domain_norm(body)
+            self._norm = body.l2_norm()
 
     def turn_to(self, problem: Problem) -> None:
         """Go on with another step of the same problem; what is factorised remains."""

@@ -26,7 +26,6 @@ from typing import Any
 import numpy as np
 from petsc4py import PETSc
 
-from contact.body.norms import domain_norm
 from contact.errors import InputError, SingularError
 from contact.interface.penalised import (
     Implicit,
@@ -319,7 +318,7 @@ class Penalty:
         self._eps = regularisation(self.problem, self.options)
         self._solvers: dict[bool, PenalisedProblem] = {}
         thesis = self.options.stopping == "thesis"
-        self._norm = domain_norm(self.problem.equilibrium) if thesis else None
+        self._norm = self.problem.equilibrium.l2_norm() if thesis else None
 
     def turn_to(self, problem: ContactProblem) -> None:
         """Go on with another step of the same problem; what is factorised remains."""

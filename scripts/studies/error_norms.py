@@ -1,4 +1,4 @@
-"""Norms, errors and volumes over the body."""
+"""Norms of the difference between two displacements, by quadrature."""
 
 from __future__ import annotations
 
@@ -8,37 +8,13 @@ from dataclasses import dataclass
 import numpy as np
 import ufl
 from dolfinx import fem
-from dolfinx.fem.petsc import assemble_matrix
 from mpi4py import MPI
 from ufl.core.expr import Expr
 
 from contact.body.equilibrium import BodyEquilibrium
-from contact.body.fields import constant
 from contact.body.materials import material_measures
-from contact.mesh.domain import Domain, Measure
 from contact.typing import Array
 from forms.hencky import secant_form
-
-
-def volume(domain: Domain, measure: Measure) -> float:
-    """Return the volume or area that a UFL measure covers, over all ranks. Collective."""
-    form = fem.form(constant(domain.mesh, 1.0) * measure)
-    return float(domain.comm.allreduce(fem.assemble_scalar(form), op=MPI.SUM))
-
-
-def domain_norm(body: BodyEquilibrium) -> Callable[[Array], float]:
-    """Return the L2(Omega) norm of owned unknowns (displacement and scaled potential)."""
-    trial, test = ufl.TrialFunction(body.space), ufl.TestFunction(body.space)
-    mass = assemble_matrix(fem.form(ufl.inner(trial, test) * body.domain.dx))
-    mass.assemble()
-    vector, image = mass.createVecs()
-
-    def norm(values: Array) -> float:
-        vector.array[:] = values[: body.owned]
-        mass.mult(vector, image)
-        return float(np.sqrt(max(vector.dot(image), 0.0)))
-
-    return norm
 
 
 @dataclass(frozen=True)
