@@ -127,7 +127,7 @@ def test_two_electrodes_under_one_body() -> None:
         (
             [{"on": "one", "friction": {"mu": 1}}, {"on": "two"}],
             {},
-            r'contact\.0\.friction\.mu: given with law = "none"',
+            r'contact\.0\.friction\.mu: given 1\.0; accepted: mu with law = "coulomb"',
         ),
         (
             [{"on": name, "friction": coulomb(0.1)} for name in PIECES],
