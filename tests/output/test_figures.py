@@ -118,3 +118,21 @@ def test_rounding_has_no_colours() -> None:
     assert high - low > 5
     assert widened(0.0, 1.0) == (0.0, 1.0)
     assert widened(-3.0, 2.0) == (-3.0, 2.0)
+
+
+def test_a_small_contact_zone_is_drawn_with_its_vicinity() -> None:
+    """Not the whole body, of which it is a dot; the displacements have the scale of the part."""
+    from contact.output.figures.body import draw_plane, near_contact, picture
+
+    mesh = {"generator": "rectangle", "size": [2.0, 1.0], "cells": [64, 4]}
+    solution = solve(block(2, mesh=mesh))
+    table, whole = contact_table(solution), picture(solution, "von_mises", "stress")
+    assert table is not None and whole is not None
+    assert near_contact(whole, table) is whole
+    status = np.where(abs(table["x"] - 1.0) < 0.03, "stick", "open")
+    near = near_contact(whole, {**table, "status": status})
+    assert near.scale <= whole.scale
+    width = np.ptp(table["x"][status == "stick"])
+    assert np.ptp(near.box, axis=0)[0] == pytest.approx(7 * width)
+    ax = draw_plane(near, table).axes[0]
+    assert ax.get_xlim() == pytest.approx((1 - 3.5 * width, 1 + 3.5 * width))

@@ -5,7 +5,7 @@ from __future__ import annotations
 import logging
 import os
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import matplotlib
@@ -37,6 +37,8 @@ from contact.typing import Array
 
 logger = logging.getLogger("contact.plots")
 
+#: Contact zones below this part of the body are drawn with their vicinity, of so many zones.
+SMALL, VICINITY = 0.04, 3.0
 #: Scaled gaps up to this part of Gamma_3 are drawn.
 FAR = 0.2
 
@@ -60,7 +62,7 @@ class Picture:
     scale
         Factor of the displacements in the drawing.
     box
-        Lower and upper corner of the drawn body, shape (2, d).
+        Lower and upper corner of the part that is shown, shape (2, d).
     limits
         Values at which the colours end; None for those that suit this picture alone.
     """
@@ -141,6 +143,20 @@ def drawn(body: VTU, held: Array, field: str, label: str, scale: float | None = 
     places = points + scale * u
     box = np.array([places.min(axis=0), places.max(axis=0)])
     return Picture(body, values, in_cells, label, held, scale, box)
+
+
+def near_contact(picture: Picture, table: Table) -> Picture:
+    """Return a picture of the vicinity of a contact zone that is small, of the body otherwise."""
+    points = np.column_stack([table[axis] for axis in "xyz" if axis in table])
+    zone = points[table["status"] != "open"]
+    width = float(np.ptp(zone, axis=0).max()) if len(zone) else 0.0
+    if not 0 < width < SMALL * np.ptp(picture.box, axis=0).max():
+        return picture
+    largest = float(np.linalg.norm(displacement(picture.body), axis=1).max())
+    near = replace(picture, scale=magnification(2 * VICINITY * width, largest))
+    low, high = zone.min(axis=0) - VICINITY * width, zone.max(axis=0) + VICINITY * width
+    whole = near.places.min(axis=0), near.places.max(axis=0)
+    return replace(near, box=np.clip([low, high], *whole))
 
 
 def scalar(body: VTU, field: str) -> tuple[Array, bool]:
@@ -228,6 +244,9 @@ def draw_plane(
     ax.use_sticky_edges = False
     ax.margins(0.02)
     ax.autoscale_view()
+    (left, low), (right, top) = picture.box
+    if np.any(picture.box[1] - picture.box[0] < 0.99 * np.ptp(picture.places, axis=0)):
+        ax.set(xlim=(-right if mirrored else left, right), ylim=(low, top))
     ax.set_xlabel(units.label(f"${axes[0]}$", "length"))
     ax.set_ylabel(units.label(f"${axes[1]}$", "length"))
     ax.set_title(head, fontsize="medium")

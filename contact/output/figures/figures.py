@@ -11,7 +11,7 @@ from pathlib import Path
 import matplotlib
 from matplotlib.figure import Figure
 
-from contact.output.figures.body import Picture, draw_plane, draw_space, picture
+from contact.output.figures.body import Picture, draw_plane, draw_space, near_contact, picture
 from contact.output.figures.contact import draw_line, draw_surface
 from contact.output.figures.steps import Course
 from contact.output.figures.style import DEFORMED, STYLE, UNNAMED, axes_of, heading, named, style
@@ -108,7 +108,7 @@ class Drawing:
             if contact and self.course is not None:
                 figures |= self.course.draw(self.plane, self.title, self.axes, self.units)
             for name, made in self.pictures:
-                figures[name] = self.body(made, self.table, self.title)
+                figures[name] = self.body(near_contact(made, self.table), self.table, self.title)
         return Gallery({name: figure for name, figure in figures.items() if figure is not None})
 
     def _contact(self) -> Figure:
