@@ -58,7 +58,7 @@ class Change:
     inverse
         Its inverse.
     unrestrained
-        The inverse if nothing were fixed: what it is made of is the same for all unknowns of a
+        The inverse if nothing were fixed: its entries are the same for all unknowns of a
         node.
     """
 
@@ -76,7 +76,7 @@ class Change:
     ) -> Change:
         """Return the change that makes jumps unknowns, in place of those of some nodes.
 
-        Where an unknown is fixed it remains itself; the others lose what depends on it, for it
+        Where an unknown is fixed it remains itself; the others lose their dependence on it, for it
         does not change.
 
         Parameters
@@ -176,7 +176,7 @@ def _of_component(
     others = others - sparse.diags_array(others.diagonal())
     identity = sparse.eye_array(count)
     follows = -(sparse.diags_array(1 / scale) @ others)
-    # What follows replaced nodes follows what these follow; without circles there is an end.
+    # Followers of replaced nodes follow those that these follow; without circles there is an end.
     whole, further = identity, follows
     while further.count_nonzero():
         whole = whole + further
@@ -274,7 +274,7 @@ class ConstrainedBulk:
     Attributes
     ----------
     columns, corner
-        K R and R^T K R of what was assembled last, shapes (owned, m) and (m, m).
+        K R and R^T K R of the matrix that was assembled last, shapes (owned, m) and (m, m).
     """
 
     def __init__(self, bulk: Bulk, constraint: Constraint, rest: Evaluated) -> None:

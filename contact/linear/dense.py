@@ -1,7 +1,7 @@
 """A dense operator at kept nodes, the same on all ranks, plus a small block at each node.
 
 The first rank factorises it, and solves for all: factors are as large as the operator. From one
-step of a contact problem to the next some nodes change what they do, mostly the same ones: those
+step of a contact problem to the next some nodes change their status, mostly the same ones: those
 that slip, in their tangential rows. The factors are kept until most have, and corrected for the
 others (Sherman, Morrison and Woodbury), with columns of the inverse that are kept as well.
 """
@@ -23,7 +23,8 @@ from contact.linear.operator import Counters
 from contact.typing import Array
 
 #: Part of the rows that may differ from those that were factorised. So many columns of
-#: the inverse cost 1.5 times what new factors do, and what follows with the same ones an eighth.
+#: the inverse cost 1.5 times as much as new factors, and further steps with the same ones an
+#: eighth.
 MOST = 1 / 2
 
 
@@ -131,8 +132,8 @@ class DenseOperator:
 
         Returns
         -------
-        Whether they can be corrected: not where too many differ, nor where they, or what they would
-        become, are singular.
+        Whether they can be corrected: not where too many differ, nor where they are singular, or
+        would be.
         """
         factors = self.bulk.factors
         change = self._blocks - factors.blocks

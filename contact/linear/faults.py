@@ -27,8 +27,8 @@ def is_mumps(pc: PETSc.PC) -> bool:
 def set_up_with_workspace(ksp: PETSc.KSP) -> None:
     """Set up a direct solver again and again until its workspace does. Collective.
 
-    What ranks exchange, and when, decides how much it takes: MUMPS's estimate may be too low for
-    one run on some ranks and not for the next.
+    The messages between ranks, and their order, decide how much it takes: MUMPS's estimate may be
+    too low for one run on some ranks and not for the next.
     """
     ksp.setUp()
     pc, workspace = ksp.getPC(), WORKSPACE
@@ -45,7 +45,7 @@ def set_up_with_workspace(ksp: PETSc.KSP) -> None:
         ksp.setUp()
 
 
-#: MUMPS's INFOG(1) where its workspace, its memory or what ICNTL(23) allows was too small.
+#: MUMPS's INFOG(1) where its workspace, its memory or the limit ICNTL(23) was too small.
 OUT_OF_MEMORY = (-8, -9, -11, -12, -13, -17, -19, -20)
 
 #: Stiffness of a function, over the largest one, that is rounding.
@@ -54,7 +54,7 @@ VANISHES = 1e-14
 
 @contextmanager
 def petsc_options(prefix: str) -> Iterator[None]:
-    """Turn what PETSc says of its options while a solver is set up into an InputError."""
+    """Turn errors of PETSc about its options while a solver is set up into an InputError."""
     try:
         yield
     except PETSc.Error as error:

@@ -1,4 +1,4 @@
-"""What the first rank works out for all, so that the others need not hold what it takes."""
+"""Work of the first rank for all, so that the others need not hold the data of it."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ T = TypeVar("T")
 
 
 def together(comm: MPI.Intracomm, work: Callable[[], T]) -> T:
-    """Return what a rank works out; raise on all what one of them alone raises. Collective.
+    """Return the result of each rank; raise on all the error of a single one. Collective.
 
     The others would wait for it for ever.
 
@@ -23,7 +23,7 @@ def together(comm: MPI.Intracomm, work: Callable[[], T]) -> T:
     comm
         The ranks.
     work
-        What this one does, without the others.
+        The work of this rank, without the others.
     """
     if comm.size == 1:
         return work()
@@ -39,14 +39,14 @@ def together(comm: MPI.Intracomm, work: Callable[[], T]) -> T:
 
 
 def from_first(comm: MPI.Intracomm, work: Callable[[], Array], *shape: int) -> Array:
-    """Return on all ranks what the first one works out, or raise what it raises. Collective.
+    """Return the result of the first rank on all, or raise its error. Collective.
 
     Parameters
     ----------
     comm
         The ranks.
     work
-        What the first one does.
+        The work of the first rank.
     shape
         Of the result.
     """

@@ -19,7 +19,7 @@ from petsc4py import PETSc
 from contact.mesh.entities import component_sums
 from contact.typing import Array
 
-#: How often a solution is corrected, at most, by a solve for what it leaves.
+#: How often a solution is corrected, at most, by a solve for its residual.
 CORRECTIONS = 3
 
 
@@ -55,7 +55,7 @@ def refine(
 ) -> None:
     """Correct a solution while it leaves far too much and corrections help. Collective.
 
-    That is more than the root of what was asked for: norms differ by as much as that. Of systems
+    That is more than the root of the tolerance: norms differ by as much as that. Of systems
     beside each other, which iterations take for one, each has to leave little by itself: beside a
     far larger right-hand side nothing of a small one is seen.
 
@@ -83,7 +83,7 @@ def refine(
         if components is not None:
             asked.array[~beyond[components.of]] = 0.0
         ksp.setInitialGuessNonzero(False)
-        # No more than is missing, by what norms may differ.
+        # No more than is missing, by the factor that norms may differ by.
         missing = float(allowed[beyond].min() / np.linalg.norm(before[beyond]))
         ksp.setTolerances(rtol=max(asked_for, missing**2))
         try:
@@ -102,7 +102,7 @@ def refine(
 
 
 class Multiplies(Protocol):
-    """What is known by its products."""
+    """An operator that is known by its products."""
 
     def multiply(self, values: Array) -> Array:
         """Return the matrix times owned values and q. Collective."""
@@ -140,7 +140,7 @@ class Packing:
         return self._size if self._comm.rank == 0 else 0
 
     def packed(self, values: Array) -> Array:
-        """Return what of owned values and global ones a rank holds."""
+        """Return the share of owned values and global ones that a rank holds."""
         return values if self.here == self._size else values[: values.size - self._size]
 
     def unpacked(self, values: Array) -> Array:

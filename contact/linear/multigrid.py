@@ -27,7 +27,7 @@ from contact.typing import Array
 #: (seen in `make bench`).
 LARGE = {(2, False): 2_500_000, (2, True): 2_500_000, (3, False): 10_000, (3, True): 60_000}
 
-#: Unknowns up to which a direct solver is thought of in space: it then takes some gigabytes.
+#: Unknowns up to which a direct solver is thought of in 3-D: it then takes some gigabytes.
 DIRECT = 150_000
 
 #: A node in contact couples its components through the large gamma of the constraint: the smoother
@@ -115,7 +115,7 @@ MOST = 1_000_000
 
 @contextmanager
 def quick_products(matrix: PETSc.Mat) -> Iterator[None]:
-    """Have products with a matrix, and with what it is coarsened to, made in the quick way.
+    """Have products with a matrix, and with its coarse levels, made in the quick way.
 
     Of several ranks, or where the user says how, nothing changes.
     """
@@ -183,7 +183,7 @@ class StiffNodes:
     So the interpolation is made for the body alone, once. At a contact node, where K is the
     body's nodal block and B the contact's, it is then multiplied by (K + |B|)^-1 K: the motion
     that is in equilibrium with the same neighbours. |B|, the root of B^T B, takes friction that
-    falls with the slip for a stiffness too, and what it is multiplied by stays bounded.
+    falls with the slip for a stiffness too, and the factor stays bounded.
 
     Parameters
     ----------
@@ -211,7 +211,7 @@ class StiffNodes:
         Parameters
         ----------
         own, blocks
-            What the body and contact have at the nodes, zero where an unknown is fixed, shape
+            Blocks of the body and of contact at the nodes, zero where an unknown is fixed, shape
             (n, block size, block size).
         """
         # Of K its diagonal will do.
@@ -240,7 +240,7 @@ class StiffNodes:
         return values
 
     def jump(self, rhs: PETSc.Vec) -> PETSc.Vec:
-        """Return a vector that balances what the stiff blocks alone can carry of a right-hand side.
+        """Return a vector that balances the part of a right-hand side for the stiff blocks alone.
 
         With friction they carry forces in other directions than those in which they are stiff.
         These would pass to the coarse levels, where nothing resists them, and the first
@@ -254,7 +254,7 @@ class StiffNodes:
         return vector
 
 
-#: What it costs to renew the coarse levels, in iterations (seen in `scripts.benchmarks.phases`).
+#: Cost of renewing the coarse levels, in iterations (seen in `scripts.benchmarks.phases`).
 PRICE = 8
 
 
@@ -296,7 +296,7 @@ class Hierarchy:
         Parameters
         ----------
         own, blocks
-            What the body and contact have at the nodes, zero where an unknown is fixed, shape
+            Blocks of the body and of contact at the nodes, zero where an unknown is fixed, shape
             (n, block size, block size).
         """
         self._stiff.follow(own, blocks)
@@ -334,7 +334,7 @@ class Hierarchy:
         return self._taken, self._renewed
 
     def _correct(self, rhs: PETSc.Vec, correction: PETSc.Vec) -> None:
-        """Solve for what a solution has left, which old coarse levels may not see."""
+        """Solve for the residual of a solution, which old coarse levels may not see."""
         if self._taken >= self._most:
             return
         if not self._fresh:
@@ -355,7 +355,7 @@ class Hierarchy:
             ksp.setConvergenceHistory(length=most + 1, reset=True)
             ksp.solve(rhs, solution)
             taken, norms = ksp.getIterationNumber(), ksp.getConvergenceHistory()
-            # What was asked for is not what was gained: of few digits, or from a start.
+            # Digits asked for are not digits gained: of few digits, or from a start.
             if not self._rate and taken > 0 and norms.size > 0 and norms[-1] > 0:
                 self._rate = taken / max(log10(norms[0] / norms[-1]), 1.0)
             return taken
@@ -373,7 +373,7 @@ class Hierarchy:
 
 
 class Coupled(Protocol):
-    """A body, or several, whose matrices can be had without what couples them."""
+    """A body, or several, whose matrices can be had without their coupling."""
 
     @property
     def layout(self) -> Layout:
@@ -391,7 +391,7 @@ class Solver(Protocol):
 
     @property
     def bulk(self) -> Coupled:
-        """What is solved for."""
+        """The body."""
 
     def set_up(self, symmetric: bool) -> None:
         """Set up the solver for the matrix as it is."""
@@ -400,7 +400,7 @@ class Solver(Protocol):
 def set_up_apart(solver: Solver) -> bool:
     """Set multigrid up for bodies that do not touch; False where none touch each other. Collective.
 
-    Motions of each body are then what is interpolated, and the jumps follow from them. Made for
+    Motions of each body are then interpolated, and the jumps follow from them. Made for
     jumps the interpolation would mix the sides of a pair, and it would take twice as many coarse
     functions to follow both.
 

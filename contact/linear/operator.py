@@ -24,7 +24,7 @@ from contact.typing import Array
 
 
 class Bulk(Protocol):
-    """What an operator needs of a body: matrices of its unknowns."""
+    """A body as operators need it: matrices of its unknowns."""
 
     @property
     def layout(self) -> Layout:
@@ -112,7 +112,7 @@ class SparseOperator:
         self.counters = counters or Counters()
         self.symmetric = symmetric
         self.matrix = bulk.create_matrix()
-        #: What is solved for: the matrix, or with global unknowns eliminated from it.
+        #: The system: the matrix, or with global unknowns eliminated from it.
         self.system = self.matrix
         self._kind = ""
         self._blocks: Array | None = None

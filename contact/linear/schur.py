@@ -58,7 +58,7 @@ def _complement(factor: PETSc.Mat, size: int) -> Array:
 
 
 def _mirror(matrix: Array) -> None:
-    """Copy what is below the diagonal, all that MUMPS writes, above it."""
+    """Copy the entries below the diagonal, all that MUMPS writes, above it."""
     for begin in range(0, len(matrix), COLUMNS):
         end = begin + COLUMNS
         matrix[begin:end, end:] = matrix[end:, begin:end].T
@@ -152,14 +152,14 @@ class PartialFactorisation:
         return solution.array[: self._first].copy()
 
     def to_last(self, first: Array) -> Array:
-        """Return what values of the first unknowns are in the last rows."""
+        """Return the coupling block times values of the first unknowns."""
         vector, image = self._coupling.createVecs()
         vector.array[:] = first
         self._coupling.mult(vector, image)
         return np.asarray(image.array)
 
     def to_first(self, last: Array) -> Array:
-        """Return what values of the last unknowns are in the first rows."""
+        """Return the coupling block, transposed, times values of the last unknowns."""
         image, vector = self._coupling.createVecs()
         vector.array[:] = last
         self._coupling.multTranspose(vector, image)
@@ -216,7 +216,7 @@ class Remainder:
             self._add(at, begin, share.T[begin : begin + ROWS])
 
     def receive(self, comm: MPI.Intracomm, rank: int, at: NDArray[np.int64]) -> None:
-        """Add what another rank sends of the unknowns at ascending places."""
+        """Add the share that another rank sends of the unknowns at ascending places."""
         rows = np.empty((ROWS, at.size))
         for begin in range(0, at.size, ROWS):
             part = rows[: at.size - begin]
@@ -232,7 +232,7 @@ class Remainder:
         self._among.T[np.ix_(here[above:] - k, at[split:] - k)] += rows[above:, split:]
 
     def eliminate(self) -> Array:
-        """Return what is left of the kept unknowns once the others are eliminated.
+        """Return the Schur complement of the kept unknowns.
 
         That is done in place: the matrix is gone then. The result is stored by columns.
         """
@@ -245,15 +245,15 @@ class Remainder:
         return np.asarray(left)
 
     def solve(self, values: Array) -> Array:
-        """Solve with the others, once they are eliminated; what is no number remains none."""
+        """Solve with the others, once they are eliminated; not a number where they are singular."""
         return np.asarray(lu_solve(self._factors, values, check_finite=False))
 
     def to_kept(self, others: Array) -> Array:
-        """Return what values of the others are in the rows of the kept unknowns."""
+        """Return the coupling block times values of the others."""
         return np.asarray(self._coupling @ others)
 
     def to_others(self, kept: Array) -> Array:
-        """Return what values of the kept unknowns are in the rows of the others."""
+        """Return the coupling block, transposed, times values of the kept unknowns."""
         return np.asarray(self._coupling.T @ kept)
 
 
@@ -336,7 +336,7 @@ class SchurComplement:
         inside[kept] = inside[shared] = False
         # Where a Schur complement is asked for, MUMPS orders by minimum degree alone, and breaks
         # its many ties by the order given. dolfinx numbers nodes along fronts: backwards along
-        # these leaves it the least work, half of what other orders do.
+        # these leaves it the least work, half of that of other orders.
         self._inside = np.flatnonzero(inside)[::-1]
         # The kept ones first, then those between the ranks, each in rank order.
         self._kept, self._shared = kept, np.flatnonzero(shared)
@@ -359,7 +359,7 @@ class SchurComplement:
         self._met, border = np.flatnonzero(met), left[met]
         #: Those that each rank's eliminated ones know of, on the first rank.
         self._mets = self.comm.gather(self._met)
-        # The first rank adds up, and needs what is left; the others what they take off.
+        # The first rank adds up, and needs the remainders; the others their own shares.
         self._left = np.arange(left.size) if self._mets else self._met
         self._left_set = PETSc.IS().createGeneral(left[self._left], PETSc.COMM_SELF)
         local = np.concatenate([eliminated, border])
@@ -375,7 +375,7 @@ class SchurComplement:
     def factorise(self, matrix: PETSc.Mat) -> Array:
         """Eliminate; return the Schur complement on all ranks, (size, size). Collective.
 
-        It is not a number where what is to be eliminated is singular.
+        It is not a number where the eliminated block is singular.
         """
         if self._part is None:
             (self._part,) = matrix.createSubMatrices([self._local], [self._local])
@@ -388,11 +388,11 @@ class SchurComplement:
         self._remainder = self._added(matrix, total)
         del total
         k = self.size
-        # Both are stored by columns, and sent as what they are by rows.
+        # Both are stored by columns, and sent as their transposes by rows.
         return from_first(self.comm, lambda: self._remainder.eliminate().T, k, k).T
 
     def _added(self, matrix: PETSc.Mat, own: Array) -> Remainder:
-        """Add up what the ranks have eliminated, and what they have left, on the first one.
+        """Add up the shares of the ranks, and the remainders between them, on the first one.
 
         The others have nothing of it. Collective.
         """
@@ -400,7 +400,7 @@ class SchurComplement:
         starts, columns, values = left.getValuesCSR()
         rows = np.repeat(self._left, np.diff(starts))
         columns = self._left[columns]
-        # Each rank has the matrix of what its eliminated ones know of in its share.
+        # The share of each rank has the matrix of the unknowns that its eliminated ones know of.
         place = np.full(self.dense_size, -1)
         place[self._met] = np.arange(self._met.size)
         row, column = place[rows], place[columns]
@@ -417,17 +417,17 @@ class SchurComplement:
         return remainder
 
     def condense(self, rhs: Array, rounding: Array | None = None) -> Array:
-        """Return what an owned right-hand side becomes on the kept unknowns, on all ranks.
+        """Return the condensed right-hand side at the kept unknowns, on all ranks.
 
-        It is remembered for `expand`. Collective.
+        `expand` has it then. Collective.
 
         Parameters
         ----------
         rhs
             The right-hand side.
         rounding
-            What counts as nothing at the eliminated unknowns, of the owned ones: no solve is needed
-            to see what is left of it elsewhere. Zero by default.
+            Zero to rounding at the eliminated unknowns, of the owned ones: no solve is needed
+            to condense it. Zero by default.
         """
         self._rhs = rhs
         total = np.zeros(self.dense_size)

@@ -37,7 +37,7 @@ from contact.typing import Array
 def expected_displacements(
     problem: ContactProblem, loads: Array, prescribed: Array
 ) -> tuple[float, float]:
-    """Return what loads, as a stress on Gamma_3, do to a block of the body's size. Collective.
+    """Return the displacement of a block of the body's size by loads on Gamma_3. Collective.
 
     Parameters
     ----------
@@ -46,7 +46,7 @@ def expected_displacements(
     loads
         Owned nodal loads, those on global unknowns behind them.
     prescribed
-        Local unknowns with what is prescribed, 0 elsewhere.
+        Local unknowns with the prescribed values, 0 elsewhere.
 
     Returns
     -------
@@ -68,7 +68,7 @@ EPS = float(np.finfo(float).eps)
 
 
 def check_problem(problem: ContactProblem) -> None:
-    """Check loads, supports and what holds the body, at the time of a problem. Collective.
+    """Check loads, supports and rigid-body modes, at the time of a problem. Collective.
 
     Raises
     ------
@@ -115,7 +115,7 @@ def _check_sizes(problem: ContactProblem) -> None:
 
 
 def check_supports(problem: ContactProblem) -> None:
-    """Refuse different values for one component of what is part of two supports. Collective.
+    """Refuse different values for one component on a part of two supports. Collective.
 
     Where parts meet at an edge values may differ: there the last one counts.
 
@@ -143,7 +143,7 @@ def check_supports(problem: ContactProblem) -> None:
             )
             size = float(np.abs(values).max(initial=0.0))
             size = problem.comm.allreduce(size, op=MPI.MAX)
-            # Rounding of what could be, such as sin(pi), is no value.
+            # Rounding of a zero, such as sin(pi), is no value.
             unit = problem.equilibrium.phi_scale if name == "potential" else 1.0
             allowed = ROUNDING * size + EPS * unit * problem.domain.size
             differ = np.ptp(values, axis=1) > allowed
@@ -228,7 +228,8 @@ def check_potential(problem: ContactProblem, state: State | None = None) -> None
     Notes
     -----
     It is where it is prescribed, and where current flows, also through nodes that cannot move: to
-    a foundation, or to another piece whose potential is known. Electrodes join what they lie on.
+    a foundation, or to another component whose potential is known. Electrodes join the components
+    that they lie on.
 
     Raises
     ------
@@ -293,7 +294,7 @@ def _flows(
 
 
 def _conducts(conductor: Conductor, count: int, deep: float) -> NDArray[np.bool_]:
-    """Tell which nodes conduct where they are pressed, and far into what is in front of them."""
+    """Tell which nodes conduct where they are pressed, and far into the foundation."""
     closed = np.ones(count, dtype=bool)
     psi = conductor.psi.at(np.full(count, deep), ~closed, closed)
     return np.broadcast_to(psi, (count,)) > 0

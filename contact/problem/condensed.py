@@ -1,6 +1,6 @@
 """A contact problem with its body condensed onto the contact nodes.
 
-Once the material is linearised, all that is left to be found is what happens at Gamma_3: the
+Once the material is linearised, only the unknowns at Gamma_3 are left to be found: the
 Schur complement of the body takes the place of its operator, and every method that solves a
 contact problem solves this one too, in small dense steps.
 """
@@ -37,7 +37,7 @@ from contact.typing import Array
 #: Unknowns that are kept at most: the dense matrix then takes 130 MB.
 LARGEST = 4200
 
-#: What is left of equilibrium inside the body that counts as nothing, over what acts on it.
+#: Residual of equilibrium inside the body that counts as zero, over the forces that act on it.
 ROUNDING = 1e-13
 
 #: Most that counts as rounding at the contact nodes, over the loads. Not as little as for the whole
@@ -73,7 +73,7 @@ class CondensedBody:
     at, own
         The owned kept unknowns there, and where these are among those of all ranks.
     acting
-        `sizes` of what acts on the whole body: loads, reactions, and one field on the other.
+        `sizes` of all that acts on the whole body: loads, reactions, and one field on the other.
     shares
         Which forces are compared with each other.
     """
@@ -128,11 +128,11 @@ class CondensedBody:
         return np.zeros(self.owned)
 
     def unbalanced(self, forces: Array) -> Array:
-        """Return what of forces acts on free unknowns."""
+        """Return the forces on free unknowns."""
         return np.where(self.free.ravel(), forces, 0.0)
 
     def reactions(self, forces: Array) -> Array:
-        """Return what of forces acts on fixed unknowns."""
+        """Return the forces on fixed unknowns."""
         return np.where(self.free.ravel(), 0.0, forces)
 
     def sizes(self, values: Array) -> Array:
@@ -140,11 +140,11 @@ class CondensedBody:
         return self.shares.sizes(values)
 
     def load_sizes(self, time: float = 1.0) -> Array:
-        """Return the `sizes` of what acts on the whole body."""
+        """Return the `sizes` of all that acts on the whole body."""
         return self.acting
 
     def exchanged(self, state: Evaluated) -> Array:
-        """Return zero: that is part of what acts on the whole body."""
+        """Return zero: that is part of all that acts on the whole body."""
         return np.zeros_like(self.acting)
 
     def operator(
@@ -279,7 +279,7 @@ class CondensedConstraint:
     def forces(self, on_kept: Array, residual: Array) -> Array:
         """Return the forces on jumps, given those on kept unknowns, and all. Collective.
 
-        They are remembered for `expand`.
+        `expand` has them then.
         """
         body = self._body
         self._residual = residual[: body.owned]
@@ -349,7 +349,7 @@ class Condensation:
         self._stiffness: Array = np.zeros((0, 0))
 
     def turn_to(self, full: ContactProblem) -> None:
-        """Go on with another step of the same problem; what is factorised remains."""
+        """Go on with another step of the same problem; factorisations remain."""
         self.full = full
         self._interface = at_kept_nodes(full.interface)
 
@@ -361,11 +361,11 @@ class Condensation:
         kind, state
             "secant" or "tangent", and where.
         keep
-            Whether to take what was factorised last, wherever that was.
+            Whether to take the last factorisation, wherever that was.
 
         Returns
         -------
-        What is left to be solved; None if it cannot be condensed: many unknowns are kept, or
+        The condensed problem; None if it cannot be condensed: many unknowns are kept, or
         these do not hold the others.
 
         Raises
@@ -423,7 +423,7 @@ class Condensation:
         return CondensedProblem(condensed, self._interface, self.full.scales, state.time)
 
     def _at(self, x: Array) -> Array:
-        """Return the owned kept unknowns: jumps, then what is at the other kept nodes."""
+        """Return the owned kept unknowns: jumps, then values at the other kept nodes."""
         jump, body = self.full.interface.jump, self.full.equilibrium
         others = body.nodal(x)[self.nodes[jump.nodes.size :]]
         return np.concatenate([jump.apply(x), others]).ravel()
@@ -448,11 +448,11 @@ class Condensation:
 def pays(problem: ContactProblem, kind: str) -> bool:
     """Tell whether dense steps at the contact nodes cost less than sparse ones of the body.
 
-    Large bodies in space are left to multigrid, unless a direct solver is asked for by `kind`.
+    Large bodies in 3-D are left to multigrid, unless a direct solver is asked for by `kind`.
 
     A dense factorisation costs k^3 operations with k kept unknowns. A sparse one costs n b^2 with
-    n unknowns and fronts of b: in the plane the body's depth, n/k nodes, in
-    space some n^(1/2).
+    n unknowns and fronts of b: in 2-D the body's depth, n/k nodes, in
+    3-D some n^(1/2).
     Of a slender body the contact nodes are too large a part.
     """
     layout = problem.equilibrium.layout

@@ -1,4 +1,4 @@
-"""What may touch what, and what acts between them."""
+"""A contact: two parts, or a part and an obstacle, and the laws between them."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from contact.mesh.together import part
 @names_arguments
 @dataclass(frozen=True)
 class Contact:
-    """A part that may touch an obstacle, and what acts between them.
+    """A part that may touch an obstacle, and the laws between them.
 
     Parameters
     ----------
@@ -33,7 +33,7 @@ class Contact:
     friction, conductor
         Friction and electric contact; None for those that the problem is given for all.
     press
-        Whether the obstacle may cut the body at rest, and presses it out.
+        Whether the obstacle may cut the undeformed body, and presses it out.
     against
         The part of another body that it may touch, instead of a foundation, whose gap is then
         added to that between the bodies; None for a rigid one.
@@ -72,9 +72,9 @@ class Contact:
         check_laws("Contact", self.friction, self.conductor)
 
 
-def check_laws(what: str, friction: Any, conductor: Any) -> None:
-    """Refuse what is no friction, or no electric contact."""
+def check_laws(name: str, friction: Any, conductor: Any) -> None:
+    """Refuse objects that are no friction, or no electric contact."""
     fits = isinstance(friction, Friction | None)
-    expect(f"{what}: friction", friction, "Friction(mu=...), or None", fits)
+    expect(f"{name}: friction", friction, "Friction(mu=...), or None", fits)
     fits = isinstance(conductor, Conductor | None)
-    expect(f"{what}: conductor", conductor, "Conductor(...), or None", fits)
+    expect(f"{name}: conductor", conductor, "Conductor(...), or None", fits)

@@ -1,13 +1,13 @@
-"""The energy balance of a step: what is put in, what is stored, and what friction takes.
+"""The energy balance of a step: work, stored energy and dissipation by friction.
 
 Work is that of all but the unilateral constraint and friction: loads, supports, electrodes, and
-what a layer and a conductive foundation do to the body, by the trapezoidal rule. What is stored
-is that of the body. Per step
+of layer and conductive foundation on the body, by the trapezoidal rule. Energy is stored
+in the body. Per step
 
     work - change of energy = dissipation + O(step^2),
 
 and the dissipation, sum w lambda_f . Delta j_tau with the friction at the end of the step, is
-never negative. For a body that was at rest nothing has acted before.
+never negative. Before the reference configuration nothing has acted before.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ _POINTS, _WEIGHTS = np.polynomial.legendre.leggauss(4)
 
 @dataclass(frozen=True)
 class Moment:
-    """What the balance has to know of the end of a step.
+    """Data of the end of a step for the balance.
 
     Attributes
     ----------
@@ -73,7 +73,7 @@ class Balance:
 
 
 def moment(problem: ContactProblem, state: State, before: Moment) -> Moment:
-    """Return what the balance has to know of a step that began at another moment. Collective."""
+    """Return the data of a step that began at another moment. Collective."""
     body, interface = problem.equilibrium, problem.interface
     external = body.external(state.time)
     residual = residual_forces(problem, state)

@@ -18,10 +18,10 @@ from contact.problem.state import State
 from contact.tolerances import EPS
 from contact.typing import Array
 
-#: How far unknowns are moved to see what rounding does, over their size.
+#: How far unknowns are moved to see the effect of rounding, over their size.
 SHAKE = 1e-8
 
-#: Rounding that is allowed for, over what moving all unknowns by rounding does to the forces.
+#: Rounding that is allowed for, over the change of forces by moving all unknowns by rounding.
 #: Residuals that fall no further are 0.6 to 1 of that; solves leave a few times as much.
 MARGIN = 4.0
 
@@ -35,25 +35,25 @@ class KKT:
     equilibrium
         |F(u) + contact forces| on free unknowns, less `rounding`, over the sum of the norms of
         loads, contact forces and reactions. Of bodies that nothing connects the largest, each over
-        what acts on itself. Of a piezoelectric body the larger one of forces and of
-        charges, each over those of its own kind: to these belong what the potential exerts on the
-        body at rest, and the charges of the strain.
+        the forces on itself. Of a piezoelectric body the larger one of forces and of
+        charges, each over those of its own kind: to these belong the forces of the potential on the
+        undeformed body, and the charges of the strain.
     contact
         |p - max(0, p - c (gap - u_nu))| / |p| in L2(Gamma_3), c = E/length with
-        the modulus of what touches, and the length of the body, less as many times as cells behind
-        Gamma_3 are longer than twice their facets (`contact.mesh.entities.elongation`); the largest
-        of those of bodies that nothing connects.
+        the modulus of the touching bodies, and the length of the body, less as many times as cells
+        behind Gamma_3 are longer than twice their facets (`contact.mesh.entities.elongation`); the
+        largest of those of bodies that nothing connects.
     friction
-        |lambda_f - proj(lambda_f + c u_tau)| / |p| with the final bound s. Both are less what the
-        forces that `rounding` stands for are as pressures: no contact force is known better than
+        |lambda_f - proj(lambda_f + c u_tau)| / |p| with the final bound s. Both are less the
+        pressures of the forces that `rounding` stands for: no contact force is known better than
         equilibrium knows it, and where the loads ask for none at all, all of them are that.
     rounding
-        What has been subtracted from the first, over the same, the largest: `force_rounding`,
+        The part subtracted from the first, over the same, the largest: `force_rounding`,
         but not more than the `most_rounding` of the body. Zero where no load acts, nothing touches
         and the other field exerts nothing: all forces are rounding then, and there is nothing to
         compare it with.
     unknown
-        What it is as pressures, and has been subtracted from the other two at most, over |p|:
+        The same as pressures, which has been subtracted from the other two at most, over |p|:
         contact forces are known to that. Zero where nothing presses.
     """
 
@@ -70,12 +70,12 @@ class KKT:
         return max(values) if np.all(np.isfinite(values)) else np.inf
 
     def excess(self, allowed: KKT) -> str:
-        """Name the residual that is farthest above what is allowed; nothing if none is."""
+        """Name the residual that is farthest above its limit; nothing if none is."""
         ratios = {
             name: getattr(self, name) / getattr(allowed, name)
             for name in ("equilibrium", "contact", "friction")
         }
-        # What is no number is above everything.
+        # A value that is no number is above everything.
         worst = max(ratios, key=lambda name: np.nan_to_num(ratios[name], nan=np.inf))
         if ratios[worst] <= 1:
             return ""
@@ -109,11 +109,11 @@ def _shakes(size: int) -> Array:
 
 
 def force_rounding(problem: Problem, state: State, internal: Array) -> Array:
-    """Return what rounding may leave of the forces, and of the charges, by piece. Collective.
+    """Return the rounding of the forces, and of the charges, by piece. Collective.
 
     Unknowns are known to `EPS` of their size. The stresses around a node of a slender body, or of
     one that is moved far, cancel but for far smaller forces, and so do potentials on both sides of
-    a contact that conducts far better than the bodies. What they owe to the rounding of each
+    a contact that conducts far better than the bodies. Their parts by the rounding of each
     unknown remains: seen by moving all of them, up and down at random. No backward stable method
     leaves less (Rigal and Gaches, J. ACM 14 (1967) 543).
     """
@@ -134,16 +134,16 @@ def _as_pressures(interface: Interface, forces: Array) -> Array:
 
 
 def left_as_pressures(problem: Problem, state: State) -> float:
-    """Return what is left of the forces, as pressures over those that press. Collective."""
+    """Return the residual forces, as pressures over those that press. Collective."""
     body, interface = problem.equilibrium, problem.interface
     left = body.sizes(body.unbalanced(residual_forces(problem, state)))[0]
     return _over_pressed(interface, state, _as_pressures(interface, left))
 
 
 def _over_pressed(interface: Interface, state: State, pressures: Array) -> float:
-    """Return the largest of norms of pressures over what presses on each piece. Collective.
+    """Return the largest of norms of pressures over the pressure on each piece. Collective.
 
-    What a method leaves of a multiplier at open nodes presses nothing, and neither does what is
+    The remainder of a multiplier at open nodes presses nothing, and neither does
     rounding beside the pressures on other pieces.
     """
     nodal, own = interface.jump.apply(state.x), state.forces.pressure
@@ -178,7 +178,7 @@ def evaluate(problem: Problem, state: State) -> KKT:
         # Where nothing acts on a body all of its forces are rounding, its own or that of others.
         largest = rounding.max(axis=1, keepdims=True)
         rounding = np.minimum(np.where(acted, np.minimum(rounding, most), largest), unbalanced)
-    # Of a piece on which nothing acts there is what rounding of the others makes of it.
+    # Of a piece on which nothing acts there is the rounding of the others.
     scale = np.maximum(scale, EPS * scale.max(axis=1, keepdims=True))
     size = np.where(scale > 0, scale, 1.0)
     equilibrium = float(np.max((unbalanced - rounding) / size))

@@ -223,9 +223,9 @@ class ContactProblem:
         )
 
     def _young_of_contacts(self) -> float:
-        """Return the modulus of what yields where bodies touch. Collective.
+        """Return the modulus of the softer side where bodies touch. Collective.
 
-        What is far from there may be softer by orders of magnitude.
+        Parts far from there may be softer by orders of magnitude.
         """
         where = self.domain, self.body.materials, self.equilibrium.cells
         sides = [[c.on] if c.against is None else [c.on, c.against] for c in self.contacts]
@@ -318,7 +318,7 @@ class ContactProblem:
         return self.nodes.apply(state.x)
 
     def start(self, time: float | None = None) -> State:
-        """Return the state to start from: at rest, but for the prescribed values at a time.
+        """Return the state to start from: zero, but for the prescribed values at a time.
 
         Where no potential is prescribed, it starts from that of the first conductive foundation,
         as these alone determine it: far from phi_F a truncated charge has no derivative.

@@ -58,7 +58,7 @@ class Equilibrium(Protocol):
     """A body as its contact nodes feel it: forces and operators at given unknowns.
 
     The whole body (`contact.body.equilibrium`) and the one condensed onto its contact nodes
-    (`contact.problem.condensed`) are two implementations. Neither remembers a state.
+    (`contact.problem.condensed`) are two implementations. Neither keeps a state.
     """
 
     @property
@@ -94,7 +94,7 @@ class Equilibrium(Protocol):
         """Most that counts as rounding, over all forces of a field."""
 
     def rest(self) -> Array:
-        """Return the local unknowns of the body at rest."""
+        """Return the local unknowns of the undeformed body."""
 
     def prescribe(self, x: Array, time: float = 1.0) -> Array:
         """Return unknowns with the prescribed values at a time. Collective."""
@@ -112,10 +112,10 @@ class Equilibrium(Protocol):
         """Return the owned nodal loads at a time. Collective."""
 
     def unbalanced(self, forces: Array) -> Array:
-        """Return what of forces has to vanish in equilibrium. Collective."""
+        """Return the part of forces that has to vanish in equilibrium. Collective."""
 
     def reactions(self, forces: Array) -> Array:
-        """Return what of forces the supports bear."""
+        """Return the part of forces that the supports bear."""
 
     def sizes(self, values: Array) -> Array:
         """Return the norms of owned forces, and of charges, of each piece apart. Collective."""
@@ -124,7 +124,7 @@ class Equilibrium(Protocol):
         """Return the `sizes` of the loads at a time. Collective."""
 
     def exchanged(self, state: Evaluated) -> Array:
-        """Return the `sizes` of what each field exerts on the other. Collective."""
+        """Return the `sizes` of the forces of each field on the other. Collective."""
 
     def operator(
         self,
@@ -146,7 +146,7 @@ class Equilibrium(Protocol):
 
 
 class Problem(Protocol):
-    """A body and what may touch it."""
+    """A body and its interface."""
 
     @property
     def equilibrium(self) -> Equilibrium:
@@ -165,7 +165,7 @@ class Problem(Protocol):
         """When its loads and prescribed values act; 1 for a static problem."""
 
     def start(self, time: float | None = None) -> State:
-        """Return the state to start from: at rest, but for the prescribed values.
+        """Return the state to start from: zero, but for the prescribed values.
 
         Those of another time than the problem's, where one is given.
         """

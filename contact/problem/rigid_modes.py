@@ -120,7 +120,7 @@ def held_by_supports(problem: ContactProblem) -> bool:
 
 
 def held_at_rest(problem: ContactProblem) -> bool:
-    """Tell whether supports, and contact where it touches at rest, hold all bodies. Collective."""
+    """Tell whether supports and contact hold all bodies where they touch undeformed. Collective."""
     interface, rest = problem.interface, problem.start()
     touching = interface.opening(interface.jump.apply(rest.x)) <= 1e-12 * interface.size
     return all(
@@ -195,7 +195,7 @@ def _group(
         columns.append(np.append(np.zeros(body.owned), np.eye(masters.size)[k]))
         names.append(name)
     moved = np.stack(columns, axis=1)
-    # Relative to what holds it: supports, and rigid parts where nodes follow them.
+    # Relative to its restraints: supports, and rigid parts where nodes follow them.
     apart = moved[: body.owned] - masters.ties @ moved[body.owned :]
     fixed = ~body.free.copy()
     fixed[:, d:] = False
@@ -254,7 +254,7 @@ def null_space(gram: Array) -> Array:
     return vectors[:, values < ROUNDING]
 
 
-#: Directions in space, of half a turn, in which friction is asked for what it can hold.
+#: Directions in 3-D, of half a turn, in which friction is asked for its bound.
 DIRECTIONS = 8
 
 #: Halvings of the time between loads that contact holds and loads that it does not.
@@ -331,14 +331,14 @@ class UnilateralSupport:
 
     @property
     def besides(self) -> str:
-        """What may be lost besides a body that is pulled off, in words."""
+        """The other motions that may be lost besides a body that is pulled off, in words."""
         moving = ", or force and moment what is rigid off the body" if self.group.moving else ""
         along = ", or along it by more than friction holds" if self.group.problem.frictional else ""
         return moving + along
 
 
 def unilateral_supports(problem: ContactProblem) -> list[UnilateralSupport]:
-    """Return what contact alone has to hold of a problem, at any time. Collective."""
+    """Return the modes of a problem that contact alone has to constrain. Collective."""
     found = [UnilateralSupport.of(group) for group in groups(problem)]
     return [support for support in found if support is not None]
 
@@ -349,7 +349,7 @@ def released(held_by: Sequence[UnilateralSupport], begin: float, end: float) -> 
     Parameters
     ----------
     held_by
-        What holds it.
+        Its unilateral supports.
     begin, end
         A time at which contact can hold it, and one that is asked for.
     """
@@ -366,7 +366,7 @@ def released(held_by: Sequence[UnilateralSupport], begin: float, end: float) -> 
 def _sideways(normal: Array) -> list[Array]:
     """Return tangential vectors t, shape (n, d) each, with |m_tau| <= max |m.t| for every m.
 
-    In the plane that is the unit tangent. In space they are spread over half a turn, and as long as
+    In 2-D that is the unit tangent. In 3-D they are spread over half a turn, and as long as
     it takes: planes around the cone of friction, 2 % wider at most.
     """
     if normal.shape[1] == 2:
