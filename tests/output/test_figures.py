@@ -129,7 +129,7 @@ def test_a_small_contact_zone_is_drawn_with_its_vicinity() -> None:
     table, whole = contact_table(solution), picture(solution, "von_mises", "stress")
     assert table is not None and whole is not None
     assert near_contact(whole, table) is whole
-    status = np.where(abs(table["x"] - 1.0) < 0.03, "stick", "open")
+    status = np.where(abs(table["x"] - 1.0) < 0.04, "stick", "open")
     near = near_contact(whole, {**table, "status": status})
     assert near.scale <= whole.scale
     width = np.ptp(table["x"][status == "stick"])
