@@ -16,7 +16,6 @@ LAYERS = (
         "tolerances",
         "settings",
         "_compat",
-        "_neighbours",
         "kinds",
         "calling",
         "history",

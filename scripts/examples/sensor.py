@@ -10,59 +10,17 @@ are multiplied by a factor; the electrode is any part of its mesh.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
 from contact import Case, build_problem, load_case
-from contact.body.description import Field, Load
 from contact.output.balances import Reading, sensor
-from contact.problem.problem import ContactProblem
-from contact.typing import Array
 from scripts.cases import CASES
 from scripts.reporting import Report, parser, solved, subplots
 
 #: Multiples of the case's load.
 FACTORS = (0.25, 0.5, 0.75, 1.0, 1.5, 2.0, 2.5, 3.0)
-
-
-class Scaled:
-    """A given function times a number.
-
-    Parameters
-    ----------
-    function, factor
-        The function and the number.
-    """
-
-    def __init__(self, function: Field, factor: float) -> None:
-        self._function, self._factor = function, factor
-
-    def ufl(self, x: object) -> object:
-        """Return the product as UFL."""
-        return self._factor * self._function.ufl(x)
-
-    def numpy(self, points: Array) -> Array:
-        """Return the product at points of shape (n, d)."""
-        return self._factor * self._function.numpy(points)
-
-
-def loaded(problem: ContactProblem, factor: float) -> ContactProblem:
-    """Return the problem with its loads multiplied by a factor. Collective."""
-
-    def scaled(load: Load) -> Load:
-        force = None if load.force is None else [Scaled(f, factor) for f in load.force]
-        pressure = None if load.pressure is None else Scaled(load.pressure, factor)
-        return replace(load, force=force, pressure=pressure)
-
-    body = replace(problem.body, loads=[scaled(load) for load in problem.body.loads])
-    return ContactProblem(
-        problem.domain,
-        body,
-        problem.contacts,
-        degree=problem.equilibrium.degree,
-    )
 
 
 def opened(case: Case, electrode: str) -> Case:
@@ -81,7 +39,7 @@ def readings(case: Case, electrode: str, factors: Sequence[float]) -> list[Readi
     base = build_problem(case)
     found = []
     for factor in factors:
-        solution = solved(case, loaded(base, factor))
+        solution = solved(case, base.at(factor))  # loads without an amplitude grow with time
         found.append(sensor(solution.problem, solution.state, electrode))
     return found
 
@@ -90,26 +48,21 @@ def curve(report: Report, case: Case, electrode: str, factors: Sequence[float]) 
     """Tabulate and draw charge (short circuit) and potential (open) over the load."""
     shorted = [reading.charge for reading in readings(case, electrode, factors)]
     left_open = [r.potential for r in readings(opened(case, electrode), electrode, factors)]
-    columns: dict[str, Sequence[object]] = {"load factor": factors}
     figure, axes = subplots(1, 2, size=(7.2, 3.0))
-    pairs = (
-        (
-            "charge",
-            "charge, short circuit (units of the case)",
-            [np.nan if q is None else q for q in shorted],
-        ),
-        ("potential", "mean potential, open (units of the case)", left_open),
-    )
-    for ax, (name, label, found) in zip(axes, pairs, strict=True):
-        columns[name] = found
+    charges = [np.nan if q is None else q for q in shorted]
+    labels = {"charge, short circuit": charges, "mean potential, open": left_open}
+    for ax, (label, found) in zip(axes, labels.items(), strict=True):
         ax.plot([0.0, *factors], [0.0, *found], "o-", ms=3)
         slope = found[0] / factors[0]
         ax.plot([0.0, factors[-1]], [0.0, slope * factors[-1]], "k:", lw=0.8)
-        ax.set(xlabel="load / load of the case", ylabel=label)
-    columns["charge per load"] = [q / f for q, f in zip(columns["charge"], factors, strict=True)]
-    columns["potential per load"] = [
-        v / f for v, f in zip(columns["potential"], factors, strict=True)
-    ]
+        ax.set(xlabel="load / load of the case", ylabel=f"{label} (units of the case)")
+    columns = {
+        "load factor": factors,
+        "charge": charges,
+        "potential": left_open,
+        "charge per load": [q / f for q, f in zip(charges, factors, strict=True)],
+        "potential per load": [v / f for v, f in zip(left_open, factors, strict=True)],
+    }
     note = (
         "Dotted: in proportion to the smallest load. With full contact and Coulomb friction a "
         "linear body's reading is proportional to the load; yielding bends the curves. Charge: "

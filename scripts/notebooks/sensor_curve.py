@@ -18,7 +18,7 @@ import numpy as np
 from contact import build_problem, load_case
 from contact.output.balances import sensor
 from scripts.cases import CASES
-from scripts.examples.sensor import loaded, opened, readings
+from scripts.examples.sensor import opened, readings
 from scripts.reporting import solved
 
 case = load_case(CASES / "piezo-sensor.toml", ["mesh.cells=[16, 8]"])
@@ -45,7 +45,7 @@ for factor, charge in zip(factors, charges, strict=True):
 # A single reading, step by step: build, solve, read.
 
 # %%
-problem = loaded(build_problem(case), 1.0)
+problem = build_problem(case).at(1.0)
 solution = solved(case, problem)
 reading = sensor(solution.problem, solution.state, "electrode")
 assert np.isclose(reading.charge, charges[1], rtol=1e-8)
