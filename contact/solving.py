@@ -185,9 +185,11 @@ def solve(
     else:
         _refuse({"start": start}, "[evolution]; evolve(problem, times, start=state) goes on")
         _refuse({"nested": nested or None}, "[evolution]")
-    computed_from = on_root(comm, lambda: digest(case)) if case.evolution and folder else None
+    computed_from: dict[str, str] = {}
+    if case.evolution is not None and (folder is not None or restart is not None):
+        computed_from = on_root(comm, lambda: digest(case))
     if restart is not None:
-        on_root(comm, lambda: check_digest(restart, kept_digest(restart), digest(case)))
+        on_root(comm, lambda: check_digest(restart, kept_digest(restart), computed_from))
     problem = build_problem(case, comm, **replacements)
     with named(case.source):
         if case.evolution is not None:
