@@ -47,9 +47,9 @@ WORDS = {
 
 #: Most of them that a package, or a page, may have. Nothing may rise; what is mended lowers it.
 ALLOWED: dict[str, int] = {
-    "contact/body": 91,
+    "contact/body": 40,
     "contact/interface": 6,
-    "contact/mesh": 40,
+    "contact/mesh": 2,
     "contact/methods": 217,
     "contact/output": 184,
     "contact/problem": 6,

@@ -1,4 +1,4 @@
-"""What is said of one body: material, supports and loads."""
+"""Description of one body: material, supports and loads."""
 
 from __future__ import annotations
 
@@ -61,7 +61,7 @@ class Fixed:
     amplitude: Amplitude | None = None
 
     def __post_init__(self) -> None:
-        """Make fields of what is given."""
+        """Make fields of the given values."""
         object.__setattr__(self, "on", part(self.on))
         object.__setattr__(self, "displacement", vector(self.displacement, free=True))
         object.__setattr__(self, "potential", field(self.potential))
@@ -107,7 +107,7 @@ class Load:
     Raises
     ------
     InputError
-        If nothing is given, or what does not act there.
+        If nothing is given, or a load that does not act there.
     """
 
     on: Given = None
@@ -120,7 +120,7 @@ class Load:
     body_charge: InitVar[Given] = None
 
     def __post_init__(self, traction: Given, body_force: Given, body_charge: Given) -> None:
-        """Make fields of what is given."""
+        """Make fields of the given values."""
         object.__setattr__(self, "on", None if self.on is None else part(self.on))
         inside = self.on is None
         force = self._one(force=self.force, traction=traction, body_force=body_force)
@@ -184,7 +184,7 @@ class Material:
     on: Given = ()
 
     def __post_init__(self) -> None:
-        """Refuse what is no material."""
+        """Refuse anything but materials."""
         names = several("on", self.on, str, "the name of a region, or a list of names")
         object.__setattr__(self, "on", names)
         expect("law", self.law, "Linear(young, poisson), Log, UserLaw, ...", is_law(self.law))
@@ -217,7 +217,7 @@ class Body:
     regions
         The materials, where `law` was given as such; else none.
     rigid, electrodes
-        What moves as a rigid body, foundations included, and parts of one unknown potential.
+        Rigid parts, foundations included, and parts of one unknown potential.
     """
 
     law: Given
@@ -229,7 +229,7 @@ class Body:
     electrodes: tuple[Electrode, ...] = ()
 
     def __post_init__(self) -> None:
-        """Refuse what is none of a body; accept one support or one load without a list."""
+        """Refuse other arguments; accept one support or one load without a list."""
         if isinstance(self.law, Material | list | tuple):
             accepted = "a law, Material(...), or a list of materials"
             given = several("law", self.law, Material, accepted)

@@ -1,11 +1,11 @@
-"""Equilibrium of one body: what its forms give at a state.
+"""Equilibrium of one body: its residual and operators at a state.
 
 Unknowns are held in one blocked Lagrange space: d displacement components a node and, for a
 piezoelectric body, the potential divided by `phi_scale` = sqrt(mu1/beta). In these units both
 blocks of the operator have the same size, whatever the unit system.
 
 A state's unknowns are a local array, those of the ghosts behind the owned ones, and at the end
-global ones, if there are any (`contact.body.masters`). Nothing here remembers one: every query is
+global ones, if there are any (`contact.body.masters`). No state is kept here: every query is
 given the state that it is about.
 """
 
@@ -148,11 +148,11 @@ class BodyEquilibrium:
         return made
 
     def nodal(self, values: Array) -> Array:
-        """Return what belongs to nodes of local or owned values, shape (nodes, block size)."""
+        """Return the nodal part of local or owned values, shape (nodes, block size)."""
         return values[: values.size - self.masters.size].reshape(-1, self.block_size)
 
     def motion(self, values: Array) -> Array:
-        """Return what belongs to the global unknowns, shape (m,)."""
+        """Return the values of the global unknowns, shape (m,)."""
         return values[values.size - self.masters.size :]
 
     def owned_part(self, x: Array) -> Array:
@@ -160,10 +160,10 @@ class BodyEquilibrium:
         return np.concatenate([x[: self.owned], self.motion(x)])
 
     def take_apart(self, matrix: PETSc.Mat) -> None:
-        """Do nothing: what touches each other is no matter of the bodies."""
+        """Do nothing: contact is no matter of the bodies."""
 
     def rest(self) -> Array:
-        """Return the unknowns of the body at rest, without prescribed values."""
+        """Return the unknowns of the undeformed body, without prescribed values."""
         return np.zeros(self._at.x.array.size + self.masters.size)
 
     def prescribe(self, x: Array, time: float = 1.0) -> Array:
@@ -222,16 +222,16 @@ class BodyEquilibrium:
         return np.concatenate([self._loads.at(time), self.masters.forces(time)])
 
     def unbalanced(self, forces: Array) -> Array:
-        """Return what of forces has to vanish in equilibrium. Collective.
+        """Return the forces that have to vanish in equilibrium. Collective.
 
-        What acts on nodes that follow a rigid part or an electrode acts on that.
+        Forces on nodes that follow a rigid part or an electrode act on that.
         """
         masters, own = self.masters, forces[: self.owned]
         q = np.where(masters.free, self.motion(forces) + masters.gathered(own), 0.0)
         return np.concatenate([self.layout.mask(own), q])
 
     def reactions(self, forces: Array) -> Array:
-        """Return what of forces the supports bear, and what holds given motions. Collective."""
+        """Return the forces that supports bear, and those that hold given motions. Collective."""
         masters, own = self.masters, forces[: self.owned]
         q = np.where(masters.free, 0.0, self.motion(forces) + masters.gathered(own))
         return np.concatenate([np.where(self.unsupported.ravel(), 0.0, own), q])

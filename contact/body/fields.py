@@ -26,15 +26,15 @@ Amplitude: TypeAlias = Callable[[float], float]
 
 
 def ramp(time: float) -> float:
-    """Return the time itself: what is given grows with it, and is all there at time 1.
+    """Return the time itself: given values grow with it, and are complete at time 1.
 
-    A static problem is one step from rest at time 0 to time 1.
+    A static problem is one step from time 0 to time 1.
     """
     return time
 
 
 def steady(time: float) -> float:
-    """Return 1: what is given always acts."""
+    """Return 1: given values always act."""
     return 1.0
 
 
@@ -51,11 +51,11 @@ def at_time(field: Any, time: Any) -> Any:
     return field.at(time) if isinstance(field, Moving) else field
 
 
-def own_amplitude(what: str, given: Any) -> Amplitude | None:
+def own_amplitude(name: str, given: Any) -> Amplitude | None:
     """Return a given function of time so that it says whose amplitude it is where it fails."""
     fits = given is None or callable(given)
-    expect(f"{what}: amplitude", given, "a function of time, such as lambda t: 2 * t", fits)
-    return given if given in (None, steady) else OfTime(given, f"{what}: amplitude")
+    expect(f"{name}: amplitude", given, "a function of time, such as lambda t: 2 * t", fits)
+    return given if given in (None, steady) else OfTime(given, f"{name}: amplitude")
 
 
 def amplitude_of(given: Amplitude | None, fields: list[Any]) -> Amplitude:
@@ -68,7 +68,7 @@ def amplitude_of(given: Amplitude | None, fields: list[Any]) -> Amplitude:
     return steady if any(isinstance(field, Moving) for field in fields) else ramp
 
 
-def values_at(field: Any, points: Array, time: float, what: str, comm: MPI.Intracomm) -> Array:
+def values_at(field: Any, points: Array, time: float, name: str, comm: MPI.Intracomm) -> Array:
     """Return the values of a field at points of shape (n, d) and a time, shape (n,). Collective.
 
     Raises
@@ -76,7 +76,7 @@ def values_at(field: Any, points: Array, time: float, what: str, comm: MPI.Intra
     InputError
         On all ranks, with the name of the field, if they are no finite numbers on one.
     """
-    with on_all_ranks(comm), naming(what):
+    with on_all_ranks(comm), naming(name):
         values = at_time(field, time).numpy(points)
         found = real(values, points.shape[:1], "one number for each of the points")
         check_finite(found, lambda i: f"at ({', '.join(f'{x:g}' for x in points[i] + 0.0)})")
@@ -88,7 +88,7 @@ def constant(mesh: Mesh, value: float) -> fem.Constant:
     return fem.Constant(mesh, np.float64(value))
 
 
-#: What `field` takes.
+#: Anything that `field` takes.
 Given: TypeAlias = Any
 
 ACCEPTED = (
@@ -98,7 +98,7 @@ ACCEPTED = (
 
 
 def field(value: Given) -> Any:
-    """Return what is given as a function of position, as a `Field` or `Moving`; None as it is.
+    """Return a given function of position as a `Field` or `Moving`; None as it is.
 
     Raises
     ------
@@ -130,7 +130,7 @@ def vector(value: Given, free: bool = False) -> tuple[Any, ...] | None:
     Parameters
     ----------
     value
-        A list with what `field` takes, or a UFL expression or Function of vectors.
+        A list of arguments of `field`, or a UFL expression or Function of vectors.
     free
         Whether None or "free" leaves a component free.
     """

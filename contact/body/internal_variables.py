@@ -1,7 +1,7 @@
 """Internal variables of materials at quadrature points: the history of a body.
 
 A law of the stress that has some (`forms.hencky.HistoryLaw`) is given those at the beginning of a
-step, and says what they are at its end. Nothing else in the program knows of them.
+step, and returns those at its end. Nothing else in the program knows of them.
 """
 
 from __future__ import annotations

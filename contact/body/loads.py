@@ -44,7 +44,7 @@ class Loads:
     Parameters
     ----------
     domain, body
-        Mesh, and what acts on the body.
+        Mesh, and the loads on the body.
     v, xi
         Test functions of the displacement and the potential; None for a body without.
     owned

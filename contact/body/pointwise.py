@@ -49,7 +49,7 @@ class Pointwise:
         Parameters
         ----------
         name
-            What the expression is known by from the first time on.
+            Name of the expression from the first time on.
         expression
             Makes it of the unknowns.
         points

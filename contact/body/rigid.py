@@ -1,4 +1,4 @@
-"""What is said of rigid bodies and electrodes: how they move, and what acts on them."""
+"""Rigid parts and electrodes: how they move, and their forces and charges."""
 
 from __future__ import annotations
 
@@ -19,9 +19,9 @@ from contact.typing import Array
 Timed: TypeAlias = float | Amplitude
 
 
-def _timed(what: str, value: Timed | None) -> Timed | None:
-    """Return a value that says what it is, where it is a function of time and fails."""
-    return OfTime(value, what) if callable(value) else value
+def _timed(name: str, value: Timed | None) -> Timed | None:
+    """Return a value that is named where it is a function of time and fails."""
+    return OfTime(value, name) if callable(value) else value
 
 
 def _at(values: Sequence[Timed | None], given: Amplitude | None, time: float) -> Array:
@@ -42,9 +42,9 @@ class Motion:
     displacement
         Components of the displacement, length d.
     rotation
-        Rotation about the centre (radians): one angle in the plane, three in space.
+        Rotation about the centre (radians): one angle in 2-D, three in 3-D.
     force, moment
-        What acts on the free components, as long as the two above.
+        Those of the free components, as long as the two above.
     centre
         Centre of rotation, about which moments are taken.
     amplitude
@@ -59,7 +59,7 @@ class Motion:
     amplitude: Amplitude | None = None
 
     def __post_init__(self) -> None:
-        """Let functions of time say what they are where they fail."""
+        """Let functions of time be named where they fail."""
         for name in ("displacement", "rotation", "force", "moment"):
             values = [_timed(f"Motion: {name}.{i}", v) for i, v in enumerate(getattr(self, name))]
             object.__setattr__(self, name, tuple(values))
@@ -128,7 +128,7 @@ class Electrode:
 def rigid_motions(points: NDArray[np.floating], revolved: bool = False) -> Array:
     """Return the rigid motions at points of shape (n, d): shape (n, d, 3 or 6).
 
-    Translations come first, then rotations: about z in the plane, about x, y and z in space.
+    Translations come first, then rotations: about z in 2-D, about x, y and z in 3-D.
     A body of revolution has one, along its axis: shape (n, 2, 1).
     """
     n, d = points.shape

@@ -1,6 +1,6 @@
 """The sizes of forces that are compared with each other, and with no others.
 
-Forces and charges have no common unit. And what is connected by nothing has nothing in common:
+Forces and charges have no common unit. And bodies that nothing connects have none in common:
 beside the loads of another component of the mesh any error of one may be small.
 """
 
@@ -94,7 +94,7 @@ class Shares:
         return np.sqrt(squares + np.bincount(self.behind, other**2, minlength=self.count))
 
     def spread(self, sizes: Array) -> Array:
-        """Return for each owned value the size of what it is compared with."""
+        """Return for each owned value the norm that it is compared with."""
         component = np.concatenate([np.repeat(self.component, self.block_size), self.behind])
         return np.where(self.mechanical, sizes[0, component], sizes[-1, component])
 
@@ -105,7 +105,7 @@ def shares_of(
     masters: Masters,
     components: tuple[NDArray[np.int32], int],
 ) -> Shares:
-    """Return what is compared with each other in a body, of given components. Collective."""
+    """Return which forces of a body of given components are compared. Collective."""
     (component, count), members, d = components, masters.members, domain.dim
     if count > 1 and members:
         touched = np.zeros((len(members), count), dtype=np.intc)
@@ -115,7 +115,7 @@ def shares_of(
                 at[component[nodes[nodes < component.size]]] = 1
         domain.comm.Allreduce(MPI.IN_PLACE, touched, op=MPI.MAX)
         member_of, piece_of = np.nonzero(touched)
-        # What moves as is given joins nothing: what holds it there is of its own.
+        # A part whose motion is given joins nothing: forces of its own hold it there.
         count, label = graph_components(member_of, len(members) + piece_of, len(members) + count)
         component, of_members = label[len(members) + component], label[: len(members)]
     else:

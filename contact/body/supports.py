@@ -30,7 +30,7 @@ class Support:
     amplitude
         Factor as a function of time.
     field
-        What is prescribed; None for nothing but zero.
+        The prescribed function; None for zero.
     values
         Where the condition takes its values from.
     dofs, points
@@ -38,9 +38,9 @@ class Support:
     scale
         Unit of the component in the unknowns.
     name, comm
-        What messages call it, and the ranks that ask together.
+        Its name in messages, and the ranks that ask together.
     check
-        What refuses values that cannot be prescribed, on all ranks together; None for any.
+        Refuses values that cannot be prescribed, on all ranks together; None for any.
     """
 
     condition: fem.DirichletBC
@@ -129,7 +129,7 @@ def _nothing(
 
 
 def _off_axis(domain: Domain, part: str, points: Array) -> Callable[[Array], None]:
-    """Return what refuses a radial displacement of points on the axis. Collective."""
+    """Return a check that there is no radial displacement on the axis. Collective."""
     inside = on_axis(domain, points)
 
     def check(radial: Array) -> None:
@@ -174,7 +174,7 @@ def _support(
 def without_field(space: fem.FunctionSpace, cells: NDArray[np.int32]) -> Support:
     """Return the condition phi = 0 at the nodes that belong to no piezoelectric cell. Collective.
 
-    There is no electric field in what is not piezoelectric: a current that reaches its surface
+    There is no electric field in other materials: a current that reaches its surface
     ends there, as at that of an insulator.
 
     Parameters

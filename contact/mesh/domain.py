@@ -55,7 +55,7 @@ class ExtendedMeasure:
         return (self.extent * integrand) * self.measure
 
 
-#: What integrates over a body or a part of its boundary.
+#: Measure of a body or of a part of its boundary.
 Measure: TypeAlias = ufl.Measure | ExtendedMeasure
 
 
@@ -86,12 +86,12 @@ class Domain:
         How often the mesh has been refined: 2**levels of its edges make up one straight edge of
         the mesh that met a curved boundary.
     unusable
-        Name of a group of facets that cannot be a part -> what is wrong with it.
+        Name of a group of facets that cannot be a part -> the reason.
     notes
-        What else the source of the mesh held, one sentence each.
+        Other contents of the source of the mesh, one sentence each.
     revolved
         Whether the mesh is the half plane of a body of revolution, x its radius and y its axis
-        (see `contact.mesh.domain`). Measures then are those of the whole body.
+       . Measures then are those of the whole body.
     """
 
     mesh: dmesh.Mesh
@@ -104,7 +104,7 @@ class Domain:
     revolved: bool = False
 
     def __repr__(self) -> str:
-        """Return what can be named, not the facets of each part."""
+        """Return the names, not the facets of each part."""
         names = f"parts {', '.join(self.parts) or 'none'}; regions {', '.join(self.regions)}"
         return f"<Domain: {self.mesh.topology.index_map(self.dim).size_global} cells; {names}>"
 
@@ -152,7 +152,7 @@ class Domain:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Names that `facets` and `ds` know, be it only to say what is wrong with one."""
+        """Names that `facets` and `ds` know, also of groups that cannot be parts."""
         return (*self.parts, *self.unusable)
 
     def facets(self, name: str) -> Indices:
@@ -331,11 +331,11 @@ def with_names(
         regions = {BODY: np.arange(count, dtype=np.int32)}
     wholes = ("part", "facet of the mesh's boundary", parts), ("region", "cell", regions)
     comm = _compat.lasting(mesh.comm)
-    for what, of_it, sets in wholes:
+    for kind, of_it, sets in wholes:
         counts = comm.allreduce(np.array([s.size for s in sets.values()], dtype=np.int64))
         empty = [name for name, count in zip(sets, counts, strict=True) if count == 0]
         if empty:
-            raise InputError(f"the {what} {empty[0]!r} contains no {of_it}")
+            raise InputError(f"the {kind} {empty[0]!r} contains no {of_it}")
     return Domain(mesh, parts, regions, extent(mesh) if size is None else size)
 
 

@@ -1,4 +1,4 @@
-"""Facets, what this rank owns, groups of indices, connected components, and extents."""
+"""Facets, entities of this rank, groups of indices, connected components, and extents."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def combinations(
     combined: list[tuple[int, ...]] = [()]
     for position, group in enumerate(groups):
         members = np.unique(group)
-        # What a number stood for so far divides into those within the group and those without.
+        # The indices of a number so far divide into those within the group and those without.
         met, within = np.unique(numbers[members], return_inverse=True)
         numbers[members] = len(combined) + within
         combined += [(*combined[old], position) for old in met]

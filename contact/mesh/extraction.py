@@ -1,4 +1,4 @@
-"""What a Gmsh model holds, taken out as plain arrays; judged elsewhere.
+"""The contents of a Gmsh model as plain arrays; checked elsewhere.
 
 Gmsh crashes on some damaged files, or takes the memory of the machine for a wrong count: a
 checker of the headers would have to know the reader of each format and version, so files are
@@ -29,7 +29,7 @@ LEAST_MEMORY, MEMORY_A_BYTE = 4 << 30, 100
 
 @dataclass(frozen=True)
 class Model:
-    """What a Gmsh model holds.
+    """The contents of a Gmsh model.
 
     Attributes
     ----------
@@ -65,7 +65,7 @@ class Model:
 
     @classmethod
     def load(cls, path: Path) -> "Model":
-        """Read what `save` wrote."""
+        """Read the file of `save`."""
         with np.load(path, allow_pickle=False) as arrays:
             names = json.loads(str(arrays["names"]))
             groups = iter([arrays[f"group {i}"] for i in range(len(arrays) - 4)])
@@ -137,7 +137,7 @@ def _read(file: Path, switch: bool) -> Model:
 
 
 def main(file: str, switch: str, out: str) -> None:
-    """Read a mesh file and write its arrays, or print what Gmsh says of it."""
+    """Read a mesh file and write its arrays, or print Gmsh's message."""
     try:
         _read(Path(file), switch == "switch").save(Path(out))
     except Exception as error:

@@ -57,9 +57,9 @@ class GridError(InputError):
     Parameters
     ----------
     key
-        What is wrong, by the name that it has in ``[mesh]``.
+        The wrong key of ``[mesh]``.
     given, accepted
-        What was given, and in words what is accepted.
+        The value, and in words the accepted ones.
     """
 
     def __init__(self, key: str, given: Any, accepted: str) -> None:
@@ -262,7 +262,7 @@ def _on_grid(
     if given is None:
         return default
     low, high, h = along
-    # A number in the plane, a list of two in space.
+    # A number in the plane, a list of two in 3-D.
     if np.shape(given) != (() if low.size == 1 else low.shape):
         accepted = "a number" if low.size == 1 else f"a list of {low.size} numbers"
         raise GridError(key, given, accepted)
@@ -351,7 +351,7 @@ def _squares(simplices: Ints, cells: Sequence[int]) -> Ints:
 
 
 def grid_partitioner(cells: Sequence[int], size: Sequence[float]) -> Callable[..., Any]:
-    """Return what dolfinx asks for the ranks of a grid's simplices.
+    """Return the partitioner of a grid's simplices, as dolfinx takes it.
 
     Parameters
     ----------

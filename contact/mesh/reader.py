@@ -1,6 +1,6 @@
 """Meshes from Gmsh: ``.msh`` files and generators, with physical groups as parts.
 
-Gmsh runs for rank 0 alone. What it finds is checked there, the verdict is broadcast, and
+Gmsh runs for rank 0 alone. The result is checked there, the verdict is broadcast, and
 all ranks go on or raise together.
 """
 
@@ -33,7 +33,7 @@ from contact.mesh.validity import Cells, Groups, check_model
 logger = logging.getLogger("contact.mesh")
 
 #: Seconds that reading a file may take, whatever its length, and for each byte of it: ten times
-#: what it takes on a machine that others use, too.
+#: the time on a machine that others use, too.
 LEAST_TIME, TIME_A_BYTE = 60.0, 5e-6
 
 #: Byte order mark, with which some editors begin a file.
@@ -67,7 +67,7 @@ def _read(file: Path) -> Model:
     command = [sys.executable, "-P", "-m", "contact.mesh.extraction"]
     switch = "switch" if _format(file) < 4 else "as they are"
     limit = LEAST_TIME + TIME_A_BYTE * file.stat().st_size
-    # What this process imports, the other can import too.
+    # All modules of this process can be imported by the other.
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join(map(os.path.abspath, sys.path))}
     with _plain_name(file) as plain:
         out = plain.with_name("model.npz")
@@ -111,7 +111,7 @@ def _format(file: Path) -> int:
     found = re.match(rb"\$MeshFormat[ \t]*\r?\n\s*(2|4)(\.\d+)?[ \t]", start.removeprefix(BOM))
     if found is None:
         raise InputError("this is no Gmsh .msh file of format 2.2 or 4.1 (it begins otherwise)")
-    # Gmsh takes what is there of a section for all of it.
+    # Gmsh takes a section that is cut off for a whole one.
     if re.search(rb"\$End\w+\s*$", end) is None:
         raise InputError("it is cut off: it does not end as a section does")
     return int(found[1])
@@ -119,7 +119,7 @@ def _format(file: Path) -> int:
 
 @contextmanager
 def _plain_name(file: Path) -> Iterator[Path]:
-    """Yield a name by which Gmsh reads a file as what it begins with.
+    """Yield a name by which Gmsh reads a file by its first line.
 
     Some suffixes have readers of their own, or programs that unpack the file first; and after a
     byte order mark Gmsh finds no beginning at all.
@@ -154,8 +154,8 @@ def from_generator(comm: MPI.Intracomm, name: str, **parameters: Any) -> Domain:
     return _from_rank_0(comm, build, f"mesh generator {name!r}")
 
 
-def _from_rank_0(comm: MPI.Intracomm, load: Callable[[], Model], what: str) -> Domain:
-    """Check on rank 0 what ``load`` makes there, and distribute it."""
+def _from_rank_0(comm: MPI.Intracomm, load: Callable[[], Model], source: str) -> Domain:
+    """Check on rank 0 the model that ``load`` makes there, and distribute it."""
     raw, problem = None, None
     if comm.rank == 0:
         try:
@@ -164,12 +164,12 @@ def _from_rank_0(comm: MPI.Intracomm, load: Callable[[], Model], what: str) -> D
             problem = str(error)
     problem = comm.bcast(problem)
     if problem is not None:
-        raise InputError(f"{what}: {problem}")
+        raise InputError(f"{source}: {problem}")
     names = comm.bcast(None if raw is None else raw.without_simplices())
-    return _distribute(comm, names if raw is None else raw, what)
+    return _distribute(comm, names if raw is None else raw, source)
 
 
-def _distribute(comm: MPI.Intracomm, raw: Cells, what: str) -> Domain:
+def _distribute(comm: MPI.Intracomm, raw: Cells, source: str) -> Domain:
     dim = raw.points.shape[1]
     element = basix.ufl.element("Lagrange", CELL_NAME[dim], 1, shape=(dim,), dtype=np.float64)
     mesh = dmesh.create_mesh(comm, cells=raw.regions.rows, x=raw.points, e=ufl.Mesh(element))
@@ -177,8 +177,8 @@ def _distribute(comm: MPI.Intracomm, raw: Cells, what: str) -> Domain:
     domain = with_names(mesh, _sets(mesh, dim - 1, raw.parts), _sets(mesh, dim, raw.regions))
     if comm.rank == 0:
         for note in raw.notes:
-            logger.info("%s: %s", what, note)
-    unusable = {name: f"{what}: {reason}" for name, reason in raw.unusable.items()}
+            logger.info("%s: %s", source, note)
+    unusable = {name: f"{source}: {reason}" for name, reason in raw.unusable.items()}
     return replace(domain, unusable=unusable, notes=raw.notes)
 
 

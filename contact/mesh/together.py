@@ -35,7 +35,7 @@ class Together(str):
         return made
 
     def __getnewargs__(self) -> tuple[tuple[str, ...]]:  # type: ignore[override]
-        """Return what a copy is made of: a text alone does not say where a name ends."""
+        """Return the names, of which copies are made: a text alone does not say where one ends."""
         return (self.members,)
 
 
@@ -88,7 +88,7 @@ def pieces(
     return [(found, own.get(found, np.empty(0, dtype=np.int32))) for found in there]
 
 
-def known(what: str, name: str, names: Mapping[str, Indices]) -> str:
+def known(kind: str, name: str, names: Mapping[str, Indices]) -> str:
     """Return a name that is one of some names.
 
     Raises
@@ -101,5 +101,5 @@ def known(what: str, name: str, names: Mapping[str, Indices]) -> str:
     near = difflib.get_close_matches(str(name), names, n=1)
     hint = f"; did you mean {near[0]!r}?" if near else ""
     raise InputError(
-        f"the mesh has no {what} {name!r}{hint} (its {what}s: {', '.join(sorted(names))})"
+        f"the mesh has no {kind} {name!r}{hint} (its {kind}s: {', '.join(sorted(names))})"
     )

@@ -83,7 +83,7 @@ def check_model(model: Model) -> Cells:
     Raises
     ------
     InputError
-        For what is no mesh of straight-sided triangles in a plane z = const or of tetrahedra,
+        For other meshes than of straight-sided triangles in a plane z = const or of tetrahedra,
         for cells without volume or that overlap, and if no part is left.
     """
     dim = model.dim
@@ -110,9 +110,9 @@ def check_model(model: Model) -> Cells:
     reasons = _check_cells(points, cells, parts)
     usable = {name: rows for name, rows in parts.items() if name not in reasons}
     if not usable:
-        what = "curves" if dim == 2 else "surfaces"
+        entities = "curves" if dim == 2 else "surfaces"
         first = next(iter(reasons.values()), None)
-        raise InputError(first or f"it has no physical groups of {what}: no part has a name")
+        raise InputError(first or f"it has no physical groups of {entities}: no part has a name")
     notes += [f"ignored: {reason}" for reason in reasons.values()]
     return Cells(points, replace(regions, rows=cells), _join(usable), reasons, tuple(notes))
 
@@ -141,7 +141,7 @@ def _places(tags: Ints, nodes: Ints) -> Ints:
 
 
 def _flatten(points: Array, dim: int) -> Array:
-    """Return the coordinates in the plane or in space."""
+    """Return the coordinates in 2-D or in 3-D."""
     extent = np.ptp(points, axis=0)
     if not np.all(np.isfinite(extent)):
         raise InputError("it has nodes whose coordinates are no numbers, or too large")

@@ -182,4 +182,4 @@ def test_a_mesh_file_is_read_whatever_its_name(fixture, mark, name, tmp_path):
 
 def test_every_bad_fixture_is_in_the_table_and_all_are_small():
     assert {p.name for p in (FIXTURES / "bad").iterdir()} == set(BAD) - {"absent.msh"}
-    assert all(p.stat().st_size < 20_000 for p in FIXTURES.rglob("*.msh"))
+    assert all(p.stat().st_size < 30_000 for p in FIXTURES.rglob("*.msh"))
