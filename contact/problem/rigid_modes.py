@@ -110,8 +110,15 @@ def groups(problem: ContactProblem) -> Iterator[Group]:
 
 
 def held_by_friction(problem: ContactProblem) -> bool:
-    """Tell whether without friction a rigid motion of a body were free. Collective."""
-    return any([null_space(group.held(friction=False)).size > 0 for group in groups(problem)])
+    """Tell whether without friction a rigid motion of a body were free. Collective.
+
+    Nodes that touch at once hold it along their normals, no others: a ring between two plates moves
+    far aside before others touch.
+    """
+    touching = _touching(problem)
+    return any(
+        [null_space(group.held(friction=False, at=touching)).size > 0 for group in groups(problem)]
+    )
 
 
 def held_by_supports(problem: ContactProblem) -> bool:
@@ -121,14 +128,19 @@ def held_by_supports(problem: ContactProblem) -> bool:
 
 def held_at_rest(problem: ContactProblem) -> bool:
     """Tell whether supports and contact hold all bodies where they touch undeformed. Collective."""
-    interface, rest = problem.interface, problem.start()
-    touching = interface.opening(interface.jump.apply(rest.x)) <= 1e-12 * interface.size
+    touching = _touching(problem)
     return all(
         [
             null_space(group.held(problem.frictional, touching)).size == 0
             for group in groups(problem)
         ]
     )
+
+
+def _touching(problem: ContactProblem) -> NDArray[np.bool_]:
+    """Tell which contact nodes touch before anything but prescribed values moves. Collective."""
+    interface, rest = problem.interface, problem.start()
+    return interface.opening(interface.jump.apply(rest.x)) <= 1e-12 * interface.size
 
 
 def _free_motions(problem: ContactProblem) -> dict[int, str]:

@@ -57,22 +57,24 @@ def test_plate_and_lid_press_a_ring_alike(method, seed):
     check(solve(case, domain=between_plates(COMM, seed)))
 
 
-def test_pressures_balance_the_reaction():
+@pytest.mark.parametrize("method", ["newton", "uzawa"])
+def test_pressures_balance_the_reaction(method):
     """Uzawa's pressures have differed by 1.8 % here, with all residuals below 1e-9.
 
     Its acceleration may stall: one node touches on either side, and nothing else holds the ring.
-    Aside of these nodes the facets are tilted: moved far along them, it touches nothing, which is a
-    solution too.
+    Newton's method has to begin with friction: without it the ring moves far aside, where it
+    touches nothing.
     """
     moduli = {
         "ring": (0.43666293017617736, 0.45),
         "plate": (0.6751374270856283, 0.2),
         "lid": (9.825794969270524, 0.45),
     }
-    case = squeezed("uzawa", moduli, "ring_top", -0.004130309947621388, file=str(RING))
+    case = squeezed(method, moduli, "ring_top", -0.004130309947621388, file=str(RING))
     solution = solve(case, comm=MPI.COMM_SELF)
     nodes = solution.problem.nodes
     assert along_normal(solution.problem, solution.forces) < 1e-14
+    assert solution.converged or method == "uzawa"
     if solution.converged:
         check(solution)
         for side in (nodes.normal[:, 1] > 0, nodes.normal[:, 1] < 0):
