@@ -36,7 +36,7 @@ STATES = {"open": "#C8C8C8", "stick": BLUE, "slip": ORANGE}
 
 
 def position(table: Table, axes: str = "xy") -> tuple[Array, str]:
-    """Return where the nodes lie along Gamma_3 and what to call it.
+    """Return the positions of the nodes along Gamma_3, and the name of the coordinate.
 
     That is a coordinate where Gamma_3 lies along an axis, and the arc length elsewhere.
     """
@@ -133,7 +133,7 @@ def draw_line(
 
 
 def _handles(axes: Iterable[Axes]) -> list[Any]:
-    """Return what a legend shows: each label once, lines first."""
+    """Return the entries of a legend: each label once, lines first."""
     found: dict[str, Any] = {}
     for ax in axes:
         handles, labels = ax.get_legend_handles_labels()
@@ -193,7 +193,7 @@ def _draw_opposite(ax: Axes, table: Table, opposite: VTU) -> None:
 
 
 def _focus(ax: Axes, values: Array, low: float) -> None:
-    """Limit the axis where a singular corner would hide all else, and say what is cut off."""
+    """Limit the axis where a singular corner would hide all else, and name the peak."""
     largest = float(values.max(initial=0.0))
     usual = float(np.quantile(values, 0.97)) * 1.6
     if largest <= 0:
@@ -220,11 +220,11 @@ def draw_surface(
 
     The arguments are those of `draw_line`.
     """
-    view = _across(surface)
+    touching = np.asarray(surface.at_points["status"]) > STATUS["open"]
+    view = _across(surface, touching)
     sides = [(surface, "contact pressure")]
     if opposite is not None:
         sides.append((opposite, "on the other side"))
-    touching = np.asarray(surface.at_points["status"]) > STATUS["open"]
     low, high = _window(surface.grid.points[:, view], touching, 0.13)  # room for the arrows
     stacked, count = page_width() < NARROW, len(sides) + 1
     rows, columns = (count, 1) if stacked else (1, count)
@@ -257,7 +257,7 @@ def draw_surface(
 
 
 def _draw_pressure(ax: Axes, side: VTU, view: list[int], highest: float) -> Any:
-    """Draw the pressure on one side; return what its colours are."""
+    """Draw the pressure on one side; return its colours."""
     flat, facets = side.grid.points[:, view], triangles(side.grid.cells)
     pressure = np.asarray(side.at_points["pressure"])
     ax.add_collection(PolyCollection(list(flat[facets]), facecolor="#F2F2F2", lw=0))
@@ -297,9 +297,10 @@ def _arrows(ax: Axes, surface: VTU, flat: Array, view: list[int], reach: float) 
     ax.quiver(*flat[chosen].T, *friction[chosen].T, color="black", width=0.004, **exact)
 
 
-def _across(surface: VTU) -> list[int]:
+def _across(surface: VTU, touching: NDArray[np.bool_]) -> list[int]:
     """Return the two axes that are the most across the mean contact direction."""
-    mean = np.nanmean(np.asarray(surface.at_points["normal"]), axis=0)
+    chosen = touching if touching.any() else slice(None)
+    mean = np.nanmean(np.asarray(surface.at_points["normal"])[chosen], axis=0)
     return sorted(int(k) for k in np.argsort(np.abs(mean))[:2])
 
 

@@ -275,7 +275,7 @@ def read_frames(folder: Path) -> list[Frame]:
 
 
 def _moved(table: Table, body: VTU, step: Table) -> Table:
-    """Return the contact nodes of a step with the way that what is opposite of them has gone."""
+    """Return the contact nodes of a step with the displacement of the opposite side."""
     names = [name for name in "xyz" if name in table]
     normal = np.column_stack([table[f"nu_{name}"] for name in names])
     places = np.column_stack([table[name] for name in names])
