@@ -5,8 +5,8 @@ piezoelectric body, the potential divided by `phi_scale` = sqrt(mu1/beta). In th
 blocks of the operator have the same size, whatever the unit system.
 
 A state's unknowns are a local array, those of the ghosts behind the owned ones, and at the end
-global ones, if there are any (`contact.body.masters`). No state is kept here: every query is
-given the state that it is about.
+global ones, if there are any (`contact.body.global_unknowns`). No state is kept here: every query
+is given the state that it is about.
 """
 
 from __future__ import annotations
@@ -24,8 +24,8 @@ from petsc4py import PETSc
 from ufl.core.expr import Expr
 
 from contact.body.description import Body
+from contact.body.global_unknowns import make_global_unknowns
 from contact.body.loads import Loads
-from contact.body.masters import make_masters
 from contact.body.materials import cells_of
 from contact.body.pointwise import Pointwise
 from contact.body.shares import shares_of
@@ -87,15 +87,15 @@ class BodyEquilibrium:
         index_map = self.space.dofmap.index_map
         #: Which unknowns of the owned nodes no support holds, shape (nodes, block size).
         self.unsupported = free_components(self.space, self.supports)
-        self.masters = make_masters(domain, self.space, body, self.unsupported)
+        self.global_unknowns = make_global_unknowns(domain, self.space, body, self.unsupported)
         #: Which forces are compared with each other.
         self.components = components(self.space)
-        self.shares = shares_of(domain, self.space, self.masters, self.components)
+        self.shares = shares_of(domain, self.space, self.global_unknowns, self.components)
         self.layout = Layout(
             domain.comm,
             index_map,
             self.space.tabulate_dof_coordinates()[: index_map.size_local, : self.dim],
-            self.unsupported & ~self.masters.tied,
+            self.unsupported & ~self.global_unknowns.tied,
             domain.size,
             float(body.law.young),
             domain.revolved,
@@ -149,11 +149,11 @@ class BodyEquilibrium:
 
     def nodal(self, values: Array) -> Array:
         """Return the nodal part of local or owned values, shape (nodes, block size)."""
-        return values[: values.size - self.masters.size].reshape(-1, self.block_size)
+        return values[: values.size - self.global_unknowns.size].reshape(-1, self.block_size)
 
     def motion(self, values: Array) -> Array:
         """Return the values of the global unknowns, shape (m,)."""
-        return values[values.size - self.masters.size :]
+        return values[values.size - self.global_unknowns.size :]
 
     def owned_part(self, x: Array) -> Array:
         """Return the owned ones of local unknowns, and the global ones behind them."""
@@ -164,15 +164,17 @@ class BodyEquilibrium:
 
     def rest(self) -> Array:
         """Return the unknowns of the undeformed body, without prescribed values."""
-        return np.zeros(self._at.x.array.size + self.masters.size)
+        return np.zeros(self._at.x.array.size + self.global_unknowns.size)
 
     def prescribe(self, x: Array, time: float = 1.0) -> Array:
         """Return unknowns with the prescribed values at a time. Collective."""
-        at, q = self._at.x, self.masters.prescribe(self.motion(x), time)
+        at, q = self._at.x, self.global_unknowns.prescribe(self.motion(x), time)
         at.array[:] = self.nodal(x).ravel()
-        if self.masters.tying:
+        if self.global_unknowns.tying:
             own = at.array[: self.owned]
-            own[self.masters.tied.ravel()] = (self.masters.ties @ q)[self.masters.tied.ravel()]
+            own[self.global_unknowns.tied.ravel()] = (self.global_unknowns.ties @ q)[
+                self.global_unknowns.tied.ravel()
+            ]
         for support in self.supports:
             support.set(at.array, time)
         at.scatter_forward()
@@ -207,7 +209,7 @@ class BodyEquilibrium:
         about = None if secant_at is None or self.linear else self.nodal(secant_at).ravel()
         variables = self.variables.of(state)
         forces = self._internal(self.nodal(state.x).ravel(), about, variables)
-        return np.concatenate([forces, np.zeros(self.masters.size)])
+        return np.concatenate([forces, np.zeros(self.global_unknowns.size)])
 
     def expect_many(self) -> None:
         """Prepare for forces that are asked for often, those of load steps. Collective.
@@ -219,21 +221,21 @@ class BodyEquilibrium:
 
     def external(self, time: float = 1.0) -> Array:
         """Return the owned nodal loads at a time. Collective."""
-        return np.concatenate([self._loads.at(time), self.masters.forces(time)])
+        return np.concatenate([self._loads.at(time), self.global_unknowns.forces(time)])
 
     def unbalanced(self, forces: Array) -> Array:
         """Return the forces that have to vanish in equilibrium. Collective.
 
         Forces on nodes that follow a rigid part or an electrode act on that.
         """
-        masters, own = self.masters, forces[: self.owned]
-        q = np.where(masters.free, self.motion(forces) + masters.gathered(own), 0.0)
+        global_unknowns, own = self.global_unknowns, forces[: self.owned]
+        q = np.where(global_unknowns.free, self.motion(forces) + global_unknowns.gathered(own), 0.0)
         return np.concatenate([self.layout.mask(own), q])
 
     def reactions(self, forces: Array) -> Array:
         """Return the forces that supports bear, and those that hold given motions. Collective."""
-        masters, own = self.masters, forces[: self.owned]
-        q = np.where(masters.free, 0.0, self.motion(forces) + masters.gathered(own))
+        global_unknowns, own = self.global_unknowns, forces[: self.owned]
+        q = np.where(global_unknowns.free, 0.0, self.motion(forces) + global_unknowns.gathered(own))
         return np.concatenate([np.where(self.unsupported.ravel(), 0.0, own), q])
 
     def create_matrix(self) -> PETSc.Mat:
@@ -276,14 +278,14 @@ class BodyEquilibrium:
             As of `SparseOperator`.
         """
         options: dict[str, Any] = {"symmetric": symmetric, "counters": counters, "kind": kind}
-        masters = self.masters
-        if change is None and masters.size == 0:
+        global_unknowns = self.global_unknowns
+        if change is None and global_unknowns.size == 0:
             return SparseOperator(self, nodes, components=self.shares.apart, **options)
-        motions = masters.ties
+        motions = global_unknowns.ties
         if motion is not None:
             dofs = nodes[: motion.shape[0], None] * self.block_size + np.arange(self.block_size)
-            motions = masters.with_foundations(dofs, motion)
-        constraint = Constraint(self.layout, change, motions, masters.free)
+            motions = global_unknowns.with_foundations(dofs, motion)
+        constraint = Constraint(self.layout, change, motions, global_unknowns.free)
         bulk = ConstrainedBulk(self, constraint, BodyState(self.rest()))
         return ConstrainedOperator(bulk, nodes, **options)
 
@@ -298,7 +300,7 @@ class BodyEquilibrium:
 
     def products(self, ones: Array, others: Array) -> Array:
         """Return the inner products of columns of local values, as a matrix. Collective."""
-        n, behind = self.owned, ones.shape[0] - self.masters.size
+        n, behind = self.owned, ones.shape[0] - self.global_unknowns.size
         own = self.comm.allreduce(ones[:n].T @ others[:n], op=MPI.SUM)
         return np.asarray(own + ones[behind:].T @ others[behind:])
 

@@ -13,7 +13,7 @@ from dolfinx import fem
 from mpi4py import MPI
 from numpy.typing import NDArray
 
-from contact.body.masters import Masters
+from contact.body.global_unknowns import GlobalUnknowns
 from contact.linear.krylov import Components
 from contact.mesh.domain import Domain
 from contact.mesh.entities import component_sums, graph_components
@@ -102,11 +102,11 @@ class Shares:
 def shares_of(
     domain: Domain,
     space: fem.FunctionSpace,
-    masters: Masters,
+    global_unknowns: GlobalUnknowns,
     components: tuple[NDArray[np.int32], int],
 ) -> Shares:
     """Return which forces of a body of given components are compared. Collective."""
-    (component, count), members, d = components, masters.members, domain.dim
+    (component, count), members, d = components, global_unknowns.members, domain.dim
     if count > 1 and members:
         touched = np.zeros((len(members), count), dtype=np.intc)
         for member, at in zip(members, touched, strict=True):
@@ -123,5 +123,11 @@ def shares_of(
     behind = np.repeat(of_members, [member.free.size for member in members]).astype(np.intp)
     block_size = space.dofmap.index_map_bs
     return Shares(
-        domain.comm, component.astype(np.intp), behind, count, block_size, d, masters.mechanical
+        domain.comm,
+        component.astype(np.intp),
+        behind,
+        count,
+        block_size,
+        d,
+        global_unknowns.mechanical,
     )

@@ -212,7 +212,7 @@ def joined_nodes(
     index_map, free
         Nodes of the mesh, and which of their unknowns are not fixed.
     ties
-        How those that follow move with the global unknowns (`contact.body.masters`).
+        How those that follow move with the global unknowns (`contact.body.global_unknowns`).
 
     Raises
     ------

@@ -59,8 +59,8 @@ class ContactNodes:
     block_size
         Unknowns a node: d, or d + 1 with the potential.
     motion
-        How the foundation moves here with the m global unknowns (`contact.body.masters`), which
-        are behind those of the nodes, shape (n, block_size, m); None where nothing moves.
+        How the foundation moves here with the m global unknowns behind those of the nodes
+        (`contact.body.global_unknowns`), shape (n, block_size, m); None where nothing moves.
     cut
         Largest depth in the foundation, undeformed, of a node on a straight facet of a curved
         part; the gap of these nodes is 0 (length).

@@ -111,7 +111,7 @@ def find_pair(
         cut,
         body.comm.allreduce(unknown, op=MPI.MAX),
         body.domain.revolved,
-        body.masters.still(local.size, body.block_size),
+        body.global_unknowns.still(local.size, body.block_size),
     )
     return Pair(nodes, coupling)
 
@@ -157,7 +157,7 @@ def _check_apart(body: BodyEquilibrium, coupling: Coupling, label: str) -> None:
     sides = (coupling.slaves, coupling.own), (coupling.masters, coupling.other)
     taking = np.concatenate([every[abs(part).sum(axis=0) > 0] for every, part in sides])
     _, local = owned_among(body.layout.index_map, taking)
-    if body.comm.allreduce(bool(body.masters.tied[local].any()), op=MPI.LOR):
+    if body.comm.allreduce(bool(body.global_unknowns.tied[local].any()), op=MPI.LOR):
         raise InputError(
             f"{label}: their nodes follow a rigid part or an electrode of unknown potential; "
             "accepted: parts that end before these"

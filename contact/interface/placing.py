@@ -309,7 +309,7 @@ def _motion(
         Components that no support holds, and the part of the direction that supports have
         taken, (n, d).
     """
-    masters, (free, held) = body.masters, supports
+    masters, (free, held) = body.global_unknowns, supports
     motion, member = masters.still(len(points), body.block_size), masters.member(part)
     if motion is not None and member is not None:
         own, d = member.motion(points, body.block_size), body.dim

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from contact.body.masters import Member
+from contact.body.global_unknowns import Member
 from contact.body.rigid import Electrode
 from contact.problem.kkt import residual_forces
 from contact.problem.problem import ContactProblem
@@ -50,7 +50,7 @@ def rigid_columns(problem: ContactProblem, state: State) -> dict[str, dict[str, 
     `potentials`. Of several foundations the names have that of the part behind them.
     """
     found: dict[str, dict[str, float]] = {"moved": {}, "acting": {}, "potentials": {}}
-    several = sum(member.foundation for member in problem.equilibrium.masters.members) > 1
+    several = sum(member.foundation for member in problem.equilibrium.global_unknowns.members) > 1
     for member, values, forces in _members(problem, state):
         part, d = member.what.on, problem.dim
         if isinstance(member.what, Electrode):
@@ -73,13 +73,13 @@ def rigid_columns(problem: ContactProblem, state: State) -> dict[str, dict[str, 
 def _members(problem: ContactProblem, state: State) -> Iterator[tuple[Member, Array, Array]]:
     """Give rigid bodies and electrodes with their values, and what acts on them."""
     body = problem.equilibrium
-    masters, q = body.masters, body.motion(state.x)
-    if masters.size == 0:
+    global_unknowns, q = body.global_unknowns, body.motion(state.x)
+    if global_unknowns.size == 0:
         return
     residual = residual_forces(problem, state)
-    forces = body.motion(residual) + masters.gathered(residual[: body.owned])
-    forces += masters.forces(state.time)
-    for member in masters.members:
+    forces = body.motion(residual) + global_unknowns.gathered(residual[: body.owned])
+    forces += global_unknowns.forces(state.time)
+    for member in global_unknowns.members:
         units, own = member.units, forces[member.columns]
         if problem.domain.revolved and not isinstance(member.what, Electrode):
             # Over the full turn what acts across the axis, and about it, cancels.

@@ -289,7 +289,7 @@ def untouched(solution: Solution) -> Remark:
         "nothing touches: no contact node has met the foundation; it is too far away, or narrower "
         "than the elements there"
     )
-    masters = problem.equilibrium.masters
+    masters = problem.equilibrium.global_unknowns
     if np.any(masters.free & masters.mechanical):
         text += "; what is rigid and free may be anywhere that it touches nothing"
     return text, False

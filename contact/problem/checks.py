@@ -244,8 +244,8 @@ def check_potential(problem: ContactProblem, state: State | None = None) -> None
     # Constants by which the potential may be raised: of each piece, and of each electrode.
     raised = np.zeros((*body.free.shape, count))
     raised[np.arange(piece.size), -1, piece] = 1.0
-    electrodes = np.eye(body.masters.size)[:, ~body.masters.mechanical]
-    follows = (body.masters.ties @ electrodes)[body.block_size - 1 :: body.block_size]
+    electrodes = np.eye(body.global_unknowns.size)[:, ~body.global_unknowns.mechanical]
+    follows = (body.global_unknowns.ties @ electrodes)[body.block_size - 1 :: body.block_size]
     rows = [np.hstack([raised[:, -1], -follows])[~body.free[:, -1]]]
     columns = linalg.block_diag(raised.reshape(body.owned, count), electrodes)
     locally = [body.local(column) for column in columns.T]

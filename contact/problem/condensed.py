@@ -208,12 +208,17 @@ class CondensedConstraint:
     """
 
     def __init__(self, body: BodyEquilibrium, interface: Interface) -> None:
-        self._body, masters, layout, comm = body, body.masters, body.layout, body.comm
-        constraint = Constraint(layout, None, masters.ties, masters.free)
+        self._body, global_unknowns, layout, comm = (
+            body,
+            body.global_unknowns,
+            body.layout,
+            body.comm,
+        )
+        constraint = Constraint(layout, None, global_unknowns.ties, global_unknowns.free)
         self.bulk = ConstrainedBulk(body, constraint, BodyState(body.rest()))
-        self._free = np.flatnonzero(masters.free)
+        self._free = np.flatnonzero(global_unknowns.free)
         #: Free unknowns that nodes follow: the others have no columns.
-        sizes = np.abs(masters.ties).sum(axis=0)
+        sizes = np.abs(global_unknowns.ties).sum(axis=0)
         followed = np.asarray(comm.allreduce(sizes, op=MPI.SUM)) > 0
         self._followed = [k for k, column in enumerate(self._free) if followed[column]]
         self._responses = np.zeros((body.owned, self._free.size))
@@ -225,7 +230,7 @@ class CondensedConstraint:
         own = np.arange(size, dtype=np.int32)
         self.unknowns: NDArray[np.int32] = (nodes[:, None] * np.int32(size) + own).ravel()
         self.offset = size * sum(comm.allgather(coupled.size)[: comm.rank])
-        self._trivial = interface.change is None and masters.size == 0
+        self._trivial = interface.change is None and global_unknowns.size == 0
         self._matrix = None if self._trivial else self._made(interface, nodes)
 
     def _made(self, interface: Interface, nodes: NDArray[np.int32]) -> sparse.csr_array:
@@ -240,7 +245,7 @@ class CondensedConstraint:
         if interface.change is not None:
             numbers = np.concatenate(comm.allgather(layout.index_map.local_to_global(nodes)))
             basis = interface.change.among(numbers, size)
-        moved = np.zeros((count * size, self._body.masters.size))
+        moved = np.zeros((count * size, self._body.global_unknowns.size))
         motion = interface.jump.carried
         if motion is not None:
             moved[: motion.shape[0] * motion.shape[1]] = motion.reshape(-1, motion.shape[2])
@@ -300,11 +305,11 @@ class CondensedConstraint:
         others = -self._solve(self._forces) - self._answers @ jumps
         moved = self._matrix @ np.concatenate([jumps, others])
         kept, free = np.split(moved, [moved.size - self._free.size])
-        q = np.zeros(body.masters.size)
+        q = np.zeros(body.global_unknowns.size)
         q[self._free] = free
         if self._followed:
             schur.condense(body.layout.mask(-self._residual) - self.bulk.columns @ q)
-        return np.concatenate([schur.expand(kept) + body.masters.ties @ q, q])
+        return np.concatenate([schur.expand(kept) + body.global_unknowns.ties @ q, q])
 
 
 def at_kept_nodes(interface: Interface) -> Interface:

@@ -11,8 +11,8 @@ from mpi4py import MPI
 
 from contact.body.description import Body
 from contact.body.equilibrium import BodyEquilibrium
+from contact.body.global_unknowns import GlobalUnknowns
 from contact.body.internal_variables import VARIABLES
-from contact.body.masters import Masters
 from contact.body.materials import young_behind
 from contact.errors import InputError
 from contact.history import CONTACT_NODES, History, InternalVariables, Part
@@ -41,7 +41,9 @@ from contact.problem.state import State
 from contact.typing import Array
 
 
-def approached(nodes: ContactNodes, x: Array, masters: Masters, time: float) -> Array:
+def approached(
+    nodes: ContactNodes, x: Array, global_unknowns: GlobalUnknowns, time: float
+) -> Array:
     """Return unknowns with each free foundation moved by its force to where it first touches.
 
     Where it touches nothing, nothing resists its force: the first linear system would be singular.
@@ -53,14 +55,14 @@ def approached(nodes: ContactNodes, x: Array, masters: Masters, time: float) -> 
         The contact nodes.
     x
         Local unknowns, the global ones behind them.
-    masters
+    global_unknowns
         The global unknowns.
     time
         When: forces are those of this time.
     """
-    forces = masters.forces(time)
-    for member in masters.members:
-        push = np.zeros(masters.size)
+    forces = global_unknowns.forces(time)
+    for member in global_unknowns.members:
+        push = np.zeros(global_unknowns.size)
         push[member.columns] = forces[member.columns]
         if nodes.motion is None or not member.foundation or not push.any():
             continue
@@ -73,7 +75,7 @@ def approached(nodes: ContactNodes, x: Array, masters: Masters, time: float) -> 
         least = nodes.comm.allreduce(float(way.min(initial=np.inf)), op=MPI.MIN)
         if 0 < least < np.inf:
             x = x.copy()
-            x[x.size - masters.size :] += least * push
+            x[x.size - global_unknowns.size :] += least * push
     return x
 
 
@@ -209,7 +211,9 @@ class ContactProblem:
             for i, contact in enumerate(self.contacts)
         )
         body = self.equilibrium
-        found = joined_nodes(self.entries, body.layout.index_map, body.free, body.masters.ties)
+        found = joined_nodes(
+            self.entries, body.layout.index_map, body.free, body.global_unknowns.ties
+        )
         layer, conductor = joined_layer(self.entries), joined_conductor(self.entries)
         stiffness = self._young_of_contacts() / size
         law = InterfaceLaw(found, layer, conductor, body.phi_scale, stiffness)
@@ -249,18 +253,18 @@ class ContactProblem:
     def _held(self, key: str, contact: Contact, nodes: ContactNodes) -> HeldCurrent | None:
         if contact.conductor is None or not self.piezoelectric:
             return None
-        body, masters = self.equilibrium, self.equilibrium.masters
+        body, global_unknowns = self.equilibrium, self.equilibrium.global_unknowns
         found = candidates(self.domain, body.space, contact.on)
         held = held_current(
             found, contact.foundation, body.free, nodes, contact.conductor, body.phi_scale
         )
-        taken = bool(masters.tied[found.nodes, -1].any())
+        taken = bool(global_unknowns.tied[found.nodes, -1].any())
         if self.comm.allreduce(taken, op=MPI.LOR):
             raise InputError(
                 f"{key}.on: part {contact.on!r}, through which current flows, shares nodes with an "
                 "electrode of unknown potential; accepted: parts apart, or an insulated foundation"
             )
-        moves = masters.member(contact.on) is not None
+        moves = global_unknowns.member(contact.on) is not None
         if self.comm.allreduce(held.jump.nodes.size, op=MPI.SUM) > 0 and moves:
             raise InputError(
                 f"{key}.rigid: supports hold nodes of part {contact.on!r}, through which current "
@@ -329,5 +333,5 @@ class ContactProblem:
         if self.piezoelectric and conductors:
             if all(fixed.potential is None for fixed in self.body.fixed):
                 body.nodal(x)[:, -1] = conductors[0].at(self.time).phi_f / body.phi_scale
-        x = approached(self.nodes, body.prescribe(x, time), body.masters, time)
+        x = approached(self.nodes, body.prescribe(x, time), body.global_unknowns, time)
         return State(x, Multipliers.zero(self.nodes), time, self.history)

@@ -147,7 +147,7 @@ def _free_motions(problem: ContactProblem) -> dict[int, str]:
     """Return the global unknowns that are motions and not given, with their names."""
     return {
         member.begin + k: f"{NAMES[problem.dim][k]} of what is rigid"
-        for member in problem.equilibrium.masters.members
+        for member in problem.equilibrium.global_unknowns.members
         if isinstance(member.what, Rigid)
         for k in map(int, np.flatnonzero(member.free))
     }
@@ -155,7 +155,11 @@ def _free_motions(problem: ContactProblem) -> dict[int, str]:
 
 def _joined(problem: ContactProblem, piece: NDArray[np.int32], count: int) -> NDArray[np.bool_]:
     """Tell which pieces touch something that moves freely, or each other, (count,). Collective."""
-    free, nodes, ties = [*_free_motions(problem)], problem.nodes, problem.equilibrium.masters.ties
+    free, nodes, ties = (
+        [*_free_motions(problem)],
+        problem.nodes,
+        problem.equilibrium.global_unknowns.ties,
+    )
     touched = np.zeros(count, dtype=np.intc)
     if free and nodes.motion is not None:
         moves = np.abs(nodes.motion[:, :, free]).max(axis=(1, 2), initial=0.0) > 0
@@ -189,7 +193,7 @@ def _group(
         Global unknowns that move them, with their names.
     """
     body, d = problem.equilibrium, problem.dim
-    points, masters = body.layout.points, body.masters
+    points, global_unknowns = body.layout.points, body.global_unknowns
     columns, names, centres, centre = [], [], [], _centre(problem)
     own_names = NAMES[d][1:2] if problem.domain.revolved else NAMES[d]
     for k in pieces:
@@ -200,15 +204,15 @@ def _group(
         motions = np.zeros((*body.free.shape, rigid.shape[2]))
         motions[inside, :d] = rigid
         centres.append(centre)
-        still = np.zeros(masters.size)
+        still = np.zeros(global_unknowns.size)
         columns += [np.append(motion.ravel(), still) for motion in np.moveaxis(motions, 2, 0)]
         names += own_names
     for k, name in moving.items():
-        columns.append(np.append(np.zeros(body.owned), np.eye(masters.size)[k]))
+        columns.append(np.append(np.zeros(body.owned), np.eye(global_unknowns.size)[k]))
         names.append(name)
     moved = np.stack(columns, axis=1)
     # Relative to its restraints: supports, and rigid parts where nodes follow them.
-    apart = moved[: body.owned] - masters.ties @ moved[body.owned :]
+    apart = moved[: body.owned] - global_unknowns.ties @ moved[body.owned :]
     fixed = ~body.free.copy()
     fixed[:, d:] = False
     return Group(

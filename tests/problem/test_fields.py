@@ -53,7 +53,7 @@ def test_each_field_is_out_of_balance_by_itself(top):
     found = solved("newton", top=top)
     problem, state = found.problem, found.state
     body = problem.equilibrium
-    free = np.concatenate([body.free.ravel(), np.zeros(body.masters.size, dtype=bool)])
+    free = np.concatenate([body.free.ravel(), np.zeros(body.global_unknowns.size, dtype=bool)])
     shake = np.random.default_rng(0).choice((-1.0, 1.0), free.size) * free
     for field in (body.shares.mechanical, ~body.shares.mechanical):
         spoilt = state.x + 1e-4 * np.where(field, shake * np.abs(state.x[field]).max(), 0.0)

@@ -81,8 +81,8 @@ class PenalisedProblem:
             counters=counters,
             kind=options.linear,
         )
-        self._packing = Packing(problem.comm, self._body.masters.size)
-        matrix = shell(self, problem.comm, self._body.owned, self._body.masters.size)
+        self._packing = Packing(problem.comm, self._body.global_unknowns.size)
+        matrix = shell(self, problem.comm, self._body.owned, self._body.global_unknowns.size)
         self._iterate, self._residual = matrix.createVecs()
         self.snes = PETSc.SNES().create(problem.comm)
         self.snes.setOptionsPrefix("penalty_")

@@ -93,7 +93,7 @@ class Member:
 
 
 @dataclass(frozen=True)
-class Masters:
+class GlobalUnknowns:
     """The global unknowns of a body and its foundations.
 
     Attributes
@@ -173,9 +173,9 @@ class Masters:
         return (self.ties + there).tocsr()
 
 
-def make_masters(
+def make_global_unknowns(
     domain: Domain, space: fem.FunctionSpace, body: Body, free: NDArray[np.bool_]
-) -> Masters:
+) -> GlobalUnknowns:
     """Return the global unknowns of a body. Collective.
 
     Parameters
@@ -208,7 +208,7 @@ def make_masters(
     for member in members:
         if not member.foundation:
             ties = ties + _tie(domain, space, member, free, tied, size)
-    return Masters(domain.comm, tuple(members), unknown, ties, tied)
+    return GlobalUnknowns(domain.comm, tuple(members), unknown, ties, tied)
 
 
 def _check_revolved(what: Rigid) -> None:
