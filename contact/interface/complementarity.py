@@ -89,18 +89,18 @@ def interface_residuals(
     forces: Multipliers,
     bound: Array,
     rounding: Array | float = 0.0,
-) -> tuple[float, float]:
+) -> tuple[Array, Array]:
     """Return the relative contact and friction residuals at nodal unknowns. Collective.
 
-    Those of each connected component are relative to its pressures; the largest are returned.
+    Those of each connected component are relative to its pressures; the `worst` are returned,
+    with their rounding floors, both of shape (2,).
 
     Parameters
     ----------
     interface, nodal, forces, bound
         The laws, unknowns and contact forces at the nodes, and the friction bound, shape (n,).
     rounding
-        Norm of pressures in L2(Gamma_3) that nothing can tell from zero, of each piece: both are
-        less it.
+        Norm of pressures in L2(Gamma_3) that nothing can tell from zero, of each component.
     """
     # A gap between neighbouring nodes costs E/h: where a body is that long only because its
     # cells are stretched, E/size hides errors of the pressure far above the tolerance.
@@ -121,9 +121,24 @@ def interface_residuals(
     scale = np.maximum(interface.norms(interface.pressure(nodal, forces)), 1e-4 * closing)
     scale = np.maximum(scale, EPS * scale.max())
     norms = np.array([interface.norms(contact), interface.norms(friction)])
-    left = (norms - np.minimum(norms, rounding)) / np.where(scale > 0, scale, 1.0)
-    contact_left, friction_left = left.max(axis=1)
-    return float(contact_left), float(friction_left)
+    size = np.where(scale > 0, scale, 1.0)
+    return worst(norms / size, np.broadcast_to(rounding / size, norms.shape))
+
+
+def worst(residuals: Array, floors: Array) -> tuple[Array, Array]:
+    """Return the largest residual of each row, and its rounding floor.
+
+    It is the largest of those above their floors, which alone decide whether a state is accepted,
+    and the largest of all where none is.
+    """
+    above = np.where(residuals <= floors, -1.0, residuals)
+    some = (above >= 0) | np.isnan(above)
+    chosen = np.where(some.any(axis=1, keepdims=True), above, residuals)
+    columns = np.argmax(chosen, axis=1)[:, None]  # NaN counts as the largest
+    return (
+        np.take_along_axis(residuals, columns, axis=1)[:, 0],
+        np.take_along_axis(floors, columns, axis=1)[:, 0],
+    )
 
 
 @dataclass(frozen=True)

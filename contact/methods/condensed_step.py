@@ -97,7 +97,7 @@ class CondensedStep:
     def __call__(self, iterate: Iterate, tangent: bool, reached: KKT) -> Taken | None:
         """Take a step; None where the body cannot be condensed or contact is not solved."""
         body = self.condensation.full.equilibrium
-        iterate, keep = self._kept.turn(iterate, reached.largest)
+        iterate, keep = self._kept.turn(iterate, reached.significant)
         state = iterate.state
         condensed = self.condensation.linearise("tangent" if tangent else "secant", state, keep)
         if condensed is None:
@@ -105,7 +105,7 @@ class CondensedStep:
         # No more accurate than the material is linearised, nor than the end asks for.
         enough = 0.1 * self.options.tolerance
         if not body.linear and not keep:
-            enough = max(enough, CONTACT_PART * min(reached.largest, 1.0))
+            enough = max(enough, CONTACT_PART * min(reached.significant, 1.0))
         options = replace(
             self.options,
             tolerance=enough,
@@ -117,11 +117,11 @@ class CondensedStep:
         end, outcome = self._solve(condensed, options, self.parameters, history, begin)
         solves = sum(record.inner for record in history.records)
         self.counters.contact_solves += solves
-        if outcome.kkt.largest > max(enough, NEAR * reached.largest):
+        if outcome.kkt.significant > max(enough, NEAR * reached.significant):
             return None
         increment = self.condensation.expand(condensed, end.state.x)
         new = replace(state, x=body.moved(state.x, increment), forces=end.state.forces)
-        far = reached.largest > FAR and not keep
+        far = reached.significant > FAR and not keep
         length = self._length(new, state, increment) if far else 1.0
         if length > 1:
             new = replace(new, x=body.moved(state.x, length * increment))

@@ -90,12 +90,12 @@ def interior_point(
     for update in range(UPDATES):
         method = InteriorPoint(problem, whole, bound, restraint.complete)
         outcome, state = method.run(search, CLOSED * CLOSER**update), method.state
-        iterate, least = Iterate(state), outcome.kkt.largest
+        iterate, least = Iterate(state), outcome.kkt.significant
         if not outcome.converged and search.left > 0:
             iterate, outcome = finish(state)
         if outcome.converged or search.left <= 0 or not interface.friction.acts:
             break
-        if outcome.kkt.largest < least:
+        if outcome.kkt.significant < least:
             state = iterate.state
         bound = interface.bound(interface.jump.apply(state.x), state.forces)
     return iterate, outcome
@@ -172,7 +172,9 @@ class InteriorPoint:
                 ended = f"rounding ends the interior point after {steps} steps"
                 break
             gap = self.gap()
-            if gap <= closed and (kkt.equilibrium <= BALANCED or gap <= VANISHED):
+            if gap <= closed and (
+                kkt.equilibrium <= max(BALANCED, kkt.floors[0]) or gap <= VANISHED
+            ):
                 ended = f"duality gap closed after {steps} steps"
                 break
         return Outcome(kkt, search.options.allowed, ended)

@@ -310,7 +310,7 @@ class NewtonLoop:
         linear, patience = problem.equilibrium.linear, self.patience or options.patience
         residuals = evaluate(problem, iterate.state)
         stagnation = Stagnation(patience, PROGRESS, together=True)
-        if iterate.active_set is not None and residuals.largest <= options.tolerance:
+        if iterate.active_set is not None and residuals.significant <= options.tolerance:
             search.see(iterate, residuals)
             search.history.record(residuals, f"{note} initial guess".strip(), inner=0)
             return iterate, self._end(residuals)
@@ -324,7 +324,7 @@ class NewtonLoop:
                 return kept, self._end(residuals, self.step.fault)
             iterate = taken.iterate
             residuals = evaluate(problem, iterate.state)
-            worse = self.step.following.worsened(residuals.largest)
+            worse = self.step.following.worsened(residuals.significant)
             search.see(iterate, residuals)
             words = (note, taken.note, "tangent" * tangent, "taken back" * worse)
             said = " ".join(word for word in words if word)
@@ -335,7 +335,7 @@ class NewtonLoop:
                 iterate = kept
                 residuals = evaluate(problem, iterate.state)
                 search.see(iterate, residuals)
-            if residuals.largest <= options.tolerance:
+            if residuals.significant <= options.tolerance:
                 return iterate, self._end(residuals)
             if (
                 self.hopeless is not None
@@ -343,14 +343,14 @@ class NewtonLoop:
                 and self.hopeless(iterate.state)
             ):
                 return iterate, self._end(residuals, SOFTER)
-            if not np.isfinite(residuals.largest):
+            if not np.isfinite(residuals.significant):
                 return iterate, self._end(residuals, "Newton's method diverged")
             if not linear:
                 falls = residuals.equilibrium < max(before.equilibrium, options.tolerance)
                 near = residuals.equilibrium < self.secant_until
                 # The energy falls along a step that is lengthened, where residuals may rise.
                 tangent = taken.lengthened or (near and (falls or not tangent))
-            if stagnation(residuals.largest):
+            if stagnation(residuals.significant):
                 ended = f"Newton's method stalled at {stagnation.best:.1e}"
                 return iterate, self._end(residuals, ended)
         steps = len(search.history.records)

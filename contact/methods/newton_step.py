@@ -122,7 +122,7 @@ class Search:
     def see(self, iterate: Iterate, residuals: KKT) -> None:
         """Remember an iterate."""
         self.at = iterate
-        self.best.see(iterate, residuals.largest)
+        self.best.see(iterate, residuals.significant)
 
 
 class Step(Protocol):
@@ -232,11 +232,11 @@ class NewtonStep:
         layer, shift = linearised_layer(
             interface, nodal, iterate, self.parameters, contact.unchanged
         )
-        blocks = contact.blocks + layer + self._current(nodal, contact, reached.largest)
+        blocks = contact.blocks + layer + self._current(nodal, contact, reached.significant)
         kind, last = "tangent" if tangent else "secant", self._kind
-        remains = kind == last and reached.equilibrium < SMALL * reached.largest
+        remains = kind == last and reached.equilibrium < SMALL * reached.significant
         if self._loose and not contact.unchanged:
-            stiffness = SPRINGS * min(reached.largest, 1.0) * self.parameters.nodal_stiffness
+            stiffness = SPRINGS * min(reached.significant, 1.0) * self.parameters.nodal_stiffness
             along = jump.normal[:, :, None] * jump.normal[:, None, :]
             blocks[:, : body.dim, : body.dim] += stiffness * (along + jump.tangent)
         blocks = interface.weighted(blocks, state.x)
@@ -246,7 +246,7 @@ class NewtonStep:
         residual = residual_forces(self.problem, here)
         jump.transpose((jump.weight * shift)[:, None] * jump.normal, residual)
         try:
-            increment = self.operator.solve(-residual, self._leaves(reached.largest))
+            increment = self.operator.solve(-residual, self._leaves(reached.significant))
         except SingularError:
             if body.linear or iterate.active_set is None:
                 raise

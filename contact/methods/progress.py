@@ -88,4 +88,4 @@ def resting(problem: Problem) -> tuple[State, KKT] | None:
     """
     state = problem.start()
     residuals = evaluate(problem, state)
-    return (state, residuals) if residuals.largest <= ROUNDING else None
+    return (state, residuals) if residuals.significant <= ROUNDING else None

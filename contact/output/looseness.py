@@ -50,7 +50,7 @@ def looseness(solution: Solution) -> Remark:
             words = described(motion[:, None] / np.linalg.norm(motion), group.names)
             return (
                 f"contact resists a rigid motion ({words}) by next to nothing: the mesh decides "
-                f"how far it goes, and {kkt.equilibrium + kkt.rounding:.1e} of the forces, which "
+                f"how far it goes, and {kkt.equilibrium:.1e} of the forces, which "
                 f"are left, may move what is there by up to {moved:.2g}, where displacements reach "
                 f"{largest:.2g}; friction, or a support against that motion, hold it",
                 False,

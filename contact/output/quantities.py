@@ -237,9 +237,10 @@ _RUN = (
     Quantity("kkt", "", "The largest residual.", lambda r: r.solution.outcome.kkt.largest, ROWS),
     Quantity(
         "rounding", "",
-        "Forces out of balance, or charges, that are no more than rounding, over all of them: "
-        "`equilibrium` is without them. Of an evolution the most in a step. More than the "
-        "tolerance in slender bodies alone, with a warning then.", lambda r: r.solution.rounding,
+        "Rounding floors of the same residuals, which are accepted up to them; of `equilibrium` "
+        "in an evolution the most in a step. More than the tolerance in slender bodies alone, with "
+        "a warning then.",
+        lambda r: r.floors,
     ),
     Quantity(
         "rigid", "",

@@ -104,6 +104,13 @@ class Results:
         return values[0] if len(names) == 1 or values[0] is ABSENT else values
 
     @property
+    def floors(self) -> dict[str, float]:
+        """Rounding floors of the residuals."""
+        balance, contact, friction = self.solution.outcome.kkt.floors
+        balance = max(balance, self.solution.rounding)
+        return {"equilibrium": balance, "contact": contact, "friction": friction}
+
+    @property
     def kinematics(self) -> str:
         """As in the case file."""
         domain = self.problem.domain

@@ -11,7 +11,7 @@ from functools import lru_cache
 import numpy as np
 
 from contact.interface.active_set import touching
-from contact.interface.complementarity import interface_residuals
+from contact.interface.complementarity import interface_residuals, worst
 from contact.interface.interface import Interface
 from contact.problem.protocols import Problem
 from contact.problem.state import State
@@ -33,49 +33,65 @@ class KKT:
     Attributes
     ----------
     equilibrium
-        |F(u) + contact forces| on free unknowns, less `rounding`, over the sum of the norms of
-        loads, contact forces and reactions. Of bodies that nothing connects the largest, each over
-        the forces on itself. Of a piezoelectric body the larger one of forces and of
-        charges, each over those of its own kind: to these belong the forces of the potential on the
-        undeformed body, and the charges of the strain.
+        |F(u) + contact forces| on free unknowns over the sum of the norms of loads, contact forces
+        and reactions; zero where nothing acts and all forces are rounding. Of bodies that nothing
+        connects the largest, each over the forces on itself. Of a piezoelectric body the larger one
+        of forces and of charges, each over those of its own kind: to these belong the forces of the
+        potential on the undeformed body, and the charges of the strain.
     contact
         |p - max(0, p - c (gap - u_nu))| / |p| in L2(Gamma_3), c = E/length with
         the modulus of the touching bodies, and the length of the body, less as many times as cells
         behind Gamma_3 are longer than twice their facets (`contact.mesh.entities.elongation`); the
         largest of those of bodies that nothing connects.
     friction
-        |lambda_f - proj(lambda_f + c u_tau)| / |p| with the final bound s. Both are less the
-        pressures of the forces that `rounding` stands for: no contact force is known better than
-        equilibrium knows it, and where the loads ask for none at all, all of them are that.
+        |lambda_f - proj(lambda_f + c u_tau)| / |p| with the final bound s.
+    floors
+        Rounding floors of the three, over the same: `force_rounding`, but not more than the
+        `most_rounding` of the body, and these forces as pressures: no contact force is known better
+        than equilibrium knows it. A residual below its floor is accepted.
     rounding
-        The part subtracted from the first, over the same, the largest: `force_rounding`,
-        but not more than the `most_rounding` of the body. Zero where no load acts, nothing touches
-        and the other field exerts nothing: all forces are rounding then, and there is nothing to
-        compare it with.
+        The largest residual of equilibrium that is accepted as rounding. Zero where no load acts,
+        nothing touches and the other field exerts nothing: all forces are rounding then, and there
+        is nothing to compare with.
     unknown
-        The same as pressures, which has been subtracted from the other two at most, over |p|:
-        contact forces are known to that. Zero where nothing presses.
+        These forces as pressures over |p|: contact forces are known to that. Zero where nothing
+        presses.
     """
 
     equilibrium: float
     contact: float
     friction: float
+    floors: tuple[float, float, float] = (0.0, 0.0, 0.0)
     rounding: float = 0.0
     unknown: float = 0.0
 
     @property
     def largest(self) -> float:
         """The largest of the three; infinity if any is not a number."""
-        values = (self.equilibrium, self.contact, self.friction)
+        values = self._values
         return max(values) if np.all(np.isfinite(values)) else np.inf
 
+    @property
+    def significant(self) -> float:
+        """The largest of those above their rounding floors; zero if none is."""
+        pairs = zip(self._values, self.floors, strict=True)
+        values = [value for value, floor in pairs if not value <= floor]
+        return max(values, default=0.0) if np.all(np.isfinite(values)) else np.inf
+
+    @property
+    def _values(self) -> tuple[float, float, float]:
+        return self.equilibrium, self.contact, self.friction
+
     def excess(self, allowed: KKT) -> str:
-        """Name the residual that is farthest above its limit; nothing if none is."""
+        """Name the residual that is farthest above its limit, or its floor where that is larger.
+
+        Nothing if none is.
+        """
         ratios = {
-            name: getattr(self, name) / getattr(allowed, name)
-            for name in ("equilibrium", "contact", "friction")
+            name: getattr(self, name) / max(getattr(allowed, name), floor)
+            for name, floor in zip(("equilibrium", "contact", "friction"), self.floors, strict=True)
         }
-        # A value that is no number is above everything.
+        # A residual that is no number is above everything.
         worst = max(ratios, key=lambda name: np.nan_to_num(ratios[name], nan=np.inf))
         if ratios[worst] <= 1:
             return ""
@@ -177,13 +193,19 @@ def evaluate(problem: Problem, state: State) -> KKT:
         acted |= answers > rounding
         # Where nothing acts on a body all of its forces are rounding, its own or that of others.
         largest = rounding.max(axis=1, keepdims=True)
-        rounding = np.minimum(np.where(acted, np.minimum(rounding, most), largest), unbalanced)
+        rounding = np.where(acted, np.minimum(rounding, most), largest)
+        nothing = ~acted & (unbalanced <= rounding)
+        unbalanced, rounding = (np.where(nothing, 0.0, sizes) for sizes in (unbalanced, rounding))
     # Of a piece on which nothing acts there is the rounding of the others.
     scale = np.maximum(scale, EPS * scale.max(axis=1, keepdims=True))
     size = np.where(scale > 0, scale, 1.0)
-    equilibrium = float(np.max((unbalanced - rounding) / size))
+    balance = worst((unbalanced / size).reshape(1, -1), (rounding / size).reshape(1, -1))
     nodal = interface.jump.apply(state.x)
     bound, pressures = interface.bound(nodal, state.forces), _as_pressures(interface, unknown)
     laws = interface_residuals(interface, nodal, state.forces, bound, pressures)
-    granted = float(np.max(np.where(acted, rounding / size, 0.0)))
-    return KKT(equilibrium, *laws, granted, _over_pressed(interface, state, pressures))
+    granted = float(np.max(np.where(acted, np.minimum(rounding, unbalanced) / size, 0.0)))
+    residuals, floors = (
+        (float(first), float(contact), float(friction))
+        for (first,), (contact, friction) in zip(balance, laws, strict=True)
+    )
+    return KKT(*residuals, floors, granted, _over_pressed(interface, state, pressures))

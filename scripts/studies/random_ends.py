@@ -131,13 +131,18 @@ def main(arguments: Sequence[str] | None = None) -> int:
             holds = all(value <= ROUNDING * most for value, most in pairs)
             raw = imbalance(solution)
             for unbalanced, size, unsure in zip(*raw.all, strict=True):
-                rounding = OTHER * max(summary["rounding"] * size, unsure)
+                rounding = OTHER * max(summary["rounding"]["equilibrium"] * size, unsure)
                 holds &= unbalanced <= ROUNDING * allowed.equilibrium * size + rounding
             if summary["converged"] and not holds:
                 shown = [" ".join(f"{pair[i]:.2e}" for pair in pairs) for i in (0, 1)]
                 left = f"{raw.force:.2e} of {raw.applied:.2e}, "
                 left += f"{raw.charge:.2e} of {raw.electrified:.2e}"
-                topic = (case.source, method, settings.max_outer, summary["rounding"])
+                topic = (
+                    case.source,
+                    method,
+                    settings.max_outer,
+                    summary["rounding"]["equilibrium"],
+                )
                 row = (*topic, shown[0], left, shown[1])
                 print(*row, flush=True)
                 append(rows, *row)

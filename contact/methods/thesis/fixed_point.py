@@ -191,8 +191,8 @@ class FixedPoint:
             inner, z = self._step(bound, z, friction, kind, secant_at)
             secant_at = self.state.x
             residuals = evaluate(problem, self.state)
-            self._residual = residuals.largest
-            best.see((self.state, residuals), residuals.largest)
+            self._residual = residuals.significant
+            best.see((self.state, residuals), residuals.significant)
             change, bound = self._update_bound(bound, iteration == 0)
             note = "tangent" if kind == "tangent" else ""
             seconds = time.perf_counter() - begin
@@ -200,16 +200,16 @@ class FixedPoint:
             if options.stopping == "thesis":
                 if iteration > first and self._thesis_criterion(change, previous):
                     return self._end(residuals, "the thesis's criterion is met")
-            elif residuals.largest <= options.tolerance:
+            elif residuals.significant <= options.tolerance:
                 return self._end(residuals)
-            if not np.isfinite(residuals.largest):
+            if not np.isfinite(residuals.significant):
                 ended = "the iteration diverged"
                 break
             if options.material_step == "auto" and not body.linear:
                 # Far from the solution the tangent is too soft and overshoots.
-                tangent = residuals.largest < (NEAR if not tangent else 2 * stagnation.best)
+                tangent = residuals.significant < (NEAR if not tangent else 2 * stagnation.best)
             patience = PATIENCE_STALLED if self._stalled else PATIENCE
-            given_up = stagnation(residuals.largest, patience)
+            given_up = stagnation(residuals.significant, patience)
             if given_up and options.stopping == "residual":
                 ended = f"the residual stalled at {stagnation.best:.2e}"
                 if self._far:

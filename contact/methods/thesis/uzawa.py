@@ -361,7 +361,7 @@ def block_relaxation(
         forces = Multipliers.of(jump, total[:, 0] - layer, total[:, 1:])
         if parameters.single_loop and step.friction:
             project.bound = interface.bound(nodal, forces)
-        residual = max(interface_residuals(interface, nodal, forces, project.bound))
+        residual = float(interface_residuals(interface, nodal, forces, project.bound)[0].max())
         logger.debug("inner iteration %d: residual %.2e", iteration, residual)
         relaxed = (1 - parameters.over_relaxation) * (z - multiplier)
         image = multiplier + relaxed + parameters.over_relaxation * way
