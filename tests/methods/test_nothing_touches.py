@@ -1,9 +1,9 @@
 """Problems whose solution touches nothing are found with the first solve."""
 
 import numpy as np
-from contact.build import build_problem
 from mpi4py import MPI
 
+from contact import build_problem
 from contact.case.file import parse_case
 from contact.methods.method import METHODS
 from contact.methods.options import NewtonOptions
