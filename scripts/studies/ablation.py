@@ -1,0 +1,194 @@
+"""Which problems need each device of Newton's method: the sweeps with one of them off at a time.
+
+`python3 -m scripts.studies.ablation [--out DIR] [--coarse] [--every K] [--devices NAME ..]
+[--only NAME]`. Problems are those of both sweeps, Example 8.4 with a steep ramp, and an approach
+whose solution touches nothing; --coarse takes a tenth of the sweeps, --every K one of K. A device
+whose row shows no problem, neither failed nor slow, is to go (CONTRIBUTING.md).
+"""
+
+from __future__ import annotations
+
+import inspect
+import time
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass, replace
+from itertools import islice
+from typing import Any
+from unittest.mock import patch
+
+from contact import Solution, solve
+from contact.case.file import Case
+from contact.interface import complementarity
+from contact.methods import (
+    chord,
+    condensed_step,
+    continuation,
+    interior_point,
+    line_search,
+    newton,
+    newton_step,
+    parameters,
+    progress,
+)
+from contact.methods.newton import Newton
+from contact.methods.options import NewtonOptions
+from contact.methods.report import Outcome
+from contact.methods.restraint import Restraint
+from contact.problem.kkt import evaluate
+from scripts.reporting import Report, append, parser
+from scripts.studies import sweep
+from scripts.thesis.tables_compliance import case_of
+
+#: Times as long as with the device, and seconds more, from which on a problem counts as slow.
+SLOW, NOTICED = 2.0, 0.1
+
+
+@dataclass(frozen=True)
+class Device:
+    """A part of the method that can be switched off.
+
+    Attributes
+    ----------
+    name
+        As in the documentation.
+    source
+        The functions and classes that it consists of.
+    literature
+        Where it is from.
+    changes
+        What stands in its place: owner, name, value.
+    options
+        Changes of the options.
+    """
+
+    name: str
+    source: tuple[Any, ...]
+    literature: str
+    changes: tuple[tuple[Any, str, Any], ...] = ()
+    options: tuple[tuple[str, Any], ...] = ()
+
+    @property
+    def lines(self) -> int:
+        """Lines of its source; of one that is part of a function 0."""
+        return sum(len(inspect.getsource(part).splitlines()) for part in self.source)
+
+    @contextmanager
+    def off(self) -> Iterator[NewtonOptions]:
+        """Switch it off; yield the options."""
+        with ExitStack() as stack:
+            for owner, name, value in self.changes:
+                stack.enter_context(patch.object(owner, name, value))
+            yield replace(NewtonOptions(), **dict(self.options))
+
+
+def _nothing(*_: Any, **__: Any) -> None:
+    return None
+
+
+def _no_fallback(search: Any, *_: Any) -> tuple[Any, Outcome]:
+    residuals = evaluate(search.problem, search.at.state)
+    return search.at, Outcome(residuals, search.options.allowed, "no interior point")
+
+
+def _linearised(old: Callable[..., Any]) -> Callable[..., Any]:
+    """Return the layer linearised about the displacement alone."""
+
+    def plain(interface: Any, nodal: Any, iterate: Any, of: Any, full: bool) -> Any:
+        about = replace(iterate, layer_pressure=interface.response.layer_pressure(nodal))
+        forces = replace(about.state.forces, pressure=0.0 * about.state.forces.pressure)
+        return old(interface, nodal, replace(about, state=replace(about.state, forces=forces)),
+                   of, full)  # fmt: skip
+
+    return plain
+
+
+DEVICES = (
+    Device("interior point", (interior_point,), "Mehrotra 1992; Nesterov and Todd 1998",
+           ((newton, "interior_point", _no_fallback),)),
+    Device("updates of the friction bound", (), "Haslinger 1983",
+           ((interior_point, "UPDATES", 1),)),
+    Device("duality gap closed further in each update", (), "-",
+           ((interior_point, "CLOSER", 1.0),)),
+    Device("sticking start where friction alone restrains", (Restraint.stuck_bound,), "-",
+           ((Restraint, "stuck_bound", _nothing),)),
+    Device("continuation in the conductivity", (continuation,), "Allgower and Georg 2003",
+           ((Newton, "_conducting", _nothing),)),
+    Device("estimate of a body far softer than a block", (parameters.far_softer,), "-",
+           ((newton, "far_softer", lambda *_: False),)),
+    Device("Levenberg-Marquardt regularisation", (), "Marquardt 1963",
+           ((newton_step, "SPRINGS", 0.0),)),
+    Device("forcing term that tightens", (newton_step.NewtonStep._leaves,),
+           "Dembo, Eisenstat and Steihaug 1982", ((newton_step, "VAIN", 10**9),)),
+    Device("layer linearised where its law is met", (newton_step.linearised_layer,), "-",
+           ((newton_step, "linearised_layer", _linearised(newton_step.linearised_layer)),)),
+    Device("foreseen friction bound", (complementarity._foreseen_bound,), "-",
+           ((complementarity, "_foreseen_bound",
+             lambda interface, total, length, *_: interface.friction.bound(total, length)),)),
+    Device("limited softening", (), "-", (), (("softening", float("inf")),)),
+    Device("secant of the material far away", (), "Kacanov 1959",
+           ((newton, "SECANT_UNTIL", float("inf")),), (("secant_until", float("inf")),)),
+    Device("energy line search", (line_search,), "Armijo 1966; Crisfield 1991",
+           ((condensed_step, "lengthened", lambda _: 1.0),)),
+    Device("chord steps", (chord,), "Kelley 1995; Walker and Ni 2011", (), (("keep", "never"),)),
+    Device("zero displacement where nothing acts", (progress.resting,), "-",
+           ((Newton, "_resting", _nothing),)),
+    Device("static condensation", (condensed_step,), "Guyan 1965", (), (("condense", False),)),
+)  # fmt: skip
+
+
+def cases(coarse: bool, every: int, only: str | None) -> Iterator[Case]:
+    """Give the problems."""
+    for hard in (False, True):
+        found = (case for _, case in sweep.problems(coarse, only, hard))
+        yield from islice(found, 0, None, every)
+    if only is None:
+        changes = "solver.method=newton", "electric.k_e=0.6", "electric.delta=83.3333"
+        yield case_of("compliance-8-4", (96, 16), *changes)
+
+
+def run(case: Case, options: NewtonOptions) -> tuple[Solution, float]:
+    """Solve a problem; return the seconds of the processor too."""
+    begin = time.process_time()
+    solution = solve(case, replace(options, tolerance=case.solver.tolerance))
+    return solution, time.process_time() - begin
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Solve all problems with all devices, then with one of them off at a time."""
+    command = parser(__doc__, "ablation")
+    command.add_argument("--every", type=int, default=1, metavar="K", help="one of K problems")
+    command.add_argument("--devices", nargs="+", metavar="NAME", help="parts of their names")
+    command.add_argument("--only", help="a family, or one problem such as bar-7")
+    given = command.parse_args(arguments)
+    chosen = [
+        device
+        for device in DEVICES
+        if not given.devices or any(name in device.name for name in given.devices)
+    ]
+    problems = list(cases(given.coarse, given.every, given.only))
+    whole = {case.source: run(case, NewtonOptions()) for case in problems}
+    keys = ("device", "lines", "failed", "slow", "seconds", "problems that need it", "literature")
+    rows: dict[str, list[Any]] = {key: [] for key in keys}
+    for device in chosen:
+        failed, slow, total = [], [], 0.0
+        with device.off() as options:
+            for case in problems:
+                (solution, least), (found, seconds) = whole[case.source], run(case, options)
+                total += seconds
+                if solution.converged and not found.converged:
+                    failed.append(case.source)
+                elif seconds > max(SLOW * least, least + NOTICED):
+                    slow.append(case.source)
+        needed = ", ".join([*failed, *slow][:6])
+        counts = len(failed), len(slow), round(total, 1)
+        append(rows, device.name, device.lines, *counts, needed or "none", device.literature)
+        print(device.name, *counts, needed, flush=True)
+    total = sum(seconds for _, seconds in whole.values())
+    unsolved = [name for name, (solution, _) in whole.items() if not solution.converged]
+    note = f"{len(problems)} problems, {total:.1f} s with all devices; not solved: {unsolved}"
+    Report(given.out).table("ablation", "Devices of Newton's method, one off", rows, note)
+
+
+if __name__ == "__main__":
+    main()
