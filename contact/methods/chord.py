@@ -1,12 +1,13 @@
-"""Steps with a factorisation that was made elsewhere, and when they pay.
+"""Chord steps: modified Newton steps with a frozen factorisation, and when they pay.
 
-A step of Newton's method costs a factorisation, a step with one of an earlier state a few
-substitutions. That one converges linearly, but where little of the body has yielded fast:
-Anderson's acceleration makes it GMRES for the tangent, with the kept factorisation as the
-preconditioner, once contact is settled. Contact itself is solved exactly in each step.
+A Newton step costs a factorisation, a chord step a few substitutions. Chord steps converge
+linearly, but fast where little of the body is in the plastic range: Anderson's acceleration makes
+them GMRES for the tangent, with the frozen factorisation as the preconditioner, once the active
+sets are unchanged. Contact itself is solved exactly in each step.
 
 References
 ----------
+Kelley, Iterative Methods for Linear and Nonlinear Equations, SIAM (1995), section 5.4.
 Walker and Ni, Anderson acceleration for fixed-point iterations, SIAM J. Numer. Anal. 49 (2011).
 """
 
@@ -39,7 +40,7 @@ DEPTH = 8
 Inner: TypeAlias = Callable[[Array, Array], Array]
 
 
-class Kept:
+class Chord:
     """Decides from the residuals whether a factorisation is kept, and accelerates its steps.
 
     All ranks decide alike.

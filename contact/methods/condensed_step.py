@@ -14,9 +14,9 @@ from dataclasses import replace
 from contact.interface.complementarity import ComplementarityParameters
 from contact.interface.jump import Multipliers
 from contact.linear.operator import Counters
-from contact.methods.chord import WORTH, Kept
+from contact.methods.chord import WORTH, Chord
 from contact.methods.following import Following
-from contact.methods.line_search import FAR, lengthened
+from contact.methods.line_search import FAR, step_length
 from contact.methods.newton_step import NEAR, Iterate, Taken
 from contact.methods.options import NewtonOptions
 from contact.methods.report import History, Outcome
@@ -78,7 +78,7 @@ class CondensedStep:
         self.counters, self.following = counters, Following()
         self._solve, self._history, self._fallbacks = solve, history, fallbacks
         inner = condensation.full.equilibrium.products
-        self._kept = Kept(options.tolerance, inner, WORTH if options.keep != "never" else 0.0)
+        self._chord = Chord(options.tolerance, inner, WORTH if options.keep != "never" else 0.0)
 
     def turn_to(self, problem: ContactProblem, history: History) -> None:
         """Go on with another step of the same problem."""
@@ -88,16 +88,16 @@ class CondensedStep:
     def forget(self) -> None:
         """Begin another solve: what is factorised remains where it may be kept across solves."""
         if self.options.keep != "across":
-            self._kept.forget()
+            self._chord.forget()
 
     def begin(self) -> None:
         """Begin another loop; what is factorised remains."""
-        self._kept.begin()
+        self._chord.begin()
 
     def __call__(self, iterate: Iterate, tangent: bool, reached: KKT) -> Taken | None:
         """Take a step; None where the body cannot be condensed or contact is not solved."""
         body = self.condensation.full.equilibrium
-        iterate, keep = self._kept.turn(iterate, reached.significant)
+        iterate, keep = self._chord.turn(iterate, reached.significant)
         state = iterate.state
         condensed = self.condensation.linearise("tangent" if tangent else "secant", state, keep)
         if condensed is None:
@@ -125,14 +125,14 @@ class CondensedStep:
         length = self._length(new, state, increment) if far else 1.0
         if length > 1:
             new = replace(new, x=body.moved(state.x, length * increment))
-            self._kept.forget()
+            self._chord.forget()
         elif not body.linear:
-            new = self._kept.mixed(state, new)
+            new = self._chord.mixed(state, new)
             jump, mixed = self.condensation.full.interface.jump, new.forces
             new = replace(new, forces=Multipliers.of(jump, mixed.pressure, mixed.friction))
         notes = [record.note for record in history.records]
         taken = [word for word in self._fallbacks if any(word in note for note in notes)]
-        note = ", ".join([*["kept"] * keep, *["lengthened"] * (length > 1), *taken])
+        note = ", ".join([*["chord step"] * keep, *["line search"] * (length > 1), *taken])
         return Taken(replace(end, state=new), note, length > 1, tuple(history.records))
 
     def _length(self, new: State, state: State, increment: Array) -> float:
@@ -145,4 +145,4 @@ class CondensedStep:
             at = replace(new, x=body.moved(state.x, length * increment))
             return body.product(increment, residual_forces(problem, at))
 
-        return lengthened(slope)
+        return step_length(slope)

@@ -1,29 +1,35 @@
-"""How far to go along a step, where the material has yielded on the way and gives more.
+"""Energy line search: the length of a Newton step at which the energy along it is least.
 
-A body that yields answers a load by more than its tangent foresees: where strains grow as the
-exponential of the stress, each step of Newton's method multiplies them by a number that the last
-residual bounds, and a solution far beyond yield takes as many steps as its logarithm is large. The
-energy is convex along a step, its slope costs an assembly of forces and no solve, and where that
-is still steep at the step's end its zero is looked for beyond.
+The merit function is the potential energy at the contact forces of the step, which is convex along
+it. A body in the plastic range answers a load by more than its tangent foresees: where strains grow
+as the exponential of the stress, each Newton step multiplies them by a number that the last
+residual bounds, and a solution far in the plastic range takes as many steps as its logarithm is
+large. The slope of the energy costs an assembly of forces and no solve; where it is still steep at
+the step's end, its zero is looked for beyond.
+
+References
+----------
+Crisfield, Non-linear Finite Element Analysis of Solids and Structures 1 (1991), section 9.2.
+Matthies and Strang, The solution of nonlinear finite element equations, IJNME 14 (1979).
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
 
-#: Slope at the end of a step, over that at its beginning, from which on a step is lengthened, and
-#: what may be left of it in the end.
+#: Slope at the end of a step, over that at its beginning, from which on a longer one is looked
+#: for, and the part of it that may remain in the end.
 STEEP, FLAT = 0.1, 0.05
 
-#: Residual below which no step is lengthened, the tangent foresees what is left, and above which
-#: no factorisation is kept.
+#: Residual below which no longer step is looked for, as the tangent is good there, and above which
+#: no factorisation is frozen.
 FAR = 0.05
 
 #: Largest length, beyond which the material holds nothing, and refinements of one at most.
 LONGEST, MOST = 64.0, 16
 
 
-def lengthened(slope: Callable[[float], float]) -> float:
+def step_length(slope: Callable[[float], float]) -> float:
     """Return the length of a step, 1 or more; 1 where the energy falls on and on.
 
     Parameters

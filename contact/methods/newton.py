@@ -349,7 +349,7 @@ class NewtonLoop:
                 falls = residuals.equilibrium < max(before.equilibrium, options.tolerance)
                 near = residuals.equilibrium < self.secant_until
                 # The energy falls along a step that is lengthened, where residuals may rise.
-                tangent = taken.lengthened or (near and (falls or not tangent))
+                tangent = taken.searched or (near and (falls or not tangent))
             if stagnation(residuals.significant):
                 ended = f"Newton's method stalled at {stagnation.best:.1e}"
                 return iterate, self._end(residuals, ended)

@@ -80,7 +80,7 @@ class Taken:
         Where it led.
     note
         What was special about it.
-    lengthened
+    searched
         Whether it has gone on to where the energy is least along it.
     inner
         Newton iterations on the condensed problem that it took.
@@ -88,7 +88,7 @@ class Taken:
 
     iterate: Iterate
     note: str = ""
-    lengthened: bool = False
+    searched: bool = False
     inner: tuple[Record, ...] = ()
 
 

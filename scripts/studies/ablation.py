@@ -95,7 +95,7 @@ def _linearised(old: Callable[..., Any]) -> Callable[..., Any]:
     """Return the layer linearised about the displacement alone."""
 
     def plain(interface: Any, nodal: Any, iterate: Any, of: Any, full: bool) -> Any:
-        about = replace(iterate, layer_pressure=interface.response.layer_pressure(nodal))
+        about = replace(iterate, layer_pressure=interface.law.layer_pressure(nodal))
         forces = replace(about.state.forces, pressure=0.0 * about.state.forces.pressure)
         return old(interface, nodal, replace(about, state=replace(about.state, forces=forces)),
                    of, full)  # fmt: skip
@@ -129,7 +129,7 @@ DEVICES = (
     Device("secant of the material far away", (), "Kacanov 1959",
            ((newton, "SECANT_UNTIL", float("inf")),), (("secant_until", float("inf")),)),
     Device("energy line search", (line_search,), "Armijo 1966; Crisfield 1991",
-           ((condensed_step, "lengthened", lambda _: 1.0),)),
+           ((condensed_step, "step_length", lambda _: 1.0),)),
     Device("chord steps", (chord,), "Kelley 1995; Walker and Ni 2011", (), (("keep", "never"),)),
     Device("zero displacement where nothing acts", (progress.resting,), "-",
            ((Newton, "_resting", _nothing),)),

@@ -7,7 +7,7 @@ import pytest
 from mpi4py import MPI
 
 from contact.interface.friction import Friction
-from contact.methods.chord import Kept
+from contact.methods.chord import Chord
 from contact.methods.newton import Newton
 from contact.methods.newton_step import Iterate
 from contact.methods.options import NewtonOptions
@@ -82,10 +82,10 @@ class Body:
         return ones.T @ others
 
 
-def begun(reached: float) -> tuple[Kept, Iterate]:
+def begun(reached: float) -> tuple[Chord, Iterate]:
     """Return the rule after one step with a new factorisation, which led to a residual."""
     state = yielding().start()
-    kept = Kept(1e-8, Body.products, 10.0)
+    kept = Chord(1e-8, Body.products, 10.0)
     iterate, keep = kept.turn(Iterate(state), 1.0)
     assert not keep
     kept.mixed(state, replace(state, x=state.x + 1.0))
@@ -111,7 +111,7 @@ def test_the_acceleration_solves_what_is_linear_in_as_many_steps_as_there_are_ra
     state = yielding().start()
     rates = np.where(np.arange(state.x.size) % 2, 0.3, 0.6)
     goal = np.linspace(1.0, 2.0, state.x.size)
-    kept = Kept(1e-8, Body.products, 10.0)
+    kept = Chord(1e-8, Body.products, 10.0)
     for _ in range(3):
         end = replace(state, x=goal + rates * (state.x - goal))
         state = kept.mixed(state, end)
