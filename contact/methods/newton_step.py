@@ -41,10 +41,10 @@ FORCING = 1e-2
 
 #: Steps in a row that come no nearer after which it leaves a hundredth of that: what two digits
 #: leave at contact nodes can make them change to and fro for ever. And the least that it leaves.
-VAIN, LEAST = 3, 1e-8
+STAGNANT, LEAST = 3, 1e-8
 
 #: Stiffness of the springs that help to hold loose bodies, over a node's own and the residual.
-SPRINGS = 1e-2
+REGULARISATION = 1e-2
 
 #: Equilibrium residual over the largest one below which the material is left as it was linearised
 #: last: contact and friction are what is wrong.
@@ -196,7 +196,7 @@ class NewtonStep:
         """Return what an iterative solver leaves of a step's residual, given where that starts."""
         self._vain = 0 if reached < self._nearest else self._vain + 1
         self._nearest = min(self._nearest, reached)
-        if self._vain >= VAIN:
+        if self._vain >= STAGNANT:
             self._vain, self._forcing = 0, max(self._forcing * FORCING, LEAST)
         return self._forcing
 
@@ -236,7 +236,9 @@ class NewtonStep:
         kind, last = "tangent" if tangent else "secant", self._kind
         remains = kind == last and reached.equilibrium < SMALL * reached.significant
         if self._loose and not contact.unchanged:
-            stiffness = SPRINGS * min(reached.significant, 1.0) * self.parameters.nodal_stiffness
+            stiffness = (
+                REGULARISATION * min(reached.significant, 1.0) * self.parameters.nodal_stiffness
+            )
             along = jump.normal[:, :, None] * jump.normal[:, None, :]
             blocks[:, : body.dim, : body.dim] += stiffness * (along + jump.tangent)
         blocks = interface.weighted(blocks, state.x)

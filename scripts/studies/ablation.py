@@ -55,9 +55,9 @@ class Device:
     source
         The functions and classes that it consists of.
     literature
-        Where it is from.
+        Its reference.
     changes
-        What stands in its place: owner, name, value.
+        Its replacement: owner, name, value.
     options
         Changes of the options.
     """
@@ -114,12 +114,12 @@ DEVICES = (
            ((Restraint, "stuck_bound", _nothing),)),
     Device("continuation in the conductivity", (continuation,), "Allgower and Georg 2003",
            ((Newton, "_conducting", _nothing),)),
-    Device("estimate of a body far softer than a block", (parameters.far_softer,), "-",
+    Device("estimate of the stiffness from the first step", (parameters.far_softer,), "-",
            ((newton, "far_softer", lambda *_: False),)),
     Device("Levenberg-Marquardt regularisation", (), "Marquardt 1963",
-           ((newton_step, "SPRINGS", 0.0),)),
+           ((newton_step, "REGULARISATION", 0.0),)),
     Device("forcing term that tightens", (newton_step.NewtonStep._leaves,),
-           "Dembo, Eisenstat and Steihaug 1982", ((newton_step, "VAIN", 10**9),)),
+           "Dembo, Eisenstat and Steihaug 1982", ((newton_step, "STAGNANT", 10**9),)),
     Device("layer linearised where its law is met", (newton_step.linearised_layer,), "-",
            ((newton_step, "linearised_layer", _linearised(newton_step.linearised_layer)),)),
     Device("foreseen friction bound", (complementarity._foreseen_bound,), "-",
