@@ -8,11 +8,9 @@ from the same statement.
 
 from __future__ import annotations
 
-import dataclasses
-import inspect
 import json
 from dataclasses import dataclass
-from typing import Annotated, Any, TypeAlias, get_args, get_type_hints
+from typing import Annotated, Any, TypeAlias
 
 from annotated_types import Ge, Gt, Le, Len, Lt, Predicate
 
@@ -90,63 +88,3 @@ Count: TypeAlias = Annotated[
     int, Ge(1), Le(10_000_000), Accepted("a whole number from 1 to 10000000")
 ]
 Switch: TypeAlias = Annotated[bool, Accepted("true or false")]
-
-
-@dataclass(frozen=True)
-class Setting:
-    """A setting that a class of options offers.
-
-    Attributes
-    ----------
-    annotation
-        Its type with the bounds.
-    default
-        Its default.
-    meaning
-        Its meaning, in words.
-    condition
-        When it is read; None for always.
-    """
-
-    annotation: Any
-    default: Any
-    meaning: str
-    condition: ReadWith | None
-
-
-def settings_of(options: type) -> dict[str, Setting]:
-    """Return the settings that a class of options offers to the case file, by name."""
-    hints = get_type_hints(options, include_extras=True)
-    meanings: dict[str, str] = {}
-    for base in reversed(options.__mro__):
-        meanings |= _meanings(base)
-    found = {}
-    for field in dataclasses.fields(options):
-        marks = get_args(hints[field.name])[1:]
-        if not any(isinstance(mark, Internal) for mark in marks):
-            condition = next((mark for mark in marks if isinstance(mark, ReadWith)), None)
-            meaning = meanings.get(field.name, "")
-            found[field.name] = Setting(hints[field.name], field.default, meaning, condition)
-    return found
-
-
-def read_by(options: Any) -> dict[str, Any]:
-    """Return the settings that have an effect, given the others, with their values."""
-    return {
-        key: getattr(options, key)
-        for key, setting in settings_of(type(options)).items()
-        if (to := setting.condition) is None or to.met(getattr(options, to.key))
-    }
-
-
-def _meanings(options: type) -> dict[str, str]:
-    """Return the meanings in a class's docstring, under "Attributes", by name."""
-    _, _, attributes = inspect.cleandoc(options.__doc__ or "").partition("Attributes\n----------\n")
-    found: dict[str, str] = {}
-    for line in attributes.splitlines():
-        if line and not line.startswith(" "):
-            name = line
-            found[name] = ""
-        else:
-            found[name] = f"{found[name]} {line.strip()}".strip()
-    return found

@@ -17,12 +17,12 @@ from typing import Any
 import numpy as np
 from mpi4py import MPI
 
+from contact.arguments import expect
 from contact.case.build import REPLACEMENTS, build_problem, named, replaced_by
 from contact.case.digest import check_digest, digest
 from contact.case.file import Case, load_case
 from contact.case.text import to_toml
 from contact.errors import InputError
-from contact.kinds import expect
 from contact.methods.interrupt import SIGNALLED, stop_on_signal
 from contact.methods.method import METHODS, Method
 from contact.methods.options import NewtonOptions, Options

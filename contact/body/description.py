@@ -10,10 +10,10 @@ from typing import Protocol
 import numpy as np
 from ufl.core.expr import Expr
 
+from contact.arguments import expect, is_law, names_arguments, several
 from contact.body.fields import Amplitude, Given, Moving, amplitude_of, field, own_amplitude, vector
 from contact.body.rigid import Electrode, Rigid
 from contact.errors import InputError
-from contact.kinds import expect, is_law, names_arguments, several
 from contact.mesh.together import part
 from contact.typing import Array
 from forms.elasticity import Anisotropic

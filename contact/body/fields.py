@@ -16,9 +16,8 @@ from mpi4py import MPI
 from ufl.core.expr import Expr
 
 from contact import _compat
-from contact.calling import OfTime, check_finite, naming, on_all_ranks, real
+from contact.arguments import OfTime, check_finite, expect, naming, on_all_ranks, real
 from contact.errors import InputError
-from contact.kinds import expect
 from contact.typing import Array
 
 #: A factor as a function of time.

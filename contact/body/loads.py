@@ -16,9 +16,9 @@ from ufl.constantvalue import ScalarValue
 from ufl.core.expr import Expr
 from ufl.corealg.traversal import traverse_unique_terminals
 
+from contact.arguments import check_finite, naming, on_all_ranks, real
 from contact.body.description import Body, Field, Load
 from contact.body.fields import Amplitude, Moving, at_time, constant
-from contact.calling import check_finite, naming, on_all_ranks, real
 from contact.errors import InputError
 from contact.mesh.domain import Domain
 from contact.tolerances import HUGE

@@ -9,9 +9,8 @@ from typing import Any, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
+from contact.arguments import OfTime, expect, names_arguments
 from contact.body.fields import Amplitude, own_amplitude, ramp, steady
-from contact.calling import OfTime
-from contact.kinds import expect, names_arguments
 from contact.mesh.together import part
 from contact.typing import Array
 

@@ -9,13 +9,13 @@ from typing import Any
 
 from mpi4py import MPI
 
+from contact.arguments import check_range
 from contact.body.description import Body, Material
 from contact.body.rigid import Rigid
 from contact.case.file import REPLACEABLE, Case
 from contact.errors import InputError
 from contact.interface.layer import Layer
 from contact.interface.obstacle import Obstacle
-from contact.kinds import check_range
 from contact.mesh.domain import Domain, revolved
 from contact.problem.checks import check_problem, check_supports
 from contact.problem.contact import Contact

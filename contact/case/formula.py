@@ -20,9 +20,9 @@ import ufl
 from mpi4py import MPI
 from numpy.typing import ArrayLike, NDArray
 
+from contact.arguments import check_range
 from contact.case.messages import shown
 from contact.errors import InputError
-from contact.kinds import check_range
 from contact.typing import Array
 from forms import ops
 

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, Tag, ValidationError, model_validator
 
+from contact.arguments import expect
 from contact.body import description
 from contact.case.messages import Words, describe, fault
 from contact.case.section import (
@@ -23,7 +24,6 @@ from contact.case.section import (
     one_or_many,
 )
 from contact.errors import InputError
-from contact.kinds import expect
 from contact.library.entry import Entry
 from contact.library.reading import PACKAGED, find
 from contact.settings import Accepted, NonNegative, Number, Positive, ReadWith

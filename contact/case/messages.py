@@ -7,18 +7,20 @@ The words come from the models: each kind of value carries the accepted ones in 
 from __future__ import annotations
 
 import difflib
+import inspect
 import json
+import re
 import types
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import MISSING, is_dataclass
+from dataclasses import MISSING, fields, is_dataclass
 from functools import cache
-from typing import Annotated, Any, Literal, Union, get_args, get_origin
+from typing import Annotated, Any, Literal, Union, get_args, get_origin, get_type_hints
 
 from pydantic import BaseModel, ValidationError
 from pydantic.fields import FieldInfo
 from pydantic_core import ErrorDetails, PydanticCustomError, PydanticUndefined
 
-from contact.settings import Accepted, settings_of
+from contact.settings import Accepted, Internal
 
 #: Most characters of a quoted value, a key, a path of keys, and a list of accepted names.
 VALUE, KEY, PATH, LIST = 60, 60, 100, 300
@@ -121,12 +123,25 @@ def keys_of(section: type) -> Mapping[str, FieldInfo]:
     """Return the keys of a section, or of a class of options, as in the case file."""
     if issubclass(section, BaseModel):
         return {field.alias or name: field for name, field in section.model_fields.items()}
-    keys = {}
-    for name, setting in settings_of(section).items():
-        default = PydanticUndefined if setting.default is MISSING else setting.default
-        keys[name] = FieldInfo.from_annotated_attribute(setting.annotation, default)
-        keys[name].description = setting.meaning
+    options: Any = section
+    hints, keys = get_type_hints(options, include_extras=True), {}
+    meanings: dict[str, str] = {}
+    for base in reversed(section.__mro__):
+        meanings |= _meanings(base)
+    for field in fields(options):
+        if any(isinstance(mark, Internal) for mark in get_args(hints[field.name])[1:]):
+            continue
+        default = PydanticUndefined if field.default is MISSING else field.default
+        keys[field.name] = FieldInfo.from_annotated_attribute(hints[field.name], default)
+        keys[field.name].description = meanings.get(field.name, "")
     return keys
+
+
+def _meanings(options: type) -> dict[str, str]:
+    """Return the meanings in a class's docstring, under "Attributes", by name."""
+    _, _, attributes = inspect.cleandoc(options.__doc__ or "").partition("Attributes\n----------\n")
+    blocks = re.findall(r"^(\w+)\n((?:[ ]+.*\n?|\n)+)", attributes, re.MULTILINE)
+    return {name: " ".join(text.split()) for name, text in blocks}
 
 
 def kinds_of(sections: Iterable[type]) -> tuple[str, dict[str, type]]:

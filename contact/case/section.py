@@ -67,9 +67,7 @@ class Section(BaseModel):
 
     @model_serializer(mode="wrap")
     def _write(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
-        unread = {
-            key for key, _, needs in _conditions(self) if not needs.met(getattr(self, needs.key))
-        }
+        unread = without_effect(self)
         return {key: value for key, value in handler(self).items() if key not in unread}
 
 
@@ -78,6 +76,11 @@ def _conditions(table: Any) -> Iterator[tuple[str, FieldInfo, ReadWith]]:
     of: type = type(table)
     for key, field in keys_of(of).items():
         yield from ((key, field, mark) for mark in field.metadata if isinstance(mark, ReadWith))
+
+
+def without_effect(table: Any) -> set[str]:
+    """Return the keys of a table that are not read, given the others."""
+    return {k for k, _, needs in _conditions(table) if not needs.met(getattr(table, needs.key))}
 
 
 def check_conditions(table: Table) -> Table:

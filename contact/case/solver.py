@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING, Annotated, Any, TypeAlias
 
 from pydantic import AfterValidator, Discriminator, PlainSerializer, Tag
 
-from contact.case.messages import fault
-from contact.case.section import FromTable, check_conditions
+from contact.case.messages import fault, keys_of
+from contact.case.section import FromTable, check_conditions, without_effect
 from contact.methods.options import OPTIONS, FixedPointOptions, NewtonOptions, Options
-from contact.settings import Accepted, read_by
+from contact.settings import Accepted
 
 #: The options where the case file names no method.
 DEFAULT = NewtonOptions()
@@ -33,7 +33,9 @@ def _check(options: Options) -> Options:
 
 
 def _read(options: Options) -> dict[str, Any]:
-    return {key: value for key, value in read_by(options).items() if value is not None}
+    of: type = type(options)
+    keys = (key for key in keys_of(of) if key not in without_effect(options))
+    return {key: getattr(options, key) for key in keys if getattr(options, key) is not None}
 
 
 #: `[solver]`: the options of one method, by its name: one of those that `OPTIONS` lists.

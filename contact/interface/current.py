@@ -14,10 +14,10 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from contact.arguments import names_arguments
 from contact.interface.nodes import ContactNodes
 from contact.interface.obstacle import Obstacle
 from contact.interface.placing import Candidates
-from contact.kinds import names_arguments
 from contact.typing import Array
 from forms.laws import Conductivity, PotentialLaw, Truncation
 from forms.ops import Value

@@ -19,7 +19,7 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 from scipy import sparse
 
-from contact.calling import naming, real
+from contact.arguments import naming, real
 from contact.errors import InputError
 from contact.interface.current import Conductor, HeldCurrent
 from contact.interface.friction import Friction, NodalFriction

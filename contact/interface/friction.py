@@ -7,13 +7,12 @@ from dataclasses import dataclass
 import numpy as np
 from mpi4py import MPI
 
+from contact.arguments import check_finite, expect, names_arguments, naming, on_all_ranks, real
 from contact.body.fields import Given, field, values_at
-from contact.calling import check_finite, naming, on_all_ranks, real
 from contact.errors import InputError
 from contact.interface.jump import SlipHistory
 from contact.interface.nodes import ContactNodes
 from contact.interface.smoothing import Smoother
-from contact.kinds import expect, names_arguments
 from contact.typing import Array
 from forms.laws import ConstantCoefficient, Coulomb, FrictionCoefficient, FrictionLaw, Tresca
 

@@ -9,9 +9,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from contact.calling import naming, real
+from contact.arguments import names_arguments, naming, real
 from contact.errors import InputError
-from contact.kinds import names_arguments
 from contact.tolerances import EPS
 from contact.typing import Array
 from forms.laws import PenetrationLaw, StiffnessLaw

@@ -9,6 +9,7 @@ from dolfinx import fem
 from mpi4py import MPI
 from numpy.typing import NDArray
 
+from contact.arguments import expect
 from contact.body.equilibrium import BodyEquilibrium
 from contact.errors import InputError
 from contact.interface.mortar.coupling import NOTHING, Coupling, couple
@@ -17,7 +18,6 @@ from contact.interface.nodes import ContactNodes, projectors
 from contact.interface.obstacle import Obstacle
 from contact.interface.obstacle.protocol import measured
 from contact.interface.placing import check_gap
-from contact.kinds import expect
 from contact.mesh.domain import Domain
 from contact.mesh.entities import components, owned_among
 from contact.typing import Array

@@ -11,8 +11,8 @@ from dolfinx import fem
 from mpi4py import MPI
 from numpy.typing import NDArray
 
+from contact.arguments import naming, on_all_ranks
 from contact.body.equilibrium import BodyEquilibrium
-from contact.calling import naming, on_all_ranks
 from contact.errors import InputError
 from contact.interface.mortar.lumping import Lumping, Mixing
 from contact.interface.mortar.surface import surface_of

@@ -12,8 +12,8 @@ from typing import Annotated, Any, Literal, TypeVar
 
 from annotated_types import Ge, Gt, Le, Lt
 
+from contact.arguments import names_arguments
 from contact.errors import InputError
-from contact.kinds import names_arguments
 from contact.problem.kkt import KKT
 from contact.settings import Accepted, Count, Internal, Positive, ReadWith, Switch, Tolerance
 from contact.tolerances import LARGEST_VIOLATION

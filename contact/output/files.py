@@ -9,7 +9,7 @@ from typing import Any
 
 from mpi4py import MPI
 
-from contact.kinds import expect
+from contact.arguments import expect
 from contact.output.field_files import write_fields, write_share
 from contact.output.folder import ResultFolder, on_root, result_folder
 from contact.output.opposite import AGAINST, opposite_surface, opposite_table

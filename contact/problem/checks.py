@@ -14,12 +14,12 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 from scipy import linalg
 
+from contact.arguments import check_range
 from contact.body.description import Fixed
 from contact.body.fields import values_at
 from contact.body.loads import to_blame
 from contact.errors import InputError
 from contact.interface.current import Conductor
-from contact.kinds import check_range
 from contact.problem.problem import ContactProblem
 from contact.problem.rigid_modes import (
     Group,

@@ -7,12 +7,12 @@ from typing import Any
 
 import numpy as np
 
+from contact.arguments import expect, names_arguments
 from contact.body.fields import Given
 from contact.interface.current import Conductor
 from contact.interface.friction import Friction
 from contact.interface.layer import Layer
 from contact.interface.obstacle import GapFunction
-from contact.kinds import expect, names_arguments
 from contact.mesh.together import part
 
 

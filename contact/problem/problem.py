@@ -9,6 +9,7 @@ from dataclasses import replace
 import numpy as np
 from mpi4py import MPI
 
+from contact.arguments import expect, several
 from contact.body.description import Body
 from contact.body.equilibrium import BodyEquilibrium
 from contact.body.global_unknowns import GlobalUnknowns
@@ -32,7 +33,6 @@ from contact.interface.law import InterfaceLaw
 from contact.interface.nodes import ContactNodes
 from contact.interface.pairing import find_pair
 from contact.interface.placing import candidates, find_nodes
-from contact.kinds import expect, several
 from contact.mesh.domain import Domain
 from contact.mesh.entities import elongation
 from contact.problem.contact import Contact, check_laws

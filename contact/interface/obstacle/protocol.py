@@ -10,10 +10,9 @@ from typing import Annotated, ClassVar, Protocol
 import numpy as np
 from mpi4py import MPI
 
+from contact.arguments import expect, naming, on_all_ranks, real
 from contact.body.fields import Given, field
-from contact.calling import naming, on_all_ranks, real
 from contact.errors import InputError
-from contact.kinds import expect
 from contact.settings import Internal
 from contact.typing import Array
 

@@ -13,9 +13,8 @@ from typing import Annotated, Literal
 import numpy as np
 from annotated_types import Gt, Lt
 
-from contact.calling import real
+from contact.arguments import expect, names_arguments, real
 from contact.interface.obstacle.protocol import GRAZING, Shape, split
-from contact.kinds import expect, names_arguments
 from contact.settings import Accepted, Direction, NonNegative, Positive, Switch, Vector
 from contact.typing import Array
 

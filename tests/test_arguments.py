@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from contact.calling import naming, real
+from contact.arguments import naming, real
 from contact.errors import InputError
 
 
