@@ -23,12 +23,12 @@ from numpy.typing import NDArray
 from petsc4py import PETSc
 from ufl.core.expr import Expr
 
+from contact.body.component_norms import component_norms_of
 from contact.body.description import Body
 from contact.body.global_unknowns import make_global_unknowns
 from contact.body.loads import Loads
 from contact.body.materials import cells_of
 from contact.body.pointwise import Pointwise
-from contact.body.shares import shares_of
 from contact.body.supports import free_components, supports_of, without_field
 from contact.body.weak_forms import InternalForces, WeakForms
 from contact.errors import InputError
@@ -90,7 +90,9 @@ class BodyEquilibrium:
         self.global_unknowns = make_global_unknowns(domain, self.space, body, self.unsupported)
         #: Which forces are compared with each other.
         self.components = components(self.space)
-        self.shares = shares_of(domain, self.space, self.global_unknowns, self.components)
+        self.component_norms = component_norms_of(
+            domain, self.space, self.global_unknowns, self.components
+        )
         self.layout = Layout(
             domain.comm,
             index_map,
@@ -280,7 +282,7 @@ class BodyEquilibrium:
         options: dict[str, Any] = {"symmetric": symmetric, "counters": counters, "kind": kind}
         global_unknowns = self.global_unknowns
         if change is None and global_unknowns.size == 0:
-            return SparseOperator(self, nodes, components=self.shares.apart, **options)
+            return SparseOperator(self, nodes, components=self.component_norms.apart, **options)
         motions = global_unknowns.ties
         if motion is not None:
             dofs = nodes[: motion.shape[0], None] * self.block_size + np.arange(self.block_size)
@@ -306,7 +308,7 @@ class BodyEquilibrium:
 
     def sizes(self, values: Array) -> Array:
         """Return the norms of forces, and of charges, of each component apart. Collective."""
-        return self.shares.sizes(values)
+        return self.component_norms.sizes(values)
 
     def load_sizes(self, time: float = 1.0) -> Array:
         """Return the `sizes` of the nodal loads at a time. Collective."""
@@ -315,13 +317,15 @@ class BodyEquilibrium:
     def exchanged(self, state: Evaluated) -> Array:
         """Return the `sizes` of the potential's forces and the strain's charges. Collective."""
         if not self.piezoelectric:
-            return np.zeros((1, self.shares.count))
+            return np.zeros((1, self.component_norms.count))
         alone = state.x.copy()
         self.nodal(alone)[:, : self.dim] = 0.0
         of_all, of_potential = (
             self.internal_forces(at) for at in (state, BodyState(alone, state.history))
         )
-        return self.sizes(np.where(self.shares.mechanical, of_potential, of_all - of_potential))
+        return self.sizes(
+            np.where(self.component_norms.mechanical, of_potential, of_all - of_potential)
+        )
 
     def l2_norm(self) -> Callable[[Array], float]:
         """Return the L2(Omega) norm of owned unknowns (displacement and scaled potential)."""

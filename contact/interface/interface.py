@@ -46,7 +46,7 @@ class Interface:
         (`contact.mesh.entities.elongation`); residuals take c so many times as large.
     component, components
         The connected component of the mesh that each contact node belongs to, shape (n,), and how
-        many there are (`contact.body.shares`).
+        many there are (`contact.body.component_norms`).
     """
 
     jump: ContactNodes

@@ -15,7 +15,7 @@ from contact.interface.complementarity import ComplementarityParameters
 from contact.interface.jump import Multipliers
 from contact.linear.operator import Counters
 from contact.methods.chord import WORTH, Chord
-from contact.methods.following import Following
+from contact.methods.gap_derivative import GapDerivative
 from contact.methods.line_search import FAR, step_length
 from contact.methods.newton_step import NEAR, Iterate, Taken
 from contact.methods.options import NewtonOptions
@@ -75,7 +75,7 @@ class CondensedStep:
         fallbacks: tuple[str, ...],
     ) -> None:
         self.condensation, self.options, self.parameters = condensation, options, parameters
-        self.counters, self.following = counters, Following()
+        self.counters, self.gap_derivative = counters, GapDerivative()
         self._solve, self._history, self._fallbacks = solve, history, fallbacks
         inner = condensation.full.equilibrium.products
         self._chord = Chord(options.tolerance, inner, WORTH if options.keep != "never" else 0.0)

@@ -31,7 +31,7 @@ from contact.interface.jump import Multipliers
 from contact.methods.cones import Array, Cones, Step
 from contact.methods.newton_step import Iterate, NewtonStep, Search
 from contact.methods.report import Outcome
-from contact.methods.restraint import Restraint, all_loads
+from contact.methods.rigid_body_modes import RigidBodyModes, all_loads
 from contact.problem.kkt import evaluate, residual_forces
 from contact.problem.protocols import Problem
 from contact.problem.state import State
@@ -61,14 +61,14 @@ SHARE = 1e-2
 #: The same for a body that nothing but contact holds, over what the loads do in the mean gap.
 LOOSE = 0.1
 
-#: Shares of the way to the rim of a cone that a step takes.
+#: Parts of the way to the rim of a cone that a step takes.
 SHORTEST, LONGEST = 0.9, 0.999
 
 
 def interior_point(
     search: Search,
     whole: NewtonStep,
-    restraint: Restraint,
+    modes: RigidBodyModes,
     finish: Callable[[State], tuple[Iterate, Outcome]],
 ) -> tuple[Iterate, Outcome]:
     """Solve convex problems with one friction bound after the other. Collective.
@@ -79,16 +79,16 @@ def interior_point(
         The problem, and what has been met of it.
     whole
         Has the operator of the body, with blocks at its contact nodes.
-    restraint
+    modes
         Of the whole problem.
     finish
         Newton's method, from a state on.
     """
     problem, interface = search.problem, search.problem.interface
-    stuck = restraint.stuck_bound()
+    stuck = modes.stuck_bound()
     bound = np.zeros(interface.jump.weight.size) if stuck is None else stuck
     for update in range(UPDATES):
-        method = InteriorPoint(problem, whole, bound, restraint.complete)
+        method = InteriorPoint(problem, whole, bound, modes.constrained_by_supports)
         outcome, state = method.run(search, CLOSED * CLOSER**update), method.state
         iterate, least = Iterate(state), outcome.kkt.significant
         if not outcome.converged and search.left > 0:
@@ -125,7 +125,7 @@ class InteriorPoint:
         self._near = np.isfinite(jump.gap)
         total, limit = all_loads(problem), jump.weight * bound
         count = max(jump.size, 1)
-        self._rubbing = self._near & (limit > EPS * max(jump.maximum(limit), total / count))
+        self._frictional = self._near & (limit > EPS * max(jump.maximum(limit), total / count))
         nodal = jump.apply(self._state.x)
         moved = np.zeros_like(nodal)
         if held:
@@ -150,7 +150,8 @@ class InteriorPoint:
             work = LOOSE * total * least / count
         # Where the body would lift off, the slack is that from the beginning.
         slack = np.maximum(np.maximum(gap, opening), least)
-        slips, limit = interface.slip_length(nodal + moved)[self._rubbing], limit[self._rubbing]
+        frictional = self._frictional
+        slips, limit = interface.slip_length(nodal + moved)[frictional], limit[frictional]
         zeros = np.zeros((limit.size, jump.dim))
         length = np.maximum(work / limit, slips)
         self.cones = Cones(slack, work / slack, length, zeros, limit, zeros, jump.comm)
@@ -189,7 +190,7 @@ class InteriorPoint:
         cones, jump = self.cones, self.problem.interface.jump
         pressure, friction = np.zeros(jump.weight.size), np.zeros(jump.normal.shape)
         pressure[self._near] = cones.force / jump.weight[self._near]
-        friction[self._rubbing] = -cones.friction / jump.weight[self._rubbing, None]
+        friction[self._frictional] = -cones.friction / jump.weight[self._frictional, None]
         return replace(self._state, forces=Multipliers.of(jump, pressure, friction))
 
     def gap(self) -> float:
@@ -197,7 +198,7 @@ class InteriorPoint:
         body, interface, x = self.problem.equilibrium, self.problem.interface, self._state.x
         jump, cones, nodal = interface.jump, self.cones, interface.jump.apply(x)
         ways = np.abs(jump.gap) + np.abs(jump.normal_component(nodal))
-        slips = interface.slip_length(nodal)[self._rubbing]
+        slips = interface.slip_length(nodal)[self._frictional]
         contact = self._sum(float(cones.force @ ways[self._near] + cones.bound @ slips))
         own = body.owned_part(x)[: body.owned]
         forces = body.internal_forces(replace(self._state, x=x)), body.external(self._state.time)
@@ -218,32 +219,32 @@ class InteriorPoint:
     def step(self) -> bool:
         """Take a step; False if rounding lets no more be taken. Collective."""
         cones, interface, state = self.cones, self.problem.interface, self.state
-        jump, near, rubbing = interface.jump, self._near, self._rubbing
+        jump, near, frictional = interface.jump, self._near, self._frictional
         body, d = self.problem.equilibrium, jump.dim
         nodal = jump.apply(state.x)
         residual = -residual_forces(self.problem, state)
         slack = interface.opening(nodal)[near] - cones.slack
-        slip = interface.slip(nodal)[rubbing] - cones.slip
+        slip = interface.slip(nodal)[frictional] - cones.slip
         cones.scale()
         stiff, across = cones.stiffness()
         blocks = np.zeros((jump.nodes.size, jump.block_size, jump.block_size))
-        normal, tangent = jump.normal[near], jump.tangent[rubbing]
+        normal, tangent = jump.normal[near], jump.tangent[frictional]
         blocks[near, :d, :d] = (stiff[:, None] * normal)[:, :, None] * normal[:, None, :]
-        blocks[rubbing, :d, :d] += tangent @ across @ tangent
+        blocks[frictional, :d, :d] += tangent @ across @ tangent
         self._update(blocks / jump.weight[:, None, None])
 
         def solve(constants: tuple[Array, Array]) -> tuple[Array, Step]:
             force, friction = cones.reduced(constants)
             at_nodes = np.zeros((jump.nodes.size, d))
             at_nodes[near] = -(force - stiff * slack)[:, None] * normal
-            at_nodes[rubbing] += friction - np.einsum("kij,kj->ki", across, slip)
+            at_nodes[frictional] += friction - np.einsum("kij,kj->ki", across, slip)
             rhs = residual.copy()
             jump.transpose(at_nodes, rhs)
             dx = self._whole.operator.solve(rhs, FORCING)
             moved = jump.apply(dx)
             closed = slack - jump.normal_component(moved)[near]
             return dx, cones.complete(
-                constants, closed, jump.tangential_component(moved)[rubbing] + slip
+                constants, closed, jump.tangential_component(moved)[frictional] + slip
             )
 
         dx, step, length = central(cones, solve)

@@ -162,12 +162,12 @@ class Ending:
 
 
 @contextmanager
-def signals_held(patience: float = math.inf) -> Iterator[list[int]]:
+def signals_held(timeout: float = math.inf) -> Iterator[list[int]]:
     """Let signals wait: what is being done must not be left half done.
 
     Parameters
     ----------
-    patience
+    timeout
         Seconds after the first signal from which on another one has its effect at once.
 
     Yields
@@ -187,7 +187,7 @@ def signals_held(patience: float = math.inf) -> Iterator[list[int]]:
     def note(number: int, frame: FrameType | None) -> None:
         caught.append(number)
         since.append(time.monotonic())
-        if since[-1] - since[0] > patience:
+        if since[-1] - since[0] > timeout:
             caught.clear()
             restore()
             signal.raise_signal(number)

@@ -48,10 +48,10 @@ from contact.methods.continuation import CONTINUATION, continuation
 from contact.methods.interior_point import INTERIOR_POINT, interior_point
 from contact.methods.newton_step import Iterate, NewtonStep, Search, Step
 from contact.methods.options import NewtonOptions
-from contact.methods.parameters import complementarity_parameters, far_softer
-from contact.methods.progress import Best, Stagnation, resting
+from contact.methods.parameters import complementarity_parameters, overestimates_stiffness
+from contact.methods.progress import Best, Stagnation, undeformed_equilibrium
 from contact.methods.report import History, Monitor, Outcome
-from contact.methods.restraint import Restraint
+from contact.methods.rigid_body_modes import RigidBodyModes
 from contact.problem.condensed import CondensedProblem, condensation, pays
 from contact.problem.kkt import KKT, evaluate
 from contact.problem.problem import ContactProblem
@@ -69,7 +69,7 @@ SHORT = 4
 #: What counts as progress of a step.
 PROGRESS = 0.5
 
-#: Why an iteration that is hopeless ends.
+#: Why an iteration that is give_up ends.
 SOFTER = "the body is far softer than a block"
 
 
@@ -87,7 +87,7 @@ class Newton:
         Told of every step.
     parameters
         Parameters of the complementarity functions; chosen from the body by default.
-    restraint
+    modes
         Of a condensed problem that of the whole one, whose supports it does not see.
     """
 
@@ -96,7 +96,7 @@ class Newton:
     monitor: Monitor | None = None
     counters: Counters = field(default_factory=Counters)
     parameters: ComplementarityParameters | None = None
-    restraint: Restraint | None = None
+    modes: RigidBodyModes | None = None
     history: History = field(init=False)
 
     def __post_init__(self) -> None:
@@ -106,11 +106,11 @@ class Newton:
             problem.scales, options.gamma
         )
         self._begin()
-        if self.restraint is None:
+        if self.modes is None:
             assert isinstance(problem, ContactProblem)
-            self.restraint = Restraint(problem)
-        loose = not self.restraint.at_rest
-        self.whole = NewtonStep(problem, options, self._parameters, self.counters, loose)
+            self.modes = RigidBodyModes(problem)
+        underconstrained = not self.modes.constrained_undeformed
+        self.whole = NewtonStep(problem, options, self._parameters, self.counters, underconstrained)
         self._condensed: CondensedStep | None = None
         if (
             options.condense
@@ -118,7 +118,7 @@ class Newton:
             and pays(problem, options.linear)
             and (body := condensation(problem, self.counters, options.linear))
         ):
-            solve = partial(_solve_condensed, restraint=self.restraint)
+            solve = partial(_solve_condensed, modes=self.modes)
             self._condensed = CondensedStep(
                 body, options, self._parameters, solve, self.history, self.counters, FALLBACKS
             )
@@ -128,8 +128,8 @@ class Newton:
         self.problem = self.whole.problem = problem
         self.history = History(self.monitor)
         if isinstance(problem, ContactProblem):
-            assert self.restraint is not None
-            self.restraint.problem = problem
+            assert self.modes is not None
+            self.modes.problem = problem
             if self._condensed is not None:
                 self._condensed.turn_to(problem, self.history)
         self._begin()
@@ -195,14 +195,15 @@ class Newton:
             logger.info("%s; going on with the whole body", outcome.ended)
             return self.whole_loop().run(iterate)
         loop = replace(
-            self.whole_loop(), hopeless=partial(far_softer, self.problem, self._parameters)
+            self.whole_loop(),
+            give_up=partial(overestimates_stiffness, self.problem, self._parameters),
         )
         return loop.run(iterate)
 
     def _fall_back(self, iterate: Iterate, outcome: Outcome) -> tuple[Iterate, Outcome]:
         """Solve by the interior point, and by continuation where that fails."""
         search = self.search
-        if (found := self._resting()) is not None:
+        if (found := self._undeformed()) is not None:
             return found
         if isinstance(self.problem, CondensedProblem):
             found = self._conducting(self.problem)
@@ -210,18 +211,18 @@ class Newton:
                 return found
         if search.left > 0:
             logger.info("%s; going on with an interior point", outcome.ended)
-            assert self.restraint is not None
-            iterate, outcome = interior_point(search, self.whole, self.restraint, self.finished)
+            assert self.modes is not None
+            iterate, outcome = interior_point(search, self.whole, self.modes, self.finished)
         return iterate, outcome
 
-    def _resting(self) -> tuple[Iterate, Outcome] | None:
+    def _undeformed(self) -> tuple[Iterate, Outcome] | None:
         """Return the body at rest where nothing is left that acts on it. Collective."""
-        found = resting(self.problem)
+        found = undeformed_equilibrium(self.problem)
         if found is None:
             return None
         iterate, residuals = Iterate(found[0]), found[1]
         self.search.see(iterate, residuals)
-        self.history.record(residuals, "at rest")
+        self.history.record(residuals, "zero displacement")
         return iterate, Outcome(residuals, self.options.allowed, "nothing acts")
 
     def _conducting(self, problem: CondensedProblem) -> tuple[Iterate, Outcome] | None:
@@ -244,9 +245,9 @@ class Newton:
         """Take Newton's last steps from what a fallback has left. Collective."""
         return self.whole_loop(SHORT).run(self.started(state), INTERIOR_POINT)
 
-    def whole_loop(self, patience: int | None = None) -> NewtonLoop:
+    def whole_loop(self, stagnation_limit: int | None = None) -> NewtonLoop:
         """Return the iteration on the problem's own body."""
-        return NewtonLoop(self.search, self.whole, self.options.secant_until, patience)
+        return NewtonLoop(self.search, self.whole, self.options.secant_until, stagnation_limit)
 
 
 def _solve_condensed(
@@ -255,10 +256,10 @@ def _solve_condensed(
     parameters: ComplementarityParameters,
     history: History,
     iterate: Iterate,
-    restraint: Restraint,
+    modes: RigidBodyModes,
 ) -> tuple[Iterate, Outcome]:
     """Solve a contact problem at its own nodes."""
-    method = Newton(problem, options, parameters=parameters, restraint=restraint)
+    method = Newton(problem, options, parameters=parameters, modes=modes)
     method.history = history
     return method.run(iterate)
 
@@ -284,17 +285,17 @@ class NewtonLoop:
     secant_until
         Equilibrium residual below which the material's tangent replaces its secant: far from the
         solution the tangent is too soft, and overshoots.
-    patience
+    stagnation_limit
         Stagnation limit; that of the options by default.
-    hopeless
+    give_up
         Asked after the first step from rest whether to give up at once; None to go on.
     """
 
     search: Search
     step: Step
     secant_until: float
-    patience: int | None = None
-    hopeless: Callable[[State], bool] | None = None
+    stagnation_limit: int | None = None
+    give_up: Callable[[State], bool] | None = None
 
     def run(self, iterate: Iterate, note: str = "") -> tuple[Iterate, Outcome]:
         """Iterate. Collective.
@@ -307,9 +308,10 @@ class NewtonLoop:
             Note of the steps in the history.
         """
         search, problem, options = self.search, self.search.problem, self.search.options
-        linear, patience = problem.equilibrium.linear, self.patience or options.patience
+        linear = problem.equilibrium.linear
         residuals = evaluate(problem, iterate.state)
-        stagnation = Stagnation(patience, PROGRESS, together=True)
+        limit = self.stagnation_limit or options.stagnation_limit
+        stagnation = Stagnation(limit, PROGRESS, together=True)
         if iterate.active_set is not None and residuals.significant <= options.tolerance:
             search.see(iterate, residuals)
             search.history.record(residuals, f"{note} initial guess".strip(), inner=0)
@@ -324,9 +326,9 @@ class NewtonLoop:
                 return kept, self._end(residuals, self.step.fault)
             iterate = taken.iterate
             residuals = evaluate(problem, iterate.state)
-            worse = self.step.following.worsened(residuals.significant)
+            worse = self.step.gap_derivative.worsened(residuals.significant)
             search.see(iterate, residuals)
-            words = (note, taken.note, "tangent" * tangent, "taken back" * worse)
+            words = (note, taken.note, "tangent" * tangent, "rejected" * worse)
             said = " ".join(word for word in words if word)
             search.history.record(
                 residuals, said, sizes=_sizes(iterate, problem), steps=taken.inner
@@ -337,11 +339,7 @@ class NewtonLoop:
                 search.see(iterate, residuals)
             if residuals.significant <= options.tolerance:
                 return iterate, self._end(residuals)
-            if (
-                self.hopeless is not None
-                and kept.active_set is None
-                and self.hopeless(iterate.state)
-            ):
+            if self.give_up is not None and kept.active_set is None and self.give_up(iterate.state):
                 return iterate, self._end(residuals, SOFTER)
             if not np.isfinite(residuals.significant):
                 return iterate, self._end(residuals, "Newton's method diverged")

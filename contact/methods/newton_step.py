@@ -21,7 +21,7 @@ from contact.interface.complementarity import (
 from contact.interface.interface import Interface
 from contact.interface.jump import Multipliers
 from contact.linear.operator import Counters, Operator
-from contact.methods.following import Following
+from contact.methods.gap_derivative import GapDerivative
 from contact.methods.options import NewtonOptions
 from contact.methods.progress import Best
 from contact.methods.report import History, Record
@@ -128,7 +128,7 @@ class Search:
 class Step(Protocol):
     """A step of Newton's method."""
 
-    following: Following
+    gap_derivative: GapDerivative
     #: What is said where a step cannot be taken.
     fault: str
 
@@ -158,7 +158,7 @@ class NewtonStep:
         The problem, and what is chosen for it.
     counters
         Where factorisations and solves are counted.
-    loose
+    underconstrained
         Whether contact alone holds a body, and not where it touches at rest. There it touches at
         a single node, say, and rolls or slides off by any length until it touches at more. As
         Levenberg and Marquardt have it, soft springs at all contact nodes keep it from that while
@@ -174,9 +174,9 @@ class NewtonStep:
         options: NewtonOptions,
         parameters: ComplementarityParameters,
         counters: Counters,
-        loose: bool = False,
+        underconstrained: bool = False,
     ) -> None:
-        self._loose = loose
+        self._underconstrained = underconstrained
         self.problem, self.options, self.parameters = problem, options, parameters
         self.counters = counters
         self._operator: Operator | None = None
@@ -184,9 +184,9 @@ class NewtonStep:
 
     def begin(self) -> None:
         """Forget the steps before."""
-        self.following = Following()
+        self.gap_derivative = GapDerivative()
         self._kind = ""
-        self._nearest, self._vain, self._forcing = np.inf, 0, FORCING
+        self._nearest, self._stagnant, self._forcing = np.inf, 0, FORCING
 
     def renew(self) -> None:
         """Forget the operator after a solve that failed: MUMPS does not begin anew after that."""
@@ -194,10 +194,10 @@ class NewtonStep:
 
     def _leaves(self, reached: float) -> float:
         """Return what an iterative solver leaves of a step's residual, given where that starts."""
-        self._vain = 0 if reached < self._nearest else self._vain + 1
+        self._stagnant = 0 if reached < self._nearest else self._stagnant + 1
         self._nearest = min(self._nearest, reached)
-        if self._vain >= STAGNANT:
-            self._vain, self._forcing = 0, max(self._forcing * FORCING, LEAST)
+        if self._stagnant >= STAGNANT:
+            self._stagnant, self._forcing = 0, max(self._forcing * FORCING, LEAST)
         return self._forcing
 
     @property
@@ -235,7 +235,7 @@ class NewtonStep:
         blocks = contact.blocks + layer + self._current(nodal, contact, reached.significant)
         kind, last = "tangent" if tangent else "secant", self._kind
         remains = kind == last and reached.equilibrium < SMALL * reached.significant
-        if self._loose and not contact.unchanged:
+        if self._underconstrained and not contact.unchanged:
             stiffness = (
                 REGULARISATION * min(reached.significant, 1.0) * self.parameters.nodal_stiffness
             )
@@ -273,7 +273,7 @@ class NewtonStep:
             return 0.0
         follow = contact.unchanged or reached < NEAR
         if law.follows_gap:
-            follow = self.following(reached, follow)
+            follow = self.gap_derivative(reached, follow)
         current = law.current_jacobian if follow else law.current_block
         return current(nodal, interface.pressure(nodal, contact.forces))
 

@@ -83,7 +83,7 @@ class LoopOptions(Options):
 @names_arguments
 @dataclass(frozen=True, kw_only=True)
 class FixedPointOptions(LoopOptions):
-    """Algorithms 1, 2 and their kin: a fixed point over block relaxation.
+    """Algorithms 1, 2 and their kin: a fixed point over Uzawa block relaxation.
 
     Attributes
     ----------
@@ -92,16 +92,16 @@ class FixedPointOptions(LoopOptions):
     inner_tolerance
         Tolerance of the inner loop. Default: a tenth of `tolerance`.
     r
-        Augmentation parameter of the block relaxation (force/volume). `auto` fits a block and,
-        where that stalls far from a solution, the softest mode of the body.
+        Augmentation parameter of the Uzawa block relaxation (force/volume). `auto` fits a block
+        and, where that stalls far from a solution, the softest mode of the body.
     acceleration
-        Acceleration of the block relaxation.
+        Acceleration of the Uzawa block relaxation.
     depth
         Number of earlier solves that `anderson` uses.
     relaxation
         Relaxation of the multiplier's step; above 1: over-relaxation.
     single_loop
-        `true`: the friction bound is updated in the block relaxation itself.
+        `true`: the friction bound is updated in the Uzawa block relaxation itself.
     """
 
     method: Literal["uzawa"] = "uzawa"
@@ -171,7 +171,7 @@ class NewtonOptions(Options):
     secant_until
         Equilibrium residual below which the material's tangent replaces its secant, where the
         body is not condensed.
-    patience
+    stagnation_limit
         Steps without progress after which the stage is given up.
     softening
         Part of a node's own stiffness that a falling friction coefficient may take away. Infinity
@@ -194,7 +194,7 @@ class NewtonOptions(Options):
     max_iterations: Annotated[int, Internal()] = 60
     gamma: Annotated[float, Internal()] = 1e4
     secant_until: Annotated[float, Internal()] = 1e-2
-    patience: Annotated[int, Internal()] = 12
+    stagnation_limit: Annotated[int, Internal()] = 12
     softening: Annotated[float, Internal()] = 0.25
     condense: Annotated[bool, Internal()] = True
     keep: Annotated[Literal["never", "within", "across"], Internal()] = "within"

@@ -37,7 +37,9 @@ def complementarity_parameters(scales: Scales, gamma: float) -> ComplementarityP
     return ComplementarityParameters(middle, nodal, gamma * max(middle, nodal))
 
 
-def far_softer(problem: Problem, parameters: ComplementarityParameters, state: State) -> bool:
+def overestimates_stiffness(
+    problem: Problem, parameters: ComplementarityParameters, state: State
+) -> bool:
     """Tell whether a body is far softer than its parameters, by a first state. Collective.
 
     It is where they make far more of a penetration than any load, also of what is rigid. Where

@@ -79,7 +79,7 @@ class Stagnation:
         return self._since >= (self.limit if limit is None else limit)
 
 
-def resting(problem: Problem) -> tuple[State, KKT] | None:
+def undeformed_equilibrium(problem: Problem) -> tuple[State, KKT] | None:
     """Return the body at rest with its residuals, where it is in equilibrium. Collective.
 
     Beside forces that vanish no residual is small, and only those that are 0 have none: a method

@@ -9,7 +9,13 @@ from scipy import linalg
 
 from contact.output.solution import Remark, Solution
 from contact.problem.kkt import residual_forces
-from contact.problem.rigid_modes import Group, described, groups, held_by_supports, null_space
+from contact.problem.rigid_modes import (
+    Group,
+    constrained_by_supports,
+    described,
+    groups,
+    null_space,
+)
 from contact.tolerances import EPS
 from contact.typing import Array
 
@@ -64,7 +70,7 @@ def adrift(solution: Solution) -> Remark:
     pressed = pressures > NOTHING * pressures.max(initial=0.0)
     # Before it has been pressed it is at rest.
     loose = np.flatnonzero(~pressed[:-1] & np.logical_or.accumulate(pressed)[:-1])
-    if loose.size == 0 or held_by_supports(solution.problem):
+    if loose.size == 0 or constrained_by_supports(solution.problem):
         return "", True
     return (
         f"at t = {solution.steps[loose[0]].row['t']:g} nothing presses any more, and no support "

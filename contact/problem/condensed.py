@@ -16,8 +16,8 @@ from petsc4py import PETSc
 from scipy import sparse
 from scipy.linalg import lu_factor, lu_solve
 
+from contact.body.component_norms import ComponentNorms
 from contact.body.equilibrium import BodyEquilibrium
-from contact.body.shares import Shares
 from contact.history import BodyState, Evaluated
 from contact.interface.interface import Interface
 from contact.interface.jump import Multipliers
@@ -74,7 +74,7 @@ class CondensedBody:
         The owned kept unknowns there, and where these are among those of all ranks.
     acting
         `sizes` of all that acts on the whole body: loads, reactions, and one field on the other.
-    shares
+    component_norms
         Which forces are compared with each other.
     """
 
@@ -88,7 +88,7 @@ class CondensedBody:
     at: Array
     own: slice
     acting: Array
-    shares: Shares
+    component_norms: ComponentNorms
 
     linear, most_rounding = True, MOST_ROUNDING
 
@@ -137,7 +137,7 @@ class CondensedBody:
 
     def sizes(self, values: Array) -> Array:
         """Return the norms of forces, and of charges, of each piece apart. Collective."""
-        return self.shares.sizes(values)
+        return self.component_norms.sizes(values)
 
     def load_sizes(self, time: float = 1.0) -> Array:
         """Return the `sizes` of all that acts on the whole body."""
@@ -407,7 +407,7 @@ class Condensation:
         acting = body.load_sizes(state.time) + reactions + body.exchanged(state)
         # Where the loads go on as before, the prediction of a step is in equilibrium but for that.
         inside = body.layout.mask(-residual[: body.owned])
-        nothing = ROUNDING * body.shares.spread(acting)[: body.owned]
+        nothing = ROUNDING * body.component_norms.spread(acting)[: body.owned]
         forces = -self._schur.condense(inside, nothing)
         forces = self._constraint.forces(forces, residual)
         if not (self._regular and np.isfinite(forces).all()):
@@ -423,7 +423,7 @@ class Condensation:
             self._at(state.x),
             self._own,
             acting,
-            body.shares.at(self.nodes),
+            body.component_norms.at(self.nodes),
         )
         return CondensedProblem(condensed, self._interface, self.full.scales, state.time)
 

@@ -101,11 +101,11 @@ def balance(problem: ContactProblem, state: State, before: Moment, now: Moment) 
     x, x_before = (body.owned_part(m.x) for m in (now, before))
     # The enthalpy's work is that of charges on changing potentials: potentials move charges.
     work = np.where(
-        body.shares.mechanical,
+        body.component_norms.mechanical,
         0.5 * (now.given + before.given) * (x - x_before),
         -0.5 * (x + x_before) * (now.given - before.given),
     )
-    stored = body.product(np.where(body.shares.mechanical, 0.0, x), now.internal)
+    stored = body.product(np.where(body.component_norms.mechanical, 0.0, x), now.internal)
     slip = interface.slip(interface.jump.apply(state.x))
     friction = interface.jump.weight @ np.einsum("ni,ni->n", state.forces.friction, slip)
     dissipation = float(problem.comm.allreduce(friction, op=MPI.SUM))

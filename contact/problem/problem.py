@@ -221,7 +221,7 @@ class ContactProblem:
         held = joined_held(self.entries, body.layout.index_map.local_range[0], found.coupling)
         mesh = self.domain.mesh
         longer = max(elongation(mesh, self.domain.facets(contact.on)) for contact in self.contacts)
-        piece, pieces = body.shares.component[found.nodes], body.shares.count
+        piece, pieces = body.component_norms.component[found.nodes], body.component_norms.count
         return Interface(
             law.constrained, law, friction, held, stiffness, size, longer, piece, pieces
         )

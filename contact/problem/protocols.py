@@ -12,7 +12,7 @@ import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
 
-from contact.body.shares import Shares
+from contact.body.component_norms import ComponentNorms
 from contact.history import Evaluated
 from contact.interface.interface import Interface
 from contact.linear.constraint import Change
@@ -86,7 +86,7 @@ class Equilibrium(Protocol):
         """Whether the operator is the same at all unknowns."""
 
     @property
-    def shares(self) -> Shares:
+    def component_norms(self) -> ComponentNorms:
         """Which forces are compared with each other."""
 
     @property

@@ -109,7 +109,7 @@ def groups(problem: ContactProblem) -> Iterator[Group]:
         )
 
 
-def held_by_friction(problem: ContactProblem) -> bool:
+def constrained_by_friction(problem: ContactProblem) -> bool:
     """Tell whether without friction a rigid motion of a body were free. Collective.
 
     Nodes that touch at once hold it along their normals, no others: a ring between two plates moves
@@ -121,12 +121,12 @@ def held_by_friction(problem: ContactProblem) -> bool:
     )
 
 
-def held_by_supports(problem: ContactProblem) -> bool:
+def constrained_by_supports(problem: ContactProblem) -> bool:
     """Tell whether no rigid motion were free without contact. Collective."""
     return all([null_space(group.supports).size == 0 for group in groups(problem)])
 
 
-def held_at_rest(problem: ContactProblem) -> bool:
+def constrained_undeformed(problem: ContactProblem) -> bool:
     """Tell whether supports and contact hold all bodies where they touch undeformed. Collective."""
     touching = _touching(problem)
     return all(

@@ -34,7 +34,7 @@ from contact.methods import (
 from contact.methods.newton import Newton
 from contact.methods.options import NewtonOptions
 from contact.methods.report import Outcome
-from contact.methods.restraint import Restraint
+from contact.methods.rigid_body_modes import RigidBodyModes
 from contact.problem.kkt import evaluate
 from scripts.reporting import Report, append, parser
 from scripts.studies import sweep
@@ -110,12 +110,13 @@ DEVICES = (
            ((interior_point, "UPDATES", 1),)),
     Device("duality gap closed further in each update", (), "-",
            ((interior_point, "CLOSER", 1.0),)),
-    Device("sticking start where friction alone restrains", (Restraint.stuck_bound,), "-",
-           ((Restraint, "stuck_bound", _nothing),)),
+    Device("sticking start where friction alone restrains", (RigidBodyModes.stuck_bound,), "-",
+           ((RigidBodyModes, "stuck_bound", _nothing),)),
     Device("continuation in the conductivity", (continuation,), "Allgower and Georg 2003",
            ((Newton, "_conducting", _nothing),)),
-    Device("estimate of the stiffness from the first step", (parameters.far_softer,), "-",
-           ((newton, "far_softer", lambda *_: False),)),
+    Device("estimate of the stiffness from the first step",
+           (parameters.overestimates_stiffness,), "-",
+           ((newton, "overestimates_stiffness", lambda *_: False),)),
     Device("Levenberg-Marquardt regularisation", (), "Marquardt 1963",
            ((newton_step, "REGULARISATION", 0.0),)),
     Device("forcing term that tightens", (newton_step.NewtonStep._leaves,),
@@ -131,8 +132,8 @@ DEVICES = (
     Device("energy line search", (line_search,), "Armijo 1966; Crisfield 1991",
            ((condensed_step, "step_length", lambda _: 1.0),)),
     Device("chord steps", (chord,), "Kelley 1995; Walker and Ni 2011", (), (("keep", "never"),)),
-    Device("zero displacement where nothing acts", (progress.resting,), "-",
-           ((Newton, "_resting", _nothing),)),
+    Device("zero displacement where nothing acts", (progress.undeformed_equilibrium,), "-",
+           ((Newton, "_undeformed", _nothing),)),
     Device("static condensation", (condensed_step,), "Guyan 1965", (), (("condense", False),)),
 )  # fmt: skip
 

@@ -8,7 +8,7 @@ from contact import build_problem
 from contact.case.file import parse_case
 from contact.methods.options import FixedPointOptions
 from contact.methods.thesis.fixed_point import FixedPoint
-from contact.methods.thesis.spectrum import softer
+from contact.methods.thesis.spectrum import spectral_fit
 from contact.solving import solve
 
 SELF = MPI.COMM_SELF
@@ -226,7 +226,7 @@ def test_the_softest_mode_of_a_cantilever_is_its_first_bending_mode():
     case = parse_case(beam(40.0, [160, 2], TIP, 0.5, space={"degree": 2}))
     problem = build_problem(case, comm=SELF)
     loop = FixedPoint(problem, FixedPointOptions())
-    found = softer(problem, loop.operator, friction=False)
+    found = spectral_fit(problem, loop.operator, friction=False)
     modulus = problem.scales.plane_modulus
     assert found.sigma == pytest.approx(1.8751**4 / 40.0**4 * modulus / 12, rel=5e-3)
     # P L^3/3EI

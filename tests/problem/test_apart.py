@@ -144,7 +144,7 @@ def test_what_moves_freely_joins_bodies(given):
     motion = Motion([0.0, height], [0.0], [0.0, 0.0 if given else 0.01], [0.0], [0.0, 0.0])
     pushed = Rigid("bottom", motion, foundation=True)
     problem = pressed(blocks(MPI.COMM_SELF), 0.0, 0.0, mu=0.0, rigid=[pushed])
-    shares = problem.equilibrium.shares
+    shares = problem.equilibrium.component_norms
     assert shares.count == (3 if given else 1)
     assert len(set(shares.component)) == (2 if given else 1)
     assert set(shares.behind) == {*range(shares.count)} - {*shares.component} or not given

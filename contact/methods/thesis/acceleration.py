@@ -1,9 +1,9 @@
-"""Acceleration of the block relaxation by minimising the residual over all solves so far.
+"""Acceleration of the Uzawa block relaxation by minimising the residual over all solves so far.
 
 Every solve leaves a pair of contact forces and displacements that are in equilibrium, and so
 is every affine combination of such pairs: only the contact laws are nonlinear. The method
 therefore looks for the combination that meets the contact laws best, which costs no linear
-solve, and takes the next step of the block relaxation from there. Once the nodes in contact
+solve, and takes the next step of the Uzawa block relaxation from there. Once the nodes in contact
 are the right ones this is GMRES with all solves as its Krylov space, also those that were
 made while the nodes were still wrong.
 """
@@ -75,7 +75,7 @@ class ResidualMinimiser:
         force, z
             The newest lambda and lambda + r u, shape (m,).
         image
-            The z with which the plain block relaxation would go on.
+            The z with which the plain Uzawa block relaxation would go on.
         """
         if self._anew and len(self._directions) == self._directions.maxlen:
             self._directions.clear()

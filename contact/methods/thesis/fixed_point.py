@@ -1,7 +1,7 @@
 """The outer loop of Algorithms 1, 4, 6 and 8.
 
 Each iteration freezes what makes the problem nonlinear (secant modulus, friction bound, what
-the foundation answers), solves the frozen problem by block relaxation and updates. Elastic
+the foundation answers), solves the frozen problem by Uzawa block relaxation and updates. Elastic
 and piezoelectric bodies, rigid and compliant foundations differ in what there is to freeze:
 
 - Algorithm 1, Problem (PV): the secant modulus and the friction bound s_n.
@@ -9,7 +9,7 @@ and piezoelectric bodies, rigid and compliant foundations differ in what there i
 - Algorithm 6, Problem (PV2): also h_nu, or all of the layer's force j_1 where it is lagged.
 - Algorithm 8, Problem (PV1): as Algorithm 6 without friction and current.
 
-Their inner Algorithms 2, 5, 7 and 9 are `uzawa.block_relaxation`; what differs is
+Their inner Algorithms 2, 5, 7 and 9 are `uzawa.uzawa_block_relaxation`; what differs is
 `Interface.law`. Where it fails, the best iterate is left, by the thesis's rules the last.
 """
 
@@ -23,14 +23,14 @@ import numpy as np
 
 from contact.body.equilibrium import BodyEquilibrium
 from contact.linear.operator import Counters, Operator
-from contact.methods.following import Following
+from contact.methods.gap_derivative import GapDerivative
 from contact.methods.options import FixedPointOptions
 from contact.methods.parameters import automatic_r
-from contact.methods.progress import Best, Stagnation, resting
+from contact.methods.progress import Best, Stagnation, undeformed_equilibrium
 from contact.methods.report import History, Monitor, Outcome, Record
-from contact.methods.restraint import Restraint
+from contact.methods.rigid_body_modes import RigidBodyModes
 from contact.methods.thesis import uzawa
-from contact.methods.thesis.spectrum import Softer, softer, spectrum
+from contact.methods.thesis.spectrum import SpectralFit, spectral_fit, stall_reason
 from contact.methods.thesis.uzawa import augmentation, linearised, split
 from contact.problem.kkt import KKT, evaluate
 from contact.problem.problem import ContactProblem
@@ -40,8 +40,8 @@ from contact.tolerances import PRECISION
 from contact.typing import Array
 
 #: Outer iterations without progress after which the loop is given up, and how many where the
-#: block relaxation gets no further either.
-PATIENCE, PATIENCE_STALLED, PROGRESS = 25, 3, 0.9
+#: Uzawa block relaxation gets no further either.
+STAGNATION_LIMIT, STAGNATION_LIMIT_STALLED, PROGRESS = 25, 3, 0.9
 
 #: What a relaxation that was given up has left, over its tolerance, from which on r does not fit.
 FAR = 100
@@ -49,7 +49,7 @@ FAR = 100
 #: Residual below which frozen coefficients give way to their derivatives.
 NEAR = 1e-2
 
-#: Why the loop stalls far from a solution though its block relaxations converge.
+#: Why the loop stalls far from a solution though its Uzawa block relaxations converge.
 FROZEN = (
     "though each frozen problem is solved: what is frozen (the friction bound, which nodes "
     "conduct, the material) changes to and fro"
@@ -88,8 +88,8 @@ class FixedPoint:
         """Choose r and set up the operator."""
         options, body = self.options, self.problem.equilibrium
         self.r = automatic_r(self.problem.scales) if options.r == "auto" else options.r
-        self._softened = False
-        self._softer: Softer | None = None
+        self._fitted = False
+        self._fit: SpectralFit | None = None
         self.operator = self._new_operator(symmetric=True)
         self.history = History(self.monitor)
         self.state = self.problem.start()
@@ -118,7 +118,7 @@ class FixedPoint:
     def _forget(self) -> None:
         """Begin a solve: it does not depend on an earlier one."""
         self._stalled, self._far, self._residual = False, False, np.inf
-        self._following = Following(NEAR)
+        self._gap_derivative = GapDerivative(NEAR)
         if not self.operator.symmetric:
             self.operator = self._new_operator(symmetric=True)
 
@@ -146,13 +146,15 @@ class FixedPoint:
         if start is None:
             self.state = problem.start()
             stuck = (
-                Restraint(problem).stuck_bound() if isinstance(problem, ContactProblem) else None
+                RigidBodyModes(problem).stuck_bound()
+                if isinstance(problem, ContactProblem)
+                else None
             )
             # Iteration 0 is the pure contact problem that the thesis starts from. A bound that is
-            # updated in the block relaxation needs none, and a body that friction alone holds has
-            # no such problem.
+            # updated in the Uzawa block relaxation needs none, and a body that friction alone holds
+            # has no such problem.
             first = 0 if frictional and not self.options.single_loop and stuck is None else 1
-            # The secant at rest: prescribed values strain the elements beside them alone.
+            # At zero strain: prescribed values strain the elements beside them alone.
             z = self._about(0.0, frictional and first > 0)
             bound = np.zeros(jump.gap.size) if stuck is None else stuck
             return self._solve(z, bound, first, problem.equilibrium.rest())
@@ -173,18 +175,18 @@ class FixedPoint:
         begin, problem, options = time.perf_counter(), self.problem, self.options
         body, frictional = problem.equilibrium, problem.interface.friction.acts
         tangent = options.material_step == "tangent"
-        stagnation, begun = Stagnation(PATIENCE, PROGRESS), bound
+        stagnation, begun = Stagnation(STAGNATION_LIMIT, PROGRESS), bound
         best: Best[tuple[State, KKT]] = Best()
         for iteration in range(first, options.max_outer + 1):
             friction = frictional and iteration > 0
             if friction and first == 0 and iteration == 1:
                 # The slip without friction is a bad guess, and so is the contact that goes with it.
                 z = self._about(0.0, friction)
-            if self._far and (start := self._soften(friction)) is not None:
+            if self._far and (start := self._fit_to_spectrum(friction)) is not None:
                 # What was found with an r that does not fit is worse than nothing.
                 self.state, secant_at = problem.start(), body.rest()
                 z, bound = self._about(start, friction), begun
-                stagnation, best = Stagnation(PATIENCE, PROGRESS), Best()
+                stagnation, best = Stagnation(STAGNATION_LIMIT, PROGRESS), Best()
             previous = self.state
             # Newton's tangent of a zero strain is the secant, and cheaper.
             kind = "tangent" if tangent and iteration > first else "secant"
@@ -208,33 +210,33 @@ class FixedPoint:
             if options.material_step == "auto" and not body.linear:
                 # Far from the solution the tangent is too soft and overshoots.
                 tangent = residuals.significant < (NEAR if not tangent else 2 * stagnation.best)
-            patience = PATIENCE_STALLED if self._stalled else PATIENCE
-            given_up = stagnation(residuals.significant, patience)
+            limit = STAGNATION_LIMIT_STALLED if self._stalled else STAGNATION_LIMIT
+            given_up = stagnation(residuals.significant, limit)
             if given_up and options.stopping == "residual":
                 ended = f"the residual stalled at {stagnation.best:.2e}"
                 if self._far:
-                    ended += f": {spectrum(problem, options.r, self._softer)}"
+                    ended += f": {stall_reason(problem, options.r, self._fit)}"
                 elif not self._stalled and stagnation.best > NEAR:
                     ended += f" {FROZEN}"
                 break
         else:
             ended = f"not converged in {options.max_outer} outer iterations"
         if best.found is not None and options.stopping == "residual":
-            if rest := resting(problem):
+            if rest := undeformed_equilibrium(problem):
                 best.found, ended = rest, ""
             self.state, residuals = best.found
         return self._end(residuals, ended)
 
-    def _soften(self, friction: bool) -> Array | None:
+    def _fit_to_spectrum(self, friction: bool) -> Array | None:
         """Take r from the body's softest mode, once; return where to begin if it has changed."""
         possible = self.options.r == "auto" and self.options.stopping == "residual"
-        if not possible or self._softened:
+        if not possible or self._fitted:
             return None
-        self._softened, self._softer = True, softer(self.problem, self.operator, friction)
-        if self._softer is None:
+        self._fitted, self._fit = True, spectral_fit(self.problem, self.operator, friction)
+        if self._fit is None:
             return None
-        self.r, self._relaxation = self._softer.r, self._softer.fit(self._relaxation)
-        return self._softer.z
+        self.r, self._relaxation = self._fit.r, self._fit.fit(self._relaxation)
+        return self._fit.z
 
     def _step(
         self, bound: Array, z: Array, friction: bool, kind: str, secant_at: Array
@@ -251,8 +253,12 @@ class FixedPoint:
         self.operator.update(kind, replace(state, x=about), weighted, constant=body.linear)
         step = linearised(problem, state, self.operator, bound, friction, secant_at)
         poll = self.poll or self.history.poll
-        result = uzawa.block_relaxation(interface, step, z, self._relaxation, self._norm, poll)
-        self._stalled = result.stalled and not self._following.followed  # freezing is left then
+        result = uzawa.uzawa_block_relaxation(
+            interface, step, z, self._relaxation, self._norm, poll
+        )
+        self._stalled = (
+            result.stalled and not self._gap_derivative.included
+        )  # freezing is left then
         self._far = self._stalled and result.residual > FAR * self._relaxation.tolerance
         x = body.moved(state.x, result.increment)
         self.state = replace(state, x=x, forces=result.forces)
@@ -264,7 +270,7 @@ class FixedPoint:
         Frozen, a steep ramp costs many iterations there; followed from afar, it overshoots.
         """
         law = self.problem.interface.law
-        if not law.follows_gap or not self._following(self._residual):
+        if not law.follows_gap or not self._gap_derivative(self._residual):
             return law.current_block(nodal, pressure)
         if self.operator.symmetric:
             self.operator = self._new_operator(symmetric=False)

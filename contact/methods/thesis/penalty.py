@@ -40,12 +40,12 @@ from contact.linear.krylov import Packing, shell
 from contact.linear.operator import Counters
 from contact.methods.interrupt import Interrupted
 from contact.methods.options import PenaltyOptions
-from contact.methods.progress import Best, Stagnation, resting
+from contact.methods.progress import Best, Stagnation, undeformed_equilibrium
 from contact.methods.report import History, Monitor, Outcome, Record
 from contact.problem.checks import expected_displacements
 from contact.problem.kkt import KKT, evaluate, residual_forces
 from contact.problem.problem import ContactProblem
-from contact.problem.rigid_modes import held_by_friction
+from contact.problem.rigid_modes import constrained_by_friction
 from contact.problem.state import State
 from contact.tolerances import LARGEST_VIOLATION
 from contact.typing import Array
@@ -164,7 +164,7 @@ class PenalisedProblem:
         interface.add_forces(on_contact, state.x, state.forces)
         sizes = body.load_sizes(state.time) + body.sizes(residual)
         sizes = sizes + body.sizes(on_contact) + body.exchanged(state)
-        self._units = body.shares.spread(np.where(sizes > 0, sizes, 1.0))
+        self._units = body.component_norms.spread(np.where(sizes > 0, sizes, 1.0))
         self.snes.setTolerances(
             rtol=1e-14,
             # Rounding is magnified by 1/eps: the residual may stay above any tolerance.
@@ -254,7 +254,7 @@ LOST = "the body has been moved to where nothing holds it"
 LEAST_ADDED = 1e-2
 
 #: Outer iterations in which the residual has to fall by 1 %.
-PATIENCE, PROGRESS = 100, 0.99
+STAGNATION_LIMIT, PROGRESS = 100, 0.99
 
 
 def regularisation(problem: ContactProblem, options: PenaltyOptions) -> Regularisation:
@@ -347,7 +347,7 @@ class Penalty:
         begin, problem, options = time.perf_counter(), self.problem, self.options
         interface = problem.interface
         # The lagged friction modulus can creep: what counts is the last hundred iterations.
-        stagnation = Stagnation(PATIENCE, PROGRESS)
+        stagnation = Stagnation(STAGNATION_LIMIT, PROGRESS)
         best: Best[tuple[State, KKT]] = Best()
         # The residual below which material and friction become implicit.
         switch = {"secant": 0.0, "auto": 1e-2, "tangent": np.inf}[options.material_step]
@@ -389,7 +389,7 @@ class Penalty:
         else:
             ended = f"not converged in {options.max_outer} outer iterations; {HARDER}"
         if best.found is not None and options.stopping == "residual":
-            if rest := resting(problem):
+            if rest := undeformed_equilibrium(problem):
                 best.found, ended = rest, ""
             self.state, residuals = best.found
         return self._outcome(residuals, ended)
@@ -420,7 +420,7 @@ class Penalty:
         At rest nothing presses, and there is no friction. What friction alone holds would fly away.
         """
         law = Lagged(self.problem.interface, self._eps, nodal)
-        if self.problem.frictional and not law.acts() and held_by_friction(self.problem):
+        if self.problem.frictional and not law.acts() and constrained_by_friction(self.problem):
             law.stick()
         return law
 

@@ -42,7 +42,7 @@ FREE = 10.0
 
 
 @dataclass(frozen=True)
-class Softer:
+class SpectralFit:
     """What fits a soft body.
 
     Attributes
@@ -66,7 +66,7 @@ class Softer:
         return replace(relaxation, r=self.r, depth=depth, anew=True)
 
 
-def softer(problem: Problem, operator: Operator, friction: bool) -> Softer | None:
+def spectral_fit(problem: Problem, operator: Operator, friction: bool) -> SpectralFit | None:
     """Return what fits a body that is softer than a block; None for others. Collective.
 
     Parameters
@@ -91,7 +91,7 @@ def softer(problem: Problem, operator: Operator, friction: bool) -> Softer | Non
 
     try:
         operator.update("secant", state, blocks, constant=body.linear)
-        sigma, held = softest(jump, solve, shift)
+        sigma, held = smallest_eigenvalue(jump, solve, shift)
         loads = -residual_forces(problem, state)
         free = jump.apply(operator.solve(loads)) if held else np.zeros_like(nodal)
     except InputError:  # nothing but contact holds it, and the springs are too soft to be seen
@@ -100,24 +100,26 @@ def softer(problem: Problem, operator: Operator, friction: bool) -> Softer | Non
     if sigma is None or sigma >= block:
         return None
     r = star * float(np.sqrt(sigma / block))
-    return Softer(r, sigma, r * split(interface, nodal + free, friction))
+    return SpectralFit(r, sigma, r * split(interface, nodal + free, friction))
 
 
-def spectrum(problem: Problem, given: float | str, softer: Softer | None) -> str:
-    """Say why the block relaxation may have stalled, with r "auto" or given, and fitted or not."""
+def stall_reason(problem: Problem, given: float | str, fit: SpectralFit | None) -> str:
+    """Say why the Uzawa block relaxation may have stalled, given r and its spectral fit."""
     if given != "auto":
         return f'r = {given:.3g} was given, r = "auto" fits it to the body'
     star = automatic_r(problem.scales)
-    if softer is None:
+    if fit is None:
         return f"r = {star:.3g} is that of a block, and the body has no softer modes"
     stiffest = 1.92 * problem.scales.plane_modulus / problem.scales.spacing
     return (
-        f"contact moves modes of the body with stiffnesses from {softer.sigma:.2g} to "
-        f"{stiffest:.2g} (stress/length); neither r = {star:.2g} nor {softer.r:.2g} fits all"
+        f"contact moves modes of the body with stiffnesses from {fit.sigma:.2g} to "
+        f"{stiffest:.2g} (stress/length); neither r = {star:.2g} nor {fit.r:.2g} fits all"
     )
 
 
-def softest(jump: Jump, solve: Callable[[Array], Array], shift: float) -> tuple[float | None, bool]:
+def smallest_eigenvalue(
+    jump: Jump, solve: Callable[[Array], Array], shift: float
+) -> tuple[float | None, bool]:
     """Return the least stiffness of a mode of the normal displacements. Collective.
 
     Parameters

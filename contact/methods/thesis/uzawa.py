@@ -129,7 +129,7 @@ logger = logging.getLogger("contact.inner")
 
 #: Iterations without progress, that is 1 %, after which the relaxation is given up: accelerated,
 #: and plain. With r far from r* the plain one creeps by 1e-4 an iteration, and still gets there.
-PATIENCE, PATIENCE_PLAIN, PROGRESS = 100, 500, 0.99
+STAGNATION_LIMIT, STAGNATION_LIMIT_PLAIN, PROGRESS = 100, 500, 0.99
 
 #: What an iterative solver leaves at most, over the tolerance of the relaxation: where it leaves as
 #: much, it hands back what it began with, and rounding decides when it does. And the least that
@@ -139,7 +139,7 @@ SHARE, LEAST = 0.1, 1e-13
 
 @dataclass(frozen=True)
 class Relaxation:
-    """Parameters of the block relaxation.
+    """Parameters of the Uzawa block relaxation.
 
     Attributes
     ----------
@@ -173,7 +173,7 @@ class Relaxation:
 
 @dataclass
 class RelaxationResult:
-    """Outcome of a block relaxation.
+    """Outcome of a Uzawa block relaxation.
 
     Attributes
     ----------
@@ -303,7 +303,7 @@ def _vectors(jump: Jump, pairs: Array) -> Array:
     return pairs[:, :1] * jump.normal + pairs[:, 1:]
 
 
-def block_relaxation(
+def uzawa_block_relaxation(
     interface: Interface,
     step: Linearised,
     z: Array,
@@ -338,7 +338,9 @@ def block_relaxation(
     residual, forces = np.inf, Multipliers.zero(jump)
     increment: Array = np.zeros(step.x.size)
     way: Array = np.zeros_like(z)
-    stagnation = Stagnation(PATIENCE if parameters.depth > 0 else PATIENCE_PLAIN, PROGRESS)
+    stagnation = Stagnation(
+        STAGNATION_LIMIT if parameters.depth > 0 else STAGNATION_LIMIT_PLAIN, PROGRESS
+    )
     for iteration in range(1, parameters.max_iterations + 1):
         if poll is not None:
             poll()

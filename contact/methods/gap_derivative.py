@@ -15,7 +15,7 @@ import numpy as np
 
 
 @dataclass
-class Following:
+class GapDerivative:
     """Decides from the residuals of the steps; all ranks decide alike.
 
     Attributes
@@ -26,12 +26,12 @@ class Following:
 
     near: float = np.inf
     _limit: float = np.inf
-    _followed: bool = False
+    _included: bool = False
 
     @property
-    def followed(self) -> bool:
+    def included(self) -> bool:
         """Whether the last step has followed psi."""
-        return self._followed
+        return self._included
 
     def worsened(self, residual: float) -> bool:
         """Tell whether the last step has followed psi and made things worse: freeze it then.
@@ -41,11 +41,11 @@ class Following:
         residual
             The largest residual after that step.
         """
-        if not self._followed or residual <= self._limit:
+        if not self._included or residual <= self._limit:
             return False
         # A step with psi frozen may well undo what this one has done: ask for more.
         self._limit *= 0.1
-        self._followed = False
+        self._included = False
         return True
 
     def __call__(self, residual: float, allowed: bool = True) -> bool:
@@ -59,7 +59,7 @@ class Following:
             Whether the solver would follow it.
         """
         self.worsened(residual)
-        self._followed = allowed and residual <= min(self.near, self._limit)
-        if self._followed:
+        self._included = allowed and residual <= min(self.near, self._limit)
+        if self._included:
             self._limit = residual
-        return self._followed
+        return self._included

@@ -17,7 +17,11 @@ from contact.mesh.entities import component_sums
 from contact.problem.kkt import residual_forces
 from contact.problem.problem import ContactProblem
 from contact.problem.protocols import Problem
-from contact.problem.rigid_modes import held_at_rest, held_by_friction, held_by_supports
+from contact.problem.rigid_modes import (
+    constrained_by_friction,
+    constrained_by_supports,
+    constrained_undeformed,
+)
 from contact.tolerances import EPS
 from contact.typing import Array
 
@@ -26,7 +30,7 @@ STUCK = 10.0
 
 
 @dataclass
-class Restraint:
+class RigidBodyModes:
     """What restrains the rigid-body modes; found out when it is first asked. Collective.
 
     Parameters
@@ -38,31 +42,31 @@ class Restraint:
     problem: ContactProblem
 
     @cached_property
-    def complete(self) -> bool:
+    def constrained_by_supports(self) -> bool:
         """Whether supports hold all bodies without contact."""
-        return held_by_supports(self.problem)
+        return constrained_by_supports(self.problem)
 
     @cached_property
-    def at_rest(self) -> bool:
+    def constrained_undeformed(self) -> bool:
         """Whether supports, and contact where it touches in the reference configuration, do."""
-        return held_at_rest(self.problem)
+        return constrained_undeformed(self.problem)
 
     @cached_property
-    def by_friction(self) -> bool:
+    def friction_alone(self) -> bool:
         """Whether a rigid-body mode is restrained by friction alone."""
-        return self.problem.frictional and held_by_friction(self.problem)
+        return self.problem.frictional and constrained_by_friction(self.problem)
 
     def stuck_bound(self) -> Array | None:
         """Return friction bounds that no load exceeds, shape (n,) (stress). Collective.
 
         None where supports and the foundation restrain all modes without friction.
         """
-        if not self.by_friction:
+        if not self.friction_alone:
             return None
         problem = self.problem
         weight = problem.interface.jump.weight
         loads = _loads(problem)
-        borne, total = float(loads[_loose(problem)].sum()), float(loads.sum())
+        borne, total = float(loads[_without_supports(problem)].sum()), float(loads.sum())
         # Loads on another body need not be borne, but where a body is squeezed by it alone.
         return np.full_like(weight, STUCK * (borne if borne > EPS * total else total)) / weight
 
@@ -74,18 +78,16 @@ def all_loads(problem: Problem) -> float:
 
 def _loads(problem: Problem) -> Array:
     """Return these sums of each piece of the body, shape (k,). Collective."""
-    body, shares = problem.equilibrium, problem.equilibrium.shares
+    body, of = problem.equilibrium, problem.equilibrium.component_norms
     residual = residual_forces(problem, problem.start())
-    forces = np.abs(body.unbalanced(residual)) * shares.mechanical
-    own = np.repeat(shares.component, body.block_size)
-    found = component_sums(body.comm, own, forces[: body.owned], shares.count)
-    return found + np.bincount(shares.behind, forces[body.owned :], shares.count)
+    forces = np.abs(body.unbalanced(residual)) * of.mechanical
+    own = np.repeat(of.component, body.block_size)
+    found = component_sums(body.comm, own, forces[: body.owned], of.count)
+    return found + np.bincount(of.behind, forces[body.owned :], of.count)
 
 
-def _loose(problem: ContactProblem) -> NDArray[np.bool_]:
+def _without_supports(problem: ContactProblem) -> NDArray[np.bool_]:
     """Return which pieces no support holds anywhere, shape (k,). Collective."""
-    body, shares = problem.equilibrium, problem.equilibrium.shares
+    body, of = problem.equilibrium, problem.equilibrium.component_norms
     supported = ~body.unsupported[:, : body.dim].all(axis=1)
-    return (
-        component_sums(problem.comm, shares.component, supported.astype(float), shares.count) == 0
-    )
+    return component_sums(problem.comm, of.component, supported.astype(float), of.count) == 0

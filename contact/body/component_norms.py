@@ -21,7 +21,7 @@ from contact.typing import Array
 
 
 @dataclass(frozen=True)
-class Shares:
+class ComponentNorms:
     """The forces, and the charges, of each of k connected components.
 
     Components count as one where something that moves freely joins them: a plate, a foundation,
@@ -57,11 +57,11 @@ class Shares:
         nodal = np.tile(np.arange(self.block_size) < self.dim, self.component.size)
         return np.concatenate([nodal, self.global_mechanical])
 
-    def at(self, nodes: NDArray[np.int32]) -> Shares:
+    def at(self, nodes: NDArray[np.int32]) -> ComponentNorms:
         """Return those of some owned nodes alone."""
         none = np.zeros(0, dtype=np.intp)
         component = self.component[nodes]
-        return Shares(
+        return ComponentNorms(
             self.comm, component, none, self.count, self.block_size, self.dim, none.astype(bool)
         )
 
@@ -99,12 +99,12 @@ class Shares:
         return np.where(self.mechanical, sizes[0, component], sizes[-1, component])
 
 
-def shares_of(
+def component_norms_of(
     domain: Domain,
     space: fem.FunctionSpace,
     global_unknowns: GlobalUnknowns,
     components: tuple[NDArray[np.int32], int],
-) -> Shares:
+) -> ComponentNorms:
     """Return which forces of a body of given components are compared. Collective."""
     (component, count), members, d = components, global_unknowns.members, domain.dim
     if count > 1 and members:
@@ -122,7 +122,7 @@ def shares_of(
         of_members = np.zeros(len(members), dtype=np.intp)
     behind = np.repeat(of_members, [member.free.size for member in members]).astype(np.intp)
     block_size = space.dofmap.index_map_bs
-    return Shares(
+    return ComponentNorms(
         domain.comm,
         component.astype(np.intp),
         behind,
