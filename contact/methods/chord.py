@@ -95,7 +95,7 @@ class Chord:
             rate = reached / last
             left = np.log(self._goal / reached) / np.log(rate) if rate < 1 else np.inf
             self._slow += self._keeps and rate > FAST
-            # What other loads have taken tells what the next ones will.
+            # The steps that earlier loads took are the estimate for the next ones.
             tired = self._first and self._slow > self._worth / 2
             keep = bool(left <= self._worth and reached <= FAR) and not tired
         self._first = before is None
@@ -145,7 +145,7 @@ def least_squares(gram: Array, load: Array) -> Array:
     """Solve the normal equations of directions of length 1.
 
     Combinations that change the residual less than a millionth of their length are left out:
-    what they do is rounding, as where a body moves that touches nothing.
+    they act by rounding, as where a body moves that touches nothing.
     """
     values, vectors = np.linalg.eigh(gram)
     kept = values > 1e-12

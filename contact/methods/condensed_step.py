@@ -30,7 +30,7 @@ from contact.typing import Array
 CONTACT_PART = 1e-3
 
 #: Equilibrium residual below which the tangent replaces the secant of a condensed body. Where
-#: contact is solved exactly in each step, the tangent does not fear what it changes.
+#: contact is solved exactly in each step, the tangent does not overshoot for its sake.
 SECANT_UNTIL = 0.3
 
 #: Most dense steps in one solve of the condensed contact problem.
@@ -51,13 +51,13 @@ class CondensedStep:
     condensation
         Condenses the body of the whole problem.
     options, parameters
-        What is chosen for the whole problem.
+        Those of the whole problem.
     solve
         Solves a contact problem at its own nodes.
     history
         Of the whole problem: it is asked whether the solve is to end.
     counters
-        Where the dense solves are counted.
+        Where solves of the condensed problem are counted.
     fallbacks
         Notes of records that tell of a fallback.
     """
@@ -86,12 +86,12 @@ class CondensedStep:
         self._history = history
 
     def forget(self) -> None:
-        """Begin another solve: what is factorised remains where it may be kept across solves."""
+        """Begin another solve; keep the factorisation if that is allowed across solves."""
         if self.options.keep != "across":
             self._chord.forget()
 
     def begin(self) -> None:
-        """Begin another loop; what is factorised remains."""
+        """Begin another loop with the same factorisation."""
         self._chord.begin()
 
     def __call__(self, iterate: Iterate, tangent: bool, reached: KKT) -> Taken | None:

@@ -75,7 +75,7 @@ class Step:
 
 
 class Cones:
-    """A point strictly inside all cones, those of this rank; what is told of all is collective.
+    """A point strictly inside all cones, those of this rank; sums over all cones are collective.
 
     Parameters
     ----------
@@ -148,7 +148,7 @@ class Cones:
         self._size = np.sqrt(roots[0] * roots[1])  # root of the determinant of lambda
 
     def stiffness(self) -> tuple[Array, Array]:
-        """Return what the cones add to the stiffness, shapes (n,) and (k, t, t).
+        """Return the stiffness that the cones add, shapes (n,) and (k, t, t).
 
         That is force/slack, and W^-2 with t eliminated: soft along the slip, stiff across it.
         """

@@ -1,7 +1,7 @@
 """Continuation in the conductivity of the foundation.
 
 A foundation that conducts well across a gap pins the potential of a node where it comes near and
-lets it go where it leaves, so that the body bends to and fro from step to step. Where it conducts
+lets it go where it leaves, so that the active set cycles. Where it conducts
 little, the problem is nearly one of contact alone; from there the solutions are followed up to its
 k_e, each one the initial guess of the next.
 
@@ -17,10 +17,10 @@ from collections.abc import Callable
 from contact.methods.newton_step import Iterate
 from contact.methods.report import Outcome
 
-#: What the history says of its steps.
+#: Note of its steps in the history.
 CONTINUATION = "continuation"
 
-#: Part of the conductivity that is nearly none, and by what a part grows: first, and at least.
+#: Smallest part of the conductivity, and the factor by which it grows: first, and at least.
 FIRST_PART, FACTOR, LEAST_FACTOR = 1e-9, 1e3, 1.2
 
 #: From here on it is the whole.

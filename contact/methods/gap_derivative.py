@@ -1,10 +1,10 @@
-"""When a solver follows the conductivity's dependence on the gap, and when it freezes it.
+"""The derivative of the conductivity by the gap: whether a linearisation includes it.
 
-Followed, the charge psi(u_nu - rho) phi_L(phi - phi_F) converges fast even where the ramp psi is
-steep. But where a node that opens draws less current and thus opens further, the linearised
-charge may point back to the foundation, where the node cannot stay: it is pulled there. Such a
-step is taken back and forth for ever. With psi frozen from step to step the node opens to the
-other end of the ramp.
+With it, the charge psi(u_nu - rho) phi_L(phi - phi_F) is linearised consistently, and converges
+fast even where the ramp psi is steep. But where a node that opens draws less current and thus opens
+further, the linearised charge may point back to the foundation, where the node is under tension:
+the active set cycles. Without the derivative (psi frozen, Picard) the node opens to the other end
+of the ramp.
 """
 
 from __future__ import annotations
@@ -16,12 +16,12 @@ import numpy as np
 
 @dataclass
 class GapDerivative:
-    """Decides from the residuals of the steps; all ranks decide alike.
+    """Decides by the residuals whether a step includes the derivative; alike on all ranks.
 
     Attributes
     ----------
     near
-        Residual from which on psi may be followed at all.
+        Largest residual at which the derivative may be included at all.
     """
 
     near: float = np.inf
@@ -30,11 +30,11 @@ class GapDerivative:
 
     @property
     def included(self) -> bool:
-        """Whether the last step has followed psi."""
+        """Whether the last step has included the derivative."""
         return self._included
 
     def worsened(self, residual: float) -> bool:
-        """Tell whether the last step has followed psi and made things worse: freeze it then.
+        """Tell whether the last step included the derivative and has raised the residual.
 
         Parameters
         ----------
@@ -43,20 +43,20 @@ class GapDerivative:
         """
         if not self._included or residual <= self._limit:
             return False
-        # A step with psi frozen may well undo what this one has done: ask for more.
+        # The next step, with psi frozen, may only undo this one: ask for a smaller residual.
         self._limit *= 0.1
         self._included = False
         return True
 
     def __call__(self, residual: float, allowed: bool = True) -> bool:
-        """Tell whether the next step is to follow psi.
+        """Tell whether the next step is to include the derivative.
 
         Parameters
         ----------
         residual
             The largest residual before that step.
         allowed
-            Whether the solver would follow it.
+            Whether the solver would include it.
         """
         self.worsened(residual)
         self._included = allowed and residual <= min(self.near, self._limit)

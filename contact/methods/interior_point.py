@@ -37,7 +37,7 @@ from contact.problem.protocols import Problem
 from contact.problem.state import State
 from contact.tolerances import EPS
 
-#: What the history says of its steps.
+#: Note of its steps in the history.
 INTERIOR_POINT = "interior point"
 
 #: Steps of one convex problem at most, and convex problems with one friction bound after the other.
@@ -47,19 +47,20 @@ LIMIT, UPDATES = 60, 8
 #: that the next problem is solved to where they were not, and where no solver tells more.
 CLOSED, CLOSER, VANISHED = 1e-10, 1e-2, 1e-20
 
-#: Forces out of balance then. Where an iterative solver leaves more, the slacks vanish beneath what
-#: it can tell long before: Newton's method, whose right-hand sides are what is left, does better.
+#: Residual of equilibrium then. Where an iterative solver leaves more, the slacks vanish beneath
+#: its tolerance long before: Newton's method, whose right-hand sides are residuals, does better.
 BALANCED = 1e-4
 
-#: What an iterative solver leaves of the forces out of balance: the next step sees what is left. A
-#: hundredth of that takes as many steps, and a third to a half more iterations.
+#: Forcing term of inexact Newton: relative residual of an iterative solve. With a hundredth of that
+#: there are as many steps, and a third to a half more iterations.
 FORCING = 1e-4
 
 #: Work at the start, over that of the loads in the way that the foundation bars.
 SHARE = 1e-2
 
-#: The same for a body that nothing but contact holds, over what the loads do in the mean gap.
-LOOSE = 0.1
+#: The same for a body with rigid-body modes that contact alone constrains, over the work of the
+#: loads in the mean gap.
+SHARE_UNSUPPORTED = 0.1
 
 #: Parts of the way to the rim of a cone that a step takes.
 SHORTEST, LONGEST = 0.9, 0.999
@@ -76,7 +77,7 @@ def interior_point(
     Parameters
     ----------
     search
-        The problem, and what has been met of it.
+        The problem, its best iterate and the number of steps left.
     whole
         Has the operator of the body, with blocks at its contact nodes.
     modes
@@ -147,7 +148,7 @@ class InteriorPoint:
         else:
             total = total or block * jump.maximum(np.abs(opening))
             least = self._sum(float(np.maximum(gap, 0.0).sum())) / count + total / block
-            work = LOOSE * total * least / count
+            work = SHARE_UNSUPPORTED * total * least / count
         # Where the body would lift off, the slack is that from the beginning.
         slack = np.maximum(np.maximum(gap, opening), least)
         frictional = self._frictional
@@ -194,7 +195,7 @@ class InteriorPoint:
         return replace(self._state, forces=Multipliers.of(jump, pressure, friction))
 
     def gap(self) -> float:
-        """Return what slacks times forces are beside the work of loads and contact. Collective."""
+        """Return slacks times forces, over the work of loads and contact. Collective."""
         body, interface, x = self.problem.equilibrium, self.problem.interface, self._state.x
         jump, cones, nodal = interface.jump, self.cones, interface.jump.apply(x)
         ways = np.abs(jump.gap) + np.abs(jump.normal_component(nodal))

@@ -163,7 +163,7 @@ class Ending:
 
 @contextmanager
 def signals_held(timeout: float = math.inf) -> Iterator[list[int]]:
-    """Let signals wait: what is being done must not be left half done.
+    """Let signals wait until the end of the block, which must not be left half done.
 
     Parameters
     ----------

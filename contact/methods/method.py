@@ -25,7 +25,7 @@ class Method(Protocol):
 
     @property
     def options(self) -> Any:
-        """What it was told; `allowed` among it, how large each residual may be at the end."""
+        """Its options; `allowed` among them, the tolerance of each residual."""
 
     @property
     def history(self) -> History:
@@ -37,16 +37,21 @@ class Method(Protocol):
 
     @property
     def state(self) -> State:
-        """What the last outer iteration has left, for a solve that is ended by a signal."""
+        """The state after the last outer iteration, for a solve that is ended by a signal."""
 
     def turn_to(self, problem: ContactProblem) -> None:
         """Go on with another step of the same problem, with a history of its own.
 
-        What has been factorised is kept: the body is the same.
+        Factorisations are kept: the body is the same.
         """
 
     def solve(self, start: State | None = None) -> tuple[State, Outcome]:
-        """Iterate until convergence or a limit; from rest by default. Collective.
+        """Iterate until convergence or a limit. Collective.
+
+        Parameters
+        ----------
+        start
+            Initial guess; zero by default.
 
         Raises
         ------

@@ -66,11 +66,11 @@ FALLBACKS = CONTINUATION, INTERIOR_POINT
 #: Stagnation limit of Newton's steps after a fallback.
 SHORT = 4
 
-#: What counts as progress of a step.
+#: Part of the least residual below which a step is progress.
 PROGRESS = 0.5
 
-#: Why an iteration that is give_up ends.
-SOFTER = "the body is far softer than a block"
+#: Why an iteration ends whose complementarity parameter overestimates the stiffness.
+OVERESTIMATED = "the complementarity parameter is far above the stiffness of the body"
 
 
 @dataclass
@@ -124,7 +124,7 @@ class Newton:
             )
 
     def turn_to(self, problem: Problem) -> None:
-        """Go on with another step of the same problem; what is factorised remains."""
+        """Go on with another step of the same problem; factorisations remain."""
         self.problem = self.whole.problem = problem
         self.history = History(self.monitor)
         if isinstance(problem, ContactProblem):
@@ -162,8 +162,8 @@ class Newton:
         """Return an iterate at a given state."""
         interface, c = self.problem.interface, self._parameters.c
         nodal = interface.jump.apply(start.x)
-        # What is left of a pressure where a node is open would give it a friction bound: one of
-        # the size of rounding, with friction of any direction, on which the node would stick.
+        # A remainder of pressure where a node is open would give it a friction bound: one of the
+        # size of rounding, with friction of any direction, on which the node would stick.
         closed = touching(start.forces.pressure, interface.opening(nodal), c)
         pressure = np.where(closed, start.forces.pressure, 0.0)
         forces = Multipliers.of(interface.jump, pressure, start.forces.friction)
@@ -216,7 +216,7 @@ class Newton:
         return iterate, outcome
 
     def _undeformed(self) -> tuple[Iterate, Outcome] | None:
-        """Return the body at rest where nothing is left that acts on it. Collective."""
+        """Return zero displacement where that is in equilibrium. Collective."""
         found = undeformed_equilibrium(self.problem)
         if found is None:
             return None
@@ -242,7 +242,7 @@ class Newton:
         return continuation(solve, Iterate(problem.start()))
 
     def finished(self, state: State) -> tuple[Iterate, Outcome]:
-        """Take Newton's last steps from what a fallback has left. Collective."""
+        """Take Newton's last steps from the state that a fallback has reached. Collective."""
         return self.whole_loop(SHORT).run(self.started(state), INTERIOR_POINT)
 
     def whole_loop(self, stagnation_limit: int | None = None) -> NewtonLoop:
@@ -288,7 +288,7 @@ class NewtonLoop:
     stagnation_limit
         Stagnation limit; that of the options by default.
     give_up
-        Asked after the first step from rest whether to give up at once; None to go on.
+        Asked after the first step from the zero initial guess whether to give up; None to go on.
     """
 
     search: Search
@@ -340,13 +340,13 @@ class NewtonLoop:
             if residuals.significant <= options.tolerance:
                 return iterate, self._end(residuals)
             if self.give_up is not None and kept.active_set is None and self.give_up(iterate.state):
-                return iterate, self._end(residuals, SOFTER)
+                return iterate, self._end(residuals, OVERESTIMATED)
             if not np.isfinite(residuals.significant):
                 return iterate, self._end(residuals, "Newton's method diverged")
             if not linear:
                 falls = residuals.equilibrium < max(before.equilibrium, options.tolerance)
                 near = residuals.equilibrium < self.secant_until
-                # The energy falls along a step that is lengthened, where residuals may rise.
+                # The energy falls along a step of the line search, where residuals may rise.
                 tangent = taken.searched or (near and (falls or not tangent))
             if stagnation(residuals.significant):
                 ended = f"Newton's method stalled at {stagnation.best:.1e}"

@@ -30,30 +30,31 @@ from contact.problem.protocols import Problem
 from contact.problem.state import State
 from contact.typing import Array
 
-#: Residual from which on the foundation's conductivity is followed although nodes still change
-#: their status: far away, its derivative belongs to nodes that will not be where they are.
+#: Residual below which the conductivity is linearised by the gap too although the active set still
+#: changes: far away, that derivative belongs to nodes that will not be where they are.
 NEAR = 0.05
 
-#: What an iterative solver leaves of a step's residual: more digits last longer than the steps that
-#: they save. A goal that depended on the residuals would ask for more digits on finer meshes, whose
-#: residuals pass through more values between the first and the last.
+#: Forcing term of inexact Newton: more digits last longer than the steps that they save. One that
+#: depended on the residuals would ask for more digits on finer meshes, whose residuals pass through
+#: more values between the first and the last.
 FORCING = 1e-2
 
-#: Steps in a row that come no nearer after which it leaves a hundredth of that: what two digits
-#: leave at contact nodes can make them change to and fro for ever. And the least that it leaves.
+#: Steps in a row without progress after which the forcing term becomes a hundredth of itself: with
+#: two digits the active set may cycle. And its least value.
 STAGNANT, LEAST = 3, 1e-8
 
-#: Stiffness of the springs that help to hold loose bodies, over a node's own and the residual.
+#: Levenberg-Marquardt regularisation of underconstrained bodies, over a node's stiffness and the
+#: residual.
 REGULARISATION = 1e-2
 
 #: Equilibrium residual over the largest one below which the material is left as it was linearised
-#: last: contact and friction are what is wrong.
+#: last: the error is in contact and friction.
 SMALL = 0.1
 
 
 @dataclass(frozen=True)
 class Iterate:
-    """A state, and what the next step takes from the one that led to it.
+    """A state, with the active set and the layer's pressure of the step that led to it.
 
     Attributes
     ----------
@@ -79,7 +80,7 @@ class Taken:
     iterate
         Where it led.
     note
-        What was special about it.
+        Its kind in the history, empty for a plain step.
     searched
         Whether it has gone on to where the energy is least along it.
     inner
@@ -120,7 +121,7 @@ class Search:
         return self.options.max_outer - len(self.history.records)
 
     def see(self, iterate: Iterate, residuals: KKT) -> None:
-        """Remember an iterate."""
+        """Take note of an iterate."""
         self.at = iterate
         self.best.see(iterate, residuals.significant)
 
@@ -129,7 +130,7 @@ class Step(Protocol):
     """A step of Newton's method."""
 
     gap_derivative: GapDerivative
-    #: What is said where a step cannot be taken.
+    #: Why a step could not be taken, in words.
     fault: str
 
     def begin(self) -> None:
@@ -155,18 +156,18 @@ class NewtonStep:
     Parameters
     ----------
     problem, options, parameters
-        The problem, and what is chosen for it.
+        The problem, the options and the complementarity parameters.
     counters
         Where factorisations and solves are counted.
     underconstrained
-        Whether contact alone holds a body, and not where it touches at rest. There it touches at
-        a single node, say, and rolls or slides off by any length until it touches at more. As
-        Levenberg and Marquardt have it, soft springs at all contact nodes keep it from that while
-        nodes change their status; what they bear is left to the next step, and they become softer
-        as the residual falls.
+        Whether a rigid-body mode is constrained by contact alone, and not by the nodes that touch
+        in the reference configuration. A body that touches at a single node, say, rolls or slides
+        off by any length until it touches at more. A Levenberg-Marquardt regularisation at all
+        contact nodes prevents that while the active set changes; its forces are left to the next
+        step, and it decreases with the residual.
     """
 
-    fault = "nothing holds the body that far from rest"
+    fault = "no contact constrains the body at that displacement"
 
     def __init__(
         self,
@@ -192,8 +193,8 @@ class NewtonStep:
         """Forget the operator after a solve that failed: MUMPS does not begin anew after that."""
         self._kind, self._operator = "", None
 
-    def _leaves(self, reached: float) -> float:
-        """Return what an iterative solver leaves of a step's residual, given where that starts."""
+    def _forcing_term(self, reached: float) -> float:
+        """Return the forcing term of a step, given the residual before it."""
         self._stagnant = 0 if reached < self._nearest else self._stagnant + 1
         self._nearest = min(self._nearest, reached)
         if self._stagnant >= STAGNANT:
@@ -248,19 +249,19 @@ class NewtonStep:
         residual = residual_forces(self.problem, here)
         jump.transpose((jump.weight * shift)[:, None] * jump.normal, residual)
         try:
-            increment = self.operator.solve(-residual, self._leaves(reached.significant))
+            increment = self.operator.solve(-residual, self._forcing_term(reached.significant))
         except SingularError:
             if body.linear or iterate.active_set is None:
                 raise
             self.renew()
-            return None  # at rest something has held it: it has been moved too far
+            return None  # the first step was possible: it has been moved too far since
         moved = jump.apply(increment)
         change = np.einsum("nij,nj->ni", contact.blocks, moved)
         vectors = contact.forces.vectors(jump) + change[:, : interface.dim]
         forces = Multipliers.of(jump, jump.normal_component(vectors), vectors)
         pressed = jump.normal_component(np.einsum("nij,nj->ni", layer, moved))
         known = interface.law.layer_pressure(nodal) + shift + pressed
-        # What follows a rigid part that has flown far and comes back follows it but for rounding.
+        # Nodes of a rigid part that has moved far and comes back follow it but for rounding.
         x = body.prescribe(body.moved(state.x, increment), state.time)
         new = replace(state, x=x, forces=forces)
         return Taken(Iterate(new, contact.active_set, known))

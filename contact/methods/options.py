@@ -1,4 +1,4 @@
-"""What the methods are told: tolerances, limits and parameters.
+"""Options of the methods: tolerances, limits and parameters.
 
 Each setting is stated here alone, see `contact.settings`: the case file's `[solver]` is one of
 these classes, by its method.
@@ -21,7 +21,7 @@ from contact.tolerances import LARGEST_VIOLATION
 
 @dataclass(frozen=True, kw_only=True)
 class Options:
-    """What every method is told.
+    """Options that every method has.
 
     Attributes
     ----------
@@ -55,7 +55,7 @@ class Options:
 
 @dataclass(frozen=True, kw_only=True)
 class LoopOptions(Options):
-    """What the methods with an inner and an outer loop are told.
+    """Options of methods with an inner and an outer loop.
 
     Attributes
     ----------
@@ -160,10 +160,10 @@ class NewtonOptions(Options):
     ----------
     nested
         `true`: solve on coarser meshes first and start from there. Default: where that saves time
-        and there are coarser meshes: in space from 40000 unknowns on, in the plane from 100000 on
+        and there are coarser meshes: in 3-D from 40000 unknowns on, in 2-D from 100000 on
         if the material yields.
     nested_levels
-        Number of nested meshes. Default: all that save time.
+        Number of coarser meshes. Default: all that save time.
     max_iterations
         Number of steps allowed in each stage.
     gamma

@@ -12,9 +12,9 @@ from contact.problem.kkt import residual_forces
 from contact.problem.protocols import Problem, Scales
 from contact.problem.state import State
 
-#: Forces that c makes of the first penetration, over the loads, from which on the body is far
-#: softer than the block that c is the stiffness of. Of a block they are some sqrt(H/h).
-SOFT = 1e3
+#: Forces that c makes of the first penetration, over the loads, from which on c overestimates the
+#: stiffness of the body. Of a block, whose stiffness c is, they are some sqrt(H/h).
+OVERESTIMATE = 1e3
 
 
 def automatic_r(scales: Scales) -> float:
@@ -40,15 +40,15 @@ def complementarity_parameters(scales: Scales, gamma: float) -> ComplementarityP
 def overestimates_stiffness(
     problem: Problem, parameters: ComplementarityParameters, state: State
 ) -> bool:
-    """Tell whether a body is far softer than its parameters, by a first state. Collective.
+    """Tell whether c is far above the stiffness of a body, by its first state. Collective.
 
-    It is where they make far more of a penetration than any load, also of what is rigid. Where
-    nothing but a given motion of the foundation acts, there is no load to tell by.
+    It is where c times the penetration is far above all loads, those on global unknowns included.
+    Where nothing but a given motion of the foundation acts, there is no load to compare with.
     """
     interface = problem.interface
     penetration = np.maximum(-interface.opening(interface.jump.apply(state.x)), 0.0)
     foreseen = parameters.c * interface.jump.sum(penetration)
     forces = np.abs(residual_forces(problem, problem.start()))
-    on_nodes, on_masters = np.split(forces, [problem.equilibrium.owned])
-    loads = interface.comm.allreduce(float(on_nodes.sum()), op=MPI.SUM) + on_masters.sum()
-    return bool(foreseen > SOFT * loads > 0)
+    on_nodes, on_global = np.split(forces, [problem.equilibrium.owned])
+    loads = interface.comm.allreduce(float(on_nodes.sum()), op=MPI.SUM) + on_global.sum()
+    return bool(foreseen > OVERESTIMATE * loads > 0)

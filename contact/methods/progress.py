@@ -13,7 +13,7 @@ from contact.problem.state import State
 
 T = TypeVar("T")
 
-#: Residuals at rest that are rounding.
+#: Residuals of zero displacement that are rounding.
 ROUNDING = 1e-13
 
 
@@ -31,7 +31,7 @@ class Best(Generic[T]):
     _least: float = np.inf
 
     def see(self, iterate: T, residual: float) -> None:
-        """Remember an iterate, if its residual is the least. No number is no residual."""
+        """Keep an iterate if its residual is the least; NaN is no residual."""
         if residual < self._least:
             self.found, self._least = iterate, residual
 
@@ -45,9 +45,9 @@ class Stagnation:
     limit
         Steps without progress after which the iteration is given up.
     progress
-        What counts as progress: a measure below this part of the best one.
+        A measure below this part of the best one is progress.
     together
-        Whether steps make progress together too: what counts is the best measure at the last
+        Whether steps make progress together too: the reference is the best measure at the last
         progress, not that of the step before. Where steps are to halve the measure, ones that
         take a fifth of it each would be given up else.
     best
@@ -67,7 +67,7 @@ class Stagnation:
         Parameters
         ----------
         measure
-            What is to become small.
+            The residual, or another number that is to vanish.
         limit
             In place of that of all steps.
         """
@@ -80,7 +80,7 @@ class Stagnation:
 
 
 def undeformed_equilibrium(problem: Problem) -> tuple[State, KKT] | None:
-    """Return the body at rest with its residuals, where it is in equilibrium. Collective.
+    """Return zero displacement and its residuals, where it is in equilibrium. Collective.
 
     Beside forces that vanish no residual is small, and only those that are 0 have none: a method
     that comes nearer and nearer to them never ends. Asked where a method has failed: a body that

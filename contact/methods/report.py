@@ -1,4 +1,4 @@
-"""What a solver tells while it works and when it is done."""
+"""Reports of a solver: a record of each iteration, and the outcome."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ class Record:
     seconds
         Since the start of the solve.
     note
-        What was special about it, for instance "tangent".
+        Its kind where it is no plain one, for instance "tangent".
     sizes
         Numbers of nodes that are open, stick and slip after it; None where nothing is known.
     steps
@@ -159,7 +159,7 @@ class Outcome:
     allowed
         How large each of them may be.
     ended
-        Why the method ended, in words; nothing where it met what is allowed.
+        Why the method ended, in words; nothing where it has converged.
     signal
         Number of the signal that ended it; 0 for none.
     """
@@ -171,12 +171,12 @@ class Outcome:
 
     @property
     def converged(self) -> bool:
-        """Whether every residual is within what is allowed, and nothing has interrupted."""
+        """Whether every residual is within its tolerance, and no signal has interrupted."""
         return not self.signal and not self.kkt.excess(self.allowed)
 
     @property
     def reason(self) -> str:
-        """Why the method ended and what the residuals say of it, in words."""
+        """Why the method ended, and its residuals, in words."""
         if self.signal:
             return self.ended
         excess = self.kkt.excess(self.allowed)

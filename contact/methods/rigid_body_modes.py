@@ -1,8 +1,8 @@
-"""How supports, contact and friction restrain the rigid-body modes of a problem's bodies.
+"""Rigid-body modes of a problem's bodies: constrained by supports, by contact or by friction alone.
 
-Where friction alone keeps a body from sliding, a method cannot begin without friction, nor with the
-bound of pressures that are not known yet: the body would slide away. All that touches is first
-taken for sticking.
+Where friction alone constrains a mode, a method cannot begin without friction, nor with the bound
+of pressures that are not known yet: the linear system would be singular. All nodes in contact are
+first taken for sticking.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ STUCK = 10.0
 
 @dataclass
 class RigidBodyModes:
-    """What restrains the rigid-body modes; found out when it is first asked. Collective.
+    """How the rigid-body modes are constrained; computed when first asked for. Collective.
 
     Parameters
     ----------
@@ -43,7 +43,7 @@ class RigidBodyModes:
 
     @cached_property
     def constrained_by_supports(self) -> bool:
-        """Whether supports hold all bodies without contact."""
+        """Whether the supports constrain all modes without contact."""
         return constrained_by_supports(self.problem)
 
     @cached_property
@@ -53,7 +53,7 @@ class RigidBodyModes:
 
     @cached_property
     def friction_alone(self) -> bool:
-        """Whether a rigid-body mode is restrained by friction alone."""
+        """Whether a mode is constrained by friction alone."""
         return self.problem.frictional and constrained_by_friction(self.problem)
 
     def stuck_bound(self) -> Array | None:
@@ -72,12 +72,12 @@ class RigidBodyModes:
 
 
 def all_loads(problem: Problem) -> float:
-    """Return the sum of all forces that act at rest, without regard to sign. Collective."""
+    """Return the sum of the magnitudes of all loads at zero displacement. Collective."""
     return float(_loads(problem).sum())
 
 
 def _loads(problem: Problem) -> Array:
-    """Return these sums of each piece of the body, shape (k,). Collective."""
+    """Return these sums of each connected component, shape (k,). Collective."""
     body, of = problem.equilibrium, problem.equilibrium.component_norms
     residual = residual_forces(problem, problem.start())
     forces = np.abs(body.unbalanced(residual)) * of.mechanical
@@ -87,7 +87,7 @@ def _loads(problem: Problem) -> Array:
 
 
 def _without_supports(problem: ContactProblem) -> NDArray[np.bool_]:
-    """Return which pieces no support holds anywhere, shape (k,). Collective."""
+    """Return which connected components have no support at all, shape (k,). Collective."""
     body, of = problem.equilibrium, problem.equilibrium.component_norms
     supported = ~body.unsupported[:, : body.dim].all(axis=1)
     return component_sums(problem.comm, of.component, supported.astype(float), of.count) == 0

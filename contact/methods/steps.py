@@ -1,8 +1,8 @@
-"""Quasi-static evolution: one step after the other, with friction that remembers.
+"""Quasi-static load stepping with incremental friction.
 
 A step is a static problem with the loads of its end and the history of the last step's. It
 starts from a prediction, and a method that has factorised a linear body does not do so again. A
-step that fails is halved; what has been reached stays.
+step that fails is halved; the steps before it stay.
 """
 
 from __future__ import annotations
@@ -73,7 +73,7 @@ class Evolution:
     method
         Solves one step after the other.
     start
-        State to go on from: that of an earlier step. From rest by default.
+        State to go on from: that of an earlier step. The reference configuration by default.
     before
         The state of the step before it, for the prediction.
     """
@@ -97,7 +97,7 @@ class Evolution:
         times
             Ends of the steps, increasing. Those that the start has passed are left out.
         begin
-            Time at rest.
+            Time of the reference configuration.
 
         Raises
         ------
@@ -118,7 +118,7 @@ class Evolution:
                     return
 
     def _step(self, now: float, end: float, whole: float) -> LoadStep:
-        """Take a step: of what is left to its end the whole, or a half, a quarter ... of it all.
+        """Take a step: all of the way to its end, or a half, a quarter ... of it.
 
         Where contact alone holds the body, loads that let it go are not tried.
         """
@@ -195,7 +195,7 @@ def check_gaps(problem: ContactProblem, times: Sequence[float]) -> None:
 def solve_step(
     problem: ContactProblem, method: Method, start: State | None
 ) -> tuple[State, Outcome]:
-    """Solve by a method, and measure what that has left. Collective."""
+    """Solve by a method, and evaluate the residuals once more. Collective."""
     try:
         state, outcome = method.solve(start)
     except Interrupted as interrupt:
@@ -205,7 +205,7 @@ def solve_step(
 
 
 def measured(problem: ContactProblem, state: State, outcome: Outcome) -> tuple[State, Outcome]:
-    """Measure what a method has left, and return it as a state of the problem. Collective.
+    """Evaluate the residuals of a method's state, as one of the problem. Collective.
 
     From scratch and at the whole load, whatever the method says and wherever it has stopped.
     """
@@ -230,7 +230,7 @@ def after(problem: ContactProblem, state: State, time: float) -> ContactProblem:
 
 
 def since(now: Counters, before: Counters) -> Counters:
-    """Return what has been counted since."""
+    """Return the counts since an earlier moment."""
     return Counters(**{name: count - vars(before)[name] for name, count in vars(now).items()})
 
 
@@ -240,7 +240,7 @@ FARTHEST = 2.0
 
 @dataclass(frozen=True)
 class Reached:
-    """A solution, and what has led there.
+    """A solution, with the method and the counts that led to it.
 
     Attributes
     ----------

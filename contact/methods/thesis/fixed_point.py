@@ -1,16 +1,16 @@
 """The outer loop of Algorithms 1, 4, 6 and 8.
 
-Each iteration freezes what makes the problem nonlinear (secant modulus, friction bound, what
-the foundation answers), solves the frozen problem by Uzawa block relaxation and updates. Elastic
-and piezoelectric bodies, rigid and compliant foundations differ in what there is to freeze:
+Each iteration freezes the nonlinear terms (secant modulus, friction bound, layer and current),
+solves the frozen problem by Uzawa block relaxation and updates. Elastic and piezoelectric bodies,
+rigid and compliant foundations differ in the terms that are frozen:
 
 - Algorithm 1, Problem (PV): the secant modulus and the friction bound s_n.
 - Algorithm 4, Problem (P~V): also psi, or all of the charge l where it is lagged.
 - Algorithm 6, Problem (PV2): also h_nu, or all of the layer's force j_1 where it is lagged.
 - Algorithm 8, Problem (PV1): as Algorithm 6 without friction and current.
 
-Their inner Algorithms 2, 5, 7 and 9 are `uzawa.uzawa_block_relaxation`; what differs is
-`Interface.law`. Where it fails, the best iterate is left, by the thesis's rules the last.
+Their inner Algorithms 2, 5, 7 and 9 are `uzawa.uzawa_block_relaxation`, with another
+`Interface.law` each. Where it fails, the best iterate is left, by the thesis's rules the last.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ from contact.typing import Array
 #: Uzawa block relaxation gets no further either.
 STAGNATION_LIMIT, STAGNATION_LIMIT_STALLED, PROGRESS = 25, 3, 0.9
 
-#: What a relaxation that was given up has left, over its tolerance, from which on r does not fit.
+#: Residual of a relaxation that was given up, over its tolerance, from which on r does not fit.
 FAR = 100
 
 #: Residual below which frozen coefficients give way to their derivatives.
@@ -51,8 +51,8 @@ NEAR = 1e-2
 
 #: Why the loop stalls far from a solution though its Uzawa block relaxations converge.
 FROZEN = (
-    "though each frozen problem is solved: what is frozen (the friction bound, which nodes "
-    "conduct, the material) changes to and fro"
+    "though each frozen problem is solved: the frozen terms (friction bound, conducting nodes, "
+    "material) cycle"
 )
 
 
@@ -75,7 +75,7 @@ class FixedPoint:
     Attributes
     ----------
     state
-        What the last outer iteration has left.
+        The state after the last outer iteration.
     """
 
     problem: Problem
@@ -111,7 +111,7 @@ class FixedPoint:
             self._norm = body.l2_norm()
 
     def turn_to(self, problem: Problem) -> None:
-        """Go on with another step of the same problem; what is factorised remains."""
+        """Go on with another step of the same problem; factorisations remain."""
         self.problem, self.state = problem, problem.start()
         self.history = History(self.monitor)
 
@@ -138,7 +138,7 @@ class FixedPoint:
         Parameters
         ----------
         start
-            Where from; from rest by default.
+            Initial guess; zero by default.
         """
         self._forget()
         problem, interface = self.problem, self.problem.interface
@@ -183,7 +183,7 @@ class FixedPoint:
                 # The slip without friction is a bad guess, and so is the contact that goes with it.
                 z = self._about(0.0, friction)
             if self._far and (start := self._fit_to_spectrum(friction)) is not None:
-                # What was found with an r that does not fit is worse than nothing.
+                # A state that was found with an r that does not fit is worse than zero.
                 self.state, secant_at = problem.start(), body.rest()
                 z, bound = self._about(start, friction), begun
                 stagnation, best = Stagnation(STAGNATION_LIMIT, PROGRESS), Best()
@@ -267,7 +267,7 @@ class FixedPoint:
     def _current_block(self, nodal: Array, pressure: Array) -> Array:
         """Linearise the charge: near the solution with psi, which depends on the gap.
 
-        Frozen, a steep ramp costs many iterations there; followed from afar, it overshoots.
+        Frozen, a steep ramp costs many iterations there; its derivative overshoots from afar.
         """
         law = self.problem.interface.law
         if not law.follows_gap or not self._gap_derivative(self._residual):

@@ -2,8 +2,8 @@
 
 The Signorini and Coulomb conditions are replaced by the laws of `contact.interface.penalised`,
 so that the penalised problem (PV_eps) is one nonlinear equation in the displacement. An outer
-iteration freezes the secant modulus of the material and the friction modulus of (4.33); what is
-left of (4.32), the unilateral [u_nu - rho]^+ of the *new* iterate, is solved by SNES as a
+iteration freezes the secant modulus of the material and the friction modulus of (4.33); the rest
+of (4.32), the unilateral [u_nu - rho]^+ of the *new* iterate, is solved by SNES as a
 semismooth equation, with a compliant layer where there is one. An outer count is that of
 Algorithm 3; the inner one counts SNES's iterations.
 
@@ -134,7 +134,7 @@ class PenalisedProblem:
     def solve(
         self, law: NodalLaw, state: State, implicit: bool, poll: Callable[[], None]
     ) -> tuple[Array, int, str]:
-        """Solve from a state; return the unknowns, the iterations and what went wrong.
+        """Solve from a state; return the unknowns, the iterations and the fault, if any.
 
         Before each of them `poll` is called, on all ranks.
 
@@ -194,14 +194,14 @@ class PenalisedProblem:
         closest = jump.maximum(opening, -np.inf)
         if closest >= 0:
             return np.zeros_like(body.owned_part(state.x))
-        spring = (opening >= closest - 1e-9 * interface.size) / self._eps.contact
+        stiffness = (opening >= closest - 1e-9 * interface.size) / self._eps.contact
         n, d = jump.normal.shape
         blocks = np.zeros((n, jump.block_size, jump.block_size))
-        blocks[:, :d, :d] = spring[:, None, None] * outer(jump.normal, jump.normal)
+        blocks[:, :d, :d] = stiffness[:, None, None] * outer(jump.normal, jump.normal)
         blocks[:, :d, :d] += self._law.block(nodal)
         self.operator.update("secant", state, interface.weighted(blocks, state.x))
         rhs = body.external(state.time) - body.internal_forces(state)
-        jump.transpose(-(jump.weight * spring * opening)[:, None] * jump.normal, rhs)
+        jump.transpose(-(jump.weight * stiffness * opening)[:, None] * jump.normal, rhs)
         return self.operator.solve(rhs)
 
     def _unknowns(self, iterate: PETSc.Vec) -> Array:
@@ -244,11 +244,11 @@ class PenalisedProblem:
         self._assembled = True
 
 
-#: What to do about an end without convergence.
+#: Advice at an end without convergence.
 HARDER = "the larger eps_contact and eps_slip, the easier the problem"
 
-#: What is said where the linear system is singular, though the body was held at rest.
-LOST = "the body has been moved to where nothing holds it"
+#: Why a linear system is singular that was not at zero displacement.
+LOST = "the body has been moved to where nothing constrains it"
 
 #: Least part of the displacement that a step is taken to add to it.
 LEAST_ADDED = 1e-2
@@ -272,7 +272,7 @@ def automatic_eps(problem: ContactProblem) -> Regularisation:
 
     The foundation is a hundred times stiffer than a layer of elements, E/h. The slip length is a
     hundredth of the displacement that the loads, as a stress on Gamma_3, give a block of the
-    body's size; in a step of an evolution, of what they add to it there.
+    body's size; in a step of an evolution, their increment there.
     """
     body, scales = problem.equilibrium, problem.scales
     loads, prescribed = body.external(problem.time), problem.start().x
@@ -282,7 +282,7 @@ def automatic_eps(problem: ContactProblem) -> Regularisation:
         added = loads - body.external(problem.since), prescribed - before
         displacement = max(*expected_displacements(problem, *added), LEAST_ADDED * displacement)
     slip = 1e-2 * displacement or 1e-6 * scales.size
-    # Of what touches: slips of a stiff part are those of its own, whatever soft one holds it.
+    # Of the part in contact: slips of a stiff one are its own, however soft its support is.
     young = problem.interface.stiffness * scales.size
     return Regularisation(1e-2 * scales.spacing / young, slip * min(1.0, scales.young / young))
 
@@ -303,7 +303,7 @@ class Penalty:
     Attributes
     ----------
     state
-        What the last outer iteration has left.
+        The state after the last outer iteration.
     """
 
     problem: ContactProblem
@@ -312,7 +312,7 @@ class Penalty:
     counters: Counters = field(default_factory=Counters)
 
     def __post_init__(self) -> None:
-        """Start from rest with an empty history."""
+        """Start from zero with an empty history."""
         self.history = History(self.monitor)
         self.state = self.problem.start()
         self._eps = regularisation(self.problem, self.options)
@@ -321,7 +321,7 @@ class Penalty:
         self._norm = self.problem.equilibrium.l2_norm() if thesis else None
 
     def turn_to(self, problem: ContactProblem) -> None:
-        """Go on with another step of the same problem; what is factorised remains."""
+        """Go on with another step of the same problem; factorisations remain."""
         self.problem, self.state = problem, problem.start()
         self.history = History(self.monitor)
         self._eps = regularisation(problem, self.options)
@@ -334,7 +334,7 @@ class Penalty:
         Parameters
         ----------
         start
-            Where from; from rest by default. From the solution of a somewhat larger eps, small
+            Initial guess; zero by default. From the solution of a somewhat larger eps, small
             ones are reached that are too hard from there.
         """
         self.state = self.problem.start() if start is None else start
@@ -346,7 +346,7 @@ class Penalty:
         """Iterate; the first time with implicit laws or not."""
         begin, problem, options = time.perf_counter(), self.problem, self.options
         interface = problem.interface
-        # The lagged friction modulus can creep: what counts is the last hundred iterations.
+        # The lagged friction modulus can creep: only the last hundred iterations count.
         stagnation = Stagnation(STAGNATION_LIMIT, PROGRESS)
         best: Best[tuple[State, KKT]] = Best()
         # The residual below which material and friction become implicit.
@@ -417,7 +417,8 @@ class Penalty:
     def _lagged(self, nodal: Array) -> Lagged:
         """Return the laws with the friction of an iterate; of stuck nodes where that has none.
 
-        At rest nothing presses, and there is no friction. What friction alone holds would fly away.
+        At zero displacement there is no pressure, so no friction: a body that friction alone
+        constrains would fly away.
         """
         law = Lagged(self.problem.interface, self._eps, nodal)
         if self.problem.frictional and not law.acts() and constrained_by_friction(self.problem):
@@ -443,7 +444,7 @@ class Penalty:
         options, limit = self.options, max(residuals.contact, residuals.friction)
         words = words or f"the residual of the penalised problem is <= {options.tolerance:g}"
         if residuals.equilibrium <= options.tolerance:
-            words += f"; the contact laws hold to {limit:.1e}"
+            words += f"; the complementarity conditions are met to {limit:.1e}"
         if limit > LARGEST_VIOLATION:
             words += "; a smaller eps_contact or eps_slip brings them nearer"
         return Outcome(residuals, options.allowed, words)

@@ -3,11 +3,10 @@
 A mode of Gamma_3 with the stiffness sigma contracts by sigma/(sigma + r) where contact holds it
 and by r/(sigma + r) where it is free: r has to stand in the middle of the spectrum. Of a block the
 ends are known, 1.1 E'/H and 1.92 E'/h. A slender body is softer than that by many orders of
-magnitude, and only its operator says by how many. A parameter for each node, from the flexibility
-of that node alone, does no better: what is wide is the spectrum of all together. Of a cantilever
-300 times as long as thick the ends are 3e10 apart, and 1e11 with each node in units of its own. One
-for each mode would: but then a node's projection depends on all others, and is the contact
-problem itself.
+magnitude, and only its operator says by how many. A parameter for each node, from the compliance
+of that node alone, does no better: the spectrum of all together is wide. Of a cantilever 300 times
+as long as thick the ends are 3e10 apart, and 1e11 with each node in units of its own. One for each
+mode would: but then a node's projection depends on all others, and is the contact problem itself.
 """
 
 from __future__ import annotations
@@ -28,13 +27,13 @@ from contact.problem.protocols import Problem
 from contact.typing import Array
 
 #: Earlier solves that the acceleration uses. It begins anew when it has so many, as it may have
-#: come to what is the best among these alone.
+#: come to the best combination of these alone.
 MEMORY = 60
 
 #: Lanczos's steps: the softest mode stands out.
 STEPS = 12
 
-#: Springs in all modes while the softest is looked for, over r*.
+#: Regularising stiffness of all modes while the softest is looked for, over r*.
 SHIFT = 1e-14
 
 #: Modes softer than this, over the shift, are motions that nothing but contact holds.
@@ -43,7 +42,7 @@ FREE = 10.0
 
 @dataclass(frozen=True)
 class SpectralFit:
-    """What fits a soft body.
+    """Augmentation parameter and start of the relaxation of a soft body, by its spectrum.
 
     Attributes
     ----------
@@ -52,7 +51,7 @@ class SpectralFit:
     sigma
         Stiffness of the softest mode (stress/length).
     z
-        What the relaxation begins with, shape (n, 1 + d): r u without contact; 0 where contact
+        Start of the relaxation, shape (n, 1 + d): r u without contact; 0 where contact
         alone holds the body.
     """
 
@@ -67,14 +66,14 @@ class SpectralFit:
 
 
 def spectral_fit(problem: Problem, operator: Operator, friction: bool) -> SpectralFit | None:
-    """Return what fits a body that is softer than a block; None for others. Collective.
+    """Return r and a start for a body that is softer than a block; else None. Collective.
 
     Parameters
     ----------
     problem
         The contact problem.
     operator
-        Its operator; what it holds is replaced.
+        Its operator, which is assembled anew.
     friction
         Whether tangential forces act.
     """
@@ -94,7 +93,7 @@ def spectral_fit(problem: Problem, operator: Operator, friction: bool) -> Spectr
         sigma, held = smallest_eigenvalue(jump, solve, shift)
         loads = -residual_forces(problem, state)
         free = jump.apply(operator.solve(loads)) if held else np.zeros_like(nodal)
-    except InputError:  # nothing but contact holds it, and the springs are too soft to be seen
+    except InputError:  # a rigid-body mode is free, and `shift` is lost in rounding
         return None
     block = 1.1 * problem.scales.plane_modulus / problem.scales.height
     if sigma is None or sigma >= block:
@@ -128,7 +127,7 @@ def smallest_eigenvalue(
         The contact nodes.
     solve
         Maps normal tractions at these nodes to normal displacements, both of shape (n,), with
-        springs of the stiffness `shift` in all of them.
+        the stiffness `shift` added to all of them.
     shift
         Small against all that is looked for (stress/length).
 

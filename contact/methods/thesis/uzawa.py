@@ -2,9 +2,9 @@
 
 One step solves for u, projects the auxiliary variables phi and updates the multipliers
 lambda, (3.34)-(3.36). Everything that it hands on is lambda + r u: the next multiplier is its
-projection, and r phi what that takes away. The step is therefore a fixed-point map, which
-`acceleration` speeds up. What is held is z = lambda + r (u - u_0), with the iterate's u_0: beside
-slips of the whole load nothing would be left of a lambda that is unloaded to 1e-12 of it.
+projection, and r phi the difference to it. The step is therefore a fixed-point map, which
+`acceleration` speeds up. Its variable is z = lambda + r (u - u_0), with the iterate's u_0: beside
+slips of the whole load a lambda that is unloaded to 1e-12 of it would be lost in rounding.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ def augmentation(jump: Jump, r: float, friction: bool) -> Array:
 
 
 def split(interface: Interface, nodal: Array, friction: bool) -> Array:
-    """Return normal displacements and what slips side by side, shape (n, 1 + d).
+    """Return normal displacements and slips side by side, shape (n, 1 + d).
 
     Without friction the slips are no unknowns of the relaxation, and 0 here.
     """
@@ -131,9 +131,8 @@ logger = logging.getLogger("contact.inner")
 #: and plain. With r far from r* the plain one creeps by 1e-4 an iteration, and still gets there.
 STAGNATION_LIMIT, STAGNATION_LIMIT_PLAIN, PROGRESS = 100, 500, 0.99
 
-#: What an iterative solver leaves at most, over the tolerance of the relaxation: where it leaves as
-#: much, it hands back what it began with, and rounding decides when it does. And the least that
-#: it leaves.
+#: Tolerance of an iterative solver over that of the relaxation: with one as large it returns its
+#: initial guess, and rounding decides when it does. And the least one.
 SHARE, LEAST = 0.1, 1e-13
 
 
@@ -182,7 +181,7 @@ class RelaxationResult:
     forces
         Multipliers in equilibrium with the iterate.
     z
-        State to start the next relaxation from, about what this one has found, shape (n, 1 + d).
+        State to start the next relaxation from, relative to the new iterate, shape (n, 1 + d).
     iterations
         Number of linear solves.
     residual
@@ -244,14 +243,14 @@ class _Projection:
         return np.concatenate([normal, tangential], axis=1)
 
     def accelerator(self, depth: int, anew: bool, size: Array) -> ResidualMinimiser:
-        """Return what speeds up the iteration of z, as a flat array.
+        """Return the acceleration of the iteration of z, as a flat array.
 
         Parameters
         ----------
         depth, anew
             As of `Relaxation`.
         size
-            What forces are measured by at each node, shape (n,).
+            Unit of the forces at each node, shape (n,).
         """
         jump, shape = self.jump, (self.jump.weight.size, 1 + self.jump.normal.shape[1])
         weights = np.repeat(jump.weight / size**2, shape[1])
@@ -326,7 +325,7 @@ def uzawa_block_relaxation(
     domain_norm
         L2(Omega) norm of owned unknowns, needed for the thesis's criterion.
     poll
-        Called before every iteration, on all ranks; what it raises ends the relaxation.
+        Called before every iteration, on all ranks; an exception ends the relaxation.
     """
     jump, r, law = interface.jump, parameters.r, step.law
     origin = r * split(interface, step.nodal, step.friction)
@@ -344,7 +343,7 @@ def uzawa_block_relaxation(
     for iteration in range(1, parameters.max_iterations + 1):
         if poll is not None:
             poll()
-        # Neither projections nor solves change what z has along the normal beside its first
+        # Neither projections nor solves change the part of z along the normal beside its first
         # column: of rounding, the acceleration makes a pressure that no law sees.
         z[:, 1:] = jump.tangential_component(z[:, 1:])
         multiplier = project(z)
