@@ -111,7 +111,8 @@ def component_norms_of(
         touched = np.zeros((len(members), count), dtype=np.intc)
         for member, at in zip(members, touched, strict=True):
             if member.free.any():
-                nodes = fem.locate_dofs_topological(space, d - 1, domain.facets(member.what.on))
+                facets = domain.facets(member.description.on)
+                nodes = fem.locate_dofs_topological(space, d - 1, facets)
                 at[component[nodes[nodes < component.size]]] = 1
         domain.comm.Allreduce(MPI.IN_PLACE, touched, op=MPI.MAX)
         member_of, piece_of = np.nonzero(touched)

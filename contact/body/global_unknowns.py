@@ -36,58 +36,59 @@ class Member:
 
     Attributes
     ----------
-    what
-        What was said of it.
+    description
+        The body or electrode as it is given.
     begin
         The first of its unknowns.
     scale
         How much a rotation of 1 counts (length), or the unit of the potential.
     """
 
-    what: Rigid | Electrode
+    description: Rigid | Electrode
     begin: int
     scale: float
 
     @property
     def foundation(self) -> bool:
         """Whether it is a foundation: no node follows it."""
-        return isinstance(self.what, Rigid) and self.what.foundation
+        return isinstance(self.description, Rigid) and self.description.foundation
 
     @property
     def columns(self) -> slice:
         """Where its unknowns are."""
-        return slice(self.begin, self.begin + len(self.what.values))
+        return slice(self.begin, self.begin + len(self.description.values))
 
     @property
     def units(self) -> Array:
         """How much an unknown of 1 is of a translation, a rotation or a potential."""
-        if isinstance(self.what, Electrode):
+        if isinstance(self.description, Electrode):
             return np.full(1, self.scale)
-        motion = self.what.motion
+        motion = self.description.motion
         turns = np.full(len(motion.rotation), 1 / self.scale)
         return np.concatenate([np.ones(len(motion.displacement)), turns])
 
     @property
     def free(self) -> NDArray[np.bool_]:
         """Which of its unknowns are not given."""
-        return np.array([value is None for value in self.what.values])
+        return np.array([value is None for value in self.description.values])
 
     def given(self, time: float) -> Array:
         """Return the given values of its unknowns at a time, 0 where they are free."""
-        return self.what.at(self.what.values, time) / self.units
+        return self.description.at(self.description.values, time) / self.units
 
     def forces(self, time: float) -> Array:
         """Return the forces and moments, or the charge, on its free unknowns at a time."""
-        return np.where(self.free, self.what.at(self.what.forces, time) * self.units, 0.0)
+        forces = self.description.at(self.description.forces, time)
+        return np.where(self.free, forces * self.units, 0.0)
 
     def motion(self, points: Array, block_size: int) -> Array:
         """Return R at points of shape (n, d): shape (n, block size, its unknowns)."""
         n, d = points.shape
         columns = np.zeros((n, block_size, self.units.size))
-        if isinstance(self.what, Electrode):
+        if isinstance(self.description, Electrode):
             columns[:, -1, 0] = 1.0
         else:
-            offset = points - np.asarray(self.what.motion.centre)
+            offset = points - np.asarray(self.description.motion.centre)
             columns[:, :d] = rigid_motions(offset) * self.units
         return columns
 
@@ -124,7 +125,7 @@ class GlobalUnknowns:
     @property
     def mechanical(self) -> NDArray[np.bool_]:
         """Which of them are motions, shape (m,)."""
-        flags = [np.full(m.free.size, isinstance(m.what, Rigid)) for m in self.members]
+        flags = [np.full(m.free.size, isinstance(m.description, Rigid)) for m in self.members]
         return np.concatenate([np.zeros(0, dtype=bool), *flags])
 
     @property
@@ -134,7 +135,7 @@ class GlobalUnknowns:
 
     def member(self, part: str) -> Member | None:
         """Return the moving foundation in front of a part; None where it is at rest."""
-        found = (m for m in self.members if m.foundation and m.what.on == part)
+        found = (m for m in self.members if m.foundation and m.description.on == part)
         return next(found, None)
 
     def still(self, nodes: int, block_size: int) -> Array | None:
@@ -183,7 +184,7 @@ def make_global_unknowns(
     domain, space
         Mesh and space of the unknowns.
     body
-        What was said of it.
+        The body or electrode as it is given.
     free
         Which unknowns of the owned nodes are not fixed, shape (nodes, block size).
 
@@ -230,14 +231,14 @@ def _tie(
     size: int,
 ) -> sparse.csr_array:
     """Return the rows of a plate or an electrode, and mark them as tied. Collective."""
-    d, key = domain.dim, f"{member.what.name} on {member.what.on!r}"
+    d, key = domain.dim, f"{member.description.name} on {member.description.on!r}"
     domain.mesh.topology.create_connectivity(d - 1, d)
-    nodes = fem.locate_dofs_topological(space, d - 1, domain.facets(member.what.on))
+    nodes = fem.locate_dofs_topological(space, d - 1, domain.facets(member.description.on))
     nodes = nodes[nodes < free.shape[0]]
     points = space.tabulate_dof_coordinates()[nodes, :d]
     motion = member.motion(points, free.shape[1])
     follows = np.zeros((nodes.size, free.shape[1]), dtype=bool)
-    follows[:, slice(d, None) if isinstance(member.what, Electrode) else slice(0, d)] = True
+    follows[:, slice(d, None) if isinstance(member.description, Electrode) else slice(0, d)] = True
     if _anywhere(domain, tied[nodes] & follows):
         raise InputError(
             f"{key}: it shares nodes with another rigid part or electrode; accepted: parts apart"
@@ -245,7 +246,7 @@ def _tie(
     # What a support holds cannot follow.
     moves = np.abs(motion[:, :, member.free]).max(axis=2, initial=0.0) > ROUNDING
     if _anywhere(domain, moves & follows & ~free[nodes]):
-        if isinstance(member.what, Electrode):
+        if isinstance(member.description, Electrode):
             raise InputError(
                 f"{key}: it shares nodes with a part whose potential is fixed; accepted: parts "
                 "that share no nodes"

@@ -28,8 +28,7 @@ from contact.case.rigid import Electrode, Moving, RigidPart
 from contact.case.section import FromTable, Section, Text, as_tuple, one_or_many
 from contact.case.solver import DEFAULT, Solver
 from contact.errors import InputError
-from contact.output.options import OutputOptions
-from contact.output.units import Units
+from contact.output.options import OutputOptions, Units
 from contact.settings import Accepted
 
 #: Key of the case -> the arguments of `build_problem` of which one replaces it.

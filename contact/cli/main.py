@@ -118,8 +118,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def run() -> NoReturn:
     """Run the command line and leave with its status."""
     status = main()
-    disk = sys.modules.get("contact.output.disk")
-    if disk is not None and disk.abandoned:  # their libraries must not clean up
+    writers = sys.modules.get("contact.output.field_files")
+    if writers is not None and writers.abandoned:  # their libraries must not clean up
         sys.stdout.flush()
         sys.stderr.flush()
         os._exit(status)

@@ -1,4 +1,4 @@
-"""What there is to say about bodies that touch each other, or that should."""
+"""Remarks on bodies in contact: sides, components, and rigid motions that hardly are resisted."""
 
 from __future__ import annotations
 
@@ -7,11 +7,22 @@ from collections.abc import Iterator
 import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
+from scipy import linalg
 
 from contact.mesh.entities import cells_at, owned_among
-from contact.output.solution import Solution
+from contact.output.solution import Remark, Solution
+from contact.problem.kkt import residual_forces
 from contact.problem.problem import ContactProblem
+from contact.problem.rigid_modes import (
+    Group,
+    constrained_by_supports,
+    described,
+    groups,
+    null_space,
+)
 from contact.problem.state import State
+from contact.tolerances import EPS
+from contact.typing import Array
 
 #: How many times finer or softer the other side may be before there is a warning.
 FINER, SOFTER = 2.0, 5.0
@@ -22,12 +33,22 @@ HALF = 0.5
 #: Share of the largest pressure from which on a node counts as pressed.
 PRESSED = 1e-3
 
+#: Share of the largest displacement by which the residual of the forces may move a body.
+MOVED = 1e-3
 
-def choices(solution: Solution) -> Iterator[tuple[str, bool]]:
+#: Share of a motion's square from which on contact holds it: normals of a mesh are off by more than
+#: the root of it, and resist motions that the true surface does not.
+HELD = 1e-8
+
+#: Largest pressure at the end of a step, over that of all steps, that is rounding of none.
+NOTHING = 1e-12
+
+
+def choices(solution: Solution) -> Iterator[Remark]:
     """Say where the sides of two bodies had better change places, or face each other in part.
 
     Multipliers live on the side `on`: it should be the finer and the softer one, else it
-    penetrates what is finer, or carries pressures that what is softer cannot follow.
+    penetrates the finer side, or carries pressures that the softer side cannot follow.
     """
     problem = solution.problem
     for contact, entry in zip(problem.contacts, problem.entries, strict=True):
@@ -45,14 +66,14 @@ def choices(solution: Solution) -> Iterator[tuple[str, bool]]:
         elif young > SOFTER * other_young and size >= other_size:
             ratio = young / other_young
             yield f"{sides}: the other side is {ratio:.3g} times softer: {better}", False
-        # The rim of what faces the other side is where pressures end, far from where they act.
+        # Beyond the rim of the other side pressures end, far from where they act.
         partly = entry.coupling.covered < HALF
         if partly.any():
             yield _partly(solution, entry.coupling.nodes[partly], sides)
         yield _slides(solution, entry.coupling.nodes, max(size, other_size), sides)
 
 
-def _partly(solution: Solution, nodes: NDArray[np.int64], sides: str) -> tuple[str, bool]:
+def _partly(solution: Solution, nodes: NDArray[np.int64], sides: str) -> Remark:
     """Warn of nodes that carry pressure though less than half of their area faces anything."""
     problem = solution.problem
     count = problem.comm.allreduce(int(_pressed(problem, solution.state, nodes).sum()), op=MPI.SUM)
@@ -70,14 +91,12 @@ def _pressed(problem: ContactProblem, state: State, nodes: NDArray[np.int64]) ->
     contact = problem.nodes
     _, local = owned_among(problem.equilibrium.layout.index_map, nodes)
     pressure = problem.interface.pressure(problem.nodal(state), state.forces)
-    # What a method leaves at open nodes is none; what is a thousandth of the rest decides nothing.
+    # Residuals at open nodes are no pressure, and a thousandth of the rest decides nothing.
     pressed = pressure > PRESSED * contact.maximum(pressure)
     return np.asarray(pressed & np.isin(contact.nodes, local))
 
 
-def _slides(
-    solution: Solution, nodes: NDArray[np.int64], size: float, sides: str
-) -> tuple[str, bool]:
+def _slides(solution: Solution, nodes: NDArray[np.int64], size: float, sides: str) -> Remark:
     """Warn of points in contact that are in some step further along than a facet is long."""
     states = [record.state for record in solution.steps] or [solution.state]
     slips = [_slip(solution.problem, state, nodes) for state in states]
@@ -86,14 +105,15 @@ def _slides(
         return "", True
     when = f" at t = {states[slips.index(largest)].time:g}" if solution.steps else ""
     return (
-        f"{sides}: points in contact are {largest:.3g} along the surface from what they faced"
-        f"{when}, and facets are {size:.3g} long: in linear kinematics each stays opposite what it "
-        "faced at rest; where surfaces are curved, or end, the result is of another contact"
+        f"{sides}: points in contact are {largest:.3g} along the surface from the points they faced"
+        f"{when}, and facets are {size:.3g} long: in linear kinematics each stays "
+        "opposite the point it faced in the beginning; where surfaces are curved, or end, the "
+        "result is of another contact"
     ), False
 
 
 def _slip(problem: ContactProblem, state: State, nodes: NDArray[np.int64]) -> float:
-    """Return how far points in contact are along the surface from what they faced. Collective."""
+    """Return how far points in contact have slid from the points they faced. Collective."""
     along = np.linalg.norm(problem.nodes.tangential_component(problem.nodal(state)), axis=1)
     return problem.nodes.maximum(np.where(_pressed(problem, state, nodes), along, 0.0))
 
@@ -114,7 +134,7 @@ def _side(problem: ContactProblem, part: str) -> tuple[float, float]:
     return float(total[0] / total[1]), float(least)
 
 
-def regions(solution: Solution) -> tuple[str, bool]:
+def regions(solution: Solution) -> Remark:
     """Say where regions of the mesh, which somebody has named, have one material."""
     names, materials = solution.problem.domain.regions, solution.problem.body.materials
     if len(names) == 1 or len(materials) > 1:
@@ -123,7 +143,7 @@ def regions(solution: Solution) -> tuple[str, bool]:
     return f"the regions {which} have one material; [[material]] with `on` gives each its own", True
 
 
-def passing(problem: ContactProblem) -> tuple[str, bool]:
+def passing(problem: ContactProblem) -> Remark:
     """Warn where components of the mesh are in no contact, so that nothing keeps them apart."""
     piece, count = problem.equilibrium.components
     if count == 1:
@@ -142,3 +162,93 @@ def passing(problem: ContactProblem) -> tuple[str, bool]:
         "the others: contact between two is asked for by [[contact]] with `on` one and "
         "`against` the other"
     ), False
+
+
+def unresisted_motions(solution: Solution) -> Remark:
+    """Warn of a rigid motion that supports leave free and contact hardly resists. Collective.
+
+    A cylinder without friction rolls in its place against next to nothing, and wherever it has
+    rolled to, its forces are in balance. Contact is taken to resist with c = E/length times areas:
+    along the normal where bodies touch, along the surface where they stick, and across the friction
+    where they slip.
+    """
+    problem, body = solution.problem, solution.problem.equilibrium
+    touches = solution.status != "open"
+    if not (solution.converged and problem.comm.allreduce(bool(touches.any()), op=MPI.LOR)):
+        return "", True
+    residual = body.unbalanced(residual_forces(problem, solution.state))
+    left = float(np.linalg.norm(body.sizes(residual)[0]))
+    whole = problem.interface.stiffness * problem.nodes.sum(np.ones_like(problem.nodes.weight))
+    largest, kkt = solution.max_displacement, solution.outcome.kkt
+    for group in groups(problem):
+        free = null_space(group.supports)
+        if free.shape[1] == 0:
+            continue
+        share, motion = _least_held(solution, group, free, touches)
+        moved = left * _reach(group, motion) / (whole * max(share, EPS))
+        if share < HELD or moved > MOVED * largest:
+            words = described(motion[:, None] / np.linalg.norm(motion), group.names)
+            return (
+                f"contact resists a rigid motion ({words}) by next to nothing: the mesh decides "
+                f"how far it goes, and the residual forces, {kkt.equilibrium:.1e} of all, may move "
+                f"that body by up to {moved:.2g}, where displacements reach {largest:.2g}; "
+                "friction, or a support against that motion, hold it",
+                False,
+            )
+    return "", True
+
+
+def adrift(solution: Solution) -> Remark:
+    """Say that nothing held a body any more before the last step. Collective."""
+    pressures = np.array([record.row["max_pressure"] for record in solution.steps])
+    pressed = pressures > NOTHING * pressures.max(initial=0.0)
+    # Before it has been pressed it has not moved.
+    free = np.flatnonzero(~pressed[:-1] & np.logical_or.accumulate(pressed)[:-1])
+    if free.size == 0 or constrained_by_supports(solution.problem):
+        return "", True
+    return (
+        f"at t = {solution.steps[free[0]].row['t']:g} nothing presses any more, and no support "
+        "holds the body: it is then in one of many places, and so it is later; a "
+        "load that goes on pressing it, or a support, holds it",
+        False,
+    )
+
+
+def _least_held(
+    solution: Solution, group: Group, free: Array, touches: NDArray[np.bool_]
+) -> tuple[float, Array]:
+    """Return the free motion that contact holds least. Collective.
+
+    Returns
+    -------
+    Which share of its square at all contact nodes is where it is held, and the motion, with a
+    mean square of 1 there, shape (m,).
+    """
+    nodes = group.problem.nodes
+    normal, tangential = group.normal @ free, group.tangential @ free
+    resisted = tangential.copy()
+    slips = touches & (solution.status == "slip")
+    size = np.linalg.norm(solution.friction, axis=1)
+    unit = solution.friction / np.where(size > 0, size, 1.0)[:, None]
+    resisted[slips] -= np.einsum("ni,nj,njk->nik", unit, unit, tangential)[slips]
+    resisted[~touches | (solution.friction_bound <= 0)] = 0.0
+    whole = np.concatenate([normal[:, None, :], tangential], axis=1)
+    resisting = np.concatenate([(normal * touches[:, None])[:, None, :], resisted], axis=1)
+    sums = np.array([_products(nodes.weight, part) for part in (resisting, whole)])
+    held, moved = nodes.comm.allreduce(sums, op=MPI.SUM)
+    area = nodes.sum(np.ones_like(nodes.weight))
+    values, motions = linalg.eigh(held / area, moved / area)
+    return max(float(values[0]), 0.0), free @ motions[:, 0]
+
+
+def _products(weight: Array, motions: Array) -> Array:
+    """Return the weighted sums of products of motions at nodes, (n, d + 1, m), shape (m, m)."""
+    return np.asarray(np.einsum("n,nik,nil->kl", weight, motions, motions))
+
+
+def _reach(group: Group, motion: Array) -> float:
+    """Return how far a motion moves a node at most. Collective."""
+    body = group.problem.equilibrium
+    moved = body.nodal(group.moved @ motion)[:, : body.dim]
+    here = float(np.linalg.norm(moved, axis=1).max(initial=0.0))
+    return float(group.problem.comm.allreduce(here, op=MPI.MAX))

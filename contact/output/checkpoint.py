@@ -31,8 +31,8 @@ from contact.errors import InputError
 from contact.history import CONTACT_NODES, QUADRATURE_POINTS
 from contact.interface.jump import Multipliers
 from contact.output.folder import on_root, settle
-from contact.output.record import StepRecord
 from contact.output.solution import Solution
+from contact.output.solved import StepRecord
 from contact.output.transaction import kind
 from contact.problem.problem import ContactProblem
 from contact.problem.state import State

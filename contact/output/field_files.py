@@ -1,8 +1,18 @@
-"""The files of fields."""
+"""The files of fields.
+
+ADIOS2 and HDF5 throw where a disk is full, and again where a failed writer is closed by its
+destructor, which ends a process; on several ranks those that had room wait for the others. So the
+room is asked for first; and a writer that fails all the same, for others write to the disk too, is
+never destroyed.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterable, Sequence
+import ctypes
+import errno
+import os
+from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, TypeAlias
 
@@ -11,10 +21,10 @@ from dolfinx import fem, has_adios2, io
 from mpi4py import MPI
 
 from contact.errors import InputError
-from contact.output.disk import OVERHEAD, claim_room, closing, library_errors
 from contact.output.fields import DerivedFields, linear, unknowns
 from contact.output.folder import on_root
 from contact.output.solved import Solved
+from contact.output.transaction import ROOM
 from contact.output.vtu import VTU, Grid, Values, gathered, write_vtu
 from contact.problem.problem import ContactProblem
 from contact.problem.state import State
@@ -194,7 +204,7 @@ def _vtx(path: Path, functions: Sequence[fem.Function]) -> Callable[[], Any]:
 
 
 def _bytes(functions: Sequence[fem.Function]) -> int:
-    """Bound what this rank adds to a file of functions of one degree, with their mesh."""
+    """Bound the bytes that this rank adds to a file of functions of one degree, with their mesh."""
     total = OVERHEAD
     for function in functions:
         space = function.function_space
@@ -207,3 +217,73 @@ def _bytes(functions: Sequence[fem.Function]) -> int:
     corners = max(links.shape[1], topology.dim + 1)
     points = max(nodes, corners * len(links) if links.shape[1] == 1 else nodes)
     return total + points * (24 + 8 + 1) + len(links) * (corners + 1) * 8
+
+
+#: Bytes that each rank adds to a file besides the numbers: names, offsets, extremes.
+OVERHEAD = 16384
+
+
+def claim_room(comm: MPI.Intracomm, folder: Path, own: int) -> None:
+    """Check that there is room for files. Collective.
+
+    Parameters
+    ----------
+    comm
+        The ranks that will write them.
+    folder
+        Where to.
+    own
+        Bytes that this rank will write.
+
+    Raises
+    ------
+    InputError
+        If there is not.
+    """
+    needed = comm.allreduce(own, op=MPI.SUM)
+
+    def ask() -> None:
+        # Quotas do not show in the free space that a file system reports.
+        path = folder / ROOM
+        try:
+            with path.open("wb") as file:
+                os.posix_fallocate(file.fileno(), 0, needed)
+        except OSError as error:
+            raise OSError(error.errno, error.strerror, str(folder)) from None
+        finally:
+            path.unlink(missing_ok=True)
+
+    on_root(comm, ask)
+
+
+@contextmanager
+def library_errors(path: Path) -> Iterator[None]:
+    """Turn the errors of a library that writes a file into OSErrors."""
+    try:
+        yield
+    except RuntimeError as error:
+        number = errno.ENOSPC if "No space left" in str(error) else errno.EIO
+        raise OSError(number, os.strerror(number), str(path)) from error
+
+
+#: Writers that have failed. Some libraries abort the process where they clean up after these.
+abandoned: list[str] = []
+
+
+@contextmanager
+def closing(open_: Callable[[], Any]) -> Iterator[Any]:
+    """Yield the writer of a file, and close it; where that fails, it is left as it is.
+
+    Parameters
+    ----------
+    open_
+        Makes the writer, which has a method ``close``.
+    """
+    writer = open_()
+    try:
+        yield writer
+        writer.close()
+    except RuntimeError:
+        ctypes.pythonapi.Py_IncRef(ctypes.py_object(writer))  # not to be destroyed
+        abandoned.append(type(writer).__name__)
+        raise

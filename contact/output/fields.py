@@ -1,4 +1,4 @@
-"""Fields of a solution: displacement, stress, von Mises, |dev eps|, electric quantities."""
+"""Fields of a solution (displacement, stress, von Mises, |dev eps|, electric), their extremes."""
 
 from __future__ import annotations
 
@@ -23,11 +23,17 @@ from contact.body.equilibrium import BodyEquilibrium
 from contact.body.materials import law_with_constants, piezo_with_constants
 from contact.history import Evaluated
 from contact.output.quantities import BODY, values_of
+from contact.problem.problem import ContactProblem
 from contact.typing import Array
-from forms.hencky import stress
+from forms.elasticity import Anisotropic
+from forms.hencky import HistoryLaw, stress
 from forms.kinematics import Axisymmetric, deviator_squared, strain, von_mises
 from forms.ops import maximum, sqrt
 from forms.piezo import coupling_stress, electric_displacement
+
+#: Decrease of |dev eps|, over its earlier value, that counts as unloading; and of the secant
+#: modulus, over that of small strains, that counts as yielding.
+DECREASE, SOFTENED = 1e-6, 1e-9
 
 
 def nodal_function(
@@ -84,7 +90,7 @@ class Extremes(NamedTuple):
     strain, von_mises
         The largest |dev eps| and von Mises stress.
     yielded, volume
-        Volume in which |dev eps| is beyond first yield, and that of all of it.
+        Volume in the plastic range, |dev eps| above first yield, and that of all of it.
     yields
         Whether the law has such a limit.
     """
@@ -297,3 +303,93 @@ class DerivedFields:
         if self.body.domain.revolved:
             volumes *= 2 * np.pi * corners[:, :, 0].mean(axis=1)
         return np.asarray(volumes)
+
+
+class Deformation(NamedTuple):
+    """Extremes over the middles of the cells.
+
+    Attributes
+    ----------
+    largest_strain
+        |eps|, the Frobenius norm.
+    least_volume, largest_volume
+        det(I + grad u), a deformed volume over the undeformed one.
+    """
+
+    largest_strain: float
+    least_volume: float
+    largest_volume: float
+
+
+def deformation(body: BodyEquilibrium, x: Array) -> Deformation:
+    """Return how large the deformation is. Collective.
+
+    Parameters
+    ----------
+    body, x
+        The body, and its local unknowns.
+    """
+    mesh, kinematics = body.domain.mesh, body.domain.kinematics
+    nodal, middle = body.nodal(x).ravel(), np.full((1, body.dim), 1 / (body.dim + 1))
+
+    def measures(at: fem.Function) -> Expr:
+        u, _ = body.split(at)
+        eps, stretch = strain(u, kinematics), ufl.Identity(3) + kinematics.gradient(u)
+        return ufl.as_vector([ufl.sqrt(ufl.inner(eps, eps)), ufl.det(stretch)])
+
+    cells = np.arange(mesh.topology.index_map(mesh.topology.dim).size_local, dtype=np.int32)
+    extremes = np.array([0.0, -np.inf, -np.inf])
+    for _, found in body.pointwise.values("deformation", measures, middle, nodal, cells):
+        size, volume = found[:, 0].T
+        here = [size.max(initial=0.0), (-volume).max(initial=-np.inf), volume.max(initial=-np.inf)]
+        extremes = np.maximum(extremes, here)
+    body.comm.Allreduce(MPI.IN_PLACE, extremes, op=MPI.MAX)
+    return Deformation(float(extremes[0]), float(-extremes[1]), float(extremes[2]))
+
+
+class Unloading:
+    """Follows |dev eps| from step to step.
+
+    Hencky's law is nonlinear elasticity: it unloads along its loading path, as no metal does. Where
+    |dev eps| decreases in the plastic range, its results are no longer those of plasticity.
+
+    Parameters
+    ----------
+    problem
+        The problem.
+    x
+        Local unknowns from which on it is followed. Collective.
+
+    Attributes
+    ----------
+    share
+        Largest share of the body (volume) that has unloaded from the plastic range in a step.
+    """
+
+    def __init__(self, problem: ContactProblem, state: Evaluated) -> None:
+        self.share = 0.0
+        body = problem.equilibrium
+        self._body = body
+        self._fields = None if body.linear else DerivedFields(body, state)
+        if self._fields is not None:
+            self._strains = self._fields.strains()
+            self._volumes = self._fields.volumes_of_materials()
+            self._whole = body.comm.allreduce(sum(v.sum() for v in self._volumes), op=MPI.SUM)
+
+    def follow(self, state: Evaluated) -> None:
+        """Look at the end of the next step. Collective."""
+        if self._fields is None:
+            return
+        self._fields.move_to(state)
+        before, self._strains = self._strains, self._fields.strains()
+        back = 0.0
+        for material, volumes, old, new in zip(
+            self._body.body.materials, self._volumes, before, self._strains, strict=True
+        ):
+            if isinstance(material.law, Anisotropic | HistoryLaw):
+                continue
+            modulus = np.asarray(material.law.secant_modulus(old**2), dtype=float)
+            yielded = modulus < (1 - SOFTENED) * float(material.law.shear)
+            back += float(volumes @ (yielded & (new < (1 - DECREASE) * old)).mean(axis=1))
+        share = self._body.comm.allreduce(back, op=MPI.SUM) / self._whole
+        self.share = max(self.share, float(share))

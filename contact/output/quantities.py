@@ -22,6 +22,8 @@ NODES, HISTORY, AGAINST = "contact.csv", "history.csv", "contact-against.csv"
 BODY, SURFACE, OPPOSITE = "fields.vtu", "contact.vtu", "contact-against.vtu"
 #: Tables with a row a solution; the others have columns of arrays.
 ROWS = (STEPS, SWEEP)
+#: Status of a node -> its number in ``contact.vtu``.
+STATUS = {"none": -1, "open": 0, "stick": 1, "slip": 2}
 
 
 @dataclass(frozen=True)
@@ -39,8 +41,9 @@ class Quantity:
     value
         A function of `results.Results` in ``summary.json``, ``steps.csv`` and ``sweep.csv``, of
         `methods.report.Record` in ``history.csv``, of `table.ContactNodes` in ``contact.csv``, of
-        `fields.Point` in ``fields.vtu``, of `surface.Facets` in ``contact.vtu``, of a mapping in
-        the files of master sides. A mapping is several columns, a vector one a component.
+        `fields.Point` in ``fields.vtu``, of `surface.ContactResult` in ``contact.vtu``, of a
+        mapping in the files of master sides. A mapping has several columns, a vector one a
+        component.
     files
         The files that have it.
     component
@@ -91,6 +94,11 @@ def _present(value: Any) -> Any:
     return ABSENT if value is None else value
 
 
+def _sizes(record: Any) -> str:
+    """Return the numbers of open, stick and slip nodes after an iteration; empty if unknown."""
+    return "/".join(map(str, record.sizes or ()))
+
+
 _ALL, _VECTOR = (SUMMARY, STEPS, SWEEP), "{name}_{axis}"
 
 #: Numbers of the run as a whole, of a step and of a case of a sweep.
@@ -128,8 +136,8 @@ _RUN = (
     ),
     Quantity(
         "contact_moment", "force · length",
-        "Moment of these about the origin of coordinates, of points at rest: in 2-D a list "
-        "of one, about z and counter-clockwise, in 3-D a vector.",
+        "Moment of these about the origin of coordinates, of points in the reference "
+        "configuration: in 2-D a list of one, about z and counter-clockwise, in 3-D a vector.",
         lambda r: r.solution.contact_moment,
     ),
     Quantity(
@@ -174,7 +182,7 @@ _RUN = (
         lambda r: r.of_deformation("largest_strain"),
     ),
     Quantity(
-        "volume_ratio", "", "Least and largest volume of a cell over that at rest.",
+        "volume_ratio", "", "Least and largest deformed volume of a cell over its own.",
         lambda r: r.of_deformation("least_volume", "largest_volume"),
     ),
     Quantity(
@@ -183,9 +191,9 @@ _RUN = (
         lambda r: r.solution.max_von_mises,
     ),
     Quantity(
-        "share_beyond_yield", "",
-        "Share of the volume in which |dev ε| is beyond the material's first yield, 0 to 1; "
-        "`null` where no material has such a limit.", lambda r: r.solution.share_beyond_yield,
+        "plastic_share", "",
+        "Share of the volume in the plastic range, |dev ε| above the material's first yield, 0 to "
+        "1; `null` where no material has such a limit.", lambda r: r.solution.plastic_share,
     ),
     Quantity(
         "contact_direction", "", "`[contact]` `direction`: whose normal ν is.",
@@ -223,7 +231,7 @@ _RUN = (
         lambda r: r.solution.counters.factorizations, _ALL,
     ),
     Quantity(
-        "contact_solves", "", "Dense solves at the contact nodes alone.",
+        "contact_solves", "", "Linear solves of the problem condensed onto the contact nodes.",
         lambda r: r.solution.counters.contact_solves,
     ),
     Quantity(
@@ -323,13 +331,13 @@ _NODES = (
         "on", "", "Part of the node; where there are several contacts.",
         lambda n: _present(n.part), (NODES,),
     ),
-    Quantity("x", "length", "Place of the node at rest.", lambda n: n.points, (NODES,), "{axis}"),
+    Quantity("x", "length", "Reference place of the node.", lambda n: n.points, (NODES,), "{axis}"),
     Quantity(
         "weight", "area", "Area that the node stands for; sums with it are integrals over Γ₃.",
         lambda n: n.nodes.weight, (NODES,),
     ),
     Quantity(
-        "gap", "length", "Distance to the foundation at rest, along the contact direction ν.",
+        "gap", "length", "Initial distance to the foundation, along the contact direction ν.",
         lambda n: n.law.jump.gap, (NODES,),
     ),
     Quantity(
@@ -385,16 +393,21 @@ _HISTORY = (
         "change", "", "Relative change of the friction bound, (3.46); `nan` where there is none.",
         lambda record: record.change, (HISTORY,),
     ),
+    Quantity("seconds", "s", "Since the solve began.", lambda record: record.seconds, (HISTORY,)),
+    Quantity("note", "", "Its kind, for instance `tangent`.", lambda r: r.note, (HISTORY,)),
     Quantity(
-        "seconds", "s", "Since the start of the solve.", lambda record: record.seconds, (HISTORY,)
-    ),
-    Quantity(
-        "note", "", "Its kind where it is no plain one, for instance `tangent`.",
-        lambda record: record.note, (HISTORY,),
-    ),
-    Quantity(
-        "contact_solves", "", "Dense solves at the contact nodes that it took.",
+        "contact_solves", "", "Linear solves of the condensed problem that it took.",
         lambda record: record.contact, (HISTORY,),
+    ),
+    Quantity(
+        "active_set", "", "Numbers of open, stick and slip nodes after it, for instance `3/5/1`; "
+        "empty where the active set is not known.", lambda record: _sizes(record), (HISTORY,),
+    ),
+    Quantity(
+        "steps", "",
+        "The same after each of its inner steps, Newton iterations on the condensed problem, one "
+        "after the other with blanks between; `-` where it is not known.",
+        lambda record: " ".join(_sizes(step) or "-" for step in record.steps), (HISTORY,),
     ),
 )  # fmt: skip
 
@@ -404,7 +417,7 @@ _AGAINST = (
         "on", "", "Part of the node: one that is `against` in a contact.",
         lambda f: f["on"], (AGAINST,),
     ),
-    Quantity("x", "length", "Place of the node at rest.", lambda f: f["x"], (AGAINST,), "{axis}"),
+    Quantity("x", "length", "Reference place of the node.", lambda f: f["x"], (AGAINST,), "{axis}"),
     Quantity(
         "weight", "area", "Area that the node stands for.",
         lambda f: f["weight"], (AGAINST, OPPOSITE),
@@ -427,9 +440,10 @@ _AGAINST = (
 
 #: Fields of the body; the derived ones have a companion NAME_cell, cell by cell.
 _BODY = (
-    Quantity("displacement", "length", "Displacement.", lambda at: ABSENT, (BODY,)),
+    Quantity("displacement", "length", "Displacement.", lambda at: ABSENT, (BODY, SURFACE)),
     Quantity(
-        "potential", "potential", "Potential; of piezoelectric bodies.", lambda at: ABSENT, (BODY,)
+        "potential", "potential", "Potential; of piezoelectric bodies.", lambda at: ABSENT,
+        (BODY, SURFACE),
     ),
     Quantity(
         "stress", "stress", "σ, nine components, row by row; tension is positive.",
@@ -452,48 +466,33 @@ _BODY = (
 
 #: Fields of the contact part; `displacement` and `potential` are those of held nodes too.
 _SURFACE = (
-    Quantity("displacement", "length", "Displacement.", lambda t: ABSENT, (SURFACE,)),
-    Quantity(
-        "potential", "potential", "Potential; of piezoelectric bodies.", lambda t: ABSENT,
-        (SURFACE,),
-    ),
-    Quantity(
-        "pressure", "stress", "As in `contact.csv`.", lambda t: t.table["pressure"], (SURFACE,)
-    ),
+    Quantity("pressure", "stress", "As in `contact.csv`.", lambda n: n.pressure, (SURFACE,)),
     Quantity(
         "traction", "stress", "Stress of the body on the foundation, a vector: p ν - σ_τ.",
-        lambda t: t.traction, (SURFACE,),
+        lambda n: n.traction, (SURFACE,),
     ),
-    Quantity(
-        "gap", "length", "As in `contact.csv`: at rest.", lambda t: t.table["gap"], (SURFACE,)
-    ),
-    Quantity(
-        "opening", "length", "gap - u_n: the open gap.",
-        lambda t: t.table["gap"] - t.table["u_n"], (SURFACE,),
-    ),
-    Quantity("slip", "length", "Tangential displacement, a vector.", lambda t: t.slip, (SURFACE,)),
-    Quantity(
-        "friction_bound", "stress", "`bound` of `contact.csv`.",
-        lambda t: t.table["bound"], (SURFACE,),
-    ),
-    Quantity("normal", "", "Contact direction ν, out of the body.", lambda t: t.normal, (SURFACE,)),
-    Quantity("weight", "area", "As in `contact.csv`.", lambda t: t.table["weight"], (SURFACE,)),
+    Quantity("gap", "length", "As in `contact.csv`.", lambda n: n.gap, (SURFACE,)),
+    Quantity("opening", "length", "gap - u_n: the open gap.", lambda n: n.opening, (SURFACE,)),
+    Quantity("slip", "length", "Tangential displacement, a vector.", lambda n: n.slip, (SURFACE,)),
+    Quantity("friction_bound", "stress", "As `bound`.", lambda n: n.friction_bound, (SURFACE,)),
+    Quantity("normal", "", "Contact direction ν, out of the body.", lambda n: n.normal, (SURFACE,)),
+    Quantity("weight", "area", "As in `contact.csv`.", lambda n: n.weight, (SURFACE,)),
     Quantity(
         "charge", "charge/area", "`d_n` of `contact.csv`; of piezoelectric bodies.",
-        lambda t: _present(t.table.get("d_n")), (SURFACE,),
+        lambda n: _present(n.charge), (SURFACE,),
     ),
     Quantity(
         "status", "", "0 open, 1 stick, 2 slip; -1 for a node that is held.",
-        lambda t: t.status, (SURFACE,),
+        lambda n: np.array([STATUS[name] for name in n.status], np.int32), (SURFACE,),
     ),
     Quantity(
         "row", "", "Row of the node in `contact.csv`, from 0; -1 for none.",
-        lambda t: t.rows, (SURFACE,),
+        lambda n: np.arange(n.status.size, dtype=np.int32), (SURFACE,),
     ),
-    Quantity("entry", "", "Number of its `[[contact]]`, from 0.", lambda t: ABSENT, (SURFACE,)),
+    Quantity("entry", "", "Number of its `[[contact]]`, from 0.", lambda n: ABSENT, (SURFACE,)),
     Quantity(
         "rigid", "", "1 in front of a rigid foundation, 0 in front of another body.",
-        lambda t: ABSENT, (SURFACE,),
+        lambda n: ABSENT, (SURFACE,),
     ),
 )  # fmt: skip
 

@@ -10,9 +10,7 @@ from mpi4py import MPI
 
 from contact.interface.current import Conductor
 from contact.output import bodies
-from contact.output.deformation import deformation
-from contact.output.fields import DerivedFields
-from contact.output.looseness import adrift, looseness
+from contact.output.fields import DerivedFields, deformation
 from contact.output.solution import Remark, Solution
 from contact.problem.kkt import left_as_pressures, residual_forces
 from contact.problem.problem import ContactProblem
@@ -62,7 +60,7 @@ def review(solution: Solution) -> None:
     solution.max_dev_strain = max(largest.strain for largest in extremes)
     solution.max_von_mises = max(largest.von_mises for largest in extremes)
     if any(largest.yields for largest in extremes):
-        solution.share_beyond_yield = sum(largest.yielded for largest in extremes) / sum(
+        solution.plastic_share = sum(largest.yielded for largest in extremes) / sum(
             largest.volume for largest in extremes
         )
     solution.deformation = deformation(body, x)
@@ -85,8 +83,8 @@ def review(solution: Solution) -> None:
         *bodies.choices(solution),
         bodies.passing(solution.problem),
         bodies.regions(solution),
-        looseness(solution),
-        adrift(solution),
+        bodies.unresisted_motions(solution),
+        bodies.adrift(solution),
         giving_way(solution),
     ):
         if text:

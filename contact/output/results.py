@@ -11,9 +11,8 @@ import numpy as np
 from mpi4py import MPI
 
 from contact.output import environment
-from contact.output.balances import ChargeBalance, charge_balance
-from contact.output.motions import rigid_columns
 from contact.output.quantities import ABSENT, SUMMARY, values_of
+from contact.output.resultants import ChargeBalance, charge_balance, rigid_columns
 from contact.output.solution import Solution
 from contact.output.table import Table
 from contact.problem.energy import Balance

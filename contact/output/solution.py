@@ -1,4 +1,4 @@
-"""What a solve gives back."""
+"""The solution of a case, and its results as a whole."""
 
 from __future__ import annotations
 
@@ -12,20 +12,19 @@ from dolfinx import fem
 from mpi4py import MPI
 
 from contact.errors import InputError
-from contact.interface.jump import Multipliers
 from contact.linear.operator import Counters
 from contact.methods.report import History, Outcome
-from contact.output.balances import ChargeBalance, charge_balance
-from contact.output.contact_result import ContactResult, contact_result
-from contact.output.deformation import Deformation
-from contact.output.fields import DerivedFields, unknowns
-from contact.output.motions import movements
-from contact.output.options import OutputOptions
-from contact.output.record import StepRecord
-from contact.output.supports import Support, moment, supports
-from contact.output.units import Units
-from contact.problem.problem import ContactProblem
-from contact.problem.state import State
+from contact.output.fields import Deformation, DerivedFields, unknowns
+from contact.output.resultants import (
+    ChargeBalance,
+    Resultant,
+    charge_balance,
+    contact_resultant,
+    movements,
+    supports,
+)
+from contact.output.solved import Solved
+from contact.output.surface import ContactResult, contact_result
 from contact.typing import Array
 
 if TYPE_CHECKING:
@@ -37,18 +36,11 @@ Remark: TypeAlias = tuple[str, bool]
 
 
 @dataclass(repr=False)
-class Solution:
-    """A solved problem, or what was reached.
-
-    Nodal quantities are those of the contact nodes that this rank owns, in the order of
-    `problem.nodes`.
+class Solution(Solved):
+    """The solution of a problem, or the state at which its method has ended.
 
     Attributes
     ----------
-    problem
-        The problem.
-    state
-        Where it is: a value, which nothing that is done with the problem changes.
     outcome
         Whether it has converged, why it ended, and the residuals.
     history
@@ -60,28 +52,20 @@ class Solution:
     seconds
         Spent on setup, solve and output.
     notes, warnings
-        What there is to say about the solution.
+        Remarks on the solution.
     max_dev_strain, max_von_mises
         The largest |dev eps| and von Mises stress over the cells (their nodes, for degree 2).
-    share_beyond_yield
-        Share of the body's volume in which |dev eps| is beyond the material's first yield; None
-        where no material has such a limit.
+    plastic_share
+        Share of the body's volume in the plastic range, |dev eps| above the material's first
+        yield; None where no material has such a limit.
     deformation
         How large strains and changes of volume are; None before the solution is reviewed.
     start
         From where the iteration started, in words.
-    title, case
-        Of the case; and the case itself as `contact check` prints it, empty where there is none.
-    output
-        What is written besides the summary and the tables.
-    units
-        Names of the units of the case, for labels.
-    steps
-        What is kept of each step of an evolution, the last of which this is.
+    case
+        The case as `contact check` prints it, empty where there is none.
     """
 
-    problem: ContactProblem
-    state: State
     outcome: Outcome
     history: History
     counters: Counters
@@ -91,17 +75,13 @@ class Solution:
     warnings: list[str] = field(default_factory=list)
     max_dev_strain: float = np.nan
     max_von_mises: float = np.nan
-    share_beyond_yield: float | None = None
+    plastic_share: float | None = None
     deformation: Deformation | None = None
     start: str = "zero slip"
-    title: str = ""
     case: str = ""
-    output: OutputOptions = field(default_factory=OutputOptions)
-    units: Units = field(default_factory=Units)
-    steps: list[StepRecord] = field(default_factory=list)
 
     def __repr__(self) -> str:
-        """Return what a look at it should show; `summary.json` has all."""
+        """Return the main results; `summary.json` has all."""
         name = f" {self.title!r}" if self.title else ""
         state = "converged" if self.converged else "not converged"
         return (
@@ -174,66 +154,18 @@ class Solution:
         return self._unknowns.get("potential")
 
     @property
-    def nodal(self) -> Array:
-        """Displacement (and scaled potential) at the contact nodes, shape (n, block size)."""
-        return self.problem.nodal(self.state)
-
-    @property
-    def forces(self) -> Multipliers:
-        """Multipliers of the unilateral constraint and of friction."""
-        return self.state.forces
-
-    @property
-    def pressure(self) -> Array:
-        """Contact pressure -sigma_nu, shape (n,): multiplier and layer."""
-        return self.problem.interface.pressure(self.nodal, self.forces)
-
-    @property
-    def friction(self) -> Array:
-        """Friction stress -sigma_tau = lambda_f, shape (n, d)."""
-        return self.forces.friction
-
-    @property
-    def friction_bound(self) -> Array:
-        """Friction bound s, shape (n,). Collective."""
-        return self.problem.interface.bound(self.nodal, self.forces)
-
-    @property
-    def normal_displacement(self) -> Array:
-        """u_nu along the contact direction, shape (n,)."""
-        return self.problem.nodes.normal_component(self.nodal)
-
-    @property
-    def slip(self) -> Array:
-        """Tangential displacement u_tau, shape (n, d)."""
-        return self.problem.nodes.tangential_component(self.nodal)
-
-    @property
     def contact_force(self) -> Array:
-        """The force that the body exerts on the foundation, shape (d,). Collective.
-
-        Of a body of revolution it is that of the full turn, along the axis.
-        """
-        nodes = self.problem.nodes
-        stress = self.problem.interface.stress(self.nodal, self.forces)
-        total = np.asarray(nodes.comm.allreduce(nodes.weight @ stress, op=MPI.SUM))
-        return self.problem.domain.resultant(total)
+        """The force that the body exerts on the foundation, shape (d,). Collective."""
+        return contact_resultant(self.problem, self.state).force
 
     @property
     def contact_moment(self) -> Array:
-        """The moment of `contact_force` about the origin of coordinates. Collective.
-
-        Shape (1,) in the plane, about z, and (3,) in space.
-        """
-        nodes = self.problem.nodes
-        stress = self.problem.interface.stress(self.nodal, self.forces)
-        revolved = self.problem.domain.revolved
-        local = moment(nodes.points, nodes.weight[:, None] * stress, revolved)
-        return np.asarray(nodes.comm.allreduce(local, op=MPI.SUM))
+        """The moment of these about the origin, shape (1,) in 2-D and (3,) in 3-D. Collective."""
+        return contact_resultant(self.problem, self.state).moment
 
     @property
     def contact_area(self) -> float:
-        """The area of what touches: the sum of the weights of its nodes. Collective."""
+        """The contact area: the sum of the weights of nodes in contact. Collective."""
         return self.problem.nodes.sum(np.where(self.status == "open", 0.0, 1.0))
 
     @property
@@ -244,8 +176,8 @@ class Solution:
         return float(comm.allreduce(np.linalg.norm(u, axis=1).max(initial=0.0), op=MPI.MAX))
 
     @cached_property
-    def supports(self) -> Mapping[str, Support]:
-        """What each part with prescribed displacements exerts on the body. Collective."""
+    def supports(self) -> Mapping[str, Resultant]:
+        """Force and moment of each part with prescribed displacements on the body. Collective."""
         return supports(self.problem, self.state)
 
     def reaction(self, part: str) -> Array:
@@ -265,7 +197,7 @@ class Solution:
 
     @property
     def movements(self) -> Mapping[str, Any]:
-        """What is rigid, and electrodes of unknown potential, as in summary.json. Collective.
+        """Rigid bodies, and electrodes of unknown potential, as in summary.json. Collective.
 
         Its keys are `rigid`, `rigid_parts` and `electrodes`, as far as there are any.
         """
@@ -277,20 +209,3 @@ class Solution:
         if not self.problem.piezoelectric:
             return None
         return charge_balance(self.problem, self.state)
-
-    @property
-    def status(self) -> Array:
-        """What each contact node does: "open", "stick" or "slip", shape (n,). Collective.
-
-        A node is in contact where p - c (gap - u_nu) > 0 for the multiplier p, or where the
-        layer presses; c = E / size. There it slips if |lambda_f + c u_tau|
-        exceeds the friction bound (always where that is 0), and sticks else. What is below
-        1e-9 of the largest pressure counts as rounding.
-        """
-        interface, nodal = self.problem.interface, self.nodal
-        rounding = 1e-9 * interface.jump.maximum(self.pressure)
-        active = interface.active_set(nodal, self.forces, self.friction_bound, rounding=rounding)
-        layer = interface.law.layer_pressure(nodal) > rounding
-        touches = active.closed | layer
-        sticks = active.sticks & (self.friction_bound > 0)
-        return np.where(touches, np.where(sticks, "stick", "slip"), "open")

@@ -1,73 +1,135 @@
-"""What tables and figures need of a solution."""
+"""A solved problem as tables and figures see it: its state, and the quantities on Gamma_3."""
 
 from __future__ import annotations
 
-from typing import Protocol
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
 
 from contact.interface.jump import Multipliers
-from contact.output.options import OutputOptions
-from contact.output.record import StepRecord
-from contact.output.units import Units
+from contact.output.options import OutputOptions, Units
 from contact.problem.problem import ContactProblem
 from contact.problem.state import State
 from contact.typing import Array
 
+#: Columns of ``steps.csv`` that a look at a step shows.
+SHOWN = ("t", "max_pressure", "contact_nodes", "max_displacement", "kkt")
 
-class Solved(Protocol):
-    """A solved problem; its quantities are those of `contact.output.solution.Solution`."""
 
-    @property
-    def title(self) -> str:
-        """Title of the case."""
+@dataclass(frozen=True, repr=False)
+class StepRecord:
+    """The end of a step of an evolution, and its rows in the tables.
 
-    @property
-    def units(self) -> Units:
-        """Names of its units."""
+    Attributes
+    ----------
+    state
+        Its solution.
+    row
+        The columns of ``steps.csv``.
+    table
+        The contact nodes, as `table.contact_table` returns them; None on ranks other than 0.
+    enthalpy
+        Where the energy balance of the next step begins, see `problem.energy.Moment`.
+    unloaded
+        Largest share of the body that has unloaded from the plastic range in a step so far.
+    rounding
+        Largest `rounding` of the residuals of a step so far, see `problem.kkt.KKT`.
+    """
 
-    @property
-    def output(self) -> OutputOptions:
-        """What is written of it."""
+    state: State
+    row: Mapping[str, float]
+    table: Mapping[str, NDArray[Any]] | None
+    enthalpy: float
+    unloaded: float = 0.0
+    rounding: float = 0.0
 
-    @property
-    def steps(self) -> list[StepRecord]:
-        """The steps of an evolution."""
+    def __repr__(self) -> str:
+        """Return the main columns; `row` has all."""
+        shown = {name: self.row[name] for name in SHOWN if name in self.row}
+        return f"<StepRecord: {', '.join(f'{name} = {v:.4g}' for name, v in shown.items())}>"
 
-    @property
-    def problem(self) -> ContactProblem:
-        """The problem."""
 
-    @property
-    def state(self) -> State:
-        """Where it is."""
+@dataclass(repr=False)
+class Solved:
+    """A solved problem.
+
+    Nodal quantities are those of the contact nodes that this rank owns, in the order of
+    `problem.nodes`.
+
+    Attributes
+    ----------
+    problem
+        The problem.
+    state
+        Its state: a value, which nothing that is done with the problem changes.
+    title
+        Title of the case.
+    units
+        Names of the units of the case, for labels.
+    output
+        The files that are written besides the summary and the tables.
+    steps
+        The steps of an evolution, the last of which this is.
+    """
+
+    problem: ContactProblem
+    state: State
+    title: str = field(default="", kw_only=True)
+    units: Units = field(default_factory=Units, kw_only=True)
+    output: OutputOptions = field(default_factory=OutputOptions, kw_only=True)
+    steps: list[StepRecord] = field(default_factory=list, kw_only=True)
 
     @property
     def nodal(self) -> Array:
-        """Unknowns at the contact nodes."""
+        """Displacement (and scaled potential) at the contact nodes, shape (n, block size)."""
+        return self.problem.nodal(self.state)
 
     @property
     def forces(self) -> Multipliers:
-        """Multipliers."""
+        """Multipliers of the unilateral constraint and of friction."""
+        return self.state.forces
 
     @property
     def pressure(self) -> Array:
-        """Contact pressure."""
+        """Contact pressure -sigma_nu, shape (n,): multiplier and layer."""
+        return self.problem.interface.pressure(self.nodal, self.forces)
 
     @property
     def friction(self) -> Array:
-        """Friction stress."""
+        """Friction stress -sigma_tau = lambda_f, shape (n, d)."""
+        return self.forces.friction
 
     @property
     def friction_bound(self) -> Array:
-        """Its bound."""
+        """Friction bound s, shape (n,). Collective."""
+        return self.problem.interface.bound(self.nodal, self.forces)
 
     @property
     def normal_displacement(self) -> Array:
-        """u_nu."""
+        """u_nu along the contact direction, shape (n,)."""
+        return self.problem.nodes.normal_component(self.nodal)
 
     @property
     def slip(self) -> Array:
-        """u_tau."""
+        """Tangential displacement u_tau, shape (n, d)."""
+        return self.problem.nodes.tangential_component(self.nodal)
 
     @property
     def status(self) -> Array:
-        """What each node does."""
+        """The active set by names: "open", "stick" or "slip", shape (n,). Collective.
+
+        A node is in contact where p - c (gap - u_nu) > 0 for the multiplier p, or where the
+        layer presses; c = E / size. There it slips if |lambda_f + c u_tau|
+        exceeds the friction bound (always where that is 0), and sticks else. Pressures
+        below 1e-9 of the largest count as rounding.
+        """
+        interface, nodal = self.problem.interface, self.nodal
+        rounding = 1e-9 * interface.jump.maximum(self.pressure)
+        active = interface.active_set(nodal, self.forces, self.friction_bound, rounding=rounding)
+        layer = interface.law.layer_pressure(nodal) > rounding
+        touches = active.closed | layer
+        sticks = active.sticks & (self.friction_bound > 0)
+        return np.where(touches, np.where(sticks, "stick", "slip"), "open")

@@ -9,16 +9,18 @@ from typing import Any
 
 import numpy as np
 from mpi4py import MPI
+from numpy.typing import NDArray
 
 from contact.body.fields import Moving, steady
 from contact.history import BodyState
 from contact.methods.steps import LoadStep
+from contact.output.fields import Unloading
 from contact.output.quantities import STEPS, values_of
-from contact.output.record import StepRecord
+from contact.output.resultants import nodes_of
 from contact.output.results import Results
 from contact.output.solution import Solution
+from contact.output.solved import StepRecord
 from contact.output.table import Table, contact_table, csv_columns, write_csv
-from contact.output.unloading import Unloading
 from contact.problem.energy import Moment, balance, moment
 from contact.problem.problem import ContactProblem
 from contact.typing import Array
@@ -47,7 +49,7 @@ class StepRecorder:
         self._unloading.share = 0.0 if last is None else last.unloaded
         self._rounding = 0.0 if last is None else last.rounding
         self._driven = driven_part(problem)
-        self._nodes = None if self._driven is None else _nodes_of(problem, self._driven)
+        self._nodes = None if self._driven is None else nodes_of(problem, self._driven)
 
     @property
     def unloaded(self) -> float:
@@ -98,16 +100,7 @@ def driven_part(problem: ContactProblem) -> str | None:
     return loaded[0] if loaded else None
 
 
-def _nodes_of(problem: ContactProblem, part: str) -> Array:
-    """Return the owned nodes of a part."""
-    from dolfinx import fem
-
-    body, d = problem.equilibrium, problem.dim
-    dofs = fem.locate_dofs_topological(body.space, d - 1, problem.domain.facets(part))
-    return dofs[dofs < body.owned // body.block_size]
-
-
-def _driven(problem: ContactProblem, nodes: Array, now: Moment) -> tuple[Array, Array]:
+def _driven(problem: ContactProblem, nodes: NDArray[np.int32], now: Moment) -> tuple[Array, Array]:
     """Return the mean displacement of nodes, and the force that drives them. Collective."""
     body, d = problem.equilibrium, problem.dim
     x, given = body.nodal(now.x)[nodes, :d], body.nodal(now.given)[nodes, :d]

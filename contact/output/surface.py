@@ -1,23 +1,143 @@
-"""The contact part as a surface of its own: its facets, with what the contact nodes say."""
+"""The contact nodes of all ranks as arrays, and on the facets of the contact part."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
+from typing import Any
 
 import numpy as np
+from dolfinx import fem
+from dolfinx import mesh as dmesh
 from numpy.typing import NDArray
+from scipy.spatial import KDTree
 
+from contact.errors import InputError
 from contact.mesh.entities import cells_at
 from contact.output.quantities import SURFACE, values_of
 from contact.output.solved import Solved
-from contact.output.table import Table, tangent_of
+from contact.output.table import Table, contact_table, tangent_of
 from contact.output.vtu import VTU, Grid, Values
 from contact.problem.problem import ContactProblem
 from contact.typing import Array
 
-#: Status of a node -> its number in the file.
-STATUS = {"none": -1, "open": 0, "stick": 1, "slip": 2}
+
+@dataclass(frozen=True, eq=False, repr=False)
+class ContactResult:
+    """The contact nodes of all ranks, on each of them, in the order of ``contact.csv``.
+
+    Attributes
+    ----------
+    points
+        Places in the reference configuration, shape (n, d) (length).
+    weight
+        Area that each node stands for, shape (n,).
+    normal
+        Contact direction, out of the body, shape (n, d).
+    gap, opening
+        Initial and present distance to the foundation along it, shape (n,) (length).
+    pressure
+        Contact pressure -sigma_nu, shape (n,) (stress).
+    traction
+        Stress of the body on the foundation, shape (n, d).
+    friction_bound
+        Shape (n,) (stress).
+    slip
+        Tangential displacement, shape (n, d) (length).
+    status
+        "open", "stick" or "slip", shape (n,).
+    potential, charge
+        Of a piezoelectric body: potential, and charge that leaves through the foundation, shape
+        (n,); else None.
+    """
+
+    points: Array
+    weight: Array
+    normal: Array
+    gap: Array
+    opening: Array
+    pressure: Array
+    traction: Array
+    friction_bound: Array
+    slip: Array
+    status: NDArray[Any]
+    potential: Array | None
+    charge: Array | None
+    _problem: ContactProblem
+
+    def __repr__(self) -> str:
+        """Return how many nodes there are, and how many of them touch."""
+        closed = np.count_nonzero(self.status != "open")
+        largest = self.pressure.max(initial=0.0)
+        return (
+            f"<ContactResult: {self.status.size} nodes, {closed} in contact, pressure up to "
+            f"{largest:.4g}>"
+        )
+
+    def function(self, name: str) -> fem.Function:
+        """Return one of the arrays as a function on a mesh of the contact surface. Collective.
+
+        It is NaN at nodes that are held, and hence no contact nodes.
+
+        Parameters
+        ----------
+        name
+            For instance "pressure" or "traction".
+
+        Raises
+        ------
+        InputError
+            If there is no such array of numbers.
+        """
+        arrays = {k: v for k, v in vars(self).items() if isinstance(v, np.ndarray)}
+        known = {k: v for k, v in arrays.items() if v.dtype.kind == "f"}
+        if name not in known:
+            raise InputError(f"contact.function({name!r}): accepted: {', '.join(known)}")
+        values = known[name]
+        domain, degree = self._problem.domain, self._problem.equilibrium.degree
+        parts = [domain.facets(contact.on) for contact in self._problem.contacts]
+        surface = dmesh.create_submesh(
+            domain.mesh, domain.dim - 1, np.unique(np.concatenate(parts))
+        )[0]
+        space = fem.functionspace(surface, ("Lagrange", degree, values.shape[1:]))
+        made = fem.Function(space, name=name)
+        places = space.tabulate_dof_coordinates()[:, : domain.dim]
+        distance, nearest = KDTree(self.points).query(places)
+        found = np.where(distance < 1e-9 * domain.size, nearest, -1)
+        rows = np.concatenate([values, np.full((1, *values.shape[1:]), np.nan)])[found]
+        made.x.array[:] = rows.ravel()
+        return made
+
+
+def contact_result(solution: Solved) -> ContactResult:
+    """Return the contact nodes of all ranks. Collective."""
+    return _result(solution.problem, solution.problem.comm.bcast(contact_table(solution)))
+
+
+def _result(problem: ContactProblem, table: Table) -> ContactResult:
+    """Return the contact nodes of a table."""
+    axes = "xyz"[: problem.dim]
+    normal = np.column_stack([table[f"nu_{axis}"] for axis in axes])
+    if problem.dim == 2:
+        tangent = tangent_of(normal)
+        slip, friction = table["u_t"][:, None] * tangent, table["tau"][:, None] * tangent
+    else:
+        slip = np.column_stack([table[f"u_t{axis}"] for axis in axes])
+        friction = np.column_stack([table[f"tau_{axis}"] for axis in axes])
+    return ContactResult(
+        points=np.column_stack([table[axis] for axis in axes]),
+        weight=table["weight"],
+        normal=normal,
+        gap=table["gap"],
+        opening=table["gap"] - table["u_n"],
+        pressure=table["pressure"],
+        traction=table["pressure"][:, None] * normal + friction,
+        friction_bound=table["bound"],
+        slip=slip,
+        status=table["status"],
+        potential=table.get("phi"),
+        charge=table.get("d_n"),
+        _problem=problem,
+    )
 
 
 def _facet_nodes(problem: ContactProblem, part: str) -> NDArray[np.int32]:
@@ -64,50 +184,6 @@ def contact_surface(solution: Solved, table: Table | None) -> VTU | None:
     return VTU(grid, {name: _completed(values, grid) for name, values in fields.items()}, {})
 
 
-def slip_and_friction(table: Table, normal: Array) -> tuple[Array, Array]:
-    """Return u_tau and lambda_f of a contact table as vectors, both of shape (n, d)."""
-    if normal.shape[1] == 2:
-        tangent = tangent_of(normal)
-        return table["u_t"][:, None] * tangent, table["tau"][:, None] * tangent
-    return (
-        np.column_stack([table[f"u_t{axis}"] for axis in "xyz"]),
-        np.column_stack([table[f"tau_{axis}"] for axis in "xyz"]),
-    )
-
-
-@dataclass(frozen=True)
-class Facets:
-    """The contact nodes as the quantities of the surface see them: their table."""
-
-    table: Table
-
-    @cached_property
-    def normal(self) -> Array:
-        """Contact directions, shape (n, d)."""
-        return np.column_stack([self.table[k] for k in ("nu_x", "nu_y", "nu_z") if k in self.table])
-
-    @property
-    def slip(self) -> Array:
-        """Tangential displacements u_tau, shape (n, d)."""
-        return slip_and_friction(self.table, self.normal)[0]
-
-    @property
-    def traction(self) -> Array:
-        """Stresses on the foundation, shape (n, d)."""
-        friction = slip_and_friction(self.table, self.normal)[1]
-        return np.asarray(self.table["pressure"][:, None] * self.normal + friction)
-
-    @property
-    def status(self) -> NDArray[np.int32]:
-        """Numbers of the status."""
-        return np.array([STATUS[name] for name in self.table["status"]], dtype=np.int32)
-
-    @property
-    def rows(self) -> NDArray[np.int32]:
-        """Rows in the table."""
-        return np.arange(len(self.table["status"]), dtype=np.int32)
-
-
 def _fields(
     problem: ContactProblem, table: Table, names: NDArray[np.int64], x: Array
 ) -> dict[str, Values]:
@@ -117,7 +193,7 @@ def _fields(
     fields: dict[str, Values] = {"displacement": x[:, :d]}
     if problem.piezoelectric:
         fields["potential"] = problem.equilibrium.phi_scale * x[:, d]
-    for name, values in values_of(SURFACE, Facets(table)).items():
+    for name, values in values_of(SURFACE, _result(problem, table)).items():
         none = np.nan if values.dtype.kind == "f" else -1
         fields[name] = np.full((len(names), *values.shape[1:]), none, dtype=values.dtype)
         fields[name][rows] = values
@@ -125,7 +201,7 @@ def _fields(
 
 
 def _completed(values: Values, grid: Grid) -> Values:
-    """Give the corners of facets of degree 2 in space the mean of the nodes beside them.
+    """Give the corners of facets of degree 2 in 3-D the mean of the nodes beside them.
 
     They are no contact nodes, as their basis functions have no mean on a facet, and one
     with unknown corners could not be drawn.

@@ -148,7 +148,7 @@ def _free_motions(problem: ContactProblem) -> dict[int, str]:
     return {
         member.begin + k: f"{NAMES[problem.dim][k]} of what is rigid"
         for member in problem.equilibrium.global_unknowns.members
-        if isinstance(member.what, Rigid)
+        if isinstance(member.description, Rigid)
         for k in map(int, np.flatnonzero(member.free))
     }
 

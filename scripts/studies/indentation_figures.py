@@ -15,7 +15,7 @@ import numpy as np
 from mpi4py import MPI
 
 from contact import build_problem, evolve
-from contact.output.balances import charge_balance
+from contact.output.resultants import charge_balance
 from contact.output.table import contact_table
 from contact.typing import Array
 from scripts.reporting import Report, options, solved, subplots

@@ -147,7 +147,7 @@ def example(
     solution = solution_of(name, cells, *changes)
     table = contact_table(solution)
     deformed = picture(solution, "potential", POTENTIAL)
-    share = solution.share_beyond_yield
+    share = solution.plastic_share
     if table is None or deformed is None:
         return
     dotted, values = number.replace("-", "."), deformed.values

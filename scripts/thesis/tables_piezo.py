@@ -13,7 +13,7 @@ from contact import Case, Solution, build_problem, load_case
 from contact.linear.operator import SparseOperator
 from contact.methods.parameters import automatic_r
 from contact.methods.thesis.uzawa import augmentation
-from contact.output.balances import charge_balance, force_balance
+from contact.output.resultants import charge_balance, force_balance
 from contact.problem.kkt import residual_forces
 from contact.problem.problem import ContactProblem
 from scripts.cases import CASES
@@ -127,7 +127,7 @@ def other_rho(report: Report, cells: tuple[int, int]) -> None:
             second = run(case_of(name, cells, friction, *SECANT, *BY_CHANGE))
             lagged.append(counted(first))
             implicit.append(counted(second))
-            shares.append(second.share_beyond_yield)
+            shares.append(second.plastic_share)
         columns |= {f"{number}: Alg. 4": lagged, f"{number}: implicit": implicit}
     columns["yielded share in 8.3"] = shares
     report.table(
@@ -190,7 +190,7 @@ def values(solution: Solution) -> tuple[object, ...]:
         max(problem.comm.allgather(float(np.abs(u).max()))),
         nodes.maximum(solution.pressure),
         solution.max_dev_strain,
-        solution.share_beyond_yield,
+        solution.plastic_share,
         charges.electrodes["left"],
         charges.foundation,
         charges.imbalance,

@@ -13,7 +13,7 @@ from contact.errors import InputError
 from contact.interface.friction import Friction
 from contact.methods.options import FixedPointOptions
 from contact.methods.thesis.fixed_point import FixedPoint
-from contact.output.balances import charge_balance, force_balance, mean_potential, sensor
+from contact.output.resultants import charge_balance, force_balance, mean_potential, sensor
 from contact.problem.problem import ContactProblem
 from tests.problems.mechanics import solve
 from tests.problems.pairs import case

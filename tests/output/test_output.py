@@ -1,5 +1,6 @@
 """The files that a solve leaves, on any number of ranks."""
 
+import csv
 import os
 from dataclasses import replace
 from pathlib import Path
@@ -42,8 +43,13 @@ def test_fixed_formats(dim: int, degree: int, shared_tmp_path: Path) -> None:
     assert summary["contact_nodes"] == sum(s != "open" for s in status)
     assert summary["stick_nodes"] == status.count("stick") > 0
     assert summary["slip_nodes"] == status.count("slip") > 0
-    history = (shared_tmp_path / "history.csv").read_text().splitlines()
-    assert len(history) == 1 + summary["outer_iterations"]
+    history = list(csv.DictReader((shared_tmp_path / "history.csv").open()))
+    assert len(history) == summary["outer_iterations"]
+    records = solution.history.records
+    assert [len(row["steps"].split()) for row in history] == [len(r.steps) for r in records]
+    known = [[int(n) for n in row["active_set"].split("/") if n] for row in history]
+    assert known == [list(record.sizes or ()) for record in records]
+    assert known[-1] == [status.count(name) for name in ("open", "stick", "slip")]
     assert len(summary["inner_iterations"]) == summary["outer_iterations"]
     for name in ("fields.vtu", "contact.vtu"):
         assert (shared_tmp_path / name).is_file()

@@ -38,7 +38,7 @@ def test_a_homogeneous_state(dim: int, degree: int, shared_tmp_path: Path) -> No
     np.testing.assert_allclose(summary["contact_moment"], moment, atol=1e-9 * force)
     mises = PRESSURE * (np.sqrt(1 - 0.3 + 0.3**2) if dim == 2 else 1.0)
     assert summary["max_von_mises"] == pytest.approx(mises, rel=1e-8)
-    assert summary["share_beyond_yield"] is None
+    assert summary["plastic_share"] is None
     for part, reaction in summary["reactions"].items():
         assert part in ("left", "front")
         np.testing.assert_allclose(reaction, 0.0, atol=1e-9 * force)
@@ -68,9 +68,9 @@ def test_supports_balance_contact(dim: int) -> None:
 
 @pytest.mark.parallel
 @pytest.mark.parametrize(("limit", "share"), [(1e-3, 1.0), (0.1, 0.0)])
-def test_share_beyond_yield(limit: float, share: float) -> None:
+def test_plastic_share(limit: float, share: float) -> None:
     law = {"law": "log", "young": 10.0, "poisson": 0.3, "yield_strain": limit}
-    assert pressed(2, 1, material=law).share_beyond_yield == pytest.approx(share, abs=1e-12)
+    assert pressed(2, 1, material=law).plastic_share == pytest.approx(share, abs=1e-12)
 
 
 def test_part_of_the_body_is_beyond_yield() -> None:
@@ -79,7 +79,7 @@ def test_part_of_the_body_is_beyond_yield() -> None:
     strain = body_share(solution.problem, solution.state).in_cells["dev_strain_cell"]
     beyond = np.mean(strain > 0.02)  # the cells are alike
     assert 0.0 < beyond < 1.0
-    assert solution.share_beyond_yield == pytest.approx(beyond, rel=1e-12)
+    assert solution.plastic_share == pytest.approx(beyond, rel=1e-12)
 
 
 def test_what_is_open_has_no_area() -> None:

@@ -117,7 +117,7 @@ def test_a_library_that_fails_to_write_does_not_end_in_an_abort(
     out = tmp_path / "out"
     shutil.copytree(good, out)
     before = (
-        "import resource, contact.output.disk as disk; disk.claim_room = lambda *_: None\n"
+        "import resource, contact.output.field_files as disk; disk.claim_room = lambda *_: None\n"
         "resource.setrlimit(resource.RLIMIT_FSIZE, (6000, 6000))"
     )
     fields = {"checkpoint": "output.checkpoint=true"}.get(format_, f"output.fields={format_}")

@@ -12,7 +12,7 @@ import pytest
 from mpi4py import MPI
 
 from contact.errors import InputError
-from contact.output.disk import claim_room
+from contact.output.field_files import claim_room
 from contact.output.folder import LOCK, result_folder, settle
 from contact.output.transaction import STAGE, begin, complete, recover, swap
 from tests.problems.processes import BAR, CLONE, SMALL

@@ -8,7 +8,7 @@ from contact import InputError, load_case, solve
 from contact.cli.main import main
 from contact.output.figures.figures import collect
 from contact.output.figures.saved import read_drawing
-from contact.output.units import Units
+from contact.output.options import Units
 from scripts.cases import CASES
 
 SMALL = ("mesh.cells=[8, 4]", "solver.method=newton")

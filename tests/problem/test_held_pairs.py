@@ -10,7 +10,7 @@ from contact.errors import InputError
 from contact.interface.friction import Friction
 from contact.methods.newton import Newton
 from contact.methods.options import NewtonOptions
-from contact.output.balances import force_balance
+from contact.output.resultants import force_balance
 from contact.problem.checks import check_rigid_modes
 from contact.problem.contact import Contact
 from contact.problem.problem import ContactProblem

@@ -10,7 +10,7 @@ from contact.interface.friction import Friction
 from contact.methods.newton import Newton
 from contact.methods.options import FixedPointOptions, NewtonOptions
 from contact.methods.thesis.fixed_point import FixedPoint
-from contact.output.balances import charge_balance
+from contact.output.resultants import charge_balance
 from forms.laws import (
     RampConductivity,
 )

@@ -6,7 +6,7 @@ from mpi4py import MPI
 
 from contact.case.file import parse_case
 from contact.methods.options import FixedPointOptions, NewtonOptions, PenaltyOptions
-from contact.output.balances import charge_balance
+from contact.output.resultants import charge_balance
 from tests.problems.rigid import PIEZO, column, plate, solved
 
 SELF = MPI.COMM_SELF

@@ -12,7 +12,7 @@ from contact.interface.obstacle import GapFunction
 from contact.linear.operator import SparseOperator
 from contact.methods.method import METHODS
 from contact.methods.options import OPTIONS
-from contact.output.balances import charge_balance
+from contact.output.resultants import charge_balance
 from contact.output.table import contact_table
 from contact.problem.checks import check_rigid_modes
 from contact.problem.contact import Contact

@@ -6,7 +6,7 @@ from mpi4py import MPI
 
 from contact.case.file import Case, parse_case
 from contact.methods.options import NewtonOptions, Options
-from contact.output.motions import movements
+from contact.output.resultants import movements
 from contact.output.solution import Solution
 from contact.solving import solve
 

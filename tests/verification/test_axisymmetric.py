@@ -20,10 +20,10 @@ from contact.mesh.grid import box, rectangle
 from contact.mesh.transfer import refined
 from contact.methods.newton import Newton
 from contact.methods.options import FixedPointOptions, NewtonOptions, PenaltyOptions
-from contact.output.balances import charge_balance, force_balance
 from contact.output.fields import DerivedFields
 from contact.output.figures.body import draw_plane
 from contact.output.figures.figures import collect
+from contact.output.resultants import charge_balance, force_balance
 from contact.problem.checks import check_rigid_modes
 from contact.problem.contact import Contact
 from contact.problem.problem import ContactProblem

@@ -15,8 +15,8 @@ from contact.interface.obstacle import GapFunction
 from contact.mesh.domain import revolved
 from contact.methods.newton import Newton
 from contact.methods.options import NewtonOptions
-from contact.output.balances import force_balance
 from contact.output.fields import DerivedFields
+from contact.output.resultants import force_balance
 from contact.problem.contact import Contact
 from contact.problem.problem import ContactProblem
 from contact.typing import Array

@@ -10,8 +10,7 @@ from contact.interface.current import Conductor
 from contact.methods.newton import Newton
 from contact.methods.options import FixedPointOptions, NewtonOptions
 from contact.methods.thesis.fixed_point import FixedPoint
-from contact.output.balances import charge_balance
-from contact.output.motions import movements
+from contact.output.resultants import charge_balance, movements
 from contact.problem.contact import Contact
 from contact.problem.kkt import evaluate
 from contact.problem.problem import ContactProblem

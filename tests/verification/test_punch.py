@@ -14,7 +14,7 @@ from contact.mesh.domain import Domain, from_mesh
 from contact.mesh.grid import rectangle
 from contact.methods.newton import Newton
 from contact.methods.options import NewtonOptions
-from contact.output.motions import movements
+from contact.output.resultants import movements
 from contact.problem.contact import Contact
 from contact.problem.problem import ContactProblem
 from contact.solving import solve

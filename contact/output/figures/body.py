@@ -29,9 +29,9 @@ from contact.output.figures.style import (
     page_width,
     sheet,
 )
+from contact.output.options import Units
 from contact.output.solved import Solved
 from contact.output.table import Table, by_contact, held_points
-from contact.output.units import Units
 from contact.output.vtu import KINDS, ORDER, VTU, gathered
 from contact.typing import Array
 

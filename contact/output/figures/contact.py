@@ -25,9 +25,9 @@ from contact.output.figures.style import (
     page_width,
     sheet,
 )
-from contact.output.surface import STATUS
+from contact.output.options import Units
+from contact.output.quantities import STATUS
 from contact.output.table import Table, by_contact
-from contact.output.units import Units
 from contact.output.vtu import VTU
 from contact.typing import Array
 

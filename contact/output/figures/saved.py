@@ -27,8 +27,8 @@ from contact.output.figures.steps import Course
 from contact.output.figures.style import DEFORMED, OUTLIERS, axes_of, heading, named, style
 from contact.output.folder import refused, result_folder
 from contact.output.opposite import AGAINST
+from contact.output.options import Units
 from contact.output.table import Table
-from contact.output.units import Units
 from contact.output.vtu import VTU, read_vtu
 
 #: Endings of files that figures may have.

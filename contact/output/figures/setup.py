@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from contact.output.figures.body import rendered
 from contact.output.figures.style import BLUE, GREEN, ORANGE, SKY
-from contact.output.units import Units
+from contact.output.options import Units
 from contact.typing import Array
 
 #: Colours of supports, electrodes, loads, contact parts and foundations.

@@ -23,8 +23,8 @@ from contact.output.figures.style import (
     page_width,
     sheet,
 )
+from contact.output.options import Units
 from contact.output.table import Table
-from contact.output.units import Units
 from contact.typing import Array
 
 #: Names of the figures: the first is drawn where a part is driven, the second in 2-D.

@@ -10,7 +10,7 @@ import numpy as np
 from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 
-from contact.output.units import Quantity, Units
+from contact.output.options import Quantity, Units
 from contact.typing import Array
 
 #: Settings of all figures.

@@ -1,0 +1,401 @@
+"""Resultants: reactions of supports, charges of electrodes, contact forces, rigid motions.
+
+Forces and charges are not integrals of a discrete stress or D, which converge slowly at edges of
+supports and electrodes, but the residuals of the discrete equations, summed over nodes. These
+balance to the tolerance of the solver on any mesh. Charges are D.nu integrated, nu pointing out of
+the body, in the sign of the given charges q_2 = D.nu.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import ufl
+from dolfinx import fem
+from dolfinx.la import InsertMode
+from mpi4py import MPI
+from numpy.typing import NDArray
+
+from contact.body.fields import constant
+from contact.body.global_unknowns import Member
+from contact.body.loads import expression
+from contact.body.rigid import Electrode
+from contact.errors import InputError
+from contact.mesh.together import members
+from contact.problem.kkt import force_rounding, residual_forces
+from contact.problem.problem import ContactProblem
+from contact.problem.state import State
+from contact.typing import Array
+
+
+@dataclass(frozen=True)
+class Resultant:
+    """The sum of forces at nodes.
+
+    Attributes
+    ----------
+    force
+        Shape (d,); of a body of revolution that of the full turn, along the axis.
+    moment
+        About the origin of coordinates, of points in the reference configuration: shape (1,) in
+        2-D, about z, and (3,) in 3-D. Over the full turn moments cancel.
+    """
+
+    force: Array
+    moment: Array
+
+
+def resultant(problem: ContactProblem, points: Array, forces: Array) -> Resultant:
+    """Return the resultant of forces at owned points, both of shape (n, d). Collective."""
+    d = problem.dim
+    if d == 3:
+        turns = np.cross(points, forces)
+    else:
+        turns = (points[:, 0] * forces[:, 1] - points[:, 1] * forces[:, 0])[:, None]
+    local = np.concatenate([forces, turns], axis=1).sum(axis=0)
+    total = problem.comm.allreduce(local, op=MPI.SUM)
+    moment = np.zeros(1) if problem.domain.revolved else total[d:]
+    return Resultant(problem.domain.resultant(total[:d]), moment)
+
+
+def contact_resultant(problem: ContactProblem, state: State) -> Resultant:
+    """Return the resultant of the body's forces on the foundations. Collective."""
+    nodes = problem.nodes
+    stress = problem.interface.stress(problem.nodal(state), state.forces)
+    return resultant(problem, nodes.points, nodes.weight[:, None] * stress)
+
+
+def supports(problem: ContactProblem, state: State) -> Mapping[str, Resultant]:
+    """Return the forces of the supports on the body, part by part. Collective.
+
+    They balance with loads and contact. A component of a node on two parts counts for the one that
+    stands first.
+    """
+    d, body = problem.dim, problem.equilibrium
+    residual = body.nodal(residual_forces(problem, state))[:, :d]
+    points = body.space.tabulate_dof_coordinates()[:, :d]
+    held = [fixed.displacement or (None,) * d for fixed in problem.body.fixed]
+    return {
+        part: resultant(problem, points[nodes], forces)
+        for part, (nodes, forces) in _reactions(problem, residual, held, slice(d)).items()
+    }
+
+
+def _reactions(
+    problem: ContactProblem, residual: Array, given: Sequence[Sequence[Any]], columns: slice
+) -> dict[str, tuple[NDArray[np.int32], Array]]:
+    """Return the residuals where supports act, part by part: the nodes, and values (n, k) there.
+
+    Parameters
+    ----------
+    problem
+        The problem.
+    residual
+        At the owned nodes, shape (nodes, k).
+    given, columns
+        Prescribed values of each of the body's `fixed`, None for those that are free; and where
+        their components are among all of a node.
+    """
+    found: dict[str, tuple[NDArray[np.int32], Array]] = {}
+    left = ~problem.equilibrium.unsupported[:, columns]
+    for fixed, values in zip(problem.body.fixed, given, strict=True):
+        held = np.array([value is not None for value in values])
+        for part in members(fixed.on) if held.any() else ():
+            nodes = nodes_of(problem, part)
+            forces = np.where(left[nodes] & held, residual[nodes], 0.0)
+            left[nodes] &= ~held
+            if part in found:  # prescribed there by several entries
+                forces = forces + found[part][1]
+            found[part] = nodes, forces
+    return found
+
+
+def nodes_of(problem: ContactProblem, part: str) -> NDArray[np.int32]:
+    """Return the owned nodes of a part of the boundary."""
+    body = problem.equilibrium
+    facets = problem.domain.facets(part)
+    nodes = fem.locate_dofs_topological(body.space, problem.dim - 1, facets)
+    return np.asarray(nodes[nodes < body.owned // body.block_size])
+
+
+@dataclass(frozen=True)
+class ChargeBalance:
+    """Free charges of a body.
+
+    Attributes
+    ----------
+    electrodes
+        Part with a prescribed or one unknown potential -> its charge. A node of two parts with a
+        prescribed one counts for the one that is fixed first.
+    given
+        Part -> prescribed surface charge.
+    foundation
+        Charge that passes through the contact part.
+    body
+        Prescribed volume charge: the sum of all the others, by Gauss's law.
+    magnitude
+        The sum of the absolute nodal charges: with an insulator and one electrode all parts
+        are neutral, though not free of charge everywhere.
+    """
+
+    electrodes: Mapping[str, float]
+    given: Mapping[str, float]
+    foundation: float
+    body: float
+    magnitude: float
+
+    @property
+    def total(self) -> float:
+        """All surface charges less the volume charge: 0 up to the solver's tolerance."""
+        surface = sum(self.electrodes.values()) + sum(self.given.values()) + self.foundation
+        return surface - self.body
+
+    @property
+    def imbalance(self) -> float:
+        """|total| / magnitude, or 0 without charges."""
+        return abs(self.total) / self.magnitude if self.magnitude > 0 else 0.0
+
+
+@dataclass(frozen=True)
+class ForceBalance:
+    """Resultants of the forces on a body, of shape (d,); of one of revolution along its axis.
+
+    Attributes
+    ----------
+    applied
+        Given tractions and body forces.
+    supports
+        Reactions of the prescribed displacements, and of rigid parts.
+    contact
+        Forces of the foundations on the body; between bodies they cancel.
+    passed
+        Force on the side `on` of each of the contacts, shape (contacts, d).
+    rounding
+        Rounding floor of these sums: see `kkt.force_rounding`.
+    """
+
+    applied: Array
+    supports: Array
+    contact: Array
+    passed: Array
+    rounding: float
+
+    @property
+    def imbalance(self) -> float:
+        """The norm of the sum over the sum of the norms, for contact those of `passed`.
+
+        Two bodies that are both held have no other resultant than the force between them, and
+        none at all apart: 0 where all is rounding.
+        """
+        parts = self.applied, self.supports, *self.passed
+        scale = sum(float(np.linalg.norm(part)) for part in parts)
+        total = self.applied + self.supports + self.contact
+        return float(np.linalg.norm(total)) / scale if scale > self.rounding else 0.0
+
+
+@dataclass(frozen=True)
+class Reading:
+    """The reading of a sensor's electrode.
+
+    Attributes
+    ----------
+    charge
+        Free charge of the part; None where its potential is not prescribed.
+    potential
+        Mean potential over the part.
+    """
+
+    charge: float | None
+    potential: float
+
+
+def charge_balance(problem: ContactProblem, state: State) -> ChargeBalance:
+    """Return the charges by part at a state. Collective.
+
+    Raises
+    ------
+    InputError
+        If the body is not piezoelectric.
+    """
+    _demand_potential(problem)
+    equilibrium, time = problem.equilibrium, state.time
+    d, bs = problem.dim, equilibrium.block_size
+    residual = equilibrium.nodal(residual_forces(problem, state))[:, d:]
+    residual = np.asarray(residual / equilibrium.phi_scale)
+    held = [(fixed.potential,) for fixed in problem.body.fixed]
+    parts = _reactions(problem, residual, held, slice(d, None))
+    nodal = {part: charges for part, (_, charges) in parts.items()}
+    nodal |= {e.on: residual[nodes_of(problem, e.on)] for e in problem.body.electrodes}
+    electrodes = {part: _sum(problem, charges) for part, charges in nodal.items()}
+    magnitude = sum(_sum(problem, np.abs(charges)) for charges in nodal.values())
+    given: dict[str, float] = {}
+    body = 0.0
+    x, test = ufl.SpatialCoordinate(problem.domain.mesh), ufl.TestFunction(equilibrium.space)
+    for i, load in enumerate(problem.body.loads):
+        if load.charge is None:
+            continue
+        measure = problem.domain.dx if load.on is None else problem.domain.ds(load.on)
+        now = constant(problem.domain.mesh, time)
+        density = expression(problem.domain, load.charge, x, now, f"load.{i}.charge")
+        vector = fem.assemble_vector(fem.form(density * test[d] * measure))
+        vector.scatter_reverse(InsertMode.add)
+        charges = load.factor(time) * vector.array[: equilibrium.owned].reshape(-1, bs)[:, d]
+        charge = _sum(problem, charges)
+        magnitude += _sum(problem, np.abs(charges))
+        if load.on is None:
+            body += charge
+        else:
+            given[load.on] = given.get(load.on, 0.0) + charge
+    passed = _foundation_charges(problem, state)
+    magnitude += _sum(problem, np.abs(passed))
+    return ChargeBalance(electrodes, given, _sum(problem, passed), body, magnitude)
+
+
+def _foundation_charges(problem: ContactProblem, state: State) -> Array:
+    """Return the charges that leave the owned nodes through contact; between bodies they cancel."""
+    interface, nodal, body = problem.interface, problem.nodal(state), problem.equilibrium
+    pressure = interface.pressure(nodal, state.forces)
+    density = np.zeros((nodal.shape[0], body.block_size))
+    density[:, -1] = problem.nodes.weight * interface.law.charge(nodal, pressure)
+    leaving = np.zeros_like(body.external(state.time))
+    problem.nodes.transpose(density, leaving)
+    if interface.held is not None:
+        interface.held.add_charge(leaving, state.x)
+    return np.asarray(body.nodal(leaving)[:, -1])
+
+
+def force_balance(problem: ContactProblem, state: State) -> ForceBalance:
+    """Return the resultant forces at a state. Collective."""
+    body, d = problem.equilibrium, problem.dim
+    residual = body.nodal(residual_forces(problem, state))[:, :d]
+    supports = np.where(problem.equilibrium.free[:, :d], 0.0, residual).sum(axis=0)
+    stress = problem.interface.stress(problem.nodal(state), state.forces)
+    given = body.nodal(body.external(state.time))[:, :d].sum(axis=0)
+    pushes = np.zeros_like(body.external(state.time))
+    forces = -problem.nodes.weight[:, None] * stress
+    problem.nodes.transpose(forces, pushes)
+    contact = body.nodal(pushes)[:, :d].sum(axis=0)
+    ends = np.cumsum([entry.nodes.nodes.size for entry in problem.entries])[:-1]
+    passed = [part.sum(axis=0) for part in np.split(forces, ends)]
+    local = np.stack([given, supports, contact, *passed])
+    total = problem.domain.resultant(problem.comm.allreduce(local, op=MPI.SUM))
+    rounding = np.linalg.norm(force_rounding(problem, state, body.internal_forces(state))[0])
+    return ForceBalance(total[0], total[1], total[2], total[3:], float(rounding))
+
+
+def mean_potential(problem: ContactProblem, state: State, part: str) -> float:
+    """Return the mean potential over a part of the boundary. Collective.
+
+    Raises
+    ------
+    InputError
+        If the body is not piezoelectric or has no such part.
+    """
+    _demand_potential(problem)
+    body = problem.equilibrium
+    _, phi = body.split(body.function(state.x))
+    ds = problem.domain.ds(part)
+    local = [
+        fem.assemble_scalar(fem.form(phi * ds)),
+        fem.assemble_scalar(fem.form(constant(problem.domain.mesh, 1.0) * ds)),
+    ]
+    integral, area = problem.comm.allreduce(np.array(local), op=MPI.SUM)
+    return float(integral / area)
+
+
+def sensor(problem: ContactProblem, state: State, electrode: str) -> Reading:
+    """Return the reading of an electrode: its charge where its potential is held. Collective.
+
+    A short-circuited electrode (prescribed potential) is read by its charge, one that is left
+    open by its mean potential; it is then no conductor, but a strip of the free surface.
+    """
+    charges = charge_balance(problem, state).electrodes
+    return Reading(charges.get(electrode), mean_potential(problem, state, electrode))
+
+
+def _demand_potential(problem: ContactProblem) -> None:
+    if not problem.piezoelectric:
+        raise InputError("charges and potentials need a piezoelectric material")
+
+
+def _sum(problem: ContactProblem, values: Array) -> float:
+    return float(problem.comm.allreduce(float(np.sum(values)), op=MPI.SUM))
+
+
+def movements(problem: ContactProblem, state: State) -> dict[str, Any]:
+    """Return how rigid bodies have moved, and the potentials of electrodes. Collective.
+
+    ``rigid`` is the foundation that moves; of several it has one entry each, by part.
+    ``rigid_parts`` are the parts that move as rigid bodies, ``electrodes`` those of unknown
+    potential; a key is absent where there are none. Rotations are in degrees. Forces, moments and
+    charges act from outside: those given, or the reactions of components that are given.
+    """
+    foundations: dict[str, Any] = {}
+    parts: dict[str, Any] = {}
+    electrodes: dict[str, Any] = {}
+    for member, values, forces in _members(problem, state):
+        if isinstance(member.description, Electrode):
+            electrodes[member.description.on] = {"potential": values[0], "charge": forces[0]}
+            continue
+        d = len(member.description.motion.displacement)
+        said = {
+            "displacement": values[:d].tolist(),
+            "rotation": _one_or_more(np.rad2deg(values[d:])),
+            "force": forces[:d].tolist(),
+            "moment": _one_or_more(forces[d:]),
+        }
+        (foundations if member.foundation else parts)[member.description.on] = said
+    rigid = next(iter(foundations.values())) if len(foundations) == 1 else foundations
+    found = {"rigid": rigid, "rigid_parts": parts, "electrodes": electrodes}
+    return {key: value for key, value in found.items() if value}
+
+
+def rigid_columns(problem: ContactProblem, state: State) -> dict[str, dict[str, float]]:
+    """Return the columns of the foundations that move, and of electrodes. Collective.
+
+    They are `moved` (displacements and rotations), `acting` (forces and moments) and
+    `potentials`. Of several foundations the names have that of the part behind them.
+    """
+    found: dict[str, dict[str, float]] = {"moved": {}, "acting": {}, "potentials": {}}
+    several = sum(member.foundation for member in problem.equilibrium.global_unknowns.members) > 1
+    for member, values, forces in _members(problem, state):
+        part, d = member.description.on, problem.dim
+        if isinstance(member.description, Electrode):
+            found["potentials"][f"potential_{part}"] = float(values[0])
+        elif member.foundation:
+            turns = ["rotation"] if d == 2 else [f"rotation_{axis}" for axis in "xyz"]
+            moments = ["moment"] if d == 2 else [f"moment_{axis}" for axis in "xyz"]
+            axes, forced = (
+                [*"xyz"[:d], *turns],
+                [*(f"force_{axis}" for axis in "xyz"[:d]), *moments],
+            )
+            moved = np.concatenate([values[:d], np.rad2deg(values[d:])])
+            for kind, names, numbers in (("moved", axes, moved), ("acting", forced, forces)):
+                for name, number in zip(names, numbers, strict=True):
+                    column = f"rigid_{name}" + (f"_{part}" if several else "")
+                    found[kind][column] = float(number)
+    return found
+
+
+def _members(problem: ContactProblem, state: State) -> Iterator[tuple[Member, Array, Array]]:
+    """Give rigid bodies and electrodes with their values, and the forces on them from outside."""
+    body = problem.equilibrium
+    global_unknowns, q = body.global_unknowns, body.motion(state.x)
+    if global_unknowns.size == 0:
+        return
+    residual = residual_forces(problem, state)
+    forces = body.motion(residual) + global_unknowns.gathered(residual[: body.owned])
+    forces += global_unknowns.forces(state.time)
+    for member in global_unknowns.members:
+        units, own = member.units, forces[member.columns]
+        if problem.domain.revolved and not isinstance(member.description, Electrode):
+            # Over the full turn forces across the axis, and moments about it, cancel.
+            own = np.where(np.arange(own.size) == 1, own, 0.0)
+        yield member, q[member.columns] * units, own / units
+
+
+def _one_or_more(values: Array) -> Any:
+    return float(values[0]) if values.size == 1 else values.tolist()
