@@ -47,11 +47,7 @@ WORDS = {
 
 #: Most of them that a package, or a page, may have. Nothing may rise; what is mended lowers it.
 ALLOWED: dict[str, int] = {
-    "contact/body": 40,
-    "contact/interface": 6,
-    "contact/mesh": 2,
-    "contact/output": 184,
-    "contact/problem": 5,
+    "contact/output": 79,
     "scripts": 4,
     "README.md": 18,
     "docs/api.md": 1,
@@ -68,7 +64,7 @@ ALLOWED: dict[str, int] = {
     "docs/results.md": 51,
     "docs/scaling.md": 11,
     "docs/theory.md": 16,
-    "docs/troubleshooting.md": 36,
+    "docs/troubleshooting.md": 30,
     "docs/tutorial.md": 8,
     "docs/two-bodies.md": 31,
 }

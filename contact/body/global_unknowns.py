@@ -5,7 +5,7 @@ component of q is given, or free under a force, moment or charge that is given. 
 plate or of an electrode follow q: their unknowns are no longer their own. A foundation that moves
 takes nothing from the body: only its distance changes (`contact.interface.nodes`).
 
-A state's unknowns have q behind those of the ghosts; forces have what is dual to q at their end.
+A state's unknowns have q behind those of the ghosts; forces have those dual to q at their end.
 All ranks hold the same values of both. Rotations count as lengths, times the size of the body, and
 potentials as those of the nodes: all of q is then of one kind.
 """
@@ -37,7 +37,7 @@ class Member:
     Attributes
     ----------
     description
-        The body or electrode as it is given.
+        The rigid part or electrode as it is given.
     begin
         The first of its unknowns.
     scale
@@ -134,12 +134,12 @@ class GlobalUnknowns:
         return any(not member.foundation for member in self.members)
 
     def member(self, part: str) -> Member | None:
-        """Return the moving foundation in front of a part; None where it is at rest."""
+        """Return the moving foundation in front of a part; None where it is fixed."""
         found = (m for m in self.members if m.foundation and m.description.on == part)
         return next(found, None)
 
     def still(self, nodes: int, block_size: int) -> Array | None:
-        """Return the motion of an obstacle at rest, (nodes, block size, m); None without any q."""
+        """Return the motion of a fixed obstacle, (nodes, block size, m); None without any q."""
         return np.zeros((nodes, block_size, self.size)) if self.size > 0 else None
 
     def prescribe(self, q: Array, time: float) -> Array:
@@ -148,11 +148,11 @@ class GlobalUnknowns:
         return np.where(self.free, q, np.concatenate([np.zeros(0), *given]))
 
     def forces(self, time: float) -> Array:
-        """Return what acts on the free ones at a time, shape (m,)."""
+        """Return the forces and charges on the free ones at a time, shape (m,)."""
         return np.concatenate([np.zeros(0), *(member.forces(time) for member in self.members)])
 
     def gathered(self, forces: Array) -> Array:
-        """Return what forces on owned unknowns are to q: R^T f, shape (m,). Collective."""
+        """Return the forces on q of those on owned unknowns: R^T f, shape (m,). Collective."""
         if not self.tying:
             return np.zeros(self.size)
         return np.asarray(self.comm.allreduce(self.ties.T @ forces, op=MPI.SUM))
@@ -184,7 +184,7 @@ def make_global_unknowns(
     domain, space
         Mesh and space of the unknowns.
     body
-        The body or electrode as it is given.
+        The body as it is described.
     free
         Which unknowns of the owned nodes are not fixed, shape (nodes, block size).
 
@@ -196,12 +196,12 @@ def make_global_unknowns(
     """
     members: list[Member] = []
     described: list[Rigid | Electrode] = [*body.rigid, *body.electrodes]
-    for what in described:
-        if domain.revolved and isinstance(what, Rigid):
-            _check_revolved(what)
+    for given in described:
+        if domain.revolved and isinstance(given, Rigid):
+            _check_revolved(given)
         begin = members[-1].columns.stop if members else 0
-        scale = body.phi_scale if isinstance(what, Electrode) else domain.size
-        members.append(Member(what, begin, scale))
+        scale = body.phi_scale if isinstance(given, Electrode) else domain.size
+        members.append(Member(given, begin, scale))
     size = members[-1].columns.stop if members else 0
     unknown = np.concatenate([np.zeros(0, dtype=bool), *(member.free for member in members)])
     tied = np.zeros(free.shape, dtype=bool)
@@ -212,12 +212,12 @@ def make_global_unknowns(
     return GlobalUnknowns(domain.comm, tuple(members), unknown, ties, tied)
 
 
-def _check_revolved(what: Rigid) -> None:
+def _check_revolved(rigid: Rigid) -> None:
     """Refuse motions that a body of revolution has not."""
-    radial, _, turn = what.values
+    radial, _, turn = rigid.values
     if any(value is None or callable(value) or value != 0 for value in (radial, turn)):
         raise InputError(
-            f"{what.name} on {what.on!r}: what is rigid moves along the axis alone where space is "
+            f"{rigid.name} on {rigid.on!r}: a rigid part moves along the axis alone where space is "
             "axisymmetric; accepted: 0 for the first component of the displacement, no rotation"
         )
 
@@ -243,7 +243,7 @@ def _tie(
         raise InputError(
             f"{key}: it shares nodes with another rigid part or electrode; accepted: parts apart"
         )
-    # What a support holds cannot follow.
+    # A node that a support holds cannot follow.
     moves = np.abs(motion[:, :, member.free]).max(axis=2, initial=0.0) > ROUNDING
     if _anywhere(domain, moves & follows & ~free[nodes]):
         if isinstance(member.description, Electrode):

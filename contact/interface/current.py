@@ -38,8 +38,8 @@ class Conductor:
         Truncation of the potential difference.
     lagged
         Whether the charge is taken from the previous outer iterate, as Algorithm 4 of the
-        thesis does: it then converges for small k_e only (Theorem 5.2). Else the block
-        relaxation of Algorithm 5 has phi implicit, as a Robin term, and only psi is lagged.
+        thesis does: it then converges for small k_e only (Theorem 5.2). Else phi is implicit,
+        as a Robin term in Algorithm 5, and only psi is lagged.
     phi_f_at
         phi_f as a function of time; None where it is always the same.
     """

@@ -231,8 +231,8 @@ def _apart(
             "bodies whose meshes are apart"
         )
     raise InputError(
-        f"{label}: the bodies overlap at rest, by up to {cut:.3g}; accepted: meshes that are "
-        "apart or touch, but for what straight facets take off a curve"
+        f"{label}: the undeformed bodies overlap, by up to {cut:.3g}; accepted: meshes that are "
+        "apart or touch, but for the deviation of straight facets from a curve"
     )
 
 

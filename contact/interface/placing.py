@@ -165,9 +165,9 @@ def _place(
     cut = domain.comm.allreduce(np.max(depth, initial=0.0), op=MPI.MAX)
     if domain.comm.allreduce(bool(np.any(depth > tolerance)), op=MPI.LOR):
         raise InputError(
-            f"foundation: the body cuts it at rest, by up to {cut:.3g}; accepted: gaps "
-            f">= 0 but for {rounding:.1g} (rounding), and what straight facets take off a curve, "
-            'or overlap = "press"'
+            f"foundation: the undeformed body cuts it, by up to {cut:.3g}; accepted: gaps "
+            f">= 0 but for {rounding:.1g} (rounding), and the deviation of straight facets from a "
+            'curve, or overlap = "press"'
         )
     return np.where(facing > 0, np.maximum(gap, 0.0), gap), float(cut)
 

@@ -360,7 +360,7 @@ def revolved(domain: Domain) -> Domain:
     """
     if domain.dim != 2:
         raise InputError(
-            'space.kinematics: "axisymmetric" with a mesh in space; accepted: a mesh in the plane, '
+            'space.kinematics: "axisymmetric" with a mesh in 3-D; accepted: a mesh in 2-D, '
             "x the radius and y the axis"
         )
     radius = domain.mesh.geometry.x[:, 0]

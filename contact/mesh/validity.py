@@ -147,7 +147,7 @@ def _flatten(points: Array, dim: int) -> Array:
         raise InputError("it has nodes whose coordinates are no numbers, or too large")
     if dim == 2 and extent[2] > 1e-9 * extent.max():
         raise InputError(
-            "it is a surface in space; accepted are meshes of tetrahedra (the volume needs a "
+            "it is a surface in 3-D; accepted are meshes of tetrahedra (the volume needs a "
             "physical group) and plane meshes with z = const"
         )
     return np.ascontiguousarray(points[:, :dim])

@@ -199,13 +199,13 @@ def _check_group(problem: ContactProblem, group: Group) -> None:
 def _unconstrained(problem: ContactProblem, group: Group, unconstrained: Array) -> str:
     """Say which pieces can move, and how."""
     count = group.count
-    whole = "the body, or what is rigid," if group.moving else "the body"
+    whole = "the body, or a rigid part," if group.moving else "the body"
     if count > 1:
         one = 1 if problem.domain.revolved else 3 * (problem.dim - 1)
         own = np.linalg.norm(unconstrained[: len(group.pieces) * one], axis=1)
         moves = own.reshape(len(group.pieces), -1).max(axis=1) > 1e-6
         where = " and ".join(f"({', '.join(f'{x:.4g}' for x in c)})" for c in group.centres[moves])
-        which = "the one" if np.count_nonzero(moves) == 1 else "what is"
+        which = "the one" if np.count_nonzero(moves) == 1 else "those"
         whole = f"the mesh has {count} connected components, and {which} about {where}"
     modes = described(unconstrained, group.names)
     return (

@@ -146,7 +146,7 @@ def _touching(problem: ContactProblem) -> NDArray[np.bool_]:
 def _free_motions(problem: ContactProblem) -> dict[int, str]:
     """Return the global unknowns that are motions and not given, with their names."""
     return {
-        member.begin + k: f"{NAMES[problem.dim][k]} of what is rigid"
+        member.begin + k: f"{NAMES[problem.dim][k]} of the rigid part"
         for member in problem.equilibrium.global_unknowns.members
         if isinstance(member.description, Rigid)
         for k in map(int, np.flatnonzero(member.free))
@@ -348,7 +348,7 @@ class UnilateralSupport:
     @property
     def besides(self) -> str:
         """The other motions that may be lost besides a body that is pulled off, in words."""
-        moving = ", or force and moment what is rigid off the body" if self.group.moving else ""
+        moving = ", or force and moment the rigid part off the body" if self.group.moving else ""
         along = ", or along it by more than friction holds" if self.group.problem.frictional else ""
         return moving + along
 

@@ -98,13 +98,13 @@ WRONG = {
     "a plane through the body": (
         "gap = 0.0",
         'foundation = { shape = "plane", point = [0.0, 0.25], normal = [0.0, 1.0] }',
-        ["contact.foundation", "cuts it at rest", "0.25"],
+        ["contact.foundation", "the undeformed body cuts it", "0.25"],
     ),
     "an oblique plane into the body": (
         "gap = 0.0",
         'direction = "body"\n'
         'foundation = { shape = "plane", point = [1.0, 0.0], normal = [0.5, 1.0] }',
-        ["contact.foundation", "cuts it at rest", "0.5"],
+        ["contact.foundation", "the undeformed body cuts it", "0.5"],
     ),
     "a sphere on the other side": (
         "gap = 0.0",
@@ -114,7 +114,7 @@ WRONG = {
     "a sphere that does not hold the body": (
         "gap = 0.0",
         'foundation = { shape = "sphere", centre = [1.0, 0.5], radius = 0.9, inside = true }',
-        ["contact.foundation", "cuts it at rest"],
+        ["contact.foundation", "the undeformed body cuts it"],
     ),
     "a sphere that overflows": (
         "gap = 0.0",

@@ -145,7 +145,7 @@ def test_two_electrodes_under_one_body() -> None:
                 {"on": "two", "foundation": {"shape": "plane", "point": [0, 1], "normal": [0, 1]}},
             ],
             {},
-            r"contact\.1\.foundation: the body cuts it at rest",
+            r"contact\.1\.foundation: the undeformed body cuts it",
         ),
         (
             [{"on": "one", **LAYER, "lagged": True}, {"on": "two", **LAYER}],

@@ -48,7 +48,7 @@ BAD = {
     "folded.msh": "cells overlap",
     "quadrangle.msh": "'Quadrilateral 4', of another shape",
     "second-order.msh": "'Triangle 6', of curved geometry",
-    "surface.msh": "surface in space",
+    "surface.msh": "surface in 3-D",
     "text.msh": "no Gmsh .msh file",
     "cut.msh": "it is cut off",
     "absent.msh": "no such file",

@@ -24,9 +24,9 @@ SELF = MPI.COMM_SELF
         ({"amplitude": "press"}, r"an amplitude with \[evolution\] only"),
         (
             {"displacement": [0.0, "free"], "force": [0.0, 0.01]},
-            "pull the body off the foundation, or force and moment what is rigid off the body",
+            "pull the body off the foundation, or force and moment the rigid part off the body",
         ),
-        ({"rotation": "free"}, r"can move as a rigid body \(rotation of what is rigid\)"),
+        ({"rotation": "free"}, r"can move as a rigid body \(rotation of the rigid part\)"),
     ],
 )
 def test_bad_motions_are_refused(changes, words):

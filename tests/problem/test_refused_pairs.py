@@ -72,7 +72,7 @@ ZERO = constant(0.0, 2)
                     {"on": "lower_top", "against": "upper_bottom"},
                 ]
             },
-            "contact nodes follow, by way of what is opposite, themselves",
+            "contact nodes follow, by way of the nodes opposite, themselves",
         ),
         (
             {
@@ -107,7 +107,7 @@ def test_overlapping_bodies_are_refused():
     problem = ContactProblem(
         domain, body, Contact("left", GapFunction(lambda p: np.full(len(p), 9.0)))
     )
-    with pytest.raises(InputError, match=r"the bodies overlap at rest, by up to 0\.2"):
+    with pytest.raises(InputError, match=r"the undeformed bodies overlap, by up to 0\.2"):
         find_pair(problem.equilibrium, "under", "over", NOTHING)
     pair = find_pair(problem.equilibrium, "under", "over", NOTHING, press=True)
     np.testing.assert_allclose(pair.nodes.gap, -0.2, atol=1e-12)

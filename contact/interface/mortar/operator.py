@@ -119,7 +119,7 @@ def coupling_operator(
     circle = in_circles(replaced, jumps)
     if circle.size:
         raise InputError(
-            f"contact.against: {circle.size} contact nodes follow, by way of what is opposite, "
+            f"contact.against: {circle.size} contact nodes follow, by way of the nodes opposite, "
             "themselves; accepted: contacts that form no circle, such as one of two that are each "
             "other's opposite"
         )
