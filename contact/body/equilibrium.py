@@ -33,12 +33,7 @@ from contact.body.supports import free_components, supports_of, without_field
 from contact.body.weak_forms import InternalForces, WeakForms
 from contact.errors import InputError
 from contact.history import BodyState, Evaluated, InternalVariables
-from contact.linear.constraint import (
-    Change,
-    ConstrainedBulk,
-    ConstrainedOperator,
-    Constraint,
-)
+from contact.linear.constraint import ConstrainedBulk, ConstrainedOperator, Constraint
 from contact.linear.layout import Layout
 from contact.linear.multigrid import is_large
 from contact.linear.operator import Counters, SparseOperator
@@ -257,8 +252,7 @@ class BodyEquilibrium:
     def operator(
         self,
         nodes: NDArray[np.int32],
-        motion: Array | None = None,
-        change: Change | None = None,
+        constraint: Constraint | None = None,
         *,
         symmetric: bool,
         counters: Counters,
@@ -270,24 +264,15 @@ class BodyEquilibrium:
         ----------
         nodes
             Contact nodes, then others that have blocks, local numbers.
-        motion
-            How the foundation moves at the contact nodes with the global unknowns, shape
-            (n, block size, m); None where nothing moves.
-        change
-            The change of unknowns after which the blocks are those of single nodes; None where
-            they are.
+        constraint
+            The constraint after which the blocks are those of single nodes; None where they are
+            and there are no global unknowns.
         symmetric, counters, kind
             As of `SparseOperator`.
         """
         options: dict[str, Any] = {"symmetric": symmetric, "counters": counters, "kind": kind}
-        global_unknowns = self.global_unknowns
-        if change is None and global_unknowns.size == 0:
+        if constraint is None:
             return SparseOperator(self, nodes, components=self.component_norms.apart, **options)
-        motions = global_unknowns.ties
-        if motion is not None:
-            dofs = nodes[: motion.shape[0], None] * self.block_size + np.arange(self.block_size)
-            motions = global_unknowns.with_foundations(dofs, motion)
-        constraint = Constraint(self.layout, change, motions, global_unknowns.free)
         bulk = ConstrainedBulk(self, constraint, BodyState(self.rest()))
         return ConstrainedOperator(bulk, nodes, **options)
 

@@ -157,16 +157,17 @@ class GlobalUnknowns:
             return np.zeros(self.size)
         return np.asarray(self.comm.allreduce(self.ties.T @ forces, op=MPI.SUM))
 
-    def with_foundations(self, dofs: NDArray[np.int32], motion: Array) -> sparse.csr_array:
+    def with_foundations(self, nodes: NDArray[np.int32], motion: Array) -> sparse.csr_array:
         """Return R at the nodes that follow and at contact nodes, shape (owned, m).
 
         Parameters
         ----------
-        dofs
-            Owned unknowns of the contact nodes, shape (n, block size).
+        nodes
+            The owned contact nodes, local numbers, shape (n,).
         motion
             R there, shape (n, block size, m).
         """
+        dofs = nodes[:, None] * motion.shape[1] + np.arange(motion.shape[1])
         size = dofs.size * self.size
         rows = np.repeat(dofs.ravel(), self.size)
         columns = np.broadcast_to(np.arange(self.size), (dofs.size, self.size)).ravel()

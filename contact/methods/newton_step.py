@@ -209,8 +209,7 @@ class NewtonStep:
             asymmetric = interface.friction.acts or interface.law.active
             self._operator = self.problem.equilibrium.operator(
                 interface.coupled,
-                interface.jump.carried,
-                interface.change,
+                self.problem.constraint,
                 symmetric=not asymmetric,
                 counters=self.counters,
                 kind=self.options.linear,

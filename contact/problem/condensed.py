@@ -22,7 +22,7 @@ from contact.history import BodyState, Evaluated
 from contact.interface.interface import Interface
 from contact.interface.jump import Multipliers
 from contact.linear import multigrid
-from contact.linear.constraint import Change, ConstrainedBulk, Constraint
+from contact.linear.constraint import ConstrainedBulk, Constraint
 from contact.linear.dense import DenseOperator, Factors
 from contact.linear.faults import check_overflow, petsc_options
 from contact.linear.layout import balance
@@ -150,8 +150,7 @@ class CondensedBody:
     def operator(
         self,
         nodes: NDArray[np.int32],
-        motion: Array | None = None,
-        change: Change | None = None,
+        constraint: Constraint | None = None,
         *,
         symmetric: bool,
         counters: Counters,
@@ -173,6 +172,9 @@ class CondensedProblem:
     interface: Interface
     scales: Scales
     time: float = 1.0
+
+    #: Its unknowns are the jumps themselves.
+    constraint = None
 
     def start(self, time: float | None = None) -> State:
         """Return the state with the free unknowns at zero."""

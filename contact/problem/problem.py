@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from copy import copy
 from dataclasses import replace
+from functools import cached_property
 
 import numpy as np
 from mpi4py import MPI
@@ -33,6 +34,7 @@ from contact.interface.law import InterfaceLaw
 from contact.interface.nodes import ContactNodes
 from contact.interface.pairing import find_pair
 from contact.interface.placing import candidates, find_nodes
+from contact.linear.constraint import Constraint
 from contact.mesh.domain import Domain
 from contact.mesh.entities import elongation
 from contact.problem.contact import Contact, check_laws
@@ -291,6 +293,18 @@ class ContactProblem:
             area=area,
             spacing=(mesh_area / self.nodes.size) ** (1 / (d - 1)),
         )
+
+    @cached_property
+    def constraint(self) -> Constraint | None:
+        """The constraint of its linear systems; None where there is none. Collective."""
+        body, interface = self.equilibrium, self.interface
+        unknowns, carried = body.global_unknowns, interface.jump.carried
+        if interface.change is None and unknowns.size == 0:
+            return None
+        motions = unknowns.ties
+        if carried is not None:
+            motions = unknowns.with_foundations(self.nodes.nodes, carried)
+        return Constraint(body.layout, interface.change, motions, unknowns.free)
 
     @property
     def comm(self) -> MPI.Intracomm:

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from contact.body.component_norms import ComponentNorms
 from contact.history import Evaluated
 from contact.interface.interface import Interface
-from contact.linear.constraint import Change
+from contact.linear.constraint import Constraint
 from contact.linear.operator import Counters, Operator
 from contact.problem.state import State
 from contact.typing import Array
@@ -129,17 +129,13 @@ class Equilibrium(Protocol):
     def operator(
         self,
         nodes: NDArray[np.int32],
-        motion: Array | None = None,
-        change: Change | None = None,
+        constraint: Constraint | None = None,
         *,
         symmetric: bool,
         counters: Counters,
         kind: str,
     ) -> Operator:
-        """Return an operator with blocks at nodes.
-
-        A foundation may move in front of them, or a change of unknowns make them jumps.
-        """
+        """Return an operator with blocks at nodes, those of a constraint where one is given."""
 
     def norm(self, values: Array) -> float:
         """Return the Euclidean norm of owned values. Collective."""
@@ -155,6 +151,10 @@ class Problem(Protocol):
     @property
     def interface(self) -> Interface:
         """Gamma_3 with its laws."""
+
+    @property
+    def constraint(self) -> Constraint | None:
+        """The constraint of its linear systems; None where there is none. Collective."""
 
     @property
     def scales(self) -> Scales:

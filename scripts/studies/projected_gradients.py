@@ -106,8 +106,7 @@ class ProjectedGradients:
         jump = interface.jump
         operator = body.operator(
             interface.coupled,
-            jump.motion,
-            interface.change,
+            problem.constraint,
             symmetric=True,
             counters=Counters(),
             kind="iterative",

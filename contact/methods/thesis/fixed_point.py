@@ -125,8 +125,7 @@ class FixedPoint:
     def _new_operator(self, symmetric: bool) -> Operator:
         return self.problem.equilibrium.operator(
             self.problem.interface.coupled,
-            self.problem.interface.jump.carried,
-            self.problem.interface.change,
+            self.problem.constraint,
             symmetric=symmetric,
             counters=self.counters,
             kind="many" if self.options.linear == "auto" else self.options.linear,

@@ -75,8 +75,7 @@ class PenalisedProblem:
         self._body, self._interface = problem.equilibrium, problem.interface
         self.operator = self._body.operator(
             self._interface.coupled,
-            self._interface.jump.carried,
-            self._interface.change,
+            problem.constraint,
             symmetric=symmetric,
             counters=counters,
             kind=options.linear,
