@@ -12,9 +12,10 @@
 4. The iteration ends with the residuals of the problem, computed from scratch, or with their
    stagnation: the active sets cycle.
 5. A primal-dual interior point then finds the active sets on the same operator, with the friction
-   bound updated outside (`interior_point`), and Newton's method takes the last steps.
-6. Where that fails too and a current flows, the solutions are followed from a foundation that
-   hardly conducts (`continuation`).
+   bound updated outside (`interior_point`), and Newton's method takes the last steps. Where the
+   body can be condensed onto its contact nodes, this happens there.
+6. Where a current flows through the contact nodes, the solutions are followed from a foundation
+   that hardly conducts instead (`continuation`).
 
 The notes of the history say which.
 
@@ -52,7 +53,7 @@ from contact.methods.parameters import complementarity_parameters, overestimates
 from contact.methods.progress import Best, Stagnation, undeformed_equilibrium
 from contact.methods.report import History, Monitor, Outcome
 from contact.methods.rigid_body_modes import RigidBodyModes
-from contact.problem.condensed import CondensedProblem, condensation, pays
+from contact.problem.condensed import Condensation, CondensedProblem, condensable, pays
 from contact.problem.kkt import KKT, evaluate
 from contact.problem.problem import ContactProblem
 from contact.problem.protocols import Problem
@@ -65,6 +66,9 @@ FALLBACKS = CONTINUATION, INTERIOR_POINT
 
 #: Stagnation limit of Newton's steps after a fallback.
 SHORT = 4
+
+#: The same in a continuation: dense steps cost little beside another part of the way.
+PATIENT = 20
 
 #: Part of the least residual below which a step is progress.
 PROGRESS = 0.5
@@ -112,16 +116,28 @@ class Newton:
         underconstrained = not self.modes.constrained_undeformed
         self.whole = NewtonStep(problem, options, self._parameters, self.counters, underconstrained)
         self._condensed: CondensedStep | None = None
-        if (
-            options.condense
-            and isinstance(problem, ContactProblem)
-            and pays(problem, options.linear)
-            and (body := condensation(problem, self.counters, options.linear))
-        ):
-            solve = partial(_solve_condensed, modes=self.modes)
+        self._condensable, self._pays = False, False
+        if options.condense and isinstance(problem, ContactProblem):
+            self._condensable = condensable(problem, options.linear)
+            self._pays = self._condensable and pays(problem, options.linear)
+
+    def _condensed_step(self) -> CondensedStep:
+        """Return the steps on the condensed body, made when they are first asked for."""
+        if self._condensed is None:
+            assert isinstance(self.problem, ContactProblem) and self.modes is not None
+            body = Condensation(self.problem, self.counters)
+            # Where the whole body comes first, its active sets have cycled already.
+            inner = self.options if self._pays else replace(self.options, patience=SHORT)
             self._condensed = CondensedStep(
-                body, options, self._parameters, solve, self.history, self.counters, FALLBACKS
+                body,
+                inner,
+                self._parameters,
+                partial(_solve_condensed, modes=self.modes),
+                self.history,
+                self.counters,
+                FALLBACKS,
             )
+        return self._condensed
 
     def turn_to(self, problem: Problem) -> None:
         """Go on with another step of the same problem; factorisations remain."""
@@ -188,20 +204,26 @@ class Newton:
     def _iterate(self, iterate: Iterate) -> tuple[Iterate, Outcome]:
         """Take Newton's steps, with the body condensed where that pays."""
         search = self.search
-        if self._condensed is not None:
-            iterate, outcome = NewtonLoop(search, self._condensed, SECANT_UNTIL).run(iterate)
+        if self._pays:
+            iterate, outcome = self._at_contact_nodes(iterate)
             if outcome.converged or search.left <= 0:
                 return iterate, outcome
             logger.info("%s; going on with the whole body", outcome.ended)
             return self.whole_loop().run(iterate)
-        loop = replace(
-            self.whole_loop(),
-            give_up=partial(overestimates_stiffness, self.problem, self._parameters),
-        )
-        return loop.run(iterate)
+        loop = self.whole_loop(SHORT if self._condensable else None)
+        give_up = partial(overestimates_stiffness, self.problem, self._parameters)
+        return replace(loop, give_up=give_up).run(iterate)
+
+    def _at_contact_nodes(self, iterate: Iterate) -> tuple[Iterate, Outcome]:
+        """Iterate over the material, with contact solved on the condensed body."""
+        return NewtonLoop(self.search, self._condensed_step(), SECANT_UNTIL).run(iterate)
 
     def _fall_back(self, iterate: Iterate, outcome: Outcome) -> tuple[Iterate, Outcome]:
-        """Solve by the interior point, and by continuation where that fails."""
+        """Solve by continuation or the interior point, on the condensed body where there is one.
+
+        Its many steps cost one factorisation of the body there. They begin with zero: where the
+        active sets cycle, a body may have moved far away.
+        """
         search = self.search
         if (found := self._undeformed()) is not None:
             return found
@@ -209,6 +231,11 @@ class Newton:
             found = self._conducting(self.problem)
             if found is not None:
                 return found
+        elif self._condensable and not self._pays and search.left > 0:
+            logger.info("%s; going on at the contact nodes", outcome.ended)
+            iterate, outcome = self._at_contact_nodes(Iterate(self.problem.start()))
+            if outcome.converged:
+                return iterate, outcome
         if search.left > 0:
             logger.info("%s; going on with an interior point", outcome.ended)
             assert self.modes is not None
@@ -236,7 +263,7 @@ class Newton:
             less = replace(problem, interface=replace(interface, law=law))
             search = self.search if part == 1 else replace(self.search, problem=less, best=Best())
             step = NewtonStep(search.problem, self.options, self._parameters, self.counters)
-            loop = NewtonLoop(search, step, self.options.secant_until, SHORT)
+            loop = NewtonLoop(search, step, self.options.secant_until, PATIENT)
             return loop.run(iterate, CONTINUATION)
 
         return continuation(solve, Iterate(problem.start()))

@@ -470,8 +470,8 @@ def pays(problem: ContactProblem, kind: str) -> bool:
     return kept <= ALWAYS or kept**3 <= DENSE_IS_FASTER * unknowns * front**2
 
 
-def condensation(problem: ContactProblem, counters: Counters, kind: str) -> Condensation | None:
-    """Return the problem condensed onto its contact nodes, where that is possible. Collective.
+def condensable(problem: ContactProblem, kind: str) -> bool:
+    """Tell whether a problem can be condensed onto its contact nodes.
 
     That is where the contact nodes are few and a direct solver has the memory, unless the user
     or his options of PETSc ask for another.
@@ -482,6 +482,4 @@ def condensation(problem: ContactProblem, counters: Counters, kind: str) -> Cond
     layout = problem.equilibrium.layout
     large = kind == "auto" and layout.dim == 3 and layout.unknowns > multigrid.DIRECT
     many = problem.nodes.size * layout.block_size > LARGEST
-    if chosen or kind == "iterative" or large or many:
-        return None
-    return Condensation(problem, counters)
+    return not (chosen or kind == "iterative" or large or many)
