@@ -127,7 +127,8 @@ class Newton:
             assert isinstance(self.problem, ContactProblem) and self.modes is not None
             body = Condensation(self.problem, self.counters)
             # Where the whole body comes first, its active sets have cycled already.
-            inner = self.options if self._pays else replace(self.options, patience=SHORT)
+            short = replace(self.options, stagnation_limit=SHORT)
+            inner = self.options if self._pays else short
             self._condensed = CondensedStep(
                 body,
                 inner,
