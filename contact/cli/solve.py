@@ -20,7 +20,7 @@ from contact.methods.interrupt import SIGNALLED, Terminated, signals_held
 from contact.output.checkpoint import case_of, discard, kept_case
 from contact.output.files import write_outputs
 from contact.output.folder import on_root, result_folder
-from contact.output.rerun import check_kept, check_rerun, check_restart
+from contact.output.rerun import check_checkpoints, check_rerun
 from contact.output.solution import Solution
 from contact.output.transaction import check_foreign
 from contact.solving import SolveInterrupted, solve
@@ -105,7 +105,9 @@ def _load(options: argparse.Namespace) -> Case:
     folder = Path(options.restart)
     stored = case_of(folder)
     case = load_case(options.case or stored, options.set)
-    check_restart(folder, to_toml(load_case(stored)), to_toml(case, anchored=True))
+    check_checkpoints(
+        folder, to_toml(load_case(stored)), to_toml(case, anchored=True), restart=True
+    )
     return case
 
 
@@ -115,7 +117,7 @@ def _check_results(folder: Path, case: Case) -> None:
     check_foreign(folder)
     kept = kept_case(folder)
     if kept is not None:
-        check_kept(folder, kept, to_toml(case, anchored=True))
+        check_checkpoints(folder, kept, to_toml(case, anchored=True))
 
 
 def _sweep(options: argparse.Namespace, comm: MPI.Intracomm) -> int:

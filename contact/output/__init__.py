@@ -1,4 +1,4 @@
-"""What a solution says and leaves: fields, balances, tables, files, figures, warnings.
+"""The results of a solution: fields, resultants, tables, files, figures, warnings.
 
-Imports: `contact.methods` and what that may import.
+Imports: `contact.methods` and all that it may import.
 """

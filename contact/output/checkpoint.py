@@ -41,7 +41,7 @@ from contact.typing import Array
 #: Folder of the checkpoints in that of the results, that of a run which has not ended a step yet,
 #: and the case in it.
 FOLDER, FRESH, CASE = "checkpoints", "checkpoints.new", "case.toml"
-#: File with the digests of what they were computed from.
+#: File with the digests of their input.
 _DIGEST = "digest.json"
 #: The list of the files in a folder of checkpoints, and a file before it has its name.
 MANIFEST, DRAFT = "manifest.json", ".contact-draft"
@@ -73,7 +73,7 @@ class Checkpoints:
     here
         Whether they are.
     digest
-        Digests of what the problem is made of, by names; None where nothing is known of them.
+        Digests of the input of the problem, by names; None where nothing is known of them.
 
     Raises
     ------
@@ -293,7 +293,7 @@ def case_of(folder: Path) -> Path:
 
 
 def kept_digest(folder: Path) -> dict[str, str]:
-    """Return the digests of what the checkpoints in a folder were computed from. On one rank.
+    """Return the digests of the input of the checkpoints in a folder. On one rank.
 
     Raises
     ------
@@ -394,7 +394,7 @@ def _check_own(folder: Path) -> None:
 
 
 def _remove(place: Path) -> None:
-    """Remove what a manifest names, the first step first, and the folder where nothing is left."""
+    """Remove the files that a manifest names, the first step first, and an empty folder."""
     for name in (*sorted(_manifest(place) or ()), DRAFT):
         (place / name).unlink(missing_ok=True)
     (place / MANIFEST).unlink(missing_ok=True)
@@ -437,12 +437,12 @@ def _put(path: Path, data: bytes) -> None:
 
 
 def _bytes(path: Path) -> bytes:
-    """Return what is in a file of the manifest.
+    """Return the contents of a file of the manifest.
 
     Raises
     ------
     InputError
-        If it is not what has been written.
+        If they are not as they were written.
     """
     data = path.read_bytes() if path.is_file() else b""
     if hashlib.sha256(data).hexdigest() != (_manifest(path.parent) or {}).get(path.name):
@@ -460,7 +460,7 @@ def _unpacked(data: bytes) -> dict[str, NDArray[Any]]:
 
 
 def _places(problem: ContactProblem) -> Array:
-    """Return what tells the owned nodes apart: their points, and the means of the cells around.
+    """Return keys of the owned nodes: their points, and the means of the cells around.
 
     Nodes of two bodies that touch may have the same point, but not the same cells. Shape
     (nodes, 2 d). Collective.

@@ -1,4 +1,4 @@
-"""What a run stands on: versions, and the BLAS that decides the speed of MUMPS."""
+"""The environment of a run: versions, and the BLAS that decides the speed of MUMPS."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ def identify(paths: Iterable[str]) -> Blas:
             if pattern.search(path):
                 return Blas(name, path)
     # Debian's alternatives put optimised libraries under the plain name too, in folders that
-    # tell; what is left is the reference.
+    # tell; any other is the reference.
     for path in candidates:
         if _PLAIN.search(path):
             return Blas("reference", path)

@@ -1,4 +1,4 @@
-"""What a solve leaves in its folder: summary, tables, fields, checkpoint, figures."""
+"""The files of a solve: summary, tables, fields, checkpoint, figures."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from contact.output.table import contact_table, csv_columns, write_csv, write_ta
 def write_outputs(
     solution: Solution, folder: str | Path | ResultFolder, figures: bool = False
 ) -> None:
-    """Write summary, tables, fields and what else is asked for. Collective.
+    """Write summary, tables, fields and all that is asked for. Collective.
 
     They take the place of an earlier run's results, all together: whatever fails, the folder
     holds the earlier ones or the new ones. Other files in it are left alone.

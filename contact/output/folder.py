@@ -26,7 +26,7 @@ from contact.output import transaction
 logger = logging.getLogger("contact.output")
 
 LOCK = ".contact-lock"
-#: What file systems without locks answer.
+#: Answers of file systems without locks.
 _NO_LOCKS = (errno.ENOLCK, errno.ENOSYS, errno.EOPNOTSUPP)
 
 T = TypeVar("T")
@@ -55,11 +55,11 @@ def on_root(comm: MPI.Intracomm, action: Callable[[], T]) -> T:
 
 
 def refused(error: OSError) -> InputError:
-    """Say in words what the system has refused."""
+    """Return a refusal of the system in words."""
     where = "a file" if error.filename is None else error.filename
     return InputError(
-        f"{where}: {error.strerror or error}; accepted: a place to write to, with room for what is "
-        "to be written (earlier results are kept)"
+        f"{where}: {error.strerror or error}; accepted: a place to write to, with room for the "
+        "results (earlier results are kept)"
     )
 
 
@@ -108,7 +108,7 @@ def result_folder(
 ) -> Iterator[ResultFolder]:
     """Make a folder if need be, and keep other runs out of it. Collective.
 
-    What an interrupted run has left is put in order first. A folder that has been made here
+    The files of an interrupted run are put in order first. A folder that has been made here
     and stays empty is removed in the end.
 
     Parameters
@@ -137,12 +137,12 @@ def result_folder(
     finally:
         for lock, made in taken:
             _release(path, lock, made)
-        if together:  # no rank finds what rank 0 is about to remove
+        if together:  # no rank finds files that rank 0 is about to remove
             comm.barrier()
 
 
 def settle(path: Path) -> None:
-    """Put in order what an interrupted run has left in a folder that is to be read. On one rank.
+    """Put the files of an interrupted run in order, before a folder is read. On one rank.
 
     Nothing is done where a run is at work or the folder cannot be written to.
     """
@@ -184,7 +184,7 @@ def _release(path: Path, lock: int, made: list[Path]) -> None:
 
 
 def _lock(folder: Path) -> int:
-    """Lock a folder for this process and return what holds the lock, until it is closed."""
+    """Lock a folder for this process and return the lock, which is held until it is closed."""
     path = folder / LOCK
     while True:
         # Neither a link is followed nor a pipe waited for.

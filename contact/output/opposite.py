@@ -1,4 +1,4 @@
-"""The other side of contacts between bodies: what the contact nodes press on, as a surface.
+"""The other side of contacts between bodies: the master side, as a surface.
 
 Multipliers live on one side. On the other one act the forces int N_l lambda, which belong to its
 own nodes; divided by the areas of these they are stresses again. A constant pressure is the same
@@ -33,7 +33,7 @@ LEAST_AREA = 1e-9
 
 
 def opposite_surface(solution: Solved) -> VTU | None:
-    """Return the parts `against` with what acts there, the same on all ranks. Collective.
+    """Return the parts `against` with the stresses there, the same on all ranks. Collective.
 
     Returns
     -------
@@ -78,7 +78,7 @@ def opposite_surface(solution: Solved) -> VTU | None:
 def _acting(
     problem: ContactProblem, entry: Entry, coupling: Coupling, lumped: Lumping, own: Array
 ) -> Array:
-    """Return what stresses at this rank's contact nodes are on the other side, shape (m, k)."""
+    """Return the stresses of this rank's contact nodes on the other side, shape (m, k)."""
     names = problem.equilibrium.layout.index_map.local_to_global(entry.nodes.nodes)
     forces = np.zeros((coupling.nodes.size, own.shape[1]))
     forces[np.searchsorted(coupling.nodes, names)] = entry.nodes.weight[:, None] * own

@@ -1,4 +1,4 @@
-"""The reference page of the output files, made from what is said of each key.
+"""The reference page of the output files, made from the description of each key.
 
 ``python3 -m contact.output.reference`` writes ``docs/output.md``.
 """
@@ -11,7 +11,7 @@ from pathlib import Path
 
 from contact.output import quantities as q
 
-#: What Markdown has for the symbols of the command line's help.
+#: Formulas in Markdown for the symbols of the command line's help.
 FORMULAS = {"σ_ν": r"$\sigma_\nu$", "σ_τ": r"$\sigma_\tau$", "u_τ": r"$u_\tau$"}
 
 PAGE = Path(__file__).parents[2] / "docs" / "output.md"
@@ -23,7 +23,7 @@ INTRODUCTION = """\
 
 `contact solve CASE.toml --out DIR` leaves in DIR:
 
-| file | what it holds |
+| file | contents |
 |---|---|
 | `summary.json` | the numbers of the run as a whole |
 | `contact.csv` | one row a contact node |
@@ -32,7 +32,7 @@ INTRODUCTION = """\
 | `contact-steps.csv` | likewise: `contact.csv` of all steps, with a first column `t` |
 | `fields.vtu` | all fields of the body, for ParaView, pyvista and meshio |
 | `contact.vtu` | the contact part alone, a surface (in the plane a line) |
-| `contact-against.csv`, `.vtu` | between bodies: the other side, with what acts there |
+| `contact-against.csv`, `.vtu` | between bodies: the other side, with the stresses there |
 | `fields.pvd` | of an evolution: its steps, for ParaView and pyvista |
 | `fields.bp`, `cells.bp` | instead of `fields.vtu`, with `output.fields = "vtx"`: needs ADIOS2 |
 | `fields.xdmf`, `fields.h5` | likewise with `output.fields = "xdmf"`: degree 1 at most |
@@ -44,15 +44,15 @@ They replace those of an earlier run all together, once they are complete; other
 left alone. Results of another problem are replaced with `--overwrite` only: the same one may be
 solved again by another method, to another tolerance, with other outputs.
 
-`contact sweep` leaves `sweep.csv`, one row a case, and `sweep.toml`, what was swept.
+`contact sweep` leaves `sweep.csv`, one row a case, and `sweep.toml`, the case that was swept.
 
 **Units.** All is in the units of the case: with millimetres and newtons, stresses are in MPa. In
 the plane, forces and charges are those of a unit of depth; of bodies of revolution they are those
 of the full turn, in which those along r cancel: resultants have 0 there.
 
 **Signs.** ν points out of the body, to the foundation. Pressure is positive; contact forces and
-friction stresses are what the body exerts *on the foundation*; reactions are what the supports
-exert *on the body*. Stresses in the body are positive in tension. In the plane tangential numbers
+friction stresses act from the body *on the foundation*, reactions from the supports *on the
+body*. Stresses in the body are positive in tension. In the plane tangential numbers
 count along ν turned counter-clockwise by 90 degrees: at the bottom of a body, where ν points down,
 along x.
 
@@ -89,7 +89,7 @@ contact plot results --field stress_xy --field displacement
 """
 
 
-#: Sections of the page, and what is said at the head of each.
+#: Sections of the page, and the text at the head of each.
 SECTIONS: Mapping[str, str] = {
     q.SUMMARY: "",
     q.NODES: "",

@@ -54,7 +54,7 @@ def announce(solution: Solution) -> None:
 
 
 def review(solution: Solution) -> None:
-    """Add what there is to say to the notes and warnings of a solution. Collective."""
+    """Add all remarks to the notes and warnings of a solution. Collective."""
     body, x = solution.problem.equilibrium, solution.state.x
     extremes = DerivedFields(body, solution.state).extremes()
     solution.max_dev_strain = max(largest.strain for largest in extremes)
@@ -99,14 +99,14 @@ def monotonicity(solution: Solution, strains: Sequence[float]) -> Iterator[Remar
         law = material.law
         if np.isfinite(strain) and not isinstance(law, Anisotropic):
             yield _monotonicity(law, _place(material.on), strain, dim)
-            yield _at_rest(law, _place(material.on))
+            yield _unstrained(law, _place(material.on))
 
 
 def _place(on: Sequence[str]) -> str:
     return f" in {', '.join(on)}" if on else ""
 
 
-def _at_rest(law: Hencky, place: str) -> Remark:
+def _unstrained(law: Hencky, place: str) -> Remark:
     """Compare g(0) of a law with mu_1, which stands for it wherever a size is asked for."""
     modulus, shear = float(law.secant_modulus(np.zeros(1))[0]), float(law.shear)
     if abs(modulus - shear) <= OFF * abs(shear):
@@ -170,7 +170,7 @@ def chords(solution: Solution) -> Remark:
     if cut == 0:
         return "", True
     return (
-        f"straight facets of the curved contact part reach {cut:.3g} into the foundation at rest: "
+        f"straight facets of the curved contact part reach {cut:.3g} into the foundation: "
         "the gap there is taken as 0; a mesh that is finer from the beginning has less of it",
         False,
     )
@@ -216,7 +216,7 @@ def fitting(problem: ContactProblem) -> Remark:
 
 
 def preload(solution: Solution) -> Remark:
-    """Say where a layer is thicker than the gap, and presses on the body at rest."""
+    """Say where a layer is thicker than the gap, and presses on the undeformed body."""
     problem = solution.problem
     law = problem.interface.law
     if law.layer is None:
@@ -225,7 +225,8 @@ def preload(solution: Solution) -> Remark:
     if least >= -1e-9 * problem.domain.size:
         return "", True
     return (
-        f"the layer is thicker than the gap, by up to {-least:.4g}: it presses on the body at rest",
+        f"the layer is thicker than the gap, by up to {-least:.4g}: it presses on the undeformed "
+        "body",
         False,
     )
 
@@ -243,7 +244,7 @@ def falling(solution: Solution) -> Remark:
 
 
 def resolution(solution: Solution) -> Remark:
-    """Say where so few nodes are in contact that pressures and zones mean nothing.
+    """Say where the mesh is too coarse for pressures and zones of contact.
 
     A zone that ends within the contact part is looked at; one that covers it has the size that it
     was given.
@@ -277,7 +278,7 @@ def resolution(solution: Solution) -> Remark:
 def untouched(solution: Solution) -> Remark:
     """Say that no node is in contact: a load step may end like that, a static problem is not one.
 
-    What has a tip may also reach into the body between the nodes.
+    A shape with a tip may also reach into the body between the nodes.
     """
     problem = solution.problem
     closed = bool(np.any(solution.status != "open"))
@@ -289,7 +290,7 @@ def untouched(solution: Solution) -> Remark:
     )
     masters = problem.equilibrium.global_unknowns
     if np.any(masters.free & masters.mechanical):
-        text += "; what is rigid and free may be anywhere that it touches nothing"
+        text += "; a rigid part that is free may be anywhere that it touches nothing"
     return text, False
 
 
@@ -299,16 +300,16 @@ def rounding(solution: Solution) -> Remark:
     if granted <= asked:
         return "", True
     return (
-        f"rounding decides how well the forces balance: {granted:.1e} of them is no more than what "
-        f"that of displacements and potentials makes of stresses and currents, and does not count, "
-        f"though the tolerance is {asked:g}; a mesh with fewer cells along a slender body, or less "
-        "of electric.k_e, has less of it",
+        f"rounding decides how well the forces balance: {granted:.1e} of them is no more than "
+        "rounding of displacements and potentials makes of stresses and currents, and does not "
+        f"count, though the tolerance is {asked:g}; a mesh with fewer cells along a slender body, "
+        "or less of electric.k_e, has less of it",
         False,
     )
 
 
 def unknown_pressures(solution: Solution) -> Remark:
-    """Say where contact forces are hardly more than what is left of far larger ones. Collective."""
+    """Say where contact forces are hardly more than the residual of far larger ones. Collective."""
     left = left_as_pressures(solution.problem, solution.state)
     unknown = max(solution.outcome.kkt.unknown, left)
     loads = solution.problem.equilibrium.load_sizes(solution.state.time)[0].max()
@@ -316,8 +317,8 @@ def unknown_pressures(solution: Solution) -> Remark:
     if not (solution.converged and unknown > KNOWN and (moved or loads > 0)):
         return "", True
     return (
-        f"contact forces are known to {unknown:.1e} of their size only: what rounding or "
-        "the tolerance leaves of far larger ones in the bodies does not count as a wrong pressure; "
+        f"contact forces are known to {unknown:.1e} of their size only: the residual "
+        "of far larger forces in the bodies does not count as a wrong pressure; "
         'a smaller solver.tolerance, linear = "lu", or smaller displacements and stresses '
         "elsewhere, make them known better",
         False,
@@ -325,10 +326,10 @@ def unknown_pressures(solution: Solution) -> Remark:
 
 
 def beside_loads(solution: Solution) -> Remark:
-    """Say where little beside the reactions is much beside what the body answers to.
+    """Say where a residual that is small beside the reactions is large beside the loads.
 
     Clamps of a slender beam bear moments of a thousand times the loads. Where supports move the
-    body, what they bear is among its loads.
+    body, their reactions are among its loads.
     """
     problem, state = solution.problem, solution.state
     body = problem.equilibrium
@@ -340,7 +341,7 @@ def beside_loads(solution: Solution) -> Remark:
     left = body.sizes(body.unbalanced(residual))[0]
     borne = body.sizes(body.reactions(residual))[0]
     most = max(LEFT, solution.outcome.allowed.equilibrium)
-    # Where supports bear no more than what acts, what is left is rounding.
+    # Where supports bear no more than the loads, the residual is rounding.
     much = (acting > 0) & (left > most * acting) & (borne > acting)
     if moved or not solution.converged or not much.any():
         return "", True
@@ -405,7 +406,7 @@ def sliding(solution: Solution) -> Remark:
 
 
 def conductivity(solution: Solution) -> Iterator[Remark]:
-    """Say what of (h~5) each conductivity gives up."""
+    """Say which parts of (h~5) each conductivity gives up."""
     laws = {
         type(contact.conductor.psi)
         for contact in solution.problem.contacts
@@ -430,7 +431,7 @@ def conductivity(solution: Solution) -> Iterator[Remark]:
 
 
 def ramp(solution: Solution) -> Remark:
-    """Set the ramp of psi beside the mesh, and what the current does beside the body's stiffness.
+    """Set the ramp of psi beside the mesh, the effect of the current beside the stiffness.
 
     Of a column of height H with the stiffness C, coupling e and permittivity beta, the potential
     follows a change of the current by the share Bi/(1 + Bi) of phi - phi_F, Bi = k_e H/beta, and
@@ -471,7 +472,7 @@ def giving_way(solution: Solution) -> Remark:
 
     The residuals weigh penetrations and slips by E/length, or more. A flat body is stiffer by far:
     its displacements are those of the penalties where these are as small as the residuals ask for.
-    Later steps are not looked at: what has slipped before stays.
+    Later steps are not looked at: earlier slips stay.
     """
     problem = solution.problem
     if solution.method != "penalty" or problem.since is not None:
@@ -489,10 +490,10 @@ def giving_way(solution: Solution) -> Remark:
     largest = solution.max_displacement
     if max(deep, far) <= LARGEST_VIOLATION * largest:
         return "", True
-    what, key = ("touch penetrate", "contact") if deep > far else ("should stick slip", "slip")
+    which, key = ("touch penetrate", "contact") if deep > far else ("should stick slip", "slip")
     return (
-        f"the penalties give way: nodes that {what} by up to {max(deep, far):.2g}, where "
+        f"the penalties give way: nodes that {which} by up to {max(deep, far):.2g}, where "
         f"displacements reach {largest:.2g}; a smaller solver.eps_{key}, or another method, brings "
-        "these nearer to what they are",
+        "these nearer to their limit",
         False,
     )

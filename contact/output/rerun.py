@@ -1,4 +1,4 @@
-"""What a run may replace: results of the same problem, and others where that is asked for."""
+"""Cases compared: a run replaces results of the same problem, others where it is asked to."""
 
 from __future__ import annotations
 
@@ -55,60 +55,40 @@ def check_rerun(folder: Path, case: str) -> None:
     )
 
 
-def check_kept(folder: Path, before: str, case: str) -> None:
-    """Refuse to replace checkpoints of another case, all that a killed run has left. On one rank.
-
-    Parameters
-    ----------
-    folder
-        Where the results are to go.
-    before, case
-        The case of the checkpoints there and the one at hand, as `contact check` prints them.
-
-    Raises
-    ------
-    InputError
-        If they differ in more than in how they are solved and shown.
-    """
-    place = _apart(before, case)
-    if place is not None:
-        raise InputError(
-            f"--out {folder}: given a folder with checkpoints of another case: there {place}; "
-            f"accepted: --restart {folder} to go on with that, --overwrite to replace them, or "
-            "another folder"
-        )
-
-
-def check_restart(folder: Path, before: str, case: str) -> None:
-    """Refuse to go on with another case than the one that was interrupted.
+def check_checkpoints(folder: Path, before: str, case: str, restart: bool = False) -> None:
+    """Refuse to go on with checkpoints of another case, or to replace them. On one rank.
 
     Parameters
     ----------
     folder
         The folder of the interrupted run.
     before, case
-        Its case and the one at hand, as `contact check` prints them.
+        The case of the checkpoints there and the one at hand, as `contact check` prints them.
+    restart
+        Whether the run is to go on.
 
     Raises
     ------
     InputError
         If they differ in more than in how they are solved and shown.
     """
-    place = _apart(before, case)
-    if place is not None:
+    place = difference(*(_without(tomllib.loads(text)) for text in (before, case)))
+    if place is None:
+        return
+    if restart:
         raise InputError(
             f"--restart {folder}: given checkpoints of another case: there {place}; accepted: the "
             "same case, solved and shown as you like"
         )
-
-
-def _apart(before: str, case: str) -> str | None:
-    """Say what differs first between cases, but in how they are solved and shown."""
-    return difference(*(_without(tomllib.loads(text)) for text in (before, case)))
+    raise InputError(
+        f"--out {folder}: given a folder with checkpoints of another case: there {place}; "
+        f"accepted: --restart {folder} to go on with that, --overwrite to replace them, or "
+        "another folder"
+    )
 
 
 def difference(before: Mapping[str, Any], now: Mapping[str, Any]) -> str | None:
-    """Say in words what differs first between the tables of two cases; None for nothing."""
+    """Return the first difference between the tables of two cases in words; None without any."""
     return next(_differences(before, now), None)
 
 
@@ -117,7 +97,7 @@ def _without(case: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _differences(before: Any, now: Any, path: str = "") -> Iterator[str]:
-    """Yield what differs in words, key by key."""
+    """Yield the differences in words, key by key."""
     if isinstance(before, dict) and isinstance(now, dict):
         for key in (*before, *(key for key in now if key not in before)):
             missing = object()

@@ -1,4 +1,4 @@
-"""What the steps of an evolution leave: a row each, and the contact nodes at the end of each."""
+"""The records of the steps of an evolution: a row each, and the contact nodes at its end."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ class StepRecorder:
     problem
         The problem of the evolution.
     last
-        The record to go on from; from rest by default. Collective.
+        The record to go on from; from the reference configuration by default. Collective.
     """
 
     def __init__(self, problem: ContactProblem, last: StepRecord | None = None) -> None:
@@ -53,7 +53,7 @@ class StepRecorder:
 
     @property
     def unloaded(self) -> float:
-        """Largest share of the body that has unloaded from beyond yield in a step."""
+        """Largest share of the body that has unloaded from the plastic range in a step."""
         return self._unloading.share
 
     def record(self, step: LoadStep) -> StepRecord:

@@ -47,7 +47,7 @@ class ContactNodes:
 
     @property
     def nodes(self) -> Nodes:
-        """The nodes at rest."""
+        """The nodes in the reference configuration."""
         return self._problem.nodes
 
     @property
@@ -69,7 +69,7 @@ class ContactNodes:
 
     @property
     def points(self) -> Array:
-        """Places at rest: mesh generators leave coordinates such as -3e-19."""
+        """Reference places: mesh generators leave coordinates such as -3e-19."""
         points = self.nodes.points
         return np.where(np.abs(points) < 1e-15 * self._problem.domain.size, 0.0, points)
 

@@ -3,15 +3,15 @@
 A run writes its members into ``.contact-new/new`` of the folder, ``summary.json`` the last: from
 then on they are complete. Then each member takes its place, the earlier one of its name, and the
 earlier ones that have no successor, going to ``.contact-new/old``. The order of the renames says
-at every moment what is left to do:
+at every moment which steps are to come:
 
 1. the earlier ``summary.json`` goes first: no summary stands beside members of another run;
 2. the other members change places one by one, a new one that is still in ``new`` not having
-   moved yet, so that what stands under its name is the earlier one;
+   moved yet, so that the file of its name is the earlier one;
 3. the new ``summary.json`` comes last.
 
 Whoever finds ``new/summary.json`` continues at 2 (`recover`); whoever finds none has nothing to
-continue: what is under ``.contact-new`` is either not complete or not needed any more.
+continue: all under ``.contact-new`` is either not complete or not needed any more.
 
 ``summary.json`` names the members under "files". These alone are removed by a later run.
 """
@@ -31,14 +31,14 @@ from contact.errors import InputError
 
 STAGE = ".contact-new"
 SUMMARY = "summary.json"
-#: What asks for room on the disk before a member is written; a run that is killed then leaves it.
+#: File that asks for room on the disk before members are written; killed runs leave it.
 ROOM = "room"
 #: Key of the summary under which the names of the members stand.
 MANIFEST = "files"
 
-#: What runs may write. A summary is data of whoever wrote it: no other names are taken from it.
+#: Names that runs may write. Summaries may be of anybody: no other names are taken from them.
 _MEMBER = re.compile(r"[A-Za-z0-9][\w-]*\.(json|csv|bp|npz|xdmf|h5|vtkhdf|pvd|vtu|png|pdf|svg|gif)")
-#: What ADIOS2 leaves in a folder of fields.
+#: Files of ADIOS2 in a folder of fields.
 _ADIOS = re.compile(r"(data|md|mmd)\.(\d+|idx)|profiling\.json|active")
 
 #: Names that every run writes or may write.
@@ -70,7 +70,7 @@ _STEP = re.compile(r"fields-\d{4,}\.vtu")
 
 
 def check_members(folder: Path, names: tuple[str, ...] = MEMBERS) -> None:
-    """Check that what stands under the names of members may be replaced.
+    """Check that all under the names of members may be replaced.
 
     Raises
     ------
@@ -83,7 +83,7 @@ def check_members(folder: Path, names: tuple[str, ...] = MEMBERS) -> None:
 
 
 def check_foreign(folder: Path, names: Sequence[str] | None = None) -> None:
-    """Check that under the names of members stands what a run has left, by its summary.
+    """Check that all under the names of members is of a run, by its summary.
 
     Parameters
     ----------
@@ -121,7 +121,7 @@ def complete(folder: Path, summary: dict[str, object]) -> None:
     new = folder / STAGE / "new"
     members = sorted({path.name for path in new.iterdir()} | {SUMMARY})
     for path in _files(new):
-        # What a disk or a server refuses, it may refuse as late as here.
+        # A disk or a server may refuse as late as here.
         _sync(path)
     # Not in `new`, where its presence would say that it is whole.
     draft = folder / STAGE / SUMMARY
@@ -152,7 +152,7 @@ def add(folder: Path, files: Sequence[Path]) -> None:
 
 
 def swap(folder: Path) -> None:
-    """Put the complete new members in their places, and remove what they replace.
+    """Put the complete new members in their places, and remove those that they replace.
 
     Raises
     ------
@@ -168,7 +168,7 @@ def swap(folder: Path) -> None:
 
 
 def recover(folder: Path) -> None:
-    """Continue what an interrupted run has begun: its members, if complete, take their places.
+    """Continue an interrupted replacement: the new members, if complete, take their places.
 
     Raises
     ------
@@ -191,7 +191,7 @@ def recover(folder: Path) -> None:
 
 
 def discard(folder: Path) -> None:
-    """Remove the temporary folder, and before the rest what says that it is complete."""
+    """Remove the temporary folder, and first the summary, by which it is complete."""
     with suppress(OSError):
         (folder / STAGE / "new" / SUMMARY).unlink()
     shutil.rmtree(folder / STAGE, ignore_errors=True)
@@ -262,7 +262,7 @@ def _check_member(path: Path) -> None:
 
 
 def kind(path: Path) -> str | None:
-    """Say what stands under a name, without following or opening it."""
+    """Return the kind of a file, without following or opening it; None where there is none."""
     try:
         mode = path.lstat().st_mode
     except FileNotFoundError:

@@ -55,7 +55,7 @@ class Grid:
 
 @dataclass(frozen=True)
 class VTU:
-    """What a file holds, or this rank's share of it.
+    """The contents of a file, or this rank's share of it.
 
     Attributes
     ----------

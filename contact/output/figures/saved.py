@@ -145,7 +145,7 @@ def added(folder: Path, draw: Callable[[Path], list[Path]]) -> list[Path]:
     """
     if not (folder / "summary.json").is_file():
         raise InputError(f"{folder}: no results there; accepted: a folder that a run has left")
-    with result_folder(folder, MPI.COMM_SELF, overwrite=True):  # it adds to what is there
+    with result_folder(folder, MPI.COMM_SELF, overwrite=True):  # it only adds
         try:
             files = draw(transaction.begin(folder))
             transaction.add(folder, files)
@@ -333,5 +333,5 @@ def _same_axes(figures: Sequence[Figure]) -> None:
 def _image(figure: Figure) -> Any:
     canvas = FigureCanvasAgg(figure)
     canvas.draw()
-    canvas.draw()  # the layout is settled by the second one
+    canvas.draw()  # the second one ends the layout
     return Image.fromarray(np.asarray(canvas.buffer_rgba())).convert("RGB")

@@ -92,7 +92,7 @@ class Course:
         for way in ways:
             direction = np.sign(np.diff(way))
             turns.append(np.count_nonzero(direction[1:] * direction[:-1] < 0))
-        # Where the part goes to and fro; else where it goes farthest.
+        # Where the part turns back most often; else where it goes farthest.
         k = int(np.lexsort(([np.ptp(way) for way in ways], turns))[-1])
         figure = sheet(0.66)
         ax = figure.subplots()
