@@ -62,7 +62,7 @@ ALLOWED: dict[str, int] = {
     "docs/results.md": 51,
     "docs/scaling.md": 11,
     "docs/theory.md": 16,
-    "docs/troubleshooting.md": 30,
+    "docs/troubleshooting.md": 29,
     "docs/tutorial.md": 8,
     "docs/two-bodies.md": 31,
 }
