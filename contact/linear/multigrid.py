@@ -2,7 +2,7 @@
 
 Three things are added to it: interpolation that knows contact nodes (`StiffNodes`), coarse levels
 that are renewed when iterations say so (`Hierarchy`), and interpolation made for bodies apart where
-bodies touch (`set_up_apart`).
+bodies touch (`join_interpolation`).
 """
 
 from __future__ import annotations
@@ -10,7 +10,6 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from math import ceil, log10
-from typing import Protocol
 
 import numpy as np
 from mpi4py import MPI
@@ -20,7 +19,7 @@ from petsc4py import PETSc
 from contact._compat import keeps_inverted_blocks
 from contact.linear.faults import petsc_options
 from contact.linear.krylov import Components, refine
-from contact.linear.layout import Layout, balance
+from contact.linear.layout import Layout
 from contact.typing import Array
 
 #: Unknowns from which an iterative solver pays, by dimension and whether the body is piezoelectric
@@ -372,67 +371,32 @@ class Hierarchy:
         return taken + self._iterate(rhs, solution, most - taken)
 
 
-class Coupled(Protocol):
-    """A body, or several, whose matrices can be had without their coupling."""
+def join_interpolation(pc: PETSc.PC, jumps: PETSc.Mat, layout: Layout) -> None:
+    """Turn interpolation made for bodies apart into that of their jumps. Collective.
 
-    @property
-    def layout(self) -> Layout:
-        """The unknowns."""
-
-    def take_apart(self, matrix: PETSc.Mat) -> PETSc.Mat | None:
-        """Fill a matrix with bodies that do not touch; see `operator.Bulk`."""
-
-
-class Solver(Protocol):
-    """A linear system with its solver, which GAMG preconditions."""
-
-    matrix: PETSc.Mat
-    ksp: PETSc.KSP
-
-    @property
-    def bulk(self) -> Coupled:
-        """The body."""
-
-    def set_up(self, symmetric: bool) -> None:
-        """Set up the solver for the matrix as it is."""
-
-
-def set_up_apart(solver: Solver) -> bool:
-    """Set multigrid up for bodies that do not touch; False where none touch each other. Collective.
-
-    Motions of each body are then interpolated, and the jumps follow from them. Made for
-    jumps the interpolation would mix the sides of a pair, and it would take twice as many coarse
+    Made for jumps it would mix the sides of a pair, and it would take twice as many coarse
     functions to follow both.
 
     Parameters
     ----------
-    solver
-        Has the matrix of bodies that touch, and has it again afterwards.
+    pc
+        GAMG, set up with bodies that do not touch.
+    jumps
+        The unknowns by those of the bodies apart.
+    layout
+        The unknowns.
     """
-    matrix, layout = solver.matrix, solver.bulk.layout
-    coupled = matrix.copy()
-    jumps = solver.bulk.take_apart(matrix)
-    if jumps is None:
-        return False
-    balance(matrix, layout)
-    # Bodies that nothing but contact holds would give a singular coarse matrix.
-    diagonal = matrix.getDiagonal()
-    diagonal.scale(1 + TOUCH)
-    matrix.setDiagonal(diagonal)
-    solver.set_up(symmetric=True)
-    pc = solver.ksp.getPC()
-    if pc.getMGLevels() > 1:
-        finest = pc.getMGLevels() - 1
-        plain = pc.getMGInterpolation(finest).copy()
-        made = jumps.matMult(plain)
-        own = made.createVecLeft()
-        own.array[:] = layout.free.ravel()
-        made.diagonalScale(L=own)
-        # Where an unknown is fixed all is as it was: coarse functions of these alone remain some.
-        own.array[:] = ~layout.free.ravel()
-        plain.diagonalScale(L=own)
-        made.axpy(1.0, plain)
-        pc.setMGInterpolation(finest, made)
-        pc.setMGRestriction(finest, made)
-    coupled.copy(matrix, PETSc.Mat.Structure.SAME_NONZERO_PATTERN)
-    return True
+    if pc.getMGLevels() == 1:
+        return
+    finest = pc.getMGLevels() - 1
+    plain = pc.getMGInterpolation(finest).copy()
+    made = jumps.matMult(plain)
+    own = made.createVecLeft()
+    own.array[:] = layout.free.ravel()
+    made.diagonalScale(L=own)
+    # Where an unknown is fixed all is as it was: coarse functions of these alone remain some.
+    own.array[:] = ~layout.free.ravel()
+    plain.diagonalScale(L=own)
+    made.axpy(1.0, plain)
+    pc.setMGInterpolation(finest, made)
+    pc.setMGRestriction(finest, made)

@@ -19,7 +19,13 @@ from contact.linear.block import BlockPreconditioner
 from contact.linear.faults import check_overflow, no_solution, petsc_options, set_up_with_workspace
 from contact.linear.krylov import Components, refine
 from contact.linear.layout import Layout, balance, insert_blocks, nodal_blocks
-from contact.linear.multigrid import TOUCH, Hierarchy, held_motions, quick_products, set_up_apart
+from contact.linear.multigrid import (
+    TOUCH,
+    Hierarchy,
+    held_motions,
+    join_interpolation,
+    quick_products,
+)
 from contact.typing import Array
 
 
@@ -175,15 +181,15 @@ class SparseOperator:
         # To insert nothing would be a reason to set the solver up again.
         inserts = same or not self._all(not rest.any())
         if self._multigrid and self._hierarchy is None:
-            if not set_up_apart(self):
+            if not self._set_up_apart():
                 if inserts:
                     insert_blocks(self.matrix, nodes, own + TOUCH * rest)
-                self.set_up(symmetric=True)
+                self._set_up(symmetric=True)
             self._hierarchy = Hierarchy(self.ksp, nodes, self._components)
         if inserts:
             insert_blocks(self.matrix, nodes, own + rest)
         if self._hierarchy is None:
-            self.set_up(self.symmetric)
+            self._set_up(self.symmetric)
             self.counters.factorizations += 1
         else:
             self.matrix.setOption(PETSc.Mat.Option.SYMMETRIC, self.symmetric)
@@ -198,7 +204,23 @@ class SparseOperator:
     def _all(self, flag: bool) -> bool:
         return bool(self.layout.comm.allreduce(int(flag)) == self.layout.comm.size)
 
-    def set_up(self, symmetric: bool) -> None:
+    def _set_up_apart(self) -> bool:
+        """Set multigrid up for bodies that do not touch; False where none do. Collective."""
+        coupled = self.matrix.copy()
+        jumps = self.bulk.take_apart(self.matrix)
+        if jumps is None:
+            return False
+        balance(self.matrix, self.layout)
+        # Bodies that nothing but contact holds would give a singular coarse matrix.
+        diagonal = self.matrix.getDiagonal()
+        diagonal.scale(1 + TOUCH)
+        self.matrix.setDiagonal(diagonal)
+        self._set_up(symmetric=True)
+        join_interpolation(self.ksp.getPC(), jumps, self.layout)
+        coupled.copy(self.matrix, PETSc.Mat.Structure.SAME_NONZERO_PATTERN)
+        return True
+
+    def _set_up(self, symmetric: bool) -> None:
         """Set up the solver for the matrix as it is."""
         self.matrix.setOption(PETSc.Mat.Option.SYMMETRIC, symmetric)
         split = self._split
