@@ -60,7 +60,8 @@ class SlipLaw(Section):
         return laws.Coulomb(laws.SlipCoefficient(self.a, self.b, self.rho))
 
 
-#: A coefficient of friction. A further law is a section like that above, added here.
+#: A coefficient of friction. A further law is a section like that above, told apart by its `law`:
+#: `Annotated[SlipLaw | Another, Field(discriminator="law")]` in place of `SlipLaw`.
 Mu: TypeAlias = Annotated[
     Annotated[NonNegativeFormula, Tag("formula")] | Annotated[SlipLaw, Tag("table")],
     formula_or_table,
@@ -85,7 +86,7 @@ class Friction(Section):
             return friction.Friction(radius=self.radius, **replacements)
         if self.law == "tresca":
             return friction.Friction(tresca=as_field(f"{key}.bound", self.bound, comm, 0.0))
-        if isinstance(self.mu, SlipLaw):
+        if isinstance(self.mu, Section):
             return friction.Friction(law=self.mu.friction(), radius=self.radius)
         if self.mu is not None and self.mu.is_constant:
             constant = laws.ConstantCoefficient(self.mu.value)

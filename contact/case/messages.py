@@ -140,8 +140,8 @@ def keys_of(section: type) -> Mapping[str, FieldInfo]:
 def _meanings(options: type) -> dict[str, str]:
     """Return the meanings in a class's docstring, under "Attributes", by name."""
     _, _, attributes = inspect.cleandoc(options.__doc__ or "").partition("Attributes\n----------\n")
-    blocks = re.findall(r"^(\w+)\n((?:[ ]+.*\n?|\n)+)", attributes, re.MULTILINE)
-    return {name: " ".join(text.split()) for name, text in blocks}
+    blocks = re.findall(r"^(\w+(?:, \w+)*)\n((?:[ ]+.*\n?|\n)+)", attributes, re.MULTILINE)
+    return {name: " ".join(text.split()) for names, text in blocks for name in names.split(", ")}
 
 
 def kinds_of(sections: Iterable[type]) -> tuple[str, dict[str, type]]:
