@@ -50,7 +50,6 @@ ALLOWED: dict[str, int] = {
     "scripts": 4,
     "README.md": 18,
     "docs/api.md": 1,
-    "docs/architecture.md": 20,
     "docs/benchmarks.md": 6,
     "docs/case-file.md": 1,
     "docs/evolution.md": 24,

@@ -35,7 +35,7 @@ BAD = {
     "infinite": ({"solver": {"method": "uzawa", "r": float("inf")}}, "solver.r: given inf"),
     "huge": ({"material__young": 10**400}, "material.young: given 1000"),
     "incompressible": ({"material__poisson": 0.5}, "a number between -1 and 0.5, both excluded"),
-    "unknown law": ({"material__law": "plastic"}, 'material.law: given "plastic"; accepted: "linear", "log"'),
+    "unknown law": ({"material__law": "plastic"}, 'given "plastic"; accepted: "linear", "log"'),
     "log without yield": ({"material__yield_strain": None}, "material.yield_strain: missing"),
     "floor above the modulus": ({"material__g_min": 1.0}, "at most the shear modulus 0.384615"),
     "degree": ({"space__degree": 3}, "space.degree: given 3; accepted: 1 or 2"),
