@@ -41,7 +41,7 @@ Inner: TypeAlias = Callable[[Array, Array], Array]
 
 
 class Chord:
-    """Decides from the residuals whether a factorisation is kept, and accelerates its steps.
+    """Decides by the residuals whether a factorisation is kept, and accelerates chord steps.
 
     All ranks decide alike.
 
@@ -67,20 +67,20 @@ class Chord:
         self._slow = 0
 
     def begin(self) -> None:
-        """Begin another loop: it has other loads, or begins elsewhere."""
+        """Begin another loop, with other loads or another initial guess."""
         self._before: Iterate | None = None
         self._first = False
         self._reached = np.inf
         self._last: tuple[Array, Array] | None = None
         self._changes.clear()
 
-    def turn(self, iterate: Iterate, reached: float) -> tuple[Iterate, bool]:
-        """Return where to go on from, and whether with the kept factorisation.
+    def choose(self, iterate: Iterate, reached: float) -> tuple[Iterate, bool]:
+        """Return the iterate to go on from, and whether the factorisation is kept.
 
         Parameters
         ----------
         iterate
-            Where the method is.
+            The last iterate.
         reached
             The largest residual there.
         """
@@ -96,8 +96,8 @@ class Chord:
             left = np.log(self._goal / reached) / np.log(rate) if rate < 1 else np.inf
             self._slow += self._keeps and rate > FAST
             # The steps that earlier loads took are the estimate for the next ones.
-            tired = self._first and self._slow > self._worth / 2
-            keep = bool(left <= self._worth and reached <= FAR) and not tired
+            outdated = self._first and self._slow > self._worth / 2
+            keep = bool(left <= self._worth and reached <= FAR) and not outdated
         self._first = before is None
         if not keep:
             self._changes.clear()
@@ -105,13 +105,13 @@ class Chord:
         self._before, self._reached, self._keeps = iterate, reached, keep
         return iterate, keep
 
-    def mixed(self, state: State, new: State) -> State:
-        """Return where a step leads that follows others with the same factorisation. Collective.
+    def accelerated(self, state: State, new: State) -> State:
+        """Return the end of a chord step after Anderson's acceleration. Collective.
 
         Parameters
         ----------
         state, new
-            Where it began and where it ended.
+            Beginning and end of the step.
         """
         end, move = _values(new), new.x - state.x
         if self._last is not None:

@@ -1,8 +1,8 @@
-"""The loop over the material alone, around a contact problem that is solved at its own nodes.
+"""A Newton step on the condensed body: one linearisation of the material, all of contact within it.
 
-Where the contact nodes are few, the linearised body is condensed onto them: the loop over contact
-and friction then takes place there, in small dense steps, and the one around it follows the
-material.
+Where the contact nodes are few, the linearised body is condensed onto them (static condensation).
+Active sets and friction are iterated there, in small dense steps on the Schur complement; the outer
+iteration is over the material alone, with chord steps and an energy line search.
 """
 
 from __future__ import annotations
@@ -26,14 +26,14 @@ from contact.problem.problem import ContactProblem
 from contact.problem.state import State
 from contact.typing import Array
 
-#: How much more accurately than the material is linearised the contact problem is solved.
+#: Tolerance of the condensed contact problem, over the residual before the step.
 CONTACT_PART = 1e-3
 
 #: Equilibrium residual below which the tangent replaces the secant of a condensed body. Where
 #: contact is solved exactly in each step, the tangent does not overshoot for its sake.
 SECANT_UNTIL = 0.3
 
-#: Most dense steps in one solve of the condensed contact problem.
+#: Most Newton steps in one solve of the condensed contact problem.
 MOST_STEPS = 1000
 
 #: Solves a condensed problem from an iterate, with a history of its own.
@@ -44,7 +44,7 @@ Solver = Callable[
 
 
 class CondensedStep:
-    """Linearises the material, and solves the contact problem that is left.
+    """Linearises the material, and solves the condensed contact problem.
 
     Parameters
     ----------
@@ -53,7 +53,7 @@ class CondensedStep:
     options, parameters
         Those of the whole problem.
     solve
-        Solves a contact problem at its own nodes.
+        Solves the condensed contact problem.
     history
         Of the whole problem: it is asked whether the solve is to end.
     counters
@@ -97,7 +97,7 @@ class CondensedStep:
     def __call__(self, iterate: Iterate, tangent: bool, reached: KKT) -> Taken | None:
         """Take a step; None where the body cannot be condensed or contact is not solved."""
         body = self.condensation.full.equilibrium
-        iterate, keep = self._chord.turn(iterate, reached.significant)
+        iterate, keep = self._chord.choose(iterate, reached.significant)
         state = iterate.state
         condensed = self.condensation.linearise("tangent" if tangent else "secant", state, keep)
         if condensed is None:
@@ -127,7 +127,7 @@ class CondensedStep:
             new = replace(new, x=body.moved(state.x, length * increment))
             self._chord.forget()
         elif not body.linear:
-            new = self._chord.mixed(state, new)
+            new = self._chord.accelerated(state, new)
             jump, mixed = self.condensation.full.interface.jump, new.forces
             new = replace(new, forces=Multipliers.of(jump, mixed.pressure, mixed.friction))
         notes = [record.note for record in history.records]
@@ -136,7 +136,7 @@ class CondensedStep:
         return Taken(replace(end, state=new), note, length > 1, tuple(history.records))
 
     def _length(self, new: State, state: State, increment: Array) -> float:
-        """Return how far to go along a step that leads from one state to another. Collective."""
+        """Return the step length of the energy line search between two states. Collective."""
         problem, body = self.condensation.full, self.condensation.full.equilibrium
         if body.linear or body.block_size > body.dim:  # a potential's energy is no minimum
             return 1.0

@@ -29,7 +29,7 @@ from mpi4py import MPI
 from contact.errors import InputError
 from contact.interface.jump import Multipliers
 from contact.methods.cones import Array, Cones, Step
-from contact.methods.newton_step import Iterate, NewtonStep, Search
+from contact.methods.newton_step import Iterate, Iteration, NewtonStep
 from contact.methods.report import Outcome
 from contact.methods.rigid_body_modes import RigidBodyModes, all_loads
 from contact.problem.kkt import evaluate, residual_forces
@@ -67,7 +67,7 @@ SHORTEST, LONGEST = 0.9, 0.999
 
 
 def interior_point(
-    search: Search,
+    iteration: Iteration,
     whole: NewtonStep,
     modes: RigidBodyModes,
     finish: Callable[[State], tuple[Iterate, Outcome]],
@@ -76,7 +76,7 @@ def interior_point(
 
     Parameters
     ----------
-    search
+    iteration
         The problem, its best iterate and the number of steps left.
     whole
         Has the operator of the body, with blocks at its contact nodes.
@@ -85,16 +85,16 @@ def interior_point(
     finish
         Newton's method, from a state on.
     """
-    problem, interface = search.problem, search.problem.interface
+    problem, interface = iteration.problem, iteration.problem.interface
     stuck = modes.stuck_bound()
     bound = np.zeros(interface.jump.weight.size) if stuck is None else stuck
     for update in range(UPDATES):
         method = InteriorPoint(problem, whole, bound, modes.constrained_by_supports)
-        outcome, state = method.run(search, CLOSED * CLOSER**update), method.state
+        outcome, state = method.run(iteration, CLOSED * CLOSER**update), method.state
         iterate, least = Iterate(state), outcome.kkt.significant
-        if not outcome.converged and search.left > 0:
+        if not outcome.converged and iteration.left > 0:
             iterate, outcome = finish(state)
-        if outcome.converged or search.left <= 0 or not interface.friction.acts:
+        if outcome.converged or iteration.left <= 0 or not interface.friction.acts:
             break
         if outcome.kkt.significant < least:
             state = iterate.state
@@ -157,18 +157,18 @@ class InteriorPoint:
         length = np.maximum(work / limit, slips)
         self.cones = Cones(slack, work / slack, length, zeros, limit, zeros, jump.comm)
 
-    def run(self, search: Search, closed: float) -> Outcome:
+    def run(self, iteration: Iteration, closed: float) -> Outcome:
         """Go towards the solution, until the duality gap is closed. Collective."""
         kkt, ended = evaluate(self.problem, self.state), "the interior point was given no step"
-        for steps in range(1, min(LIMIT, search.left) + 1):
+        for steps in range(1, min(LIMIT, iteration.left) + 1):
             try:
                 taken = self.step()
             except InputError:
                 self._whole.renew()
                 taken = False
             kkt = evaluate(self.problem, self.state)
-            search.see(Iterate(self.state), kkt)
-            search.history.record(kkt, INTERIOR_POINT, 2)
+            iteration.see(Iterate(self.state), kkt)
+            iteration.history.record(kkt, INTERIOR_POINT, 2)
             ended = f"the interior point has not converged in {steps} steps"
             if not taken:
                 ended = f"rounding ends the interior point after {steps} steps"
@@ -179,7 +179,7 @@ class InteriorPoint:
             ):
                 ended = f"duality gap closed after {steps} steps"
                 break
-        return Outcome(kkt, search.options.allowed, ended)
+        return Outcome(kkt, iteration.options.allowed, ended)
 
     def _sum(self, value: float) -> float:
         """Return the sum of the values of all ranks. Collective."""

@@ -47,7 +47,7 @@ from contact.linear.operator import Counters
 from contact.methods.condensed_step import SECANT_UNTIL, CondensedStep
 from contact.methods.continuation import CONTINUATION, continuation
 from contact.methods.interior_point import INTERIOR_POINT, interior_point
-from contact.methods.newton_step import Iterate, NewtonStep, Search, Step
+from contact.methods.newton_step import Iterate, Iteration, NewtonStep, Step
 from contact.methods.options import NewtonOptions
 from contact.methods.parameters import complementarity_parameters, overestimates_stiffness
 from contact.methods.progress import Best, Stagnation, undeformed_equilibrium
@@ -67,8 +67,8 @@ FALLBACKS = CONTINUATION, INTERIOR_POINT
 #: Stagnation limit of Newton's steps after a fallback.
 SHORT = 4
 
-#: The same in a continuation: dense steps cost little beside another part of the way.
-PATIENT = 20
+#: The same in a continuation: condensed steps cost little beside another value of the parameter.
+CONTINUATION_LIMIT = 20
 
 #: Part of the least residual below which a step is progress.
 PROGRESS = 0.5
@@ -153,12 +153,12 @@ class Newton:
 
     def _begin(self, iterate: Iterate | None = None) -> None:
         at = Iterate(self.problem.start()) if iterate is None else iterate
-        self.search = Search(self.problem, self.options, self.history, at)
+        self.iteration = Iteration(self.problem, self.options, self.history, at)
 
     @property
     def state(self) -> State:
         """The state after the last step."""
-        return self.search.at.state
+        return self.iteration.at.state
 
     def solve(self, start: State | None = None) -> tuple[State, Outcome]:
         """Iterate until convergence or the limit. Collective.
@@ -171,11 +171,11 @@ class Newton:
         self._begin()
         if self._condensed is not None:
             self._condensed.forget()
-        iterate = self.search.at if start is None else self.started(start)
+        iterate = self.iteration.at if start is None else self.iterate_at(start)
         iterate, outcome = self.run(iterate)
         return iterate.state, outcome
 
-    def started(self, start: State) -> Iterate:
+    def iterate_at(self, start: State) -> Iterate:
         """Return an iterate at a given state."""
         interface, c = self.problem.interface, self._parameters.c
         nodal = interface.jump.apply(start.x)
@@ -191,23 +191,23 @@ class Newton:
     def run(self, iterate: Iterate) -> tuple[Iterate, Outcome]:
         """Iterate, with fallbacks; the best iterate if all fail. Collective."""
         self._begin(iterate)
-        search = self.search
+        iteration = self.iteration
         self.history.restart()
         iterate, outcome = self._iterate(iterate)
         if not outcome.converged:
             iterate, outcome = self._fall_back(iterate, outcome)
-        if not outcome.converged and search.best.found is not None:
-            iterate = search.best.found
+        if not outcome.converged and iteration.best.found is not None:
+            iterate = iteration.best.found
             outcome = replace(outcome, kkt=evaluate(self.problem, iterate.state))
-        search.at = iterate
+        iteration.at = iterate
         return iterate, outcome
 
     def _iterate(self, iterate: Iterate) -> tuple[Iterate, Outcome]:
         """Take Newton's steps, with the body condensed where that pays."""
-        search = self.search
+        iteration = self.iteration
         if self._pays:
-            iterate, outcome = self._at_contact_nodes(iterate)
-            if outcome.converged or search.left <= 0:
+            iterate, outcome = self._condensed_loop(iterate)
+            if outcome.converged or iteration.left <= 0:
                 return iterate, outcome
             logger.info("%s; going on with the whole body", outcome.ended)
             return self.whole_loop().run(iterate)
@@ -215,9 +215,9 @@ class Newton:
         give_up = partial(overestimates_stiffness, self.problem, self._parameters)
         return replace(loop, give_up=give_up).run(iterate)
 
-    def _at_contact_nodes(self, iterate: Iterate) -> tuple[Iterate, Outcome]:
+    def _condensed_loop(self, iterate: Iterate) -> tuple[Iterate, Outcome]:
         """Iterate over the material, with contact solved on the condensed body."""
-        return NewtonLoop(self.search, self._condensed_step(), SECANT_UNTIL).run(iterate)
+        return NewtonLoop(self.iteration, self._condensed_step(), SECANT_UNTIL).run(iterate)
 
     def _fall_back(self, iterate: Iterate, outcome: Outcome) -> tuple[Iterate, Outcome]:
         """Solve by continuation or the interior point, on the condensed body where there is one.
@@ -225,22 +225,22 @@ class Newton:
         Its many steps cost one factorisation of the body there. They begin with zero: where the
         active sets cycle, a body may have moved far away.
         """
-        search = self.search
+        iteration = self.iteration
         if (found := self._undeformed()) is not None:
             return found
         if isinstance(self.problem, CondensedProblem):
             found = self._conducting(self.problem)
             if found is not None:
                 return found
-        elif self._condensable and not self._pays and search.left > 0:
-            logger.info("%s; going on at the contact nodes", outcome.ended)
-            iterate, outcome = self._at_contact_nodes(Iterate(self.problem.start()))
+        elif self._condensable and not self._pays and iteration.left > 0:
+            logger.info("%s; going on with the condensed body", outcome.ended)
+            iterate, outcome = self._condensed_loop(Iterate(self.problem.start()))
             if outcome.converged:
                 return iterate, outcome
-        if search.left > 0:
+        if iteration.left > 0:
             logger.info("%s; going on with an interior point", outcome.ended)
             assert self.modes is not None
-            iterate, outcome = interior_point(search, self.whole, self.modes, self.finished)
+            iterate, outcome = interior_point(iteration, self.whole, self.modes, self.last_steps)
         return iterate, outcome
 
     def _undeformed(self) -> tuple[Iterate, Outcome] | None:
@@ -249,7 +249,7 @@ class Newton:
         if found is None:
             return None
         iterate, residuals = Iterate(found[0]), found[1]
-        self.search.see(iterate, residuals)
+        self.iteration.see(iterate, residuals)
         self.history.record(residuals, "zero displacement")
         return iterate, Outcome(residuals, self.options.allowed, "nothing acts")
 
@@ -262,20 +262,22 @@ class Newton:
         def solve(part: float, iterate: Iterate) -> tuple[Iterate, Outcome]:
             law = interface.law.conducting(part)
             less = replace(problem, interface=replace(interface, law=law))
-            search = self.search if part == 1 else replace(self.search, problem=less, best=Best())
-            step = NewtonStep(search.problem, self.options, self._parameters, self.counters)
-            loop = NewtonLoop(search, step, self.options.secant_until, PATIENT)
+            iteration = (
+                self.iteration if part == 1 else replace(self.iteration, problem=less, best=Best())
+            )
+            step = NewtonStep(iteration.problem, self.options, self._parameters, self.counters)
+            loop = NewtonLoop(iteration, step, self.options.secant_until, CONTINUATION_LIMIT)
             return loop.run(iterate, CONTINUATION)
 
         return continuation(solve, Iterate(problem.start()))
 
-    def finished(self, state: State) -> tuple[Iterate, Outcome]:
+    def last_steps(self, state: State) -> tuple[Iterate, Outcome]:
         """Take Newton's last steps from the state that a fallback has reached. Collective."""
-        return self.whole_loop(SHORT).run(self.started(state), INTERIOR_POINT)
+        return self.whole_loop(SHORT).run(self.iterate_at(state), INTERIOR_POINT)
 
     def whole_loop(self, stagnation_limit: int | None = None) -> NewtonLoop:
         """Return the iteration on the problem's own body."""
-        return NewtonLoop(self.search, self.whole, self.options.secant_until, stagnation_limit)
+        return NewtonLoop(self.iteration, self.whole, self.options.secant_until, stagnation_limit)
 
 
 def _solve_condensed(
@@ -286,7 +288,7 @@ def _solve_condensed(
     iterate: Iterate,
     modes: RigidBodyModes,
 ) -> tuple[Iterate, Outcome]:
-    """Solve a contact problem at its own nodes."""
+    """Solve a condensed contact problem."""
     method = Newton(problem, options, parameters=parameters, modes=modes)
     method.history = history
     return method.run(iterate)
@@ -306,7 +308,7 @@ class NewtonLoop:
 
     Attributes
     ----------
-    search
+    iteration
         The problem with the tolerances; told of every iterate.
     step
         Takes the steps.
@@ -319,7 +321,7 @@ class NewtonLoop:
         Asked after the first step from the zero initial guess whether to give up; None to go on.
     """
 
-    search: Search
+    iteration: Iteration
     step: Step
     secant_until: float
     stagnation_limit: int | None = None
@@ -335,19 +337,19 @@ class NewtonLoop:
         note
             Note of the steps in the history.
         """
-        search, problem, options = self.search, self.search.problem, self.search.options
+        iteration, problem, options = self.iteration, self.iteration.problem, self.iteration.options
         linear = problem.equilibrium.linear
         residuals = evaluate(problem, iterate.state)
         limit = self.stagnation_limit or options.stagnation_limit
         stagnation = Stagnation(limit, PROGRESS, together=True)
         if iterate.active_set is not None and residuals.significant <= options.tolerance:
-            search.see(iterate, residuals)
-            search.history.record(residuals, f"{note} initial guess".strip(), inner=0)
+            iteration.see(iterate, residuals)
+            iteration.history.record(residuals, f"{note} initial guess".strip(), inner=0)
             return iterate, self._end(residuals)
         self.step.begin()
         # A start from elsewhere is near the solution; zero displacement has no better tangent.
         tangent = iterate.active_set is not None and not linear
-        for _ in range(min(options.max_iterations, search.left)):
+        for _ in range(min(options.max_iterations, iteration.left)):
             before, kept = residuals, iterate
             taken = self.step(iterate, tangent, residuals)
             if taken is None:
@@ -355,16 +357,16 @@ class NewtonLoop:
             iterate = taken.iterate
             residuals = evaluate(problem, iterate.state)
             worse = self.step.gap_derivative.worsened(residuals.significant)
-            search.see(iterate, residuals)
+            iteration.see(iterate, residuals)
             words = (note, taken.note, "tangent" * tangent, "rejected" * worse)
             said = " ".join(word for word in words if word)
-            search.history.record(
+            iteration.history.record(
                 residuals, said, sizes=_sizes(iterate, problem), steps=taken.inner
             )
             if worse:
                 iterate = kept
                 residuals = evaluate(problem, iterate.state)
-                search.see(iterate, residuals)
+                iteration.see(iterate, residuals)
             if residuals.significant <= options.tolerance:
                 return iterate, self._end(residuals)
             if self.give_up is not None and kept.active_set is None and self.give_up(iterate.state):
@@ -375,12 +377,12 @@ class NewtonLoop:
                 falls = residuals.equilibrium < max(before.equilibrium, options.tolerance)
                 near = residuals.equilibrium < self.secant_until
                 # The energy falls along a step of the line search, where residuals may rise.
-                tangent = taken.searched or (near and (falls or not tangent))
+                tangent = taken.line_search or (near and (falls or not tangent))
             if stagnation(residuals.significant):
                 ended = f"Newton's method stalled at {stagnation.best:.1e}"
                 return iterate, self._end(residuals, ended)
-        steps = len(search.history.records)
+        steps = len(iteration.history.records)
         return iterate, self._end(residuals, f"not converged in {steps} steps")
 
     def _end(self, residuals: KKT, ended: str = "") -> Outcome:
-        return Outcome(residuals, self.search.options.allowed, ended)
+        return Outcome(residuals, self.iteration.options.allowed, ended)

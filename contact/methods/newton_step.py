@@ -81,7 +81,7 @@ class Taken:
         Where it led.
     note
         Its kind in the history, empty for a plain step.
-    searched
+    line_search
         Whether it has gone on to where the energy is least along it.
     inner
         Newton iterations on the condensed problem that it took.
@@ -89,12 +89,12 @@ class Taken:
 
     iterate: Iterate
     note: str = ""
-    searched: bool = False
+    line_search: bool = False
     inner: tuple[Record, ...] = ()
 
 
 @dataclass
-class Search:
+class Iteration:
     """One solve of a problem: its iterate, the best one, and the number of steps left.
 
     Attributes

@@ -19,7 +19,7 @@ from contact.tolerances import EPS
 from contact.typing import Array
 
 #: How far unknowns are moved to see the effect of rounding, over their size.
-SHAKE = 1e-8
+PERTURBATION = 1e-8
 
 #: Rounding that is allowed for, over the change of forces by moving all unknowns by rounding.
 #: Residuals that fall no further are 0.6 to 1 of that; solves leave a few times as much.
@@ -119,9 +119,9 @@ def residual_forces(problem: Problem, state: State, secant_at: Array | None = No
 
 
 @lru_cache(maxsize=2)  # of the body, and of its contact nodes
-def _shakes(size: int) -> Array:
-    """Return by how much unknowns are moved, over their size, up and down at random."""
-    return SHAKE * np.random.default_rng(0).choice((-1.0, 1.0), size)
+def _perturbation(size: int) -> Array:
+    """Return relative perturbations of unknowns, with random signs."""
+    return PERTURBATION * np.random.default_rng(0).choice((-1.0, 1.0), size)
 
 
 def force_rounding(problem: Problem, state: State, internal: Array) -> Array:
@@ -135,12 +135,12 @@ def force_rounding(problem: Problem, state: State, internal: Array) -> Array:
     """
     body, own = problem.equilibrium, problem.equilibrium.owned_part(state.x)
     # All ranks hold the global unknowns behind those of the nodes.
-    step = np.full(own.size, SHAKE)
-    step[: body.owned] = _shakes(body.owned)
+    step = np.full(own.size, PERTURBATION)
+    step[: body.owned] = _perturbation(body.owned)
     moved = body.moved(state.x, step * own)
     change = body.internal_forces(replace(state, x=moved)) - internal
     problem.interface.add_current(change, state.x, moved - state.x, state.forces)
-    return MARGIN * EPS / SHAKE * body.sizes(body.unbalanced(change))
+    return MARGIN * EPS / PERTURBATION * body.sizes(body.unbalanced(change))
 
 
 def _as_pressures(interface: Interface, forces: Array) -> Array:

@@ -86,9 +86,9 @@ def _nothing(*_: Any, **__: Any) -> None:
     return None
 
 
-def _no_fallback(search: Any, *_: Any) -> tuple[Any, Outcome]:
-    residuals = evaluate(search.problem, search.at.state)
-    return search.at, Outcome(residuals, search.options.allowed, "no interior point")
+def _no_fallback(iteration: Any, *_: Any) -> tuple[Any, Outcome]:
+    residuals = evaluate(iteration.problem, iteration.at.state)
+    return iteration.at, Outcome(residuals, iteration.options.allowed, "no interior point")
 
 
 def _linearised(old: Callable[..., Any]) -> Callable[..., Any]:

@@ -86,10 +86,10 @@ def begun(reached: float) -> tuple[Chord, Iterate]:
     """Return the rule after one step with a new factorisation, which led to a residual."""
     state = yielding().start()
     kept = Chord(1e-8, Body.products, 10.0)
-    iterate, keep = kept.turn(Iterate(state), 1.0)
+    iterate, keep = kept.choose(Iterate(state), 1.0)
     assert not keep
-    kept.mixed(state, replace(state, x=state.x + 1.0))
-    iterate, keep = kept.turn(Iterate(state), reached)
+    kept.accelerated(state, replace(state, x=state.x + 1.0))
+    iterate, keep = kept.choose(Iterate(state), reached)
     assert keep
     return kept, iterate
 
@@ -97,12 +97,12 @@ def begun(reached: float) -> tuple[Chord, Iterate]:
 @pytest.mark.parametrize(("rate", "keeps"), [(0.1, True), (0.5, False)])
 def test_it_is_kept_as_long_as_that_is_fast(rate, keeps):
     kept, iterate = begun(1e-3)
-    assert kept.turn(Iterate(iterate.state), 1e-3 * rate)[1] is keeps
+    assert kept.choose(Iterate(iterate.state), 1e-3 * rate)[1] is keeps
 
 
 def test_a_step_that_makes_things_worse_is_taken_back():
     kept, iterate = begun(1e-3)
-    again, keep = kept.turn(Iterate(iterate.state), 2e-3)
+    again, keep = kept.choose(Iterate(iterate.state), 2e-3)
     assert again is iterate and not keep
 
 
@@ -114,5 +114,5 @@ def test_the_acceleration_solves_what_is_linear_in_as_many_steps_as_there_are_ra
     kept = Chord(1e-8, Body.products, 10.0)
     for _ in range(3):
         end = replace(state, x=goal + rates * (state.x - goal))
-        state = kept.mixed(state, end)
+        state = kept.accelerated(state, end)
     assert np.allclose(state.x, goal, rtol=0, atol=1e-9)

@@ -50,23 +50,23 @@ NOTHING: NDArray[np.int64] = np.zeros(0, dtype=np.int64)
 
 
 @dataclass(frozen=True)
-class Heirs:
-    """Whose functions act on facets, where some nodes carry no multiplier.
+class Carriers:
+    """The nodes whose dual functions act on facets, where some nodes carry no multiplier.
 
     Attributes
     ----------
     nodes
         Global numbers of the nodes whose multipliers act, shape (f, k).
-    shares
+    functions
         Their functions as combinations of the facet's own, shape (f, k, k).
     """
 
     nodes: NDArray[np.int64]
-    shares: Array
+    functions: Array
 
     @staticmethod
-    def of(slave: Surface, without: NDArray[np.int64], comm: MPI.Intracomm) -> Heirs:
-        """Return who has the functions of some nodes. Collective.
+    def of(slave: Surface, without: NDArray[np.int64], comm: MPI.Intracomm) -> Carriers:
+        """Return the nodes that take over the dual functions of others. Collective.
 
         They go in equal parts to the others of the facet, and all of those of a facet without
         others to the nearest corner of another facet.
@@ -81,15 +81,15 @@ class Heirs:
         gone = np.isin(slave.nodes, without)
         kept = ~gone
         among = kept / np.maximum(kept.sum(axis=1, keepdims=True), 1)
-        shares = among[:, :, None] * gone[:, None, :] + kept[:, :, None] * np.eye(gone.shape[1])
+        functions = among[:, :, None] * gone[:, None, :] + kept[:, :, None] * np.eye(gone.shape[1])
         nodes, corners = slave.nodes.copy(), kept[:, : slave.corners.shape[1]]
         names = np.concatenate(comm.allgather(slave.nodes[:, : corners.shape[1]][corners]))
         places = np.concatenate(comm.allgather(slave.corners[corners]))
         alone = np.flatnonzero(gone.all(axis=1))
         if alone.size and names.size:
             nodes[alone, 0] = names[cKDTree(places).query(slave.centres[alone])[1]]
-            shares[alone, 0] = 1.0
-        return Heirs(nodes, shares)
+            functions[alone, 0] = 1.0
+        return Carriers(nodes, functions)
 
 
 @dataclass(frozen=True)
@@ -100,7 +100,7 @@ class Parts:
     ----------
     nodes
         Global numbers of the facets' nodes, shape (f, k).
-    heirs
+    carriers
         Those of the nodes whose functions Phi these are, shape (f, k).
     own
         int Phi_i N~_j over the part that faces the master, shape (f, k, k).
@@ -112,11 +112,11 @@ class Parts:
         int Phi_i times the vector across, everywhere and where the sides do not cut each other,
         shape (f, k, 2, d).
     rows, columns, values
-        int Phi_i (N_l o Pi): numbers of the heir and of the master's node, shape (e,).
+        int Phi_i (N_l o Pi): numbers of the carrier and of the master's node, shape (e,).
     """
 
     nodes: NDArray[np.int64]
-    heirs: NDArray[np.int64]
+    carriers: NDArray[np.int64]
     own: Array
     whole: Array
     normal: Array
@@ -131,7 +131,7 @@ class Parts:
         return Parts(*arrays)
 
 
-def integrate(slave: Surface, master: Surface, reach: float, heirs: Heirs) -> Parts:
+def integrate(slave: Surface, master: Surface, reach: float, carriers: Carriers) -> Parts:
     """Integrate the dual functions of slave facets, alone and with the facets opposite.
 
     Parameters
@@ -140,13 +140,13 @@ def integrate(slave: Surface, master: Surface, reach: float, heirs: Heirs) -> Pa
         Slave facets of this rank, and all master facets.
     reach
         Largest distance at which facets face each other (length).
-    heirs
-        Whose functions act on the slave facets.
+    carriers
+        The nodes whose functions act on the slave facets.
     """
     direction, found = _facing(slave, master, reach)
     change = positive_change(slave.corners.shape[1], slave.degree)
     dual, weight = _dual(slave, found, change)
-    dual, own = heirs.shares @ dual, heirs.shares * weight[:, None, :]
+    dual, own = carriers.functions @ dual, carriers.functions * weight[:, None, :]
     gap = np.zeros((*weight.shape, 2))
     entries: list[Entries] = [(NOTHING, NOTHING, np.zeros(0))]
     for points in found:
@@ -154,12 +154,12 @@ def integrate(slave: Surface, master: Surface, reach: float, heirs: Heirs) -> Pa
         phi *= points.weight[:, None]
         across = np.column_stack([points.gap, np.maximum(points.gap, 0.0)])
         _add(gap, points.slave, phi[:, :, None] * across[:, None, :])
-        entries.append(_master_entries(points, phi, heirs.nodes, master))
+        entries.append(_master_entries(points, phi, carriers.nodes, master))
     return Parts(
         slave.nodes,
-        heirs.nodes,
+        carriers.nodes,
         own,
-        np.einsum("fij,fj->fi", heirs.shares, integrals(slave)),
+        np.einsum("fij,fj->fi", carriers.functions, integrals(slave)),
         own.sum(axis=2)[:, :, None] * direction[:, None, :],
         gap[:, :, :, None] * direction[:, None, None, :],
         *(np.concatenate(part) for part in zip(*entries, strict=True)),
@@ -223,7 +223,7 @@ def _add(total: Array, index: NDArray[np.intp], values: Array) -> None:
 
 
 def _master_entries(
-    points: Points, phi: Array, heirs: NDArray[np.int64], master: Surface
+    points: Points, phi: Array, carriers: NDArray[np.int64], master: Surface
 ) -> Entries:
     """Return int Phi_j N_l as global row, global column, value."""
     n = basis(points.on_master, master.degree)
@@ -233,7 +233,7 @@ def _master_entries(
     if first.size == 0:
         return NOTHING, NOTHING, np.zeros(0)
     values = np.add.reduceat(phi[:, :, None] * n[:, None, :], first, axis=0)
-    rows = heirs[points.slave[first]][:, :, None]
+    rows = carriers[points.slave[first]][:, :, None]
     columns = master.nodes[points.master[first]][:, None, :]
     rows, columns = np.broadcast_arrays(rows, columns)
     return rows.ravel(), columns.ravel(), values.ravel()
@@ -310,18 +310,18 @@ def couple(
         nodes of their facets, or to the nearest node where these have none, so that the multipliers
         still contain the constants.
     """
-    parts = integrate(slave, master, reach, Heirs.of(slave, without, comm)).gathered(comm)
+    parts = integrate(slave, master, reach, Carriers.of(slave, without, comm)).gathered(comm)
     return _assembled(parts, slave.corners.shape[1], slave.degree, without)
 
 
 def _assembled(parts: Parts, d: int, degree: int, without: NDArray[np.int64]) -> Coupling:
     every, place = np.unique(parts.nodes, return_inverse=True)
     place = place.reshape(parts.nodes.shape)
-    heir = np.searchsorted(every, parts.heirs)
+    carrier = np.searchsorted(every, parts.carriers)
 
     def summed(values: Array) -> Array:
         total = np.zeros((every.size, *values.shape[2:]))
-        np.add.at(total, heir, values)
+        np.add.at(total, carrier, values)
         return total
 
     weight, whole = summed(parts.own.sum(axis=2)), summed(parts.whole)
@@ -337,7 +337,7 @@ def _assembled(parts: Parts, d: int, degree: int, without: NDArray[np.int64]) ->
     rows = np.searchsorted(every, parts.rows)
     other = sparse.csr_array((parts.values, (rows, columns)), shape=(every.size, masters.size))
     divide = sparse.diags_array(1 / weight[kept])
-    rows, columns = np.broadcast_arrays(heir[:, :, None], place[:, None, :])
+    rows, columns = np.broadcast_arrays(carrier[:, :, None], place[:, None, :])
     places = (rows.ravel(), columns.ravel())
     dual = sparse.csr_array((parts.own.ravel(), places), shape=(every.size, every.size))[kept]
     own = divide @ dual @ coefficients(place, every.size, positive_change(d, degree))
