@@ -12,12 +12,11 @@ from mpi4py import MPI
 from contact.arguments import expect
 from contact.output.field_files import write_fields, write_share
 from contact.output.folder import ResultFolder, on_root, result_folder
-from contact.output.opposite import AGAINST, opposite_surface, opposite_table
-from contact.output.quantities import HISTORY, quantities, values_of
+from contact.output.quantities import AGAINST, HISTORY, OPPOSITE, quantities, values_of
 from contact.output.results import summarise
 from contact.output.solution import Solution
 from contact.output.steps import write_steps
-from contact.output.surface import contact_surface
+from contact.output.surface import contact_surface, opposite_surface, opposite_table
 from contact.output.table import contact_table, csv_columns, write_csv, write_table
 
 
@@ -77,8 +76,8 @@ def _replace(solution: Solution, folder: ResultFolder, figures: bool) -> None:
                 write_steps(solution.steps, new)
             write_share(MPI.COMM_SELF, surface, new / "contact.vtu")
             if opposite is not None:
-                write_table(opposite_table(solution.problem, opposite), new / f"{AGAINST}.csv")
-                write_share(MPI.COMM_SELF, opposite, new / f"{AGAINST}.vtu")
+                write_table(opposite_table(solution.problem, opposite), new / AGAINST)
+                write_share(MPI.COMM_SELF, opposite, new / OPPOSITE)
 
         on_root(comm, write_contact)
         if solution.output.fields != "none":

@@ -1,4 +1,4 @@
-"""The contact nodes of all ranks as arrays, and on the facets of the contact part."""
+"""The contact nodes of all ranks as arrays, and both sides of contacts as surfaces."""
 
 from __future__ import annotations
 
@@ -8,17 +8,26 @@ from typing import Any
 import numpy as np
 from dolfinx import fem
 from dolfinx import mesh as dmesh
+from mpi4py import MPI
 from numpy.typing import NDArray
+from scipy.sparse.linalg import splu
 from scipy.spatial import KDTree
 
 from contact.errors import InputError
-from contact.mesh.entities import cells_at
-from contact.output.quantities import SURFACE, values_of
+from contact.interface.entries import Entry
+from contact.interface.mortar.coupling import Coupling
+from contact.interface.mortar.lumping import Lumping
+from contact.interface.mortar.surface import surface_of
+from contact.mesh.entities import owned_among
+from contact.output.quantities import AGAINST, SURFACE, values_of
 from contact.output.solved import Solved
 from contact.output.table import Table, contact_table, tangent_of
 from contact.output.vtu import VTU, Grid, Values
 from contact.problem.problem import ContactProblem
 from contact.typing import Array
+
+#: Nodes with less than this share of the mean area have none but by rounding.
+LEAST_AREA = 1e-9
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -140,15 +149,6 @@ def _result(problem: ContactProblem, table: Table) -> ContactResult:
     )
 
 
-def _facet_nodes(problem: ContactProblem, part: str) -> NDArray[np.int32]:
-    """Return the local nodes of each owned facet of a part, corners first, shape (m, k)."""
-    domain, space, d = problem.domain, problem.equilibrium.space, problem.dim
-    cells, place = cells_at(domain.mesh, domain.facets(part))
-    layout = space.dofmap.dof_layout
-    closure = np.array([sorted(layout.entity_closure_dofs(d - 1, i)) for i in range(d + 1)])
-    return np.take_along_axis(space.dofmap.list[cells], closure[place], axis=1)
-
-
 def contact_surface(solution: Solved, table: Table | None) -> VTU | None:
     """Return the contact part on rank 0, None elsewhere. Collective.
 
@@ -159,29 +159,43 @@ def contact_surface(solution: Solved, table: Table | None) -> VTU | None:
     table
         Its contact table, None on ranks other than 0.
     """
-    problem, comm, d = solution.problem, solution.problem.comm, solution.problem.dim
-    body = problem.equilibrium
-    index_map = body.space.dofmap.index_map
-    shares = []
+    problem, d = solution.problem, solution.problem.dim
+    space = problem.equilibrium.space
+    size, count = space.dofmap.index_map.size_global, 0
+    names, cells = [], []
     for i, entry in enumerate(problem.entries):
-        facets = _facet_nodes(problem, entry.on)
-        nodes, inverse = np.unique(facets, return_inverse=True)
-        # A node of two contacts is one of each.
-        names = i * index_map.size_global + index_map.local_to_global(nodes.astype(np.int32))
-        x = body.nodal(solution.state.x)[nodes]
-        points = body.space.tabulate_dof_coordinates()[nodes, :d]
-        shares.append((names[inverse.reshape(facets.shape)], names, points, x))
-    gathered = comm.gather([np.concatenate(arrays) for arrays in zip(*shares, strict=True)])
-    if table is None or gathered is None:
+        facets = surface_of(problem.domain, space, entry.on).gathered(problem.comm).nodes
+        nodes, place = np.unique(facets, return_inverse=True)
+        names.append(i * size + nodes)  # a node of two contacts is one of each
+        cells.append(count + place.reshape(facets.shape))
+        count += nodes.size
+    known = np.concatenate(names)
+    points, x = _at_nodes(solution, known % size)
+    if table is None:
         return None
-    cells, names, points, x = (np.concatenate(arrays) for arrays in zip(*gathered, strict=True))
-    names, first = np.unique(names, return_index=True)
-    grid = Grid(points[first], np.searchsorted(names, cells), d - 1)
-    fields = _fields(problem, table, names, x[first])
-    owner = (names // index_map.size_global).astype(np.int32)
+    grid = Grid(points, np.concatenate(cells), d - 1)
+    fields = _fields(problem, table, known, x)
+    owner = (known // size).astype(np.int32)
     rigid = [contact.against is None for contact in problem.contacts]
     fields |= {"entry": owner, "rigid": np.array(rigid, dtype=np.int32)[owner]}
     return VTU(grid, {name: _completed(values, grid) for name, values in fields.items()}, {})
+
+
+def _at_nodes(solution: Solved, nodes: NDArray[np.int64]) -> tuple[Array, Array]:
+    """Return the points and unknowns of nodes, given by global numbers, on all ranks. Collective.
+
+    Returns
+    -------
+    Arrays of shapes (n, d) and (n, block size).
+    """
+    problem, body = solution.problem, solution.problem.equilibrium
+    points = body.layout.points
+    values = np.concatenate([points, body.nodal(solution.state.x)[: len(points)]], axis=1)
+    here, local = owned_among(body.layout.index_map, nodes)
+    found = np.zeros((nodes.size, values.shape[1]))
+    found[here] = values[local]
+    problem.comm.Allreduce(MPI.IN_PLACE, found, op=MPI.SUM)
+    return found[:, : problem.dim], found[:, problem.dim :]
 
 
 def _fields(
@@ -215,3 +229,78 @@ def _completed(values: Values, grid: Grid) -> Values:
         np.add.at(counts, grid.cells[:, corner], np.isfinite(near).sum(axis=1))
     missing = np.isnan(values) & (counts > 0)
     return np.where(missing, sums / np.maximum(counts, 1), values)
+
+
+def opposite_surface(solution: Solved) -> VTU | None:
+    """Return the parts `against` with the stresses there, the same on all ranks. Collective.
+
+    Multipliers live on the other side. Here the forces int N_l lambda act, which belong to nodes of
+    this one; divided by the areas of these they are stresses again. A constant pressure is the same
+    constant here, and forces are the same on both sides.
+
+    Returns
+    -------
+    The surface, with the displacement, `pressure` and `traction` at its nodes, their normals out
+    of the body, their areas, and the number of the contact (`entry`). None where all obstacles are
+    rigid.
+    """
+    problem, d = solution.problem, solution.problem.dim
+    body = problem.equilibrium
+    stresses = np.column_stack([solution.pressure, solution.forces.vectors(problem.nodes)])
+    ends = np.cumsum([entry.nodes.nodes.size for entry in problem.entries])[:-1]
+    sides, cells, count = [], [], 0
+    for i, own in enumerate(np.split(stresses, ends)):
+        against, entry = problem.contacts[i].against, problem.entries[i]
+        if against is None or entry.coupling is None:
+            continue
+        surface = surface_of(problem.domain, body.space, against).gathered(problem.comm)
+        lumped = Lumping.of(surface)
+        acting = _acting(problem, entry, entry.coupling, lumped, own)
+        points, x = _at_nodes(solution, lumped.nodes)
+        sides.append(
+            {
+                "points": points,
+                "displacement": x[:, :d],
+                "pressure": acting[:, 0],
+                "traction": acting[:, 1:],
+                "normal": lumped.normal / np.linalg.norm(lumped.normal, axis=1)[:, None],
+                "weight": lumped.weight,
+                "entry": np.full(lumped.nodes.size, i, dtype=np.int32),
+            }
+        )
+        cells.append(count + np.searchsorted(lumped.nodes, surface.nodes))
+        count += lumped.nodes.size
+    if not sides:
+        return None
+    fields = {name: np.concatenate([side[name] for side in sides]) for name in sides[0]}
+    return VTU(Grid(fields.pop("points"), np.concatenate(cells), d - 1), fields, {})
+
+
+def _acting(
+    problem: ContactProblem, entry: Entry, coupling: Coupling, lumped: Lumping, own: Array
+) -> Array:
+    """Return the stresses of this rank's contact nodes on the other side, shape (m, k)."""
+    names = problem.equilibrium.layout.index_map.local_to_global(entry.nodes.nodes)
+    forces = np.zeros((coupling.nodes.size, own.shape[1]))
+    forces[np.searchsorted(coupling.nodes, names)] = entry.nodes.weight[:, None] * own
+    problem.comm.Allreduce(MPI.IN_PLACE, forces, op=MPI.SUM)
+    on_nodes = np.zeros((lumped.nodes.size, own.shape[1]))
+    on_nodes[np.searchsorted(lumped.nodes, coupling.masters)] = coupling.other.T @ forces
+    if lumped.mixing is not None:
+        # Forces on coefficients S u, given those on u.
+        on_nodes = splu(lumped.mixing.own.T.tocsc()).solve(on_nodes)
+    some = lumped.weight > LEAST_AREA * lumped.weight.mean()
+    return np.where(some[:, None], on_nodes / np.where(some, lumped.weight, 1.0)[:, None], np.nan)
+
+
+def opposite_table(problem: ContactProblem, surface: VTU) -> Table:
+    """Return the rows of ``contact-against.csv``: nodes with an area, contact by contact."""
+    fields, size = surface.at_points, problem.domain.size
+    # Mesh generators leave coordinates such as -3e-19.
+    points = np.where(np.abs(surface.grid.points) < 1e-15 * size, 0.0, surface.grid.points)
+    names = np.array([contact.against or "" for contact in problem.contacts])
+    columns = values_of(AGAINST, {"on": names[fields["entry"]], "x": points, **fields})
+    rounded = np.round(points / (1e-9 * size))
+    order = np.lexsort((*rounded.T[::-1], fields["entry"]))
+    order = order[np.isfinite(columns["pressure"][order])]
+    return {name: values[order] for name, values in columns.items()}

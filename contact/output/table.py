@@ -15,9 +15,9 @@ from scipy import sparse
 from scipy.sparse import csgraph
 
 from contact.interface.law import InterfaceLaw
+from contact.interface.mortar.surface import surface_of
 from contact.interface.nodes import ContactNodes as Nodes
 from contact.interface.placing import candidates
-from contact.mesh.entities import cells_at
 from contact.output.quantities import NODES, quantities, values_of
 from contact.output.solved import Solved
 from contact.problem.problem import ContactProblem
@@ -185,17 +185,12 @@ def _order(problem: ContactProblem) -> NDArray[np.intp] | None:
 
 def _links(problem: ContactProblem) -> NDArray[np.int64]:
     """Return the global numbers of neighbours on the owned facets of Gamma_3, shape (m, 2)."""
-    mesh, space = problem.domain.mesh, problem.equilibrium.space
-    facets = np.concatenate([problem.domain.facets(contact.on) for contact in problem.contacts])
-    cells, place = cells_at(mesh, facets)
-    layout = space.dofmap.dof_layout
-    closure = np.array([layout.entity_closure_dofs(1, i) for i in range(3)])
+    space = problem.equilibrium.space
+    parts = [surface_of(problem.domain, space, contact.on).nodes for contact in problem.contacts]
+    nodes = np.concatenate(parts)
     # Both ends, then the middle node if there is one.
-    chain = closure[:, [0, 1]] if closure.shape[1] == 2 else closure[:, [0, 2, 1]]
-    nodes = np.take_along_axis(space.dofmap.list[cells], chain[place], axis=1)
-    pairs = np.concatenate([nodes[:, k : k + 2] for k in range(nodes.shape[1] - 1)])
-    flat = space.dofmap.index_map.local_to_global(pairs.ravel().astype(np.int32))
-    return np.asarray(flat).reshape(-1, 2)
+    chain = nodes if nodes.shape[1] == 2 else nodes[:, [0, 2, 1]]
+    return np.concatenate([chain[:, k : k + 2] for k in range(chain.shape[1] - 1)])
 
 
 def _along_chain(

@@ -16,8 +16,8 @@ from contact.methods.options import NewtonOptions
 from contact.output.figures.figures import collect
 from contact.output.figures.saved import read_drawing
 from contact.output.files import write_outputs
-from contact.output.opposite import opposite_surface
 from contact.output.quantities import AGAINST, OPPOSITE, quantities
+from contact.output.surface import opposite_surface
 from contact.output.vtu import read_vtu
 from contact.problem.contact import Contact
 from contact.problem.problem import ContactProblem

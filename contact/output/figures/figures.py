@@ -15,10 +15,9 @@ from contact.output.figures.body import Picture, draw_plane, draw_space, near_co
 from contact.output.figures.contact import draw_line, draw_surface
 from contact.output.figures.steps import Course
 from contact.output.figures.style import DEFORMED, STYLE, UNNAMED, axes_of, heading, named, style
-from contact.output.opposite import opposite_surface
 from contact.output.options import Units
 from contact.output.solved import Solved
-from contact.output.surface import contact_surface
+from contact.output.surface import contact_surface, opposite_surface
 from contact.output.table import Table, contact_table, held_points
 from contact.output.vtu import VTU
 from contact.typing import Array

@@ -26,8 +26,8 @@ from contact.output.figures.figures import Drawing
 from contact.output.figures.steps import Course
 from contact.output.figures.style import DEFORMED, OUTLIERS, axes_of, heading, named, style
 from contact.output.folder import refused, result_folder
-from contact.output.opposite import AGAINST
 from contact.output.options import Units
+from contact.output.quantities import OPPOSITE
 from contact.output.table import Table
 from contact.output.vtu import VTU, read_vtu
 
@@ -73,8 +73,8 @@ def read_drawing(folder: Path, fields: Sequence[str] = (), mirror: bool = False)
         name, label = named(field, units)
         pictures.append((name, drawn(body, held, field, label)))
     opposite = None
-    if f"{AGAINST}.vtu" in files:
-        opposite = read(folder, f"{AGAINST}.vtu", read_vtu)
+    if OPPOSITE in files:
+        opposite = read(folder, OPPOSITE, read_vtu)
     course = None
     if "steps.csv" in files:
         course = Course(
