@@ -26,7 +26,7 @@ from contact.errors import InputError
 from contact.methods.interrupt import SIGNALLED, stop_on_signal
 from contact.methods.method import METHODS, Method
 from contact.methods.options import NewtonOptions, Options
-from contact.methods.report import History, Monitor, Outcome, tell
+from contact.methods.report import IterationHistory, Monitor, Outcome, tell
 from contact.methods.steps import Evolution, LoadStep, solve_step
 from contact.nesting import nested_start, pays
 from contact.output.checkpoint import Checkpoints, kept_digest, read_steps
@@ -284,7 +284,7 @@ def run_schedule(
     clock = time.perf_counter()
     if schedule.start is not None:
         schedule = replace(schedule, start=_prescribed(problem, schedule.start))
-    history, records = History(), list(schedule.kept)
+    history, records = IterationHistory(), list(schedule.kept)
     with stop_on_signal(problem.comm, monitor) as stop:
         method = METHODS[settings.method](problem, settings, stop)
         setup = time.perf_counter() - clock

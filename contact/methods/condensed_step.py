@@ -19,7 +19,7 @@ from contact.methods.gap_derivative import GapDerivative
 from contact.methods.line_search import FAR, step_length
 from contact.methods.newton_step import NEAR, Iterate, Taken
 from contact.methods.options import NewtonOptions
-from contact.methods.report import History, Outcome
+from contact.methods.report import IterationHistory, Outcome
 from contact.problem.condensed import Condensation, CondensedProblem
 from contact.problem.kkt import KKT, residual_forces
 from contact.problem.problem import ContactProblem
@@ -38,7 +38,7 @@ MOST_STEPS = 1000
 
 #: Solves a condensed problem from an iterate, with a history of its own.
 Solver = Callable[
-    [CondensedProblem, NewtonOptions, ComplementarityParameters, History, Iterate],
+    [CondensedProblem, NewtonOptions, ComplementarityParameters, IterationHistory, Iterate],
     tuple[Iterate, Outcome],
 ]
 
@@ -70,7 +70,7 @@ class CondensedStep:
         options: NewtonOptions,
         parameters: ComplementarityParameters,
         solve: Solver,
-        history: History,
+        history: IterationHistory,
         counters: Counters,
         fallbacks: tuple[str, ...],
     ) -> None:
@@ -80,7 +80,7 @@ class CondensedStep:
         inner = condensation.full.equilibrium.products
         self._chord = Chord(options.tolerance, inner, WORTH if options.keep != "never" else 0.0)
 
-    def turn_to(self, problem: ContactProblem, history: History) -> None:
+    def turn_to(self, problem: ContactProblem, history: IterationHistory) -> None:
         """Go on with another step of the same problem."""
         self.condensation.turn_to(problem)
         self._history = history
@@ -112,7 +112,7 @@ class CondensedStep:
             max_outer=MOST_STEPS,
             condense=False,
         )
-        history = History(self._history.quiet(), level=logging.DEBUG)
+        history = IterationHistory(self._history.quiet(), level=logging.DEBUG)
         begin = replace(iterate, state=replace(state, x=condensed.equilibrium.at))
         end, outcome = self._solve(condensed, options, self.parameters, history, begin)
         solves = sum(record.inner for record in history.records)

@@ -7,7 +7,7 @@ from typing import Any, Protocol
 
 from contact.linear.operator import Counters
 from contact.methods.newton import Newton
-from contact.methods.report import History, Monitor, Outcome
+from contact.methods.report import IterationHistory, Monitor, Outcome
 from contact.methods.thesis.fixed_point import FixedPoint
 from contact.methods.thesis.penalty import Penalty
 from contact.problem.problem import ContactProblem
@@ -28,7 +28,7 @@ class Method(Protocol):
         """Its options; `allowed` among them, the tolerance of each residual."""
 
     @property
-    def history(self) -> History:
+    def history(self) -> IterationHistory:
         """The outer iterations."""
 
     @property

@@ -51,7 +51,7 @@ from contact.methods.newton_step import Iterate, Iteration, NewtonStep, Step
 from contact.methods.options import NewtonOptions
 from contact.methods.parameters import complementarity_parameters, overestimates_stiffness
 from contact.methods.progress import Best, Stagnation, undeformed_equilibrium
-from contact.methods.report import History, Monitor, Outcome
+from contact.methods.report import IterationHistory, Monitor, Outcome
 from contact.methods.rigid_body_modes import RigidBodyModes
 from contact.problem.condensed import Condensation, CondensedProblem, condensable, pays
 from contact.problem.kkt import KKT, evaluate
@@ -101,11 +101,11 @@ class Newton:
     counters: Counters = field(default_factory=Counters)
     parameters: ComplementarityParameters | None = None
     modes: RigidBodyModes | None = None
-    history: History = field(init=False)
+    history: IterationHistory = field(init=False)
 
     def __post_init__(self) -> None:
         """Choose the complementarity parameters, and condense the body where that pays."""
-        problem, options, self.history = self.problem, self.options, History(self.monitor)
+        problem, options, self.history = self.problem, self.options, IterationHistory(self.monitor)
         self._parameters = self.parameters or complementarity_parameters(
             problem.scales, options.gamma
         )
@@ -143,7 +143,7 @@ class Newton:
     def turn_to(self, problem: Problem) -> None:
         """Go on with another step of the same problem; factorisations remain."""
         self.problem = self.whole.problem = problem
-        self.history = History(self.monitor)
+        self.history = IterationHistory(self.monitor)
         if isinstance(problem, ContactProblem):
             assert self.modes is not None
             self.modes.problem = problem
@@ -284,7 +284,7 @@ def _solve_condensed(
     problem: CondensedProblem,
     options: NewtonOptions,
     parameters: ComplementarityParameters,
-    history: History,
+    history: IterationHistory,
     iterate: Iterate,
     modes: RigidBodyModes,
 ) -> tuple[Iterate, Outcome]:

@@ -24,7 +24,7 @@ from contact.linear.operator import Counters, Operator
 from contact.methods.gap_derivative import GapDerivative
 from contact.methods.options import NewtonOptions
 from contact.methods.progress import Best
-from contact.methods.report import History, Record
+from contact.methods.report import IterationHistory, Record
 from contact.problem.kkt import KKT, residual_forces
 from contact.problem.protocols import Problem
 from contact.problem.state import State
@@ -111,7 +111,7 @@ class Iteration:
 
     problem: Problem
     options: NewtonOptions
-    history: History
+    history: IterationHistory
     at: Iterate
     best: Best[Iterate] = field(default_factory=Best)
 

@@ -16,7 +16,7 @@ logger = logging.getLogger("contact.solver")
 
 
 def tell(logger: logging.Logger, share: float, text: str, *values: object) -> None:
-    """Log how far a run of many solves has come: the share of it that is done, 0 to 1."""
+    """Log the progress of a run of many solves: the part of it that is done, 0 to 1."""
     logger.info(text, *values, extra={"share": share})
 
 
@@ -86,7 +86,7 @@ class Quiet:
 
 
 @dataclass
-class History:
+class IterationHistory:
     """The outer iterations so far, handed to a monitor as they come.
 
     Attributes

@@ -18,7 +18,7 @@ from contact.errors import InputError
 from contact.linear.operator import Counters
 from contact.methods.interrupt import Interrupted
 from contact.methods.method import Method
-from contact.methods.report import History, Outcome
+from contact.methods.report import IterationHistory, Outcome
 from contact.problem.kkt import KKT, evaluate
 from contact.problem.problem import ContactProblem
 from contact.problem.rigid_modes import released, unilateral_supports
@@ -59,7 +59,7 @@ class LoadStep:
     problem: ContactProblem
     state: State
     outcome: Outcome
-    history: History
+    history: IterationHistory
     counters: Counters
 
 
@@ -140,7 +140,7 @@ class Evolution:
         state, outcome = measured(
             problem, start, Outcome(NOTHING, self.method.options.allowed, why)
         )
-        return LoadStep(problem, state, outcome, History(), Counters())
+        return LoadStep(problem, state, outcome, IterationHistory(), Counters())
 
     def _at(self, time: float) -> ContactProblem:
         """Return the problem of a step that ends at a time."""
@@ -240,7 +240,7 @@ FARTHEST = 2.0
 
 @dataclass(frozen=True)
 class Reached:
-    """A solution, with the method and the counts that led to it.
+    """A solution, with the loads and prescribed values that belong to it.
 
     Attributes
     ----------
@@ -260,7 +260,7 @@ class Reached:
 
 
 def predicted(problem: ContactProblem, last: Reached, before: Reached | None) -> State:
-    """Return where the solution of a problem is looked for. Collective.
+    """Return the initial guess of a step, by extrapolation of the last two. Collective.
 
     Parameters
     ----------
@@ -271,21 +271,21 @@ def predicted(problem: ContactProblem, last: Reached, before: Reached | None) ->
     """
     x, body = last.state.x, problem.equilibrium
     if before is not None:
-        x = x + _share(problem, last, before) * (x - before.state.x)
+        x = x + _extrapolation(problem, last, before) * (x - before.state.x)
     x = body.prescribe(x, problem.time)
     return State(x, last.state.forces, problem.time, problem.history)
 
 
-def _share(problem: ContactProblem, last: Reached, before: Reached) -> float:
-    """Return how far the loads go on the way they have come, over that way. Collective."""
-    product, shares = problem.equilibrium.product, []
+def _extrapolation(problem: ContactProblem, last: Reached, before: Reached) -> float:
+    """Return the increment of the loads over the last one, along that. Collective."""
+    product, factors = problem.equilibrium.product, []
     now = _given(problem, problem.time)
     for first, second, third in zip(before.given, last.given, now, strict=True):
         come, going = second - first, third - second
         square = product(come, come)
         if square > 0:
-            shares.append(product(come, going) / square)
-    return float(np.clip(min(shares, default=0.0), 0.0, FARTHEST))
+            factors.append(product(come, going) / square)
+    return float(np.clip(min(factors, default=0.0), 0.0, FARTHEST))
 
 
 def _given(problem: ContactProblem, time: float) -> tuple[Array, Array]:

@@ -13,7 +13,7 @@ from mpi4py import MPI
 
 from contact.errors import InputError
 from contact.linear.operator import Counters
-from contact.methods.report import History, Outcome
+from contact.methods.report import IterationHistory, Outcome
 from contact.output.fields import Deformation, DerivedFields, unknowns
 from contact.output.resultants import (
     ChargeBalance,
@@ -67,7 +67,7 @@ class Solution(Solved):
     """
 
     outcome: Outcome
-    history: History
+    history: IterationHistory
     counters: Counters
     method: str
     seconds: dict[str, float]

@@ -135,15 +135,15 @@ def test_too_little_memory_is_said_in_words(bar, capsys, monkeypatch):
 
 @pytest.mark.parametrize(("number", "status"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
 def test_a_signal_in_a_solve_keeps_what_there_is(bar, capsys, monkeypatch, number, status):
-    from contact.methods.report import History
+    from contact.methods.report import IterationHistory
 
-    add = History.add
+    add = IterationHistory.add
 
     def press(history, record):
         signal.raise_signal(number)
         add(history, record)
 
-    monkeypatch.setattr(History, "add", press)
+    monkeypatch.setattr(IterationHistory, "add", press)
     out = bar.parent / "out"
     assert main(["solve", str(bar), "--out", str(out), "--quiet"]) == status
     assert json.loads((out / "summary.json").read_text())["converged"] is False

@@ -15,7 +15,7 @@ from contact.case.text import to_toml
 from contact.cli.main import main
 from contact.errors import InputError
 from contact.methods.newton import Newton
-from contact.methods.report import History
+from contact.methods.report import IterationHistory
 from contact.output.checkpoint import Checkpoints, case_of, discard, read_steps
 from tests.output.test_steps import case_of as steps_case
 
@@ -233,14 +233,14 @@ def test_a_signal_before_the_first_iteration_leaves_what_is_there(tmp_path, monk
         signal.raise_signal(signal.SIGINT)
         turn(self, problem)
 
-    record = History.record
+    record = IterationHistory.record
 
     def nothing(self, *arguments, **named):
         self.poll()
         record(self, *arguments, **named)
 
     monkeypatch.setattr(Newton, "turn_to", signalled)
-    monkeypatch.setattr(History, "record", nothing)
+    monkeypatch.setattr(IterationHistory, "record", nothing)
     assert on_the_line("solve", case, "--out", out) == 130
     after = {path.name: path.read_bytes() for path in out.iterdir() if path.is_file()}
     assert after == before

@@ -27,7 +27,7 @@ from contact.methods.gap_derivative import GapDerivative
 from contact.methods.options import FixedPointOptions
 from contact.methods.parameters import automatic_r
 from contact.methods.progress import Best, Stagnation, undeformed_equilibrium
-from contact.methods.report import History, Monitor, Outcome, Record
+from contact.methods.report import IterationHistory, Monitor, Outcome, Record
 from contact.methods.rigid_body_modes import RigidBodyModes
 from contact.methods.thesis import uzawa
 from contact.methods.thesis.spectrum import SpectralFit, spectral_fit, stall_reason
@@ -91,7 +91,7 @@ class FixedPoint:
         self._fitted = False
         self._fit: SpectralFit | None = None
         self.operator = self._new_operator(symmetric=True)
-        self.history = History(self.monitor)
+        self.history = IterationHistory(self.monitor)
         self.state = self.problem.start()
         thesis = options.stopping == "thesis"
         inner = options.inner_tolerance or max(options.tolerance / 10, PRECISION)
@@ -113,7 +113,7 @@ class FixedPoint:
     def turn_to(self, problem: Problem) -> None:
         """Go on with another step of the same problem; factorisations remain."""
         self.problem, self.state = problem, problem.start()
-        self.history = History(self.monitor)
+        self.history = IterationHistory(self.monitor)
 
     def _forget(self) -> None:
         """Begin a solve: it does not depend on an earlier one."""

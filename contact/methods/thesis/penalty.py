@@ -41,7 +41,7 @@ from contact.linear.operator import Counters
 from contact.methods.interrupt import Interrupted
 from contact.methods.options import PenaltyOptions
 from contact.methods.progress import Best, Stagnation, undeformed_equilibrium
-from contact.methods.report import History, Monitor, Outcome, Record
+from contact.methods.report import IterationHistory, Monitor, Outcome, Record
 from contact.problem.checks import expected_displacements
 from contact.problem.kkt import KKT, evaluate, residual_forces
 from contact.problem.problem import ContactProblem
@@ -312,7 +312,7 @@ class Penalty:
 
     def __post_init__(self) -> None:
         """Start from zero with an empty history."""
-        self.history = History(self.monitor)
+        self.history = IterationHistory(self.monitor)
         self.state = self.problem.start()
         self._eps = regularisation(self.problem, self.options)
         self._solvers: dict[bool, PenalisedProblem] = {}
@@ -322,7 +322,7 @@ class Penalty:
     def turn_to(self, problem: ContactProblem) -> None:
         """Go on with another step of the same problem; factorisations remain."""
         self.problem, self.state = problem, problem.start()
-        self.history = History(self.monitor)
+        self.history = IterationHistory(self.monitor)
         self._eps = regularisation(problem, self.options)
         for solver in self._solvers.values():
             solver.turn_to(problem, self._eps)
