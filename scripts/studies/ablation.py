@@ -1,9 +1,10 @@
-"""Which problems need each device of Newton's method: the sweeps with one of them off at a time.
+"""Which problems need each device of solver and linear algebra: one of them off at a time.
 
 `python3 -m scripts.studies.ablation [--out DIR] [--coarse] [--every K] [--devices NAME ..]
 [--only NAME]`. Problems are those of both sweeps, Example 8.4 with a steep ramp, and an approach
 whose solution touches nothing; --coarse takes a tenth of the sweeps, --every K one of K. A device
-whose row shows no problem, neither failed nor slow, is to go (CONTRIBUTING.md).
+whose row shows no problem, neither failed nor slow, is to go (CONTRIBUTING.md). Devices of linear
+algebra have a large problem of their own, which counts as slow from 10 % on.
 """
 
 from __future__ import annotations
@@ -17,9 +18,13 @@ from itertools import islice
 from typing import Any
 from unittest.mock import patch
 
-from contact import Solution, solve
+import numpy as np
+
+from contact import Solution, load_case, solve
 from contact.case.file import Case
 from contact.interface import complementarity
+from contact.linear import block, dense, multigrid
+from contact.linear.operator import SparseOperator
 from contact.methods import (
     chord,
     condensed_step,
@@ -36,12 +41,17 @@ from contact.methods.options import NewtonOptions
 from contact.methods.report import Outcome
 from contact.methods.rigid_body_modes import RigidBodyModes
 from contact.problem.kkt import evaluate
+from scripts.benchmarks import bench_one
+from scripts.cases import CASES
 from scripts.reporting import Report, append, parser
 from scripts.studies import sweep
 from scripts.thesis.tables_compliance import case_of
 
 #: Times as long as with the device, and seconds more, from which on a problem counts as slow.
 SLOW, NOTICED = 2.0, 0.1
+
+#: The same of a device of linear algebra, on a problem of its own.
+SLOW_LINEAR = 1.1
 
 
 @dataclass(frozen=True)
@@ -60,6 +70,8 @@ class Device:
         Its replacement: owner, name, value.
     options
         Changes of the options.
+    problem
+        The only problem that is solved without it, slow from `SLOW_LINEAR` on; None for all.
     """
 
     name: str
@@ -67,6 +79,7 @@ class Device:
     literature: str
     changes: tuple[tuple[Any, str, Any], ...] = ()
     options: tuple[tuple[str, Any], ...] = ()
+    problem: Callable[[], Case] | None = None
 
     @property
     def lines(self) -> int:
@@ -103,6 +116,22 @@ def _linearised(old: Callable[..., Any]) -> Callable[..., Any]:
     return plain
 
 
+def _same_blocks(operator: dense.DenseOperator) -> bool:
+    operator._changes = False
+    return np.array_equal(operator.bulk.factors.blocks, operator._blocks)
+
+
+def _large(name: str, *changes: str) -> Callable[[], Case]:
+    """Return how a case on a finer mesh is made."""
+    return lambda: load_case(CASES / f"{name}.toml", changes)
+
+
+def _block() -> Case:
+    case = bench_one.block(16)
+    case._source = "block-16"
+    return case
+
+
 DEVICES = (
     Device("interior point", (interior_point,), "Mehrotra 1992; Nesterov and Todd 1998",
            ((newton, "interior_point", _no_fallback),)),
@@ -119,7 +148,7 @@ DEVICES = (
            ((newton, "overestimates_stiffness", lambda *_: False),)),
     Device("Levenberg-Marquardt regularisation", (), "Marquardt 1963",
            ((newton_step, "REGULARISATION", 0.0),)),
-    Device("forcing term that tightens", (newton_step.NewtonStep._leaves,),
+    Device("forcing term that tightens", (newton_step.NewtonStep._forcing_term,),
            "Dembo, Eisenstat and Steihaug 1982", ((newton_step, "STAGNANT", 10**9),)),
     Device("layer linearised where its law is met", (newton_step.linearised_layer,), "-",
            ((newton_step, "linearised_layer", _linearised(newton_step.linearised_layer)),)),
@@ -135,6 +164,21 @@ DEVICES = (
     Device("zero displacement where nothing acts", (progress.undeformed_equilibrium,), "-",
            ((Newton, "_undeformed", _nothing),)),
     Device("static condensation", (condensed_step,), "Guyan 1965", (), (("condense", False),)),
+    Device("low-rank correction of dense factors",
+           (dense.Factors.know, dense.DenseOperator._correct), "Woodbury 1950",
+           ((dense.DenseOperator, "_correct", _same_blocks),), (),
+           _large("hertz-sphere", "mesh.contact_size=0.04", "solver.linear=lu")),
+    Device("coarse levels kept from step to step", (multigrid.Hierarchy,),
+           "Karlin, Manasse, Rudolph and Sleator 1988", ((multigrid, "PRICE", 0),), (), _block),
+    Device("interpolation that follows contact nodes", (multigrid.StiffNodes,), "-",
+           ((multigrid.StiffNodes, "follow", _nothing),
+            (multigrid.StiffNodes, "jump", lambda _, rhs: rhs.duplicate())), (), _block),
+    Device("interpolation made for bodies apart", (multigrid.join_interpolation,), "-",
+           ((SparseOperator, "_set_up_apart", lambda _: False),), (),
+           _large("two-spheres", "mesh.contact_size=0.5")),
+    Device("piezoelectric block preconditioner", (block,), "Silvester and Wathen 1994",
+           ((multigrid, "LARGE", {**multigrid.LARGE, (3, True): 10**9}),), (),
+           _large("piezo-column", "mesh.cells=[20, 20, 40]")),
 )  # fmt: skip
 
 
@@ -151,7 +195,8 @@ def cases(coarse: bool, every: int, only: str | None) -> Iterator[Case]:
 def run(case: Case, options: NewtonOptions) -> tuple[Solution, float]:
     """Solve a problem; return the seconds of the processor too."""
     begin = time.process_time()
-    solution = solve(case, replace(options, tolerance=case.solver.tolerance))
+    given = {"tolerance": case.solver.tolerance, "linear": case.solver.linear}
+    solution = solve(case, replace(options, **given))
     return solution, time.process_time() - begin
 
 
@@ -168,18 +213,21 @@ def main(arguments: Sequence[str] | None = None) -> None:
         if not given.devices or any(name in device.name for name in given.devices)
     ]
     problems = list(cases(given.coarse, given.every, given.only))
-    whole = {case.source: run(case, NewtonOptions()) for case in problems}
+    own = {device.name: device.problem() for device in chosen if device.problem is not None}
+    whole = {case.source: run(case, NewtonOptions()) for case in [*problems, *own.values()]}
     keys = ("device", "lines", "failed", "slow", "seconds", "problems that need it", "literature")
     rows: dict[str, list[Any]] = {key: [] for key in keys}
     for device in chosen:
         failed, slow, total = [], [], 0.0
         with device.off() as options:
-            for case in problems:
+            alone = own.get(device.name)
+            slower = SLOW if alone is None else SLOW_LINEAR
+            for case in problems if alone is None else [alone]:
                 (solution, least), (found, seconds) = whole[case.source], run(case, options)
                 total += seconds
                 if solution.converged and not found.converged:
                     failed.append(case.source)
-                elif seconds > max(SLOW * least, least + NOTICED):
+                elif seconds > max(slower * least, least + NOTICED):
                     slow.append(case.source)
         needed = ", ".join([*failed, *slow][:6])
         counts = len(failed), len(slow), round(total, 1)
@@ -188,7 +236,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     total = sum(seconds for _, seconds in whole.values())
     unsolved = [name for name, (solution, _) in whole.items() if not solution.converged]
     note = f"{len(problems)} problems, {total:.1f} s with all devices; not solved: {unsolved}"
-    Report(given.out).table("ablation", "Devices of Newton's method, one off", rows, note)
+    Report(given.out).table("ablation", "Devices of solver and linear algebra, one off", rows, note)
 
 
 if __name__ == "__main__":
