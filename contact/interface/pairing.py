@@ -237,7 +237,7 @@ def _apart(
 
 
 def _connected(body: BodyEquilibrium, coupling: Coupling) -> bool:
-    """Tell whether both sides are on the same piece of the mesh. Collective."""
+    """Tell whether both sides are on the same connected component. Collective."""
     piece, count = body.components
     found = np.zeros((2, count), dtype=np.intc)
     for k, nodes in enumerate((coupling.slaves, coupling.masters)):

@@ -197,15 +197,15 @@ def _check_group(problem: ContactProblem, group: Group) -> None:
 
 
 def _unconstrained(problem: ContactProblem, group: Group, unconstrained: Array) -> str:
-    """Say which pieces can move, and how."""
+    """Say which connected components can move, and how."""
     count = group.count
     whole = "the body, or a rigid part," if group.moving else "the body"
     if count > 1:
         one = 1 if problem.domain.revolved else 3 * (problem.dim - 1)
-        own = np.linalg.norm(unconstrained[: len(group.pieces) * one], axis=1)
-        moves = own.reshape(len(group.pieces), -1).max(axis=1) > 1e-6
+        own = np.linalg.norm(unconstrained[: len(group.components) * one], axis=1)
+        moves = own.reshape(len(group.components), -1).max(axis=1) > 1e-6
         where = " and ".join(f"({', '.join(f'{x:.4g}' for x in c)})" for c in group.centres[moves])
-        which = "the one" if np.count_nonzero(moves) == 1 else "those"
+        which = "the one" if np.count_nonzero(moves) == 1 else "the group"
         whole = f"the mesh has {count} connected components, and {which} about {where}"
     modes = described(unconstrained, group.names)
     return (
@@ -240,10 +240,10 @@ def check_potential(problem: ContactProblem, state: State | None = None) -> None
     if not problem.piezoelectric:
         return
     body, interface = problem.equilibrium, problem.interface
-    piece, count = body.components
-    # Constants by which the potential may be raised: of each piece, and of each electrode.
+    component, count = body.components
+    # Constants by which the potential may be raised: of each component, and of each electrode.
     raised = np.zeros((*body.free.shape, count))
-    raised[np.arange(piece.size), -1, piece] = 1.0
+    raised[np.arange(component.size), -1, component] = 1.0
     electrodes = np.eye(body.global_unknowns.size)[:, ~body.global_unknowns.mechanical]
     follows = (body.global_unknowns.ties @ electrodes)[body.block_size - 1 :: body.block_size]
     rows = [np.hstack([raised[:, -1], -follows])[~body.free[:, -1]]]
@@ -261,9 +261,9 @@ def check_potential(problem: ContactProblem, state: State | None = None) -> None
     where, known = "", "a conductive foundation"
     if count > 1:
         alone = np.flatnonzero(np.linalg.norm(floating[:count], axis=1) > 1e-6)
-        middles = (middle(problem, body.layout.points[piece == k])[0] for k in alone)
+        middles = (middle(problem, body.layout.points[component == k])[0] for k in alone)
         found = " and ".join(f"({', '.join(f'{x:.4g}' for x in c)})" for c in middles)
-        where = f" of the piece of the mesh about {found}"
+        where = f" of the component of the mesh about {found}"
         known += ", or with a body that conducts and whose potential is known"
     raise InputError(
         f"the potential{where} is not determined: it is prescribed nowhere, and the foundation "

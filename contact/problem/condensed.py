@@ -136,7 +136,7 @@ class CondensedBody:
         return np.where(self.free.ravel(), 0.0, forces)
 
     def sizes(self, values: Array) -> Array:
-        """Return the norms of forces, and of charges, of each piece apart. Collective."""
+        """Return the norms of forces, and of charges, of each component apart. Collective."""
         return self.component_norms.sizes(values)
 
     def load_sizes(self, time: float = 1.0) -> Array:

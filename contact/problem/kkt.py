@@ -125,7 +125,7 @@ def _perturbation(size: int) -> Array:
 
 
 def force_rounding(problem: Problem, state: State, internal: Array) -> Array:
-    """Return the rounding of the forces, and of the charges, by piece. Collective.
+    """Return the rounding of the forces, and of the charges, by component. Collective.
 
     Unknowns are known to `EPS` of their size. The stresses around a node of a slender body, or of
     one that is moved far, cancel but for far smaller forces, and so do potentials on both sides of
@@ -157,10 +157,10 @@ def left_as_pressures(problem: Problem, state: State) -> float:
 
 
 def _over_pressed(interface: Interface, state: State, pressures: Array) -> float:
-    """Return the largest of norms of pressures over the pressure on each piece. Collective.
+    """Return the largest of norms of pressures over the pressure on each component. Collective.
 
     The remainder of a multiplier at open nodes presses nothing, and neither does
-    rounding beside the pressures on other pieces.
+    rounding beside the pressures on other components.
     """
     nodal, own = interface.jump.apply(state.x), state.forces.pressure
     on = touching(own, interface.opening(nodal), interface.stiffness)
@@ -196,7 +196,7 @@ def evaluate(problem: Problem, state: State) -> KKT:
         rounding = np.where(acted, np.minimum(rounding, most), largest)
         nothing = ~acted & (unbalanced <= rounding)
         unbalanced, rounding = (np.where(nothing, 0.0, sizes) for sizes in (unbalanced, rounding))
-    # Of a piece on which nothing acts there is the rounding of the others.
+    # Of a component on which nothing acts there is the rounding of the others.
     scale = np.maximum(scale, EPS * scale.max(axis=1, keepdims=True))
     size = np.where(scale > 0, scale, 1.0)
     balance = worst((unbalanced / size).reshape(1, -1), (rounding / size).reshape(1, -1))

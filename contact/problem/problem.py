@@ -223,9 +223,12 @@ class ContactProblem:
         held = joined_held(self.entries, body.layout.index_map.local_range[0], found.coupling)
         mesh = self.domain.mesh
         longer = max(elongation(mesh, self.domain.facets(contact.on)) for contact in self.contacts)
-        piece, pieces = body.component_norms.component[found.nodes], body.component_norms.count
+        component, components = (
+            body.component_norms.component[found.nodes],
+            body.component_norms.count,
+        )
         return Interface(
-            law.constrained, law, friction, held, stiffness, size, longer, piece, pieces
+            law.constrained, law, friction, held, stiffness, size, longer, component, components
         )
 
     def _young_of_contacts(self) -> float:

@@ -118,7 +118,7 @@ class Equilibrium(Protocol):
         """Return the part of forces that the supports bear."""
 
     def sizes(self, values: Array) -> Array:
-        """Return the norms of owned forces, and of charges, of each piece apart. Collective."""
+        """Return the norms of owned forces, and of charges, of each component apart. Collective."""
 
     def load_sizes(self, time: float = 1.0) -> Array:
         """Return the `sizes` of the loads at a time. Collective."""

@@ -39,14 +39,14 @@ class Group:
     ----------
     problem
         The problem.
-    pieces, count
-        Which pieces they are, and how many the mesh has.
+    components, count
+        Which components they are, and how many the mesh has.
     inside
         Which owned nodes are theirs.
     moved
         The motions, of owned unknowns and global ones, shape (owned + global, m).
     names, centres
-        The names of the motions, and the middles of the pieces.
+        The names of the motions, and the middles of the components.
     supports
         Gram matrix of the motions where supports hold the body, shape (m, m).
     moving
@@ -54,7 +54,7 @@ class Group:
     """
 
     problem: ContactProblem
-    pieces: list[int]
+    components: list[int]
     count: int
     inside: NDArray[np.bool_]
     moved: Array
@@ -99,13 +99,13 @@ def groups(problem: ContactProblem) -> Iterator[Group]:
     That is for those that touch each other, or that a rigid part or a foundation joins: they are
     looked at together, with its motion.
     """
-    piece, count = problem.equilibrium.components
-    joined = _joined(problem, piece, count)
+    component, count = problem.equilibrium.components
+    joined = _joined(problem, component, count)
     for k in map(int, np.flatnonzero(~joined)):
-        yield _group(problem, piece, [k], count)
+        yield _group(problem, component, [k], count)
     if joined.any():
         yield _group(
-            problem, piece, [*map(int, np.flatnonzero(joined))], count, _free_motions(problem)
+            problem, component, [*map(int, np.flatnonzero(joined))], count, _free_motions(problem)
         )
 
 
@@ -153,8 +153,8 @@ def _free_motions(problem: ContactProblem) -> dict[int, str]:
     }
 
 
-def _joined(problem: ContactProblem, piece: NDArray[np.int32], count: int) -> NDArray[np.bool_]:
-    """Tell which pieces touch something that moves freely, or each other, (count,). Collective."""
+def _joined(problem: ContactProblem, component: NDArray[np.int32], count: int) -> NDArray[np.bool_]:
+    """Tell which components touch a free motion, or each other, shape (count,). Collective."""
     free, nodes, ties = (
         [*_free_motions(problem)],
         problem.nodes,
@@ -163,19 +163,19 @@ def _joined(problem: ContactProblem, piece: NDArray[np.int32], count: int) -> ND
     touched = np.zeros(count, dtype=np.intc)
     if free and nodes.motion is not None:
         moves = np.abs(nodes.motion[:, :, free]).max(axis=(1, 2), initial=0.0) > 0
-        touched[piece[nodes.nodes[moves]]] = 1
+        touched[component[nodes.nodes[moves]]] = 1
         rows = np.flatnonzero(np.abs(ties[:, free]).sum(axis=1) > 0)
-        touched[piece[rows // problem.equilibrium.block_size]] = 1
+        touched[component[rows // problem.equilibrium.block_size]] = 1
     if nodes.coupling is not None and nodes.coupling.between:
-        touched[piece[nodes.coupling.local]] = 1
+        touched[component[nodes.coupling.local]] = 1
     problem.comm.Allreduce(MPI.IN_PLACE, touched, op=MPI.MAX)
     return touched > 0
 
 
 def _group(
     problem: ContactProblem,
-    piece: NDArray[np.int32],
-    pieces: list[int],
+    component: NDArray[np.int32],
+    components: list[int],
     count: int,
     moving: Mapping[int, str] = MappingProxyType({}),
 ) -> Group:
@@ -185,9 +185,9 @@ def _group(
     ----------
     problem
         The problem.
-    piece
-        The piece of each owned node, shape (nodes,).
-    pieces, count
+    component
+        The component of each owned node, shape (nodes,).
+    components, count
         Those asked for, and how many there are in all.
     moving
         Global unknowns that move them, with their names.
@@ -196,8 +196,8 @@ def _group(
     points, global_unknowns = body.layout.points, body.global_unknowns
     columns, names, centres, centre = [], [], [], _centre(problem)
     own_names = NAMES[d][1:2] if problem.domain.revolved else NAMES[d]
-    for k in pieces:
-        inside, size = piece == k, problem.domain.size
+    for k in components:
+        inside, size = component == k, problem.domain.size
         if count > 1:
             centre, size = middle(problem, points[inside])
         rigid = rigid_motions((points[inside] - centre) / size, problem.domain.revolved)
@@ -217,9 +217,9 @@ def _group(
     fixed[:, d:] = False
     return Group(
         problem,
-        pieces,
+        components,
         count,
-        np.isin(piece, pieces),
+        np.isin(component, components),
         moved,
         names,
         np.array(centres),
@@ -284,7 +284,7 @@ class UnilateralSupport:
     Attributes
     ----------
     group
-        The pieces, with all their motions.
+        The components, with all their motions.
     free
         The motions that no support holds, shape (m, k).
     cone

@@ -85,7 +85,9 @@ def test_each_body_of_a_pair_needs_a_potential(
         status, lines = run(case, capfd=capfd)
         assert status == CONVERGED, lines
     else:
-        refuse(case, ["potential of the piece of the mesh about", "0.5) is not determined"], capfd)
+        refuse(
+            case, ["potential of the component of the mesh about", "0.5) is not determined"], capfd
+        )
 
 
 @pytest.mark.parallel

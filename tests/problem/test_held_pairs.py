@@ -50,7 +50,7 @@ def test_a_body_that_lies_on_another_is_held_by_friction(condense):
     ("held", "traction", "mu", "words"),
     [
         ((0.0, 0.0), (0.0, -0.01), 0.0, r"the one about \(0.5, 1.5\) is not held.*along x\)"),
-        ((None, 0.0), (0.0, -0.01), 0.5, r"what is about \(.*\) and \(.*\) .*along x, together"),
+        ((None, 0.0), (0.0, -0.01), 0.5, r"the group about \(.*\) and \(.*\) .*along x, together"),
         ((0.0, 0.0), (0.0, 0.01), 0.5, "pull the body off"),
         ((0.0, 0.0), (0.01, -0.01), 0.5, "pull the body off"),
     ],
@@ -73,7 +73,7 @@ def test_a_potential_that_no_contact_could_determine_is_refused_before_anything_
     if electric.get("law") != "none":
         given["electric"] = electric
     if refused:
-        with pytest.raises(InputError, match="potential of the piece of the mesh about"):
+        with pytest.raises(InputError, match="potential of the component of the mesh about"):
             build_problem(parse_case(given), SELF)
     else:
         build_problem(parse_case(given), SELF)
