@@ -8,7 +8,7 @@ the body, in the sign of the given charges q_2 = D.nu.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -20,7 +20,6 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 
 from contact.body.fields import constant
-from contact.body.global_unknowns import Member
 from contact.body.loads import expression
 from contact.body.rigid import Electrode
 from contact.errors import InputError
@@ -333,21 +332,7 @@ def movements(problem: ContactProblem, state: State) -> dict[str, Any]:
     potential; a key is absent where there are none. Rotations are in degrees. Forces, moments and
     charges act from outside: those given, or the reactions of components that are given.
     """
-    foundations: dict[str, Any] = {}
-    parts: dict[str, Any] = {}
-    electrodes: dict[str, Any] = {}
-    for member, values, forces in _members(problem, state):
-        if isinstance(member.description, Electrode):
-            electrodes[member.description.on] = {"potential": values[0], "charge": forces[0]}
-            continue
-        d = len(member.description.motion.displacement)
-        said = {
-            "displacement": values[:d].tolist(),
-            "rotation": _one_or_more(np.rad2deg(values[d:])),
-            "force": forces[:d].tolist(),
-            "moment": _one_or_more(forces[d:]),
-        }
-        (foundations if member.foundation else parts)[member.description.on] = said
+    foundations, parts, electrodes = _motions(problem, state)
     rigid = next(iter(foundations.values())) if len(foundations) == 1 else foundations
     found = {"rigid": rigid, "rigid_parts": parts, "electrodes": electrodes}
     return {key: value for key, value in found.items() if value}
@@ -359,42 +344,56 @@ def rigid_columns(problem: ContactProblem, state: State) -> dict[str, dict[str, 
     They are `moved` (displacements and rotations), `acting` (forces and moments) and
     `potentials`. Of several foundations the names have that of the part behind them.
     """
-    found: dict[str, dict[str, float]] = {"moved": {}, "acting": {}, "potentials": {}}
-    several = sum(member.foundation for member in problem.equilibrium.global_unknowns.members) > 1
-    for member, values, forces in _members(problem, state):
-        part, d = member.description.on, problem.dim
-        if isinstance(member.description, Electrode):
-            found["potentials"][f"potential_{part}"] = float(values[0])
-        elif member.foundation:
-            turns = ["rotation"] if d == 2 else [f"rotation_{axis}" for axis in "xyz"]
-            moments = ["moment"] if d == 2 else [f"moment_{axis}" for axis in "xyz"]
-            axes, forced = (
-                [*"xyz"[:d], *turns],
-                [*(f"force_{axis}" for axis in "xyz"[:d]), *moments],
-            )
-            moved = np.concatenate([values[:d], np.rad2deg(values[d:])])
-            for kind, names, numbers in (("moved", axes, moved), ("acting", forced, forces)):
-                for name, number in zip(names, numbers, strict=True):
-                    column = f"rigid_{name}" + (f"_{part}" if several else "")
-                    found[kind][column] = float(number)
+    foundations, _, electrodes = _motions(problem, state)
+    found: dict[str, dict[str, float]] = {"moved": {}, "acting": {}}
+    found["potentials"] = {f"potential_{part}": e["potential"] for part, e in electrodes.items()}
+    for part, body in foundations.items():
+        end = f"_{part}" if len(foundations) > 1 else ""
+        for kind, key, name in (
+            ("moved", "displacement", "rigid"),
+            ("moved", "rotation", "rigid_rotation"),
+            ("acting", "force", "rigid_force"),
+            ("acting", "moment", "rigid_moment"),
+        ):
+            values = body[key]
+            axes = [f"_{axis}" for axis in "xyz"] if isinstance(values, list) else [""]
+            for axis, value in zip(axes, np.atleast_1d(values), strict=False):
+                found[kind][f"{name}{axis}{end}"] = float(value)
     return found
 
 
-def _members(problem: ContactProblem, state: State) -> Iterator[tuple[Member, Array, Array]]:
-    """Give rigid bodies and electrodes with their values, and the forces on them from outside."""
+def _motions(
+    problem: ContactProblem, state: State
+) -> tuple[dict[str, Any], dict[str, Any], dict[str, Any]]:
+    """Return foundations that move, rigid parts and electrodes, by part. Collective."""
+    foundations: dict[str, Any] = {}
+    parts: dict[str, Any] = {}
+    electrodes: dict[str, Any] = {}
     body = problem.equilibrium
     global_unknowns, q = body.global_unknowns, body.motion(state.x)
     if global_unknowns.size == 0:
-        return
+        return foundations, parts, electrodes
     residual = residual_forces(problem, state)
     forces = body.motion(residual) + global_unknowns.gathered(residual[: body.owned])
     forces += global_unknowns.forces(state.time)
     for member in global_unknowns.members:
-        units, own = member.units, forces[member.columns]
-        if problem.domain.revolved and not isinstance(member.description, Electrode):
+        values, own = q[member.columns] * member.units, forces[member.columns]
+        part = member.description.on
+        if isinstance(member.description, Electrode):
+            charge = float((own / member.units)[0])
+            electrodes[part] = {"potential": float(values[0]), "charge": charge}
+            continue
+        if problem.domain.revolved:
             # Over the full turn forces across the axis, and moments about it, cancel.
             own = np.where(np.arange(own.size) == 1, own, 0.0)
-        yield member, q[member.columns] * units, own / units
+        own, d = own / member.units, len(member.description.motion.displacement)
+        (foundations if member.foundation else parts)[part] = {
+            "displacement": values[:d].tolist(),
+            "rotation": _one_or_more(np.rad2deg(values[d:])),
+            "force": own[:d].tolist(),
+            "moment": _one_or_more(own[d:]),
+        }
+    return foundations, parts, electrodes
 
 
 def _one_or_more(values: Array) -> Any:

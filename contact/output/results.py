@@ -12,7 +12,7 @@ from mpi4py import MPI
 
 from contact.output import environment
 from contact.output.quantities import ABSENT, SUMMARY, values_of
-from contact.output.resultants import ChargeBalance, charge_balance, rigid_columns
+from contact.output.resultants import ChargeBalance, rigid_columns
 from contact.output.solution import Solution
 from contact.output.table import Table
 from contact.problem.energy import Balance
@@ -50,14 +50,10 @@ class Results:
         counts = {name: int(np.sum(status == name)) for name in ("open", "stick", "slip")}
         return self.problem.comm.bcast(counts)
 
-    @cached_property
+    @property
     def charges(self) -> ChargeBalance | None:
         """The free charges; None for a body without a potential."""
-        return charge_balance(self.problem, self.solution.state) if self._electric else None
-
-    @property
-    def _electric(self) -> bool:
-        return self.problem.piezoelectric
+        return self.solution.charges
 
     @property
     def charge_columns(self) -> Any:
@@ -70,7 +66,7 @@ class Results:
     @cached_property
     def potential_range(self) -> tuple[Any, Any]:
         """The least and the largest potential at a node."""
-        if not self._electric:
+        if not self.problem.piezoelectric:
             return ABSENT, ABSENT
         comm, body = self.problem.comm, self.problem.equilibrium
         scaled = self.solution.state.x[: body.owned].reshape(-1, body.block_size)[:, -1]
@@ -83,7 +79,7 @@ class Results:
     @property
     def conduction_ramp(self) -> Any:
         """How far in front of the closed gap the foundation conducts, 1/delta (length)."""
-        if not self._electric:
+        if not self.problem.piezoelectric:
             return ABSENT
         conductor = self.problem.interface.law.conductor
         return 1 / conductor.psi.delta if conductor and conductor.psi.follows_gap else None

@@ -203,7 +203,7 @@ class Solution(Solved):
         """
         return movements(self.problem, self.state)
 
-    @property
+    @cached_property
     def charges(self) -> ChargeBalance | None:
         """The free charges; None for a body without a potential. Collective."""
         if not self.problem.piezoelectric:

@@ -47,11 +47,6 @@ class Grid:
     cells: NDArray[np.int64]
     dimension: int
 
-    @property
-    def corners(self) -> NDArray[np.int64]:
-        """The corners of the cells, shape (m, dimension + 1)."""
-        return self.cells[:, : self.dimension + 1]
-
 
 @dataclass(frozen=True)
 class VTU:
