@@ -215,5 +215,5 @@ def test_the_case_file_and_its_figures(tmp_path):
 def test_what_is_no_half_plane_is_refused(comm):
     with pytest.raises(InputError, match="x >= 0"):
         revolved(rectangle(comm, [-1.0, 0.0], [2.0, 1.0], [4, 2]))
-    with pytest.raises(InputError, match="mesh in the plane"):
+    with pytest.raises(InputError, match="a mesh in 2-D"):
         revolved(box(comm, [0.0] * 3, [1.0] * 3, [1, 1, 1]))
