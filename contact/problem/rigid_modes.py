@@ -33,7 +33,7 @@ ROUNDING = 1e-9
 
 @dataclass(frozen=True)
 class Group:
-    """Pieces of the mesh that are held together or not at all, and their m rigid motions.
+    """Components of the mesh that are held together or not at all, and their m rigid motions.
 
     Attributes
     ----------
