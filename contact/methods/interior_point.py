@@ -170,7 +170,7 @@ class InteriorPoint:
             iteration.see(Iterate(self.state), kkt)
             iteration.history.record(kkt, INTERIOR_POINT, 2)
             ended = f"the interior point has not converged in {steps} steps"
-            if not taken:
+            if not taken or not np.isfinite(kkt.significant):
                 ended = f"rounding ends the interior point after {steps} steps"
                 break
             gap = self.gap()

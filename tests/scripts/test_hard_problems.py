@@ -9,7 +9,7 @@ from scripts.studies.sweep import problems
 
 @pytest.mark.parametrize(
     ("name", "whole", "dense"),
-    [("bimorph-3", 1, 50), ("bimorph-8", 1, 60), ("unsupported-5", 1, 40)],
+    [("bimorph-3", 1, 70), ("bimorph-8", 1, 60), ("unsupported-5", 1, 40)],
 )
 def test_what_takes_no_block_relaxation(name, whole, dense):
     """A bent bimorph, a good conductor, and a block that Newton's loop lets fly away.
