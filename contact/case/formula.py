@@ -1,7 +1,7 @@
 """Formulas of the case file, such as ``"-10*x"``, as functions of the coordinates and the time.
 
-A formula is read with Python's own parser and checked, node by node, against a short list of
-accepted ones. Nothing is handed to ``eval``.
+A formula is read with Python's own parser and evaluated node by node: a node that is not among the
+accepted ones is refused. Nothing is handed to ``eval``.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ import operator
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial, reduce
-from typing import TYPE_CHECKING, Any, TypeAlias
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import ufl
@@ -43,9 +43,6 @@ MAX_DEPTH = 100
 #: The coordinates and the time.
 VARIABLES = ("x", "y", "z", "t")
 
-#: A formula as read: a number, or a function of the values of the variables by their names.
-Read: TypeAlias = float | Callable[[Mapping[str, Any]], Any]
-
 _FUNCTIONS: Mapping[str, Callable[[Any], Any]] = {
     "sin": ops.sin,
     "cos": ops.cos,
@@ -63,7 +60,7 @@ _ARITHMETIC: Mapping[type[ast.AST], Callable[..., Any]] = {
     ast.Div: operator.truediv,
     ast.Pow: operator.pow,
     ast.USub: operator.neg,
-    ast.UAdd: lambda a: a,
+    ast.UAdd: operator.pos,
 }
 _COMPARISONS: Mapping[type[ast.cmpop], Callable[[Any, Any], Any]] = {
     ast.Lt: ops.less,
@@ -92,24 +89,20 @@ class Expression:
         If the source is anything else; the message names the source and the accepted ones.
     """
 
-    __slots__ = ("_read", "names", "source")
-
-    source: float | str
-    #: Coordinates that the formula uses, and "t" if it uses the time.
-    names: frozenset[str]
-
     def __init__(self, source: float | str) -> None:
         if isinstance(source, bool) or not isinstance(source, int | float | str):
             raise InputError(f"{source!r} is neither a number nor a formula")
+        self.source: float | str
+        #: The value of a constant, else the syntax tree.
+        self._read: float | ast.expr
+        #: Coordinates that the formula uses, and "t" if it uses the time.
+        self.names: frozenset[str] = frozenset()
         if isinstance(source, str):
-            self.source, (self._read, names) = source, _parse(source)
-            self.names = frozenset() if isinstance(self._read, float) else names
+            self.source, (self._read, self.names) = source, _parse(source)
             return
         try:
-            self.source, self.names = float(source), frozenset()
-            self._read = _finite(self.source)
-        except (OverflowError, InputError):
-            # A whole number may be as long as it likes.
+            self.source = self._read = _finite(source)
+        except InputError:
             raise InputError(f"{shown(source)} is not finite; accepted: finite numbers") from None
 
     @property
@@ -158,8 +151,10 @@ class Expression:
             If a value is not finite, or z is used in 2-D.
         """
         points = np.asarray(points, dtype=np.float64)
+        # An array, since numbers are taken for constants of the formula.
+        moment = None if time is None else np.full(1, time, dtype=np.float64)
         with np.errstate(all="ignore"):
-            result = self._evaluate(points.T, points.shape[1], time)
+            result = self._evaluate(points.T, points.shape[1], moment)
         values = np.array(np.broadcast_to(result, points.shape[:1]), dtype=np.float64)
         bad = points[~np.isfinite(values)][:1].tolist()
         # The lowest rank that has a bad point speaks for all.
@@ -181,6 +176,8 @@ class Expression:
         return ops.symbolic(self._evaluate(x, dimension, time))
 
     def _evaluate(self, x: Any, dimension: int, time: Any) -> Any:
+        if isinstance(self._read, float):
+            return self._read
         if dimension < 3 and "z" in self.names:
             raise InputError(f"{self} uses z in a plane problem; accepted there: x and y")
         if time is None and "t" in self.names:
@@ -204,11 +201,6 @@ class Expression:
     def __hash__(self) -> int:
         """Hash the source."""
         return hash(self.source)
-
-    def __reduce__(self) -> tuple[type[Expression], tuple[float | str]]:
-        """Pickle the source alone."""
-        # The functions that were read would not pass between ranks.
-        return Expression, (self.source,)
 
 
 @dataclass(frozen=True)
@@ -284,7 +276,7 @@ def as_number(given: Expression, unit: float = 1.0) -> float | Callable[[float],
     return lambda time: unit * given.number(time)
 
 
-def _parse(source: str) -> tuple[Read, frozenset[str]]:
+def _parse(source: str) -> tuple[float | ast.expr, frozenset[str]]:
     """Read a formula and the names of its variables, or raise an InputError that shows it."""
     if len(source) > MAX_LENGTH:
         raise InputError(
@@ -295,83 +287,84 @@ def _parse(source: str) -> tuple[Read, frozenset[str]]:
     except (SyntaxError, ValueError, RecursionError, MemoryError) as error:
         # Python reports some malformed or deeply nested texts by the last three.
         raise InputError(f"{shown(source)} is not a formula; accepted: {ACCEPTED}") from error
-    if _depth(body) > MAX_DEPTH:
+    level: list[ast.AST] = [body]
+    for _ in range(MAX_DEPTH):
+        level = [child for node in level for child in ast.iter_child_nodes(node)]
+    if level:
         raise InputError(f"{shown(source)} is nested too deeply; accepted: {MAX_DEPTH} levels")
     try:
-        read = _read(body)
+        # Anything that is not accepted is found by an evaluation anywhere.
+        with np.errstate(all="ignore"):
+            value = _value(body, dict.fromkeys(VARIABLES, np.zeros(1)))
     except InputError as error:
         raise InputError(f"{shown(source)}: {error}") from None
+    if isinstance(value, float):
+        return value, frozenset()
     names = {node.id for node in ast.walk(body) if isinstance(node, ast.Name)}
-    return read, frozenset(names & {*VARIABLES})
+    return body, frozenset(names & {*VARIABLES})
 
 
-def _depth(root: ast.AST) -> int:
-    """Depth of a syntax tree, without recursion: the depth is in doubt."""
-    level, depth = [root], 0
-    while level:
-        level = [child for node in level for child in ast.iter_child_nodes(node)]
-        depth += 1
-    return depth
+def _value(node: ast.AST, variables: Mapping[str, Any]) -> Any:
+    """Evaluate a node of the syntax tree at arrays, or UFL, of the variables.
 
+    Constant parts are floats, so that neither NumPy nor UFL has to simplify them.
+    """
 
-def _read(node: ast.AST) -> Read:
-    """Read a node of the syntax tree; constant parts are evaluated at once."""
+    def read(inner: ast.AST) -> Any:
+        return _value(inner, variables)
+
     match node:
         case ast.Constant(value=int() | float() as value) if not isinstance(value, bool):
             return _finite(value)
         case ast.Name(id="pi"):
             return math.pi
         case ast.Name(id=name) if name in VARIABLES:
-            return operator.itemgetter(name)
+            return variables[name]
         case ast.Name(id=name):
             raise InputError(f"unknown name {name}; accepted: {ACCEPTED}")
         case ast.UnaryOp(op=op, operand=operand) if type(op) in _ARITHMETIC:
-            return _apply(_ARITHMETIC[type(op)], _read(operand))
+            return _apply(_ARITHMETIC[type(op)], read(operand))
         case ast.BinOp(op=op, left=left, right=right) if type(op) in _ARITHMETIC:
-            return _arithmetic(op, _read(left), _read(right))
+            return _arithmetic(op, read(left), read(right))
         case ast.BinOp(op=ast.BitXor()):
             raise InputError("^ is not accepted; a power is written **")
         case ast.Compare(left=left, ops=signs, comparators=others):
-            return _comparison(signs, [_read(side) for side in (left, *others)])
+            return _comparison(signs, [read(side) for side in (left, *others)])
         case ast.Call(func=ast.Name(id=name), args=args, keywords=[]):
-            return _function(name, [_read(arg) for arg in args])
+            return _function(name, [read(arg) for arg in args])
     raise InputError(f"{ast.unparse(node)[:40]} is not accepted; accepted: {ACCEPTED}")
 
 
-def _arithmetic(op: ast.operator, left: Read, right: Read) -> Read:
-    """Read an operation of two; 0*a, 0/a and a**0 are constants.
+def _arithmetic(op: ast.operator, left: Any, right: Any) -> Any:
+    """Evaluate an operation of two; 0*a, 0/a and a**0 are constants.
 
     UFL would simplify these and go on to compute in Python's numbers, which raise or go complex
     where NumPy's do not; here they are caught as any constant is.
     """
-    if isinstance(op, ast.Div) and right == 0.0:
+    left_is_zero, right_is_zero = (isinstance(a, float) and a == 0.0 for a in (left, right))
+    if isinstance(op, ast.Div) and right_is_zero:
         raise InputError("division by zero is not accepted")
-    if isinstance(op, ast.Pow) and right == 0.0:
+    if isinstance(op, ast.Pow) and right_is_zero:
         return 1.0
-    if (isinstance(op, ast.Mult) and 0.0 in (left, right)) or (
-        isinstance(op, ast.Div) and left == 0.0
-    ):
+    if isinstance(op, ast.Mult | ast.Div) and (left_is_zero or right_is_zero):
         return 0.0
     return _apply(_ARITHMETIC[type(op)], left, right)
 
 
-def _comparison(signs: Sequence[ast.cmpop], sides: Sequence[Read]) -> Read:
-    """Read ``a < b``, or the chain ``a < b < c``, which holds if each link does."""
+def _comparison(signs: Sequence[ast.cmpop], sides: Sequence[Any]) -> Any:
+    """Evaluate ``a < b``, or the chain ``a < b < c``, which holds if each link does."""
     if not all(type(sign) in _COMPARISONS for sign in signs):
         raise InputError("only the comparisons < <= > >= == != are accepted")
     pairs = zip(signs, itertools.pairwise(sides), strict=True)
     links = [_apply(_COMPARISONS[type(sign)], *pair) for sign, pair in pairs]
-    if 0.0 in links:
+    known = [link for link in links if isinstance(link, float)]
+    if 0.0 in known:
         return 0.0
-    conditions: list[Callable[..., Any]] = [link for link in links if callable(link)]
-
-    def both(one: Callable[..., Any], other: Callable[..., Any]) -> Callable[..., Any]:
-        return lambda variables: ops.both(one(variables), other(variables))
-
-    return reduce(both, conditions) if conditions else 1.0
+    conditions = [link for link in links if not isinstance(link, float)]
+    return reduce(ops.both, conditions) if conditions else 1.0
 
 
-def _function(name: str, arguments: Sequence[Read]) -> Read:
+def _function(name: str, arguments: Sequence[Any]) -> Any:
     def check(right: bool, accepted: str) -> None:
         if not right:
             given = f"{name} is given {len(arguments)} argument(s)"
@@ -383,39 +376,26 @@ def _function(name: str, arguments: Sequence[Read]) -> Read:
     if name in _EXTREMES:
         check(len(arguments) >= 2, "2 arguments or more")
         return reduce(partial(_apply, _EXTREMES[name]), arguments)
-    if name == "where":
-        check(len(arguments) == 3, "3 arguments: condition, a, b")
-        return _where(*arguments)
-    raise InputError(f"unknown function {name}; accepted: {ACCEPTED}")
-
-
-def _where(condition: Read, a: Read, b: Read) -> Read:
+    if name != "where":
+        raise InputError(f"unknown function {name}; accepted: {ACCEPTED}")
+    check(len(arguments) == 3, "3 arguments: condition, a, b")
+    condition, a, b = arguments
     if isinstance(condition, float):
         return a if condition else b
-
-    def chosen(variables: Mapping[str, Any]) -> Any:
-        holds = condition(variables)
-        if not _is_condition(holds):
-            holds = ops.not_equal(holds, 0.0)
-        return ops.where(holds, *(_as_number(_value(part, variables)) for part in (a, b)))
-
-    return chosen
+    if not _is_condition(condition):
+        condition = ops.not_equal(condition, 0.0)
+    return ops.where(condition, _as_number(a), _as_number(b))
 
 
-def _apply(function: Callable[..., Any], *arguments: Read) -> Read:
-    """Apply a function; at once if all is known, so that neither NumPy nor UFL has to."""
-    numbers = [argument for argument in arguments if isinstance(argument, float)]
-    if len(numbers) == len(arguments):
+def _apply(function: Callable[..., Any], *arguments: Any) -> Any:
+    """Apply a function; to constants in NumPy's floats, and the value has to be finite.
+
+    Python's own raise for 9.0**999 and go complex for (-8.0)**0.3.
+    """
+    if all(isinstance(argument, float) for argument in arguments):
         with np.errstate(all="ignore"):
-            # NumPy's floats: Python's own raise for 9.0**999 and go complex for (-8.0)**0.3.
-            return _finite(function(*map(np.float64, numbers)))
-    return lambda variables: function(
-        *(_as_number(_value(argument, variables)) for argument in arguments)
-    )
-
-
-def _value(read: Read, variables: Mapping[str, Any]) -> Any:
-    return read if isinstance(read, float) else read(variables)
+            return _finite(function(*map(np.float64, arguments)))
+    return function(*map(_as_number, arguments))
 
 
 def _as_number(value: Any) -> Any:
