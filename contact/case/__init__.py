@@ -1,4 +1,4 @@
-"""The case file: its models, messages, reference page, and the problem of it.
+"""The case file: its models, messages, and the problem of it.
 
 `file` reads it, the sections check it (`mesh`, `material`, `body`, `interface`, `shapes`, `rigid`,
 `evolution`, `solver`), each key with its description, bounds and default in one place, and

@@ -4,11 +4,11 @@ import tomllib
 
 import pytest
 
-from contact.case import reference
 from contact.case.file import Case, parse_case
 from contact.case.messages import keys_of, sections_of
 from contact.case.text import to_toml
 from contact.methods.options import OPTIONS, NewtonOptions, with_method
+from scripts import case_page
 from tests.problems.bar import changed
 
 
@@ -39,17 +39,4 @@ def test_the_resolved_case_holds_what_the_method_reads():
 
 
 def test_the_reference_page_is_up_to_date():
-    assert reference.PAGE.read_text() == reference.page(), "run python3 -m contact.case.reference"
-
-
-def test_the_page_is_written_where_it_is_asked_for(tmp_path, monkeypatch, capsys):
-    monkeypatch.chdir(tmp_path)
-    with pytest.raises(SystemExit) as ended:
-        reference.main(["--help"])
-    assert (
-        ended.value.code == 0
-        and "usage: python3 -m contact.case.reference" in capsys.readouterr().out
-    )
-    assert not list(tmp_path.iterdir())
-    reference.main(["page.md"])
-    assert (tmp_path / "page.md").read_text() == reference.page()
+    assert case_page.PAGE.read_text() == case_page.page(), "run python3 -m scripts.case_page"

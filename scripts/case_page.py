@@ -1,11 +1,10 @@
 """The reference page of the case file, made from the models themselves.
 
-``python3 -m contact.case.reference`` writes ``docs/case-file.md``.
+``python3 -m scripts.case_page`` writes ``docs/case-file.md``.
 """
 
 from __future__ import annotations
 
-import argparse
 import inspect
 from collections.abc import Collection, Iterator, Sequence
 from dataclasses import is_dataclass
@@ -21,12 +20,12 @@ from contact.case.solver import DEFAULT
 from contact.case.text import literal
 from contact.settings import ReadWith
 
-PAGE = Path(__file__).parents[2] / "docs" / "case-file.md"
+PAGE = Path(__file__).parents[1] / "docs" / "case-file.md"
 
 INTRODUCTION = f"""\
 # The case file
 
-<!-- Made by `python3 -m contact.case.reference`; edit the models in contact/case/ instead. -->
+<!-- Made by `python3 -m scripts.case_page`; edit the models in contact/case/ instead. -->
 
 A case file is a TOML file that says all about a problem and how it is solved:
 
@@ -152,16 +151,5 @@ def _generators() -> Iterator[str]:
         yield f"| `{name}` | {summary} | {defaults} |"
 
 
-def main(arguments: Sequence[str] | None = None) -> None:
-    """Write the page to a file, by default docs/case-file.md."""
-    parser = argparse.ArgumentParser(
-        prog="python3 -m contact.case.reference", description=main.__doc__
-    )
-    parser.add_argument("path", nargs="?", type=Path, default=PAGE, help="default: %(default)s")
-    path: Path = parser.parse_args(arguments).path
-    path.parent.mkdir(parents=True, exist_ok=True)
-    path.write_text(page())
-
-
 if __name__ == "__main__":
-    main()
+    PAGE.write_text(page())
