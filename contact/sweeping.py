@@ -35,9 +35,8 @@ from contact.methods.steps import Reached, predicted, since, solve_step
 from contact.output.folder import on_root
 from contact.output.quantities import SWEEP, values_of
 from contact.output.rerun import difference
-from contact.output.results import Results
 from contact.output.solution import Solution
-from contact.output.table import contact_table, write_csv
+from contact.output.table import write_csv
 from contact.problem.checks import check_potential
 from contact.problem.problem import ContactProblem
 from contact.solving import Schedule, run_schedule
@@ -166,8 +165,7 @@ def sweep(
                 if solution.outcome.signal:
                     raise Interrupted(solution.outcome.signal)
                 seconds = comm.bcast(time.perf_counter() - begin)
-                results = Results(solution, contact_table(solution))
-                row = {**point, **values_of(SWEEP, results), "seconds": seconds}
+                row = {**point, **values_of(SWEEP, solution), "seconds": seconds}
                 row[INPUT] = given
                 said = f"{', '.join(_set(point))}: {solution.outcome.reason}"
                 tell(logger, (len(rows) + 1) / len(cases), said)

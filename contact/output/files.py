@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from mpi4py import MPI
 
 from contact.arguments import expect
 from contact.output.field_files import write_fields, write_share
 from contact.output.folder import ResultFolder, on_root, result_folder
-from contact.output.quantities import AGAINST, HISTORY, OPPOSITE, quantities, values_of
-from contact.output.results import summarise
+from contact.output.quantities import AGAINST, HISTORY, OPPOSITE, SUMMARY, quantities, values_of
 from contact.output.solution import Solution
 from contact.output.steps import write_steps
 from contact.output.surface import contact_surface, opposite_surface, opposite_table
@@ -96,7 +97,7 @@ def _replace(solution: Solution, folder: ResultFolder, figures: bool) -> None:
                 except Exception as error:
                     failures.append(error)
         solution.seconds["output"] += time.perf_counter() - begin
-        return summarise(solution, table)
+        return {key: _plain(value) for key, value in values_of(SUMMARY, solution).items()}
 
     folder.replace(write)
     # A figure that fails is no reason to lose the rest.
@@ -106,3 +107,13 @@ def _replace(solution: Solution, folder: ResultFolder, figures: bool) -> None:
 def _raise(failures: list[Exception]) -> None:
     if failures:
         raise failures[0]
+
+
+def _plain(value: Any) -> Any:
+    """Return a value of JSON: null in place of NaN and infinity."""
+    if isinstance(value, Mapping):
+        return {key: _plain(item) for key, item in value.items()}
+    if isinstance(value, list | np.ndarray):
+        return [_plain(item) for item in value]
+    value = value.item() if isinstance(value, np.generic) else value
+    return None if isinstance(value, float) and not math.isfinite(value) else value

@@ -14,6 +14,8 @@ from typing import Any
 
 import numpy as np
 
+from contact.output.environment import versions
+
 #: Value of a quantity that a problem does not have: it has no key, column or field then.
 ABSENT = object()
 
@@ -33,19 +35,13 @@ class Quantity:
     Attributes
     ----------
     name
-        Of the key, column or field. PART, KEY and AXIS stand for names of the case, and x, y, z.
-    unit
-        In words: "length", "stress", ...; empty for none.
+        PART, KEY and AXIS in it stand for names of the case, and x, y, z.
     text
-        The description, with the sign.
+        The description, with the sign; `unit` is "length", "stress", ..., empty for none.
     value
-        A function of `results.Results` in ``summary.json``, ``steps.csv`` and ``sweep.csv``, of
-        `methods.report.Record` in ``history.csv``, of `table.ContactNodes` in ``contact.csv``, of
-        `fields.Point` in ``fields.vtu``, of `surface.ContactResult` in ``contact.vtu``, of a
-        mapping in the files of master sides. A mapping has several columns, a vector one a
-        component.
-    files
-        The files that have it.
+        A function of `solution.Solution`; in ``history.csv`` of `methods.report.Record`, in
+        ``fields.vtu`` of `fields.Point`, in ``contact.vtu`` of `surface.ContactResult`, on master
+        sides of a mapping. A mapping has several columns, a vector one a component.
     component
         Of a vector: name of the column of a component.
     """
@@ -94,35 +90,40 @@ def _present(value: Any) -> Any:
     return ABSENT if value is None else value
 
 
+def _item(values: Any, index: int) -> Any:
+    return ABSENT if values is None else values[index]
+
+
 def _sizes(record: Any) -> str:
     """Return the numbers of open, stick and slip nodes after an iteration; empty if unknown."""
     return "/".join(map(str, record.sizes or ()))
 
 
 _ALL, _VECTOR = (SUMMARY, STEPS, SWEEP), "{name}_{axis}"
+_STRAIN = {2: "plane_strain", 3: "solid"}
 
-#: Numbers of the run as a whole, of a step and of a case of a sweep.
 _RUN = (
     Quantity(
         "KEY", "", "A swept key, a column each: its value in this row.", lambda r: ABSENT, (SWEEP,)
     ),
-    Quantity("title", "", "Title of the case.", lambda r: r.solution.title),
-    Quantity(
-        "units", "", "Names of the units, those of `[case] units`.",
-        lambda r: r.solution.units.given,
-    ),
-    Quantity("t", "time", "End of the step.", lambda r: r.solution.state.time, (STEPS,)),
+    Quantity("title", "", "Title of the case.", lambda r: r.title),
+    Quantity("units", "", "Names of the units, those of `[case] units`.", lambda r: r.units.given),
+    Quantity("t", "time", "End of the step.", lambda r: r.state.time, (STEPS,)),
     Quantity(
         "converged", "", "Whether all residuals are within the tolerance.",
-        lambda r: r.solution.converged, (SUMMARY, SWEEP),
+        lambda r: r.converged, (SUMMARY, SWEEP),
     ),
-    Quantity("reason", "", "Why the run ended, in words.", lambda r: r.solution.outcome.reason),
-    Quantity("method", "", "The method, as in `[solver]`.", lambda r: r.solution.method),
+    Quantity("reason", "", "Why the run ended, in words.", lambda r: r.outcome.reason),
+    Quantity("method", "", "The method, as in `[solver]`.", lambda r: r.method),
     Quantity(
-        "kinematics", "", "`plane_strain`, `axisymmetric` or `solid`.", lambda r: r.kinematics
+        "kinematics", "", "`plane_strain`, `axisymmetric` or `solid`.",
+        lambda r: "axisymmetric" if r.problem.domain.revolved else _STRAIN[r.problem.dim],
     ),
     Quantity("dofs", "", "Number of unknowns.", lambda r: r.problem.equilibrium.layout.unknowns),
-    Quantity("cells", "", "Number of triangles or tetrahedra.", lambda r: r.cells),
+    Quantity(
+        "cells", "", "Number of triangles or tetrahedra.",
+        lambda r: r.problem.domain.mesh.topology.index_map(r.problem.dim).size_global,
+    ),
     Quantity(
         "ranks", "", "Number of MPI processes. The results do not depend on it.",
         lambda r: r.problem.comm.size,
@@ -132,28 +133,28 @@ _RUN = (
         "Force that the body exerts on the foundation, a vector; in 2-D a unit of depth. Between "
         "bodies the one that the body with `on` exerts on the other; of several contacts the sum, "
         "and `traction`, `weight` and `entry` of `contact.vtu` have the force of each.",
-        lambda r: r.solution.contact_force, _ALL, _VECTOR,
+        lambda r: r.contact_force, _ALL, _VECTOR,
     ),
     Quantity(
         "contact_moment", "force · length",
         "Moment of these about the origin of coordinates, of points in the reference "
         "configuration: in 2-D a list of one, about z and counter-clockwise, in 3-D a vector.",
-        lambda r: r.solution.contact_moment,
+        lambda r: r.contact_moment,
     ),
     Quantity(
         "reactions", "force",
         "Force of the support of each part on the body, a vector a part. A node of two parts "
         "counts for the one that stands first in the case. With the loads and minus "
         "`contact_force` they add up to nothing; forces between bodies are no part of that.",
-        lambda r: {part: held.force for part, held in r.solution.supports.items()},
+        lambda r: {part: held.force for part, held in r.supports.items()},
     ),
     Quantity(
         "reaction_moments", "force · length", "Moments of these, as `contact_moment`.",
-        lambda r: {part: held.moment for part, held in r.solution.supports.items()},
+        lambda r: {part: held.moment for part, held in r.supports.items()},
     ),
     Quantity(
         "max_pressure", "stress", "Largest contact pressure, -σ_ν >= 0.",
-        lambda r: r.problem.nodes.maximum(r.solution.pressure), _ALL,
+        lambda r: r.problem.nodes.maximum(r.pressure), _ALL,
     ),
     Quantity(
         "contact_nodes", "", "Number of contact nodes that touch: sticking and sliding ones.",
@@ -166,34 +167,34 @@ _RUN = (
     ),
     Quantity(
         "max_displacement", "length", "Largest Euclidean norm of the displacement at a node.",
-        lambda r: r.solution.max_displacement, _ALL,
+        lambda r: r.max_displacement, _ALL,
     ),
     Quantity(
         "contact_area", "area", "Sum of the weights of the nodes that touch; in 2-D a length.",
-        lambda r: r.solution.contact_area, (SUMMARY, SWEEP),
+        lambda r: r.contact_area, (SUMMARY, SWEEP),
     ),
     Quantity(
         "max_dev_strain", "", "Largest |dev ε| over the cells (at degree 2 their nodes).",
-        lambda r: r.solution.max_dev_strain,
+        lambda r: r.max_dev_strain,
     ),
     Quantity(
         "max_strain", "",
         "Largest Frobenius norm of ε in the middle of a cell; linear kinematics is for small ones.",
-        lambda r: r.of_deformation("largest_strain"),
+        lambda r: _item(r.deformation, 0),
     ),
     Quantity(
         "volume_ratio", "", "Least and largest deformed volume of a cell over its own.",
-        lambda r: r.of_deformation("least_volume", "largest_volume"),
+        lambda r: _present(r.deformation and [*r.deformation[1:]]),
     ),
     Quantity(
         "max_von_mises", "stress",
         "Largest von Mises stress over the same. At sharp corners it grows with each refinement.",
-        lambda r: r.solution.max_von_mises,
+        lambda r: r.max_von_mises,
     ),
     Quantity(
         "plastic_share", "",
         "Share of the volume in the plastic range, |dev ε| above the material's first yield, 0 to "
-        "1; `null` where no material has such a limit.", lambda r: r.solution.plastic_share,
+        "1; `null` where no material has such a limit.", lambda r: r.plastic_share,
     ),
     Quantity(
         "contact_direction", "", "`[contact]` `direction`: whose normal ν is.",
@@ -212,58 +213,57 @@ _RUN = (
     ),
     Quantity(
         "outer_iterations", "", "Outer iterations: rows of `history.csv`.",
-        lambda r: len(r.solution.history.records), (SUMMARY, SWEEP),
+        lambda r: len(r.history.records), (SUMMARY, SWEEP),
     ),
     Quantity(
         "inner_iterations", "", "Linear solves in each of them, a list.",
-        lambda r: [record.inner for record in r.solution.history.records],
+        lambda r: [record.inner for record in r.history.records],
     ),
     Quantity(
         "linear_solves", "", "Solves with the matrix of the whole body.",
-        lambda r: r.solution.counters.linear_solves, _ALL,
+        lambda r: r.counters.linear_solves, _ALL,
     ),
     Quantity(
         "linear_iterations", "", "Iterations of the linear solver in all of these; 1 each by LU.",
-        lambda r: r.solution.counters.linear_iterations,
+        lambda r: r.counters.linear_iterations,
     ),
     Quantity(
         "factorizations", "", "Factorisations of it, or set-ups of multigrid.",
-        lambda r: r.solution.counters.factorizations, _ALL,
+        lambda r: r.counters.factorizations, _ALL,
     ),
     Quantity(
         "contact_solves", "", "Linear solves of the problem condensed onto the contact nodes.",
-        lambda r: r.solution.counters.contact_solves,
+        lambda r: r.counters.contact_solves,
     ),
     Quantity(
         "kkt", "",
         "Residuals of the equations, each relative to its own size: `equilibrium` (forces; of "
         "piezoelectric bodies charges, where these are farther from balance), `contact` (no "
         "penetration, no tension, one of them zero), `friction` (stick or slip).", lambda r: {
-        name: getattr(r.solution.outcome.kkt, name)
+        name: getattr(r.outcome.kkt, name)
         for name in ("equilibrium", "contact", "friction") },
     ),
-    Quantity("kkt", "", "The largest residual.", lambda r: r.solution.outcome.kkt.largest, ROWS),
+    Quantity("kkt", "", "The largest residual.", lambda r: r.outcome.kkt.largest, ROWS),
     Quantity(
         "rounding", "",
         "Rounding floors of the same residuals, which are accepted up to them; of `equilibrium` "
         "in an evolution the most in a step. More than the tolerance in slender bodies alone, with "
-        "a warning then.",
-        lambda r: r.floors,
+        "a warning then.", lambda r: r.floors,
     ),
     Quantity(
         "rigid", "",
         "The foundation that moves: its `displacement` and `rotation` (degrees), and the `force` "
         "and `moment` on it from outside, given or held. Of several, one entry a part.",
-        lambda r: r.moving("rigid"),
+        lambda r: r.movements.get("rigid", ABSENT),
     ),
     Quantity(
         "rigid_parts", "", "The same of each part that moves as a rigid body, by part.",
-        lambda r: r.moving("rigid_parts"),
+        lambda r: r.movements.get("rigid_parts", ABSENT),
     ),
     Quantity(
         "electrodes", "",
         "`potential` and `charge` of each electrode whose potential was unknown, by part.",
-        lambda r: r.moving("electrodes"),
+        lambda r: r.movements.get("electrodes", ABSENT),
     ),
     Quantity(
         "rigid_AXIS", "length",
@@ -279,53 +279,55 @@ _RUN = (
     ),
     Quantity(
         "charge_PART", "charge", "Likewise; `charge_foundation` through the contact part.",
-        lambda r: r.charge_columns, ROWS,
+        lambda r: _present(r.charge_columns), ROWS,
     ),
     Quantity(
         "driven", "length", "Mean displacement of the part that is moved or loaded in time.",
-        lambda r: r.driven[0], (STEPS,), _VECTOR,
+        lambda r: _item(r.driven, 0), (STEPS,), _VECTOR,
     ),
     Quantity(
         "driven_force", "force", "The force that drives it: with `driven_x` it makes the loop.",
-        lambda r: r.driven[1], (STEPS,), _VECTOR,
+        lambda r: _item(r.driven, 1), (STEPS,), _VECTOR,
     ),
     Quantity(
         "notes", "", "Assumptions that were checked and found to hold, in words.",
-        lambda r: r.solution.notes,
+        lambda r: r.notes,
     ),
-    Quantity("warnings", "", "Reasons for care, in words.", lambda r: r.solution.warnings),
-    Quantity("phi_min", "potential", "Least potential at a node.", lambda r: r.potential_range[0]),
+    Quantity("warnings", "", "Reasons for care, in words.", lambda r: r.warnings),
     Quantity(
-        "phi_max", "potential", "Largest potential at a node.", lambda r: r.potential_range[1]
+        "phi_min", "potential", "Least potential at a node.", lambda r: _item(r.potential_range, 0)
+    ),
+    Quantity(
+        "phi_max", "potential", "Largest potential at a node.",
+        lambda r: _item(r.potential_range, 1),
     ),
     Quantity(
         "total_charge", "charge", "Sum of all charges: 0 up to the tolerance, by Gauss's law.",
-        lambda r: ABSENT if r.charges is None else r.charges.total,
+        lambda r: _present(r.charges and r.charges.total),
     ),
     Quantity(
         "charges", "charge",
         "Free charges D·ν integrated, ν out of the body: `electrodes` and `given` part by part, "
         "`foundation` (through the contact part), `body` (in the volume), `magnitude` (of all "
-        "nodal ones, without sign).", lambda r: ABSENT if r.charges is None else vars(r.charges),
+        "nodal ones, without sign).", lambda r: _present(r.charges and vars(r.charges)),
     ),
     Quantity(
         "conduction_ramp", "length",
         "1/delta: how far in front of the closed gap the foundation conducts, if it does.",
-        lambda r: r.conduction_ramp,
+        lambda r: r.conduction_ramp if r.problem.piezoelectric else ABSENT,
     ),
     Quantity(
         "case", "",
         "The case as it was solved, all defaults written out: a case file to run again. Empty "
-        "where the problem was built or changed in Python.", lambda r: r.solution.case,
+        "where the problem was built or changed in Python.", lambda r: r.case,
     ),
-    Quantity("seconds", "s", "For `setup`, `solve` and `output`.", lambda r: r.solution.seconds),
-    Quantity("versions", "", "Of Python, the libraries and the BLAS.", lambda r: r.versions),
+    Quantity("seconds", "s", "For `setup`, `solve` and `output`.", lambda r: r.seconds),
+    Quantity("versions", "", "Of Python, the libraries and the BLAS.", lambda r: versions()),
     Quantity("files", "", "Files of this run: a later run replaces them.", lambda r: ABSENT),
     Quantity("seconds", "s", "Time for this row.", lambda r: ABSENT, (SWEEP,)),
     Quantity("input", "", "Digests of the case and its files.", lambda r: ABSENT, (SWEEP,)),
 )  # fmt: skip
 
-#: The contact nodes: one row each of ``contact.csv``.
 _NODES = (
     Quantity(
         "on", "", "Part of the node; where there are several contacts.",
@@ -334,46 +336,46 @@ _NODES = (
     Quantity("x", "length", "Reference place of the node.", lambda n: n.points, (NODES,), "{axis}"),
     Quantity(
         "weight", "area", "Area that the node stands for; sums with it are integrals over Γ₃.",
-        lambda n: n.nodes.weight, (NODES,),
+        lambda n: n.problem.nodes.weight, (NODES,),
     ),
     Quantity(
         "gap", "length", "Initial distance to the foundation, along the contact direction ν.",
-        lambda n: n.law.jump.gap, (NODES,),
+        lambda n: n.problem.interface.law.jump.gap, (NODES,),
     ),
     Quantity(
         "u_n", "length", "Displacement along ν, out of the body; gap - u_n is the open gap. Where "
         "the foundation moves, relative to that; so are the tangential ones. At degree 2 in 3-D "
         "mid-edges have (u - (u₁ + u₂)/5)/(3/5), u₁ and u₂ being at the ends of the edge, and so "
         "has the gap: the pressure there acts against that, not against u.",
-        lambda n: n.solution.normal_displacement, (NODES,),
+        lambda n: n.normal_displacement, (NODES,),
     ),
     Quantity(
         "u_t", "length", "Tangential displacement u_τ: its components in 3-D, `u_t` in 2-D.",
-        lambda n: n.tangential(n.solution.slip), (NODES,), "{name}{axis}",
+        lambda n: n.tangential(n.slip), (NODES,), "{name}{axis}",
     ),
     Quantity(
         "pressure", "stress", "Contact pressure -σ_ν, of the foundation and its layer.",
-        lambda n: n.solution.pressure, (NODES,),
+        lambda n: n.pressure, (NODES,),
     ),
     Quantity(
         "tau", "stress",
         "Friction stress -σ_τ of the body on the foundation: its components, `tau` in 2-D.",
-        lambda n: n.tangential(n.solution.friction), (NODES,), _VECTOR,
+        lambda n: n.tangential(n.friction), (NODES,), _VECTOR,
     ),
     Quantity(
         "bound", "stress", "Friction bound: `tau` is no larger.",
-        lambda n: n.solution.friction_bound, (NODES,),
+        lambda n: n.friction_bound, (NODES,),
     ),
-    Quantity("status", "", "`open`, `stick` or `slip`.", lambda n: n.solution.status, (NODES,)),
+    Quantity("status", "", "`open`, `stick` or `slip`.", lambda n: n.status, (NODES,)),
     Quantity(
         "phi", "potential", "Potential; of piezoelectric bodies.",
-        lambda n: _present(n.potential), (NODES,),
+        lambda n: _present(n.contact_potential), (NODES,),
     ),
     Quantity(
         "d_n", "charge/area",
         "Charge D·ν that leaves through the foundation; likewise. Nodes that supports hold "
         "conduct too, and have no row: `charges` of the summary has all.",
-        lambda n: _present(n.charge), (NODES,),
+        lambda n: _present(n.contact_charge), (NODES,),
     ),
 )  # fmt: skip
 
@@ -411,7 +413,6 @@ _HISTORY = (
     ),
 )  # fmt: skip
 
-#: Master sides of contacts between bodies.
 _AGAINST = (
     Quantity(
         "on", "", "Part of the node: one that is `against` in a contact.",

@@ -332,47 +332,13 @@ def movements(problem: ContactProblem, state: State) -> dict[str, Any]:
     potential; a key is absent where there are none. Rotations are in degrees. Forces, moments and
     charges act from outside: those given, or the reactions of components that are given.
     """
-    foundations, parts, electrodes = _motions(problem, state)
-    rigid = next(iter(foundations.values())) if len(foundations) == 1 else foundations
-    found = {"rigid": rigid, "rigid_parts": parts, "electrodes": electrodes}
-    return {key: value for key, value in found.items() if value}
-
-
-def rigid_columns(problem: ContactProblem, state: State) -> dict[str, dict[str, float]]:
-    """Return the columns of the foundations that move, and of electrodes. Collective.
-
-    They are `moved` (displacements and rotations), `acting` (forces and moments) and
-    `potentials`. Of several foundations the names have that of the part behind them.
-    """
-    foundations, _, electrodes = _motions(problem, state)
-    found: dict[str, dict[str, float]] = {"moved": {}, "acting": {}}
-    found["potentials"] = {f"potential_{part}": e["potential"] for part, e in electrodes.items()}
-    for part, body in foundations.items():
-        end = f"_{part}" if len(foundations) > 1 else ""
-        for kind, key, name in (
-            ("moved", "displacement", "rigid"),
-            ("moved", "rotation", "rigid_rotation"),
-            ("acting", "force", "rigid_force"),
-            ("acting", "moment", "rigid_moment"),
-        ):
-            values = body[key]
-            axes = [f"_{axis}" for axis in "xyz"] if isinstance(values, list) else [""]
-            for axis, value in zip(axes, np.atleast_1d(values), strict=False):
-                found[kind][f"{name}{axis}{end}"] = float(value)
-    return found
-
-
-def _motions(
-    problem: ContactProblem, state: State
-) -> tuple[dict[str, Any], dict[str, Any], dict[str, Any]]:
-    """Return foundations that move, rigid parts and electrodes, by part. Collective."""
     foundations: dict[str, Any] = {}
     parts: dict[str, Any] = {}
     electrodes: dict[str, Any] = {}
     body = problem.equilibrium
     global_unknowns, q = body.global_unknowns, body.motion(state.x)
     if global_unknowns.size == 0:
-        return foundations, parts, electrodes
+        return {}
     residual = residual_forces(problem, state)
     forces = body.motion(residual) + global_unknowns.gathered(residual[: body.owned])
     forces += global_unknowns.forces(state.time)
@@ -393,8 +359,36 @@ def _motions(
             "force": own[:d].tolist(),
             "moment": _one_or_more(own[d:]),
         }
-    return foundations, parts, electrodes
+    rigid = next(iter(foundations.values())) if len(foundations) == 1 else foundations
+    found = {"rigid": rigid, "rigid_parts": parts, "electrodes": electrodes}
+    return {key: value for key, value in found.items() if value}
 
 
 def _one_or_more(values: Array) -> Any:
     return float(values[0]) if values.size == 1 else values.tolist()
+
+
+def rigid_columns(moving: Mapping[str, Any]) -> dict[str, dict[str, float]]:
+    """Return the columns of the foundations that move, and of electrodes, from their `movements`.
+
+    They are `moved` (displacements and rotations), `acting` (forces and moments) and
+    `potentials`. Of several foundations the names have that of the part behind them.
+    """
+    foundations, electrodes = moving.get("rigid", {}), moving.get("electrodes", {})
+    found: dict[str, dict[str, float]] = {"moved": {}, "acting": {}}
+    found["potentials"] = {f"potential_{part}": e["potential"] for part, e in electrodes.items()}
+    if isinstance(foundations.get("displacement"), list):  # a single one
+        foundations = {"": foundations}
+    for part, body in foundations.items():
+        end = f"_{part}" if part else ""
+        for kind, key, name in (
+            ("moved", "displacement", "rigid"),
+            ("moved", "rotation", "rigid_rotation"),
+            ("acting", "force", "rigid_force"),
+            ("acting", "moment", "rigid_moment"),
+        ):
+            values = body[key]
+            axes = [f"_{axis}" for axis in "xyz"] if isinstance(values, list) else [""]
+            for axis, value in zip(axes, np.atleast_1d(values), strict=False):
+                found[kind][f"{name}{axis}{end}"] = float(value)
+    return found

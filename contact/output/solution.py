@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -21,10 +22,12 @@ from contact.output.resultants import (
     charge_balance,
     contact_resultant,
     movements,
+    rigid_columns,
     supports,
 )
 from contact.output.solved import Solved
 from contact.output.surface import ContactResult, contact_result
+from contact.problem.energy import Balance
 from contact.typing import Array
 
 if TYPE_CHECKING:
@@ -64,6 +67,8 @@ class Solution(Solved):
         From where the iteration started, in words.
     case
         The case as `contact check` prints it, empty where there is none.
+    energies, driven
+        Of a step: its energies, and displacement and force of the part that is moved or loaded.
     """
 
     outcome: Outcome
@@ -79,6 +84,8 @@ class Solution(Solved):
     deformation: Deformation | None = None
     start: str = "zero slip"
     case: str = ""
+    energies: Balance | None = None
+    driven: tuple[Array, Array] | None = None
 
     def __repr__(self) -> str:
         """Return the main results; `summary.json` has all."""
@@ -103,6 +110,13 @@ class Solution(Solved):
     def rounding(self) -> float:
         """Forces out of balance that count as rounding; of an evolution the most in a step."""
         return max([self.outcome.kkt.rounding, *(step.rounding for step in self.steps[-1:])])
+
+    @property
+    def floors(self) -> dict[str, float]:
+        """Rounding floors of the residuals."""
+        balance, contact, friction = self.outcome.kkt.floors
+        balance = max(balance, self.rounding)
+        return {"equilibrium": balance, "contact": contact, "friction": friction}
 
     @cached_property
     def contact(self) -> ContactResult:
@@ -195,7 +209,7 @@ class Solution(Solved):
             )
         return self.supports[part].force
 
-    @property
+    @cached_property
     def movements(self) -> Mapping[str, Any]:
         """Rigid bodies, and electrodes of unknown potential, as in summary.json. Collective.
 
@@ -209,3 +223,43 @@ class Solution(Solved):
         if not self.problem.piezoelectric:
             return None
         return charge_balance(self.problem, self.state)
+
+    @property
+    def charge_columns(self) -> Mapping[str, float] | None:
+        """Charges of the electrodes and of the contact part, by the names of their columns."""
+        if self.charges is None:
+            return None
+        columns = {f"charge_{part}": charge for part, charge in self.charges.electrodes.items()}
+        return columns | {"charge_foundation": self.charges.foundation}
+
+    @property
+    def rigid(self) -> Mapping[str, Mapping[str, float]]:
+        """The columns of foundations that move, and of electrodes: see `rigid_columns`."""
+        return rigid_columns(self.movements)
+
+    @property
+    def conduction_ramp(self) -> float | None:
+        """How far in front of the closed gap the foundation conducts, 1/delta (length)."""
+        conductor = self.problem.interface.law.conductor
+        return 1 / conductor.psi.delta if conductor and conductor.psi.follows_gap else None
+
+    @cached_property
+    def counts(self) -> dict[str, int]:
+        """Numbers of contact nodes that are open, stick and slip. Collective."""
+        names, status = ("open", "stick", "slip"), self.status
+        own = np.array([np.count_nonzero(status == name) for name in names])
+        counts = self.problem.comm.allreduce(own, op=MPI.SUM)
+        return dict(zip(names, counts.tolist(), strict=True))
+
+    @cached_property
+    def potential_range(self) -> tuple[float, float] | None:
+        """The least and the largest potential at a node. Collective."""
+        if not self.problem.piezoelectric:
+            return None
+        comm, body = self.problem.comm, self.problem.equilibrium
+        scaled = self.state.x[: body.owned].reshape(-1, body.block_size)[:, -1]
+        phi = body.phi_scale * scaled
+        return (
+            comm.allreduce(float(phi.min(initial=math.inf)), op=MPI.MIN),
+            comm.allreduce(float(phi.max(initial=-math.inf)), op=MPI.MAX),
+        )

@@ -19,6 +19,15 @@ from contact.typing import Array
 SHOWN = ("t", "max_pressure", "contact_nodes", "max_displacement", "kkt")
 
 
+def tangent_of(normal: Array) -> Array:
+    """Return the unit tangents t of contact directions nu in the plane, shape (n, 2).
+
+    t is nu turned counter-clockwise by 90 degrees: on the bottom of a body, where
+    nu = (0, -1), t points along x.
+    """
+    return np.column_stack([-normal[:, 1], normal[:, 0]])
+
+
 @dataclass(frozen=True, repr=False)
 class StepRecord:
     """The end of a step of an evolution, and its rows in the tables.
@@ -133,3 +142,41 @@ class Solved:
         touches = active.closed | layer
         sticks = active.sticks & (self.friction_bound > 0)
         return np.where(touches, np.where(sticks, "stick", "slip"), "open")
+
+    @property
+    def entry(self) -> NDArray[np.intp]:
+        """Number of the contact of each node."""
+        sizes = [entry.nodes.nodes.size for entry in self.problem.entries]
+        return np.repeat(np.arange(len(sizes)), sizes)
+
+    @property
+    def part(self) -> NDArray[Any] | None:
+        """Part of each node; None for a single contact."""
+        names = np.array([entry.on for entry in self.problem.entries])
+        return names[self.entry] if names.size > 1 else None
+
+    @property
+    def points(self) -> Array:
+        """Reference places: mesh generators leave coordinates such as -3e-19."""
+        points = self.problem.nodes.points
+        return np.where(np.abs(points) < 1e-15 * self.problem.domain.size, 0.0, points)
+
+    def tangential(self, vectors: Array) -> Array:
+        """Return the component along `tangent_of` the contact direction; in 3-D the vectors."""
+        if self.problem.dim == 3:
+            return vectors
+        return np.asarray(np.einsum("ni,ni->n", vectors, tangent_of(self.problem.nodes.normal)))
+
+    @property
+    def contact_potential(self) -> Array | None:
+        """Potential at the nodes of a piezoelectric body."""
+        if not self.problem.piezoelectric:
+            return None
+        return np.asarray(self.problem.equilibrium.phi_scale * self.nodal[:, -1])
+
+    @property
+    def contact_charge(self) -> Array | None:
+        """Charge D.nu that leaves a piezoelectric body through the foundation."""
+        if not self.problem.piezoelectric:
+            return None
+        return self.problem.interface.law.charge(self.nodal, self.pressure)

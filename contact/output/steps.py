@@ -17,11 +17,10 @@ from contact.methods.steps import LoadStep
 from contact.output.fields import Unloading
 from contact.output.quantities import STEPS, values_of
 from contact.output.resultants import nodes_of
-from contact.output.results import Results
 from contact.output.solution import Solution
 from contact.output.solved import StepRecord
 from contact.output.table import Table, contact_table, csv_columns, write_csv
-from contact.problem.energy import Moment, balance, moment
+from contact.problem.energy import Balance, Moment, balance, moment
 from contact.problem.problem import ContactProblem
 from contact.typing import Array
 
@@ -63,15 +62,14 @@ class StepRecorder:
         energies = balance(problem, state, self._before, now)
         self._before = now
         self._unloading.follow(state)
-        solution = solution_of(step)
-        table = contact_table(solution)
         driven = None if self._nodes is None else _driven(problem, self._nodes, now)
-        row = values_of(STEPS, Results(solution, table, energies, driven))
+        solution = _solution_of(step, energies, driven)
+        table, row = contact_table(solution), values_of(STEPS, solution)
         self._rounding = max(self._rounding, step.outcome.kkt.rounding)
         return StepRecord(state, row, table, now.enthalpy, self._unloading.share, self._rounding)
 
 
-def solution_of(step: LoadStep) -> Solution:
+def _solution_of(step: LoadStep, energies: Balance, driven: tuple[Array, Array] | None) -> Solution:
     """Return a step as a solution of its own."""
     return Solution(
         problem=step.problem,
@@ -82,6 +80,8 @@ def solution_of(step: LoadStep) -> Solution:
         method="",
         seconds={},
         start="the step before",
+        energies=energies,
+        driven=driven,
     )
 
 

@@ -20,8 +20,8 @@ from contact.interface.mortar.lumping import Lumping
 from contact.interface.mortar.surface import surface_of
 from contact.mesh.entities import owned_among
 from contact.output.quantities import AGAINST, SURFACE, values_of
-from contact.output.solved import Solved
-from contact.output.table import Table, contact_table, tangent_of
+from contact.output.solved import Solved, tangent_of
+from contact.output.table import Table, contact_table
 from contact.output.vtu import VTU, Grid, Values
 from contact.problem.problem import ContactProblem
 from contact.typing import Array

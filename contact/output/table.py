@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import csv
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
-from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -14,9 +12,7 @@ from numpy.typing import NDArray
 from scipy import sparse
 from scipy.sparse import csgraph
 
-from contact.interface.law import InterfaceLaw
 from contact.interface.mortar.surface import surface_of
-from contact.interface.nodes import ContactNodes as Nodes
 from contact.interface.placing import candidates
 from contact.output.quantities import NODES, quantities, values_of
 from contact.output.solved import Solved
@@ -24,74 +20,6 @@ from contact.problem.problem import ContactProblem
 from contact.typing import Array
 
 Table = Mapping[str, NDArray[Any]]
-
-
-def tangent_of(normal: Array) -> Array:
-    """Return the unit tangents t of contact directions nu in the plane, shape (n, 2).
-
-    t is nu turned counter-clockwise by 90 degrees: on the bottom of a body, where
-    nu = (0, -1), t points along x.
-    """
-    return np.column_stack([-normal[:, 1], normal[:, 0]])
-
-
-@dataclass(frozen=True)
-class ContactNodes:
-    """The owned contact nodes of a solution, as the quantities see them."""
-
-    solution: Solved
-
-    @cached_property
-    def _problem(self) -> ContactProblem:
-        return self.solution.problem
-
-    @property
-    def nodes(self) -> Nodes:
-        """The nodes in the reference configuration."""
-        return self._problem.nodes
-
-    @property
-    def law(self) -> InterfaceLaw:
-        """Layer and current; the gap without a rigid part is that of the layer's first touch."""
-        return self._problem.interface.law
-
-    @property
-    def entry(self) -> NDArray[np.intp]:
-        """Number of the contact of each node."""
-        sizes = [entry.nodes.nodes.size for entry in self._problem.entries]
-        return np.repeat(np.arange(len(sizes)), sizes)
-
-    @property
-    def part(self) -> NDArray[Any] | None:
-        """Part of each node; None for a single contact."""
-        names = np.array([entry.on for entry in self._problem.entries])
-        return names[self.entry] if names.size > 1 else None
-
-    @property
-    def points(self) -> Array:
-        """Reference places: mesh generators leave coordinates such as -3e-19."""
-        points = self.nodes.points
-        return np.where(np.abs(points) < 1e-15 * self._problem.domain.size, 0.0, points)
-
-    def tangential(self, vectors: Array) -> Array:
-        """Return the component along `tangent_of` the contact direction; in 3-D the vectors."""
-        if self._problem.dim == 3:
-            return vectors
-        return np.asarray(np.einsum("ni,ni->n", vectors, tangent_of(self.nodes.normal)))
-
-    @property
-    def potential(self) -> Array | None:
-        """Potential of a piezoelectric body."""
-        if not self._problem.piezoelectric:
-            return None
-        return np.asarray(self._problem.equilibrium.phi_scale * self.solution.nodal[:, -1])
-
-    @property
-    def charge(self) -> Array | None:
-        """Charge D.nu that leaves a piezoelectric body through the foundation."""
-        if not self._problem.piezoelectric:
-            return None
-        return self.law.charge(self.solution.nodal, self.solution.pressure)
 
 
 def contact_table(solution: Solved) -> Table | None:
@@ -106,14 +34,13 @@ def contact_table(solution: Solved) -> Table | None:
     and the rows are sorted by x, then y, then z. Of several contacts the rows of one follow
     those of another.
     """
-    given = ContactNodes(solution)
-    problem, nodes = solution.problem, given.nodes
-    columns: dict[str, NDArray[Any]] = values_of(NODES, given)
+    problem, nodes = solution.problem, solution.problem.nodes
+    columns: dict[str, NDArray[Any]] = values_of(NODES, solution)
     columns |= {f"nu_{axis}": nodes.normal[:, i] for i, axis in enumerate("xyz"[: problem.dim])}
     columns |= {
         "node": problem.equilibrium.layout.index_map.local_to_global(nodes.nodes),
-        "entry": given.entry,
-        "rigid": np.array([e.coupling is None for e in problem.entries])[given.entry],
+        "entry": solution.entry,
+        "rigid": np.array([e.coupling is None for e in problem.entries])[solution.entry],
     }
     # How far the foundation has moved along the contact direction.
     own = problem.equilibrium.nodal(solution.state.x)[nodes.nodes]

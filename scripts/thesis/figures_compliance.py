@@ -16,7 +16,8 @@ from contact.interface.complementarity import project_disc
 from contact.interface.layer import NormalLaw
 from contact.output.figures.body import Picture, draw_plane, picture
 from contact.output.figures.contact import draw_line
-from contact.output.table import Table, contact_table, csv_columns, tangent_of
+from contact.output.solved import tangent_of
+from contact.output.table import Table, contact_table, csv_columns
 from contact.typing import Array
 from forms.foundation import contact_multiplier
 from forms.laws import Compliance, PotentialFactor, RampConductivity, ShiftedConductivity

@@ -14,7 +14,8 @@ from contact.errors import InputError
 from contact.methods.options import OPTIONS, with_method
 from contact.output.files import write_outputs
 from contact.output.options import OutputOptions
-from contact.output.table import contact_table, csv_columns, tangent_of
+from contact.output.solved import tangent_of
+from contact.output.table import contact_table, csv_columns
 from contact.solving import solve
 from tests.problems.written import block, electric, written
 

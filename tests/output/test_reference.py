@@ -92,7 +92,7 @@ def test_one_entry_is_a_key_and_a_column(tmp_path: Path, monkeypatch: pytest.Mon
     """A further quantity stands in the summary, the steps, a sweep, the page and the help."""
     mean = Quantity(
         "mean_pressure", "stress", "Mean contact pressure.",
-        lambda r: r.problem.nodes.sum(r.solution.pressure) / r.solution.contact_area,
+        lambda r: r.problem.nodes.sum(r.pressure) / r.contact_area,
         (SUMMARY, STEPS, SWEEP),
     )  # fmt: skip
     monkeypatch.setattr(registry, "QUANTITIES", (*QUANTITIES, mean))
