@@ -21,9 +21,10 @@ from contact.output.quantities import (
     Quantity,
     quantities,
 )
-from contact.output.reference import PAGE, files_help, page
+from contact.output.reference import files_help
 from contact.output.vtu import read_vtu
 from contact.solving import solve
+from scripts.output_page import PAGE, page
 from tests.output.test_steps import case_of as steps_case
 from tests.problems.rigid import column, indented, plate
 from tests.problems.written import block, electric
@@ -109,7 +110,7 @@ def test_one_entry_is_a_key_and_a_column(tmp_path: Path, monkeypatch: pytest.Mon
 
 
 def test_the_page_is_made_from_this() -> None:
-    assert PAGE.read_text() == page(), "python3 -m contact.output.reference"
+    assert PAGE.read_text() == page(), "python3 -m scripts.output_page"
 
 
 def test_help_names_every_key() -> None:
