@@ -24,7 +24,7 @@ from contact.body.loads import expression
 from contact.body.rigid import Electrode
 from contact.errors import InputError
 from contact.mesh.together import members
-from contact.problem.kkt import force_rounding, residual_forces
+from contact.problem.kkt import residual_forces
 from contact.problem.problem import ContactProblem
 from contact.problem.state import State
 from contact.typing import Array
@@ -159,43 +159,6 @@ class ChargeBalance:
 
 
 @dataclass(frozen=True)
-class ForceBalance:
-    """Resultants of the forces on a body, of shape (d,); of one of revolution along its axis.
-
-    Attributes
-    ----------
-    applied
-        Given tractions and body forces.
-    supports
-        Reactions of the prescribed displacements, and of rigid parts.
-    contact
-        Forces of the foundations on the body; between bodies they cancel.
-    passed
-        Force on the side `on` of each of the contacts, shape (contacts, d).
-    rounding
-        Rounding floor of these sums: see `kkt.force_rounding`.
-    """
-
-    applied: Array
-    supports: Array
-    contact: Array
-    passed: Array
-    rounding: float
-
-    @property
-    def imbalance(self) -> float:
-        """The norm of the sum over the sum of the norms, for contact those of `passed`.
-
-        Two bodies that are both held have no other resultant than the force between them, and
-        none at all apart: 0 where all is rounding.
-        """
-        parts = self.applied, self.supports, *self.passed
-        scale = sum(float(np.linalg.norm(part)) for part in parts)
-        total = self.applied + self.supports + self.contact
-        return float(np.linalg.norm(total)) / scale if scale > self.rounding else 0.0
-
-
-@dataclass(frozen=True)
 class Reading:
     """The reading of a sensor's electrode.
 
@@ -264,25 +227,6 @@ def _foundation_charges(problem: ContactProblem, state: State) -> Array:
     if interface.held is not None:
         interface.held.add_charge(leaving, state.x)
     return np.asarray(body.nodal(leaving)[:, -1])
-
-
-def force_balance(problem: ContactProblem, state: State) -> ForceBalance:
-    """Return the resultant forces at a state. Collective."""
-    body, d = problem.equilibrium, problem.dim
-    residual = body.nodal(residual_forces(problem, state))[:, :d]
-    supports = np.where(problem.equilibrium.free[:, :d], 0.0, residual).sum(axis=0)
-    stress = problem.interface.stress(problem.nodal(state), state.forces)
-    given = body.nodal(body.external(state.time))[:, :d].sum(axis=0)
-    pushes = np.zeros_like(body.external(state.time))
-    forces = -problem.nodes.weight[:, None] * stress
-    problem.nodes.transpose(forces, pushes)
-    contact = body.nodal(pushes)[:, :d].sum(axis=0)
-    ends = np.cumsum([entry.nodes.nodes.size for entry in problem.entries])[:-1]
-    passed = [part.sum(axis=0) for part in np.split(forces, ends)]
-    local = np.stack([given, supports, contact, *passed])
-    total = problem.domain.resultant(problem.comm.allreduce(local, op=MPI.SUM))
-    rounding = np.linalg.norm(force_rounding(problem, state, body.internal_forces(state))[0])
-    return ForceBalance(total[0], total[1], total[2], total[3:], float(rounding))
 
 
 def mean_potential(problem: ContactProblem, state: State, part: str) -> float:

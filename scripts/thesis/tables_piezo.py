@@ -13,10 +13,11 @@ from contact import Case, Solution, build_problem, load_case
 from contact.linear.operator import SparseOperator
 from contact.methods.parameters import automatic_r
 from contact.methods.thesis.uzawa import augmentation
-from contact.output.resultants import charge_balance, force_balance
+from contact.output.resultants import charge_balance
 from contact.problem.kkt import residual_forces
 from contact.problem.problem import ContactProblem
 from scripts.cases import CASES
+from scripts.force_balance import force_balance
 from scripts.reporting import Report, options
 from scripts.thesis.tables_compliance import difference, iterations, run
 

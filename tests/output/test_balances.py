@@ -13,8 +13,9 @@ from contact.errors import InputError
 from contact.interface.friction import Friction
 from contact.methods.options import FixedPointOptions
 from contact.methods.thesis.fixed_point import FixedPoint
-from contact.output.resultants import charge_balance, force_balance, mean_potential, sensor
+from contact.output.resultants import charge_balance, mean_potential, sensor
 from contact.problem.problem import ContactProblem
+from scripts.force_balance import force_balance
 from tests.problems.mechanics import solve
 from tests.problems.pairs import case
 from tests.problems.piezo import (

@@ -10,12 +10,12 @@ from contact.errors import InputError
 from contact.interface.friction import Friction
 from contact.methods.newton import Newton
 from contact.methods.options import NewtonOptions
-from contact.output.resultants import force_balance
 from contact.problem.checks import check_rigid_modes
 from contact.problem.contact import Contact
 from contact.problem.problem import ContactProblem
 from forms.hencky import Linear
 from forms.laws import ConstantCoefficient
+from scripts.force_balance import force_balance
 from tests.problems.blocks import Blocks
 from tests.problems.mechanics import constant, flat
 from tests.problems.pairs import case

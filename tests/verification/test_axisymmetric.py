@@ -23,11 +23,12 @@ from contact.methods.options import FixedPointOptions, NewtonOptions, PenaltyOpt
 from contact.output.fields import DerivedFields
 from contact.output.figures.body import draw_plane
 from contact.output.figures.figures import collect
-from contact.output.resultants import charge_balance, force_balance
+from contact.output.resultants import charge_balance
 from contact.problem.checks import check_rigid_modes
 from contact.problem.contact import Contact
 from contact.problem.problem import ContactProblem
 from forms.hencky import Linear
+from scripts.force_balance import force_balance
 from scripts.studies.error_norms import errors
 from tests.problems.mechanics import Affine, constant, flat
 from tests.problems.piezo import SCALED, pzt

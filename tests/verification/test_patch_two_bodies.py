@@ -16,12 +16,12 @@ from contact.mesh.domain import revolved
 from contact.methods.newton import Newton
 from contact.methods.options import NewtonOptions
 from contact.output.fields import DerivedFields
-from contact.output.resultants import force_balance
 from contact.problem.contact import Contact
 from contact.problem.problem import ContactProblem
 from contact.typing import Array
 from forms.hencky import Linear
 from forms.laws import ConstantCoefficient
+from scripts.force_balance import force_balance
 from tests.problems.blocks import Blocks, squares
 from tests.problems.mechanics import constant
 
