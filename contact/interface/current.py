@@ -176,6 +176,7 @@ def held_current(
     direction, gap = candidates.measure(obstacle)
     gap = candidates.gaps(direction, gap)
     keep = ~np.isin(candidates.nodes, jump.nodes) & free[candidates.nodes, -1] & np.isfinite(gap)
+    keep &= candidates.weight > 0
     held = replace(
         jump,
         nodes=candidates.nodes[keep],

@@ -13,6 +13,7 @@ from contact.arguments import expect
 from contact.body.equilibrium import BodyEquilibrium
 from contact.errors import InputError
 from contact.interface.mortar.coupling import NOTHING, Coupling, couple
+from contact.interface.mortar.lumping import pairs_at_axis
 from contact.interface.mortar.surface import Surface, surface_of
 from contact.interface.nodes import ContactNodes, projectors
 from contact.interface.obstacle import Obstacle
@@ -135,7 +136,8 @@ def _coupled(
         )
     reach = REACH * body.domain.size
     coupling = couple(slave, master, reach, body.comm)
-    stuck = _stuck(body, coupling)
+    on_axis = np.concatenate(body.comm.allgather(pairs_at_axis(slave, slave.nodes)[:, 0]))
+    stuck = np.union1d(_stuck(body, coupling), on_axis)
     if rough is not None:
         one_sided = _one_sided(body, coupling)
         one_sided[np.isin(coupling.nodes, stuck)] = False

@@ -79,18 +79,17 @@ class Candidates:
 
 
 def candidates(domain: Domain, space: fem.FunctionSpace, part: str) -> Candidates:
-    """Collect the nodes of a boundary part whose area is not zero. Collective."""
+    """Collect the nodes of a boundary part; those of no area carry no multiplier. Collective."""
     facets = surface_of(domain, space, part).gathered(domain.comm)
-    lumped = Lumping.of(facets)
-    # Nodes whose function has no mean on Gamma_3 carry none: P2 vertices of edges where they meet
-    # the axis of a body of revolution.
-    heavy = lumped.weight > 1e-9 * lumped.weight.sum() / max(lumped.weight.size, 1)
+    lumped = Lumping.of(facets).without_axis(facets)
+    # Functions without a mean on Gamma_3 carry nothing: P2 vertices on the axis of revolution.
+    light = lumped.weight <= 1e-9 * lumped.weight.sum() / max(lumped.weight.size, 1)
     here, nodes = owned_among(space.dofmap.index_map, lumped.nodes)
-    here, nodes = here[heavy[here]], nodes[heavy[here]]
     numbers, normal = lumped.nodes[here], lumped.normal[here]
     points = space.tabulate_dof_coordinates()[nodes, : domain.dim]
     normal = normal / np.linalg.norm(normal, axis=1)[:, None]
-    weight, surface = lumped.weight[here], points + lumped.deviation[here]
+    weight = np.where(light, 0.0, lumped.weight)[here]
+    surface = points + lumped.deviation[here]
     return Candidates(
         domain.comm,
         nodes,
@@ -262,7 +261,7 @@ def find_nodes(
             f"{key}: from no node of the part {part!r} does the contact direction meet the "
             "foundation; accepted: a shape in front of the part; an axis from the body towards it"
         )
-    keep = (length > 0.5) & meets
+    keep = (length > 0.5) & meets & (weight > 0)
     nodes, points, weight = nodes[keep], points[keep], weight[keep]
     gap, free = gap[keep], free[keep]
     held = (direction * ~body.free[found.nodes, :d])[keep] / length[keep, None]

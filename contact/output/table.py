@@ -88,7 +88,8 @@ def held_points(problem: ContactProblem) -> Array:
     parts = []
     for contact in problem.contacts:
         found = candidates(problem.domain, problem.equilibrium.space, contact.on)
-        parts.append(found.points[~np.isin(found.nodes, problem.nodes.nodes)])
+        held = ~np.isin(found.nodes, problem.nodes.nodes) & (found.weight > 0)
+        parts.append(found.points[held])
     return np.concatenate(problem.comm.allgather(np.concatenate(parts)))
 
 

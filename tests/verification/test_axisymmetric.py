@@ -29,6 +29,7 @@ from contact.problem.contact import Contact
 from contact.problem.problem import ContactProblem
 from forms.hencky import Linear
 from scripts.force_balance import force_balance
+from scripts.studies import pressure_on_axis
 from scripts.studies.error_norms import errors
 from tests.problems.mechanics import Affine, constant, flat
 from tests.problems.piezo import SCALED, pzt
@@ -130,13 +131,30 @@ def test_the_mollifier_is_averaged_over_rings(comm):
     assert np.abs(Smoothing(nodes, radius)(np.ones_like(r)) - 1).max(initial=0.0) < 1e-13
 
 
-def test_p2_has_no_contact_node_on_the_axis(comm):
-    """Its basis function has no mean over the disc; total areas are exact all the same."""
-    for degree, least in ((1, 0.0), (2, 1 / 12)):
+def test_no_node_on_the_axis_carries_a_multiplier(comm):
+    """It has little area, or none at degree 2; total areas are exact all the same."""
+    for degree, least in ((1, 1 / 6), (2, 1 / 12)):
         nodes = pressed_cylinder(comm, 6, degree).nodes
         first = -nodes.maximum(-nodes.points[:, 0], -np.inf)
         assert first == pytest.approx(least, abs=1e-12)
         assert nodes.sum(np.ones(nodes.nodes.size)) == pytest.approx(np.pi, rel=1e-12)
+
+
+@pytest.mark.parametrize("diagonal", ["left", "right"])
+def test_a_constant_pressure_about_the_axis(comm, diagonal):
+    block = rectangle(comm, [0.0, 0.0], [1.0, 1.0], [7, 5], diagonal=diagonal)
+    body = Body(Linear(1.0, 0.3), [Fixed("left", [0.0, None]), Fixed("top", [None, -0.01])])
+    solution = solved(ContactProblem(revolved(block), body, Contact("bottom", 0.0)))
+    assert np.abs(solution.pressure - 0.01).max(initial=0.0) < 1e-14
+
+
+def test_pressures_beside_the_axis():
+    """With a multiplier on it, 0.889 and 1.04 times the pressure of its neighbours at 1/200."""
+    for diagonal, bound in (("left", 0.007), ("right", 0.035)):
+        coarse, fine = (pressure_on_axis.ratios(n, 1, diagonal)[0] for n in (100, 200))
+        assert abs(fine[0] - 1) < bound
+        assert abs(fine[0] - 1) < 0.75 * abs(coarse[0] - 1)
+        assert np.abs(fine[1:4] - 1).max() < 0.003
 
 
 def test_the_iterative_solver_knows_the_one_rigid_motion(comm):

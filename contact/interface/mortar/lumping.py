@@ -8,7 +8,8 @@ front of another body. For all other facets A is the identity.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from mpi4py import MPI
@@ -146,3 +147,34 @@ class Lumping:
             return Lumping(nodes, weight, normal, deviation, None)
         mixing = Mixing(nodes, coefficients(place, nodes.size, change))
         return Lumping(nodes, weight, normal, deviation, mixing)
+
+    def without_axis(self, surface: Surface) -> Lumping:
+        """Return the areas where nodes on the axis of revolution carry no multiplier (degree 1).
+
+        Pressures at degree 1 are of second order by a cancellation between alike elements alone,
+        which ends at the axis; a node there has so little area that its pressure would be off by
+        several times as much as others. As at crosspoints its function goes to its neighbour.
+        """
+        facets = np.searchsorted(self.nodes, surface.nodes)
+        weight, own = self.weight.copy(), sparse.lil_array(sparse.eye_array(self.nodes.size))
+        for axis, beside in pairs_at_axis(surface, facets):
+            total = self.weight[axis] + self.weight[beside]
+            own[beside, axis] = self.weight[axis] / total
+            own[beside, beside] = self.weight[beside] / total
+            weight[axis], weight[beside] = 0.0, total
+        if np.array_equal(weight, self.weight):
+            return self
+        return replace(self, weight=weight, mixing=Mixing(self.nodes, sparse.csr_array(own)))
+
+
+def pairs_at_axis(surface: Surface, numbers: NDArray[Any]) -> NDArray[Any]:
+    """Return the numbers of nodes on the axis of revolution and of those beside them, (k, 2).
+
+    None at degree 2, where the functions of nodes on the axis have no mean.
+    """
+    radius = surface.corners[:, :, 0]
+    on_axis = radius <= 1e-12 * radius.max(initial=0.0)
+    at = on_axis.any(axis=1) & ~on_axis.all(axis=1)
+    if not surface.revolved or surface.degree > 1:
+        at[:] = False
+    return np.take_along_axis(numbers[at], np.argsort(~on_axis[at], axis=1), axis=1)
