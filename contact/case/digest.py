@@ -10,7 +10,7 @@ from pathlib import Path
 from contact.case.file import Case
 from contact.case.section import FilePath, walk
 from contact.errors import InputError
-from contact.library.reading import PACKAGED
+from contact.library.materials import PACKAGED
 
 #: Sections that say how a problem is solved and shown, not which one it is.
 MANNER = frozenset({"title", "case", "solver", "output"})

@@ -24,8 +24,7 @@ from contact.case.section import (
     one_or_many,
 )
 from contact.errors import InputError
-from contact.library.entry import Entry
-from contact.library.reading import PACKAGED, find
+from contact.library.materials import PACKAGED, Entry, find
 from contact.settings import Accepted, NonNegative, Number, Positive, ReadWith
 from contact.typing import Array
 from forms.crystal import in_plane, isotropic_about_x3, stiffness_tensor, to_axis

@@ -10,8 +10,7 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 
 from contact.cli.ending import CONVERGED
-from contact.library.entry import Entry
-from contact.library.reading import PACKAGED, find, library
+from contact.library.materials import PACKAGED, Entry, find, library
 from contact.output.folder import on_root
 
 

@@ -15,7 +15,7 @@ import numpy as np
 from mpi4py import MPI
 
 from contact import Case, Solution, load_case
-from contact.library.reading import find
+from contact.library.materials import find
 from contact.output.resultants import charge_balance
 from contact.typing import Array
 from forms.elasticity import isotropic

@@ -8,7 +8,7 @@ from contact.case.digest import difference, digest
 from contact.case.file import load_case
 from contact.case.text import to_toml
 from contact.errors import InputError
-from contact.library.reading import PACKAGED
+from contact.library.materials import PACKAGED
 
 CASE = """
 title = "Punch"

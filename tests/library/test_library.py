@@ -8,7 +8,7 @@ from contact.case.file import load_case, parse_case
 from contact.case.text import to_toml
 from contact.cli.main import main
 from contact.errors import InputError
-from contact.library.reading import PACKAGED, find, library
+from contact.library.materials import PACKAGED, find, library
 from forms.crystal import isotropic_about_x3, stiffness_tensor, turned
 
 CASE = {

@@ -8,7 +8,7 @@ from contact import solve
 from contact.body.description import Body, Fixed
 from contact.interface.friction import Friction
 from contact.interface.obstacle import Plane
-from contact.library.reading import find
+from contact.library.materials import find
 from contact.mesh.grid import box, rectangle
 from contact.methods.options import NewtonOptions
 from contact.problem.contact import Contact

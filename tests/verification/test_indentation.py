@@ -10,7 +10,7 @@ import pytest
 pytest.importorskip("gmsh")
 from contact import load_case, parse_case, solve
 from contact.errors import InputError
-from contact.library.reading import find
+from contact.library.materials import find
 from forms.elasticity import hexagonal
 from scripts.cases import CASES
 from scripts.reporting import Report

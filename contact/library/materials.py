@@ -1,0 +1,226 @@
+"""Materials by name: the constants of libraries, TOML files, and the constants that follow."""
+
+from __future__ import annotations
+
+import difflib
+import tomllib
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cache, cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from contact.errors import InputError
+from contact.typing import Array
+from forms.crystal import coupling_tensor, isotropic_about_x3, stiffness_tensor
+from forms.elasticity import Anisotropic, hexagonal, isotropic
+from forms.piezo import Piezo, from_voigt, hexagonal_voigt
+
+#: The library of the package.
+PACKAGED = Path(__file__).with_name("materials.toml")
+
+#: Texts of every entry, and all keys.
+WORDS = ("class", "source", "temperature", "condition")
+ELASTIC, ELECTRIC = ("young", "c", "stiffness"), ("e", "coupling", "permittivity")
+KEYS = (*WORDS, *ELASTIC, "poisson", *ELECTRIC, "d", "within", "checked")
+
+#: Classes that are the same however they are turned about X3.
+ROUND = ("isotropic", "6mm")
+
+
+@dataclass(frozen=True, eq=False)
+class Entry:
+    """A material.
+
+    Attributes
+    ----------
+    name, source, temperature, condition
+        Its name, the source of its constants, and the temperature and conditions of these.
+    symmetry
+        Crystal class, or "isotropic".
+    stiffness
+        C at constant field in Voigt's notation, shape (6, 6) (Pa).
+    isotropic
+        Young's modulus (Pa) and Poisson's ratio; None for crystals.
+    coupling
+        e, shape (3, 6) (C/m2); None for a material that is not piezoelectric.
+    permittivity
+        At constant strain, shape (3, 3) (F/m); None likewise.
+    published
+        Indices (i, J) of d_iJ -> published value (C/N).
+    within
+        By which share d = e s may differ from these.
+    checked
+        Where else the constants were found, and how they differ there; empty where nobody looked.
+    """
+
+    name: str
+    source: str
+    temperature: str
+    condition: str
+    symmetry: str
+    stiffness: Array
+    isotropic: tuple[float, float] | None
+    coupling: Array | None
+    permittivity: Array | None
+    published: Mapping[tuple[int, int], float]
+    within: float
+    checked: str
+
+    @staticmethod
+    def of(name: str, table: Mapping[str, Any]) -> Entry:
+        """Read a table of a library.
+
+        Raises
+        ------
+        ValueError, KeyError, TypeError, AttributeError, IndexError
+            If it is none.
+        """
+        unknown = [key for key in table if key not in KEYS]
+        if unknown:
+            raise ValueError(f"{unknown[0]}: unknown key")
+        kinds = [key for key in ELASTIC if key in table]
+        if len(kinds) != 1:
+            raise ValueError("one of young with poisson, c, and stiffness is needed")
+        elastic = None
+        if kinds == ["young"]:
+            elastic = 1e9 * float(table["young"]), float(table["poisson"])
+            stiffness = isotropic(*elastic)
+        elif kinds == ["c"]:
+            stiffness = 1e9 * hexagonal(**_numbers(table["c"]))
+        else:
+            stiffness = 1e9 * np.array(table["stiffness"], dtype=float)
+        published = {
+            (int(key[1]) - 1, int(key[2]) - 1): 1e-12 * value
+            for key, value in _numbers(table.get("d", {})).items()
+        }
+        symmetry, *words = (str(table[key]) for key in WORDS)
+        tensors = _electric(table) if {*ELECTRIC} & {*table} else (None, None)
+        rest = float(table.get("within", 0.05)), str(table.get("checked", ""))
+        return Entry(name, *words, symmetry, stiffness, elastic, *tensors, published, *rest)
+
+    @property
+    def piezo(self) -> Piezo | None:
+        """The piezoelectric tensors in the axes of the crystal, SI."""
+        if self.coupling is None or self.permittivity is None:
+            return None
+        return from_voigt(self.coupling, self.permittivity)
+
+    @cached_property
+    def compliance(self) -> Array:
+        """S = C^-1 at constant field, shape (6, 6) (1/Pa)."""
+        return np.asarray(np.linalg.inv(self.stiffness))
+
+    @cached_property
+    def charge_constants(self) -> Array:
+        """D = e s, Bechmann's relation, shape (3, 6) (C/N); zeros without coupling."""
+        coupling = np.zeros((3, 6)) if self.coupling is None else self.coupling
+        return np.asarray(coupling @ self.compliance)
+
+    @property
+    def free_permittivity(self) -> Array:
+        """The permittivity at constant stress, shape (3, 3) (F/m)."""
+        assert self.coupling is not None
+        return np.asarray(self.permittivity + self.charge_constants @ self.coupling.T)
+
+    @property
+    def voltage_constants(self) -> Array:
+        """g, the field of a stress at open circuit, shape (3, 6) (V m/N)."""
+        return np.asarray(np.linalg.solve(self.free_permittivity, self.charge_constants))
+
+    def bar_coupling(self, field: int, strain: int) -> float:
+        """Return k = d / sqrt(s eps) of a bar: k_33 of (2, 2), k_31 of (2, 0), k_15 of (0, 4)."""
+        free = self.free_permittivity[field, field] * self.compliance[strain, strain]
+        return float(abs(self.charge_constants[field, strain]) / np.sqrt(free))
+
+    def check(self) -> None:
+        """Check that the constants are those of a material.
+
+        Raises
+        ------
+        ValueError
+            If stiffness or permittivity are not positive definite, a crystal of class 6mm is not
+            the same all around, d = e s differs from the published values, or k_33 is not below 1.
+        """
+        Anisotropic(self.stiffness).check()
+        tensors = [stiffness_tensor(self.stiffness)]
+        if self.coupling is not None and self.permittivity is not None:
+            from_voigt(self.coupling, self.permittivity)
+            tensors += [coupling_tensor(self.coupling), self.permittivity]
+        if self.symmetry in ROUND and not isotropic_about_x3(*tensors):
+            raise ValueError(f"class {self.symmetry}: the constants change with a turn about X3")
+        for (i, j), given in self.published.items():
+            found = float(self.charge_constants[i, j])
+            if not abs(found - given) <= self.within * abs(given):
+                raise ValueError(
+                    f"d{i + 1}{j + 1} = {given * 1e12:.4g} pC/N is published, and e s makes "
+                    f"{found * 1e12:.4g}: they differ by more than {self.within:g}"
+                )
+        if self.coupling is not None and not self.bar_coupling(2, 2) < 1:
+            raise ValueError(f"k33 = {self.bar_coupling(2, 2):.4g}, which is not below 1")
+
+
+def _numbers(table: Mapping[str, Any]) -> dict[str, float]:
+    return {key: float(value) for key, value in table.items()}
+
+
+def _electric(table: Mapping[str, Any]) -> tuple[Array, Array]:
+    """Return the coupling, shape (3, 6) (C/m2), and the permittivity, shape (3, 3) (F/m)."""
+    if ("e" in table) == ("coupling" in table):
+        raise ValueError("one of e and coupling is needed, with permittivity")
+    given = _numbers(table["permittivity"])
+    permittivity = 1e-9 * np.diag([given["11"], given.get("22", given["11"]), given["33"]])
+    if "coupling" in table:
+        return np.array(table["coupling"], dtype=float), permittivity
+    return hexagonal_voigt(**_numbers(table["e"]), beta11=1.0, beta33=1.0)[0], permittivity
+
+
+@cache
+def library(path: Path = PACKAGED) -> Mapping[str, Entry]:
+    """Read a library: name -> entry, in the order of the file.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be read, or an entry is none; the message names it.
+    """
+    found = {}
+    try:
+        data = tomllib.loads(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise InputError(f"{path}: {error.strerror}; accepted: a library of materials") from None
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise InputError(f"{path}: not a TOML file: {error}") from None
+    for name, table in data.items():
+        try:
+            if not isinstance(table, Mapping):
+                raise ValueError("it is no table")
+            found[name] = Entry.of(name, table)
+            found[name].check()
+        except (ValueError, TypeError, KeyError, IndexError, AttributeError) as error:
+            fault = f"{error} is missing" if isinstance(error, KeyError) else str(error)
+            raise InputError(
+                f"{path}: {name}: {fault}; accepted: class, source, temperature, condition, and "
+                "young and poisson, c or stiffness, with e or coupling and permittivity, as in "
+                "the package's own library"
+            ) from None
+    return found
+
+
+def find(name: str, path: Path = PACKAGED) -> Entry:
+    """Return a material by its name.
+
+    Raises
+    ------
+    InputError
+        As `library`, and if there is no such material: the message names the nearest one.
+    """
+    known = library(path)
+    if name in known:
+        return known[name]
+    lower = {other.lower(): other for other in known}
+    near = difflib.get_close_matches(name.lower(), lower, n=1)
+    hint = f" (did you mean {lower[near[0]]}?)" if near else ""
+    raise InputError(f"{name}: no such material{hint}; accepted: {', '.join(known)}")
