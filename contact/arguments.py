@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import functools
-import inspect
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
@@ -84,24 +82,6 @@ def is_law(given: Any) -> bool:
         return True
     except (AttributeError, TypeError, ValueError):
         return False
-
-
-def names_arguments(cls: type[T]) -> type[T]:
-    """Let a class say which arguments it has where it is given others."""
-    made = cls.__init__
-    signature = inspect.signature(made)
-    names = ", ".join([*signature.parameters][1:])
-
-    @functools.wraps(made)
-    def checked(self: T, *values: Any, **named: Any) -> None:
-        try:
-            signature.bind(self, *values, **named)
-        except TypeError as error:
-            raise InputError(f"{cls.__name__}: {error}; accepted: {names}") from None
-        made(self, *values, **named)
-
-    cls.__init__ = checked  # type: ignore[method-assign, assignment]
-    return cls
 
 
 class _Returned(ValueError):

@@ -10,7 +10,7 @@ from typing import Protocol
 import numpy as np
 from ufl.core.expr import Expr
 
-from contact.arguments import expect, is_law, names_arguments, several
+from contact.arguments import expect, is_law, several
 from contact.body.fields import Amplitude, Given, Moving, amplitude_of, field, own_amplitude, vector
 from contact.body.rigid import Electrode, Rigid
 from contact.errors import InputError
@@ -31,7 +31,6 @@ class Field(Protocol):
         """Return the values at points of shape (n, d)."""
 
 
-@names_arguments
 @dataclass(frozen=True)
 class Fixed:
     """Prescribed values on a part of the boundary.
@@ -81,7 +80,6 @@ class Fixed:
         return amplitude_of(self.amplitude, fields)
 
 
-@names_arguments
 @dataclass(frozen=True)
 class Load:
     """Given forces and charges: on a part, or in the whole body where `on` is None.
@@ -164,7 +162,6 @@ class Load:
         return amplitude_of(self.amplitude, [*self.named.values()])
 
 
-@names_arguments
 @dataclass(frozen=True)
 class Material:
     """A material and where it is.
@@ -198,7 +195,6 @@ def _leading(materials: Sequence[Material]) -> tuple[Law, Piezo | None]:
     return softest, next((m.piezo for m in materials if m.piezo is not None), None)
 
 
-@names_arguments
 @dataclass(frozen=True)
 class Body:
     """Material and supports.

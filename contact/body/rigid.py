@@ -9,7 +9,7 @@ from typing import Any, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from contact.arguments import OfTime, expect, names_arguments
+from contact.arguments import OfTime, expect
 from contact.body.fields import Amplitude, own_amplitude, ramp, steady
 from contact.mesh.together import part
 from contact.typing import Array
@@ -31,7 +31,6 @@ def _at(values: Sequence[Timed | None], given: Amplitude | None, time: float) ->
     return factor * np.array(numbers)
 
 
-@names_arguments
 @dataclass(frozen=True)
 class Motion:
     """The motion of a rigid body; a component that is None is free.
@@ -65,7 +64,6 @@ class Motion:
         object.__setattr__(self, "amplitude", own_amplitude("Motion", self.amplitude))
 
 
-@names_arguments
 @dataclass(frozen=True)
 class Rigid:
     """A part that moves as a rigid body, or a list of parts, or a foundation in front of it."""
@@ -96,7 +94,6 @@ class Rigid:
         return _at(values, self.motion.amplitude, time)
 
 
-@names_arguments
 @dataclass(frozen=True)
 class Electrode:
     """A part, or a list of parts, with one unknown potential, and its charge."""

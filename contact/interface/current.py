@@ -14,7 +14,6 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from contact.arguments import names_arguments
 from contact.interface.nodes import ContactNodes
 from contact.interface.obstacle import Obstacle
 from contact.interface.placing import Candidates
@@ -23,7 +22,6 @@ from forms.laws import Conductivity, PotentialLaw, Truncation
 from forms.ops import Value
 
 
-@names_arguments
 @dataclass(frozen=True)
 class Conductor:
     """A conductive foundation at the potential phi_f.

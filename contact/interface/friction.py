@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from mpi4py import MPI
 
-from contact.arguments import check_finite, expect, names_arguments, naming, on_all_ranks, real
+from contact.arguments import check_finite, expect, naming, on_all_ranks, real
 from contact.body.fields import Given, field, values_at
 from contact.errors import InputError
 from contact.interface.jump import SlipHistory
@@ -21,7 +21,6 @@ COEFFICIENT = ("maximum", "lipschitz", "__call__", "derivative")
 LAW = ("maximum", "lipschitz", "__call__", "by_slip", "by_pressure")
 
 
-@names_arguments
 @dataclass(frozen=True)
 class Friction:
     """Friction on the contact part: none or one of these, and a radius.

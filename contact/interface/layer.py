@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from contact.arguments import names_arguments, naming, real
+from contact.arguments import naming, real
 from contact.errors import InputError
 from contact.tolerances import EPS
 from contact.typing import Array
@@ -20,7 +20,6 @@ from forms.ops import Value
 EACH = "one number for each penetration or difference"
 
 
-@names_arguments
 @dataclass(frozen=True)
 class Layer:
     """A compliant layer in front of the rigid part.

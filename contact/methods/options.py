@@ -12,7 +12,6 @@ from typing import Annotated, Any, Literal, TypeVar
 
 from annotated_types import Ge, Gt, Le, Lt
 
-from contact.arguments import names_arguments
 from contact.errors import InputError
 from contact.problem.kkt import KKT
 from contact.settings import Accepted, Count, Internal, Positive, ReadWith, Switch, Tolerance
@@ -80,7 +79,6 @@ class LoopOptions(Options):
     material_step: Literal["secant", "tangent", "auto"] = "auto"
 
 
-@names_arguments
 @dataclass(frozen=True, kw_only=True)
 class FixedPointOptions(LoopOptions):
     """Algorithms 1, 2 and their kin: a fixed point over Uzawa block relaxation.
@@ -126,7 +124,6 @@ class FixedPointOptions(LoopOptions):
     single_loop: Switch = False
 
 
-@names_arguments
 @dataclass(frozen=True, kw_only=True)
 class PenaltyOptions(LoopOptions):
     """Algorithm 3, the penalty method.
@@ -151,7 +148,6 @@ class PenaltyOptions(LoopOptions):
         return KKT(self.tolerance, LARGEST_VIOLATION, LARGEST_VIOLATION)
 
 
-@names_arguments
 @dataclass(frozen=True, kw_only=True)
 class NewtonOptions(Options):
     """Semismooth Newton.

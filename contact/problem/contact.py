@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from contact.arguments import expect, names_arguments
+from contact.arguments import expect
 from contact.body.fields import Given
 from contact.interface.current import Conductor
 from contact.interface.friction import Friction
@@ -16,7 +16,6 @@ from contact.interface.obstacle import GapFunction
 from contact.mesh.together import part
 
 
-@names_arguments
 @dataclass(frozen=True)
 class Contact:
     """A part that may touch an obstacle, and the laws between them.

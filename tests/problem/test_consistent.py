@@ -20,11 +20,9 @@ from contact import (
     Linear,
     Load,
     Material,
-    NewtonOptions,
     Plane,
     Problem,
     Punch,
-    Rigid,
     Sphere,
     UserLaw,
     build_problem,
@@ -106,14 +104,6 @@ WRONG = {
     "a traction in the body": (lambda: Load(traction=[0, 1]), "Load: traction: .*it on a part"),
     "a body force on a part": (lambda: Load("top", body_force=[0, 1]), "Load: body_force: "),
     "two names for a force": (lambda: Load("top", [0, 1], traction=[0, 1]), "Load: .*one of force"),
-    "an unknown argument": (
-        lambda: Load("top", forces=[0, 1]),  # type: ignore[call-arg]
-        "Load: got an unexpected keyword argument 'forces'; accepted: on, force, pressure, charge",
-    ),
-    "a missing argument": (
-        lambda: Rigid("top"),  # type: ignore[call-arg]
-        "Rigid: missing a required argument: 'motion'; accepted: on, motion, foundation",
-    ),
     "a support of nothing": (lambda: Fixed("top", ["free", None]), "nothing is prescribed"),
     "an amplitude": (
         lambda: Fixed("top", [0, 0], amplitude=2),
@@ -184,7 +174,6 @@ WRONG = {
         lambda: solve(problem(), times=[1.0], start=problem().start()),
         r"start: given together with times; evolve",
     ),
-    "an option": (lambda: NewtonOptions(tol=1e-9), "NewtonOptions: .*'tol'; accepted: .*tolerance"),  # type: ignore[call-arg]
 }
 
 

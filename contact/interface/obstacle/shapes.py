@@ -13,13 +13,12 @@ from typing import Annotated, Literal
 import numpy as np
 from annotated_types import Gt, Lt
 
-from contact.arguments import expect, names_arguments, real
+from contact.arguments import expect, real
 from contact.interface.obstacle.protocol import GRAZING, Shape, split
 from contact.settings import Accepted, Direction, NonNegative, Positive, Switch, Vector
 from contact.typing import Array
 
 
-@names_arguments
 @dataclass(frozen=True)
 class Plane(Shape):
     """A half space: the foundation lies below the plane through `point`.
@@ -50,7 +49,6 @@ class Plane(Shape):
         return np.where(facing, distance / np.where(facing, cosine, 1.0), np.inf)
 
 
-@names_arguments
 @dataclass(frozen=True)
 class Sphere(Shape):
     """A rigid ball (`inside` false), or the outside of a ball that holds the body (true).
@@ -93,7 +91,6 @@ class Sphere(Shape):
         return np.where((root >= 0) & ~away, gap, np.inf)
 
 
-@names_arguments
 @dataclass(frozen=True)
 class Cylinder(Shape):
     """A rigid cylinder without ends (`inside` false), or the bore that holds the body (true).
@@ -140,7 +137,6 @@ class Cylinder(Shape):
         return np.where(met & ~leaving, gap, np.inf)
 
 
-@names_arguments
 @dataclass(frozen=True)
 class Cone(Shape):
     """A rigid cone without end; in 2-D a wedge.
@@ -184,7 +180,6 @@ class Cone(Shape):
         return np.where(beyond, length, side), np.where(beyond[:, None], radial, normal)
 
 
-@names_arguments
 @dataclass(frozen=True)
 class Paraboloid(Shape):
     """A rigid paraboloid, h >= r^2/(2 R) at the height h and the distance r; in 2-D a parabola.
@@ -227,7 +222,6 @@ class Paraboloid(Shape):
         return (across * s / big - up) / length, normal
 
 
-@names_arguments
 @dataclass(frozen=True)
 class Punch(Shape):
     """A rigid cylinder with a flat face; in 2-D a rectangle.
