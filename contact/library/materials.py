@@ -96,10 +96,11 @@ class Entry:
             (int(key[1]) - 1, int(key[2]) - 1): 1e-12 * value
             for key, value in _numbers(table.get("d", {})).items()
         }
-        symmetry, *words = (str(table[key]) for key in WORDS)
-        tensors = _electric(table) if {*ELECTRIC} & {*table} else (None, None)
-        rest = float(table.get("within", 0.05)), str(table.get("checked", ""))
-        return Entry(name, *words, symmetry, stiffness, elastic, *tensors, published, *rest)
+        symmetry, source, temperature, condition = (str(table[key]) for key in WORDS)
+        coupling, permittivity = _electric(table) if {*ELECTRIC} & {*table} else (None, None)
+        within, checked = float(table.get("within", 0.05)), str(table.get("checked", ""))
+        words = name, source, temperature, condition, symmetry
+        return Entry(*words, stiffness, elastic, coupling, permittivity, published, within, checked)
 
     @property
     def piezo(self) -> Piezo | None:
@@ -122,7 +123,7 @@ class Entry:
     @property
     def free_permittivity(self) -> Array:
         """The permittivity at constant stress, shape (3, 3) (F/m)."""
-        assert self.coupling is not None
+        assert self.coupling is not None and self.permittivity is not None
         return np.asarray(self.permittivity + self.charge_constants @ self.coupling.T)
 
     @property
