@@ -22,7 +22,6 @@ from contact.output.files import write_outputs
 from contact.output.folder import on_root, result_folder
 from contact.output.rerun import check_checkpoints, check_rerun
 from contact.output.solution import Solution
-from contact.output.transaction import check_foreign
 from contact.solving import SolveInterrupted, solve
 from contact.sweeping import TABLE, Axis, sweep
 
@@ -41,7 +40,7 @@ def _solve(options: argparse.Namespace, comm: MPI.Intracomm) -> int:
     if not out:  # the present folder is "."; this is rather a variable that is not set
         raise InputError('--out "": no folder; accepted: a folder to write to')
     restart = None if options.restart is None else Path(options.restart)
-    with result_folder(out, comm, overwrite=True) as folder:
+    with result_folder(out, comm, options.overwrite) as folder:
         if not options.overwrite:
             on_root(comm, lambda: _check_results(folder.path, case))
         with progress(comm, options.quiet, options.log) as monitor:
@@ -112,9 +111,8 @@ def _load(options: argparse.Namespace) -> Case:
 
 
 def _check_results(folder: Path, case: Case) -> None:
-    """Refuse to replace results or checkpoints of another case, or a user's own files."""
+    """Refuse to replace results or checkpoints of another case."""
     check_rerun(folder, to_toml(case))
-    check_foreign(folder)
     kept = kept_case(folder)
     if kept is not None:
         check_checkpoints(folder, kept, to_toml(case, anchored=True))

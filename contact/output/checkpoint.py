@@ -30,10 +30,9 @@ from contact import _compat
 from contact.errors import InputError
 from contact.history import CONTACT_NODES, QUADRATURE_POINTS
 from contact.interface.jump import Multipliers
-from contact.output.folder import on_root, settle
+from contact.output.folder import kind, on_root, settle
 from contact.output.solution import Solution
 from contact.output.solved import StepRecord
-from contact.output.transaction import kind
 from contact.problem.problem import ContactProblem
 from contact.problem.state import State
 from contact.typing import Array

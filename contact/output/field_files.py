@@ -22,9 +22,8 @@ from mpi4py import MPI
 
 from contact.errors import InputError
 from contact.output.fields import DerivedFields, linear, unknowns
-from contact.output.folder import on_root
+from contact.output.folder import ROOM, on_root
 from contact.output.solved import Solved
-from contact.output.transaction import ROOM
 from contact.output.vtu import VTU, Grid, Values, gathered, write_vtu
 from contact.problem.problem import ContactProblem
 from contact.problem.state import State

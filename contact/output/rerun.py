@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from contact.errors import InputError
-from contact.output.transaction import SUMMARY
+from contact.output.folder import SUMMARY, read_json
 
 #: Sections of the case file that say how a problem is solved and shown, not which one it is.
 MANNER = ("title", "solver", "output")
@@ -32,20 +32,13 @@ def check_rerun(folder: Path, case: str) -> None:
     InputError
         If the folder has results of another problem, or of one that it does not tell.
     """
-    try:
-        summary = json.loads((folder / SUMMARY).read_bytes())
-    except FileNotFoundError:
+    if not (folder / SUMMARY).exists():
         return
-    except (ValueError, RecursionError):
-        summary = None
-    before: Mapping[str, Any] | None = None
-    if isinstance(summary, dict) and isinstance(summary.get("case"), str):
-        with suppress(tomllib.TOMLDecodeError, ValueError, RecursionError):
-            before = tomllib.loads(summary["case"])
-    given = "results that do not say of which case they are"
+    given, before = "results that do not say of which case they are", None
+    with suppress(ValueError, TypeError, RecursionError):
+        before = tomllib.loads(read_json(folder / SUMMARY).get("case", 0))
     if before is not None:
-        now = tomllib.loads(case)
-        place = next(_differences(_without(before), _without(now)), None)
+        place = difference(_without(before), _without(tomllib.loads(case)))
         if place is None:
             return
         given = f"results of another case: there {place}"

@@ -32,7 +32,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from contact.output import transaction
+from contact.output.folder import STAGE, SUMMARY, recover
 from scripts.reporting import Report, append, parser
 
 COUNT, COARSE_COUNT, SEED = 120, 8, 23
@@ -102,7 +102,7 @@ def processes(session: int) -> list[int]:
 
 def wait_until_writing(process: subprocess.Popen[bytes], folder: Path) -> None:
     """Wait until a run has begun to write."""
-    while process.poll() is None and not (folder / transaction.STAGE).exists():
+    while process.poll() is None and not (folder / STAGE).exists():
         time.sleep(0.001)
 
 
@@ -142,9 +142,9 @@ def disturbed(
 
 def fault(folder: Path, accepted: set[int]) -> str:
     """Return the fault of a folder; nothing if it holds one run's whole result."""
-    transaction.recover(folder)
+    recover(folder)
     try:
-        summary = json.loads((folder / transaction.SUMMARY).read_text())
+        summary = json.loads((folder / SUMMARY).read_text())
     except OSError:
         return "no summary"
     number = int(summary["title"].rpartition(" ")[2])
@@ -188,7 +188,7 @@ def difference(one: Path, other: Path) -> float:
 def converged(folder: Path) -> bool:
     """Whether an evolution has come to its end."""
     with suppress(OSError):
-        return bool(json.loads((folder / transaction.SUMMARY).read_text())["converged"])
+        return bool(json.loads((folder / SUMMARY).read_text())["converged"])
     return False
 
 

@@ -12,8 +12,7 @@ from pathlib import Path
 
 import pytest
 
-from contact.output.folder import LOCK
-from contact.output.transaction import STAGE, recover
+from contact.output.folder import LOCK, STAGE, recover
 from tests.problems.processes import (
     BAR,
     RANKS,

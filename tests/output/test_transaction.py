@@ -13,8 +13,16 @@ from mpi4py import MPI
 
 from contact.errors import InputError
 from contact.output.field_files import claim_room
-from contact.output.folder import LOCK, result_folder, settle
-from contact.output.transaction import STAGE, begin, complete, recover, swap
+from contact.output.folder import (
+    LOCK,
+    STAGE,
+    begin,
+    complete,
+    recover,
+    result_folder,
+    settle,
+    swap,
+)
 from tests.problems.processes import BAR, CLONE, SMALL
 
 

@@ -20,12 +20,11 @@ from PIL import Image
 from scipy.spatial import KDTree
 
 from contact.errors import InputError
-from contact.output import transaction
 from contact.output.figures.body import Picture, displacement, drawn, magnification
 from contact.output.figures.figures import Drawing
 from contact.output.figures.steps import Course
 from contact.output.figures.style import DEFORMED, OUTLIERS, axes_of, heading, named, style
-from contact.output.folder import refused, result_folder
+from contact.output.folder import add, begin, discard, refused, result_folder
 from contact.output.options import Units
 from contact.output.quantities import OPPOSITE
 from contact.output.table import Table
@@ -147,12 +146,12 @@ def added(folder: Path, draw: Callable[[Path], list[Path]]) -> list[Path]:
         raise InputError(f"{folder}: no results there; accepted: a folder that a run has left")
     with result_folder(folder, MPI.COMM_SELF, overwrite=True):  # it only adds
         try:
-            files = draw(transaction.begin(folder))
-            transaction.add(folder, files)
+            files = draw(begin(folder))
+            add(folder, files)
         except OSError as error:
             raise refused(error) from None
         finally:
-            transaction.discard(folder)
+            discard(folder)
     return [folder / path.name for path in files]
 
 
