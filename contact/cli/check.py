@@ -13,7 +13,7 @@ from contact import _compat
 from contact.case.build import build_problem
 from contact.case.file import Case, load_case
 from contact.case.text import to_toml
-from contact.cli.ending import CONVERGED
+from contact.cli.main import CONVERGED
 from contact.mesh.domain import Indices
 from contact.methods.options import NewtonOptions
 from contact.nesting import coarser_cases

@@ -12,6 +12,8 @@ import os
 import signal
 import sys
 import tempfile
+import time
+import traceback
 from collections.abc import Sequence
 from importlib import import_module
 from pathlib import Path
@@ -20,7 +22,6 @@ from typing import NoReturn
 from mpi4py import MPI
 
 from contact.cli.arguments import parse
-from contact.cli.ending import BAD_INPUT, end, end_by_crash, end_in_words, end_with_launcher
 from contact.errors import InputError
 from contact.methods.interrupt import (
     SIGNALLED,
@@ -30,6 +31,10 @@ from contact.methods.interrupt import (
     signals_held,
 )
 from contact.output.folder import on_root, refused
+
+CONVERGED, NOT_CONVERGED, BAD_INPUT = 0, 1, 2
+#: EX_SOFTWARE: a fault of the program.
+CRASH = 70
 
 #: Command -> its module. They load dolfinx, which PETSc's options have to precede.
 COMMANDS = {
@@ -71,14 +76,22 @@ def _own_options() -> list[str]:
     return ["-skip_petscrc", *(["-options_file", str(own)] if own.is_file() else [])]
 
 
+def _end(comm: MPI.Intracomm, text: str, status: int) -> int:
+    """Print the reason for the end on this rank, and end the other ranks too."""
+    if comm.size > 1 and comm.rank > 0:
+        time.sleep(1)  # rank 0, if it ends for the same reason, says it for all
+    print(f"contact: {text}", file=sys.stderr, flush=True)
+    if comm.size > 1:
+        comm.Abort(status)
+    return status
+
+
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line and return its exit status."""
     comm = MPI.COMM_WORLD
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors="backslashreplace")  # names of files may be any bytes
-    end_in_words()
-    end_with_launcher()
     try:
         with ending_on_signal():
             with signals_held():  # C++ libraries that are being loaded take no exceptions
@@ -102,17 +115,18 @@ def main(arguments: Sequence[str] | None = None) -> int:
             print(f"contact: {error}", file=sys.stderr)
         return BAD_INPUT
     except Interrupted as interrupt:
-        return end(comm, str(interrupt), SIGNALLED + interrupt.number)
+        return _end(comm, str(interrupt), SIGNALLED + interrupt.number)
     except MemoryError:
         text = "not enough memory; accepted: fewer cells, or more ranks on more machines"
-        return end(comm, text, BAD_INPUT)
+        return _end(comm, text, BAD_INPUT)
     except OSError as error:
-        return end(comm, str(refused(error)), BAD_INPUT)
+        return _end(comm, str(refused(error)), BAD_INPUT)
     except KeyboardInterrupt as interrupt:
         number = signal.SIGTERM if isinstance(interrupt, Terminated) else signal.SIGINT
-        return end(comm, f"interrupted ({number.name})", SIGNALLED + number)
+        return _end(comm, f"interrupted ({number.name})", SIGNALLED + number)
     except Exception:
-        return end_by_crash(comm)
+        traceback.print_exc()
+        return _end(comm, "this is a fault of the program, not of its input", CRASH)
 
 
 def run() -> NoReturn:

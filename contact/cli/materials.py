@@ -9,7 +9,7 @@ import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
 
-from contact.cli.ending import CONVERGED
+from contact.cli.main import CONVERGED
 from contact.library.materials import PACKAGED, Entry, find, library
 from contact.output.folder import on_root
 

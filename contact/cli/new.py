@@ -10,7 +10,7 @@ from dolfinx import mesh as dmesh
 from mpi4py import MPI
 
 from contact.case.text import literal
-from contact.cli.ending import CONVERGED
+from contact.cli.main import CONVERGED
 from contact.errors import InputError
 from contact.interface.pairing import facing_parts
 from contact.mesh.domain import Domain

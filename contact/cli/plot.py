@@ -8,7 +8,7 @@ from pathlib import Path
 
 from mpi4py import MPI
 
-from contact.cli.ending import CONVERGED
+from contact.cli.main import CONVERGED
 from contact.errors import InputError
 from contact.methods.interrupt import signals_held
 from contact.output.figures.saved import FORMATS, animate, plot

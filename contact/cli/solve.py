@@ -13,7 +13,7 @@ from mpi4py import MPI
 
 from contact.case.file import Case, load_case
 from contact.case.text import to_toml
-from contact.cli.ending import CONVERGED, NOT_CONVERGED
+from contact.cli.main import CONVERGED, NOT_CONVERGED
 from contact.cli.progress import progress
 from contact.errors import InputError
 from contact.methods.interrupt import SIGNALLED, Terminated, signals_held

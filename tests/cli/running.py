@@ -5,8 +5,7 @@ from pathlib import Path
 import pytest
 from mpi4py import MPI
 
-from contact.cli.ending import BAD_INPUT
-from contact.cli.main import main
+from contact.cli.main import BAD_INPUT, main
 
 BAR = """
 [mesh]

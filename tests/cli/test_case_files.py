@@ -4,8 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from contact.cli.ending import BAD_INPUT, CONVERGED
-from contact.cli.main import main
+from contact.cli.main import BAD_INPUT, CONVERGED, main
 from tests.cli.running import BAR, MESH, PIEZO, refuse, run, write
 
 FIXTURES = Path(__file__).parents[2] / "meshes" / "fixtures"

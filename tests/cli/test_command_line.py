@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 from petsc4py import PETSc
 
-from contact.cli.ending import BAD_INPUT, CONVERGED
+from contact.cli.main import BAD_INPUT, CONVERGED
 from tests.cli.running import BAR, refuse, run, write
 
 ROOT = Path(__file__).parents[2]

@@ -7,8 +7,7 @@ import pytest
 
 from contact.case.file import load_case
 from contact.cli.check import mean_ratio
-from contact.cli.ending import BAD_INPUT, CONVERGED
-from contact.cli.main import main
+from contact.cli.main import BAD_INPUT, CONVERGED, main
 from meshes import write
 from scripts.cases import CASES
 

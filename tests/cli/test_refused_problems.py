@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 from mpi4py import MPI
 
-from contact.cli.ending import CONVERGED, NOT_CONVERGED
+from contact.cli.main import CONVERGED, NOT_CONVERGED
 from tests.cli.running import BAR, PIEZO, refuse, run, write
 
 

@@ -6,8 +6,7 @@ from pathlib import Path
 import pytest
 from mpi4py import MPI
 
-from contact.cli.ending import BAD_INPUT, CONVERGED
-from contact.cli.main import main
+from contact.cli.main import BAD_INPUT, CONVERGED, main
 
 pytestmark = pytest.mark.parallel
 

@@ -7,8 +7,7 @@ import numpy as np
 import pytest
 
 from contact.case.file import load_case
-from contact.cli.ending import CONVERGED
-from contact.cli.main import main
+from contact.cli.main import CONVERGED, main
 from contact.solving import solve
 from scripts.cases import CASES, bar
 

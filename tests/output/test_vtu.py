@@ -7,8 +7,7 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from contact.cli.ending import BAD_INPUT, CONVERGED
-from contact.cli.main import main
+from contact.cli.main import BAD_INPUT, CONVERGED, main
 from contact.output.field_files import write_share
 from contact.output.files import write_outputs
 from contact.output.vtu import VTU, Grid, gathered, read_vtu
