@@ -69,14 +69,14 @@ def progress(
     """
     handlers: list[logging.Handler] = [logging.NullHandler()] if comm.rank > 0 else []
     on_root(comm, lambda: handlers.append(_log(log)) if log is not None else None)
-    monitor: _Bar | _Lines | None = None
-    if comm.rank == 0 and not quiet and sys.stderr.isatty():
-        from tqdm import tqdm
+    monitor = bar = None
+    if comm.rank == 0:
+        if not quiet and sys.stderr.isatty():
+            from tqdm import tqdm
 
-        monitor = _Bar(tqdm(unit=" iterations", file=sys.stderr))
-    elif comm.rank == 0:
-        monitor = _Lines(quiet)
-    handlers += [monitor] if monitor is not None else []
+            bar = tqdm(unit=" iterations", file=sys.stderr)
+        monitor = Console(quiet, bar)
+        handlers.append(monitor)
     logger = logging.getLogger("contact")
     level = logger.level
     for handler in handlers:
@@ -92,99 +92,67 @@ def progress(
             handler.close()
 
 
-class _Named(logging.Formatter):
-    """Calls a warning one."""
+class Console(logging.Handler):
+    """Shows the table of iterations and the lines of the leading logger, or a bar instead of these.
 
-    def format(self, record: logging.LogRecord) -> str:
-        """Return the line of a record."""
-        text = super().format(record)
-        return f"warning: {text}" if record.levelno >= logging.WARNING else text
+    The leading one is the highest of those in `RANKS` that has spoken so far; the others are heard
+    in long silence.
 
+    Parameters
+    ----------
+    quiet
+        Whether warnings alone are shown.
+    bar
+        tqdm's, on a terminal: over outer iterations, or over the finished share of many solves.
+    """
 
-class _Ranked(logging.Handler):
-    """Follows the leading logger: the highest of those in `RANKS` that has spoken so far."""
-
-    def __init__(self, level: int) -> None:
-        super().__init__(level)
-        self.setFormatter(_Named())
+    def __init__(self, quiet: bool = False, bar: Any = None) -> None:
+        super().__init__(logging.WARNING if quiet else logging.DEBUG)
+        self._quiet, self._bar = quiet, bar
         self._lead = RANKS.index(OUTER)
         self._last = time.monotonic()
-        self._rows = 0
-
-    def _leads(self, name: str) -> bool:
-        """Note a logger that speaks; tell whether it leads, or is none of the ranks."""
-        if name not in RANKS:
-            return True
-        self._lead = max(self._lead, RANKS.index(name))
-        return name == RANKS[self._lead]
-
-    def _silent_for(self, seconds: float) -> bool:
-        """Tell whether nothing has been said for so long; if so, something is now."""
-        now = time.monotonic()
-        silent = now - self._last >= seconds
-        if silent:
-            self._last = now
-        return silent
-
-    def _table(self, record: Record) -> list[str]:
-        """Return the lines of the table for an iteration, where iterations lead."""
-        if RANKS[self._lead] != OUTER:
-            return []
-        self._rows += 1
-        return [*[HEAD] * (self._rows == 1), *table(record)]
-
-
-class _Lines(_Ranked):
-    """Plain lines; of iterations within a step or case one now and then, in long silence."""
-
-    def __init__(self, quiet: bool) -> None:
-        super().__init__(logging.WARNING if quiet else logging.DEBUG)
-        self._quiet = quiet
+        self._headed = False
 
     def __call__(self, record: Record) -> None:
-        """Show an outer iteration."""
-        if not self._quiet:
-            for line in self._table(record):
-                print(line, file=sys.stderr, flush=True)
+        """Show an outer iteration, where iterations lead."""
+        if self._quiet or RANKS[self._lead] != OUTER:
+            return
+        for line in ([] if self._headed else [HEAD]) + table(record):
+            self._write(line)
+        self._headed = True
+        if self._bar is not None:
+            self._bar.update(1)
 
     def emit(self, record: logging.LogRecord) -> None:
-        """Write a line; that of a leading iteration stands in the table."""
-        leads = self._leads(record.name) and record.levelno >= logging.INFO
-        if leads and record.name == OUTER and record.levelno < logging.WARNING:
+        """Show a line of the leading logger, or of none of the ranks; others now and then."""
+        rank = RANKS.index(record.name) if record.name in RANKS else None
+        self._lead = max(self._lead, rank or 0)
+        leads, warns = rank in (None, self._lead), record.levelno >= logging.WARNING
+        silent = time.monotonic() - self._last >= (SELDOM if self._bar is None else OFTEN)
+        in_table = record.name == OUTER and leads and not warns
+        if in_table:
             self._last = time.monotonic()
-        elif self._silent_for(0.0 if leads else SELDOM) and (leads or record.name in RANKS):
-            print(self.format(record), file=sys.stderr, flush=True)
+        elif self._bar is not None and rank is not None:
+            if leads and hasattr(record, "share"):
+                self._bar.total, self._bar.bar_format, self._bar.n = 1.0, SHARES, record.share
+            elif not silent:
+                return
+            self._bar.set_postfix_str(record.getMessage())
+            self._last = time.monotonic()
+        elif (leads and record.levelno >= logging.INFO) or (rank is not None and silent):
+            self._write(("warning: " if warns else "") + record.getMessage())
+            self._last = time.monotonic()
 
-
-class _Bar(_Ranked):
-    """A bar over outer iterations below their table, or over the finished share of many solves."""
-
-    def __init__(self, bar: Any) -> None:
-        super().__init__(logging.DEBUG)
-        self._bar = bar
-
-    def __call__(self, record: Record) -> None:
-        """Show an outer iteration."""
-        for line in self._table(record):
+    def _write(self, line: str) -> None:
+        if self._bar is None:
+            print(line, file=sys.stderr, flush=True)
+        else:
             self._bar.write(line, file=sys.stderr)
-        self._bar.update(1 if RANKS[self._lead] == OUTER else 0)
-
-    def emit(self, record: logging.LogRecord) -> None:
-        """Show the leading logger and those within it in the bar, and other lines above it."""
-        leads = self._leads(record.name)
-        if record.name not in RANKS:
-            if record.levelno >= logging.INFO:
-                self._bar.write(self.format(record), file=sys.stderr)
-        elif leads and hasattr(record, "share"):
-            self._bar.total, self._bar.bar_format = 1.0, SHARES
-            self._bar.n = record.share
-            self._bar.set_postfix_str(record.getMessage())
-        elif record.name != OUTER and self._silent_for(OFTEN):
-            self._bar.set_postfix_str(record.getMessage())
 
     def close(self) -> None:
         """Leave the bar as it is."""
-        self._bar.close()
+        if self._bar is not None:
+            self._bar.close()
         super().close()
 
 

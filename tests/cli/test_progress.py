@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from contact.cli.main import main
-from contact.cli.progress import HEAD, _Bar, shown
+from contact.cli.progress import HEAD, Console, shown
 from contact.methods.report import tell
 from scripts.cases import CASES
 
@@ -87,7 +87,7 @@ class Tqdm:
 
 def test_the_bar_is_over_what_leads() -> None:
     shown = Tqdm()
-    bar = _Bar(shown)
+    bar = Console(bar=shown)
     logger = logging.getLogger("contact")
     logger.addHandler(bar)
     level = logger.level
