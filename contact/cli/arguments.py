@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 import difflib
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import Any, NoReturn
 
 from mpi4py import MPI
@@ -86,150 +86,130 @@ def parse(arguments: Sequence[str]) -> tuple[argparse.Namespace, list[str]]:
 
 def _parser() -> Parser:
     parser = Parser(prog="contact", description=DESCRIPTION, epilog=EXIT, **COMMON)
-    _help(parser)
+    parser.add_argument("--help", action="help", help="show this help and leave")
     parser.add_argument(
         "--version", action="version", version=f"contact {__version__}", help="show the version"
     )
     commands = parser.add_subparsers(
         dest="command", required=True, metavar="new|check|solve|sweep|plot|materials"
     )
-    for add in (_new, _check, _solve, _sweep, _plot, _materials):
-        add(commands)
+    for usage, text, epilog, arguments in _commands():
+        command = commands.add_parser(
+            usage.partition(" ")[0],
+            help=text,
+            description=text,
+            epilog=epilog,
+            usage=f"contact {usage}",
+            **COMMON,
+        )
+        command.add_argument("--help", action="help", help="show this help and leave")
+        for name, options in arguments.items():
+            command.add_argument(name, **options)
     return parser
 
 
-def _new(commands: Any) -> None:
-    text = "write a commented case file for a mesh file, with its parts"
-    command = _command(commands, "new MESH.msh [--case CASE.toml]", text)
-    command.add_argument("mesh", metavar="MESH.msh", help="Gmsh file with named physical groups")
-    command.add_argument("--case", metavar="FILE", help="file to write; MESH.toml by default")
+def _value(metavar: str, text: str, **more: Any) -> dict[str, Any]:
+    return {"metavar": metavar, "help": text, **more}
 
 
-def _check(commands: Any) -> None:
-    text = "validate a case and print it with its mesh parts and unknowns"
-    command = _command(commands, "check CASE.toml [options] [PETSc options]", text)
-    _case(command)
-    setup = "draw the set-up too: CASE-setup.png and .pdf in the present folder"
-    command.add_argument("--plot", action="store_true", help=setup)
+def _values(metavar: str, text: str) -> dict[str, Any]:
+    return {
+        "metavar": metavar,
+        "help": f"{text}; may be repeated",
+        "action": "append",
+        "default": [],
+    }
 
 
-def _solve(commands: Any) -> None:
-    files = files_help("summary.json", "contact.csv", "steps.csv", "history.csv")
-    usage = "solve CASE.toml --out DIR [options] [PETSc options]"
-    text = "solve a case and write the results"
-    command = _command(commands, usage, text, f"{PETSC}\n{files}")
-    _case(command, optional=True)
-    command.add_argument("--plot", action="store_true", help="draw the figures too")
-    command.add_argument("--out", metavar="DIR", help="folder for results")
-    command.add_argument(
-        "--restart",
-        metavar="DIR",
-        help="go on with an evolution that was ended, from the checkpoints in DIR: the case is "
-        "known, and the results go there too unless told otherwise",
+def _flag(text: str) -> dict[str, Any]:
+    return {"help": text, "action": "store_true"}
+
+
+def _commands() -> Iterator[tuple[str, str, str | None, dict[str, dict[str, Any]]]]:
+    """Give the commands: usage, purpose, the text below the options, and the arguments."""
+    case = _value("CASE.toml", "case file (TOML)")
+    replaced = _values(
+        "KEY=VALUE", "replace a value of the case file, for instance load.0.traction='[0, -1]'"
     )
-    _progress(command)
-    command.add_argument(
-        "--overwrite",
-        action="store_true",
-        help="replace results or checkpoints of another case, if DIR has any",
+    shown = {
+        "--quiet": _flag("show no progress"),
+        "--log": _value("FILE", "write a log to the end of a file"),
+    }
+    yield (
+        "new MESH.msh [--case CASE.toml]",
+        "write a commented case file for a mesh file, with its parts",
+        None,
+        {
+            "mesh": _value("MESH.msh", "Gmsh file with named physical groups"),
+            "--case": _value("FILE", "file to write; MESH.toml by default"),
+        },
     )
-
-
-def _sweep(commands: Any) -> None:
-    usage = "sweep CASE.toml --over KEY=V1,V2,... --out DIR [options]"
-    text = "solve a case for several values of some keys: sweep.csv, one row a value"
-    command = _command(commands, usage, text, files_help("sweep.csv"))
-    _case(command)
-    command.add_argument(
-        "--over",
-        action="append",
-        default=[],
-        metavar="KEY=V1,V2,...",
-        help="the values of a key; may be repeated, for all combinations",
+    yield (
+        "check CASE.toml [options] [PETSc options]",
+        "validate a case and print it with its mesh parts and unknowns",
+        None,
+        {
+            "case": case,
+            "--set": replaced,
+            "--plot": _flag("draw the set-up too: CASE-setup.png and .pdf in the present folder"),
+        },
     )
-    command.add_argument("--out", metavar="DIR", help="folder for the table; rows in it are kept")
-    command.add_argument(
-        "--cold",
-        action="store_true",
-        help="start each solve from the zero initial guess, without a warm start",
+    yield (
+        "solve CASE.toml --out DIR [options] [PETSc options]",
+        "solve a case and write the results",
+        f"{PETSC}\n{files_help('summary.json', 'contact.csv', 'steps.csv', 'history.csv')}",
+        {
+            "case": {**case, "nargs": "?"},
+            "--set": replaced,
+            "--plot": _flag("draw the figures too"),
+            "--out": _value("DIR", "folder for results"),
+            "--restart": _value(
+                "DIR",
+                "go on with an evolution that was ended, from the checkpoints in DIR: the case is "
+                "known, and the results go there too unless told otherwise",
+            ),
+            **shown,
+            "--overwrite": _flag("replace results or checkpoints of another case, if DIR has any"),
+        },
     )
-    _progress(command)
-
-
-def _plot(commands: Any) -> None:
-    text = "draw the figures of a run again, from its files"
-    command = _command(commands, "plot DIR [options]", text)
-    command.add_argument("folder", metavar="DIR", help="folder with the results of a run")
-    command.add_argument(
-        "--field",
-        action="append",
-        default=[],
-        metavar="NAME",
-        help="colour the body by this field of fields.vtu, and draw this figure alone; may be "
-        "repeated: von_mises, displacement, displacement_y, stress_xy, potential, ...",
+    yield (
+        "sweep CASE.toml --over KEY=V1,V2,... --out DIR [options]",
+        "solve a case for several values of some keys: sweep.csv, one row a value",
+        files_help("sweep.csv"),
+        {
+            "case": case,
+            "--set": replaced,
+            "--over": _values("KEY=V1,V2,...", "the values of a key, for all combinations"),
+            "--out": _value("DIR", "folder for the table; rows in it are kept"),
+            "--cold": _flag("start each solve from the zero initial guess, without a warm start"),
+            **shown,
+        },
     )
-    command.add_argument(
-        "--format", default="png", metavar="pdf,png", help="formats of the files: png, pdf, svg"
+    yield (
+        "plot DIR [options]",
+        "draw the figures of a run again, from its files",
+        None,
+        {
+            "folder": _value("DIR", "folder with the results of a run"),
+            "--field": _values(
+                "NAME",
+                "colour the body by this field of fields.vtu, von_mises, displacement, "
+                "displacement_y, stress_xy, potential, ..., and draw this figure alone",
+            ),
+            "--format": _value("pdf,png", "formats of the files: png, pdf, svg", default="png"),
+            "--width": _value("85mm", "width of the figures, in mm, cm or in"),
+            "--mirror": _flag("show both halves of a body of revolution"),
+            "--animate": _flag(
+                "draw animation-FIELD.gif instead, the deformed body over the steps of an evolution"
+            ),
+        },
     )
-    command.add_argument("--width", metavar="85mm", help="width of the figures, in mm, cm or in")
-    command.add_argument(
-        "--mirror", action="store_true", help="show both halves of a body of revolution"
+    yield (
+        "materials [NAME] [--file FILE]",
+        "list the materials that have a name, or show one with its derived constants",
+        None,
+        {
+            "name": _value("NAME", "material to show", nargs="?"),
+            "--file": _value("FILE", "a library of one's own (TOML)"),
+        },
     )
-    command.add_argument(
-        "--animate",
-        action="store_true",
-        help="draw animation-FIELD.gif instead, the deformed body over the steps of an evolution",
-    )
-
-
-def _materials(commands: Any) -> None:
-    text = "list the materials that have a name, or show one with its derived constants"
-    command = _command(commands, "materials [NAME] [--file FILE]", text)
-    command.add_argument("name", nargs="?", metavar="NAME", help="material to show")
-    command.add_argument("--file", metavar="FILE", help="a library of one's own (TOML)")
-
-
-def _command(commands: Any, usage: str, text: str, epilog: str | None = None) -> Parser:
-    """Add a command and return its parser.
-
-    Parameters
-    ----------
-    commands
-        The commands of the parser.
-    usage
-        Its name and arguments.
-    text
-        Its purpose.
-    epilog
-        The text below its options.
-    """
-    name = usage.partition(" ")[0]
-    command: Parser = commands.add_parser(
-        name, help=text, description=text, epilog=epilog, usage=f"contact {usage}", **COMMON
-    )
-    _help(command)
-    return command
-
-
-def _help(parser: Parser) -> None:
-    parser.add_argument("--help", action="help", help="show this help and leave")
-
-
-def _case(command: Parser, optional: bool = False) -> None:
-    """Add a case file, and values that replace some of its own."""
-    how: dict[str, Any] = {"nargs": "?"} if optional else {}
-    command.add_argument("case", metavar="CASE.toml", help="case file (TOML)", **how)
-    command.add_argument(
-        "--set",
-        action="append",
-        default=[],
-        metavar="KEY=VALUE",
-        help="replace a value of the case file, for instance load.0.traction='[0, -1]'; may be "
-        "repeated",
-    )
-
-
-def _progress(command: Parser) -> None:
-    """Add the options of the output on the console."""
-    command.add_argument("--quiet", action="store_true", help="show no progress")
-    command.add_argument("--log", metavar="FILE", help="write a log to the end of a file")
