@@ -88,18 +88,23 @@ def interior_point(
     problem, interface = iteration.problem, iteration.problem.interface
     stuck = modes.stuck_bound()
     bound = np.zeros(interface.jump.weight.size) if stuck is None else stuck
+    aside: tuple[Iterate, Outcome] | None = None
     for update in range(UPDATES):
         method = InteriorPoint(problem, whole, bound, modes.constrained_by_supports)
         outcome, state = method.run(iteration, CLOSED * CLOSER**update), method.state
         iterate, least = Iterate(state), outcome.kkt.significant
         if not outcome.converged and iteration.left > 0:
             iterate, outcome = finish(state)
-        if outcome.converged or iteration.left <= 0 or not interface.friction.acts:
+        if outcome.converged and modes.pushed_aside(problem, iterate.state):
+            aside = iterate, outcome
+        elif outcome.converged or not interface.friction.acts:
+            return iterate, outcome
+        if iteration.left <= 0:
             break
-        if outcome.kkt.significant < least:
+        if aside is None and outcome.kkt.significant < least:
             state = iterate.state
         bound = interface.bound(interface.jump.apply(state.x), state.forces)
-    return iterate, outcome
+    return aside or (iterate, outcome)
 
 
 class InteriorPoint:

@@ -193,14 +193,36 @@ class Newton:
         self._begin(iterate)
         iteration = self.iteration
         self.history.restart()
+        assert self.modes is not None
         iterate, outcome = self._iterate(iterate)
         if not outcome.converged:
             iterate, outcome = self._fall_back(iterate, outcome)
+        elif not self._pays and self.modes.pushed_aside(self.problem, iterate.state):
+            found = self._fall_back(iterate, outcome)
+            iterate, outcome = found if found[1].converged else (iterate, outcome)
+        if outcome.converged and isinstance(self.problem, ContactProblem):
+            iterate, outcome = self._least(iterate, outcome)
         if not outcome.converged and iteration.best.found is not None:
             iterate = iteration.best.found
             outcome = replace(outcome, kkt=evaluate(self.problem, iterate.state))
         iteration.at = iterate
         return iterate, outcome
+
+    def _least(self, iterate: Iterate, outcome: Outcome) -> tuple[Iterate, Outcome]:
+        """Take a rigid motion off a solution that costs nothing. Collective."""
+        assert self.modes is not None
+        if self.modes.constrained_by_supports:
+            return iterate, outcome
+        found = self.modes.least(self.problem, iterate.state)
+        if found is None:
+            return iterate, outcome
+        state = iterate.state
+        x = self.problem.equilibrium.moved(state.x, -found[0])
+        least = replace(iterate, state=replace(state, x=x))
+        residuals = evaluate(self.problem, least.state)
+        if residuals.excess(self.options.allowed):
+            return iterate, outcome
+        return least, replace(outcome, kkt=residuals)
 
     def _iterate(self, iterate: Iterate) -> tuple[Iterate, Outcome]:
         """Take Newton's steps, with the body condensed where that pays."""

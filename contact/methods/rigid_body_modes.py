@@ -3,6 +3,14 @@
 Where friction alone constrains a mode, a method cannot begin without friction, nor with the bound
 of pressures that are not known yet: the linear system would be singular. All nodes in contact are
 first taken for sticking.
+
+Where nothing constrains a mode at a solution, a rigid motion costs nothing: of all solutions the
+one is taken whose displacements at the contact nodes are the least.
+
+References
+----------
+Lawson and Hanson, Solving least squares problems (1974), chapter 23: least distances with
+inequalities by non-negative least squares.
 """
 
 from __future__ import annotations
@@ -11,22 +19,31 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+from mpi4py import MPI
 from numpy.typing import NDArray
+from scipy.optimize import nnls
 
 from contact.mesh.entities import component_sums
 from contact.problem.kkt import residual_forces
 from contact.problem.problem import ContactProblem
 from contact.problem.protocols import Problem
 from contact.problem.rigid_modes import (
+    Group,
     constrained_by_friction,
     constrained_by_supports,
     constrained_undeformed,
+    groups,
+    null_space,
 )
+from contact.problem.state import State
 from contact.tolerances import EPS
 from contact.typing import Array
 
 #: Force that a node can bear by friction then, over all loads.
 STUCK = 10.0
+
+#: Depth that counts as none, over the size of the bodies.
+PASSES = 1e-9
 
 
 @dataclass
@@ -69,6 +86,78 @@ class RigidBodyModes:
         borne, total = float(loads[_without_supports(problem)].sum()), float(loads.sum())
         # Loads on another body need not be borne, but where a body is squeezed by it alone.
         return np.full_like(weight, STUCK * (borne if borne > EPS * total else total)) / weight
+
+    @cached_property
+    def _unsupported(self) -> list[Group]:
+        return [group for group in groups(self.problem) if null_space(group.supports).size > 0]
+
+    def least(self, problem: Problem, state: State) -> tuple[Array, bool] | None:
+        """Return the free rigid motion to take off a solution, and whether contact limits it.
+
+        Collective.
+
+        Parameters
+        ----------
+        problem
+            The whole problem, or the condensed one.
+        state
+            Its solution.
+
+        Returns
+        -------
+        The motion of owned and global unknowns of the whole problem, and whether the least
+        displacements of all would pass through the foundation; None where nothing is free.
+        """
+        interface = problem.interface
+        jump, nodal = interface.jump, interface.jump.apply(state.x)
+        pressed = interface.pressure(nodal, state.forces) > 0
+        motions, columns = [], []
+        for group in self._unsupported:
+            free = null_space(group.held(self.problem.frictional, pressed))
+            if free.shape[1] > 0:
+                along = group.normal[:, None, :] * jump.normal[:, :, None]
+                columns.append((along + group.tangential) @ free)
+                motions.append(group.moved @ free)
+        if not motions:
+            return None
+        moved = np.concatenate(columns, axis=2)
+        weight, displacement = jump.weight, nodal[:, : jump.dim]
+        products = np.einsum("n,nik,nil->kl", weight, moved, moved)
+        sides = np.einsum("n,nik,ni->k", weight, moved, displacement)
+        products, sides = (jump.comm.allreduce(part, op=MPI.SUM) for part in (products, sides))
+        amounts = np.linalg.lstsq(products, sides, rcond=EPS)[0]
+        near, opening = np.isfinite(jump.gap), interface.opening(nodal)
+        rising = np.einsum("ni,nik->nk", jump.normal, moved)
+        passes = -(opening + rising @ amounts)[near]
+        limited = jump.maximum(passes) > PASSES * interface.size
+        if limited:
+            parts = jump.comm.allgather((rising[near], np.maximum(opening[near], 0.0)))
+            cone, room = (np.concatenate(part) for part in zip(*parts, strict=True))
+            amounts = _least_distance(products, amounts, cone, -room)
+        return np.hstack(motions) @ amounts, limited
+
+    def pushed_aside(self, problem: Problem, state: State) -> bool:
+        """Tell whether contact has pushed a body to where nothing holds it. Collective.
+
+        With friction there may be another solution, in which it is held.
+        """
+        if not problem.interface.friction.acts or self.constrained_by_supports:
+            return False
+        found = self.least(problem, state)
+        return found is not None and found[1]
+
+
+def _least_distance(products: Array, wanted: Array, cone: Array, least: Array) -> Array:
+    """Return the q nearest to a wanted one in the norm of `products` with cone q >= least."""
+    values, vectors = np.linalg.eigh(products)
+    used = values > EPS * values.max()
+    back = vectors[:, used] / np.sqrt(values[used])
+    rows, below = cone @ back, least - cone @ wanted
+    size = max(float(np.abs(below).max()), np.finfo(float).tiny)
+    unit = np.append(np.zeros(back.shape[1]), 1.0)
+    system = np.vstack([rows.T, below / size])
+    residual = system @ nnls(system, unit)[0] - unit
+    return np.asarray(wanted - size * back @ residual[:-1] / residual[-1])
 
 
 def all_loads(problem: Problem) -> float:

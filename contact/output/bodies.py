@@ -169,12 +169,11 @@ def unresisted_motions(solution: Solution) -> Remark:
 
     A cylinder without friction rolls in its place against next to nothing, and wherever it has
     rolled to, its forces are in balance. Contact is taken to resist with c = E/length times areas:
-    along the normal where bodies touch, along the surface where they stick, and across the friction
-    where they slip.
+    along the normal where something presses, along the surface where it sticks, and across the
+    friction where it slips.
     """
     problem, body = solution.problem, solution.problem.equilibrium
-    touches = solution.status != "open"
-    if not (solution.converged and problem.comm.allreduce(bool(touches.any()), op=MPI.LOR)):
+    if not solution.converged:
         return "", True
     residual = body.unbalanced(residual_forces(problem, solution.state))
     left = float(np.linalg.norm(body.sizes(residual)[0]))
@@ -184,18 +183,45 @@ def unresisted_motions(solution: Solution) -> Remark:
         free = null_space(group.supports)
         if free.shape[1] == 0:
             continue
-        share, motion = _least_held(solution, group, free, touches)
-        moved = left * _reach(group, motion) / (whole * max(share, EPS))
-        if share < HELD or moved > MOVED * largest:
-            words = described(motion[:, None] / np.linalg.norm(motion), group.names)
+        share, motion = _least_held(solution, group, free, solution.pressure > 0)
+        words = described(motion[:, None] / np.linalg.norm(motion), group.names)
+        name = _named(group, motion)
+        if share < EPS:
             return (
-                f"contact resists a rigid motion ({words}) by next to nothing: the mesh decides "
-                f"how far it goes, and the residual forces, {kkt.equilibrium:.1e} of all, may move "
-                f"that body by up to {moved:.2g}, where displacements reach {largest:.2g}; "
+                f"nothing holds {name} against a rigid motion ({words}), which costs nothing: "
+                "of all places the one with the least displacements at the contact nodes is given; "
                 "friction, or a support against that motion, hold it",
                 False,
             )
+        moved = left * _reach(group, motion) / (whole * share)
+        if share < HELD or moved > MOVED * largest:
+            return (
+                f"contact resists a rigid motion of {name} ({words}) by next to nothing: the "
+                f"mesh decides how far it goes, and the residual forces, {kkt.equilibrium:.1e} of "
+                f"all, may move that body by up to {moved:.2g}, where displacements reach "
+                f"{largest:.2g}; friction, or a support against that motion, hold it",
+                False,
+            )
     return "", True
+
+
+def _named(group: Group, motion: Array) -> str:
+    """Return the regions of the components that a motion of a group moves most. Collective."""
+    problem, names = group.problem, group.problem.domain.regions
+    if group.count == 1 or len(names) == 1:
+        return "the body"
+    component, dofs = problem.equilibrium.components[0], problem.equilibrium.space.dofmap.list
+    each = 1 if problem.domain.revolved else 3 * (problem.dim - 1)  # motions of a component
+    own = motion[: each * len(group.components)].reshape(-1, each)
+    amounts = np.linalg.norm(own, axis=1)
+    moved = np.array(group.components)[amounts >= amounts.max() / 2]
+    found = []
+    for name, cells in names.items():
+        nodes = dofs[cells].ravel()
+        inside = np.isin(component[nodes[nodes < component.size]], moved).any()
+        if problem.comm.allreduce(bool(inside), op=MPI.LOR):
+            found.append(name)
+    return ", ".join(found)
 
 
 def adrift(solution: Solution) -> Remark:

@@ -57,12 +57,7 @@ def test_plate_and_lid_press_a_ring_alike(method, seed):
     check(solve(case, domain=between_plates(COMM, seed)))
 
 
-#: A known fault: the fixed point on the friction bound does not converge here, and the ring that
-#: has moved far aside, where nothing touches, is taken for the solution.
-FLIES_AWAY = pytest.mark.xfail(strict=False, reason="the ring is moved far aside: nothing touches")
-
-
-@pytest.mark.parametrize("method", [pytest.param("newton", marks=FLIES_AWAY), "uzawa"])
+@pytest.mark.parametrize("method", ["newton", "uzawa"])
 def test_pressures_balance_the_reaction(method):
     """Uzawa's pressures have differed by 1.8 % here, with all residuals below 1e-9.
 

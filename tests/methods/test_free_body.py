@@ -1,0 +1,58 @@
+"""A body in a clearance: a rigid motion costs nothing, and the least of all is taken."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+from scipy.optimize import minimize
+
+from contact.methods.rigid_body_modes import RigidBodyModes, _least_distance
+from contact.problem.rigid_modes import groups
+from contact.solving import solve
+from tests.problems.rings import between_plates, squeezed
+
+COMM = MPI.COMM_WORLD
+
+
+@pytest.mark.parallel
+def test_the_least_of_all_places():
+    """The lid is lifted: the ring may go anywhere in between. It does not depend on the ranks."""
+    solution = solve(squeezed("newton", way=0.01), domain=between_plates(COMM, 0))
+    problem, state, nodes = solution.problem, solution.state, solution.problem.nodes
+    assert solution.converged
+    assert nodes.maximum(solution.forces.pressure) == 0
+    (said,) = [text for text in solution.warnings if "nothing holds" in text]
+    assert "nothing holds ring against a rigid motion" in said
+
+    modes, body = RigidBodyModes(problem), problem.equilibrium
+    motion, limited = modes.least(problem, state)
+    assert not limited
+    assert np.abs(motion).max() < 1e-9
+    # Whatever motion is added, the least of all takes it off.
+    (group,) = groups(problem)
+    ring = int(np.argsort(group.centres[:, 1])[1])
+    columns = group.moved[:, 3 * ring : 3 * ring + 3]
+    for amounts in ([0.01, 0.0, 0.0], [0.0, 0.02, 0.01], [-0.3, -0.2, 0.1]):
+        elsewhere = replace(state, x=body.moved(state.x, columns @ np.array(amounts)))
+        motion, limited = modes.least(problem, elsewhere)
+        assert not limited
+        back = body.moved(elsewhere.x, -motion)
+        np.testing.assert_allclose(nodes.apply(back), nodes.apply(state.x), rtol=0, atol=1e-9)
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_least_distance_by_another_method(seed):
+    rng = np.random.default_rng(seed)
+    root, cone, wanted = rng.standard_normal((4, 3)), rng.standard_normal((6, 3)), rng.random(3)
+    products, room = root.T @ root, rng.random(6) / 10
+    found = _least_distance(products, wanted, cone, -room)
+    other = minimize(
+        lambda q: (q - wanted) @ products @ (q - wanted),
+        np.zeros(3),
+        method="SLSQP",
+        constraints={"type": "ineq", "fun": lambda q: cone @ q + room},
+        options={"ftol": 1e-14, "maxiter": 500},
+    )
+    assert np.all(cone @ found + room > -1e-12)
+    np.testing.assert_allclose(found, other.x, rtol=0, atol=1e-6)
