@@ -30,7 +30,7 @@ from contact import _compat
 from contact.errors import InputError
 from contact.history import CONTACT_NODES, QUADRATURE_POINTS
 from contact.interface.jump import Multipliers
-from contact.output.folder import kind, on_root, settle
+from contact.output.folder import kind, on_root, read_json, settle
 from contact.output.solution import Solution
 from contact.output.solved import StepRecord
 from contact.problem.problem import ContactProblem
@@ -40,15 +40,14 @@ from contact.typing import Array
 #: Folder of the checkpoints in that of the results, that of a run which has not ended a step yet,
 #: and the case in it.
 FOLDER, FRESH, CASE = "checkpoints", "checkpoints.new", "case.toml"
-#: File with the digests of their input.
-_DIGEST = "digest.json"
-#: The list of the files in a folder of checkpoints, and a file before it has its name.
+#: The files in a folder of checkpoints with their SHA-256, and the digests of their input; a file
+#: before it has its name.
 MANIFEST, DRAFT = "manifest.json", ".contact-draft"
 _NODES = "nodes.npz"
 #: Names that a manifest may have: it is data of whoever wrote it.
-_LISTED = re.compile(r"\d{5}\.npz|case\.toml|digest\.json|nodes\.npz")
-#: Begin of the names of the arrays of a history in a checkpoint.
-HISTORY = "history "
+_LISTED = re.compile(r"\d{5}\.npz|case\.toml|nodes\.npz")
+#: Begin of the names of the arrays of a history, and of a table, in a checkpoint.
+HISTORY, TABLE = "history ", "table "
 #: How near a node has to be to where it was, over the size of the body.
 _NEAR = 1e-9
 
@@ -89,52 +88,44 @@ class Checkpoints:
         here: bool = False,
         digest: Mapping[str, str] | None = None,
     ) -> None:
-        self._folder, self._problem, self._case = folder, problem, case
-        self._digest = digest or {}
-        self._count, self._fresh = 0, not here
+        self._folder, self._problem, self._count = folder, problem, 0
         if here:
             self._count, self._where = len(kept), _where(folder, problem)
-            on_root(problem.comm, lambda: _cut(_files(folder)[0].parent, self._count))
+            self._place: Path = on_root(problem.comm, lambda: _cut(folder, self._count))
             return
-        points = _places(problem)
+        self._place, points = folder / FRESH, _places(problem)
         #: Rows of the owned nodes in the files.
         self._where = (problem.comm.exscan(len(points)) or 0) + np.arange(len(points))
         gathered = problem.comm.gather(points)
-        on_root(problem.comm, lambda: self._begin(np.concatenate(gathered or [points])))
-        for record in kept:
-            self._gather(record)
 
-    def _begin(self, points: Array) -> None:
-        fresh = self._folder / FRESH
-        _check_own(self._folder)
-        _remove(fresh)
-        fresh.mkdir(parents=True, exist_ok=True)
-        _put(fresh / MANIFEST, json.dumps({}).encode())
-        _save(fresh, CASE, self._case.encode())
-        _save(fresh, _DIGEST, json.dumps(self._digest, indent=1).encode())
-        _save(fresh, _NODES, _packed({"points": points}))
+        def begin() -> None:
+            _check_own(folder)
+            _remove(self._place)
+            self._place.mkdir(parents=True, exist_ok=True)
+            _list(self._place, {}, digest or {})
+            _save(self._place, CASE, case.encode())
+            _save(self._place, _NODES, _packed({"points": np.concatenate(gathered or [points])}))
+
+        on_root(problem.comm, begin)
+        for record in kept:
+            self.keep(record)
 
     def keep(self, record: StepRecord) -> None:
         """Write the checkpoint of the next step; the first replaces those of an earlier run."""
-        self._gather(record)
-        if self._fresh:
-            on_root(self._problem.comm, self._settle)
-        self._fresh = False
-
-    def _settle(self) -> None:
-        _check_own(self._folder)
-        _remove(self._folder / FOLDER)
-        os.rename(self._folder / FRESH, self._folder / FOLDER)
-
-    def _gather(self, record: StepRecord) -> None:
         self._count += 1
-        problem, arrays = self._problem, _gathered(self._problem, record.state, self._where)
+        arrays = _gathered(self._problem, record.state, self._where)
         said = {"enthalpy": record.enthalpy, "unloaded": record.unloaded}
         said["rounding"] = record.rounding
         arrays |= {"said": np.array(json.dumps(said)), "row": np.array(json.dumps(record.row))}
-        arrays |= {f"table {name}": column for name, column in (record.table or {}).items()}
-        place = self._folder / (FRESH if self._fresh else FOLDER)
-        on_root(problem.comm, lambda: _save(place, _name(self._count), _packed(arrays)))
+        arrays |= {TABLE + name: column for name, column in (record.table or {}).items()}
+        on_root(self._problem.comm, lambda: self._write(_packed(arrays)))
+
+    def _write(self, data: bytes) -> None:
+        _save(self._place, _name(self._count), data)
+        if self._place.name == FRESH:
+            _check_own(self._folder)
+            _remove(self._folder / FOLDER)
+            self._place = self._place.rename(self._folder / FOLDER)
 
 
 def _gathered(problem: ContactProblem, state: State, where: NDArray[np.intp]) -> dict[str, Any]:
@@ -245,9 +236,9 @@ def _read(problem: ContactProblem, path: Path, where: NDArray[np.intp]) -> StepR
     arrays = on_root(problem.comm, lambda: _load(path))
     if problem.comm.rank == 0:
         table = {
-            name.removeprefix("table "): column
+            name.removeprefix(TABLE): column
             for name, column in arrays.items()
-            if name.startswith("table ")
+            if name.startswith(TABLE)
         }
     said, row = json.loads(str(arrays["said"])), json.loads(str(arrays["row"]))
     state = _state(problem, arrays, where)
@@ -291,30 +282,17 @@ def case_of(folder: Path) -> Path:
     return _files(folder)[0].parent / CASE
 
 
-def kept_digest(folder: Path) -> dict[str, str]:
-    """Return the digests of the input of the checkpoints in a folder. On one rank.
-
-    Raises
-    ------
-    InputError
-        If there are none.
-    """
-    path = _files(folder)[0].parent / _DIGEST
-    try:
-        given = json.loads(path.read_bytes())
-    except (OSError, ValueError, RecursionError):
-        given = None
-    if not isinstance(given, dict):
-        raise InputError(f"{path}: no digests; accepted: checkpoints of this program")
-    return given
-
-
 def kept_case(folder: Path) -> str | None:
     """Return the case of the checkpoints in a folder; None without any. On one rank."""
-    try:
+    with suppress(InputError):
         return case_of(folder).read_text(encoding="utf-8")
-    except InputError:
-        return None
+    return None
+
+
+def kept_digest(folder: Path) -> dict[str, str]:
+    """Return the digests of the input of the checkpoints in a folder. On one rank."""
+    digest = read_json(case_of(folder).with_name(MANIFEST)).get("digest")
+    return digest if isinstance(digest, dict) else {}
 
 
 def discard(folder: Path) -> None:
@@ -361,14 +339,17 @@ def _name(count: int) -> str:
 
 
 def _manifest(place: Path) -> dict[str, str] | None:
-    """Return the checksums of the files that a run has left in a folder; None without a list."""
-    if kind(place) != "a folder" or kind(place / MANIFEST) != "a file":
+    """Return the SHA-256 of the files that a run has left in a folder; None without a list."""
+    listed = read_json(place / MANIFEST).get("files") if kind(place) == "a folder" else None
+    if not isinstance(listed, dict):
         return None
-    with suppress(ValueError, RecursionError):
-        listed = json.loads((place / MANIFEST).read_bytes())
-        if isinstance(listed, dict):
-            return {name: str(sum_) for name, sum_ in listed.items() if _LISTED.fullmatch(name)}
-    return None
+    return {name: str(sum_) for name, sum_ in listed.items() if _LISTED.fullmatch(name)}
+
+
+def _list(place: Path, files: Mapping[str, str], digest: Any = None) -> None:
+    """Write a manifest, by default with the digests of the one before."""
+    digest = read_json(place / MANIFEST).get("digest") if digest is None else digest
+    _put(place / MANIFEST, json.dumps({"files": files, "digest": digest}, indent=1).encode())
 
 
 def _check_own(folder: Path) -> None:
@@ -394,21 +375,22 @@ def _check_own(folder: Path) -> None:
 
 def _remove(place: Path) -> None:
     """Remove the files that a manifest names, the first step first, and an empty folder."""
-    for name in (*sorted(_manifest(place) or ()), DRAFT):
+    for name in (*sorted(_manifest(place) or ()), DRAFT, MANIFEST):
         (place / name).unlink(missing_ok=True)
-    (place / MANIFEST).unlink(missing_ok=True)
     with suppress(OSError):  # it is not there, or not empty
         place.rmdir()
 
 
-def _cut(place: Path, count: int) -> None:
-    """Remove the checkpoints after a step, which those of another course are to replace."""
-    listed = _manifest(place) or {}
-    later = [name for name in sorted(listed) if name[0].isdigit() and name > _name(count)]
-    for name in later:
-        (place / name).unlink(missing_ok=True)
-    kept = {name: sum_ for name, sum_ in listed.items() if name not in later}
-    _put(place / MANIFEST, json.dumps(kept).encode())
+def _cut(folder: Path, count: int) -> Path:
+    """Remove the checkpoints after a step, for those of another course; return where all are."""
+    place = _files(folder)[0].parent
+    kept = _manifest(place) or {}
+    for name in sorted(kept):
+        if name[0].isdigit() and name > _name(count):
+            (place / name).unlink(missing_ok=True)
+            del kept[name]
+    _list(place, kept)
+    return place
 
 
 def _packed(arrays: dict[str, Any]) -> bytes:
@@ -421,8 +403,7 @@ def _save(place: Path, name: str, data: bytes) -> None:
     """Write a file and its name in the manifest, which comes first: no file is without one."""
     if name not in (listed := _manifest(place) or {}) and kind(place / name) is not None:
         raise InputError(f"{place / name}: no run has left it; accepted: a folder without it")
-    listed[name] = hashlib.sha256(data).hexdigest()
-    _put(place / MANIFEST, json.dumps(listed).encode())
+    _list(place, listed | {name: hashlib.sha256(data).hexdigest()})
     _put(place / name, data)
 
 
@@ -435,8 +416,8 @@ def _put(path: Path, data: bytes) -> None:
     os.replace(draft, path)
 
 
-def _bytes(path: Path) -> bytes:
-    """Return the contents of a file of the manifest.
+def _load(path: Path) -> dict[str, NDArray[Any]]:
+    """Return the arrays in a file of the manifest.
 
     Raises
     ------
@@ -446,11 +427,7 @@ def _bytes(path: Path) -> bytes:
     data = path.read_bytes() if path.is_file() else b""
     if hashlib.sha256(data).hexdigest() != (_manifest(path.parent) or {}).get(path.name):
         raise InputError(f"{path}: no checkpoint, or a damaged one; accepted: as a run has left it")
-    return data
-
-
-def _load(path: Path) -> dict[str, NDArray[Any]]:
-    return _unpacked(_bytes(path))
+    return _unpacked(data)
 
 
 def _unpacked(data: bytes) -> dict[str, NDArray[Any]]:

@@ -196,7 +196,6 @@ def test_damaged_checkpoints_are_gone_on_from_before(
         "00001.npz",
         "nodes.npz",
         "case.toml",
-        "digest.json",
         "manifest.json",
     ):
         folder = tmp_path / name
