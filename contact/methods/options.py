@@ -15,7 +15,7 @@ from annotated_types import Ge, Gt, Le, Lt
 from contact.errors import InputError
 from contact.problem.kkt import KKT
 from contact.settings import Accepted, Count, Internal, Positive, ReadWith, Switch, Tolerance
-from contact.tolerances import LARGEST_VIOLATION
+from contact.tolerances import LARGEST_VIOLATION, PRECISION
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -90,8 +90,8 @@ class FixedPointOptions(LoopOptions):
     inner_tolerance
         Tolerance of the inner loop. Default: a tenth of `tolerance`.
     r
-        Augmentation parameter of the Uzawa block relaxation (force/volume). `auto` fits a block
-        and, where that stalls far from a solution, the softest mode of the body.
+        Augmentation parameter of the Uzawa block relaxation (force/volume). `auto` fits a block;
+        for a slender body no r does.
     acceleration
         Acceleration of the Uzawa block relaxation.
     depth
@@ -122,6 +122,11 @@ class FixedPointOptions(LoopOptions):
         ReadWith("acceleration", "none"),
     ] = 1.0
     single_loop: Switch = False
+
+    @property
+    def inner(self) -> float:
+        """Tolerance of the inner loop."""
+        return self.inner_tolerance or max(self.tolerance / 10, PRECISION)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -23,7 +23,6 @@ DAMPED = 0.5 ** np.arange(5)
 BETWEEN = np.linspace(0, 1, 5)
 BEYOND = 2.0 ** np.arange(1, 21)
 
-
 #: Most Gauss-Newton steps in one search.
 SWEEPS = 20
 
@@ -44,8 +43,6 @@ class ResidualMinimiser:
         Maps z and directions, shape (m, k), to the directional derivatives of P, (m, k).
     depth
         Number of directions kept.
-    anew
-        Whether to begin anew when there are so many, instead of leaving out the oldest.
 
     References
     ----------
@@ -60,10 +57,8 @@ class ResidualMinimiser:
         project: Callable[[Array], Array],
         derivative: Callable[[Array, Array], Array],
         depth: int,
-        anew: bool = False,
     ) -> None:
         self._inner, self._project, self._derivative = inner, project, derivative
-        self._anew = anew
         self._directions: deque[Array] = deque(maxlen=depth)
         self._best: Array | None = None
 
@@ -77,9 +72,6 @@ class ResidualMinimiser:
         image
             The z with which the plain Uzawa block relaxation would go on.
         """
-        if self._anew and len(self._directions) == self._directions.maxlen:
-            self._directions.clear()
-            self._best = None
         new, old = np.stack([force, z]), self._best
         if old is None:
             self._best = new

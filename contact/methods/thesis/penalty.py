@@ -18,10 +18,9 @@ penalised solution is from the limit, and fall like eps. Where they are above
 from __future__ import annotations
 
 import logging
-import time
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
-from typing import Any
+from dataclasses import dataclass, replace
+from typing import Any, ClassVar
 
 import numpy as np
 from petsc4py import PETSc
@@ -40,10 +39,10 @@ from contact.linear.krylov import Packing, shell
 from contact.linear.operator import Counters
 from contact.methods.interrupt import Interrupted
 from contact.methods.options import PenaltyOptions
-from contact.methods.progress import Best, Stagnation, undeformed_equilibrium
-from contact.methods.report import IterationHistory, Monitor, Outcome, Record
+from contact.methods.report import Outcome
+from contact.methods.thesis.outer_loop import LOST, NEAR, OuterLoop
 from contact.problem.checks import expected_displacements
-from contact.problem.kkt import KKT, evaluate, residual_forces
+from contact.problem.kkt import KKT, residual_forces
 from contact.problem.problem import ContactProblem
 from contact.problem.rigid_modes import constrained_by_friction
 from contact.problem.state import State
@@ -244,16 +243,10 @@ class PenalisedProblem:
 
 
 #: Advice at an end without convergence.
-HARDER = "the larger eps_contact and eps_slip, the easier the problem"
-
-#: Why a linear system is singular that was not at zero displacement.
-LOST = "the body has been moved to where nothing constrains it"
+HARDER = "; the larger eps_contact and eps_slip, the easier the problem"
 
 #: Least part of the displacement that a step is taken to add to it.
 LEAST_ADDED = 1e-2
-
-#: Outer iterations in which the residual has to fall by 1 %.
-STAGNATION_LIMIT, PROGRESS = 100, 0.99
 
 
 def regularisation(problem: ContactProblem, options: PenaltyOptions) -> Regularisation:
@@ -287,42 +280,21 @@ def automatic_eps(problem: ContactProblem) -> Regularisation:
 
 
 @dataclass
-class Penalty:
-    """Algorithm 3, one outer iteration at a time.
+class Penalty(OuterLoop):
+    """Algorithm 3; see `OuterLoop`."""
 
-    Parameters
-    ----------
-    problem
-        The contact problem.
-    options
-        Options of the method.
-    monitor
-        Told of every outer iteration.
-
-    Attributes
-    ----------
-    state
-        The state after the last outer iteration.
-    """
-
-    problem: ContactProblem
     options: PenaltyOptions
-    monitor: Monitor | None = None
-    counters: Counters = field(default_factory=Counters)
+    #: The lagged friction modulus can creep: only the last hundred iterations count.
+    stagnation: ClassVar[tuple[int, float]] = (100, 0.99)
 
     def __post_init__(self) -> None:
-        """Start from zero with an empty history."""
-        self.history = IterationHistory(self.monitor)
-        self.state = self.problem.start()
-        self._eps = regularisation(self.problem, self.options)
+        """Start from zero, without a solver."""
         self._solvers: dict[bool, PenalisedProblem] = {}
-        thesis = self.options.stopping == "thesis"
-        self._norm = self.problem.equilibrium.l2_norm() if thesis else None
+        super().__post_init__()
 
     def turn_to(self, problem: ContactProblem) -> None:
         """Go on with another step of the same problem; factorisations remain."""
-        self.problem, self.state = problem, problem.start()
-        self.history = IterationHistory(self.monitor)
+        super().turn_to(problem)
         self._eps = regularisation(problem, self.options)
         for solver in self._solvers.values():
             solver.turn_to(problem, self._eps)
@@ -337,64 +309,27 @@ class Penalty:
             ones are reached that are too hard from there.
         """
         self.state = self.problem.start() if start is None else start
-        implicit = start is not None and self.options.material_step != "secant"
-        outcome = self._solve(implicit)
+        self.bound = np.zeros_like(self.bound)
+        self._implicit = start is not None and self.options.material_step != "secant"
+        self._failed = False
+        # The residual below which material and friction become implicit.
+        self._switch = {"secant": 0.0, "auto": NEAR, "tangent": np.inf}[self.options.material_step]
+        outcome = self._iterate()
         return self.state, outcome
 
-    def _solve(self, implicit: bool) -> Outcome:
-        """Iterate; the first time with implicit laws or not."""
-        begin, problem, options = time.perf_counter(), self.problem, self.options
-        interface = problem.interface
-        # The lagged friction modulus can creep: only the last hundred iterations count.
-        stagnation = Stagnation(STAGNATION_LIMIT, PROGRESS)
-        best: Best[tuple[State, KKT]] = Best()
-        # The residual below which material and friction become implicit.
-        switch = {"secant": 0.0, "auto": 1e-2, "tangent": np.inf}[options.material_step]
-        bound: Array = np.zeros(interface.jump.gap.size)
-        for iteration in range(1, options.max_outer + 1):
-            previous = self.state
-            x, inner, note = self._step(implicit)
-            failed = implicit and bool(note)
-            # Where Newton's method failed its step is given up, for Algorithm 3 to go on a while.
-            x = previous.x if failed else x
-            nodal = interface.jump.apply(x)
-            forces = penalised_forces(interface, nodal, self._eps)
-            self.state = replace(previous, x=x, forces=forces)
-            residuals = evaluate(problem, self.state)
-            old, bound = bound, interface.bound(nodal, self.state.forces)
-            change = self._change(old, bound)
-            note = note or ("implicit" if implicit else "")
-            seconds = time.perf_counter() - begin
-            self.history.add(Record(iteration, inner, residuals, change, seconds, note))
-            residual = residuals.equilibrium
-            best.see((self.state, residuals), residual)
-            if note == LOST and not failed:
-                ended = f"{LOST}; {HARDER}"
-                break
-            if not np.isfinite(residual):
-                ended = "the iteration diverged"
-                break
-            if options.stopping == "thesis":
-                if self._thesis_criterion(previous):
-                    return self._outcome(residuals, "the thesis's criterion is met")
-            elif residual <= options.tolerance:
-                return self._outcome(residuals)
-            stalled = stagnation(residual)
-            switch = stagnation.best / 10 if failed else switch
-            if stalled and options.stopping == "residual":
-                ended = f"the residual stalled at {stagnation.best:.2e}; {HARDER}"
-                break
-            implicit = residual < switch
-        else:
-            ended = f"not converged in {options.max_outer} outer iterations; {HARDER}"
-        if best.found is not None and options.stopping == "residual":
-            if rest := undeformed_equilibrium(problem):
-                best.found, ended = rest, ""
-            self.state, residuals = best.found
-        return self._outcome(residuals, ended)
-
-    def _step(self, implicit: bool) -> tuple[Array, int, str]:
+    def _step(self, iteration: int) -> tuple[int, str]:
         """Solve (4.32), or the penalised problem itself, by SNES from the state."""
+        interface, implicit = self.problem.interface, self._implicit
+        x, inner, fault = self._solve(implicit)
+        self._failed = implicit and bool(fault)
+        if self._failed:  # Algorithm 3 goes on a while
+            x, fault = self.state.x, f"implicit: {fault}"
+        forces = penalised_forces(interface, interface.jump.apply(x), self._eps)
+        self.state = replace(self.state, x=x, forces=forces)
+        return inner, fault or ("implicit" if implicit else "")
+
+    def _solve(self, implicit: bool) -> tuple[Array, int, str]:
+        """Return the unknowns that SNES finds, its iterations and the fault, if any."""
         interface = self.problem.interface
         nodal = interface.jump.apply(self.state.x)
         law: NodalLaw = Implicit(interface, self._eps) if implicit else self._lagged(nodal)
@@ -424,26 +359,22 @@ class Penalty:
             law.stick()
         return law
 
-    def _change(self, old: Array, new: Array) -> float:
-        """Return the relative change (3.46) of the friction bound."""
-        interface = self.problem.interface
-        if not interface.friction.acts:
-            return np.nan
-        size = interface.jump.norm(new)
-        return interface.jump.norm(new - old) / size if size > 0 else 0.0
+    def _measure(self, residuals: KKT) -> float:
+        return residuals.equilibrium
 
-    def _thesis_criterion(self, previous: State) -> bool:
-        """Tell whether (4.38) is met."""
-        assert self._norm is not None
-        own = self.problem.equilibrium.owned_part
-        now, before = own(self.state.x), own(previous.x)
-        return self._norm(now - before) < self.options.eps_fp * self._norm(now)
+    def _adapt(self, residual: float, best: float) -> None:
+        """Go on implicitly near the solution; nearer where that has failed."""
+        self._switch = best / 10 if self._failed else self._switch
+        self._implicit = residual < self._switch
 
-    def _outcome(self, residuals: KKT, words: str = "") -> Outcome:
+    def _advice(self, residual: float | None = None) -> str:
+        return HARDER
+
+    def _outcome(self, residuals: KKT, ended: str = "") -> Outcome:
         options, limit = self.options, max(residuals.contact, residuals.friction)
-        words = words or f"the residual of the penalised problem is <= {options.tolerance:g}"
+        ended = ended or f"the residual of the penalised problem is <= {options.tolerance:g}"
         if residuals.equilibrium <= options.tolerance:
-            words += f"; the complementarity conditions are met to {limit:.1e}"
+            ended += f"; the complementarity conditions are met to {limit:.1e}"
         if limit > LARGEST_VIOLATION:
-            words += "; a smaller eps_contact or eps_slip brings them nearer"
-        return Outcome(residuals, options.allowed, words)
+            ended += "; a smaller eps_contact or eps_slip brings them nearer"
+        return super()._outcome(residuals, ended)

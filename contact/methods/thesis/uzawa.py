@@ -23,6 +23,7 @@ from contact.interface.layer import NormalLaw
 from contact.interface.nodes import ContactNodes
 from contact.linear.multigrid import TOLERANCE
 from contact.linear.operator import Operator
+from contact.methods.options import FixedPointOptions
 from contact.methods.progress import Stagnation
 from contact.methods.thesis.acceleration import ResidualMinimiser
 from contact.problem.kkt import residual_forces
@@ -30,6 +31,16 @@ from contact.problem.protocols import Problem
 from contact.problem.state import State
 from contact.typing import Array
 from forms.foundation import contact_multiplier
+
+logger = logging.getLogger("contact.inner")
+
+#: Iterations without progress, that is 1 %, after which the relaxation is given up: accelerated,
+#: and plain. With r far from r* the plain one creeps by 1e-4 an iteration, and still gets there.
+STAGNATION_LIMIT, STAGNATION_LIMIT_PLAIN, PROGRESS = 100, 500, 0.99
+
+#: Tolerance of an iterative solver over that of the relaxation: with one as large it returns its
+#: initial guess, and rounding decides when it does. And the least one.
+SHARE, LEAST = 0.1, 1e-13
 
 
 def augmentation(jump: Jump, r: float, friction: bool) -> Array:
@@ -58,120 +69,8 @@ def components(jump: Jump, nodal: Array, friction: bool) -> Array:
     return np.column_stack([jump.normal_component(nodal), tangential])
 
 
-@dataclass(frozen=True)
-class Linearised:
-    """The linearised problem about an iterate: A dx = -residual - contact forces.
-
-    Attributes
-    ----------
-    operator
-        Factorised operator, augmented by r at the contact nodes.
-    residual
-        Owned residual without multipliers at the iterate.
-    x
-        The iterate's owned unknowns.
-    nodal
-        The iterate at the contact nodes, shape (n, block size).
-    bound
-        Friction bound s_n, shape (n,).
-    law
-        The compliant layer in front of the rigid part, to be solved with the constraint; None
-        without one. The multipliers are then those of the total pressure -sigma_nu.
-    friction
-        Whether tangential forces act; the operator is augmented tangentially only then.
-    """
-
-    operator: Operator
-    residual: Array
-    x: Array
-    nodal: Array
-    bound: Array
-    law: NormalLaw | None = None
-    friction: bool = False
-
-
-def linearised(
-    problem: Problem,
-    state: State,
-    operator: Operator,
-    bound: Array,
-    friction: bool,
-    secant_at: Array,
-) -> Linearised:
-    """Freeze a problem at a state. Collective.
-
-    The multipliers are the unknowns of the relaxation, and no part of the residual. Neither is the
-    layer's pressure, unless it is lagged. The contact flag of the perfect conductor still looks
-    at the last pressure.
-
-    Parameters
-    ----------
-    problem, state
-        The problem, and where it is.
-    operator, bound, friction
-        As of `Linearised`.
-    secant_at
-        Unknowns at which the secant modulus of the material is taken.
-    """
-    interface, jump = problem.interface, problem.interface.jump
-    nodal = jump.apply(state.x)
-    law = interface.law.normal_law(nodal)
-    residual = residual_forces(problem, state, secant_at)
-    unknown = state.forces.vectors(jump)
-    if law is not None:
-        unknown += interface.law.layer_pressure(nodal)[:, None] * jump.normal
-    jump.transpose(-jump.weight[:, None] * unknown, residual)
-    owned = problem.equilibrium.owned_part(state.x)
-    return Linearised(operator, residual, owned, nodal, bound, law, friction)
-
-
-logger = logging.getLogger("contact.inner")
-
-#: Iterations without progress, that is 1 %, after which the relaxation is given up: accelerated,
-#: and plain. With r far from r* the plain one creeps by 1e-4 an iteration, and still gets there.
-STAGNATION_LIMIT, STAGNATION_LIMIT_PLAIN, PROGRESS = 100, 500, 0.99
-
-#: Tolerance of an iterative solver over that of the relaxation: with one as large it returns its
-#: initial guess, and rounding decides when it does. And the least one.
-SHARE, LEAST = 0.1, 1e-13
-
-
-@dataclass(frozen=True)
-class Relaxation:
-    """Parameters of the Uzawa block relaxation.
-
-    Attributes
-    ----------
-    r
-        Augmentation parameter (stress/length).
-    tolerance
-        On the relative contact and friction residuals of the iterate.
-    max_iterations
-        Number of linear solves allowed.
-    depth
-        Number of earlier solves that the acceleration uses, 0 for no acceleration.
-    over_relaxation
-        Factor in (0, 2) on the step in u; 1 for none. Only without acceleration.
-    thesis_tolerance
-        If given, stop by the thesis's criterion (3.45) with this epsilon instead.
-    single_loop
-        Whether the friction bound is updated in every iteration.
-    anew
-        Whether the acceleration begins anew after as many solves as it uses.
-    """
-
-    r: float
-    tolerance: float
-    max_iterations: int
-    depth: int = 30
-    over_relaxation: float = 1.0
-    thesis_tolerance: float | None = None
-    single_loop: bool = False
-    anew: bool = False
-
-
 @dataclass
-class RelaxationResult:
+class Relaxed:
     """Outcome of a Uzawa block relaxation.
 
     Attributes
@@ -184,8 +83,6 @@ class RelaxationResult:
         State to start the next relaxation from, relative to the new iterate, shape (n, 1 + d).
     iterations
         Number of linear solves.
-    residual
-        The largest interface residual reached.
     stalled
         Whether it was given up because nothing got better: rounding, as a rule.
     """
@@ -194,7 +91,6 @@ class RelaxationResult:
     forces: Multipliers
     z: Array
     iterations: int
-    residual: float
     stalled: bool = False
 
 
@@ -206,12 +102,13 @@ class _Projection:
 
     Attributes
     ----------
-    jump
-        The contact nodes.
-    r
-        Augmentation parameter.
-    bound, law
-        Friction bound and layer, as in `Linearised`.
+    jump, r
+        The contact nodes, and the augmentation parameter.
+    bound
+        Friction bound, shape (n,).
+    law
+        The compliant layer in front of the rigid part, which is solved with the constraint; None
+        without one. The multipliers are then those of the total pressure -sigma_nu.
     origin
         r u_0 of the iterate, shape (n, 1 + d).
     """
@@ -242,16 +139,8 @@ class _Projection:
         tangential = disc_derivative(z[:, 1:], self.bound, directions[:, 1:])
         return np.concatenate([normal, tangential], axis=1)
 
-    def accelerator(self, depth: int, anew: bool, size: Array) -> ResidualMinimiser:
-        """Return the acceleration of the iteration of z, as a flat array.
-
-        Parameters
-        ----------
-        depth, anew
-            As of `Relaxation`.
-        size
-            Unit of the forces at each node, shape (n,).
-        """
+    def accelerator(self, depth: int, size: Array) -> ResidualMinimiser:
+        """Return the acceleration of z as a flat array; `size`: unit of forces, (n,)."""
         jump, shape = self.jump, (self.jump.weight.size, 1 + self.jump.normal.shape[1])
         weights = np.repeat(jump.weight / size**2, shape[1])
 
@@ -265,124 +154,117 @@ class _Projection:
             columns = directions.reshape(*shape, directions.shape[1])
             return self.derivative(flat.reshape(shape), columns).reshape(directions.shape)
 
-        return ResidualMinimiser(inner, project, derivative, depth, anew)
+        return ResidualMinimiser(inner, project, derivative, depth)
 
 
-class _Changes:
-    """How much an iteration changes, for the thesis's criterion (3.45).
+def _residual(problem: Problem, state: State, secant_at: Array, layer: bool) -> Array:
+    """Return the owned residual without the multipliers, the unknowns of the relaxation.
 
-    Parameters
-    ----------
-    project
-        From z to the multipliers.
-    x
-        The iterate's owned unknowns.
-    norm
-        L2(Omega) norm of owned unknowns.
+    Neither is the layer's pressure a part of it, unless it is lagged. The contact flag of the
+    perfect conductor still looks at the last pressure. Collective.
     """
-
-    def __init__(self, project: _Projection, x: Array, norm: Callable[[Array], float]) -> None:
-        self._project, self._x, self._norm = project, x, norm
-        self._last: tuple[Array, Array] | None = None
-
-    def squares(self, increment: Array, image: Array) -> tuple[float, float] | None:
-        """Return the squares of the change and of the size; None after the first iteration."""
-        jump, norm, last = self._project.jump, self._norm, self._last
-        project = self._project
-        phi = (image + project.origin - project(image)) * (1 / project.r)
-        self._last = increment, phi
-        if last is None:
-            return None
-        change = norm(increment - last[0]) ** 2 + jump.norm(phi - last[1]) ** 2
-        return change, norm(self._x + increment) ** 2 + jump.norm(phi) ** 2
-
-
-def _vectors(jump: Jump, pairs: Array) -> Array:
-    """Return (normal, tangential) pairs as vectors, shape (n, d)."""
-    return pairs[:, :1] * jump.normal + pairs[:, 1:]
+    interface, jump = problem.interface, problem.interface.jump
+    residual, unknown = residual_forces(problem, state, secant_at), state.forces.vectors(jump)
+    if layer:
+        pressure = interface.law.layer_pressure(jump.apply(state.x))
+        unknown += pressure[:, None] * jump.normal
+    jump.transpose(-jump.weight[:, None] * unknown, residual)
+    return residual
 
 
 def uzawa_block_relaxation(
-    interface: Interface,
-    step: Linearised,
+    problem: Problem,
+    state: State,
+    operator: Operator,
+    bound: Array,
+    friction: bool,
+    secant_at: Array,
     z: Array,
-    parameters: Relaxation,
-    domain_norm: Callable[[Array], float] | None = None,
-    poll: Callable[[], None] | None = None,
-) -> RelaxationResult:
-    """Iterate Steps 1 to 3 of Algorithm 2 (5, 7, 9) on one linearised problem. Collective.
+    r: float,
+    options: FixedPointOptions,
+    domain_norm: Callable[[Array], float] | None,
+    poll: Callable[[], None],
+) -> Relaxed:
+    """Iterate Steps 1 to 3 of Algorithm 2 (5, 7, 9) on one frozen problem. Collective.
 
     Parameters
     ----------
-    interface
-        The contact nodes with their laws.
-    step
-        The linearised problem; its operator holds `augmentation(jump, r, friction)`.
+    problem, state
+        The problem, and the iterate at which it is frozen.
+    operator
+        Factorised operator, with `augmentation(jump, r, friction)`.
+    bound
+        Friction bound s_n, shape (n,).
+    friction
+        Whether tangential forces act.
+    secant_at
+        Unknowns at which the secant modulus of the material is taken.
     z
         lambda + r (u - u_0) to start from, shape (n, 1 + d); u_0 is that of the iterate.
-    parameters
-        Of the method.
+    r, options
+        Augmentation parameter (stress/length), and the options.
     domain_norm
-        L2(Omega) norm of owned unknowns, needed for the thesis's criterion.
+        L2(Omega) norm of owned unknowns: ends the relaxation by the thesis's criterion (3.45).
     poll
         Called before every iteration, on all ranks; an exception ends the relaxation.
     """
-    jump, r, law = interface.jump, parameters.r, step.law
-    origin = r * split(interface, step.nodal, step.friction)
-    project = _Projection(jump, r, step.bound, law, origin)
+    interface, jump = problem.interface, problem.interface.jump
+    at, own = jump.apply(state.x), problem.equilibrium.owned_part(state.x)
+    law = interface.law.normal_law(at)
+    constant = -_residual(problem, state, secant_at, law is not None)
+    origin = r * split(interface, at, friction)
+    project = _Projection(jump, r, bound, law, origin)
+    accelerated, over = options.acceleration == "anderson", options.relaxation
     accelerator: ResidualMinimiser | None = None
     beside: Array = np.ones_like(jump.weight)
-    changes = None if domain_norm is None else _Changes(project, step.x, domain_norm)
-    rtol = max(SHARE * parameters.tolerance, LEAST)
-    residual, forces = np.inf, Multipliers.zero(jump)
-    increment: Array = np.zeros(step.x.size)
-    way: Array = np.zeros_like(z)
-    stagnation = Stagnation(
-        STAGNATION_LIMIT if parameters.depth > 0 else STAGNATION_LIMIT_PLAIN, PROGRESS
-    )
-    for iteration in range(1, parameters.max_iterations + 1):
-        if poll is not None:
-            poll()
+    last: tuple[Array, Array] | None = None
+    rtol = max(SHARE * options.inner, LEAST)
+    increment: Array = np.zeros(own.size)
+    stagnation = Stagnation(STAGNATION_LIMIT if accelerated else STAGNATION_LIMIT_PLAIN, PROGRESS)
+    for iteration in range(1, options.max_inner + 1):
+        poll()
         # Neither projections nor solves change the part of z along the normal beside its first
         # column: of rounding, the acceleration makes a pressure that no law sees.
         z[:, 1:] = jump.tangential_component(z[:, 1:])
         multiplier = project(z)
         q = 2 * multiplier - z
-        rhs = -step.residual
-        jump.transpose(-jump.weight[:, None] * _vectors(jump, q), rhs)
-        increment = step.operator.solve(rhs, rtol if rtol < TOLERANCE else None, increment)
+        rhs = constant.copy()
+        vectors = q[:, :1] * jump.normal + q[:, 1:]
+        jump.transpose(-jump.weight[:, None] * vectors, rhs)
+        increment = operator.solve(rhs, rtol if rtol < TOLERANCE else None, increment)
         moved = jump.apply(increment)
-        nodal = step.nodal + moved
-        way = r * components(jump, moved, step.friction)
+        nodal = at + moved
+        way = r * components(jump, moved, friction)
         # q + r (u - u_0) is the force that the foundation exerted in this very solve.
         total = q + way
         if iteration == 1:
             beside = interface.component_norms(total)
         layer = 0.0 if law is None else law.layer(jump.normal_component(nodal))
         forces = Multipliers.of(jump, total[:, 0] - layer, total[:, 1:])
-        if parameters.single_loop and step.friction:
+        if options.single_loop and friction:
             project.bound = interface.bound(nodal, forces)
         residual = float(interface_residuals(interface, nodal, forces, project.bound)[0].max())
         logger.debug("inner iteration %d: residual %.2e", iteration, residual)
-        relaxed = (1 - parameters.over_relaxation) * (z - multiplier)
-        image = multiplier + relaxed + parameters.over_relaxation * way
-        done = residual <= parameters.tolerance or not np.isfinite(residual)
+        image = multiplier + (1 - over) * (z - multiplier) + over * way
+        done = residual <= options.inner or not np.isfinite(residual)
         # Not the residual: where nothing touches yet it is small, beside the stress of closing.
         measured = jump.norm((total - project(total + way)) / beside[:, None])
-        if parameters.thesis_tolerance is not None:
-            assert changes is not None
-            squares, done = changes.squares(increment, image), False
-            if squares is not None:
-                change, size = squares
-                done = change < parameters.thesis_tolerance**2 * size
+        if domain_norm is not None:
+            phi: Array = (image + origin - project(image)) * (1 / r)
+            before, done = last, False
+            last = increment, phi
+            if before is not None:
+                change = domain_norm(increment - before[0]) ** 2 + jump.norm(phi - before[1]) ** 2
+                size = domain_norm(own + increment) ** 2 + jump.norm(phi) ** 2
+                done = change < options.eps**2 * size
                 measured = float(np.sqrt(change / size)) if size > 0 else 0.0
         stalled = not done and stagnation(measured)
         if done or stalled:
-            return RelaxationResult(increment, forces, image - way, iteration, residual, stalled)
+            return Relaxed(increment, forces, image - way, iteration, stalled)
         z = image
-        if parameters.depth > 0:
+        if accelerated:
             if accelerator is None:
-                accelerator = project.accelerator(parameters.depth, parameters.anew, beside)
+                accelerator = project.accelerator(options.depth, beside)
             newest = (total + way).ravel()
             z = accelerator.next(total.ravel(), newest, image.ravel()).reshape(z.shape)
-    return RelaxationResult(increment, forces, z - way, parameters.max_iterations, residual)
+    return Relaxed(increment, forces, z - way, options.max_inner)

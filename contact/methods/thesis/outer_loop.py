@@ -1,0 +1,156 @@
+"""The frame of the thesis's outer loops, Algorithms 1, 3, 4, 6 and 8: freeze, solve, update.
+
+Each outer iteration freezes nonlinear terms (Kacanov's secant modulus, the friction bound), solves
+the frozen problem by an inner iteration and evaluates the residuals. `fixed_point` and `penalty`
+differ in the step. Where a loop fails its best iterate is left, by the thesis's rules the last.
+"""
+
+from __future__ import annotations
+
+import time
+from abc import ABC, abstractmethod
+from dataclasses import dataclass, field
+from typing import ClassVar
+
+import numpy as np
+
+from contact.linear.operator import Counters
+from contact.methods.options import LoopOptions
+from contact.methods.progress import Best, Stagnation, undeformed_equilibrium
+from contact.methods.report import IterationHistory, Monitor, Outcome, Record
+from contact.problem.kkt import KKT, evaluate
+from contact.problem.problem import ContactProblem
+from contact.problem.state import State
+from contact.typing import Array
+
+#: Residual below which frozen coefficients give way to their derivatives: from afar these
+#: overshoot.
+NEAR = 1e-2
+
+#: Note of a step that could not be taken, as its linear system was singular.
+LOST = "the body has been moved to where nothing constrains it"
+
+
+@dataclass
+class OuterLoop(ABC):
+    """An outer loop, one iteration at a time.
+
+    Parameters
+    ----------
+    problem
+        The contact problem.
+    options
+        Options of the loop, a `LoopOptions`.
+    monitor
+        Told of every outer iteration.
+
+    Attributes
+    ----------
+    state, bound
+        The state after the last outer iteration, and its friction bound, shape (n,) (stress).
+    """
+
+    problem: ContactProblem
+    options: LoopOptions
+    monitor: Monitor | None = None
+    counters: Counters = field(default_factory=Counters)
+
+    #: Outer iterations without progress after which the loop is given up, and progress.
+    stagnation: ClassVar[tuple[int, float]]
+
+    def __post_init__(self) -> None:
+        """Start from zero with an empty history."""
+        thesis = self.options.stopping == "thesis"
+        self._norm = self.problem.equilibrium.l2_norm() if thesis else None
+        self.turn_to(self.problem)
+
+    def turn_to(self, problem: ContactProblem) -> None:
+        """Go on with another step of the same problem; factorisations remain."""
+        self.problem, self.state = problem, problem.start()
+        self.history = IterationHistory(self.monitor)
+        self.bound: Array = np.zeros(problem.interface.jump.gap.size)
+
+    @abstractmethod
+    def _step(self, iteration: int) -> tuple[int, str]:
+        """Move the state by a frozen problem; return its inner iterations and a note."""
+
+    @abstractmethod
+    def _measure(self, residuals: KKT) -> float:
+        """Return the residual that is to vanish."""
+
+    @abstractmethod
+    def _adapt(self, residual: float, best: float) -> None:
+        """Choose the next linearisation, given the last residual and the least one."""
+
+    def _limit(self) -> int:
+        """Return the stagnation limit."""
+        return self.stagnation[0]
+
+    def _advice(self, residual: float | None = None) -> str:
+        """Say more of an end without convergence; at a residual where it stalled there."""
+        return ""
+
+    def _iterate(self, first: int = 1) -> Outcome:
+        """Iterate until convergence, stagnation or the limit, and leave the best iterate."""
+        begin, problem, options = time.perf_counter(), self.problem, self.options
+        stagnation = Stagnation(*self.stagnation)
+        best: Best[tuple[State, KKT]] = Best()
+        by_thesis = options.stopping == "thesis"
+        for iteration in range(first, options.max_outer + 1):
+            previous = self.state
+            inner, note = self._step(iteration)
+            residuals = evaluate(problem, self.state)
+            residual = self._measure(residuals)
+            best.see((self.state, residuals), residual)
+            change, seconds = self._update_bound(iteration), time.perf_counter() - begin
+            self.history.add(Record(iteration, inner, residuals, change, seconds, note))
+            if by_thesis and iteration > first and self._thesis_criterion(change, previous):
+                return self._outcome(residuals, "the thesis's criterion is met")
+            if not by_thesis and residual <= options.tolerance:
+                return self._outcome(residuals)
+            if note == LOST:
+                ended = LOST + self._advice()
+                break
+            if not np.isfinite(residual):
+                ended = "the iteration diverged"
+                break
+            given_up = stagnation(residual, self._limit())
+            self._adapt(residual, stagnation.best)
+            if given_up and not by_thesis:
+                ended = f"the residual stalled at {stagnation.best:.2e}"
+                ended += self._advice(stagnation.best)
+                break
+        else:
+            ended = f"not converged in {options.max_outer} outer iterations{self._advice()}"
+        if best.found is not None and not by_thesis:
+            if rest := undeformed_equilibrium(problem):
+                best.found, ended = rest, ""
+            self.state, residuals = best.found
+        return self._outcome(residuals, ended)
+
+    def _update_bound(self, iteration: int) -> float:
+        """Update the friction bound; return its relative change (3.46), NaN without friction.
+
+        After the frictionless start, iteration 0, it is that of zero slip.
+        """
+        interface, forces, old = self.problem.interface, self.state.forces, self.bound
+        if not interface.friction.acts:
+            return np.nan
+        nodal = interface.jump.apply(self.state.x)
+        if iteration == 0:
+            pressure = interface.pressure(nodal, forces)
+            self.bound = interface.friction.bound(pressure, np.zeros_like(pressure))
+        else:
+            self.bound = interface.bound(nodal, forces)
+        size = interface.jump.norm(self.bound)
+        return interface.jump.norm(self.bound - old) / size if size > 0 else 0.0
+
+    def _thesis_criterion(self, change: float, previous: State) -> bool:
+        """Tell whether (4.38), or (6.40), is met: the displacement has changed by little."""
+        assert self._norm is not None
+        own = self.problem.equilibrium.owned_part
+        now, before = own(self.state.x), own(previous.x)
+        return self._norm(now - before) < self.options.eps_fp * self._norm(now)
+
+    def _outcome(self, residuals: KKT, ended: str = "") -> Outcome:
+        return Outcome(residuals, self.options.allowed, ended)
