@@ -27,7 +27,7 @@ from contact.methods.interrupt import SIGNALLED, stop_on_signal
 from contact.methods.method import METHODS, Method
 from contact.methods.options import NewtonOptions, Options
 from contact.methods.report import IterationHistory, Monitor, Outcome, tell
-from contact.methods.steps import Evolution, LoadStep, solve_step
+from contact.methods.steps import Evolution, solve_step
 from contact.nesting import nested_start, pays
 from contact.output.checkpoint import Checkpoints, kept_digest, read_steps
 from contact.output.folder import on_root
@@ -99,16 +99,6 @@ class Schedule:
     guess: str = GIVEN
     kept: Sequence[StepRecord] = ()
     keep: Callable[[StepRecord], None] | None = None
-
-    def steps(self, problem: ContactProblem, method: Method) -> Iterator[LoadStep]:
-        """Take the steps. Collective."""
-        if self.times:
-            states = [record.state for record in self.kept[-1:-3:-1]]
-            tell(logger, 0.0, "steps to t = %g", self.times[-1])
-            yield from Evolution(problem, method, *states).run(self.times, self.begin)
-        else:
-            state, outcome = solve_step(problem, method, self.start)
-            yield LoadStep(problem, state, outcome, method.history, method.counters)
 
 
 def solve(
@@ -282,28 +272,21 @@ def run_schedule(
         that of another problem.
     """
     clock = time.perf_counter()
-    if schedule.start is not None:
-        schedule = replace(schedule, start=_prescribed(problem, schedule.start))
-    history, records = IterationHistory(), list(schedule.kept)
+    start = None if schedule.start is None else _prescribed(problem, schedule.start)
+    records = list(schedule.kept)
     with stop_on_signal(problem.comm, monitor) as stop:
         method = METHODS[settings.method](problem, settings, stop)
         setup = time.perf_counter() - clock
-        recorder = None
         if schedule.times:
-            recorder = StepRecorder(problem, records[-1] if records else None)
-        step: LoadStep | None = None
-        for step in schedule.steps(problem, method):
-            history.records += step.history.records if recorder is None else _labelled(step)
-            if recorder is not None and step.outcome.converged:
-                records.append(recorder.record(step))
-                _report(step, records[-1], schedule)
-    here, state = _end(problem, records, step)
-    outcome = _outcome(here, state, step, method.options.allowed, schedule)
+            here, state, outcome, history = _steps(problem, method, schedule, records)
+        else:
+            here, history = problem, IterationHistory()
+            state, outcome = solve_step(problem, method, start)
+            history.records += method.history.records
     counters = method.counters
     # The review needs the memory that the method's operators take.
     del method
     check_potential(here, state)
-    guess = ZERO if schedule.start is None else schedule.guess
     solution = Solution(
         problem=here,
         state=state,
@@ -311,7 +294,7 @@ def run_schedule(
         history=history,
         counters=counters,
         method=settings.method,
-        start=BEFORE if records else guess,
+        start=BEFORE if records else ZERO if start is None else schedule.guess,
         seconds={"setup": setup, "solve": time.perf_counter() - clock - setup, "output": 0.0},
         steps=records,
     )
@@ -325,49 +308,44 @@ def run_schedule(
     return solution
 
 
-def _labelled(step: LoadStep) -> Iterator[Any]:
-    """Give the outer iterations of a step, with its time in their notes."""
-    time = f"t = {step.problem.time:g}"
-    for record in step.history.records:
-        yield replace(record, note=f"{time} {record.note}".strip())
+def _steps(
+    problem: ContactProblem, method: Method, schedule: Schedule, records: list[StepRecord]
+) -> tuple[ContactProblem, State, Outcome, IterationHistory]:
+    """Take load steps, and append the records of those that converge. Collective.
 
-
-def _report(step: LoadStep, record: StepRecord, schedule: Schedule) -> None:
-    """Hand on the record of a step, and log the progress of the run."""
-    if schedule.keep is not None:
-        schedule.keep(record)
-    end = schedule.times[-1]
-    tell(
-        logger,
-        (step.problem.time - schedule.begin) / (end - schedule.begin),
-        "t = %g of %g: iterations %d, residual %.1e",
-        *(step.problem.time, end, len(step.history.records), step.outcome.kkt.largest),
-    )
-
-
-def _end(
-    problem: ContactProblem, records: Sequence[StepRecord], step: LoadStep | None
-) -> tuple[ContactProblem, State]:
-    """Return the last step that is recorded; the iterate of the first one, if none is."""
+    Returns
+    -------
+    The last step that is recorded, or the iterate of the first one if none is; the outcome of the
+    last one, with the time that was reached; and the outer iterations of all.
+    """
+    recorder = StepRecorder(problem, records[-1] if records else None)
+    history, step, end = IterationHistory(), None, schedule.times[-1]
+    states = [record.state for record in records[-1:-3:-1]]
+    tell(logger, 0.0, "steps to t = %g", end)
+    for step in Evolution(problem, method, *states).run(schedule.times, schedule.begin):
+        now, taken = step.problem.time, step.history.records
+        history.records += [replace(r, note=f"t = {now:g} {r.note}".strip()) for r in taken]
+        if step.outcome.converged:
+            records.append(recorder.record(step))
+            if schedule.keep is not None:
+                schedule.keep(records[-1])
+            share = (now - schedule.begin) / (end - schedule.begin)
+            words = "t = %g of %g: iterations %d, residual %.1e"
+            tell(logger, share, words, now, end, len(taken), step.outcome.kkt.largest)
     if not records:
         assert step is not None  # there is one step at least
-        return step.problem, step.state
-    state = records[-1].state
-    return problem.at(state.time, state.history), state
-
-
-def _outcome(
-    problem: ContactProblem, state: State, step: LoadStep | None, allowed: Any, schedule: Schedule
-) -> Outcome:
-    """Return the outcome of the last step, with the time that was reached. Collective."""
+        here, state, reached = step.problem, step.state, 0.0
+    else:
+        state, reached = records[-1].state, records[-1].state.time
+        here = problem.at(state.time, state.history)
     if step is None:  # all were there already
-        return Outcome(evaluate(problem, state), allowed)
-    if step.outcome.converged or not schedule.times:
-        return step.outcome
-    reached = problem.time if state is not step.state else 0.0
-    words = f"the steps end at t = {reached:g} of {schedule.times[-1]:g}"
-    ended = f"{words}: {step.outcome.ended or f'the one to {step.problem.time:g} fails'}"
-    return replace(step.outcome, ended=ended)
+        return here, state, Outcome(evaluate(here, state), method.options.allowed), history
+    outcome = step.outcome
+    if not outcome.converged:
+        words = outcome.ended or f"the one to {step.problem.time:g} fails"
+        ended = f"the steps end at t = {reached:g} of {end:g}: {words}"
+        outcome = replace(outcome, ended=ended)
+    return here, state, outcome, history
 
 
 def _prescribed(problem: ContactProblem, start: State) -> State:
