@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -11,7 +11,6 @@ from contact.case.build import build_problem
 from contact.case.file import Case
 from contact.case.mesh import Mesh
 from contact.errors import InputError
-from contact.history import History
 from contact.interface.complementarity import project_half_line
 from contact.interface.jump import Multipliers
 from contact.linear import multigrid
@@ -52,35 +51,23 @@ def pays(case: Case, problem: ContactProblem) -> bool:
     return slow and enough and case.evolution is None and has_coarser(case)
 
 
-def _levels(case: Case, problem: ContactProblem) -> int | None:
-    """Return the number of meshes, the finest one counted; None for all that pay."""
-    newton = case.solver if isinstance(case.solver, NewtonOptions) else NewtonOptions()
-    # In the plane a second coarser one takes more time than it saves on the first.
-    one = newton.nested_levels is None and problem.dim == 2 and not newton.nested
-    return 2 if one else newton.nested_levels
-
-
-def _linear(case: Case, problem: ContactProblem) -> Literal["auto", "lu", "iterative"]:
-    """Return how the systems of the coarser meshes are solved: by multigrid where the finest are.
-
-    In 3-D that takes a quarter of the time of a factorisation from 2,000 unknowns on. Where it
-    fails a start is lost, and no solution.
-    """
-    layout, linear = problem.equilibrium.layout, case.solver.linear
-    quick = layout.dim == 3 and not layout.coupled and multigrid.is_large(layout)
-    return "iterative" if linear == "auto" and quick else linear
-
-
 def nested_start(case: Case, problem: ContactProblem, **replacements: Any) -> State:
     """Solve on all coarser meshes, each from the one before, and carry that to a problem's.
 
     Collective.
     """
-    options = NewtonOptions(
-        tolerance=max(COARSE_TOLERANCE, case.solver.tolerance), linear=_linear(case, problem)
-    )
+    layout, solver = problem.equilibrium.layout, case.solver
+    newton = solver if isinstance(solver, NewtonOptions) else NewtonOptions()
+    levels, linear = newton.nested_levels, solver.linear
+    if levels is None and layout.dim == 2 and not newton.nested:
+        levels = 2  # a second coarser one takes more time than it saves on the first
+    if linear == "auto" and layout.dim == 3 and not layout.coupled and multigrid.is_large(layout):
+        # A quarter of the time of a factorisation from 2,000 unknowns on. Where it fails a start
+        # is lost, and no solution.
+        linear = "iterative"
+    options = NewtonOptions(tolerance=max(COARSE_TOLERANCE, solver.tolerance), linear=linear)
     last: tuple[ContactProblem, State] | None = None
-    for level in coarser_cases(case, _levels(case, problem)):
+    for level in coarser_cases(case, levels):
         coarse = build_problem(level, problem.comm, **replacements)
         start = None if last is None else prolong(*last, coarse)
         last = coarse, Newton(coarse, options).solve(start)[0]
@@ -89,7 +76,7 @@ def nested_start(case: Case, problem: ContactProblem, **replacements: Any) -> St
 
 
 def prolong(coarse: ContactProblem, state: State, fine: ContactProblem) -> State:
-    """Carry a state of a coarse problem to a finer one. Collective."""
+    """Carry a state of a coarse problem, in a static step, to a finer one. Collective."""
     body, before = fine.equilibrium, coarse.equilibrium
     x = carry(before.function(state.x), body.space).x.array.copy()
     if coarse.piezoelectric:
@@ -99,20 +86,7 @@ def prolong(coarse: ContactProblem, state: State, fine: ContactProblem) -> State
     points = coarse.nodes.gather(coarse.nodes.points)
     values = _interpolate(points, coarse.nodes.gather(forces), fine.nodes.points)
     multipliers = Multipliers.of(fine.nodes, project_half_line(values[:, 0]), values[:, 1:])
-    history = transferred(state.history, coarse, fine)
-    return State(body.prescribe(x, fine.time), multipliers, fine.time, history)
-
-
-def transferred(history: History, coarse: ContactProblem, fine: ContactProblem) -> History:
-    """Carry a history to the contact nodes and quadrature points of a finer mesh. Collective."""
-    arrays = fine.initial.arrays()
-    for place in history.places:
-        given, at = history.arrays(place), fine.points(place)
-        points = np.concatenate(coarse.comm.allgather(coarse.points(place)))
-        for name, array in given.items():
-            values = np.concatenate(coarse.comm.allgather(array.reshape(len(array), -1)))
-            arrays[name] = _interpolate(points, values, at).reshape(arrays[name].shape)
-    return fine.initial.replaced(arrays)
+    return State(body.prescribe(x, fine.time), multipliers, fine.time, fine.history)
 
 
 def _interpolate(points: Array, values: Array, at: Array) -> Array:
@@ -150,7 +124,9 @@ def coarser_cases(case: Case, levels: int | None = None) -> list[Case]:
     found: list[Case] = []
     mesh = _coarser(case.mesh)
     while mesh is not None and (levels is None or len(found) < levels - 1):
-        if levels is None and found and _nodes(mesh) < SMALL:
+        # Of a mesh from a file or another generator the number of nodes is not known.
+        nodes = np.inf if mesh.cells is None else np.prod(np.add(mesh.cells, 1))
+        if levels is None and found and nodes < SMALL:
             break
         found.insert(0, case.model_copy(update={"mesh": mesh}))
         mesh = _coarser(mesh)
@@ -170,25 +146,13 @@ def has_coarser(case: Case) -> bool:
 
 def _coarser(mesh: Mesh) -> Mesh | None:
     """Return the next coarser mesh, if there is one."""
-    cells = mesh.cells
     if mesh.refine > 0:
         return mesh.model_copy(update={"refine": mesh.refine - 1})
-    if cells is not None and min(cells) >= 2 * COARSEST:
-        coarser = mesh.model_copy(update={"cells": tuple((n + 1) // 2 for n in cells)})
-        return coarser if _fits(coarser) else None
-    return None
-
-
-def _fits(mesh: Mesh) -> bool:
-    """Tell whether the parts of a rectangle or box end at positions of its grid."""
-    assert mesh.generator and mesh.origin and mesh.size and mesh.cells
+    if mesh.cells is None or min(mesh.cells) < 2 * COARSEST:
+        return None
+    coarser = mesh.model_copy(update={"cells": tuple((n + 1) // 2 for n in mesh.cells)})
     try:
-        grid.plan(mesh.generator, mesh.origin, mesh.size, mesh.cells, mesh.pieces)
-    except grid.GridError:
-        return False
-    return True
-
-
-def _nodes(mesh: Mesh) -> float:
-    """Return the number of vertices of a generated mesh; infinity if it is not known."""
-    return np.inf if mesh.cells is None else float(np.prod([n + 1 for n in mesh.cells]))
+        coarser.check_grid()
+    except grid.GridError:  # a part ends between positions of its grid
+        return None
+    return coarser

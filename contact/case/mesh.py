@@ -183,7 +183,7 @@ class Mesh(Section):
         if self.diagonal is not None and self.generator != "rectangle":
             raise fault("diagonal", self.diagonal, "diagonal for a rectangle only")
         if self.generator is not None and self.sides:
-            self._check_grid(self.generator)
+            self._check_keys()
             return self
         for key in ("origin", "size", "cells", "parts"):
             if getattr(self, key):
@@ -192,16 +192,27 @@ class Mesh(Section):
             raise fault("parameters", self.parameters, "parameters of a generator only")
         return self
 
-    def _check_grid(self, generator: str) -> None:
+    def _check_keys(self) -> None:
         for key, value in self.parameters.items():
             raise fault(f"parameters.{key}", value, "parameters of another generator only")
         for key in ("size", "cells"):
             if getattr(self, key) is None:
                 raise fault(key, Words("missing"), f"a list of {self.dimension} numbers")
         try:
-            grid.plan(generator, *self._grid)
+            self.check_grid()
         except grid.GridError as error:
             raise fault(error.key, error.given, error.accepted) from None
+
+    def check_grid(self) -> None:
+        """Refuse parts of a rectangle or box that do not end at positions of its grid.
+
+        Raises
+        ------
+        GridError
+            If one does not, or a size is none.
+        """
+        assert self.generator is not None
+        grid.plan(self.generator, *self._grid)
 
     @property
     def _grid(self) -> tuple[Any, Any, Any, Any]:

@@ -15,7 +15,6 @@ from mpi4py import MPI
 from contact import evolve, parse_case, solve
 from contact.case.build import build_problem
 from contact.history import QUADRATURE_POINTS
-from contact.nesting import prolong
 from contact.output.checkpoint import read_steps
 from contact.output.fields import DerivedFields
 from forms.hencky import Isotropic, Linear, secant_stress
@@ -148,14 +147,3 @@ def test_a_state_without_its_history_is_of_another_step():
     assert forces[0] / forces[1] == pytest.approx(ratio / undamaged, rel=1e-6)
     assert not second.near(virgin)
     assert problem.commit(first).near(second.history, rtol=1e-14)
-
-
-def test_a_history_is_carried_to_a_finer_mesh():
-    law = Damage(YOUNG, POISSON)
-    coarse, fine = (build_problem(case(cells), MPI.COMM_SELF, law=law) for cells in (4, 8))
-    *_, state = evolve(coarse, [1.0, 2.0])
-    carried = prolong(coarse, state, fine)
-    assert carried.history.arrays()["material.kappa"] == pytest.approx(
-        expected([1.0])[0][1], rel=1e-6
-    )
-    assert carried.history["slip"].place != QUADRATURE_POINTS
