@@ -298,12 +298,6 @@ def run_schedule(
         seconds={"setup": setup, "solve": time.perf_counter() - clock - setup, "output": 0.0},
         steps=records,
     )
-    if records and records[-1].unloaded > 0:
-        solution.warnings.append(
-            f"{records[-1].unloaded:.1%} of the body unload from the plastic range in a "
-            "step: Hencky's law is nonlinear elasticity, and they come back the way they went; a "
-            "metal would keep a part of its strain"
-        )
     announce(solution)
     return solution
 

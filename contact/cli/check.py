@@ -82,7 +82,7 @@ def _counts(sets: Mapping[str, Indices], comm: MPI.Intracomm) -> list[str]:
 
 def expectations(problem: ContactProblem) -> list[str]:
     """Return lines on the mesh and on the expected effect of the loads. Collective."""
-    warnings = [f"# warning: {text}" for text, _ in (fitting(problem), passing(problem)) if text]
+    warnings = [f"# warning: {text}" for text in (*fitting(problem), *passing(problem))]
     return [*_quality(problem), *_sizes(problem), *warnings]
 
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scipy import linalg
 
 from contact.mesh.entities import cells_at, owned_among
-from contact.output.solution import Remark, Solution
+from contact.output.solution import Note, Remark, Solution
 from contact.problem.kkt import residual_forces
 from contact.problem.problem import ContactProblem
 from contact.problem.rigid_modes import (
@@ -62,28 +62,28 @@ def choices(solution: Solution) -> Iterator[Remark]:
         if size > FINER * other_size:
             sizes = f"facets of {other_size:.3g} against {size:.3g}"
             ratio = size / other_size
-            yield f"{sides}: the other side is {ratio:.3g} times finer ({sizes}): {better}", False
+            yield f"{sides}: the other side is {ratio:.3g} times finer ({sizes}): {better}"
         elif young > SOFTER * other_young and size >= other_size:
             ratio = young / other_young
-            yield f"{sides}: the other side is {ratio:.3g} times softer: {better}", False
+            yield f"{sides}: the other side is {ratio:.3g} times softer: {better}"
         # Beyond the rim of the other side pressures end, far from where they act.
         partly = entry.coupling.covered < HALF
         if partly.any():
-            yield _partly(solution, entry.coupling.nodes[partly], sides)
-        yield _slides(solution, entry.coupling.nodes, max(size, other_size), sides)
+            yield from _partly(solution, entry.coupling.nodes[partly], sides)
+        yield from _slides(solution, entry.coupling.nodes, max(size, other_size), sides)
 
 
-def _partly(solution: Solution, nodes: NDArray[np.int64], sides: str) -> Remark:
+def _partly(solution: Solution, nodes: NDArray[np.int64], sides: str) -> Iterator[Remark]:
     """Warn of nodes that carry pressure though less than half of their area faces anything."""
     problem = solution.problem
     count = problem.comm.allreduce(int(_pressed(problem, solution.state, nodes).sum()), op=MPI.SUM)
     if count == 0:
-        return "", True
-    return (
+        return
+    yield (
         f"{sides}: {count} nodes in contact face the other side with less than half of their "
         "area: the pressure there is a mean over the rest; facets that end where the other side "
         "does avoid that"
-    ), False
+    )
 
 
 def _pressed(problem: ContactProblem, state: State, nodes: NDArray[np.int64]) -> NDArray[np.bool_]:
@@ -96,20 +96,22 @@ def _pressed(problem: ContactProblem, state: State, nodes: NDArray[np.int64]) ->
     return np.asarray(pressed & np.isin(contact.nodes, local))
 
 
-def _slides(solution: Solution, nodes: NDArray[np.int64], size: float, sides: str) -> Remark:
+def _slides(
+    solution: Solution, nodes: NDArray[np.int64], size: float, sides: str
+) -> Iterator[Remark]:
     """Warn of points in contact that are in some step further along than a facet is long."""
     states = [record.state for record in solution.steps] or [solution.state]
     slips = [_slip(solution.problem, state, nodes) for state in states]
     largest = max(slips)
     if largest <= size:
-        return "", True
+        return
     when = f" at t = {states[slips.index(largest)].time:g}" if solution.steps else ""
-    return (
+    yield (
         f"{sides}: points in contact are {largest:.3g} along the surface from the points they faced"
         f"{when}, and facets are {size:.3g} long: in linear kinematics each stays "
         "opposite the point it faced in the beginning; where surfaces are curved, or end, the "
         "result is of another contact"
-    ), False
+    )
 
 
 def _slip(problem: ContactProblem, state: State, nodes: NDArray[np.int64]) -> float:
@@ -134,20 +136,20 @@ def _side(problem: ContactProblem, part: str) -> tuple[float, float]:
     return float(total[0] / total[1]), float(least)
 
 
-def regions(solution: Solution) -> Remark:
+def regions(solution: Solution) -> Iterator[Remark]:
     """Say where regions of the mesh, which somebody has named, have one material."""
     names, materials = solution.problem.domain.regions, solution.problem.body.materials
     if len(names) == 1 or len(materials) > 1:
-        return "", True
+        return
     which = ", ".join(names)
-    return f"the regions {which} have one material; [[material]] with `on` gives each its own", True
+    yield Note(f"the regions {which} have one material; [[material]] with `on` gives each its own")
 
 
-def passing(problem: ContactProblem) -> Remark:
+def passing(problem: ContactProblem) -> Iterator[Remark]:
     """Warn where components of the mesh are in no contact, so that nothing keeps them apart."""
     piece, count = problem.equilibrium.components
     if count == 1:
-        return "", True
+        return
     met = np.zeros(count, dtype=np.intc)
     for entry in problem.entries:
         if entry.coupling is not None:
@@ -156,15 +158,15 @@ def passing(problem: ContactProblem) -> Remark:
     problem.comm.Allreduce(MPI.IN_PLACE, met, op=MPI.MAX)
     alone = count - int(np.count_nonzero(met))
     if alone == 0:
-        return "", True
-    return (
+        return
+    yield (
         f"the mesh has {count} connected components, and {alone} of them can pass through "
         "the others: contact between two is asked for by [[contact]] with `on` one and "
         "`against` the other"
-    ), False
+    )
 
 
-def unresisted_motions(solution: Solution) -> Remark:
+def unresisted_motions(solution: Solution) -> Iterator[Remark]:
     """Warn of a rigid motion that supports leave free and contact hardly resists. Collective.
 
     A cylinder without friction rolls in its place against next to nothing, and wherever it has
@@ -174,7 +176,7 @@ def unresisted_motions(solution: Solution) -> Remark:
     """
     problem, body = solution.problem, solution.problem.equilibrium
     if not solution.converged:
-        return "", True
+        return
     residual = body.unbalanced(residual_forces(problem, solution.state))
     left = float(np.linalg.norm(body.sizes(residual)[0]))
     whole = problem.interface.stiffness * problem.nodes.sum(np.ones_like(problem.nodes.weight))
@@ -187,22 +189,21 @@ def unresisted_motions(solution: Solution) -> Remark:
         words = described(motion[:, None] / np.linalg.norm(motion), group.names)
         name = _named(group, motion)
         if share < EPS:
-            return (
+            yield (
                 f"nothing holds {name} against a rigid motion ({words}), which costs nothing: "
                 "of all places the one with the least displacements at the contact nodes is given; "
-                "friction, or a support against that motion, hold it",
-                False,
+                "friction, or a support against that motion, hold it"
             )
+            return
         moved = left * _reach(group, motion) / (whole * share)
         if share < HELD or moved > MOVED * largest:
-            return (
+            yield (
                 f"contact resists a rigid motion of {name} ({words}) by next to nothing: the "
                 f"mesh decides how far it goes, and the residual forces, {kkt.equilibrium:.1e} of "
                 f"all, may move that body by up to {moved:.2g}, where displacements reach "
-                f"{largest:.2g}; friction, or a support against that motion, hold it",
-                False,
+                f"{largest:.2g}; friction, or a support against that motion, hold it"
             )
-    return "", True
+            return
 
 
 def _named(group: Group, motion: Array) -> str:
@@ -224,19 +225,18 @@ def _named(group: Group, motion: Array) -> str:
     return ", ".join(found)
 
 
-def adrift(solution: Solution) -> Remark:
+def adrift(solution: Solution) -> Iterator[Remark]:
     """Say that nothing held a body any more before the last step. Collective."""
     pressures = np.array([record.row["max_pressure"] for record in solution.steps])
     pressed = pressures > NOTHING * pressures.max(initial=0.0)
     # Before it has been pressed it has not moved.
     free = np.flatnonzero(~pressed[:-1] & np.logical_or.accumulate(pressed)[:-1])
     if free.size == 0 or constrained_by_supports(solution.problem):
-        return "", True
-    return (
+        return
+    yield (
         f"at t = {solution.steps[free[0]].row['t']:g} nothing presses any more, and no support "
         "holds the body: it is then in one of many places, and so it is later; a "
-        "load that goes on pressing it, or a support, holds it",
-        False,
+        "load that goes on pressing it, or a support, holds it"
     )
 
 

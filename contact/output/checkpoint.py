@@ -114,8 +114,7 @@ class Checkpoints:
         """Write the checkpoint of the next step; the first replaces those of an earlier run."""
         self._count += 1
         arrays = _gathered(self._problem, record.state, self._where)
-        said = {"enthalpy": record.enthalpy, "unloaded": record.unloaded}
-        said["rounding"] = record.rounding
+        said = {"enthalpy": record.enthalpy, "rounding": record.rounding}
         arrays |= {"said": np.array(json.dumps(said)), "row": np.array(json.dumps(record.row))}
         arrays |= {TABLE + name: column for name, column in (record.table or {}).items()}
         on_root(self._problem.comm, lambda: self._write(_packed(arrays)))
@@ -242,7 +241,7 @@ def _read(problem: ContactProblem, path: Path, where: NDArray[np.intp]) -> StepR
         }
     said, row = json.loads(str(arrays["said"])), json.loads(str(arrays["row"]))
     state = _state(problem, arrays, where)
-    return StepRecord(state, row, table, said["enthalpy"], said["unloaded"], said["rounding"])
+    return StepRecord(state, row, table, said["enthalpy"], said["rounding"])
 
 
 def _state(

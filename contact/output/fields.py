@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from functools import cached_property, partial
 from itertools import accumulate
 from typing import NamedTuple
@@ -21,9 +21,10 @@ from contact import _compat
 from contact.body.description import Material
 from contact.body.equilibrium import BodyEquilibrium
 from contact.body.materials import law_with_constants, piezo_with_constants
-from contact.history import Evaluated
+from contact.history import BodyState, Evaluated
 from contact.output.quantities import BODY, values_of
 from contact.problem.problem import ContactProblem
+from contact.problem.state import State
 from contact.typing import Array
 from forms.elasticity import Anisotropic
 from forms.hencky import HistoryLaw, stress
@@ -229,11 +230,6 @@ class DerivedFields:
             for material in range(len(self.body.cells))
         ]
 
-    def volumes_of_materials(self) -> list[Array]:
-        """Return the volumes of these cells, shape (cells,) each."""
-        volumes = self._volumes()
-        return [volumes[cells] for cells in self.body.cells]
-
     def extremes(self) -> list[Extremes]:
         """Return the largest values over the cells (their nodes, for degree 2), a material."""
         volume, found = self._volumes(), []
@@ -347,49 +343,35 @@ def deformation(body: BodyEquilibrium, x: Array) -> Deformation:
     return Deformation(float(extremes[0]), float(-extremes[1]), float(extremes[2]))
 
 
-class Unloading:
-    """Follows |dev eps| from step to step.
+def unloaded(problem: ContactProblem, states: Sequence[State]) -> float:
+    """Return the largest share of a body that has unloaded from the plastic range in a step.
 
     Hencky's law is nonlinear elasticity: it unloads along its loading path, as no metal does. Where
     |dev eps| decreases in the plastic range, its results are no longer those of plasticity.
+    Collective.
 
     Parameters
     ----------
-    problem
-        The problem.
-    x
-        Local unknowns from which on it is followed. Collective.
-
-    Attributes
-    ----------
-    share
-        Largest share of the body (volume) that has unloaded from the plastic range in a step.
+    problem, states
+        The problem, and the states at the ends of all of its steps.
     """
-
-    def __init__(self, problem: ContactProblem, state: Evaluated) -> None:
-        self.share = 0.0
-        body = problem.equilibrium
-        self._body = body
-        self._fields = None if body.linear else DerivedFields(body, state)
-        if self._fields is not None:
-            self._strains = self._fields.strains()
-            self._volumes = self._fields.volumes_of_materials()
-            self._whole = body.comm.allreduce(sum(v.sum() for v in self._volumes), op=MPI.SUM)
-
-    def follow(self, state: Evaluated) -> None:
-        """Look at the end of the next step. Collective."""
-        if self._fields is None:
-            return
-        self._fields.move_to(state)
-        before, self._strains = self._strains, self._fields.strains()
-        back = 0.0
-        for material, volumes, old, new in zip(
-            self._body.body.materials, self._volumes, before, self._strains, strict=True
+    body = problem.equilibrium
+    if body.linear or not states:
+        return 0.0
+    fields = DerivedFields(body, BodyState(body.rest()))
+    of_cells = fields._volumes()
+    volumes = [of_cells[cells] for cells in body.cells]
+    sums, after = np.zeros(len(states) + 1), fields.strains()
+    sums[-1] = sum(float(own.sum()) for own in volumes)
+    for k, state in enumerate(states):
+        fields.move_to(state)
+        before, after = after, fields.strains()
+        for material, own, old, new in zip(
+            body.body.materials, volumes, before, after, strict=True
         ):
-            if isinstance(material.law, Anisotropic | HistoryLaw):
-                continue
-            modulus = np.asarray(material.law.secant_modulus(old**2), dtype=float)
-            yielded = modulus < (1 - SOFTENED) * float(material.law.shear)
-            back += float(volumes @ (yielded & (new < (1 - DECREASE) * old)).mean(axis=1))
-        share = self._body.comm.allreduce(back, op=MPI.SUM) / self._whole
-        self.share = max(self.share, float(share))
+            if not isinstance(material.law, Anisotropic | HistoryLaw):
+                modulus = np.asarray(material.law.secant_modulus(old**2), dtype=float)
+                yielded = modulus < (1 - SOFTENED) * float(material.law.shear)
+                sums[k] += own @ (yielded & (new < (1 - DECREASE) * old)).mean(axis=1)
+    body.comm.Allreduce(MPI.IN_PLACE, sums, op=MPI.SUM)
+    return float(sums[:-1].max() / sums[-1])

@@ -10,8 +10,8 @@ from mpi4py import MPI
 
 from contact.interface.current import Conductor
 from contact.output import bodies
-from contact.output.fields import DerivedFields, deformation
-from contact.output.solution import Remark, Solution
+from contact.output.fields import DerivedFields, deformation, unloaded
+from contact.output.solution import Note, Remark, Solution
 from contact.problem.kkt import left_as_pressures, residual_forces
 from contact.problem.problem import ContactProblem
 from contact.tolerances import LARGEST_VIOLATION
@@ -57,38 +57,49 @@ def review(solution: Solution) -> None:
     """Add all remarks to the notes and warnings of a solution. Collective."""
     body, x = solution.problem.equilibrium, solution.state.x
     extremes = DerivedFields(body, solution.state).extremes()
-    solution.max_dev_strain = max(largest.strain for largest in extremes)
+    strains = [largest.strain for largest in extremes]
+    solution.max_dev_strain = max(strains)
     solution.max_von_mises = max(largest.von_mises for largest in extremes)
     if any(largest.yields for largest in extremes):
         solution.plastic_share = sum(largest.yielded for largest in extremes) / sum(
             largest.volume for largest in extremes
         )
     solution.deformation = deformation(body, x)
-    for text, good in (
-        *monotonicity(solution, [largest.strain for largest in extremes]),
+    for remarks in (
+        unloading(solution),
+        monotonicity(solution, strains),
         small_strain(solution),
-        chords(solution),
         coarse_curves(solution),
         fitting(solution.problem),
-        preload(solution),
-        falling(solution),
+        layers(solution),
         untouched(solution),
         resolution(solution),
         rounding(solution),
         unknown_pressures(solution),
         beside_loads(solution),
         sliding(solution),
-        *conductivity(solution),
+        conductivity(solution),
         ramp(solution),
-        *bodies.choices(solution),
+        bodies.choices(solution),
         bodies.passing(solution.problem),
         bodies.regions(solution),
         bodies.unresisted_motions(solution),
         bodies.adrift(solution),
         giving_way(solution),
     ):
-        if text:
-            (solution.notes if good else solution.warnings).append(text)
+        for text in remarks:
+            (solution.notes if isinstance(text, Note) else solution.warnings).append(text)
+
+
+def unloading(solution: Solution) -> Iterator[Remark]:
+    """Say how much of a body of Hencky's materials has unloaded from the plastic range."""
+    share = unloaded(solution.problem, [record.state for record in solution.steps])
+    if share > 0:
+        yield (
+            f"{share:.1%} of the body unload from the plastic range in a step: Hencky's law is "
+            "nonlinear elasticity, and they come back the way they went; a metal would keep a part "
+            "of its strain"
+        )
 
 
 def monotonicity(solution: Solution, strains: Sequence[float]) -> Iterator[Remark]:
@@ -96,27 +107,18 @@ def monotonicity(solution: Solution, strains: Sequence[float]) -> Iterator[Remar
     dim = 3 if solution.problem.domain.revolved else solution.problem.dim
     for material, strain in zip(solution.problem.body.materials, strains, strict=True):
         # (h1) speaks of Hencky laws; a crystal's stiffness is positive definite, or refused.
-        law = material.law
-        if np.isfinite(strain) and not isinstance(law, Anisotropic):
-            yield _monotonicity(law, _place(material.on), strain, dim)
-            yield _unstrained(law, _place(material.on))
-
-
-def _place(on: Sequence[str]) -> str:
-    return f" in {', '.join(on)}" if on else ""
-
-
-def _unstrained(law: Hencky, place: str) -> Remark:
-    """Compare g(0) of a law with mu_1, which stands for it wherever a size is asked for."""
-    modulus, shear = float(law.secant_modulus(np.zeros(1))[0]), float(law.shear)
-    if abs(modulus - shear) <= OFF * abs(shear):
-        return "", True
-    return (
-        f"the secant modulus{place} is {modulus:.4g} without strain, and Young's modulus and "
-        f"Poisson's ratio say mu_1 = {shear:.4g}: the deviator follows the first, and changes of "
-        "volume those two",
-        False,
-    )
+        law, place = material.law, f" in {', '.join(material.on)}" if material.on else ""
+        if not np.isfinite(strain) or isinstance(law, Anisotropic):
+            continue
+        yield _monotonicity(law, place, strain, dim)
+        # g(0) and mu_1, which stands for it wherever a size is asked for.
+        modulus, shear = float(law.secant_modulus(np.zeros(1))[0]), float(law.shear)
+        if abs(modulus - shear) > OFF * abs(shear):
+            yield (
+                f"the secant modulus{place} is {modulus:.4g} without strain, and Young's modulus "
+                f"and Poisson's ratio say mu_1 = {shear:.4g}: the deviator follows the first, and "
+                "changes of volume those two"
+            )
 
 
 def _monotonicity(law: Hencky, place: str, strain: float, dim: int) -> Remark:
@@ -139,61 +141,51 @@ def _monotonicity(law: Hencky, place: str, strain: float, dim: int) -> Remark:
         f"{report.largest:.4g}, (d/2) k_0 = {report.ceiling:.4g}, alpha = {report.alpha:.4g}, "
         f"beta = {report.beta:.4g}"
     )
-    return "; ".join(said), report.holds
+    return Note("; ".join(said)) if report.holds else "; ".join(said)
 
 
-def small_strain(solution: Solution) -> Remark:
+def small_strain(solution: Solution) -> Iterator[Remark]:
     """Say where strains or rotations are no small ones, or the deformed body turns inside out.
 
     To turn by an angle a makes the determinant 1 + a^2, and strains at most 1 + sqrt(3) |eps|.
     """
     made = solution.deformation
     if made is None:
-        return "", True
+        return
     turned = made.largest_volume - 1 - np.sqrt(3) * made.largest_strain
-    if max(made.largest_strain, turned) <= SMALL:
-        return "", True
-    strained = made.largest_strain > SMALL
-    text = "strains are not small" if strained else "rotations are not small"
-    text += (
-        f": |eps| reaches {made.largest_strain:.3g}, and det(I + grad u) lies "
-        f"between {made.least_volume:.3g} and {made.largest_volume:.3g}"
-    )
-    if made.least_volume <= 0:
-        text += ": where it is not positive the deformed body would pass through itself"
-    return f"{text}; linear kinematics is a formal model there", False
+    if max(made.largest_strain, turned) > SMALL:
+        strained = made.largest_strain > SMALL
+        text = "strains are not small" if strained else "rotations are not small"
+        text += (
+            f": |eps| reaches {made.largest_strain:.3g}, and det(I + grad u) lies "
+            f"between {made.least_volume:.3g} and {made.largest_volume:.3g}"
+        )
+        if made.least_volume <= 0:
+            text += ": where it is not positive the deformed body would pass through itself"
+        yield f"{text}; linear kinematics is a formal model there"
 
 
-def chords(solution: Solution) -> Remark:
-    """Say where nodes on straight facets were found in the foundation, and put on it."""
-    cut = solution.problem.nodes.cut
-    if cut == 0:
-        return "", True
-    return (
-        f"straight facets of the curved contact part reach {cut:.3g} into the foundation: "
-        "the gap there is taken as 0; a mesh that is finer from the beginning has less of it",
-        False,
-    )
-
-
-def coarse_curves(solution: Solution) -> Remark:
-    """Say where facets deviate from a curved surface by as much as contact closes gaps."""
-    problem = solution.problem
+def coarse_curves(solution: Solution) -> Iterator[Remark]:
+    """Say where straight facets of a curved surface lie in the foundation, or decide the gap."""
+    problem, nodes = solution.problem, solution.problem.nodes
+    if nodes.cut > 0:
+        yield (
+            f"straight facets of the curved contact part reach {nodes.cut:.3g} into the "
+            "foundation: the gap there is taken as 0; a mesh that is finer from the beginning has "
+            "less of it"
+        )
     closed = solution.status != "open"
-    size = problem.nodes.maximum(np.where(closed, np.abs(problem.nodes.gap), 0.0))
-    deviation = problem.nodes.deviation
-    if not size > 1e-9 * problem.domain.size or deviation <= DEVIATION * size:
-        return "", True
-    return (
-        f"straight facets deviate by up to {deviation:.3g} from a curved contact surface, and gaps "
-        f"or overlaps that contact closes are at most {size:.3g}: pressures are off by about that "
-        "share; a mesh that is finer from the beginning, or space.degree = 2 without refinement, "
-        "has less of it",
-        False,
-    )
+    size = nodes.maximum(np.where(closed, np.abs(nodes.gap), 0.0))
+    if size > 1e-9 * problem.domain.size and nodes.deviation > DEVIATION * size:
+        yield (
+            f"straight facets deviate by up to {nodes.deviation:.3g} from a curved contact "
+            f"surface, and gaps or overlaps that contact closes are at most {size:.3g}: pressures "
+            "are off by about that share; a mesh that is finer from the beginning, or "
+            "space.degree = 2 without refinement, has less of it"
+        )
 
 
-def fitting(problem: ContactProblem) -> Remark:
+def fitting(problem: ContactProblem) -> Iterator[Remark]:
     """Say where a curved part has no gap anywhere: its foundation has then its very shape."""
     comm, size = problem.comm, problem.domain.size
     found = []
@@ -205,45 +197,37 @@ def fitting(problem: ContactProblem) -> Remark:
         gap = comm.allreduce(float(np.abs(nodes.gap).max(initial=0.0)), op=MPI.MAX)
         if contact.against is None and not contact.foundation.is_shape:
             found += [contact.on] * (not flat and gap <= 1e-9 * size)
-    if not found:
-        return "", True
-    return (
-        f"the part {', '.join(found)} is curved and its gap is 0 everywhere: the foundation has "
-        "the body's own shape; for a plane, sphere... in front of it give contact.foundation, and "
-        "a gap otherwise",
-        False,
-    )
+    if found:
+        yield (
+            f"the part {', '.join(found)} is curved and its gap is 0 everywhere: the foundation "
+            "has the body's own shape; for a plane, sphere... in front of it give "
+            "contact.foundation, and a gap otherwise"
+        )
 
 
-def preload(solution: Solution) -> Remark:
-    """Say where a layer is thicker than the gap, and presses on the undeformed body."""
+def layers(solution: Solution) -> Iterator[Remark]:
+    """Say where a layer presses on the undeformed body, or p_nu falls.
+
+    (h6) asks for less, uniqueness for a law that does not fall.
+    """
     problem = solution.problem
-    law = problem.interface.law
+    law, size = problem.interface.law, problem.domain.size
     if law.layer is None:
-        return "", True
+        return
     least = -problem.nodes.maximum(-law.touch, -np.inf)
-    if least >= -1e-9 * problem.domain.size:
-        return "", True
-    return (
-        f"the layer is thicker than the gap, by up to {-least:.4g}: it presses on the undeformed "
-        "body",
-        False,
-    )
+    if least < -1e-9 * size:
+        yield (
+            f"the layer is thicker than the gap, by up to {-least:.4g}: it presses on the "
+            "undeformed body"
+        )
+    if any(contact.layer is not None and contact.layer.falls(size) for contact in problem.contacts):
+        yield (
+            "the layer presses less the deeper it is pressed, p_nu falls with the penetration: "
+            "several solutions may exist, and this is one of them"
+        )
 
 
-def falling(solution: Solution) -> Remark:
-    """Say where p_nu falls: (h6) asks for less, uniqueness for a law that does not."""
-    layers, size = [c.layer for c in solution.problem.contacts], solution.problem.domain.size
-    if not any(layer is not None and layer.falls(size) for layer in layers):
-        return "", True
-    text = (
-        "the layer presses less the deeper it is pressed, p_nu falls with the penetration: several "
-        "solutions may exist, and this is one of them"
-    )
-    return text, False
-
-
-def resolution(solution: Solution) -> Remark:
+def resolution(solution: Solution) -> Iterator[Remark]:
     """Say where the mesh is too coarse for pressures and zones of contact.
 
     A zone that ends within the contact part is looked at; one that covers it has the size that it
@@ -253,7 +237,7 @@ def resolution(solution: Solution) -> Remark:
     closed = solution.status != "open"
     count = int(nodes.comm.allreduce(int(np.count_nonzero(closed)), op=MPI.SUM))
     if count == 0 or count == nodes.size:
-        return "", True
+        return
     points = nodes.gather(nodes.points[closed])
     if problem.dim == 3:
         # Of a round zone with that many nodes.
@@ -266,16 +250,15 @@ def resolution(solution: Solution) -> Remark:
         width = float(2 * np.sqrt(solution.contact_area / np.pi))
     else:
         across, width = count, solution.contact_area
-    if across >= ACROSS:
-        return "", True
-    return (
-        f"the mesh is too coarse for the pressures: {across:.3g} nodes across the contact zone; "
-        f"accepted: {ACROSS} at least, for instance elements of at most {width / ACROSS:.2g} there",
-        False,
-    )
+    if across < ACROSS:
+        yield (
+            f"the mesh is too coarse for the pressures: {across:.3g} nodes across the contact "
+            f"zone; accepted: {ACROSS} at least, for instance elements of at most "
+            f"{width / ACROSS:.2g} there"
+        )
 
 
-def untouched(solution: Solution) -> Remark:
+def untouched(solution: Solution) -> Iterator[Remark]:
     """Say that no node is in contact: a load step may end like that, a static problem is not one.
 
     A shape with a tip may also reach into the body between the nodes.
@@ -283,7 +266,7 @@ def untouched(solution: Solution) -> Remark:
     problem = solution.problem
     closed = bool(np.any(solution.status != "open"))
     if problem.since is not None or problem.comm.allreduce(closed, op=MPI.LOR):
-        return "", True
+        return
     text = (
         "nothing touches: no contact node has met the foundation; it is too far away, or narrower "
         "than the elements there"
@@ -291,49 +274,48 @@ def untouched(solution: Solution) -> Remark:
     masters = problem.equilibrium.global_unknowns
     if np.any(masters.free & masters.mechanical):
         text += "; a rigid part that is free may be anywhere that it touches nothing"
-    return text, False
+    yield text
 
 
-def rounding(solution: Solution) -> Remark:
+def rounding(solution: Solution) -> Iterator[Remark]:
     """Say where forces balance to their rounding alone, which is more than the tolerance."""
     granted, asked = solution.rounding, solution.outcome.allowed.equilibrium
-    if granted <= asked:
-        return "", True
-    return (
-        f"rounding decides how well the forces balance: {granted:.1e} of them is no more than "
-        "rounding of displacements and potentials makes of stresses and currents, and does not "
-        f"count, though the tolerance is {asked:g}; a mesh with fewer cells along a slender body, "
-        "or less of electric.k_e, has less of it",
-        False,
-    )
+    if granted > asked:
+        yield (
+            f"rounding decides how well the forces balance: {granted:.1e} of them is no more than "
+            "rounding of displacements and potentials makes of stresses and currents, and does not "
+            f"count, though the tolerance is {asked:g}; a mesh with fewer cells along a slender "
+            "body, or less of electric.k_e, has less of it"
+        )
 
 
-def unknown_pressures(solution: Solution) -> Remark:
+def unknown_pressures(solution: Solution) -> Iterator[Remark]:
     """Say where contact forces are hardly more than the residual of far larger ones. Collective."""
     left = left_as_pressures(solution.problem, solution.state)
     unknown = max(solution.outcome.kkt.unknown, left)
     loads = solution.problem.equilibrium.load_sizes(solution.state.time)[0].max()
-    moved = solution.problem.comm.allreduce(bool(np.any(solution.problem.start().x)), op=MPI.LOR)
-    if not (solution.converged and unknown > KNOWN and (moved or loads > 0)):
-        return "", True
-    return (
-        f"contact forces are known to {unknown:.1e} of their size only: the residual "
-        "of far larger forces in the bodies does not count as a wrong pressure; "
-        'a smaller solver.tolerance, linear = "lu", or smaller displacements and stresses '
-        "elsewhere, make them known better",
-        False,
-    )
+    if solution.converged and unknown > KNOWN and (_moved(solution.problem) or loads > 0):
+        yield (
+            f"contact forces are known to {unknown:.1e} of their size only: the residual "
+            "of far larger forces in the bodies does not count as a wrong pressure; "
+            'a smaller solver.tolerance, linear = "lu", or smaller displacements and stresses '
+            "elsewhere, make them known better"
+        )
 
 
-def beside_loads(solution: Solution) -> Remark:
+def _moved(problem: ContactProblem) -> bool:
+    """Whether supports move the body. Collective."""
+    return bool(problem.comm.allreduce(bool(np.any(problem.start().x)), op=MPI.LOR))
+
+
+def beside_loads(solution: Solution) -> Iterator[Remark]:
     """Say where a residual that is small beside the reactions is large beside the loads.
 
     Clamps of a slender beam bear moments of a thousand times the loads. Where supports move the
     body, their reactions are among its loads.
     """
     problem, state = solution.problem, solution.state
-    body = problem.equilibrium
-    moved = problem.comm.allreduce(bool(np.any(problem.start().x)), op=MPI.LOR)
+    body, moved = problem.equilibrium, _moved(problem)
     residual = residual_forces(problem, state)
     on_contact = np.zeros_like(residual)
     problem.interface.add_forces(on_contact, state.x, state.forces)
@@ -344,26 +326,50 @@ def beside_loads(solution: Solution) -> Remark:
     # Where supports bear no more than the loads, the residual is rounding.
     much = (acting > 0) & (left > most * acting) & (borne > acting)
     if moved or not solution.converged or not much.any():
-        return "", True
+        return
     worst = np.argmax(np.where(much, left, 0.0) / np.where(much, acting, 1.0))
     left, borne = left[worst] / acting[worst], borne[worst] / acting[worst]
-    return (
+    yield (
         f"{left:.1e} of loads and contact forces are out of balance, and displacements "
         f"about as far off: the supports bear {borne:.3g} times as much, beside which it "
         "is nothing; fewer cells along a slender body, linear elements, or a smaller tolerance "
-        "where rounding allows it, bring them nearer",
-        False,
+        "where rounding allows it, bring them nearer"
     )
 
 
-def _friction(solution: Solution) -> tuple[float, float] | None:
-    """Return mu* and L_mu; None without friction, or with Tresca's. Collective."""
+def sliding(solution: Solution) -> Iterator[Remark]:
+    """Set L_mu beside the bound that a sliding block gives.
+
+    A block of height H under the pressure p slides by s where G (U - s)/H = mu(s) p; the
+    left-hand side falls faster than the right for all s if L_mu < G/(p H), and only then is s
+    unique for every U. A pressure that is uneven is larger where most of it acts: there it counts
+    with its own weight, and half of G.
+    """
     problem, law = solution.problem, solution.problem.interface.friction.law
     if law is None:
-        return None
-    own = (law.maximum, law.lipschitz) if problem.nodes.nodes.size else (0.0, 0.0)
+        return
+    nodes, pressure = problem.nodes, solution.pressure
+    own = (law.maximum, law.lipschitz) if nodes.nodes.size else (0.0, 0.0)
     maximum, lipschitz = (problem.comm.allreduce(value, op=MPI.MAX) for value in own)
-    return (maximum, lipschitz) if np.isfinite(maximum) else None
+    if lipschitz == 0 or not np.isfinite(maximum):  # constant, or Tresca's
+        return
+    total = nodes.sum(pressure)
+    mean = nodes.sum(pressure**2) / total if total > 0 else 0.0
+    if mean <= 0:
+        return
+    bound = 0.5 * problem.scales.shear / (mean * problem.scales.height)
+    text = (
+        f"friction falls with the slip by up to L_mu = {lipschitz:.4g}/length of the pressure; a "
+        f"sliding block under the pressure {mean:.4g} has one solution where "
+        f"L_mu < {bound:.4g}/length"
+    )
+    if lipschitz < bound:
+        yield Note(text)
+    else:
+        yield (
+            f"several solutions may exist, and this is one reached from {solution.start}: {text}; "
+            "a mu that falls more slowly (a smaller rho) has fewer of them"
+        )
 
 
 def _conductor(solution: Solution) -> Conductor | None:
@@ -372,37 +378,6 @@ def _conductor(solution: Solution) -> Conductor | None:
     if conductor is None or not solution.problem.piezoelectric or conductor.psi.k_e == 0:
         return None
     return conductor
-
-
-def sliding(solution: Solution) -> Remark:
-    """Set L_mu beside the bound that a sliding block gives.
-
-    A block of height H under the pressure p slides by s where G (U - s)/H = mu(s) p; the
-    left-hand side falls faster than the right for all s if L_mu < G/(p H), and only then is s
-    unique for every U. A pressure that is uneven is larger where most of it acts: there it counts
-    with its own weight, and half of G.
-    """
-    problem, friction = solution.problem, _friction(solution)
-    if friction is None or friction[1] == 0:
-        return "", True
-    nodes, pressure = problem.nodes, solution.pressure
-    total = nodes.sum(pressure)
-    mean = nodes.sum(pressure**2) / total if total > 0 else 0.0
-    if mean <= 0:
-        return "", True
-    bound = 0.5 * problem.scales.shear / (mean * problem.scales.height)
-    text = (
-        f"friction falls with the slip by up to L_mu = {friction[1]:.4g}/length of the pressure; a "
-        f"sliding block under the pressure {mean:.4g} has one solution where "
-        f"L_mu < {bound:.4g}/length"
-    )
-    if friction[1] < bound:
-        return text, True
-    return (
-        f"several solutions may exist, and this is one reached from {solution.start}: {text}; a "
-        "mu that falls more slowly (a smaller rho) has fewer of them",
-        False,
-    )
 
 
 def conductivity(solution: Solution) -> Iterator[Remark]:
@@ -416,8 +391,7 @@ def conductivity(solution: Solution) -> Iterator[Remark]:
         yield (
             'the foundation never conducts, k_e has no effect: electric.law = "ramp" conducts only '
             'where u_nu > rho, and u_nu <= rho; "shifted" moves the ramp in front of the closing '
-            "gap",
-            False,
+            "gap"
         )
     if PerfectConductivity in laws:
         yield (
@@ -425,12 +399,11 @@ def conductivity(solution: Solution) -> Iterator[Remark]:
             "theorem says that there is a solution or only one. Where contact ends within the "
             "part, the place of its edge is not determined: a potential that lifts the body to the "
             "foundation leaves an interval for it, with a pressure that is singular there, one "
-            'that pushes it off no place; "shifted" with a large delta is continuous and decides',
-            False,
+            'that pushes it off no place; "shifted" with a large delta is continuous and decides'
         )
 
 
-def ramp(solution: Solution) -> Remark:
+def ramp(solution: Solution) -> Iterator[Remark]:
     """Set the ramp of psi beside the mesh, the effect of the current beside the stiffness.
 
     Of a column of height H with the stiffness C, coupling e and permittivity beta, the potential
@@ -441,11 +414,11 @@ def ramp(solution: Solution) -> Remark:
     problem = solution.problem
     conductor, piezo = _conductor(solution), problem.body.piezo
     if conductor is None or piezo is None or not conductor.psi.follows_gap:
-        return "", True
+        return
     scales, psi = problem.scales, conductor.psi
-    width, text = 1 / psi.delta, ""
+    width = 1 / psi.delta
     if width < 2 * scales.spacing:
-        text = (
+        yield (
             f"the mesh decides which contact nodes conduct: psi rises within 1/delta = "
             f"{width:.3g} of the gap, less than two of their spacings "
             f"(2 h = {2 * scales.spacing:.3g}); take a finer mesh, or electric.delta below "
@@ -458,16 +431,15 @@ def ramp(solution: Solution) -> Remark:
     coupling = float(np.abs(np.asarray(piezo.e)).max()) / (scales.bulk + 4 / 3 * scales.shear)
     number = psi.delta * largest * coupling * biot / (1 + biot)
     if number >= 1:
-        text += (text and "; ") + (
+        yield (
             f"several solutions may exist, and this is one reached from {solution.start}: the "
             f"current changes within 1/delta = {width:.3g} of the gap by so much that it opens or "
             f"closes gaps by itself (a column asks for a number below 1, and it is {number:.3g}); "
             "a smaller delta has fewer of them"
         )
-    return text, False
 
 
-def giving_way(solution: Solution) -> Remark:
+def giving_way(solution: Solution) -> Iterator[Remark]:
     """Say where penalties move contact nodes by much of the largest displacement. Collective.
 
     The residuals weigh penetrations and slips by E/length, or more. A flat body is stiffer by far:
@@ -476,7 +448,7 @@ def giving_way(solution: Solution) -> Remark:
     """
     problem = solution.problem
     if solution.method != "penalty" or problem.since is not None:
-        return "", True
+        return
     size = np.linalg.norm(solution.friction, axis=1)
     held = size < BELOW * solution.friction_bound
     slip = np.linalg.norm(solution.slip[held], axis=1)
@@ -488,12 +460,10 @@ def giving_way(solution: Solution) -> Remark:
         for values in (depth, slip)
     )
     largest = solution.max_displacement
-    if max(deep, far) <= LARGEST_VIOLATION * largest:
-        return "", True
-    which, key = ("touch penetrate", "contact") if deep > far else ("should stick slip", "slip")
-    return (
-        f"the penalties give way: nodes that {which} by up to {max(deep, far):.2g}, where "
-        f"displacements reach {largest:.2g}; a smaller solver.eps_{key}, or another method, brings "
-        "these nearer to their limit",
-        False,
-    )
+    if max(deep, far) > LARGEST_VIOLATION * largest:
+        which, key = ("touch penetrate", "contact") if deep > far else ("should stick slip", "slip")
+        yield (
+            f"the penalties give way: nodes that {which} by up to {max(deep, far):.2g}, where "
+            f"displacements reach {largest:.2g}; a smaller solver.eps_{key}, or another method, "
+            "brings these nearer to their limit"
+        )

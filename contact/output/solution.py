@@ -34,8 +34,12 @@ if TYPE_CHECKING:
     from contact.output.figures.figures import Gallery
 
 
-#: A text on a solution, empty for none, and whether it is a note rather than a warning.
-Remark: TypeAlias = tuple[str, bool]
+#: A text on a solution: a warning, or a `Note`.
+Remark: TypeAlias = str
+
+
+class Note(str):
+    """A remark that is no reason for care."""
 
 
 @dataclass(repr=False)

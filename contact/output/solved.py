@@ -42,8 +42,6 @@ class StepRecord:
         The contact nodes, as `table.contact_table` returns them; None on ranks other than 0.
     enthalpy
         Where the energy balance of the next step begins, see `problem.energy.Moment`.
-    unloaded
-        Largest share of the body that has unloaded from the plastic range in a step so far.
     rounding
         Largest `rounding` of the residuals of a step so far, see `problem.kkt.KKT`.
     """
@@ -52,7 +50,6 @@ class StepRecord:
     row: Mapping[str, float]
     table: Mapping[str, NDArray[Any]] | None
     enthalpy: float
-    unloaded: float = 0.0
     rounding: float = 0.0
 
     def __repr__(self) -> str:

@@ -12,9 +12,7 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 
 from contact.body.fields import Moving, steady
-from contact.history import BodyState
 from contact.methods.steps import LoadStep
-from contact.output.fields import Unloading
 from contact.output.quantities import STEPS, values_of
 from contact.output.resultants import nodes_of
 from contact.output.solution import Solution
@@ -42,18 +40,9 @@ class StepRecorder:
             here = problem.at(last.state.time, last.state.history)
             self._before = moment(here, last.state, self._before)
             self._before = replace(self._before, enthalpy=last.enthalpy)
-        self._unloading = Unloading(
-            problem, BodyState(self._before.x) if last is None else last.state
-        )
-        self._unloading.share = 0.0 if last is None else last.unloaded
         self._rounding = 0.0 if last is None else last.rounding
         self._driven = driven_part(problem)
         self._nodes = None if self._driven is None else nodes_of(problem, self._driven)
-
-    @property
-    def unloaded(self) -> float:
-        """Largest share of the body that has unloaded from the plastic range in a step."""
-        return self._unloading.share
 
     def record(self, step: LoadStep) -> StepRecord:
         """Return the record of a step that follows the last one. Collective."""
@@ -61,12 +50,11 @@ class StepRecorder:
         now = moment(problem, state, self._before)
         energies = balance(problem, state, self._before, now)
         self._before = now
-        self._unloading.follow(state)
         driven = None if self._nodes is None else _driven(problem, self._nodes, now)
         solution = _solution_of(step, energies, driven)
         table, row = contact_table(solution), values_of(STEPS, solution)
         self._rounding = max(self._rounding, step.outcome.kkt.rounding)
-        return StepRecord(state, row, table, now.enthalpy, self._unloading.share, self._rounding)
+        return StepRecord(state, row, table, now.enthalpy, self._rounding)
 
 
 def _solution_of(step: LoadStep, energies: Balance, driven: tuple[Array, Array] | None) -> Solution:
