@@ -13,8 +13,8 @@ from contact.case.file import load_case as load_case
 from contact.case.file import parse_case as parse_case
 from contact.case.material import make_material as make_material
 from contact.errors import InputError as InputError
-from contact.interface.current import Conductor as Conductor
 from contact.interface.friction import Friction as Friction
+from contact.interface.law import Conductor as Conductor
 from contact.interface.layer import Layer as Layer
 from contact.interface.obstacle import Cone as Cone
 from contact.interface.obstacle import Cylinder as Cylinder

@@ -25,7 +25,7 @@ from contact.case.section import (
 )
 from contact.case.shapes import Foundation
 from contact.interface import friction
-from contact.interface.current import Conductor
+from contact.interface.law import Conductor
 from contact.interface.layer import Layer
 from contact.interface.obstacle import GapFunction, Obstacle
 from contact.mesh.domain import Domain

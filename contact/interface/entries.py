@@ -21,9 +21,9 @@ from scipy import sparse
 
 from contact.arguments import naming, real
 from contact.errors import InputError
-from contact.interface.current import Conductor, HeldCurrent
 from contact.interface.friction import Friction, NodalFriction
 from contact.interface.jump import SlipHistory
+from contact.interface.law import Conductor, InterfaceLaw
 from contact.interface.layer import Layer
 from contact.interface.mortar.coupling import Coupling
 from contact.interface.mortar.lumping import Mixing
@@ -41,9 +41,27 @@ from forms.laws import (
 )
 
 
+def _each(name: str) -> Any:
+    """Return the method that evaluates those of this name, of each law at its own nodes."""
+
+    def at_each(self: Grouped, *given: Array) -> Array:
+        """Return the values at all nodes."""
+        return self.evaluated(name, given)
+
+    return at_each
+
+
+def _largest(name: str) -> Any:
+    """Return the property that is the largest one of the laws."""
+    return property(lambda self: max(getattr(law, name) for law in self.laws))
+
+
 @dataclass(frozen=True)
 class Grouped:
-    """Several laws in place of one.
+    """Laws of groups of nodes in place of one, of whatever kind (`forms.laws`).
+
+    Values are those of each law at its own nodes, constants the largest ones. The operator R is
+    one too: the pressure on one obstacle does not bound friction on another.
 
     Attributes
     ----------
@@ -64,101 +82,23 @@ class Grouped:
         """Return the bounds of groups of given sizes."""
         return tuple(int(bound) for bound in np.cumsum([0, *sizes]))
 
-    def _each(self, name: str, *arguments: Array) -> Array:
+    def evaluated(self, name: str, given: Sequence[Array]) -> Array:
         """Return a method of each law at its own nodes."""
         parts, label = [], self.label
         if label and name != "__call__":
             label = f"{label}: {name}"
         for law, (begin, end) in zip(self.laws, pairwise(self.bounds), strict=True):
-            here = [argument[begin:end] for argument in arguments]
+            here = [argument[begin:end] for argument in given]
             with naming(label) if label else nullcontext():
                 values = getattr(law, name)(*here)
                 parts.append(real(values, (end - begin,), "one number for each node"))
         return np.concatenate(parts) if len(parts) > 1 else parts[0]
 
-
-@dataclass(frozen=True)
-class GroupedPointwise(Grouped):
-    """p_nu, h_nu or phi_L."""
-
-    def __call__(self, s: Array) -> Array:
-        """Return the law at all nodes."""
-        return self._each("__call__", s)
-
-    def derivative(self, s: Array) -> Array:
-        """Return the derivative at all nodes."""
-        return self._each("derivative", s)
-
-
-@dataclass(frozen=True)
-class GroupedFriction(Grouped):
-    """Friction bounds, see `forms.laws.FrictionLaw`."""
-
-    @property
-    def maximum(self) -> float:
-        """Upper bound of s/p."""
-        return max(law.maximum for law in self.laws)
-
-    @property
-    def lipschitz(self) -> float:
-        """Lipschitz constant of s/p in the slip (1/length)."""
-        return max(law.lipschitz for law in self.laws)
-
-    def __call__(self, slip: Array, pressure: Array) -> Array:
-        """Return the bound at all nodes."""
-        return self._each("__call__", slip, pressure)
-
-    def by_slip(self, slip: Array, pressure: Array) -> Array:
-        """Return ds/d|u_tau|."""
-        return self._each("by_slip", slip, pressure)
-
-    def by_pressure(self, slip: Array, pressure: Array) -> Array:
-        """Return ds/dp."""
-        return self._each("by_pressure", slip, pressure)
-
-
-@dataclass(frozen=True)
-class GroupedConductivity(Grouped):
-    """Conductivities, see `forms.laws.Conductivity`."""
-
-    @property
-    def k_e(self) -> float:
-        """The largest conductivity."""
-        return max(law.k_e for law in self.laws)
-
-    @property
-    def delta(self) -> float:
-        """The largest slope of psi over k_e (1/length)."""
-        return max(law.delta for law in self.laws)
-
-    @property
-    def follows_gap(self) -> bool:
-        """Whether one of them does."""
-        return any(law.follows_gap for law in self.laws)
-
-    def at(self, s: Array, pressed: Array, loaded: Array) -> Array:
-        """Return the conductivity at all nodes."""
-        return self._each("at", s, pressed, loaded)
-
-    def gap_slope(self, s: Array, pressed: Array) -> Array:
-        """Return the derivative by s."""
-        return self._each("gap_slope", s, pressed)
-
-
-@dataclass(frozen=True)
-class GroupedSmoothing(Grouped):
-    """R within each group: the pressure on one obstacle does not bound friction on another."""
-
-    laws: tuple[Smoothing, ...]
-
-    @property
-    def radius(self) -> float:
-        """The largest radius."""
-        return max(law.radius for law in self.laws)
-
-    def __call__(self, values: Array) -> Array:
-        """Return R applied to nodal values, shape (n,). Collective."""
-        return self._each("__call__", values)
+    __call__, derivative = _each("__call__"), _each("derivative")
+    by_slip, by_pressure = _each("by_slip"), _each("by_pressure")
+    at, gap_slope = _each("at"), _each("gap_slope")
+    maximum, lipschitz, radius = _largest("maximum"), _largest("lipschitz"), _largest("radius")
+    k_e, delta, follows_gap = _largest("k_e"), _largest("delta"), _largest("follows_gap")
 
 
 #: Laws of an obstacle without friction, layer or current.
@@ -180,7 +120,7 @@ class Entry:
     friction, layer, conductor
         The laws there.
     held
-        The current through nodes of the part that cannot move; None without.
+        Nodes of the part that cannot move, but through which current flows; None without.
     coupling
         The other side of the nodes, where that is another body; None for a rigid foundation.
     mixing
@@ -192,7 +132,7 @@ class Entry:
     friction: Friction
     layer: Layer | None = None
     conductor: Conductor | None = None
-    held: HeldCurrent | None = None
+    held: ContactNodes | None = None
     coupling: Coupling | None = None
     mixing: Mixing | None = None
 
@@ -281,34 +221,47 @@ def joined_friction(entries: Sequence[Entry], nodes: ContactNodes) -> NodalFrict
     if any(laws):
         every = tuple(NO_FRICTION if own is None else own for own in laws)
         own = any(entry.friction.law is not None for entry in entries)
-        law = GroupedFriction(every, bounds, "Friction: law" if own else "Friction: mu")
-    return NodalFriction(law, GroupedSmoothing(smoothing, bounds), SlipHistory.rest(nodes))
+        law = Grouped(every, bounds, "Friction: law" if own else "Friction: mu")
+    return NodalFriction(law, Grouped(smoothing, bounds), SlipHistory.rest(nodes))
 
 
-def joined_layer(entries: Sequence[Entry]) -> Layer | None:
-    """Return the layers of all entries as one.
+def joined_law(
+    entries: Sequence[Entry], nodes: ContactNodes, phi_scale: float, contact_scale: float
+) -> InterfaceLaw:
+    """Return the layers and conductors of all entries as one law.
+
+    Parameters
+    ----------
+    entries, nodes
+        The entries, and their nodes joined before.
+    phi_scale, contact_scale
+        As in `InterfaceLaw`.
 
     Raises
     ------
     InputError
         If some are lagged and others not.
     """
-    given = [entry.layer for entry in entries]
-    if not any(given):
-        return None
-    layers, bounds = [layer or NO_LAYER for layer in given], _bounds(entries)
-    return Layer(
-        np.repeat([layer.thickness for layer in layers], np.diff(bounds)),
-        GroupedPointwise(tuple(layer.p_nu for layer in layers), bounds, "layer: p_nu"),
-        GroupedPointwise(tuple(layer.h_nu for layer in layers), bounds, "layer: h_nu"),
-        _alike([layer.lagged for layer in given if layer is not None]),
+    bounds, conductors = _bounds(entries), [entry.conductor for entry in entries]
+    return InterfaceLaw(
+        nodes,
+        _joined_layers([entry.layer for entry in entries], bounds),
+        _joined_conductors(conductors, bounds),
+        phi_scale,
+        contact_scale,
     )
 
 
-def joined_conductor(entries: Sequence[Entry]) -> Conductor | None:
-    """Return the conductors of all entries as one; raises as `joined_layer`."""
-    given = [entry.conductor for entry in entries]
-    return _joined_conductors(given, _bounds(entries))
+def _joined_layers(given: Sequence[Layer | None], bounds: tuple[int, ...]) -> Layer | None:
+    if not any(given):
+        return None
+    layers = [layer or NO_LAYER for layer in given]
+    return Layer(
+        np.repeat([layer.thickness for layer in layers], np.diff(bounds)),
+        Grouped(tuple(layer.p_nu for layer in layers), bounds, "layer: p_nu"),
+        Grouped(tuple(layer.h_nu for layer in layers), bounds, "layer: h_nu"),
+        _alike([layer.lagged for layer in given if layer is not None]),
+    )
 
 
 def _joined_conductors(
@@ -325,42 +278,34 @@ def _joined_conductors(
 
     moving = any(conductor.phi_f_at is not None for conductor in conductors)
     return Conductor(
-        GroupedConductivity(
-            tuple(conductor.psi for conductor in conductors), bounds, "Conductor: psi"
-        ),
+        Grouped(tuple(conductor.psi for conductor in conductors), bounds, "Conductor: psi"),
         np.repeat([conductor.phi_f for conductor in conductors], np.diff(bounds)),
-        GroupedPointwise(
-            tuple(conductor.phi_l for conductor in conductors), bounds, "Conductor: phi_l"
-        ),
+        Grouped(tuple(conductor.phi_l for conductor in conductors), bounds, "Conductor: phi_l"),
         _alike([conductor.lagged for conductor in given if conductor is not None]),
         phi_f if moving else None,
     )
 
 
-def joined_held(
-    entries: Sequence[Entry], begin: int, coupling: CouplingOperator | None
-) -> HeldCurrent | None:
-    """Return the current through the held nodes of all entries.
+def joined_held(entries: Sequence[Entry], law: InterfaceLaw, begin: int) -> InterfaceLaw | None:
+    """Return the law at the held nodes of all entries; None without conductors.
 
     Parameters
     ----------
-    entries
-        The entries.
+    entries, law
+        The entries, and their law at contact nodes.
     begin
         Global number of the first node of this rank.
-    coupling
-        The mortar coupling operator.
     """
-    given = [entry.held for entry in entries if entry.held is not None]
+    given = [(entry.held, entry.conductor) for entry in entries if entry.held is not None]
     if not given:
         return None
-    nodes = _side_by_side([held.jump for held in given])
-    if coupling is not None:
-        nodes = replace(nodes, coupling=coupling.at(nodes.nodes.astype(np.int64) + begin))
-    bounds = Grouped.bounds_of(held.jump.nodes.size for held in given)
-    conductor = _joined_conductors([held.conductor for held in given], bounds)
-    assert conductor is not None
-    return replace(given[0], jump=nodes, conductor=conductor)
+    nodes = _side_by_side([held for held, _ in given])
+    if law.jump.coupling is not None:
+        coupling = law.jump.coupling.at(nodes.nodes.astype(np.int64) + begin)
+        nodes = replace(nodes, coupling=coupling)
+    bounds = Grouped.bounds_of(held.nodes.size for held, _ in given)
+    conductor = _joined_conductors([conductor for _, conductor in given], bounds)
+    return replace(law, jump=nodes, layer=None, conductor=conductor)
 
 
 def _bounds(entries: Sequence[Entry]) -> tuple[int, ...]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -9,7 +10,6 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 
 from contact.interface.active_set import ActiveSet, touching
-from contact.interface.current import HeldCurrent
 from contact.interface.friction import NodalFriction
 from contact.interface.jump import Multipliers, SlipHistory
 from contact.interface.law import InterfaceLaw
@@ -35,7 +35,7 @@ class Interface:
     friction
         Friction.
     held
-        The current through nodes that cannot move; None without.
+        The current through nodes that cannot move, but whose potential is free; None without.
     stiffness
         c = E/size, which weighs displacements against stresses (stress/length); E of the regions
         that touch.
@@ -52,7 +52,7 @@ class Interface:
     jump: ContactNodes
     law: InterfaceLaw
     friction: NodalFriction
-    held: HeldCurrent | None
+    held: InterfaceLaw | None
     stiffness: float
     size: float
     elongation: float
@@ -175,21 +175,27 @@ class Interface:
         opened, stick, slip = self.comm.allreduce(local, op=MPI.SUM).tolist()
         return opened, stick, slip
 
+    def acting(self, x: Array, forces: Multipliers) -> Iterator[tuple[InterfaceLaw, Array, Array]]:
+        """Yield the law, unknowns and pressures of contact nodes, then of held ones. Collective."""
+        nodal = self.jump.apply(x)
+        yield self.law, nodal, self.pressure(nodal, forces)
+        if self.held is not None:
+            nodal = self.held.jump.apply(x)
+            yield self.held, nodal, self.held.resting(nodal)
+
     def add_forces(self, residual: Array, x: Array, forces: Multipliers) -> None:
         """Add the contact forces and the current at local unknowns to owned values."""
-        jump, nodal = self.jump, self.jump.apply(x)
+        jump = self.jump
         jump.transpose(jump.weight[:, None] * forces.vectors(jump), residual)
-        density = self.law.force(nodal, self.pressure(nodal, forces))
-        jump.transpose(jump.weight[:, None] * density, residual)
-        if self.held is not None:
-            self.held.add_force(residual, x)
+        for law, nodal, pressure in self.acting(x, forces):
+            law.jump.transpose(law.jump.weight[:, None] * law.force(nodal, pressure), residual)
 
     def add_current(self, residual: Array, x: Array, change: Array, forces: Multipliers) -> None:
         """Add the change of the current with local unknowns, psi frozen, to owned values."""
-        jump, nodal = self.jump, self.jump.apply(x)
-        block = self.law.current_block(nodal, self.pressure(nodal, forces))
-        density = np.einsum("nij,nj->ni", block, jump.apply(change))
-        jump.transpose(jump.weight[:, None] * density, residual)
+        for law, nodal, pressure in self.acting(x, forces):
+            block = law.current_block(nodal, pressure)
+            density = np.einsum("nij,nj->ni", block, law.jump.apply(change))
+            law.jump.transpose(law.jump.weight[:, None] * density, residual)
 
     @property
     def change(self) -> Change | None:
@@ -216,4 +222,7 @@ class Interface:
         weighted = self.jump.weight[:, None, None] * blocks
         if self.held is None:
             return weighted
-        return np.concatenate([weighted, self.held.block(x)])
+        held = self.held.jump
+        nodal = held.apply(x)
+        block = self.held.current_block(nodal, self.held.resting(nodal))
+        return np.concatenate([weighted, held.weight[:, None, None] * block])

@@ -2,7 +2,7 @@
 
 The compliant layer presses with h_nu(phi - phi_F) p_nu(u_nu - rho_0), section 8.1.2, and the
 conductive foundation draws the charge psi(u_nu - rho) phi_L(phi - phi_F), (1.30). Both act
-node by node. Newton's method takes `force` and its full derivative `jacobian`.
+node by node. Newton's method takes `force` and its full derivative.
 
 The fixed point of Algorithms 6 and 8 freezes h_nu and psi. It treats the layer with the
 unilateral constraint, as the one monotone graph `NormalLaw` of Figure 1.6, and the current
@@ -12,16 +12,55 @@ is stiff enough cycles for ever between the slopes of an open and of a saturated
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from contact.interface.active_set import touching
-from contact.interface.current import Conductor
 from contact.interface.layer import Layer, NormalLaw
 from contact.interface.nodes import ContactNodes
 from contact.typing import Array
+from forms.laws import Conductivity, PotentialLaw, Truncation
+from forms.ops import Value
+
+#: A pressure above zero.
+TINY = np.finfo(float).tiny
+
+
+@dataclass(frozen=True)
+class Conductor:
+    """A conductive foundation at the potential phi_f.
+
+    Attributes
+    ----------
+    psi
+        Conductivity law.
+    phi_f
+        Potential of the foundation; several conductors as one have one value a node.
+    phi_l
+        Truncation of the potential difference.
+    lagged
+        Whether the charge is taken from the previous outer iterate, as Algorithm 4 of the
+        thesis does: it then converges for small k_e only (Theorem 5.2). Else phi is implicit,
+        as a Robin term in Algorithm 5, and only psi is lagged.
+    phi_f_at
+        phi_f as a function of time; None where it is always the same.
+    share
+        Part of the conductivity that is taken, from 0 to 1: for continuations.
+    """
+
+    psi: Conductivity
+    phi_f: Value
+    phi_l: PotentialLaw = field(default_factory=lambda: Truncation(np.inf))
+    lagged: bool = False
+    phi_f_at: Callable[[float], Value] | None = None
+    share: float = 1.0
+
+    def at(self, time: float) -> Conductor:
+        """Return the foundation at a time."""
+        return self if self.phi_f_at is None else replace(self, phi_f=self.phi_f_at(time))
 
 
 @dataclass(frozen=True)
@@ -71,10 +110,10 @@ class InterfaceLaw:
             return self
         return replace(self, conductor=self.conductor.at(time))
 
-    def conducting(self, part: float) -> InterfaceLaw:
+    def conducting(self, share: float) -> InterfaceLaw:
         """Return the foundation with a part of its conductivity."""
         assert self.conductor is not None
-        return replace(self, conductor=self.conductor.part(part))
+        return replace(self, conductor=replace(self.conductor, share=share))
 
     def normal_law(self, x: Array) -> NormalLaw | None:
         """Return the layer and the constraint as one graph, h_nu frozen at the nodal unknowns.
@@ -118,11 +157,21 @@ class InterfaceLaw:
         return self._conductivity(x, pressure) * self.conductor.phi_l(self._difference(x))
 
     def _conductivity(self, x: Array, pressure: Array) -> Array:
+        """Return psi at the nodes."""
         assert self.conductor is not None
         pressed = self._pressed(x, pressure)
         # A multiplier of the size of rounding on an open node is no pressure.
         loaded = pressed | (self.layer_pressure(x) > 0)
-        return self.conductor.psi.at(self._penetration(x), pressed, loaded)
+        psi = self.conductor.psi.at(self._penetration(x), pressed, loaded)
+        return np.asarray(self.conductor.share * psi)
+
+    def resting(self, x: Array) -> Array:
+        """Return pressures by which nodes conduct whose displacements are prescribed, shape (n,).
+
+        They are closed up to the rounding of these; there is no tolerance of a solver.
+        """
+        reach = np.abs(self.jump.gap) + np.linalg.norm(x[:, : self.jump.dim], axis=1)
+        return np.maximum(1e-12 * self.contact_scale * reach, TINY)
 
     def _pressed(self, x: Array, pressure: Array) -> NDArray[np.bool_]:
         """Tell where the rigid part presses, and u_nu = rho.
@@ -167,46 +216,38 @@ class InterfaceLaw:
         total[:, : self.jump.dim] = self.jump.normal[:, :, None] * gradient[:, None, :]
         return total
 
-    def jacobian(self, x: Array, pressure: Array) -> Array:
-        """Return the full derivative of `force`, shape (n, block size, block size).
+    def current_block(self, x: Array, pressure: Array, full: bool = False) -> Array:
+        """Return the derivative of the charge in `force`, shape (n, block size, block size).
 
-        Not symmetric where h_nu depends on the potential or psi on the gap. The contact flag
-        of the perfect conductor is kept; at kinks a one-sided derivative is taken.
+        Parameters
+        ----------
+        x, pressure
+            Nodal unknowns, and pressures that tell the contact.
+        full
+            With the derivative of psi by the gap, not symmetric. Else psi is frozen, and a lagged
+            current has no derivative, as the fixed point takes it.
         """
-        return self.layer_block(x, True) + self.current_jacobian(x, pressure)
-
-    def current_jacobian(self, x: Array, pressure: Array) -> Array:
-        """Return the full derivative of the charge, shape (n, block size, block size)."""
         d, bs = self.jump.dim, self.jump.block_size
         total = np.zeros((x.shape[0], bs, bs))
-        if self.conductor is not None:
-            psi, difference = self.conductor.psi, self._difference(x)
-            slope = self._conductivity(x, pressure) * self.conductor.phi_l.derivative(difference)
-            total[:, -1, -1] -= self.phi_scale**2 * slope
-            closing = psi.gap_slope(self._penetration(x), self._pressed(x, pressure))
-            closing = self.phi_scale * closing * self.conductor.phi_l(difference)
-            total[:, -1, :d] -= closing[:, None] * self.jump.normal
+        if self.conductor is None or (self.conductor.lagged and not full):
+            return total
+        conductor, difference = self.conductor, self._difference(x)
+        slope = self._conductivity(x, pressure) * conductor.phi_l.derivative(difference)
+        total[:, -1, -1] = -(self.phi_scale**2) * slope
+        if full:
+            # The contact flag of the perfect conductor is kept; at kinks a one-sided derivative.
+            closing = conductor.psi.gap_slope(self._penetration(x), self._pressed(x, pressure))
+            closing = self.phi_scale * conductor.share * closing * conductor.phi_l(difference)
+            total[:, -1, :d] = -closing[:, None] * self.jump.normal
         return total
 
-    def current_block(self, x: Array, pressure: Array) -> Array:
-        """Return the current's derivative by the potential alone, psi frozen, (n, bs, bs).
+    def block(self, x: Array, pressure: Array, full: bool = False) -> Array:
+        """Return the derivative of `force`, shape (n, block size, block size).
 
-        Zero for a lagged current. It keeps the operator of the fixed point symmetric.
+        Without the derivatives of h_nu and psi, and thus symmetric, unless `full`; then that of a
+        lagged layer and current too.
         """
-        bs = self.jump.block_size
-        total = np.zeros((x.shape[0], bs, bs))
-        if self.conductor is not None and not self.conductor.lagged:
-            slope = self._conductivity(x, pressure)
-            slope = slope * self.conductor.phi_l.derivative(self._difference(x))
-            total[:, -1, -1] = -(self.phi_scale**2) * slope
-        return total
-
-    def block(self, x: Array, pressure: Array) -> Array:
-        """Return `jacobian` without the derivatives of h_nu and psi: symmetric.
-
-        A lagged layer or current has none.
-        """
-        total = self.current_block(x, pressure)
-        if self.layer is not None and not self.layer.lagged:
-            total += self.layer_block(x, False)
+        total = self.current_block(x, pressure, full)
+        if self.layer is not None and (full or not self.layer.lagged):
+            total += self.layer_block(x, full)
         return total

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from dolfinx import fem
@@ -60,10 +60,6 @@ class Candidates:
         if self.mixing is None:
             return values
         return self.mixing.apply(self.comm, self.numbers, values)
-
-    def measure(self, obstacle: Obstacle) -> tuple[Array, Array]:
-        """Return the contact directions and the gaps of nodes, before anything is mixed."""
-        return obstacle.measure(self.in_front_of(obstacle), self.normal)
 
     def in_front_of(self, obstacle: Obstacle) -> Array:
         """Return the points from which gaps are measured: given gaps are those of the nodes."""
@@ -318,3 +314,37 @@ def _motion(
         own[:, :d] += direction[:, :, None] * towards[:, None, :]
         motion[:, :, member.columns] = own
     return motion
+
+
+def held_nodes(
+    found: Candidates, obstacle: Obstacle, free: NDArray[np.bool_], jump: ContactNodes
+) -> ContactNodes:
+    """Return the nodes of Gamma_3 that cannot move but whose potential is free.
+
+    They carry no contact force, but let the current through like others: without them their share
+    of Gamma_3 would be missing.
+
+    Parameters
+    ----------
+    found, obstacle
+        All owned nodes of Gamma_3, and what gives their contact direction and gap.
+    free
+        Which components of the owned nodes are not fixed, shape (nodes, block size).
+    jump
+        The contact nodes.
+    """
+    direction, gap = obstacle.measure(found.in_front_of(obstacle), found.normal)
+    gap = found.gaps(direction, gap)
+    keep = ~np.isin(found.nodes, jump.nodes) & free[found.nodes, -1] & np.isfinite(gap)
+    keep &= found.weight > 0
+    return replace(
+        jump,
+        nodes=found.nodes[keep],
+        points=found.points[keep],
+        weight=found.weight[keep],
+        normal=direction[keep],
+        tangent=np.zeros((np.count_nonzero(keep), jump.dim, jump.dim)),
+        gap=gap[keep],
+        motion=None,
+        held=None,
+    )

@@ -274,8 +274,7 @@ class NewtonStep:
         follow = contact.unchanged or reached < NEAR
         if law.follows_gap:
             follow = self.gap_derivative(reached, follow)
-        current = law.current_jacobian if follow else law.current_block
-        return current(nodal, interface.pressure(nodal, contact.forces))
+        return law.current_block(nodal, interface.pressure(nodal, contact.forces), follow)
 
 
 def linearised_layer(

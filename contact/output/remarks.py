@@ -8,7 +8,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 from mpi4py import MPI
 
-from contact.interface.current import Conductor
+from contact.interface.law import Conductor
 from contact.output import bodies
 from contact.output.fields import DerivedFields, deformation, unloaded
 from contact.output.solution import Note, Remark, Solution

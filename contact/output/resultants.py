@@ -218,14 +218,12 @@ def charge_balance(problem: ContactProblem, state: State) -> ChargeBalance:
 
 def _foundation_charges(problem: ContactProblem, state: State) -> Array:
     """Return the charges that leave the owned nodes through contact; between bodies they cancel."""
-    interface, nodal, body = problem.interface, problem.nodal(state), problem.equilibrium
-    pressure = interface.pressure(nodal, state.forces)
-    density = np.zeros((nodal.shape[0], body.block_size))
-    density[:, -1] = problem.nodes.weight * interface.law.charge(nodal, pressure)
+    body = problem.equilibrium
     leaving = np.zeros_like(body.external(state.time))
-    problem.nodes.transpose(density, leaving)
-    if interface.held is not None:
-        interface.held.add_charge(leaving, state.x)
+    for law, nodal, pressure in problem.interface.acting(state.x, state.forces):
+        density = np.zeros((nodal.shape[0], body.block_size))
+        density[:, -1] = law.jump.weight * law.charge(nodal, pressure)
+        law.jump.transpose(density, leaving)
     return np.asarray(body.nodal(leaving)[:, -1])
 
 

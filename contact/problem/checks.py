@@ -19,7 +19,7 @@ from contact.body.description import Fixed
 from contact.body.fields import values_at
 from contact.body.loads import to_blame
 from contact.errors import InputError
-from contact.interface.current import Conductor
+from contact.interface.law import Conductor
 from contact.problem.problem import ContactProblem
 from contact.problem.rigid_modes import (
     Group,
@@ -287,10 +287,11 @@ def _flows(
             for conductor, size in zip(conductors, sizes, strict=True)
         )
         return at_contact, among_held
-    nodal = problem.nodal(state)
-    pressure = interface.pressure(nodal, state.forces)
-    slope = np.zeros(0) if held is None else held.slope(state.x)
-    return law.jacobian(nodal, pressure)[:, -1, -1] != 0, slope != 0
+    found = [
+        law.current_block(nodal, pressure, full=True)[:, -1, -1] != 0
+        for law, nodal, pressure in interface.acting(state.x, state.forces)
+    ]
+    return found[0], found[1] if held is not None else np.zeros(0, dtype=bool)
 
 
 def _conducts(conductor: Conductor, count: int, deep: float) -> NDArray[np.bool_]:

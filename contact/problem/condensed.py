@@ -21,6 +21,7 @@ from contact.body.equilibrium import BodyEquilibrium
 from contact.history import BodyState, Evaluated
 from contact.interface.interface import Interface
 from contact.interface.jump import Multipliers
+from contact.interface.nodes import ContactNodes
 from contact.linear import multigrid
 from contact.linear.constraint import ConstrainedBulk, Constraint
 from contact.linear.dense import DenseOperator, Factors
@@ -317,16 +318,18 @@ class CondensedConstraint:
 def at_kept_nodes(interface: Interface) -> Interface:
     """Return an interface whose nodes are numbered among the kept ones."""
     count = interface.jump.nodes.size
-    positions = np.arange(interface.coupled.size, dtype=np.int32)
-    held = interface.held
-    if held is not None:
-        held = replace(held, jump=replace(held.jump, nodes=positions[count:], coupling=None))
+    first, others = np.split(np.arange(interface.coupled.size, dtype=np.int32), [count])
+
+    def kept(nodes: ContactNodes, positions: NDArray[np.int32]) -> ContactNodes:
+        """Return nodes of other numbers, whose jumps are nodal values."""
+        return replace(nodes, nodes=positions, motion=None, carried=None, coupling=None)
+
+    law, held = interface.law, interface.held
     return replace(
         interface,
-        jump=replace(
-            interface.jump, nodes=positions[:count], motion=None, carried=None, coupling=None
-        ),
-        held=held,
+        jump=kept(interface.jump, first),
+        law=replace(law, jump=kept(law.jump, first)),
+        held=None if held is None else replace(held, jump=kept(held.jump, others)),
     )
 
 

@@ -9,8 +9,8 @@ import numpy as np
 
 from contact.arguments import expect
 from contact.body.fields import Given
-from contact.interface.current import Conductor
 from contact.interface.friction import Friction
+from contact.interface.law import Conductor
 from contact.interface.layer import Layer
 from contact.interface.obstacle import GapFunction
 from contact.mesh.together import part

@@ -18,22 +18,20 @@ from contact.body.internal_variables import VARIABLES
 from contact.body.materials import young_behind
 from contact.errors import InputError
 from contact.history import CONTACT_NODES, History, InternalVariables, Part
-from contact.interface.current import Conductor, HeldCurrent, held_current
 from contact.interface.entries import (
     Entry,
-    joined_conductor,
     joined_friction,
     joined_held,
-    joined_layer,
+    joined_law,
     joined_nodes,
 )
 from contact.interface.friction import Friction
 from contact.interface.interface import Interface
 from contact.interface.jump import Multipliers, SlipHistory
-from contact.interface.law import InterfaceLaw
+from contact.interface.law import Conductor
 from contact.interface.nodes import ContactNodes
 from contact.interface.pairing import find_pair
-from contact.interface.placing import candidates, find_nodes
+from contact.interface.placing import candidates, find_nodes, held_nodes
 from contact.linear.constraint import Constraint
 from contact.mesh.domain import Domain
 from contact.mesh.entities import elongation
@@ -216,11 +214,10 @@ class ContactProblem:
         found = joined_nodes(
             self.entries, body.layout.index_map, body.free, body.global_unknowns.ties
         )
-        layer, conductor = joined_layer(self.entries), joined_conductor(self.entries)
         stiffness = self._young_of_contacts() / size
-        law = InterfaceLaw(found, layer, conductor, body.phi_scale, stiffness)
+        law = joined_law(self.entries, found, body.phi_scale, stiffness)
         friction = joined_friction(self.entries, found)
-        held = joined_held(self.entries, body.layout.index_map.local_range[0], found.coupling)
+        held = joined_held(self.entries, law, body.layout.index_map.local_range[0])
         mesh = self.domain.mesh
         longer = max(elongation(mesh, self.domain.facets(contact.on)) for contact in self.contacts)
         component, components = (
@@ -255,14 +252,12 @@ class ContactProblem:
         laws = contact.friction, contact.layer, contact.conductor
         return Entry(contact.on, nodes, *laws, self._held(key, contact, nodes), mixing=mixing)
 
-    def _held(self, key: str, contact: Contact, nodes: ContactNodes) -> HeldCurrent | None:
+    def _held(self, key: str, contact: Contact, nodes: ContactNodes) -> ContactNodes | None:
         if contact.conductor is None or not self.piezoelectric:
             return None
         body, global_unknowns = self.equilibrium, self.equilibrium.global_unknowns
         found = candidates(self.domain, body.space, contact.on)
-        held = held_current(
-            found, contact.foundation, body.free, nodes, contact.conductor, body.phi_scale
-        )
+        held = held_nodes(found, contact.foundation, body.free, nodes)
         taken = bool(global_unknowns.tied[found.nodes, -1].any())
         if self.comm.allreduce(taken, op=MPI.LOR):
             raise InputError(
@@ -270,7 +265,7 @@ class ContactProblem:
                 "electrode of unknown potential; accepted: parts apart, or an insulated foundation"
             )
         moves = global_unknowns.member(contact.on) is not None
-        if self.comm.allreduce(held.jump.nodes.size, op=MPI.SUM) > 0 and moves:
+        if held.size > 0 and moves:
             raise InputError(
                 f"{key}.rigid: supports hold nodes of part {contact.on!r}, through which current "
                 "flows as the foundation comes near; accepted: a part that can move everywhere"

@@ -7,7 +7,7 @@ from mpi4py import MPI
 from scipy.optimize import brentq
 
 from contact.body.description import Body, Fixed, Load
-from contact.interface.current import Conductor
+from contact.interface.law import Conductor
 from contact.interface.layer import Layer
 from contact.mesh.grid import box, rectangle
 from contact.problem.contact import Contact

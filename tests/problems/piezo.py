@@ -7,8 +7,8 @@ import numpy as np
 from mpi4py import MPI
 
 from contact.body.description import Body, Fixed, Load
-from contact.interface.current import Conductor
 from contact.interface.friction import Friction
+from contact.interface.law import Conductor
 from contact.mesh.grid import box, rectangle
 from contact.problem.contact import Contact
 from contact.problem.problem import ContactProblem

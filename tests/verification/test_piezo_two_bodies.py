@@ -6,7 +6,7 @@ from mpi4py import MPI
 
 from contact.body.description import Body, Fixed, Material
 from contact.body.rigid import Electrode
-from contact.interface.current import Conductor
+from contact.interface.law import Conductor
 from contact.methods.newton import Newton
 from contact.methods.options import FixedPointOptions, NewtonOptions
 from contact.methods.thesis.fixed_point import FixedPoint

@@ -151,7 +151,7 @@ class FixedPoint(OuterLoop):
             return law.current_block(nodal, pressure)
         if self.operator.symmetric:
             self.operator = self._new_operator(symmetric=False)
-        return law.current_jacobian(nodal, pressure)
+        return law.current_block(nodal, pressure, full=True)
 
     def _measure(self, residuals: KKT) -> float:
         self._residual = residuals.significant
