@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from types import FrameType
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeAlias
 
 from mpi4py import MPI
 
@@ -22,6 +22,39 @@ REPEAT = 2.0
 
 #: Added to the number of the signal that ended a run: its exit status.
 SIGNALLED = 128
+
+
+#: A handler of signals, as `signal.signal` takes it.
+Handler: TypeAlias = Callable[[int, FrameType | None], object] | int
+
+
+@contextmanager
+def _handled(
+    handler: Handler,
+    signals: tuple[int, ...] = (signal.SIGINT, signal.SIGTERM),
+    replaces: Callable[[object], bool] = lambda old: True,
+) -> Iterator[dict[int, Handler]]:
+    """Install a handler of signals in place of some; yield those, which come back in the end.
+
+    Signals can be caught in the main thread alone; in others nothing is changed.
+    """
+    before: dict[int, Handler] = {}
+    if threading.current_thread() is threading.main_thread():
+        for number in signals:
+            old = signal.getsignal(number)
+            if old is not None and replaces(old):  # None: not installed from Python
+                before[number] = old
+                signal.signal(number, handler)
+    try:
+        yield before
+    finally:
+        _restore(before)
+
+
+def _restore(before: dict[int, Handler]) -> None:
+    for number, handler in before.items():
+        signal.signal(number, handler)
+    before.clear()
 
 
 class Interrupted(Exception):
@@ -101,38 +134,31 @@ def stop_on_signal(comm: MPI.Intracomm, monitor: Monitor | None) -> Iterator[Sto
     -----
     The first signal is noted; one that comes more than `REPEAT` seconds later has its usual
     effect (a launcher and its process group may both deliver the same one). So has one for which
-    nothing was raised, after the last iteration, in the end and on all ranks. Signals can be
-    caught in the main thread alone; in others nothing is changed.
+    nothing was raised, after the last iteration, in the end and on all ranks.
     """
     stop = Stop(comm, monitor)
     since: list[float] = []
-    before: dict[int, Callable[[int, FrameType | None], object] | int] = {}
 
     def note(number: int, frame: FrameType | None) -> None:
         if stop.caught and time.monotonic() - since[0] > REPEAT:
-            for ending, handler in before.items():
-                signal.signal(ending, handler)
+            _restore(before)
             signal.raise_signal(number)
         if not stop.caught:
             stop.caught.append(number)
             since.append(time.monotonic())
 
     try:
-        if threading.current_thread() is threading.main_thread():
-            for ending in (signal.SIGINT, signal.SIGTERM):
-                handler = signal.getsignal(ending)
-                if handler is not None:  # None: not installed from Python, left alone
-                    before[ending] = handler
-                    signal.signal(ending, note)
-                if isinstance(handler, Ending) and handler.caught and not stop.caught:
-                    note(handler.caught[0], None)
-        yield stop
-        stop.agree()
+        with _handled(note) as before:
+            outside = [handler for handler in before.values() if isinstance(handler, Ending)]
+            for number in [handler.caught[0] for handler in outside if handler.caught][:1]:
+                note(number, None)
+            try:
+                yield stop
+                stop.agree()
+            finally:
+                for handler in outside if stop.told and since else []:
+                    handler.deaf_until = since[0] + REPEAT
     finally:
-        for number, handler in before.items():
-            if isinstance(handler, Ending) and stop.told and since:
-                handler.deaf_until = since[0] + REPEAT
-            signal.signal(number, handler)
         if stop.caught and not stop.told:
             signal.raise_signal(stop.caught[0])
 
@@ -172,36 +198,23 @@ def signals_held(timeout: float = math.inf) -> Iterator[list[int]]:
 
     Yields
     ------
-    The signals so far. They have their effect in the end, unless the list is cleared. Where
-    signals cannot be caught, in other threads than the main one, nothing is changed.
+    The signals so far. They have their effect in the end, unless the list is cleared.
     """
     caught: list[int] = []
     since: list[float] = []
-    before: dict[int, Callable[[int, FrameType | None], object] | int] = {}
-
-    def restore() -> None:
-        for number, handler in before.items():
-            signal.signal(number, handler)
-        before.clear()
 
     def note(number: int, frame: FrameType | None) -> None:
         caught.append(number)
         since.append(time.monotonic())
         if since[-1] - since[0] > timeout:
             caught.clear()
-            restore()
+            _restore(before)
             signal.raise_signal(number)
 
-    if threading.current_thread() is threading.main_thread():
-        for kind in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
-            handler = signal.getsignal(kind)
-            if handler is not None:  # None: not installed from Python, left alone
-                before[kind] = handler
-                signal.signal(kind, note)
     try:
-        yield caught
+        with _handled(note, (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)) as before:
+            yield caught
     finally:
-        restore()
         if caught:
             signal.raise_signal(caught[0])
 
@@ -209,19 +222,9 @@ def signals_held(timeout: float = math.inf) -> Iterator[list[int]]:
 @contextmanager
 def ending_on_signal() -> Iterator[Ending]:
     """Let SIGINT and SIGTERM end a run in words, where Python's own handlers stand."""
-    ending = Ending()
-    before: dict[int, Callable[[int, FrameType | None], object] | int | None] = {}
-    if threading.current_thread() is threading.main_thread():
-        for kind in (signal.SIGINT, signal.SIGTERM):
-            handler = signal.getsignal(kind)
-            if handler in (signal.SIG_DFL, signal.default_int_handler):
-                before[kind] = handler
-                signal.signal(kind, ending)
-    try:
+    ending, own = Ending(), (signal.SIG_DFL, signal.default_int_handler)
+    with _handled(ending, replaces=lambda old: old in own):
         yield ending
-    finally:
-        for number, handler in before.items():
-            signal.signal(number, handler)
 
 
 @contextmanager
@@ -231,15 +234,5 @@ def deaf() -> Iterator[None]:
     For work of a library that takes minutes without returning to Python, before anything has
     been computed.
     """
-    before: dict[int, Ending] = {}
-    if threading.current_thread() is threading.main_thread():
-        for kind in (signal.SIGINT, signal.SIGTERM):
-            handler = signal.getsignal(kind)
-            if isinstance(handler, Ending):
-                before[kind] = handler
-                signal.signal(kind, signal.SIG_DFL)
-    try:
+    with _handled(signal.SIG_DFL, replaces=lambda old: isinstance(old, Ending)):
         yield
-    finally:
-        for number, handler in before.items():
-            signal.signal(number, handler)
