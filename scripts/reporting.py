@@ -11,7 +11,7 @@ import argparse
 import csv
 import logging
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -26,6 +26,7 @@ from contact import Case, InputError, Solution, solve
 from contact.methods.method import METHODS
 from contact.methods.options import Options
 from contact.methods.report import Outcome, Record
+from contact.output.figures.run import Run
 from contact.output.figures.style import STYLE
 from contact.problem.problem import ContactProblem
 from contact.problem.state import State
@@ -186,6 +187,12 @@ def solved(case: Case, problem: ContactProblem | None = None) -> Solution:
     if not solution.converged:
         raise InputError(f"{case.title}: {solution.outcome.reason}")
     return solution
+
+
+def run_of(solution: Solution) -> Run | None:
+    """Return what the figures of a solution are drawn from, without its title. Collective."""
+    run = solution.written()
+    return None if run is None else replace(run, title="")
 
 
 def iterates(

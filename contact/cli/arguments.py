@@ -198,6 +198,8 @@ def _commands() -> Iterator[tuple[str, str, str | None, dict[str, dict[str, Any]
             ),
             "--format": _value("pdf,png", "formats of the files: png, pdf, svg", default="png"),
             "--width": _value("85mm", "width of the figures, in mm, cm or in"),
+            "--xlim": _value("A,B", "ends of the x axis of places in 2-D figures"),
+            "--ylim": _value("A,B", "ends of the y axis of places in 2-D figures"),
             "--mirror": _flag("show both halves of a body of revolution"),
             "--animate": _flag(
                 "draw animation-FIELD.gif instead, the deformed body over the steps of an evolution"

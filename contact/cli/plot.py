@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import math
 import re
 from pathlib import Path
 
@@ -11,7 +12,8 @@ from mpi4py import MPI
 from contact.cli.main import CONVERGED
 from contact.errors import InputError
 from contact.methods.interrupt import signals_held
-from contact.output.figures.saved import FORMATS, animate, plot
+from contact.output.figures.figures import FORMATS, animate, plot
+from contact.output.figures.style import Look
 from contact.output.folder import on_root
 
 _LENGTH = re.compile(r"(\d+(?:\.\d*)?)\s*(mm|cm|in)")
@@ -28,12 +30,13 @@ def run(options: argparse.Namespace, comm: MPI.Intracomm) -> int:
                 f"{', '.join(FORMATS)}, or several with commas"
             )
     width = None if options.width is None else inches(options.width)
-    folder, fields, mirror = Path(options.folder), options.field, options.mirror
+    limits = [limits_of(option, getattr(options, option)) for option in ("xlim", "ylim")]
+    look, folder = Look(width, options.mirror, *limits), Path(options.folder)
 
     def draw() -> list[Path]:
         if options.animate:
-            return animate(folder, fields, width, mirror)
-        return plot(folder, fields, formats, width, mirror)
+            return animate(folder, options.field, look)
+        return plot(folder, options.field, formats, look)
 
     with signals_held():  # no figure is left half written
         files = on_root(comm, draw)
@@ -55,3 +58,22 @@ def inches(text: str) -> float:
     if not 1.5 <= length <= 40:
         raise InputError(f"--width {text}; accepted: a length such as 85mm, from 40mm to 1000mm")
     return length
+
+
+def limits_of(option: str, text: str | None) -> tuple[float, float] | None:
+    """Return the ends of an axis that are given as "0.5,1.5".
+
+    Raises
+    ------
+    InputError
+        If they are not two numbers, the smaller one first.
+    """
+    if text is None:
+        return None
+    try:
+        low, high = map(float, text.split(","))
+    except ValueError:
+        low = high = 0.0
+    if not low < high < math.inf:
+        raise InputError(f"--{option} {text}; accepted: the ends of the axis, such as 0.5,1.5")
+    return low, high

@@ -18,7 +18,7 @@ from contact.case.file import Case
 from contact.mesh.domain import Domain, Indices
 from contact.mesh.entities import exterior_facets
 from contact.output.figures.body import rendered
-from contact.output.figures.style import BLUE, GREEN, ORANGE, SKY, STYLE, axes_of, heading
+from contact.output.figures.style import BLUE, GREEN, ORANGE, SKY, STYLE, heading
 from contact.output.options import Units
 from contact.problem.problem import ContactProblem
 from contact.typing import Array
@@ -105,7 +105,8 @@ def draw_setup(case: Case, problem: ContactProblem) -> Figure | None:
     given = [role for role in roles if role is not None]
     with matplotlib.rc_context(STYLE):
         draw = _draw_plane if domain.dim == 2 else _draw_space
-        figure = draw(boundary, cells, given, surface, case.case.units, axes_of(domain.revolved))
+        axes = "rz" if domain.revolved else "xy"
+        figure = draw(boundary, cells, given, surface, case.case.units, axes)
         figure.suptitle(heading(case.title), fontsize="medium")
         figure.legend(loc="outside lower center", ncols=2, fontsize=7)
     return figure

@@ -87,21 +87,31 @@ def _replace(solution: Solution, folder: ResultFolder, figures: bool) -> None:
             from contact.output.checkpoint import write_checkpoint
 
             write_checkpoint(solution, new / "checkpoint.npz")
-        if figures:
-            from contact.output.figures.figures import collect
-
-            drawing = collect(solution)
-            if drawing is not None:
-                try:
-                    drawing.draw(new)
-                except Exception as error:
-                    failures.append(error)
         solution.seconds["output"] += time.perf_counter() - begin
-        return {key: _plain(value) for key, value in values_of(SUMMARY, solution).items()}
+        summary = {key: _plain(value) for key, value in values_of(SUMMARY, solution).items()}
+        if figures:
+            try:
+                _draw(solution, new, summary)
+            except Exception as error:
+                failures.append(error)
+        return summary
 
     folder.replace(write)
     # A figure that fails is no reason to lose the rest.
     on_root(comm, lambda: _raise(failures))
+
+
+def _draw(solution: Solution, folder: Path, summary: Mapping[str, Any]) -> None:
+    """Draw the figures from the files. Collective."""
+    from contact.output.figures.figures import Look, draw, read_run  # which take a while to load
+
+    run = None
+    if solution.output.fields != "vtu":
+        run = solution.written()
+    elif solution.problem.comm.rank == 0:
+        run = read_run(folder, summary)
+    if run is not None:
+        draw(run, folder, look=Look(mirror=solution.output.mirror))
 
 
 def _raise(failures: list[Exception]) -> None:

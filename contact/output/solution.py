@@ -4,8 +4,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from contextlib import ExitStack
+from dataclasses import dataclass, field, replace
 from functools import cached_property
+from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
@@ -16,6 +19,7 @@ from contact.errors import InputError
 from contact.linear.operator import Counters
 from contact.methods.report import IterationHistory, Outcome
 from contact.output.fields import Deformation, DerivedFields, unknowns
+from contact.output.options import OutputOptions
 from contact.output.resultants import (
     ChargeBalance,
     Resultant,
@@ -32,6 +36,7 @@ from contact.typing import Array
 
 if TYPE_CHECKING:
     from contact.output.figures.figures import Gallery
+    from contact.output.figures.run import Run
 
 
 #: A text on a solution: a warning, or a `Note`.
@@ -152,10 +157,22 @@ class Solution(Solved):
         width
             Of the figures (inches).
         """
-        from contact.output.figures.figures import collect  # matplotlib takes a while to load
+        from contact.output.figures.figures import Look, figures_of  # which take a while to load
 
-        drawing = collect(self, fields)
-        return None if drawing is None else drawing.figures(width, contact=not fields)
+        run = self.written()
+        return None if run is None else figures_of(run, fields, Look(width, self.output.mirror))
+
+    def written(self) -> Run | None:
+        """Return the results in the files as figures read them; None but on rank 0. Collective."""
+        from contact import write_outputs
+        from contact.output.figures.run import read_run
+
+        comm = self.problem.comm
+        with ExitStack() as stack:
+            folder = stack.enter_context(TemporaryDirectory()) if comm.rank == 0 else ""
+            whole = replace(self, output=OutputOptions(), seconds={**self.seconds})
+            write_outputs(whole, comm.bcast(folder))
+            return read_run(Path(folder)) if comm.rank == 0 else None
 
     @cached_property
     def _unknowns(self) -> dict[str, fem.Function]:

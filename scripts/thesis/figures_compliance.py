@@ -16,6 +16,7 @@ from contact.interface.complementarity import project_disc
 from contact.interface.layer import NormalLaw
 from contact.output.figures.body import Picture, draw_plane, picture
 from contact.output.figures.contact import draw_line
+from contact.output.figures.style import Look
 from contact.output.solved import tangent_of
 from contact.output.table import Table, contact_table, csv_columns
 from contact.typing import Array
@@ -27,6 +28,7 @@ from scripts.reporting import (
     TWO_COLUMNS,
     Report,
     options,
+    run_of,
     solved,
     subplots,
 )
@@ -146,12 +148,11 @@ def example(
         Appended to the remark on the stresses.
     """
     solution = solution_of(name, cells, *changes)
-    table = contact_table(solution)
-    deformed = picture(solution, "potential", POTENTIAL)
-    share = solution.plastic_share
-    if table is None or deformed is None:
+    run, share = run_of(solution), solution.plastic_share
+    if run is None:
         return
-    dotted, values = number.replace("-", "."), deformed.values
+    table, deformed = run.table, picture(run, "potential")
+    dotted, values = number.replace("-", "."), deformed.skin["values"]
     of, ending = (" of the variant", f"-{variant}") if variant else ("", "")
     stress = "normal and tangential stress"
     if not solution.problem.frictional:
@@ -159,7 +160,7 @@ def example(
     report.figure(
         f"figure-{number}a{ending}",
         f"Figure {dotted} (a){of}: {stress} on Gamma_3, {topic}",
-        draw_line(table, held=deformed.held, units=solution.units),
+        draw_line(run, Look()),
         csv_columns(table),
         f"{remark(solution, table)}{yielding(solution.max_dev_strain, share)} {note}".rstrip(),
     )
@@ -167,13 +168,14 @@ def example(
         f"figure-{number}b{ending}",
         f"Figure {dotted} (b){of}: deformed bar, potential and contact forces on it (arrows), "
         f"{topic}",
-        with_forces(draw_plane(deformed, table, units=solution.units), deformed, table),
+        with_forces(deformed),
         {"smallest potential": [float(values.min())], "largest potential": [float(values.max())]},
     )
 
 
-def with_forces(figure: Figure, deformed: Picture, table: Table) -> Figure:
-    """Add the forces that the foundation exerts on the body, as arrows at the contact nodes."""
+def with_forces(deformed: Picture) -> Figure:
+    """Draw a plane body, and the forces of the foundation on it as arrows at the contact nodes."""
+    figure, table = draw_plane(deformed, Look()), deformed.run.table
     normal = np.column_stack([table["nu_x"], table["nu_y"]])
     tangent = tangent_of(normal)
     place = np.column_stack([table["x"], table["y"]])

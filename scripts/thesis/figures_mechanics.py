@@ -14,9 +14,10 @@ from mpi4py import MPI
 from contact import Case, Solution
 from contact.output.figures.body import draw_plane, picture
 from contact.output.figures.contact import draw_line
-from contact.output.table import Table, contact_table, csv_columns
+from contact.output.figures.style import Look
+from contact.output.table import Table, csv_columns
 from scripts.cases import bar
-from scripts.reporting import TWO_COLUMNS, Report, options, solved, subplots
+from scripts.reporting import TWO_COLUMNS, Report, options, run_of, solved, subplots
 
 RHO = 1e4
 EPS = 1.05e-5
@@ -44,24 +45,24 @@ FIGURES: Mapping[str, tuple[float, tuple[str, ...], str]] = {
 def draw(report: Report, number: str, case: Case, text: str, load: float) -> Table | None:
     """Draw both parts of a figure; return the contact table on rank 0. Collective."""
     solution = solved(case)
-    table = contact_table(solution)
-    deformed = picture(solution, "von_mises", "von Mises stress (daN/mm²)")
-    if table is None or deformed is None:
-        return table
+    run = run_of(solution)
+    if run is None:
+        return None
+    table, deformed = run.table, picture(run, "von_mises")
     dotted = number.replace("-", ".")
     where = f"Example 7.2, f2 = {load:g}, rho = {RHO:g}, {text}"
     report.figure(
         f"figure-{number}a",
         f"Figure {dotted} (a): stresses on Gamma_3, {where}",
-        draw_line(table, held=deformed.held, units=solution.units),
+        draw_line(run, Look()),
         csv_columns(table),
         f"{_remark(solution, table)} {OF_7_4 if number == '7-4' else ''}".rstrip(),
     )
-    values = deformed.values
+    values = deformed.skin["values"]
     report.figure(
         f"figure-{number}b",
         f"Figure {dotted} (b): deformed configuration and von Mises stress, {where}",
-        draw_plane(deformed, table, units=solution.units),
+        draw_plane(deformed, Look()),
         {"smallest von Mises": [float(values.min())], "largest von Mises": [float(values.max())]},
     )
     return table

@@ -18,11 +18,11 @@ from mpi4py import MPI
 
 from contact.body.equilibrium import BodyEquilibrium
 from contact.mesh.transfer import carry
-from contact.output.figures.body import draw_plane, picture
+from contact.output.figures.body import picture
 from contact.output.table import contact_table
 from contact.typing import Array
 from forms.kinematics import strain
-from scripts.reporting import TWO_COLUMNS, Report, observed_orders, options, subplots
+from scripts.reporting import TWO_COLUMNS, Report, observed_orders, options, run_of, subplots
 from scripts.studies.lagged_current import theorem_5_2
 from scripts.thesis.figures_compliance import (
     ALONG,
@@ -52,15 +52,15 @@ class Curve:
 def figure_8_2a(report: Report, cells: tuple[int, int]) -> None:
     """Draw the deformed bar on an insulating foundation. Collective."""
     solution = solution_of("piezo-8-1", cells)
-    table = contact_table(solution)
-    deformed = picture(solution, "potential", POTENTIAL)
-    if table is None or deformed is None:
+    run, (along, across) = run_of(solution), solution.contact_force
+    if run is None:
         return
-    values, (along, across) = deformed.values, solution.contact_force
+    table, deformed = run.table, picture(run, "potential")
+    values = deformed.skin["values"]
     report.figure(
         "figure-8-2a",
         "Figure 8.2 (a): deformed bar, potential, contact forces on it (arrows), k_e = 0, mu = 0.2",
-        with_forces(draw_plane(deformed, table, units=solution.units), deformed, table),
+        with_forces(deformed),
         {"smallest potential": [float(values.min())], "largest potential": [float(values.max())]},
         f"{remark(solution, table)} The body presses on the foundation with ({along:.4g}, "
         f"{across:.4g}): to the right, as the thesis says of the contact force; the arrows are "

@@ -13,8 +13,9 @@ from mpi4py import MPI
 
 from contact import Case, Solution, build_problem
 from contact.output.figures.body import draw_plane, picture
+from contact.output.figures.style import Look
 from contact.output.table import contact_table
-from scripts.reporting import TWO_COLUMNS, Report, append, options, solved, subplots
+from scripts.reporting import TWO_COLUMNS, Report, append, options, run_of, solved, subplots
 from scripts.thesis.hertz_problems import Cylinder, Sphere, cylinder, sphere
 
 
@@ -172,9 +173,10 @@ def figure_7_2(report: Report, solutions: Mapping[tuple[object, ...], Solution])
         "(7.16), body's normal": (1600.0, "(7.16)", "body", "quarter_disc"),
     }
     tables = {label: contact_table(solutions[key]) for label, key in shown.items()}
-    deformed = picture(solutions[shown["(7.16), rho = 1e4"]], "von_mises", "von Mises stress")
-    if MPI.COMM_WORLD.rank > 0:
+    run = run_of(solutions[shown["(7.16), rho = 1e4"]])
+    if run is None:
         return
+    deformed = picture(run, "von_mises")
     x = np.linspace(0, 1.25 * hertz.half_width, 400)
     data: dict[str, Sequence[float]] = {"x": x, "Hertz": hertz.pressure(x)}
     figure, axes = subplots(2, 1, size=(TWO_COLUMNS, 5.2), sharex=True)
@@ -204,14 +206,11 @@ def figure_7_2(report: Report, solutions: Mapping[tuple[object, ...], Solution])
         "Example 7.1. Hertz's solution is one of small contact widths and without friction; "
         "friction narrows the contact and raises the pressure.",
     )
-    assert deformed is not None
-    table = tables["(7.16), rho = 1e4"]
-    assert table is not None
     report.figure(
         "figure-7-2b",
         "Figure 7.2 (b): deformed quarter cylinder, von Mises stress",
-        draw_plane(deformed, table),
-        {"von Mises": [float(deformed.values.max())]},
+        draw_plane(deformed, Look()),
+        {"von Mises": [float(deformed.skin["values"].max())]},
         "Coulomb friction (7.16), rho = 1e4, contact along the foundation's normal. The number "
         "is the largest von Mises stress.",
     )

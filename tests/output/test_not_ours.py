@@ -13,7 +13,7 @@ from contact import solve
 from contact.case.text import to_toml
 from contact.cli.main import main
 from contact.output.checkpoint import Checkpoints
-from contact.output.figures.saved import plot
+from contact.output.figures.figures import plot
 from contact.output.files import write_outputs
 from tests.output.test_steps import case_of as steps_case
 from tests.problems.written import block

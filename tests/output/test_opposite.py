@@ -13,8 +13,8 @@ from contact import parse_case, solve
 from contact.body.description import Body, Fixed, Load
 from contact.interface.obstacle import GapFunction
 from contact.methods.options import NewtonOptions
-from contact.output.figures.figures import collect
-from contact.output.figures.saved import read_drawing
+from contact.output.figures.figures import figures_of
+from contact.output.figures.run import read_run
 from contact.output.files import write_outputs
 from contact.output.quantities import AGAINST, OPPOSITE, quantities
 from contact.output.surface import opposite_surface
@@ -71,8 +71,7 @@ def test_files_and_figures_of_both_sides(tmp_path: Path) -> None:
     np.testing.assert_allclose(force, [0.2, -2.0], rtol=1e-7)
     fields = read_vtu(tmp_path / "contact-against.vtu").at_points
     assert fields.keys() == {q.name for q in quantities(OPPOSITE)}
-    for drawing in (collect(solution), read_drawing(tmp_path)):
-        figures = drawing.figures()
+    for figures in (solution.plot(), figures_of(read_run(tmp_path))):
         labels = [text.get_text() for ax in figures["contact"].axes for text in _texts(ax)]
         assert "pressure on the other side" in labels
 

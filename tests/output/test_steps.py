@@ -9,8 +9,7 @@ from mpi4py import MPI
 
 from contact import parse_case, solve, write_outputs
 from contact.case.build import build_problem
-from contact.output.figures.saved import plot
-from contact.output.figures.steps import Course
+from contact.output.figures.figures import plot
 from contact.solving import evolve
 from tests.problems.bar import changed
 from tests.problems.piezo import COUPLING, PERMITTIVITY
@@ -154,9 +153,7 @@ def test_figures(tmp_path):
     assert {name.removesuffix(".svg") for name in again} == {
         name.removesuffix(".png") for name in drawn
     }
-    figure = Course([r.row for r in solution.steps], [r.table for r in solution.steps]).draw(
-        True, "steps"
-    )["loop"]
+    figure = solution.plot()["loop"]
     (line,) = figure.axes[0].lines
     way = [0.0, *(record.row["driven_x"] for record in solution.steps)]
     np.testing.assert_allclose(line.get_xdata(), way)

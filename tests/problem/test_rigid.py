@@ -12,7 +12,7 @@ from contact.errors import InputError
 from contact.interface.jump import Multipliers
 from contact.methods.newton import Newton
 from contact.methods.options import FixedPointOptions, NewtonOptions, PenaltyOptions
-from contact.output.figures.saved import plot
+from contact.output.figures.figures import plot
 from contact.problem.kkt import evaluate, residual_forces
 from contact.problem.state import State
 from contact.solving import build_problem, solve

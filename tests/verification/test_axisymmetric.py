@@ -21,8 +21,6 @@ from contact.mesh.transfer import refined
 from contact.methods.newton import Newton
 from contact.methods.options import FixedPointOptions, NewtonOptions, PenaltyOptions
 from contact.output.fields import DerivedFields
-from contact.output.figures.body import draw_plane
-from contact.output.figures.figures import collect
 from contact.output.resultants import charge_balance
 from contact.problem.checks import check_rigid_modes
 from contact.problem.contact import Contact
@@ -217,11 +215,9 @@ def test_the_case_file_and_its_figures(tmp_path):
     solution = contact.solve(parse_case(data))
     # Uniform pressure E eps under the area pi: the side is free.
     assert solution.contact_force == pytest.approx([0.0, -0.01 * np.pi], rel=1e-8)
-    drawing = collect(solution)
-    if drawing is not None:
-        (_, drawn), *_ = drawing.pictures
-        assert (drawing.axes, drawing.mirror) == ("rz", True)
-        ax = draw_plane(drawn, drawing.table, "", drawing.axes, drawing.mirror).axes[0]
+    figures = solution.plot()
+    if figures is not None:
+        ax = figures["deformed"].axes[0]
         assert ax.get_xlabel().startswith("$r$")
         assert ax.get_ylabel().startswith("$z$")
         assert ax.get_xlim()[0] < -1

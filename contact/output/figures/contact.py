@@ -12,27 +12,29 @@ from matplotlib.colors import ListedColormap
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from numpy.typing import NDArray
-from scipy.spatial import cKDTree
+from scipy.spatial import KDTree
 
+from contact.output.figures.run import Run
 from contact.output.figures.style import (
     BLUE,
     GREY,
     NARROW,
     ORANGE,
-    UNNAMED,
     ZONES,
+    Look,
     fitted,
     page_width,
     sheet,
 )
-from contact.output.options import Units
 from contact.output.quantities import STATUS
 from contact.output.table import Table, by_contact
-from contact.output.vtu import VTU
 from contact.typing import Array
 
 #: Colours of the nodes of Gamma_3 in 3-D by their status, in the order of its numbers.
 STATES = {"open": "#C8C8C8", "stick": BLUE, "slip": ORANGE}
+
+#: Contact zones below this share of an axis are drawn with their vicinity alone.
+SMALL = 1 / 3
 
 
 def position(table: Table, axes: str = "xy") -> tuple[Array, str]:
@@ -52,69 +54,57 @@ def position(table: Table, axes: str = "xy") -> tuple[Array, str]:
 def ends(table: Table, held: Array) -> Array:
     """Return the first and the last point of Gamma_3 in 2-D, shape (2, 2).
 
-    Parameters
-    ----------
-    table
-        The contact nodes in their order.
-    held
-        Nodes of Gamma_3 that are held, and hence no contact nodes, shape (n, 2).
+    They are those of the contact nodes, given in their order, or nodes beside them that are held
+    and hence no contact nodes, shape (n, 2).
     """
     points = np.column_stack([table["x"], table["y"]])
     found = points[[0, -1]]
     if len(held) and len(points) > 1:
         for k, (last, before) in enumerate([(0, 1), (-1, -2)]):
             distance = np.linalg.norm(held - points[last], axis=1)
-            spacing = np.linalg.norm(points[last] - points[before])
-            if distance.min() < 1.5 * spacing:
+            if distance.min() < 1.5 * np.linalg.norm(points[last] - points[before]):
                 found[k] = held[np.argmin(distance)]
     return found
 
 
-def zones(status: Any, where: Array) -> Iterator[tuple[str, float, float]]:
-    """Yield the runs of nodes of one status, and between which positions they lie."""
-    order = np.argsort(where)
-    status, where = status[order], where[order]
-    edges = np.concatenate([where[:1], (where[1:] + where[:-1]) / 2, where[-1:]])
-    starts = np.flatnonzero(np.concatenate([[True], status[1:] != status[:-1]]))
-    for start, stop in zip(starts, [*starts[1:], status.size], strict=True):
-        yield str(status[start]), float(edges[start]), float(edges[stop])
-
-
-def draw_line(
-    table: Table,
-    title: str = "",
-    held: Array | None = None,
-    axes: str = "xy",
-    units: Units = UNNAMED,
-    opposite: VTU | None = None,
-) -> Figure:
-    """Draw pressure, tangential stress and friction bound along Gamma_3 in the plane.
+def window(places: Array, touching: NDArray[np.bool_], margin: float) -> tuple[Array, Array]:
+    """Return the corners of the part that is shown: all, or a small contact zone's vicinity.
 
     Parameters
     ----------
-    table
-        The contact nodes in their order.
-    title
-        Of the figure.
-    held
-        Nodes of Gamma_3 that are no contact nodes, shape (n, 2), to begin and end at.
-    axes
-        Names of the coordinates.
-    units
-        Names of the units.
-    opposite
-        The other sides of contacts between bodies.
+    places
+        Nodes of Gamma_3, shape (n, k).
+    touching
+        Which of them are in contact, shape (n,).
+    margin
+        About all, in shares of the extent.
     """
-    parts = by_contact(table)
-    frictional = bool(np.any(table["bound"] > 0))
+    extent = float(np.ptp(places, axis=0).max())
+    zone = float(np.ptp(places[touching], axis=0).max()) if touching.any() else extent
+    room = margin * extent
+    if zone < SMALL * extent:
+        places, room = places[touching], max(0.4 * zone, 0.02 * extent)
+    return places.min(axis=0) - room, places.max(axis=0) + room
+
+
+def contact_figure(run: Run, look: Look) -> Figure:
+    """Draw the contact part: along Gamma_3 in 2-D, along the contact direction in 3-D."""
+    figure = draw_line(run, look) if run.plane else draw_surface(run, look)
+    if run.title:
+        figure.suptitle(fitted(run.title), fontsize="large")
+    return figure
+
+
+def draw_line(run: Run, look: Look) -> Figure:
+    """Draw pressure, tangential stress and friction bound along Gamma_3 in the plane."""
+    parts = by_contact(run.table)
+    frictional = bool(np.any(run.table["bound"] > 0))
     narrow = page_width() <= NARROW
     figure = sheet((0.8 if frictional else 0.48) * (1.5 if narrow else 1.0))
     size = (2 if frictional else 1, len(parts))
     grid = figure.subplots(*size, sharex="col", sharey="row", squeeze=False)
     for rows, part in zip(grid.T, parts, strict=True):
-        _draw_rows(rows, part, held, axes, units)
-        if opposite is not None:
-            _draw_opposite(rows[0], part, opposite)
+        _draw_rows(rows, part, run, look)
     for ax in grid[:, 1:].ravel():
         ax.set_ylabel("")
     if len(parts) == 1:
@@ -127,8 +117,6 @@ def draw_line(
         for ax, part in zip(grid[0], parts, strict=True):
             ax.set_title(str(part["on"][0]), fontsize="medium")
         figure.legend(handles=_handles(grid.ravel()), ncols=3, loc="outside lower center")
-    if title:
-        figure.suptitle(fitted(title), fontsize="large")
     return figure
 
 
@@ -142,13 +130,13 @@ def _handles(axes: Iterable[Axes]) -> list[Any]:
     return sorted(found.values(), key=lambda handle: not isinstance(handle, Line2D))
 
 
-def _draw_rows(rows: Any, table: Table, held: Array | None, axes: str, units: Units) -> None:
+def _draw_rows(rows: Any, table: Table, run: Run, look: Look) -> None:
     """Draw one contact: pressure, and below it friction, if there is a second row."""
-    where, name = position(table, axes)
-    bound, tau = table["bound"], table["tau"]
+    where, name = position(table, run.axes)
+    bound, tau, units = table["bound"], table["tau"], run.units
     frictional = len(rows) > 1
     for ax in rows:
-        for zone, start, stop in zones(table["status"], where):
+        for zone, start, stop in _zones(table["status"], where):
             ax.axvspan(start, stop, color=ZONES[zone][0], lw=0, zorder=0)
     for zone, (colour, label) in ZONES.items():
         if np.any(table["status"] == zone):
@@ -156,39 +144,50 @@ def _draw_rows(rows: Any, table: Table, held: Array | None, axes: str, units: Un
             rows[0].fill_between([], [], color=colour, lw=0, label=words)
     rows[0].plot(where, table["pressure"], color=BLUE, label=r"pressure $-\sigma_\nu$")
     rows[0].set_ylabel(units.label(r"$-\sigma_\nu$", "stress"))
+    _focus(rows[0], table["pressure"], 0.0)
     if frictional:
         rows[1].plot(where, tau, color=ORANGE, label=r"tangential stress $-\sigma_\tau\cdot t$")
         rows[1].plot(where, bound, "--", color=GREY, lw=0.8, label=r"friction bound $\pm s$")
         rows[1].plot(where, -bound, "--", color=GREY, lw=0.8)
         rows[1].axhline(0.0, color="black", lw=0.4)
         rows[1].set_ylabel(units.label(r"$-\sigma_\tau\cdot t$", "stress"))
+        _focus(rows[1], bound, -1.0)
+    if run.opposite is not None:
+        _draw_opposite(rows[0], table, run.opposite)
     rows[-1].set_xlabel(units.label(f"${name}$ along $\\Gamma_3$", "length"))
     outer = np.column_stack([table["x"], table["y"]])[[0, -1]]
     # The rows begin where x, then y is smaller, and so does the axis.
-    beyond = np.linalg.norm((outer if held is None else ends(table, held)) - outer, axis=1)
-    whole = np.array([where.min() - beyond[0], where.max() + beyond[1]])
-    low, high = _window(where[:, None], table["status"] != "open", 0.0)
-    cut = low[0] > where.min() or high[0] < where.max()
-    rows[0].set_xlim(*(np.clip([low[0], high[0]], *whole) if cut else whole))
-    _focus(rows[0], table["pressure"], 0.0)
-    if frictional:
-        _focus(rows[1], bound, -1.0)
+    beyond = np.linalg.norm(ends(table, run.held) - outer, axis=1)
+    whole = where.min() - beyond[0], where.max() + beyond[1]
+    (low,), (high,) = window(where[:, None], table["status"] != "open", 0.0)
+    cut = low > where.min() or high < where.max()
+    rows[0].set_xlim(look.xlim or (tuple(np.clip([low, high], *whole)) if cut else whole))
 
 
-def _draw_opposite(ax: Axes, table: Table, opposite: VTU) -> None:
+def _zones(status: Any, where: Array) -> Iterator[tuple[str, float, float]]:
+    """Yield the runs of nodes of one status, and between which positions they lie."""
+    order = np.argsort(where)
+    status, where = status[order], where[order]
+    edges = np.concatenate([where[:1], (where[1:] + where[:-1]) / 2, where[-1:]])
+    starts = np.flatnonzero(np.concatenate([[True], status[1:] != status[:-1]]))
+    for start, stop in zip(starts, [*starts[1:], status.size], strict=True):
+        yield str(status[start]), float(edges[start]), float(edges[stop])
+
+
+def _draw_opposite(ax: Axes, table: Table, opposite: Any) -> None:
     """Draw the pressure on the other side where its nodes are opposite of those of a contact."""
-    own = np.asarray(opposite.at_points["entry"]) == table["entry"][0]
+    own = opposite["entry"] == table["entry"][0]
     if not own.any():
         return
     points = np.column_stack([table["x"], table["y"]])
     where, _ = position(table)
-    places = opposite.grid.points[own][:, :2]
-    near = cKDTree(points).query(places)[1]
+    places = opposite.points[own][:, :2]
+    near = KDTree(points).query(places)[1]
     # Along the side of the contact nodes, from the nearest of them.
     along = np.gradient(points, axis=0) / np.gradient(where)[:, None]
     there = where[near] + np.einsum("ni,ni->n", places - points[near], along[near])
     order = np.argsort(there)
-    pressure = np.asarray(opposite.at_points["pressure"])[own][order]
+    pressure = opposite["pressure"][own][order]
     ax.plot(there[order], pressure, ":", color=GREY, lw=1.0, label="pressure on the other side")
 
 
@@ -205,27 +204,18 @@ def _focus(ax: Axes, values: Array, low: float) -> None:
         ax.annotate(text, (0.99, 0.97), xycoords="axes fraction", ha="right", va="top", fontsize=7)
 
 
-def triangles(cells: Any) -> Any:
-    """Return triangles by their corners, those of degree 2 as four each, shape (n, 3)."""
-    if cells.shape[1] == 3:
-        return cells
-    quarters = [[0, 5, 4], [5, 1, 3], [4, 3, 2], [3, 4, 5]]
-    return np.concatenate([cells[:, corners] for corners in quarters])
-
-
-def draw_surface(
-    surface: VTU, title: str = "", units: Units = UNNAMED, opposite: VTU | None = None
-) -> Figure:
-    """Draw pressure, status and friction arrows on Gamma_3 in 3-D, along the contact direction.
-
-    The arguments are those of `draw_line`.
-    """
-    touching = np.asarray(surface.at_points["status"]) > STATUS["open"]
-    view = _across(surface, touching)
+def draw_surface(run: Run, look: Look) -> Figure:
+    """Draw pressure, status and friction arrows on Gamma_3 in 3-D, along the contact direction."""
+    surface = run.surface
+    touching = surface["status"] > STATUS["open"]
+    mean = np.nanmean(surface["normal"][touching if touching.any() else slice(None)], axis=0)
+    view = sorted(int(k) for k in np.argsort(np.abs(mean))[:2])  # the axes most across it
     sides = [(surface, "contact pressure")]
-    if opposite is not None:
-        sides.append((opposite, "on the other side"))
-    low, high = _window(surface.grid.points[:, view], touching, 0.13)  # room for the arrows
+    if run.opposite is not None:
+        sides.append((run.opposite, "on the other side"))
+    low, high = window(surface.points[:, view], touching, 0.13)  # room for the arrows
+    for k, given in enumerate((look.xlim, look.ylim)):
+        low[k], high[k] = given or (low[k], high[k])
     stacked, count = page_width() < NARROW, len(sides) + 1
     rows, columns = (count, 1) if stacked else (1, count)
     aspect = float(np.clip((high - low)[1] / (high - low)[0], 0.25, 0.8 if stacked else 1.25))
@@ -233,7 +223,7 @@ def draw_surface(
     figure.set_layout_engine("compressed")
     grid = figure.subplots(rows, columns, sharey=not stacked, sharex=stacked)
     *lefts, right = grid.ravel()
-    highest = float(np.nanmax(surface.at_points["pressure"], initial=0.0))
+    highest = float(np.nanmax(surface["pressure"], initial=0.0))
     for ax, (side, _) in zip(lefts, sides, strict=True):
         shown = _draw_pressure(ax, side, view, highest)
     status = _draw_status(right, surface, view, 0.1 * float((high - low).max()))
@@ -243,86 +233,55 @@ def draw_surface(
         ax.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]))
         ax.set_title(name, fontsize="medium")
         if not stacked or ax is right:
-            ax.set_xlabel(units.label(f"${'xyz'[view[0]]}$", "length"))
+            ax.set_xlabel(run.units.label(f"${'xyz'[view[0]]}$", "length"))
         if stacked or ax is lefts[0]:
-            ax.set_ylabel(units.label(f"${'xyz'[view[1]]}$", "length"))
-    label = units.label(r"$-\sigma_\nu$", "stress")
+            ax.set_ylabel(run.units.label(f"${'xyz'[view[1]]}$", "length"))
+    label = run.units.label(r"$-\sigma_\nu$", "stress")
     figure.colorbar(shown, ax=lefts, location="bottom", label=label, aspect=25)
     bar = figure.colorbar(status, ax=right, location="bottom", aspect=25, ticks=range(len(STATES)))
     bar.ax.set_xticklabels([ZONES[zone][1] for zone in STATES])
     bar.ax.tick_params(length=0)
-    if title:
-        figure.suptitle(fitted(title), fontsize="large")
     return figure
 
 
-def _draw_pressure(ax: Axes, side: VTU, view: list[int], highest: float) -> Any:
-    """Draw the pressure on one side; return its colours."""
-    flat, facets = side.grid.points[:, view], triangles(side.grid.cells)
-    pressure = np.asarray(side.at_points["pressure"])
+def _facets(ax: Axes, side: Any, view: list[int]) -> tuple[Any, Array, Array]:
+    """Draw the facets of a side in grey; return them as triangles, and their nodes in the view."""
+    skin = side.extract_surface(nonlinear_subdivision=1)  # of degree 2: four triangles each
+    flat, facets = np.asarray(skin.points)[:, view], np.asarray(skin.regular_faces)
     ax.add_collection(PolyCollection(list(flat[facets]), facecolor="#F2F2F2", lw=0))
-    known = np.isfinite(pressure[facets]).all(axis=1)
+    return skin, flat, facets
+
+
+def _draw_pressure(ax: Axes, side: Any, view: list[int], highest: float) -> Any:
+    """Draw the pressure on one side; return its colours."""
+    skin, flat, facets = _facets(ax, side, view)
+    known = np.isfinite(skin["pressure"][facets]).all(axis=1)
     drawn = facets[known] if known.any() else facets
-    values = np.nan_to_num(pressure)
+    values = np.nan_to_num(skin["pressure"])
     colours = {"shading": "gouraud", "cmap": "viridis", "vmin": 0.0, "vmax": highest or 1.0}
     return ax.tripcolor(*flat.T, drawn, values, **colours)
 
 
-def _draw_status(ax: Axes, surface: VTU, view: list[int], reach: float) -> Any:
+def _draw_status(ax: Axes, surface: Any, view: list[int], reach: float) -> Any:
     """Draw the status of the nodes, and friction as arrows of a length at most; return colours."""
-    flat, facets = surface.grid.points[:, view], triangles(surface.grid.cells)
-    ax.add_collection(PolyCollection(list(flat[facets]), facecolor="#F2F2F2", lw=0))
-    status = np.asarray(surface.at_points["status"])
+    _facets(ax, surface, view)
+    flat, status = surface.points[:, view], surface["status"]
     known = status >= STATUS["open"]
     size = float(np.clip(2e3 / len(flat), 0.5, 12))
     colours = {"cmap": ListedColormap(list(STATES.values())), "vmin": -0.5, "vmax": 2.5}
     shown = ax.scatter(*flat[known].T, c=status[known], s=size, lw=0, **colours)
-    _arrows(ax, surface, flat, view, reach)
-    return shown
-
-
-def _arrows(ax: Axes, surface: VTU, flat: Array, view: list[int], reach: float) -> None:
-    """Draw the friction stress, its largest arrow of a given length."""
-    traction, normal = (np.asarray(surface.at_points[name]) for name in ("traction", "normal"))
+    traction, normal = surface["traction"], surface["normal"]
     along = traction - np.einsum("ni,ni->n", traction, normal)[:, None] * normal
     friction = np.nan_to_num(along[:, view])
-    size = np.linalg.norm(friction, axis=1)
+    size_of = np.linalg.norm(friction, axis=1)
     # Rounding of the pressures is no friction.
     rounding = 1e-9 * np.nan_to_num(np.linalg.norm(traction, axis=1)).max(initial=0.0)
-    acting = np.flatnonzero(size > max(1e-6 * size.max(initial=0.0), rounding))
-    if not acting.size:
-        return
-    chosen = acting[_thinned(flat[acting], 16)]
-    exact = {"angles": "xy", "scale_units": "xy", "scale": size[chosen].max() / reach}
-    ax.quiver(*flat[chosen].T, *friction[chosen].T, color="black", width=0.004, **exact)
-
-
-def _across(surface: VTU, touching: NDArray[np.bool_]) -> list[int]:
-    """Return the two axes that are the most across the mean contact direction."""
-    chosen = touching if touching.any() else slice(None)
-    mean = np.nanmean(np.asarray(surface.at_points["normal"])[chosen], axis=0)
-    return sorted(int(k) for k in np.argsort(np.abs(mean))[:2])
-
-
-def _window(places: Array, touching: NDArray[np.bool_], margin: float) -> tuple[Array, Array]:
-    """Return the corners of the part that is shown: all, or a small contact zone's vicinity.
-
-    Parameters
-    ----------
-    places
-        Nodes of Gamma_3, shape (n, k).
-    touching
-        Which of them are in contact, shape (n,).
-    margin
-        About all, in shares of the extent.
-    """
-    extent = float(np.ptp(places, axis=0).max())
-    zone = float(np.ptp(places[touching], axis=0).max()) if touching.any() else extent
-    if zone < 0.3 * extent:
-        places, room = places[touching], max(0.4 * zone, 0.02 * extent)
-    else:
-        room = margin * extent
-    return places.min(axis=0) - room, places.max(axis=0) + room
+    acting = np.flatnonzero(size_of > max(1e-6 * size_of.max(initial=0.0), rounding))
+    if acting.size:
+        chosen = acting[_thinned(flat[acting], 16)]
+        exact = {"angles": "xy", "scale_units": "xy", "scale": size_of[chosen].max() / reach}
+        ax.quiver(*flat[chosen].T, *friction[chosen].T, color="black", width=0.004, **exact)
+    return shown
 
 
 def _thinned(flat: Array, count: int) -> NDArray[np.intp]:

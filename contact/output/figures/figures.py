@@ -1,127 +1,43 @@
-"""Figures of a solution: contact, deformed body, potential, steps."""
+"""All figures of a run, and animations, from the files that it has left."""
 
 from __future__ import annotations
 
 import base64
 import io
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import matplotlib
+import numpy as np
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
+from mpi4py import MPI
+from PIL import Image
 
-from contact.output.figures.body import Picture, draw_plane, draw_space, near_contact, picture
-from contact.output.figures.contact import draw_line, draw_surface
-from contact.output.figures.steps import Course
-from contact.output.figures.style import DEFORMED, STYLE, UNNAMED, axes_of, heading, named, style
-from contact.output.options import Units
-from contact.output.solved import Solved
-from contact.output.surface import contact_surface, opposite_surface
-from contact.output.table import Table, contact_table, held_points
-from contact.output.vtu import VTU
-from contact.typing import Array
+from contact.errors import InputError
+from contact.output.figures.body import (
+    body_figure,
+    largest_displacement,
+    magnification,
+    picture,
+    scalar,
+)
+from contact.output.figures.contact import contact_figure
+from contact.output.figures.run import Run, read_run, read_steps
+from contact.output.figures.steps import steps_figures
+from contact.output.figures.style import DEFORMED, OUTLIERS, STYLE, Look, named
+from contact.output.folder import add, begin, discard, refused, result_folder
 
+#: Endings of files that figures may have.
+FORMATS = ("png", "pdf", "svg")
 
-@dataclass(frozen=True)
-class Drawing:
-    """The data of all figures, from all ranks.
+#: Dots per inch of an animation: a file that a page can show.
+DPI = 90
 
-    Attributes
-    ----------
-    title
-        Of all figures.
-    plane
-        Whether the body is plane.
-    table, held
-        The contact nodes, and the other nodes of Gamma_3.
-    surface, opposite
-        Gamma_3 with its fields, drawn in 3-D, and the other sides of contacts between bodies.
-    pictures
-        The figures of the deformed body by name.
-    axes
-        Names of the coordinates of a plane mesh.
-    mirror
-        Whether both halves of a body of revolution are drawn.
-    units
-        Names of the units, for labels.
-    course
-        The steps of an evolution.
-    """
-
-    title: str
-    plane: bool
-    table: Table
-    held: Array
-    surface: VTU
-    pictures: Sequence[tuple[str, Picture]]
-    axes: str = "xy"
-    mirror: bool = False
-    units: Units = UNNAMED
-    course: Course | None = None
-    opposite: VTU | None = None
-
-    @property
-    def mirrored(self) -> bool:
-        """Whether there are two halves to draw."""
-        return self.mirror and self.axes == "rz"
-
-    def draw(
-        self,
-        folder: Path,
-        formats: Sequence[str] = ("png",),
-        width: float | None = None,
-        contact: bool = True,
-    ) -> list[Path]:
-        """Draw the figures into a folder. On one rank.
-
-        Parameters
-        ----------
-        folder
-            The folder.
-        formats
-            Endings of the files: png, pdf or svg.
-        width
-            Of the figures (inches); by default that of a page.
-        contact
-            Whether to draw the contact part and the steps too.
-
-        Returns
-        -------
-        The files, in the order in which they were drawn; one that fails is not left half done.
-        """
-        figures = self.figures(width, contact)
-        with matplotlib.rc_context(style(width)):
-            return [
-                _save(figure, folder / f"figure-{name}.{ending}")
-                for name, figure in figures.items()
-                for ending in formats
-            ]
-
-    def figures(self, width: float | None = None, contact: bool = True) -> Gallery:
-        """Return the figures by name, as `draw` takes their width and choice. On one rank."""
-        figures: dict[str, Figure | None] = {}
-        with matplotlib.rc_context(style(width)):
-            if contact:
-                figures["contact"] = self._contact()
-            if contact and self.course is not None:
-                figures |= self.course.draw(self.plane, self.title, self.axes, self.units)
-            for name, made in self.pictures:
-                figures[name] = self.body(near_contact(made, self.table), self.table, self.title)
-        return Gallery({name: figure for name, figure in figures.items() if figure is not None})
-
-    def _contact(self) -> Figure:
-        if self.plane:
-            return draw_line(
-                self.table, self.title, self.held, self.axes, self.units, self.opposite
-            )
-        return draw_surface(self.surface, self.title, self.units, self.opposite)
-
-    def body(self, made: Picture, table: Table, title: str) -> Figure | None:
-        """Draw a deformed body with its contact nodes; None where pyvista has no display."""
-        if self.plane:
-            return draw_plane(made, table, title, self.axes, self.mirrored, self.units)
-        return draw_space(made, title)
+#: Milliseconds of the whole animation, and of a frame at least and at most.
+LENGTH, SHORTEST, LONGEST = 6000, 40, 500
 
 
 class Gallery(dict[str, Figure]):
@@ -138,56 +54,153 @@ class Gallery(dict[str, Figure]):
         return "".join(images)
 
 
-def collect(solution: Solved, fields: Sequence[str] = ()) -> Drawing | None:
-    """Gather on rank 0 the data of the figures of a solution; None elsewhere. Collective.
+def figures_of(run: Run, fields: Sequence[str] = (), look: Look | None = None) -> Gallery:
+    """Return the figures of a run by name.
 
-    In 2-D the contact figure shows the stresses along Gamma_3 with the friction bound
-    and the zones of stick and slip, as Figure 7.4 of the thesis does, and the deformed body is
-    coloured by the von Mises stress, as in Figure 7.5. In 3-D the contact nodes are seen
-    along the mean contact direction, and the deformed surface from the side.
+    In 2-D the contact figure shows the stresses along Gamma_3 with the friction bound and the zones
+    of stick and slip, as Figure 7.4 of the thesis does, and the deformed body is coloured by the
+    von Mises stress, as in Figure 7.5. In 3-D the contact nodes are seen along the mean contact
+    direction, and the deformed surface from the side.
 
     Parameters
     ----------
-    solution
-        The solution.
+    run
+        The run.
     fields
-        Fields to colour the body by; by default the von Mises stress and the potential.
+        Fields to colour the body by, and these figures alone; by default all figures, the body by
+        von Mises stress and potential.
+    look
+        Choices for all figures.
     """
-    table, held = contact_table(solution), held_points(solution.problem)
-    surface, opposite = contact_surface(solution, table), opposite_surface(solution)
-    pictures: list[tuple[str, Picture]] = []
-    usual = [field for field in DEFORMED if field != "potential" or solution.problem.piezoelectric]
-    for field in fields or usual:
-        name, label = named(field, solution.units)
-        made = picture(solution, field, label)
-        if made is not None:
-            pictures.append((name, made))
-    if table is None or surface is None:
-        return None
-    course = None
-    if solution.steps:
-        tables = [record.table for record in solution.steps if record.table is not None]
-        course = Course([record.row for record in solution.steps], tables)
-    return Drawing(
-        title=heading(solution.title),
-        plane=solution.problem.dim == 2,
-        table=table,
-        held=held,
-        surface=surface,
-        pictures=pictures,
-        axes=axes_of(solution.problem.domain.revolved),
-        mirror=solution.output.mirror,
-        units=solution.units,
-        course=course,
-        opposite=opposite,
-    )
+    look, found = look or Look(), Gallery()
+    with matplotlib.rc_context(look.style):
+        if not fields:
+            found["contact"] = contact_figure(run, look)
+            if run.steps is not None:
+                found |= steps_figures(run, look)
+        for field in fields or [field for field in DEFORMED if field in run.body.point_data]:
+            figure = body_figure(picture(run, field), look)
+            if figure is not None:
+                found[named(field, run.units)[0]] = figure
+    return found
 
 
-def _save(figure: Figure, path: Path) -> Path:
-    """Save a figure made without pyplot."""
-    try:
-        figure.savefig(path)
-    except BaseException:
-        path.unlink(missing_ok=True)
-        raise
+def draw(
+    run: Run,
+    folder: Path,
+    fields: Sequence[str] = (),
+    formats: Sequence[str] = ("png",),
+    look: Look | None = None,
+) -> list[Path]:
+    """Draw the figures of `figures_of` into a folder; return the files. On one rank."""
+    files = []
+    look = look or Look()
+    figures = figures_of(run, fields, look)
+    with matplotlib.rc_context(look.style):
+        for name, figure in figures.items():
+            for ending in formats:
+                files.append(folder / f"figure-{name}.{ending}")
+                try:
+                    figure.savefig(files[-1])
+                except BaseException:  # it is not left half done
+                    files[-1].unlink(missing_ok=True)
+                    raise
+    return files
+
+
+def plot(
+    folder: Path,
+    fields: Sequence[str] = (),
+    formats: Sequence[str] = ("png",),
+    look: Look | None = None,
+) -> list[Path]:
+    """Draw the figures of a run into its folder; return the files. On one rank.
+
+    Parameters
+    ----------
+    folder
+        The results of the run.
+    fields, formats, look
+        As `draw` takes them.
+
+    Raises
+    ------
+    InputError
+        If the folder has not all that is needed, or no such field, cannot be written to, or another
+        run works in it.
+    """
+    return _added(folder, lambda new: draw(read_run(folder), new, fields, formats, look))
+
+
+def animate(folder: Path, fields: Sequence[str] = (), look: Look | None = None) -> list[Path]:
+    """Draw ``animation-FIELD.gif`` from the files of an evolution. On one rank.
+
+    Scale, colours and axes are the same in all frames. The arguments are those of `plot`.
+
+    Raises
+    ------
+    InputError
+        As `plot`, and if the folder has no steps.
+    """
+
+    def draw(new: Path) -> list[Path]:
+        frames, chosen = read_steps(folder), look or Look()
+        return [_animation(frames, field, new, chosen) for field in fields or ("von_mises",)]
+
+    return _added(folder, draw)
+
+
+def _added(folder: Path, draw: Callable[[Path], list[Path]]) -> list[Path]:
+    """Let files be drawn, and add them to the results in a folder."""
+    if not (folder / "summary.json").is_file():
+        raise InputError(f"{folder}: no results there; accepted: a folder that a run has left")
+    with result_folder(folder, MPI.COMM_SELF, overwrite=True):  # it only adds
+        try:
+            files = draw(begin(folder))
+            add(folder, files)
+        except OSError as error:
+            raise refused(error) from None
+        finally:
+            discard(folder)
+    return [folder / path.name for path in files]
+
+
+def _animation(frames: Sequence[tuple[float, Run]], field: str, folder: Path, look: Look) -> Path:
+    runs = [replace(run, title=f"{run.title}, t = {time:.3g}".lstrip(", ")) for time, run in frames]
+    diameter = float(np.ptp(runs[-1].body.points, axis=0).max())
+    scale = magnification(diameter, max(largest_displacement(run) for run in runs))
+    places = np.concatenate([run.body.points + scale * run.displacement for run in runs])
+    box = np.array([places.min(axis=0), places.max(axis=0)])[:, : len(runs[0].axes)]
+    # Colours of all frames, without values far beyond the others.
+    limits = np.array([np.quantile(scalar(run, field)[0], OUTLIERS) for run in runs])
+    same: Any = {"scale": scale, "limits": (limits[:, 0].min(), limits[:, 1].max())}
+    with matplotlib.rc_context(look.style | {"figure.dpi": DPI}):
+        found = [body_figure(replace(picture(run, field, **same), box=box), look) for run in runs]
+        figures = [figure for figure in found if figure is not None]
+        if not figures:
+            raise InputError("--animate: pyvista cannot draw here; accepted: a display, or Xvfb")
+        if runs[0].plane:
+            _same_axes(figures)
+        images = [_image(figure) for figure in figures]
+    palette = images[-1].quantize(256)  # one for all, so that nothing flickers; the bar has it
+    first, *rest = (image.quantize(palette=palette, dither=Image.Dither.NONE) for image in images)
+    path = folder / f"animation-{named(field, runs[0].units)[0]}.gif"
+    each = int(np.clip(LENGTH / len(frames), SHORTEST, LONGEST))
+    first.save(path, save_all=True, append_images=rest, duration=each, loop=0)
     return path
+
+
+def _same_axes(figures: Sequence[Figure]) -> None:
+    """Show the same part of the plane in all figures."""
+    axes = [figure.axes[0] for figure in figures]
+    for get, put in (("get_xlim", "set_xlim"), ("get_ylim", "set_ylim")):
+        limits = np.array([getattr(ax, get)() for ax in axes])
+        for ax in axes:
+            getattr(ax, put)(limits[:, 0].min(), limits[:, 1].max())
+
+
+def _image(figure: Figure) -> Any:
+    canvas = FigureCanvasAgg(figure)
+    canvas.draw()
+    canvas.draw()  # the second one ends the layout
+    return Image.fromarray(np.asarray(canvas.buffer_rgba())).convert("RGB")

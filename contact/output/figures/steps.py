@@ -2,158 +2,126 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-
 import numpy as np
 from matplotlib.colors import ListedColormap
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
-from contact.output.figures.contact import position
+from contact.output.figures.contact import position, window
+from contact.output.figures.run import Run
 from contact.output.figures.style import (
     BLUE,
     GREEN,
     GREY,
     NARROW,
     ORANGE,
-    UNNAMED,
     ZONES,
+    Look,
     fitted,
     page_width,
     sheet,
 )
-from contact.output.options import Units
-from contact.output.table import Table
 from contact.typing import Array
-
-#: Names of the figures: the first is drawn where a part is driven, the second in 2-D.
-LOOP, MAP, ENERGY = "loop", "zones", "energy"
 
 #: Parts that move, as the columns of ``steps.csv`` begin; labels of their displacement, and names.
 DRIVEN = {"driven": ("mean displacement", "part"), "rigid": ("displacement", "foundation")}
 
 
-@dataclass(frozen=True)
-class Course:
-    """The steps of an evolution.
+def steps_figures(run: Run, look: Look) -> dict[str, Figure]:
+    """Return the figures of an evolution by name.
 
-    Attributes
-    ----------
-    rows
-        The rows of ``steps.csv``.
-    tables
-        The contact nodes at the end of each step.
+    The loop is drawn where a part is driven, and zones in 2-D.
     """
-
-    rows: Sequence[Mapping[str, float]]
-    tables: Sequence[Table]
-
-    def column(self, name: str) -> Array:
-        """Return a column of ``steps.csv``, shape (steps,)."""
-        return np.array([row[name] for row in self.rows], dtype=float)
-
-    def draw(
-        self, plane: bool, title: str, axes: str = "xy", units: Units = UNNAMED
-    ) -> dict[str, Figure]:
-        """Return the figures by name.
-
-        Parameters
-        ----------
-        plane
-            Whether the body is plane.
-        title
-            Of the figures.
-        axes
-            Names of the coordinates of a plane mesh.
-        units
-            Names of the units, for labels.
-        """
-        # Forces of plane bodies are those of a unit of thickness.
-        power = 1 if plane and axes == "xy" else 2
-        found = {ENERGY: self._energies(_product(units, power + 1))}
-        for moves, words in DRIVEN.items():
-            if f"{moves}_x" in self.rows[0] and LOOP not in found:
-                found[LOOP] = self._loop(moves, words, plane, units, _product(units, power))
-        if plane and len(self.rows) > 1 and "on" not in self.tables[0]:
-            found[MAP] = self._zones(axes, units)
-        for figure in found.values():
-            figure.suptitle(fitted(title), fontsize="large")
-        return found
-
-    def _loop(
-        self, moves: str, words: tuple[str, str], plane: bool, units: Units, unit: str
-    ) -> Figure:
-        """Draw the force on the part that moves over its displacement, from the origin on."""
-        names = "xy" if plane else "xyz"
-        ways = [np.concatenate([[0.0], self.column(f"{moves}_{axis}")]) for axis in names]
-        forces = [np.concatenate([[0.0], self.column(f"{moves}_force_{axis}")]) for axis in names]
-        turns = []
-        for way in ways:
-            direction = np.sign(np.diff(way))
-            turns.append(np.count_nonzero(direction[1:] * direction[:-1] < 0))
-        # Where the part turns back most often; else where it goes farthest.
-        k = int(np.lexsort(([np.ptp(way) for way in ways], turns))[-1])
-        figure = sheet(0.66)
-        ax = figure.subplots()
-        ax.plot(ways[k], forces[k], "-o", color=BLUE, markersize=2.5)
-        ax.set_xlabel(units.label(f"{words[0]} $u_{names[k]}$", "length"))
-        ax.set_ylabel(f"force on the {words[1]} along ${names[k]}${unit}")
-        ax.grid(alpha=0.25)
-        return figure
-
-    def _energies(self, unit: str) -> Figure:
-        """Draw the work of loads and supports, the elastic energy and the dissipation."""
-        narrow = page_width() < NARROW
-        time = np.concatenate([[0.0], self.column("t")])
-        work, taken = (
-            np.concatenate([[0.0], np.cumsum(self.column(name))])
-            for name in ("work", "dissipation")
-        )
-        stored = np.concatenate([[0.0], self.column("energy")])
-        figure = sheet(0.9 if narrow else 0.6)
-        ax = figure.subplots()
-        ax.plot(time, work, color=BLUE, label="work done")
-        ax.plot(time, stored + taken, "--", color=ORANGE, label="stored and dissipated")
-        ax.plot(time, stored, color=GREEN, label="stored")
-        ax.plot(time, taken, color=GREY, label="dissipated by friction")
-        ax.set_xlabel("time")
-        ax.set_ylabel(f"energy{unit}")
-        ax.legend(ncols=1 if narrow else 2, loc="lower left", bbox_to_anchor=(0, 1))
-        ax.grid(alpha=0.25)
-        return figure
-
-    def _zones(self, axes: str, units: Units) -> Figure:
-        """Draw the status of each node at the end of each step, over its position and the time."""
-        where, name = position(self.tables[0], axes)
-        order = np.argsort(where)
-        kinds = list(ZONES)
-        status = np.array(
-            [[kinds.index(str(kind)) for kind in table["status"][order]] for table in self.tables]
-        )
-        figure = sheet(0.7)
-        ax = figure.subplots()
-        ax.pcolormesh(
-            _edges(where[order]),
-            np.concatenate([[0.0], self.column("t")]),
-            status,
-            cmap=ListedColormap([colour for colour, _ in ZONES.values()]),
-            vmin=-0.5,
-            vmax=len(kinds) - 0.5,
-            rasterized=True,
-        )
-        handles = [Patch(color=colour, label=words) for colour, words in ZONES.values()]
-        ax.legend(handles=handles, ncols=3, loc="lower left", bbox_to_anchor=(0, 1))
-        ax.set_xlabel(units.label(f"position ${name}$", "length"))
-        ax.set_ylabel("time")
-        return figure
+    assert run.steps is not None
+    found = {"energy": draw_energies(run)}
+    moves = next((moves for moves in DRIVEN if f"{moves}_x" in run.steps), None)
+    if moves is not None:
+        found["loop"] = draw_loop(run, moves)
+    if run.plane and len(run.tables) > 1 and "on" not in run.tables[0]:
+        found["zones"] = draw_zones(run, look)
+    for figure in found.values():
+        figure.suptitle(fitted(run.title), fontsize="large")
+    return found
 
 
-def _product(units: Units, power: int) -> str:
-    """Return the unit of stress times a power of length in parentheses, if both are named."""
-    if not units.stress or not units.length:
+def _course(run: Run, name: str) -> Array:
+    """Return a column of ``steps.csv`` after its value 0 in the reference configuration."""
+    assert run.steps is not None
+    return np.concatenate([[0.0], run.steps[name]])
+
+
+def _unit(run: Run, power: int) -> str:
+    """Return the unit of stress times area (1) or volume (2), if stress and length are named.
+
+    Forces of plane bodies are those of a unit of thickness.
+    """
+    stress, length = run.units.stress, run.units.length
+    if not stress or not length:
         return ""
-    return f" ({units.stress} {units.length}{f'$^{power}$' if power > 1 else ''})"
+    power += run.axes != "xy"
+    return f" ({stress} {length}{f'$^{power}$' if power > 1 else ''})"
+
+
+def draw_loop(run: Run, moves: str) -> Figure:
+    """Draw the force on the part that moves over its displacement, from the origin on."""
+    names = "xyz"[: len(run.axes)]
+    ways = [_course(run, f"{moves}_{axis}") for axis in names]
+    directions = [np.sign(np.diff(way)) for way in ways]
+    turns = [np.count_nonzero(there[1:] * there[:-1] < 0) for there in directions]
+    # Where the part turns back most often; else where it goes farthest.
+    k = int(np.lexsort(([np.ptp(way) for way in ways], turns))[-1])
+    words, part = DRIVEN[moves]
+    figure = sheet(0.66)
+    ax = figure.subplots()
+    ax.plot(ways[k], _course(run, f"{moves}_force_{names[k]}"), "-o", color=BLUE, markersize=2.5)
+    ax.set_xlabel(run.units.label(f"{words} $u_{run.axes[k]}$", "length"))
+    ax.set_ylabel(f"force on the {part} along ${run.axes[k]}${_unit(run, 1)}")
+    ax.grid(alpha=0.25)
+    return figure
+
+
+def draw_energies(run: Run) -> Figure:
+    """Draw the work of loads and supports, the elastic energy and the dissipation."""
+    narrow = page_width() < NARROW
+    time, stored = _course(run, "t"), _course(run, "energy")
+    work, taken = (np.cumsum(_course(run, name)) for name in ("work", "dissipation"))
+    figure = sheet(0.9 if narrow else 0.6)
+    ax = figure.subplots()
+    ax.plot(time, work, color=BLUE, label="work done")
+    ax.plot(time, stored + taken, "--", color=ORANGE, label="stored and dissipated")
+    ax.plot(time, stored, color=GREEN, label="stored")
+    ax.plot(time, taken, color=GREY, label="dissipated by friction")
+    ax.set_xlabel("time")
+    ax.set_ylabel(f"energy{_unit(run, 2)}")
+    ax.legend(ncols=1 if narrow else 2, loc="lower left", bbox_to_anchor=(0, 1))
+    ax.grid(alpha=0.25)
+    return figure
+
+
+def draw_zones(run: Run, look: Look) -> Figure:
+    """Draw the status of each node at the end of each step, over its position and the time."""
+    where, name = position(run.tables[0], run.axes)
+    order, kinds = np.argsort(where), list(ZONES)
+    status = np.array([table["status"][order] for table in run.tables])
+    figure = sheet(0.7)
+    ax = figure.subplots()
+    ax.pcolormesh(
+        _edges(where[order]),
+        _course(run, "t"),
+        np.argmax([status == kind for kind in kinds], axis=0),
+        cmap=ListedColormap([colour for colour, _ in ZONES.values()]),
+        vmin=-0.5,
+        vmax=len(kinds) - 0.5,
+        rasterized=True,
+    )
+    (low,), (high,) = window(where[order, None], (status != "open").any(axis=0), 0.0)
+    if look.xlim or low > where.min() or high < where.max():
+        ax.set_xlim(look.xlim or (low, high))
+    handles = [Patch(color=colour, label=words) for colour, words in ZONES.values()]
+    ax.legend(handles=handles, ncols=3, loc="lower left", bbox_to_anchor=(0, 1))
+    ax.set_xlabel(run.units.label(f"${name}$ along $\\Gamma_3$", "length"))
+    ax.set_ylabel("time")
+    return figure
 
 
 def _edges(where: Array) -> Array:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import textwrap
+from dataclasses import dataclass
 from typing import Any
 
 import matplotlib
@@ -39,8 +40,6 @@ ZONES = {
     "slip": ("#FBE3C8", "sliding"),
     "open": ("#F2F2F2", "open"),
 }
-#: Where no units are named.
-UNNAMED = Units()
 #: Fields of the deformed body that are drawn by default: name of the figure, label, quantity.
 DEFORMED: dict[str, tuple[str, str, Quantity]] = {
     "von_mises": ("deformed", "von Mises stress", "stress"),
@@ -52,12 +51,32 @@ QUANTITIES: dict[str, Quantity] = {"displacement": "length", "stress": "stress"}
 OUTLIERS = (0.005, 0.995)
 
 
-def style(width: float | None) -> dict[str, Any]:
-    """Return the settings of figures of a width (inches); None for that of a page."""
-    if width is None:
-        return STYLE
-    small = {"font.size": 7, "legend.fontsize": 6} if width < NARROW else {}
-    return STYLE | {"figure.figsize": (width, width)} | small
+@dataclass(frozen=True)
+class Look:
+    """Choices for all figures of a run.
+
+    Attributes
+    ----------
+    width
+        Of the figures (inches); None for that of a page.
+    mirror
+        Whether both halves of a body of revolution are drawn.
+    xlim, ylim
+        Ends of the axes that show places; None for those that suit the figure.
+    """
+
+    width: float | None = None
+    mirror: bool = False
+    xlim: tuple[float, float] | None = None
+    ylim: tuple[float, float] | None = None
+
+    @property
+    def style(self) -> dict[str, Any]:
+        """The settings of the figures."""
+        if self.width is None:
+            return STYLE
+        small = {"font.size": 7, "legend.fontsize": 6} if self.width < NARROW else {}
+        return STYLE | {"figure.figsize": (self.width, self.width)} | small
 
 
 def page_width() -> float:
@@ -82,11 +101,6 @@ def fitted(title: str) -> str:
     """Return a title in lines that fit on a figure of the present width."""
     letter = 0.6 * 1.2 * float(matplotlib.rcParams["font.size"]) / 72
     return "\n".join(textwrap.wrap(title, int(page_width() / letter)))
-
-
-def axes_of(revolved: bool) -> str:
-    """Return the names of the coordinates of a plane mesh, or of the half plane of a body."""
-    return "rz" if revolved else "xy"
 
 
 def named(field: str, units: Units) -> tuple[str, str]:

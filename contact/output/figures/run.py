@@ -1,0 +1,202 @@
+"""The files of a run, as its figures see them."""
+
+from __future__ import annotations
+
+import csv
+import json
+import re
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any, TypeVar
+
+import numpy as np
+import pyvista
+from numpy.typing import NDArray
+from scipy.spatial import KDTree
+
+from contact.errors import InputError
+from contact.output.figures.style import heading
+from contact.output.folder import refused
+from contact.output.options import Units
+from contact.output.quantities import OPPOSITE
+from contact.output.table import Table
+from contact.typing import Array
+
+T = TypeVar("T")
+
+#: Most frames of an animation.
+MOST = 100
+
+_SET = re.compile(r'timestep="([^"]+)" file="([\w-]+\.vtu)"')
+
+
+@dataclass(frozen=True)
+class Run:
+    """The results of a run, or those at the end of one of its steps.
+
+    Attributes
+    ----------
+    title
+        One line, to be shown as it is.
+    units
+        Names of the units, for labels.
+    axes
+        Names of the coordinates: xy, rz of a body of revolution, xyz.
+    table
+        The columns of ``contact.csv``, with contact direction ``nu_x``..., number of the contact
+        (``entry``), whether its foundation is rigid (``rigid``), and how far that has moved along
+        the contact direction (``moved``).
+    body, surface, opposite
+        Grids of pyvista: body, contact part, and the other sides of contacts between bodies.
+    steps, tables
+        The columns of ``steps.csv``, and the contact nodes of each step, of an evolution.
+    """
+
+    title: str
+    units: Units
+    axes: str
+    table: Table
+    body: Any
+    surface: Any
+    opposite: Any = None
+    steps: Table | None = None
+    tables: Sequence[Table] = ()
+
+    @property
+    def plane(self) -> bool:
+        """Whether the body is drawn in 2-D."""
+        return len(self.axes) == 2
+
+    @property
+    def points(self) -> Array:
+        """Places of the contact nodes in the reference configuration, shape (n, d)."""
+        return np.column_stack([self.table[axis] for axis in "xyz" if axis in self.table])
+
+    @property
+    def held(self) -> Array:
+        """Nodes of the contact part that are no contact nodes, shape (n, d)."""
+        return np.asarray(self.surface.points[self.surface["row"] < 0, : len(self.axes)])
+
+    @property
+    def displacement(self) -> Array:
+        """Displacement of the nodes of the body, shape (n, 3)."""
+        return np.asarray(self.body.point_data["displacement"])
+
+
+def read_run(folder: Path, summary: Mapping[str, Any] | None = None) -> Run:
+    """Read the files of a run. On one rank.
+
+    Parameters
+    ----------
+    folder
+        The results of the run.
+    summary
+        The contents of ``summary.json``, where that is not written yet.
+
+    Raises
+    ------
+    InputError
+        If the folder has not all that is needed.
+    """
+    about = summary or read(folder, "summary.json", lambda path: json.loads(path.read_bytes()))
+    surface, body = (read(folder, name, _grid) for name in ("contact.vtu", "fields.vtu"))
+    columns = read(folder, "contact.csv", _columns)
+    files = about.get("files", [path.name for path in folder.iterdir()])
+
+    def run(_: Path) -> Run:
+        flat = "rz" if about["kinematics"] == "axisymmetric" else "xy"
+        return Run(
+            heading(str(about["title"])),
+            Units(**about.get("units", {})),
+            "xyz" if "z" in columns else flat,
+            _moved(columns | _of_surface(surface), columns, body),
+            body,
+            surface,
+            opposite=read(folder, OPPOSITE, _grid) if OPPOSITE in files else None,
+            steps=read(folder, "steps.csv", _columns) if "steps.csv" in files else None,
+            tables=read(folder, "contact-steps.csv", _tables) if "steps.csv" in files else (),
+        )
+
+    return read(folder, "summary.json", run)
+
+
+def read_steps(folder: Path) -> list[tuple[float, Run]]:
+    """Read an evolution: at most `MOST` of its times and results then, the last one always."""
+    if not (folder / "fields.pvd").is_file():
+        raise InputError(
+            f"{folder}: no steps there; accepted: the results of an evolution, with "
+            'output.fields = "vtu"'
+        )
+    sets = _SET.findall(read(folder, "fields.pvd", lambda path: path.read_text("utf-8")))
+    run, found = read_run(folder), []
+    assert run.steps is not None  # where there are fields in time, there are steps
+    for time, name in sets[:: -int(np.ceil(len(sets) / MOST))][::-1]:
+        body = read(folder, name, _grid)
+        step = run.tables[int(np.argmin(abs(run.steps["t"] - float(time))))]
+        found.append((float(time), replace(run, body=body, table=_moved(run.table, step, body))))
+    return found
+
+
+def read(folder: Path, name: str, reader: Callable[[Path], T]) -> T:
+    """Read a file of the results.
+
+    Raises
+    ------
+    InputError
+        If it is missing or damaged.
+    """
+    path = folder / name
+    try:
+        return reader(path)
+    except FileNotFoundError:
+        hint = ', written with output.fields = "vtu"' if name == "fields.vtu" else ""
+        raise InputError(f"{path}: no such file; accepted: a run's results{hint}") from None
+    except OSError as error:
+        raise refused(error) from None
+    except (ValueError, KeyError, IndexError, TypeError, AttributeError) as error:
+        raise InputError(f"{path}: not as a run has left it ({error})") from None
+
+
+def _grid(path: Path) -> Any:
+    """Read a grid with its fields."""
+    path.open("rb").close()
+    errors = pyvista.VtkErrorCatcher(send_to_logging=False)
+    with errors:  # VTK would print them
+        grid = pyvista.read(path)
+    if errors.events or not grid.n_cells:
+        raise ValueError("it has no grid")
+    return grid
+
+
+def _columns(path: Path) -> dict[str, NDArray[Any]]:
+    """Read a table: the columns by name."""
+    with path.open(newline="", encoding="utf-8") as file:
+        header, *rows = csv.reader(file)
+    columns = {name: np.array(texts) for name, *texts in zip(header, *rows, strict=True)}
+    return {k: v if k in ("status", "on") else v.astype(float) for k, v in columns.items()}
+
+
+def _tables(path: Path) -> list[Table]:
+    """Read ``contact-steps.csv``: a table a step."""
+    columns = _columns(path)
+    starts = np.flatnonzero(np.diff(columns["t"])) + 1
+    parts = {name: np.split(values, starts) for name, values in columns.items()}
+    return [{name: values[k] for name, values in parts.items()} for k in range(len(starts) + 1)]
+
+
+def _of_surface(surface: Any) -> dict[str, NDArray[Any]]:
+    """Return the columns that the contact part adds to ``contact.csv``."""
+    row = surface["row"]
+    nodes = np.argsort(row)[np.count_nonzero(row < 0) :]
+    added = {f"nu_{axis}": surface["normal"][nodes, i] for i, axis in enumerate("xyz")}
+    return added | {"entry": surface["entry"][nodes], "rigid": surface["rigid"][nodes] > 0}
+
+
+def _moved(table: Table, step: Table, body: Any) -> Table:
+    """Return contact nodes with how far the foundation has moved by a step."""
+    normal = np.column_stack([table[f"nu_{axis}"] for axis in "xyz"])
+    places = np.column_stack([table.get(axis, np.zeros(len(normal))) for axis in "xyz"])
+    nodes = KDTree(body.points).query(places)[1]
+    along = np.einsum("ni,ni->n", body.point_data["displacement"][nodes], normal)
+    return {**table, "moved": along - step["u_n"]}
