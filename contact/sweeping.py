@@ -13,7 +13,7 @@ import logging
 import os
 import time
 import tomllib
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -23,7 +23,7 @@ from mpi4py import MPI
 from contact.case.build import build_problem, named
 from contact.case.digest import difference as changed_input
 from contact.case.digest import digest
-from contact.case.file import Case, load_case, read_value
+from contact.case.file import Case, load_case
 from contact.case.text import literal, to_toml
 from contact.errors import InputError
 from contact.mesh.domain import Domain
@@ -65,41 +65,25 @@ class Axis:
 
     @staticmethod
     def of(text: str) -> Axis:
-        """Read ``key=v1,v2,...``; commas in lists and texts separate nothing.
+        """Read ``key=v1,v2,...``: TOML values, or bare words.
 
         Raises
         ------
         InputError
             If it is not that.
         """
-        key, equals, given = text.partition("=")
-        texts = [value.strip() for value in _split(given)]
-        if not equals or not key.strip() or not all(texts):
+        key, _, given = text.partition("=")
+        try:
+            values = tomllib.loads(f"values = [{given}]")["values"]
+            # Each in one way: a row is found again by its texts.
+            texts = [literal(value) for value in values]
+        except ValueError:  # bare words
+            texts = values = [value.strip() for value in given.split(",")]
+        if not key.strip() or not values or "" in values:
             raise InputError(f"--over {text}: accepted: path.to.key=value,value,...")
-        values = [read_value(key.strip(), value, "--over") for value in texts]
         if any(one == other for one, other in itertools.combinations(values, 2)):
             raise InputError(f"--over {text}: a value stands there twice; accepted: each once")
-        # Numbers in one way: a row is found again by its texts.
-        texts = [
-            literal(value) if isinstance(value, int | float) else text
-            for value, text in zip(values, texts, strict=True)
-        ]
         return Axis(key.strip(), tuple(texts))
-
-
-def _split(text: str) -> Iterator[str]:
-    """Split at the commas outside of brackets and quotes."""
-    depth, quote, begin = 0, "", 0
-    for i, letter in enumerate(text):
-        if quote:
-            quote = "" if letter == quote else quote
-        elif letter in "\"'":
-            quote = letter
-        elif letter == "," and depth == 0:
-            yield text[begin:i]
-            begin = i + 1
-        depth += (letter in "[{") - (letter in "]}") if not quote else 0
-    yield text[begin:]
 
 
 def sweep(
@@ -146,13 +130,14 @@ def sweep(
         for values in itertools.product(*(axis.values for axis in axes))
     ]
 
-    def load(point: Mapping[str, str]) -> Case:
-        return load_case(path, [*overrides, *_set(point)])
+    def load(point: Mapping[str, str], file: str | Path | None = None) -> Case:
+        given = [*([] if file else overrides), *_set(point)]
+        return load_case(file or path, given, folder=Path(path).parent)
 
     # All of them before the first is solved.
     cases = on_root(comm, lambda: [load(point) for point in points])
     inputs = on_root(comm, lambda: [_input(case) for case in cases])
-    kept = on_root(comm, lambda: _kept_rows(folder, names, to_toml(cases[0]), load))
+    kept = on_root(comm, lambda: _kept_rows(folder, names, points[0], load))
     rows: list[dict[str, Any]] = []
     tell(logger, 0.0, "%d cases", len(cases))
     with stop_on_signal(comm, monitor) as stop:
@@ -185,7 +170,7 @@ def _input(case: Case) -> str:
 
 
 def _kept_rows(
-    folder: Path, names: list[str], text: str, load: Callable[[Mapping[str, str]], Case]
+    folder: Path, names: list[str], first: Mapping[str, str], load: Callable[..., Case]
 ) -> dict[tuple[str, ...], dict[str, Any]]:
     """Return the rows that are there already, by the values of the keys. On one rank.
 
@@ -193,10 +178,10 @@ def _kept_rows(
     ----------
     folder
         Folder of the table.
-    names, text
-        The keys of the sweep, and the case of its first row.
+    names, first
+        The keys of the sweep, and their values in its first row.
     load
-        Returns the case of a row.
+        Returns the case of a row, read from the case file or from another.
 
     Raises
     ------
@@ -207,27 +192,28 @@ def _kept_rows(
     for path in (table, before):
         if path.is_symlink() or (path.exists() and not path.is_file()):
             raise InputError(f"{path} is no file of ours; accepted: a folder without it")
+    refused = f"--out {folder}: given"
     rows = _read(table) if table.exists() else []
     if rows:
         swept = [*itertools.takewhile(lambda column: column != "converged", rows[0])]
         if swept != names:
             raise InputError(
-                f"--out {folder}: given a sweep over other keys; accepted: one over "
-                f"{', '.join(swept)}, or another folder"
+                f"{refused} a sweep over other keys; accepted: one over {', '.join(swept)}, or "
+                "another folder"
             )
+    text = to_toml(load(first), anchored=True)
     if before.exists():
-        place = difference(
-            _without(before, before.read_bytes(), names), _without(before, text.encode(), names)
-        )
+        stored = to_toml(load(first, before), anchored=True)
+        place = difference(tomllib.loads(stored), tomllib.loads(text))
         if place is not None:
             raise InputError(
-                f"--out {folder}: given a sweep of another case: there {place}; accepted: the same "
-                "case, or another folder"
+                f"{refused} a sweep of another case: there {place}; accepted: the same case, or "
+                "another folder"
             )
     elif table.exists():
         raise InputError(
-            f"--out {folder}: given a {TABLE} without the {CASE} that a sweep leaves beside it; "
-            "accepted: another folder"
+            f"{refused} a {TABLE} without the {CASE} that a sweep leaves beside it; accepted: "
+            "another folder"
         )
     for row in rows:
         point = {name: row[name] for name in names}
@@ -261,26 +247,6 @@ def _read(table: Path) -> list[dict[str, str]]:
             f"{table}: damaged, or no table of a sweep of this version; accepted: another folder"
         )
     return found
-
-
-def _without(path: Path, text: bytes, names: list[str]) -> dict[str, Any]:
-    """Return a case without the keys that are swept."""
-    try:
-        data = tomllib.loads(text.decode())
-        for name in names:
-            *parents, last = name.split(".")
-            place: Any = data
-            for key in parents:
-                place = place[int(key)] if isinstance(place, list) else place.get(key, {})
-            if isinstance(place, list):
-                place[int(last)] = 0
-            else:
-                place.pop(last, None)
-    except (ValueError, LookupError, AttributeError, TypeError, RecursionError):
-        raise InputError(
-            f"{path}: damaged, or no case of this sweep; accepted: another folder"
-        ) from None
-    return data
 
 
 def _write(folder: Path, rows: Sequence[Mapping[str, Any]]) -> None:

@@ -6,8 +6,6 @@
 
 from __future__ import annotations
 
-import re
-import sys
 import tomllib
 from collections.abc import Collection, Iterable, Iterator, Mapping
 from pathlib import Path
@@ -186,6 +184,7 @@ def load_case(
     path: str | Path,
     overrides: Mapping[str, str] | Iterable[str] = (),
     without: Collection[str] = (),
+    folder: str | Path | None = None,
 ) -> Case:
     """Read a case file.
 
@@ -197,8 +196,8 @@ def load_case(
         Values that replace those of the file: ``"material.young=2.0"``, or a mapping of keys
         to texts. Keys are dotted paths, with numbers for list entries (``load.0.traction``);
         values are TOML, bare words are texts.
-    without
-        As `parse_case` takes it.
+    without, folder
+        As `parse_case` takes them; by default the folder of the file.
 
     Raises
     ------
@@ -207,7 +206,6 @@ def load_case(
         given and the accepted values.
     """
     path = Path(path)
-    text = ""
     try:
         text = path.read_bytes().decode("utf-8-sig")
         data = tomllib.loads(text)
@@ -216,21 +214,13 @@ def load_case(
         raise InputError(f"{path}: {reason}; accepted: a case file (TOML)") from None
     except UnicodeDecodeError:
         raise InputError(f"{path}: not a text in UTF-8; accepted: a case file (TOML)") from None
-    except (tomllib.TOMLDecodeError, RecursionError) as error:
+    except (ValueError, RecursionError) as error:  # of a whole number with too many digits, too
         raise InputError(f"{path}: not a TOML file: {clipped(str(error), 200)}") from None
-    except ValueError:
-        # Python reads whole numbers up to a limit of digits only.
-        digits = sys.get_int_max_str_digits()
-        long = re.search(rf"[0-9_]{{{digits + 1},}}", text)
-        place = f": line {text.count(chr(10), 0, long.start()) + 1}" if long else ""
-        raise InputError(
-            f"{path}{place}: a number of more than {digits} digits; accepted: shorter ones"
-        ) from None
     if isinstance(overrides, Mapping):
         overrides = [f"{key}={value}" for key, value in overrides.items()]
     for override in overrides:
         _override(data, override, str(path))
-    return parse_case(data, path.parent, str(path), without)
+    return parse_case(data, path.parent if folder is None else folder, str(path), without)
 
 
 def parse_case(
@@ -300,47 +290,32 @@ def _override(data: dict[str, Any], text: str, source: str) -> None:
     if not equals or not path.strip():
         raise _refusal(source, text, "no assignment; accepted: path.to.key=value")
     path = path.strip()
-    value = read_value(path, given.strip(), source)
+    value = _read_value(path, given.strip(), source)
     *parents, last = path.split(".")
     if len(parents) > DEEPEST:
         words = f"{len(parents) + 1} keys deep; accepted: at most {DEEPEST + 1}"
         raise _refusal(source, path, words)
     place: Any = data
-    for i, key in enumerate(parents):
-        if isinstance(place, dict):
-            place = place.setdefault(key, {})
-        else:
-            place = place[_index(place, key, parents[:i], path, source)]
+    for i, key in enumerate((*parents, last)):
         if not isinstance(place, dict | list):
-            words = f"{path_of(parents[: i + 1])} is {shown(place)}, no table"
+            words = f"{path_of(parents[:i])} is {shown(place)}, no table"
             raise _refusal(source, path, f"{words}; accepted: keys of tables")
-    if isinstance(place, dict):
-        place[last] = value
-    else:
-        place[_index(place, last, parents, path, source)] = value
+        at: Any = key if isinstance(place, dict) else _index(place, key, parents[:i], path, source)
+        if i == len(parents):
+            place[at] = value
+        else:
+            place = place.setdefault(at, {}) if isinstance(place, dict) else place[at]
 
 
-def read_value(path: str, text: str, source: str) -> Any:
-    """Read a TOML value; anything that does not look like one is a text.
-
-    Parameters
-    ----------
-    path, text
-        The key and its value.
-    source
-        The name of the case in messages.
-    """
+def _read_value(path: str, text: str, source: str) -> Any:
+    """Read a TOML value; anything that does not look like one is a text."""
     try:
         table = tomllib.loads(f"value = {text}")
-    except (tomllib.TOMLDecodeError, RecursionError) as error:
-        if text and text[0] not in "[{\"'":
-            return text
-        words = f"{shown(text)} is broken ({clipped(str(error))}); accepted: a TOML value"
-        raise _refusal(source, path, words) from None
-    except ValueError:
-        # Python reads whole numbers up to a limit of digits only.
-        words = f"{shown(text)} has too many digits; accepted: a TOML value"
-        raise _refusal(source, path, words) from None
+    except (ValueError, RecursionError) as error:
+        if not isinstance(error, tomllib.TOMLDecodeError) or text[:1] in "[{\"'":
+            words = f"{shown(text)} is broken ({clipped(str(error))}); accepted: a TOML value"
+            raise _refusal(source, path, words) from None
+        return text
     # A value with line breaks could smuggle in further keys.
     return table["value"] if set(table) == {"value"} else text
 

@@ -59,11 +59,13 @@ def _key(key: str) -> str:
 
 
 def literal(value: Any) -> str:
-    """Return a number, text, switch or list of these as TOML."""
+    """Return a number, text, switch, or a list or table of these as TOML."""
     if isinstance(value, str):
         return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
     if isinstance(value, bool):
         return str(value).lower()
     if isinstance(value, list | tuple):
         return f"[{', '.join(literal(item) for item in value)}]"
+    if isinstance(value, Mapping):
+        return f"{{ {', '.join(f'{_key(key)} = {literal(item)}' for key, item in value.items())} }}"
     return str(value)

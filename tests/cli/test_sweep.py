@@ -73,7 +73,7 @@ def test_rows_of_other_values_remain(sweep):
 
 def test_numbers_are_those_of_their_values():
     assert Axis.of("friction.mu=0.20,4e-1").values == ("0.2", "0.4")
-    assert Axis.of("mesh.cells=[8, 4],[8,2]").values == ("[8, 4]", "[8,2]")
+    assert Axis.of("mesh.cells=[8, 4],[8,2]").values == ("[8, 4]", "[8, 2]")
 
 
 def test_rows_that_come_later_remain_where_the_sweep_is_ended(sweep, monkeypatch):
