@@ -53,7 +53,7 @@ def describe(case: Case, problem: ContactProblem) -> str:
     domain, comm = problem.domain, problem.comm
     cells = domain.mesh.topology.index_map(domain.dim).size_global
     layout = problem.equilibrium.layout
-    library = environment.blas()
+    library, path = environment.blas()
     lines = [
         to_toml(case, domain.dim),
         f"# mesh: {cells} cells in {domain.dim}-D on {comm.size} rank(s), largest extent "
@@ -66,10 +66,10 @@ def describe(case: Case, problem: ContactProblem) -> str:
         f"# unknowns: {layout.unknowns} ({layout.block_size} a node), contact nodes: "
         f"{problem.nodes.size}",
         *expectations(problem),
-        f"# blas: {library.name} {library.path}".rstrip(),
+        f"# blas: {library} {path}".rstrip(),
         "# versions: " + ", ".join(f"{k} {v}" for k, v in environment.versions().items()),
     ]
-    if library.is_reference:
+    if library == environment.REFERENCE:
         lines.append(f"# {environment.ADVICE}")
     return "\n".join(lines)
 

@@ -19,8 +19,8 @@ from contact.errors import InputError
 from contact.methods.interrupt import SIGNALLED, Terminated, signals_held
 from contact.output.checkpoint import case_of, discard, kept_case
 from contact.output.files import write_outputs
-from contact.output.folder import on_root, result_folder
-from contact.output.rerun import check_checkpoints, check_rerun
+from contact.output.folder import SUMMARY, on_root, read_json, result_folder
+from contact.output.rerun import check_same
 from contact.output.solution import Solution
 from contact.solving import SolveInterrupted, solve
 from contact.sweeping import TABLE, Axis, sweep
@@ -52,7 +52,7 @@ def _solve(options: argparse.Namespace, comm: MPI.Intracomm) -> int:
                 solution = interrupt.solution
             logging.getLogger("contact").debug(solution.outcome.reason)
         outcome = solution.outcome
-        earlier = on_root(comm, (folder.path / "summary.json").exists)
+        earlier = on_root(comm, (folder.path / SUMMARY).exists)
         if outcome.signal and not solution.begun and earlier:  # which are worth more
             raise Terminated if outcome.signal == signal.SIGTERM else KeyboardInterrupt
         # Results that have taken long to compute are written, signal or not.
@@ -104,18 +104,22 @@ def _load(options: argparse.Namespace) -> Case:
     folder = Path(options.restart)
     stored = case_of(folder)
     case = load_case(options.case or stored, options.set)
-    check_checkpoints(
-        folder, to_toml(load_case(stored)), to_toml(case, anchored=True), restart=True
-    )
+    accepted = "the same case, solved and shown as you like"
+    before, now = to_toml(load_case(stored)), to_toml(case, anchored=True)
+    check_same(f"--restart {folder}", "checkpoints", before, now, accepted)
     return case
 
 
 def _check_results(folder: Path, case: Case) -> None:
     """Refuse to replace results or checkpoints of another case."""
-    check_rerun(folder, to_toml(case))
+    where, accepted = f"--out {folder}", "--overwrite to replace them, or another folder"
+    if (folder / SUMMARY).exists():
+        before = read_json(folder / SUMMARY).get("case")
+        check_same(where, "a folder with results", before, to_toml(case), accepted)
     kept = kept_case(folder)
     if kept is not None:
-        check_checkpoints(folder, kept, to_toml(case, anchored=True))
+        accepted = f"--restart {folder} to go on with that, {accepted}"
+        check_same(where, "a folder with checkpoints", kept, to_toml(case, anchored=True), accepted)
 
 
 def _sweep(options: argparse.Namespace, comm: MPI.Intracomm) -> int:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import platform
 import re
 from collections.abc import Iterable
-from dataclasses import dataclass
 from pathlib import Path
 
 #: Name -> pattern of the path of its library, in the order of preference where several are
@@ -26,49 +25,35 @@ ADVICE = (
 )
 
 
-@dataclass(frozen=True)
-class Blas:
-    """The BLAS library that PETSc uses.
+#: Name of the slow implementation.
+REFERENCE = "reference"
 
-    Attributes
-    ----------
-    name
-        For instance "OpenBLAS", "reference" or "unknown".
-    path
-        File that was loaded, empty if unknown.
+
+def identify(paths: Iterable[str]) -> tuple[str, str]:
+    """Return the name of the BLAS among the paths of loaded libraries, and its path.
+
+    The name is for instance "OpenBLAS", `REFERENCE` or "unknown"; the path of that is empty.
     """
-
-    name: str
-    path: str = ""
-
-    @property
-    def is_reference(self) -> bool:
-        """True for the slow reference implementation."""
-        return self.name == "reference"
-
-
-def identify(paths: Iterable[str]) -> Blas:
-    """Name the BLAS among the paths of loaded libraries."""
     candidates = sorted({path for path in paths if not _PRIVATE.search(path)})
     for name, pattern in _LIBRARIES:
         for path in candidates:
             if pattern.search(path):
-                return Blas(name, path)
+                return name, path
     # Debian's alternatives put optimised libraries under the plain name too, in folders that
     # tell; any other is the reference.
     for path in candidates:
         if _PLAIN.search(path):
-            return Blas("reference", path)
-    return Blas("unknown")
+            return REFERENCE, path
+    return "unknown", ""
 
 
-def blas() -> Blas:
-    """Name the BLAS that this process has loaded, after loading PETSc."""
+def blas() -> tuple[str, str]:
+    """Return name and path of the BLAS that this process has loaded, after loading PETSc."""
     from petsc4py import PETSc  # noqa: F401  loads the library
 
     maps = Path("/proc/self/maps")
     if not maps.exists():
-        return Blas("unknown")
+        return "unknown", ""
     lines = (line.split(maxsplit=5) for line in maps.read_text().splitlines())
     return identify(fields[5] for fields in lines if len(fields) == 6)
 
@@ -90,5 +75,5 @@ def versions() -> dict[str, str]:
         "mpi4py": mpi4py.__version__,
         "mpi": MPI.Get_library_version().splitlines()[0].split(",")[0].rstrip("\0"),
         "numpy": numpy.__version__,
-        "blas": blas().name,
+        "blas": blas()[0],
     }

@@ -6,78 +6,38 @@ import json
 import tomllib
 from collections.abc import Iterator, Mapping
 from contextlib import suppress
-from pathlib import Path
 from typing import Any
 
 from contact.errors import InputError
-from contact.output.folder import SUMMARY, read_json
 
 #: Sections of the case file that say how a problem is solved and shown, not which one it is.
 MANNER = ("title", "solver", "output")
 _SHOWN = 60
 
 
-def check_rerun(folder: Path, case: str) -> None:
-    """Refuse to replace results of another case. On one rank.
+def check_same(where: str, found: str, before: object, case: str, accepted: str) -> None:
+    """Refuse to replace or continue files of another case. On one rank.
 
     Parameters
     ----------
-    folder
-        Where the results are to go.
-    case
-        The case that is about to be solved, as `contact check` prints it.
+    where, found, accepted
+        Words for the message: option and folder, the files there, the ways out.
+    before, case
+        The case of the files and the one at hand, as `contact check` prints them.
 
     Raises
     ------
     InputError
-        If the folder has results of another problem, or of one that it does not tell.
+        If they differ in more than in how they are solved and shown, or `before` is no case.
     """
-    if not (folder / SUMMARY).exists():
-        return
-    given, before = "results that do not say of which case they are", None
-    with suppress(ValueError, TypeError, RecursionError):
-        before = tomllib.loads(read_json(folder / SUMMARY).get("case", 0))
-    if before is not None:
-        place = difference(_without(before), _without(tomllib.loads(case)))
+    said = "that do not say of which case they are"
+    with suppress(ValueError, RecursionError):
+        tables = [tomllib.loads(before if isinstance(before, str) else "="), tomllib.loads(case)]
+        place = difference(*(_without(table) for table in tables))
         if place is None:
             return
-        given = f"results of another case: there {place}"
-    raise InputError(
-        f"--out {folder}: given a folder with {given}; accepted: --overwrite to replace them, or "
-        "another folder"
-    )
-
-
-def check_checkpoints(folder: Path, before: str, case: str, restart: bool = False) -> None:
-    """Refuse to go on with checkpoints of another case, or to replace them. On one rank.
-
-    Parameters
-    ----------
-    folder
-        The folder of the interrupted run.
-    before, case
-        The case of the checkpoints there and the one at hand, as `contact check` prints them.
-    restart
-        Whether the run is to go on.
-
-    Raises
-    ------
-    InputError
-        If they differ in more than in how they are solved and shown.
-    """
-    place = difference(*(_without(tomllib.loads(text)) for text in (before, case)))
-    if place is None:
-        return
-    if restart:
-        raise InputError(
-            f"--restart {folder}: given checkpoints of another case: there {place}; accepted: the "
-            "same case, solved and shown as you like"
-        )
-    raise InputError(
-        f"--out {folder}: given a folder with checkpoints of another case: there {place}; "
-        f"accepted: --restart {folder} to go on with that, --overwrite to replace them, or "
-        "another folder"
-    )
+        said = f"of another case: there {place}"
+    raise InputError(f"{where}: given {found} {said}; accepted: {accepted}")
 
 
 def difference(before: Mapping[str, Any], now: Mapping[str, Any]) -> str | None:
