@@ -1,6 +1,6 @@
-"""The jump, and the values at the contact nodes that go with it: contact forces and slip history.
+"""Values at the contact nodes that go with the jump: contact forces and slip history.
 
-All laws of Gamma_3 are written in the jump T x of the unknowns. `Multipliers` are dual to it, and
+All laws of Gamma_3 are written in the jump T x (`ContactNodes`). `Multipliers` are dual to it, and
 `SlipHistory` is its history between the steps of an evolution: friction acts against the slip since
 the end of the last step, and a coefficient mu(slip) looks at all slip so far. A static problem is
 one step from zero.
@@ -10,66 +10,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
-from mpi4py import MPI
-from numpy.typing import NDArray
 
 from contact.history import CONTACT_NODES
+from contact.interface.nodes import ContactNodes
 from contact.typing import Array
-
-
-class Jump(Protocol):
-    """Nodal values T x at the contact nodes, with their weights, directions and gaps.
-
-    All that happens on Gamma_3 is written in them. In front of a rigid foundation T selects the
-    nodes of the body (`contact.interface.nodes.ContactNodes`), and takes off how the foundation
-    moves there.
-    """
-
-    @property
-    def comm(self) -> MPI.Intracomm:
-        """Communicator."""
-
-    @property
-    def nodes(self) -> NDArray[np.int32]:
-        """Local numbers of the nodes that carry the blocks, shape (n,)."""
-
-    @property
-    def weight(self) -> Array:
-        """Lumped surface mass: tributary areas, shape (n,)."""
-
-    @property
-    def normal(self) -> Array:
-        """Contact directions, unit vectors out of the body, shape (n, d)."""
-
-    @property
-    def tangent(self) -> Array:
-        """Projectors onto the free tangential directions, shape (n, d, d)."""
-
-    @property
-    def gap(self) -> Array:
-        """Distances to the obstacle along the contact direction, shape (n,)."""
-
-    @property
-    def block_size(self) -> int:
-        """Unknowns a node."""
-
-    def apply(self, x: Array) -> Array:
-        """Return T x of local or owned unknowns, shape (n, block size)."""
-
-    def transpose(self, nodal: Array, into: Array) -> None:
-        """Add T^T t of nodal vectors, shape (n, d) or (n, block size), to owned unknowns.
-
-        Collective.
-        """
-
-    def normal_component(self, u: Array) -> Array:
-        """Return u . nu, shape (n,), of vectors of shape (n, >= d)."""
-
-    def tangential_component(self, u: Array) -> Array:
-        """Return u_tau in the free tangential directions, shape (n, d)."""
 
 
 @dataclass(frozen=True)
@@ -88,19 +34,19 @@ class Multipliers:
     friction: Array
 
     @staticmethod
-    def zero(jump: Jump) -> Multipliers:
+    def zero(jump: ContactNodes) -> Multipliers:
         """Return vanishing contact forces."""
         return Multipliers(np.zeros(jump.gap.size), np.zeros(jump.normal.shape))
 
     @staticmethod
-    def of(jump: Jump, pressure: Array, friction: Array) -> Multipliers:
+    def of(jump: ContactNodes, pressure: Array, friction: Array) -> Multipliers:
         """Return contact forces with the tangential part of vectors of shape (n, d).
 
         All methods hand over theirs by this: rounding along the normal is no friction.
         """
         return Multipliers(pressure, jump.tangential_component(friction))
 
-    def vectors(self, jump: Jump) -> Array:
+    def vectors(self, jump: ContactNodes) -> Array:
         """Return lambda_c nu + lambda_f, shape (n, d); of lambda_f the tangential part acts."""
         return self.pressure[:, None] * jump.normal + jump.tangential_component(self.friction)
 
@@ -128,7 +74,7 @@ class SlipHistory:
         self.jump.flags.writeable = self.accumulated.flags.writeable = False
 
     @staticmethod
-    def rest(jump: Jump) -> SlipHistory:
+    def rest(jump: ContactNodes) -> SlipHistory:
         """Return that of a body that has never slipped."""
         return SlipHistory(np.zeros(jump.normal.shape), np.zeros(jump.gap.size))
 

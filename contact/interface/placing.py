@@ -327,7 +327,7 @@ def held_nodes(
     Parameters
     ----------
     found, obstacle
-        All owned nodes of Gamma_3, and what gives their contact direction and gap.
+        All owned nodes of Gamma_3, and the obstacle in front of them.
     free
         Which components of the owned nodes are not fixed, shape (nodes, block size).
     jump

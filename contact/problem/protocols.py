@@ -1,7 +1,4 @@
-"""Protocols that methods are written against, and the scales of a problem.
-
-`Jump` is in `contact.interface.jump`, for the laws of the interface need it too.
-"""
+"""Protocols that methods are written against, and the scales of a problem."""
 
 from __future__ import annotations
 

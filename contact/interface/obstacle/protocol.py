@@ -115,8 +115,33 @@ class Shape(ABC):
         """
 
     def ray(self, points: Array, rays: Array) -> Array:
-        """Return how far the surface is along unit vectors, shape (n,): infinite if never met."""
-        return trace(self.distance, points, rays)
+        """Return how far the surface is along unit vectors, (n,), by Newton's method.
+
+        Along a ray the distance to a convex body is convex: Newton's method goes up to the surface
+        from outside and never beyond. At other bodies the steps are those of the distance where
+        Newton's would lead away. Infinite where the surface is never met.
+        """
+        found = np.full(len(points), np.inf)
+        left = np.arange(len(points))
+        at = np.zeros(len(points))
+        reach = np.zeros(len(points))
+        for step in range(STEPS):
+            value, normal = self.distance(points[left] + at[left, None] * rays[left])
+            slope = -np.einsum("ni,ni->n", normal, rays[left])
+            if step == 0:
+                reach = 1e4 * (np.abs(value) + np.linalg.norm(points, axis=1))
+            towards = slope > GRAZING
+            move = np.where(towards, value / np.where(towards, slope, 1.0), np.abs(value))
+            size = np.maximum(np.abs(points[left]).max(axis=1, initial=0.0), np.abs(at[left]))
+            done = towards & (np.abs(move) <= 1e-13 * np.maximum(size, np.abs(value)))
+            at[left] += move
+            found[left[done]] = at[left[done]]
+            # A ray that is outside and moves away for good is lost.
+            gone = ~done & ~(np.abs(at[left]) <= reach[left])
+            left = left[~done & ~gone]
+            if left.size == 0:
+                break
+        return found
 
     def measure(self, points: Array, body_normal: Array) -> tuple[Array, Array]:
         """Return contact directions and gaps."""
@@ -128,60 +153,6 @@ class Shape(ABC):
             axis = np.asarray(self.along) / np.linalg.norm(self.along)
             rays = np.broadcast_to(axis, points.shape).copy()
         return rays, self.ray(points, rays)
-
-
-def trace(distance: Callable[[Array], tuple[Array, Array]], points: Array, rays: Array) -> Array:
-    """Return where rays meet a surface, by Newton's method on the signed distance.
-
-    Along a ray the distance to a convex body is convex: Newton's method goes up to the surface
-    from outside and never beyond. At other bodies the steps are those of the distance where
-    Newton's would lead away.
-
-    Parameters
-    ----------
-    distance
-        As `Shape.distance`.
-    points, rays
-        Where the rays begin, and unit vectors along them, shape (n, d).
-    """
-    found = np.full(len(points), np.inf)
-    left = np.arange(len(points))
-    at = np.zeros(len(points))
-    reach = np.zeros(len(points))
-    for step in range(STEPS):
-        value, normal = distance(points[left] + at[left, None] * rays[left])
-        slope = -np.einsum("ni,ni->n", normal, rays[left])
-        if step == 0:
-            reach = 1e4 * (np.abs(value) + np.linalg.norm(points, axis=1))
-        towards = slope > GRAZING
-        move = np.where(towards, value / np.where(towards, slope, 1.0), np.abs(value))
-        size = np.maximum(np.abs(points[left]).max(axis=1, initial=0.0), np.abs(at[left]))
-        done = towards & (np.abs(move) <= 1e-13 * np.maximum(size, np.abs(value)))
-        at[left] += move
-        found[left[done]] = at[left[done]]
-        # A ray that is outside and moves away for good is lost.
-        gone = ~done & ~(np.abs(at[left]) <= reach[left])
-        left = left[~done & ~gone]
-        if left.size == 0:
-            break
-    return found
-
-
-def split(points: Array, origin: tuple[float, ...], axis: tuple[float, ...]) -> tuple[Array, ...]:
-    """Split points into parts along and across an axis.
-
-    Returns
-    -------
-    The unit axis, shape (d,), coordinates along it, (n,), distances from it, (n,), and unit vectors
-    away from it, (n, d); 0 on the axis itself.
-    """
-    unit = np.asarray(axis, dtype=float) / np.linalg.norm(axis)
-    offset = points - np.asarray(origin)
-    along = offset @ unit
-    across = offset - along[:, None] * unit
-    radius = np.linalg.norm(across, axis=1)
-    away = across / np.where(radius > 0, radius, 1.0)[:, None]
-    return unit, along, radius, away
 
 
 @dataclass(frozen=True)

@@ -1,11 +1,12 @@
 """Rigid shapes: plane, sphere, cylinder, cone, paraboloid, punch, and one by its signed distance.
 
-A shape is a class that returns signed distances with normals (`protocol.Shape.distance`) and, where
-these are known, distances along rays and the depth of chords; all else follows from it.
+A shape is a class that returns signed distances with normals (`protocol.Shape.distance`); all else
+follows from it.
 """
 
 from __future__ import annotations
 
+from abc import abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Annotated, Literal
@@ -14,7 +15,7 @@ import numpy as np
 from annotated_types import Gt, Lt
 
 from contact.arguments import expect, real
-from contact.interface.obstacle.protocol import GRAZING, Shape, split
+from contact.interface.obstacle.protocol import Shape
 from contact.settings import Accepted, Direction, NonNegative, Positive, Switch, Vector
 from contact.typing import Array
 
@@ -40,13 +41,6 @@ class Plane(Shape):
         normal = np.asarray(self.normal) / np.linalg.norm(self.normal)
         distance = (points - np.asarray(self.point)) @ normal
         return distance, np.broadcast_to(normal, points.shape).copy()
-
-    def ray(self, points: Array, rays: Array) -> Array:
-        """Return the distances along rays."""
-        distance, normal = self.distance(points)
-        cosine = -np.einsum("ni,ni->n", rays, normal)
-        facing = cosine > GRAZING
-        return np.where(facing, distance / np.where(facing, cosine, 1.0), np.inf)
 
 
 @dataclass(frozen=True)
@@ -78,21 +72,39 @@ class Sphere(Shape):
         radial = offset / np.where(known, distance, np.nan)[:, None]
         return inward * (distance - self.radius), inward * radial
 
-    def ray(self, points: Array, rays: Array) -> Array:
-        """Return the distances along rays: x + t d meets the sphere where |offset + t d| = R."""
-        offset = points - np.asarray(self.centre)
-        distance = np.linalg.norm(offset, axis=1)
-        outward = 1.0 if self.inside else -1.0
-        along = np.einsum("ni,ni->n", offset, rays)
-        root = along**2 + self.radius**2 - distance**2
-        gap = -along + outward * np.sqrt(np.maximum(root, 0.0))
-        # A ray that misses the ball, or leads away from it, never touches it.
-        away = (along > 0) & (distance > self.radius) & (not self.inside)
-        return np.where((root >= 0) & ~away, gap, np.inf)
+
+@dataclass(frozen=True)
+class AboutAxis(Shape):
+    """Base class of shapes of revolution; in 2-D their axis lies in the plane."""
+
+    @abstractmethod
+    def profile(self, along: Array, radius: Array) -> tuple[Array, Array, Array]:
+        """Return distances, and the parts of the normals along and away from the axis, (n,).
+
+        Parameters
+        ----------
+        along, radius
+            Places along the axis, from the origin of the shape on, and distances from it, (n,).
+        """
+
+    def distance(self, points: Array) -> tuple[Array, Array]:
+        """Return distances and normals."""
+        origin, axis = (
+            np.asarray(next(getattr(self, name) for name in names if hasattr(self, name)))
+            for names in (("point", "centre", "apex"), ("axis",))
+        )
+        unit = axis / np.linalg.norm(axis)
+        offset = points - origin
+        along = offset @ unit
+        across = offset - along[:, None] * unit
+        radius = np.linalg.norm(across, axis=1)
+        away = across / np.where(radius > 0, radius, 1.0)[:, None]
+        distance, upwards, outwards = self.profile(along, radius)
+        return distance, outwards[:, None] * away + upwards[:, None] * unit
 
 
 @dataclass(frozen=True)
-class Cylinder(Shape):
+class Cylinder(AboutAxis):
     """A rigid cylinder without ends (`inside` false), or the bore that holds the body (true).
 
     In 2-D the axis lies in the plane: a strip, or about the axis of a body of revolution a shaft.
@@ -115,30 +127,15 @@ class Cylinder(Shape):
     inside: Switch = False
     shape: Literal["cylinder"] = field(default="cylinder", kw_only=True)
 
-    def distance(self, points: Array) -> tuple[Array, Array]:
-        """Return distances and normals."""
-        _, _, radius, away = split(points, self.point, self.axis)
+    def profile(self, along: Array, radius: Array) -> tuple[Array, Array, Array]:
+        """Return distances and normals; NaN on the axis itself."""
         inward = -1.0 if self.inside else 1.0
-        # The axis itself has no normal.
-        known = np.where(radius > 1e-12 * self.radius, 1.0, np.nan)
-        return inward * (radius - self.radius), inward * known[:, None] * away
-
-    def ray(self, points: Array, rays: Array) -> Array:
-        """Return the distances along rays, by the quadratic equation across the axis."""
-        unit, _, radius, away = split(points, self.point, self.axis)
-        across = rays - (rays @ unit)[:, None] * unit
-        a = np.einsum("ni,ni->n", across, across)
-        b = radius * np.einsum("ni,ni->n", away, across)
-        root = b**2 - a * (radius**2 - self.radius**2)
-        outward = 1.0 if self.inside else -1.0
-        met = (a > 1e-12) & (root >= 0)
-        gap = (-b + outward * np.sqrt(np.maximum(root, 0.0))) / np.where(met, a, 1.0)
-        leaving = (b > 0) & (radius > self.radius) & (not self.inside)
-        return np.where(met & ~leaving, gap, np.inf)
+        known = np.where(radius > 1e-12 * self.radius, inward, np.nan)
+        return inward * (radius - self.radius), 0.0 * known, known
 
 
 @dataclass(frozen=True)
-class Cone(Shape):
+class Cone(AboutAxis):
     """A rigid cone without end; in 2-D a wedge.
 
     Attributes
@@ -164,24 +161,24 @@ class Cone(Shape):
         angle = self.half_angle
         expect("Cone: half_angle", angle, "degrees between 0 and 90", 0 < angle < 90)
 
-    def distance(self, points: Array) -> tuple[Array, Array]:
+    def profile(self, along: Array, radius: Array) -> tuple[Array, Array, Array]:
         """Return distances and normals; those of the tip where it is nearest."""
-        unit, along, radius, away = split(points, self.apex, self.axis)
         angle = np.deg2rad(self.half_angle)
-        side = radius * np.cos(angle) - along * np.sin(angle)
-        normal = np.cos(angle) * away - np.sin(angle) * unit
-        # On the axis within the cone all sides are equally near: away from the tip.
-        normal = np.where((radius > 0)[:, None], normal, -unit)
-        beyond = radius * np.sin(angle) + along * np.cos(angle) <= 0
+        cosine, sine = np.cos(angle), np.sin(angle)
         length = np.hypot(radius, along)
-        tip = np.where(length > 0, length, 1.0)[:, None]
-        radial = np.where((length > 0)[:, None], (radius / tip[:, 0])[:, None] * away, 0.0)
-        radial = radial + np.where(length > 0, along / tip[:, 0], -1.0)[:, None] * unit
-        return np.where(beyond, length, side), np.where(beyond[:, None], radial, normal)
+        tip = (radius * sine + along * cosine <= 0) & (length > 0)
+        scale = np.where(tip, length, 1.0)
+        # On the axis within the cone all sides are equally near: away from the tip.
+        side = np.where(radius > 0, -sine, -1.0)
+        return (
+            np.where(tip, length, radius * cosine - along * sine),
+            np.where(tip, along / scale, side),
+            np.where(tip, radius / scale, cosine),
+        )
 
 
 @dataclass(frozen=True)
-class Paraboloid(Shape):
+class Paraboloid(AboutAxis):
     """A rigid paraboloid, h >= r^2/(2 R) at the height h and the distance r; in 2-D a parabola.
 
     Attributes
@@ -199,31 +196,29 @@ class Paraboloid(Shape):
     radius: Positive
     shape: Literal["paraboloid"] = field(default="paraboloid", kw_only=True)
 
-    def distance(self, points: Array) -> tuple[Array, Array]:
+    def profile(self, along: Array, radius: Array) -> tuple[Array, Array, Array]:
         """Return distances and normals, by the cubic equation of the nearest point.
 
         It lies at the distance s from the axis with s^3/(2 R^2) + s (1 - h/R) = r. From the
         right, where the cubic is convex, Newton's method goes down to its largest root.
         """
-        unit, along, r, away = split(points, self.apex, self.axis)
         big = self.radius
-        s = np.maximum(r, np.sqrt(2 * big * np.maximum(along, 0.0)))
+        s = np.maximum(radius, np.sqrt(2 * big * np.maximum(along, 0.0)))
         for _ in range(100):
-            value = s**3 / (2 * big**2) + s * (1 - along / big) - r
+            value = s**3 / (2 * big**2) + s * (1 - along / big) - radius
             slope = 3 * s**2 / (2 * big**2) + 1 - along / big
             step = value / np.where(slope > 0, slope, 1.0)
             s = np.maximum(s - np.where(slope > 0, step, 0.0), 0.0)
             if np.all(np.abs(step) <= 1e-15 * (s + big)):
                 break
-        across, up = r - s, along - s**2 / (2 * big)
         # Outward normal at the nearest point: (s/R, -1) in (r, h).
         length = np.hypot(s / big, 1.0)
-        normal = (s / big / length)[:, None] * away - unit / length[:, None]
-        return (across * s / big - up) / length, normal
+        distance = ((radius - s) * s / big - (along - s**2 / (2 * big))) / length
+        return distance, -1 / length, s / big / length
 
 
 @dataclass(frozen=True)
-class Punch(Shape):
+class Punch(AboutAxis):
     """A rigid cylinder with a flat face; in 2-D a rectangle.
 
     Attributes
@@ -250,9 +245,8 @@ class Punch(Shape):
         fits = 0 <= self.edge_radius <= self.radius
         expect("Punch: edge_radius", self.edge_radius, "a length from 0 to the radius", fits)
 
-    def distance(self, points: Array) -> tuple[Array, Array]:
+    def profile(self, along: Array, radius: Array) -> tuple[Array, Array, Array]:
         """Return distances and normals: those of a smaller punch, less the edge radius."""
-        unit, along, radius, away = split(points, self.centre, self.axis)
         e = self.edge_radius
         side, face = radius - (self.radius - e), e - along
         outside = np.hypot(np.maximum(side, 0.0), np.maximum(face, 0.0))
@@ -260,9 +254,9 @@ class Punch(Shape):
         # On the surface of the smaller punch, and in it, the nearer of side and face.
         out = outside > 0
         scale = np.where(out, outside, 1.0)
-        first = np.where(out, np.maximum(side, 0.0) / scale, side > face)
-        second = np.where(out, np.maximum(face, 0.0) / scale, side <= face)
-        return outside + within - e, first[:, None] * away - second[:, None] * unit
+        outwards = np.where(out, np.maximum(side, 0.0) / scale, side > face)
+        upwards = np.where(out, np.maximum(face, 0.0) / scale, side <= face)
+        return outside + within - e, -upwards, outwards
 
 
 #: Step of the central differences, over the size of the coordinates: the third root of rounding.

@@ -18,7 +18,7 @@ from mpi4py import MPI
 
 from contact.interface.complementarity import disc_derivative, interface_residuals, project_disc
 from contact.interface.interface import Interface
-from contact.interface.jump import Jump, Multipliers
+from contact.interface.jump import Multipliers
 from contact.interface.layer import NormalLaw
 from contact.interface.nodes import ContactNodes
 from contact.linear.multigrid import TOLERANCE
@@ -43,7 +43,7 @@ STAGNATION_LIMIT, STAGNATION_LIMIT_PLAIN, PROGRESS = 100, 500, 0.99
 SHARE, LEAST = 0.1, 1e-13
 
 
-def augmentation(jump: Jump, r: float, friction: bool) -> Array:
+def augmentation(jump: ContactNodes, r: float, friction: bool) -> Array:
     """Return the nodal blocks of r u_nu v_nu [+ r u_tau v_tau], without weights, (n, bs, bs)."""
     n, d = jump.normal.shape
     blocks = np.zeros((n, jump.block_size, jump.block_size))
@@ -63,7 +63,7 @@ def split(interface: Interface, nodal: Array, friction: bool) -> Array:
     return parts
 
 
-def components(jump: Jump, nodal: Array, friction: bool) -> Array:
+def components(jump: ContactNodes, nodal: Array, friction: bool) -> Array:
     """Return normal and tangential displacements side by side, shape (n, 1 + d); as `split`."""
     tangential = friction * jump.tangential_component(nodal)
     return np.column_stack([jump.normal_component(nodal), tangential])
