@@ -19,7 +19,7 @@ from contact.errors import InputError
 from contact.methods.interrupt import SIGNALLED, Terminated, signals_held
 from contact.output.checkpoint import case_of, discard, kept_case
 from contact.output.files import write_outputs
-from contact.output.folder import SUMMARY, on_root, read_json, result_folder
+from contact.output.folder import SUMMARY, check_members, on_root, read_json, result_folder
 from contact.output.rerun import check_same
 from contact.output.solution import Solution
 from contact.solving import SolveInterrupted, solve
@@ -40,7 +40,7 @@ def _solve(options: argparse.Namespace, comm: MPI.Intracomm) -> int:
     if not out:  # the present folder is "."; this is rather a variable that is not set
         raise InputError('--out "": no folder; accepted: a folder to write to')
     restart = None if options.restart is None else Path(options.restart)
-    with result_folder(out, comm, options.overwrite) as folder:
+    with result_folder(out, comm, overwrite=True) as folder:
         if not options.overwrite:
             on_root(comm, lambda: _check_results(folder.path, case))
         with progress(comm, options.quiet, options.log) as monitor:
@@ -111,11 +111,12 @@ def _load(options: argparse.Namespace) -> Case:
 
 
 def _check_results(folder: Path, case: Case) -> None:
-    """Refuse to replace results or checkpoints of another case."""
+    """Refuse to replace results or checkpoints of another case, or a user's own files."""
     where, accepted = f"--out {folder}", "--overwrite to replace them, or another folder"
     if (folder / SUMMARY).exists():
         before = read_json(folder / SUMMARY).get("case")
         check_same(where, "a folder with results", before, to_toml(case), accepted)
+    check_members(folder, overwrite=False)
     kept = kept_case(folder)
     if kept is not None:
         accepted = f"--restart {folder} to go on with that, {accepted}"

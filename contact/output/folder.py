@@ -181,8 +181,7 @@ def _take(path: Path, overwrite: bool) -> tuple[int, list[Path]]:
         path.mkdir(parents=True, exist_ok=True)
         lock = _lock(path)
         recover(path)
-        results = [name for name in sorted(os.listdir(path)) if _RESULT.fullmatch(name)]
-        check_members(path, results, overwrite)
+        check_members(path, overwrite=overwrite)
     except (InputError, OSError) as error:
         _release(path, lock, made)
         if isinstance(error, InputError):
@@ -245,8 +244,8 @@ def _lock_file(lock: int, folder: Path) -> None:
         logger.warning("%s: its file system has no locks; run once at a time in it", folder)
 
 
-def check_members(folder: Path, names: Iterable[str], overwrite: bool = True) -> None:
-    """Check that all under the names of members may be replaced.
+def check_members(folder: Path, names: Iterable[str] | None = None, overwrite: bool = True) -> None:
+    """Check that all under the names of members, by default all of results, may be replaced.
 
     Raises
     ------
@@ -256,7 +255,7 @@ def check_members(folder: Path, names: Iterable[str], overwrite: bool = True) ->
         Without `overwrite` also if something is there that the summary does not name.
     """
     own = _members(folder / SUMMARY)
-    for name in names:
+    for name in filter(_RESULT.fullmatch, sorted(os.listdir(folder))) if names is None else names:
         path = folder / name
         found, expected = kind(path), "a folder" if path.suffix == ".bp" else "a file"
         if found not in (None, expected):
