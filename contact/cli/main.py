@@ -46,9 +46,6 @@ COMMANDS = {
     "materials": "contact.cli.materials",
 }
 
-#: Commands that compile forms.
-COMPILING = ("check", "solve", "sweep")
-
 
 def _check_cache() -> None:
     """Raise an InputError if compiled forms cannot be kept. On one rank."""
@@ -57,8 +54,7 @@ def _check_cache() -> None:
     cache = Path(get_options()["cache_dir"])
     try:
         cache.mkdir(parents=True, exist_ok=True)
-        with tempfile.TemporaryFile(dir=cache):
-            pass
+        tempfile.TemporaryFile(dir=cache).close()
     except OSError as error:
         raise InputError(
             f"{cache}: {error.strerror or error}; accepted: a folder to keep compiled forms in, "
@@ -102,7 +98,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
                 # PETSc would call it a crash that a reader, such as head, has seen enough.
                 signal.signal(signal.SIGPIPE, signal.SIG_IGN)
                 command = import_module(COMMANDS[options.command])
-                if options.command in COMPILING:
+                if options.command in ("check", "solve", "sweep"):
                     on_root(comm, _check_cache)
             status = int(command.run(options, comm))
             sys.stdout.flush()  # it has been read: else it is a broken pipe
