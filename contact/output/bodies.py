@@ -60,30 +60,32 @@ def choices(solution: Solution) -> Iterator[Remark]:
         )
         better = "accuracy is better with on and against exchanged"
         if size > FINER * other_size:
-            sizes = f"facets of {other_size:.3g} against {size:.3g}"
-            ratio = size / other_size
-            yield f"{sides}: the other side is {ratio:.3g} times finer ({sizes}): {better}"
+            facets = f"facets of {other_size:.3g} against {size:.3g}"
+            finer = f"{size / other_size:.3g} times finer ({facets})"
+            yield f"{sides}: the other side is {finer}: {better}"
         elif young > SOFTER * other_young and size >= other_size:
-            ratio = young / other_young
-            yield f"{sides}: the other side is {ratio:.3g} times softer: {better}"
+            yield f"{sides}: the other side is {young / other_young:.3g} times softer: {better}"
         # Beyond the rim of the other side pressures end, far from where they act.
-        partly = entry.coupling.covered < HALF
-        if partly.any():
-            yield from _partly(solution, entry.coupling.nodes[partly], sides)
-        yield from _slides(solution, entry.coupling.nodes, max(size, other_size), sides)
-
-
-def _partly(solution: Solution, nodes: NDArray[np.int64], sides: str) -> Iterator[Remark]:
-    """Warn of nodes that carry pressure though less than half of their area faces anything."""
-    problem = solution.problem
-    count = problem.comm.allreduce(int(_pressed(problem, solution.state, nodes).sum()), op=MPI.SUM)
-    if count == 0:
-        return
-    yield (
-        f"{sides}: {count} nodes in contact face the other side with less than half of their "
-        "area: the pressure there is a mean over the rest; facets that end where the other side "
-        "does avoid that"
-    )
+        nodes, covered = entry.coupling.nodes, entry.coupling.covered
+        partly = _pressed(problem, solution.state, nodes[covered < HALF])
+        count = problem.comm.allreduce(int(partly.sum()), op=MPI.SUM)
+        if count:
+            yield (
+                f"{sides}: {count} nodes in contact face the other side with less than half of "
+                "their area: the pressure there is a mean over the rest; facets that end where the "
+                "other side does avoid that"
+            )
+        states = [record.state for record in solution.steps] or [solution.state]
+        slips = [_slip(problem, state, nodes) for state in states]
+        largest, facet = max(slips), max(size, other_size)
+        if largest > facet:
+            when = f" at t = {states[slips.index(largest)].time:g}" if solution.steps else ""
+            yield (
+                f"{sides}: points in contact are {largest:.3g} along the surface from the points "
+                f"they faced{when}, and facets are {facet:.3g} long: in linear kinematics each "
+                "stays opposite the point it faced in the beginning; where surfaces are curved, or "
+                "end, the result is of another contact"
+            )
 
 
 def _pressed(problem: ContactProblem, state: State, nodes: NDArray[np.int64]) -> NDArray[np.bool_]:
@@ -94,24 +96,6 @@ def _pressed(problem: ContactProblem, state: State, nodes: NDArray[np.int64]) ->
     # Residuals at open nodes are no pressure, and a thousandth of the rest decides nothing.
     pressed = pressure > PRESSED * contact.maximum(pressure)
     return np.asarray(pressed & np.isin(contact.nodes, local))
-
-
-def _slides(
-    solution: Solution, nodes: NDArray[np.int64], size: float, sides: str
-) -> Iterator[Remark]:
-    """Warn of points in contact that are in some step further along than a facet is long."""
-    states = [record.state for record in solution.steps] or [solution.state]
-    slips = [_slip(solution.problem, state, nodes) for state in states]
-    largest = max(slips)
-    if largest <= size:
-        return
-    when = f" at t = {states[slips.index(largest)].time:g}" if solution.steps else ""
-    yield (
-        f"{sides}: points in contact are {largest:.3g} along the surface from the points they faced"
-        f"{when}, and facets are {size:.3g} long: in linear kinematics each stays "
-        "opposite the point it faced in the beginning; where surfaces are curved, or end, the "
-        "result is of another contact"
-    )
 
 
 def _slip(problem: ContactProblem, state: State, nodes: NDArray[np.int64]) -> float:
@@ -139,10 +123,9 @@ def _side(problem: ContactProblem, part: str) -> tuple[float, float]:
 def regions(solution: Solution) -> Iterator[Remark]:
     """Say where regions of the mesh, which somebody has named, have one material."""
     names, materials = solution.problem.domain.regions, solution.problem.body.materials
-    if len(names) == 1 or len(materials) > 1:
-        return
-    which = ", ".join(names)
-    yield Note(f"the regions {which} have one material; [[material]] with `on` gives each its own")
+    if len(names) > 1 and len(materials) == 1:
+        words = f"the regions {', '.join(names)} have one material"
+        yield Note(f"{words}; [[material]] with `on` gives each its own")
 
 
 def passing(problem: ContactProblem) -> Iterator[Remark]:
@@ -157,13 +140,12 @@ def passing(problem: ContactProblem) -> Iterator[Remark]:
             met[piece[owned_among(problem.equilibrium.layout.index_map, both)[1]]] = 1
     problem.comm.Allreduce(MPI.IN_PLACE, met, op=MPI.MAX)
     alone = count - int(np.count_nonzero(met))
-    if alone == 0:
-        return
-    yield (
-        f"the mesh has {count} connected components, and {alone} of them can pass through "
-        "the others: contact between two is asked for by [[contact]] with `on` one and "
-        "`against` the other"
-    )
+    if alone:
+        yield (
+            f"the mesh has {count} connected components, and {alone} of them can pass through the "
+            "others: contact between two is asked for by [[contact]] with `on` one and `against` "
+            "the other"
+        )
 
 
 def unresisted_motions(solution: Solution) -> Iterator[Remark]:
@@ -243,12 +225,10 @@ def adrift(solution: Solution) -> Iterator[Remark]:
 def _least_held(
     solution: Solution, group: Group, free: Array, touches: NDArray[np.bool_]
 ) -> tuple[float, Array]:
-    """Return the free motion that contact holds least. Collective.
+    """Return the free motion that contact holds least, and how far. Collective.
 
-    Returns
-    -------
-    Which share of its square at all contact nodes is where it is held, and the motion, with a
-    mean square of 1 there, shape (m,).
+    That is the share of its square at all contact nodes that is where it is held; the motion, shape
+    (m,), has a mean square of 1 there.
     """
     nodes = group.problem.nodes
     normal, tangential = group.normal @ free, group.tangential @ free
@@ -260,16 +240,12 @@ def _least_held(
     resisted[~touches | (solution.friction_bound <= 0)] = 0.0
     whole = np.concatenate([normal[:, None, :], tangential], axis=1)
     resisting = np.concatenate([(normal * touches[:, None])[:, None, :], resisted], axis=1)
-    sums = np.array([_products(nodes.weight, part) for part in (resisting, whole)])
+    product = "n,nik,nil->kl"
+    sums = np.array([np.einsum(product, nodes.weight, part, part) for part in (resisting, whole)])
     held, moved = nodes.comm.allreduce(sums, op=MPI.SUM)
     area = nodes.sum(np.ones_like(nodes.weight))
     values, motions = linalg.eigh(held / area, moved / area)
     return max(float(values[0]), 0.0), free @ motions[:, 0]
-
-
-def _products(weight: Array, motions: Array) -> Array:
-    """Return the weighted sums of products of motions at nodes, (n, d + 1, m), shape (m, m)."""
-    return np.asarray(np.einsum("n,nik,nil->kl", weight, motions, motions))
 
 
 def _reach(group: Group, motion: Array) -> float:

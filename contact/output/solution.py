@@ -31,6 +31,7 @@ from contact.output.resultants import (
 )
 from contact.output.solved import Solved
 from contact.output.surface import ContactResult, contact_result
+from contact.output.table import contact_table
 from contact.problem.energy import Balance
 from contact.typing import Array
 
@@ -130,7 +131,7 @@ class Solution(Solved):
     @cached_property
     def contact(self) -> ContactResult:
         """The contact nodes of all ranks as arrays, and as functions. Collective."""
-        return contact_result(self)
+        return contact_result(self.problem, self.problem.comm.bcast(contact_table(self)))
 
     @cached_property
     def _derived(self) -> dict[str, fem.Function]:

@@ -21,8 +21,8 @@ from contact.interface.mortar.surface import surface_of
 from contact.mesh.entities import owned_among
 from contact.output.quantities import AGAINST, SURFACE, values_of
 from contact.output.solved import Solved, tangent_of
-from contact.output.table import Table, contact_table
-from contact.output.vtu import VTU, Grid, Values
+from contact.output.table import Table
+from contact.output.vtu import VTU, Grid
 from contact.problem.problem import ContactProblem
 from contact.typing import Array
 
@@ -36,22 +36,16 @@ class ContactResult:
 
     Attributes
     ----------
-    points
-        Places in the reference configuration, shape (n, d) (length).
-    weight
-        Area that each node stands for, shape (n,).
+    points, weight
+        Places in the reference configuration, shape (n, d), and the areas they stand for, (n,).
     normal
         Contact direction, out of the body, shape (n, d).
     gap, opening
         Initial and present distance to the foundation along it, shape (n,) (length).
-    pressure
-        Contact pressure -sigma_nu, shape (n,) (stress).
-    traction
-        Stress of the body on the foundation, shape (n, d).
-    friction_bound
-        Shape (n,) (stress).
-    slip
-        Tangential displacement, shape (n, d) (length).
+    pressure, traction
+        Contact pressure -sigma_nu, (n,), and stress of the body on the foundation, (n, d).
+    friction_bound, slip
+        Shape (n,) (stress); and tangential displacement, shape (n, d) (length).
     status
         "open", "stick" or "slip", shape (n,).
     potential, charge
@@ -76,21 +70,13 @@ class ContactResult:
     def __repr__(self) -> str:
         """Return how many nodes there are, and how many of them touch."""
         closed = np.count_nonzero(self.status != "open")
-        largest = self.pressure.max(initial=0.0)
-        return (
-            f"<ContactResult: {self.status.size} nodes, {closed} in contact, pressure up to "
-            f"{largest:.4g}>"
-        )
+        words = f"{self.status.size} nodes, {closed} in contact"
+        return f"<ContactResult: {words}, pressure up to {self.pressure.max(initial=0.0):.4g}>"
 
     def function(self, name: str) -> fem.Function:
         """Return one of the arrays as a function on a mesh of the contact surface. Collective.
 
         It is NaN at nodes that are held, and hence no contact nodes.
-
-        Parameters
-        ----------
-        name
-            For instance "pressure" or "traction".
 
         Raises
         ------
@@ -101,28 +87,20 @@ class ContactResult:
         known = {k: v for k, v in arrays.items() if v.dtype.kind == "f"}
         if name not in known:
             raise InputError(f"contact.function({name!r}): accepted: {', '.join(known)}")
-        values = known[name]
-        domain, degree = self._problem.domain, self._problem.equilibrium.degree
-        parts = [domain.facets(contact.on) for contact in self._problem.contacts]
-        surface = dmesh.create_submesh(
-            domain.mesh, domain.dim - 1, np.unique(np.concatenate(parts))
-        )[0]
-        space = fem.functionspace(surface, ("Lagrange", degree, values.shape[1:]))
-        made = fem.Function(space, name=name)
-        places = space.tabulate_dof_coordinates()[:, : domain.dim]
+        values, domain = known[name], self._problem.domain
+        facets = np.concatenate([domain.facets(contact.on) for contact in self._problem.contacts])
+        surface = dmesh.create_submesh(domain.mesh, domain.dim - 1, np.unique(facets))[0]
+        element = ("Lagrange", self._problem.equilibrium.degree, values.shape[1:])
+        made = fem.Function(fem.functionspace(surface, element), name=name)
+        places = made.function_space.tabulate_dof_coordinates()[:, : domain.dim]
         distance, nearest = KDTree(self.points).query(places)
-        found = np.where(distance < 1e-9 * domain.size, nearest, -1)
-        rows = np.concatenate([values, np.full((1, *values.shape[1:]), np.nan)])[found]
+        rows = values[nearest]
+        rows[distance > 1e-9 * domain.size] = np.nan
         made.x.array[:] = rows.ravel()
         return made
 
 
-def contact_result(solution: Solved) -> ContactResult:
-    """Return the contact nodes of all ranks. Collective."""
-    return _result(solution.problem, solution.problem.comm.bcast(contact_table(solution)))
-
-
-def _result(problem: ContactProblem, table: Table) -> ContactResult:
+def contact_result(problem: ContactProblem, table: Table) -> ContactResult:
     """Return the contact nodes of a table."""
     axes = "xyz"[: problem.dim]
     normal = np.column_stack([table[f"nu_{axis}"] for axis in axes])
@@ -150,44 +128,36 @@ def _result(problem: ContactProblem, table: Table) -> ContactResult:
 
 
 def contact_surface(solution: Solved, table: Table | None) -> VTU | None:
-    """Return the contact part on rank 0, None elsewhere. Collective.
-
-    Parameters
-    ----------
-    solution
-        The solution.
-    table
-        Its contact table, None on ranks other than 0.
-    """
+    """Return the contact part on rank 0, where its table is; None elsewhere. Collective."""
     problem, d = solution.problem, solution.problem.dim
-    space = problem.equilibrium.space
-    size, count = space.dofmap.index_map.size_global, 0
-    names, cells = [], []
-    for i, entry in enumerate(problem.entries):
-        facets = surface_of(problem.domain, space, entry.on).gathered(problem.comm).nodes
-        nodes, place = np.unique(facets, return_inverse=True)
-        names.append(i * size + nodes)  # a node of two contacts is one of each
-        cells.append(count + place.reshape(facets.shape))
-        count += nodes.size
-    known = np.concatenate(names)
+    body, comm = problem.equilibrium, problem.comm
+    size = body.space.dofmap.index_map.size_global
+    # A node of two contacts is one of each.
+    facets = np.concatenate(
+        [
+            k * size + surface_of(problem.domain, body.space, entry.on).gathered(comm).nodes
+            for k, entry in enumerate(problem.entries)
+        ]
+    )
+    known, cells = np.unique(facets, return_inverse=True)
     points, x = _at_nodes(solution, known % size)
     if table is None:
         return None
-    grid = Grid(points, np.concatenate(cells), d - 1)
-    fields = _fields(problem, table, known, x)
     owner = (known // size).astype(np.int32)
-    rigid = [contact.against is None for contact in problem.contacts]
-    fields |= {"entry": owner, "rigid": np.array(rigid, dtype=np.int32)[owner]}
-    return VTU(grid, {name: _completed(values, grid) for name, values in fields.items()}, {})
+    rigid = np.array([contact.against is None for contact in problem.contacts], dtype=np.int32)
+    fields = {"displacement": x[:, :d], "entry": owner, "rigid": rigid[owner]}
+    if problem.piezoelectric:
+        fields["potential"] = body.phi_scale * x[:, d]
+    rows = np.searchsorted(known, table["entry"] * size + table["node"])
+    for name, values in values_of(SURFACE, contact_result(problem, table)).items():
+        none = np.nan if values.dtype.kind == "f" else -1
+        fields[name] = np.full((len(known), *values.shape[1:]), none, dtype=values.dtype)
+        fields[name][rows] = values
+    return VTU(Grid(points, cells.reshape(facets.shape), d - 1), fields, {})
 
 
 def _at_nodes(solution: Solved, nodes: NDArray[np.int64]) -> tuple[Array, Array]:
-    """Return the points and unknowns of nodes, given by global numbers, on all ranks. Collective.
-
-    Returns
-    -------
-    Arrays of shapes (n, d) and (n, block size).
-    """
+    """Return points and unknowns, (n, d) and (n, k), of nodes by global numbers. Collective."""
     problem, body = solution.problem, solution.problem.equilibrium
     points = body.layout.points
     values = np.concatenate([points, body.nodal(solution.state.x)[: len(points)]], axis=1)
@@ -198,39 +168,6 @@ def _at_nodes(solution: Solved, nodes: NDArray[np.int64]) -> tuple[Array, Array]
     return found[:, : problem.dim], found[:, problem.dim :]
 
 
-def _fields(
-    problem: ContactProblem, table: Table, names: NDArray[np.int64], x: Array
-) -> dict[str, Values]:
-    """Return the fields at nodes of given global names and unknowns."""
-    d, size = problem.dim, problem.equilibrium.space.dofmap.index_map.size_global
-    rows = np.searchsorted(names, table["entry"] * size + table["node"])
-    fields: dict[str, Values] = {"displacement": x[:, :d]}
-    if problem.piezoelectric:
-        fields["potential"] = problem.equilibrium.phi_scale * x[:, d]
-    for name, values in values_of(SURFACE, _result(problem, table)).items():
-        none = np.nan if values.dtype.kind == "f" else -1
-        fields[name] = np.full((len(names), *values.shape[1:]), none, dtype=values.dtype)
-        fields[name][rows] = values
-    return fields
-
-
-def _completed(values: Values, grid: Grid) -> Values:
-    """Give the corners of facets of degree 2 in 3-D the mean of the nodes beside them.
-
-    They are no contact nodes, as their basis functions have no mean on a facet, and one
-    with unknown corners could not be drawn.
-    """
-    if grid.cells.shape[1] < 6 or values.dtype.kind != "f":
-        return values
-    sums, counts = np.zeros_like(values), np.zeros_like(values)
-    for corner, beside in enumerate(([4, 5], [3, 5], [3, 4])):
-        near = values[grid.cells[:, beside]]
-        np.add.at(sums, grid.cells[:, corner], np.nansum(near, axis=1))
-        np.add.at(counts, grid.cells[:, corner], np.isfinite(near).sum(axis=1))
-    missing = np.isnan(values) & (counts > 0)
-    return np.where(missing, sums / np.maximum(counts, 1), values)
-
-
 def opposite_surface(solution: Solved) -> VTU | None:
     """Return the parts `against` with the stresses there, the same on all ranks. Collective.
 
@@ -238,11 +175,7 @@ def opposite_surface(solution: Solved) -> VTU | None:
     this one; divided by the areas of these they are stresses again. A constant pressure is the same
     constant here, and forces are the same on both sides.
 
-    Returns
-    -------
-    The surface, with the displacement, `pressure` and `traction` at its nodes, their normals out
-    of the body, their areas, and the number of the contact (`entry`). None where all obstacles are
-    rigid.
+    None where all obstacles are rigid.
     """
     problem, d = solution.problem, solution.problem.dim
     body = problem.equilibrium

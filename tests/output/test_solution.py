@@ -29,7 +29,7 @@ def test_contact_as_arrays_and_functions(dim: int, degree: int) -> None:
     np.testing.assert_allclose(friction[sliding], contact.friction_bound[sliding], rtol=1e-6)
     pressure = contact.function("pressure")
     assert pressure.function_space.mesh.topology.dim == dim - 1
-    if (dim, degree) != (3, 2):  # corners of such facets are no contact nodes
+    if (dim, degree) != (3, 2):  # whose weights are those of other functions
         form = fem.form(pressure * ufl.dx)
         integral = MPI.COMM_WORLD.allreduce(fem.assemble_scalar(form), op=MPI.SUM)
         assert integral == pytest.approx(contact.weight @ contact.pressure, rel=1e-10)
