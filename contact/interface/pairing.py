@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from dolfinx import fem
 from mpi4py import MPI
@@ -30,22 +28,6 @@ REACH = 0.25
 CHORDS = 0.25
 
 
-@dataclass(frozen=True)
-class Pair:
-    """Contact nodes of the slave side, and the mortar operator.
-
-    Attributes
-    ----------
-    nodes
-        Those that this rank owns.
-    coupling
-        The operator, the same on all ranks.
-    """
-
-    nodes: ContactNodes
-    coupling: Coupling
-
-
 def find_pair(
     body: BodyEquilibrium,
     part: str,
@@ -54,8 +36,8 @@ def find_pair(
     key: str = "contact",
     press: bool = False,
     friction: bool = False,
-) -> Pair:
-    """Collect the nodes of a part that may touch another one. Collective.
+) -> tuple[ContactNodes, Coupling]:
+    """Return the nodes of a part that may touch another one, and the operator. Collective.
 
     A node whose normal is fixed by a Dirichlet condition is left out, and its multiplier is
     handed over to its neighbours. With friction that is so too where a tangential component is
@@ -114,7 +96,7 @@ def find_pair(
         body.domain.revolved,
         body.global_unknowns.still(local.size, body.block_size),
     )
-    return Pair(nodes, coupling)
+    return nodes, coupling
 
 
 def _coupled(

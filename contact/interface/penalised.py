@@ -1,14 +1,12 @@
 """The contact laws of the penalised problem (PV_eps), node by node.
 
 Pressure and friction are functions of the displacement here: [u_nu - rho]^+/eps_contact, and
-s u_tau/(|u_tau| + eps_slip), (4.1)-(4.3). `Lagged` keeps the friction modulus of (4.33) from
-an earlier iterate, `Implicit` takes everything at the present one.
+s u_tau/(|u_tau| + eps_slip), (4.1)-(4.3).
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
 
@@ -36,25 +34,7 @@ class Regularisation:
 
 def penalised_forces(interface: Interface, nodal: Array, eps: Regularisation) -> Multipliers:
     """Return the contact forces of (4.3) at nodal unknowns of shape (n, bs). Collective."""
-    return Implicit(interface, eps).forces(nodal)
-
-
-class NodalLaw(Protocol):
-    """Contact forces as a function of the nodal unknowns, with their derivative."""
-
-    def forces(self, nodal: Array) -> Multipliers:
-        """Return the forces. Collective."""
-
-    def block(self, nodal: Array) -> Array:
-        """Return their derivative, shape (n, d, d). Collective."""
-
-
-def _pressure(interface: Interface, nodal: Array, eps: Regularisation) -> tuple[Array, Array]:
-    """Return the penalty pressure and its derivative in u_nu: 1/eps also at first touch."""
-    jump = interface.jump
-    normal = jump.normal_component(nodal)
-    pressure = penalty_pressure(normal, jump.gap, eps.contact)
-    return pressure, (normal >= jump.gap) / eps.contact
+    return PenalisedLaw(interface, eps).forces(nodal)
 
 
 def outer(a: Array, b: Array) -> Array:
@@ -62,85 +42,69 @@ def outer(a: Array, b: Array) -> Array:
     return a[:, :, None] * b[:, None, :]
 
 
-class Lagged:
-    """The laws of (4.32)-(4.33), with the friction modulus s/(|u_tau| + eps) of an iterate.
+class PenalisedLaw:
+    """Contact forces as a function of the nodal unknowns, with their derivative.
 
     Parameters
     ----------
-    interface
-        The contact nodes with their laws.
-    eps
-        Parameters of the laws.
+    interface, eps
+        The contact nodes with their laws, and the parameters of these.
     iterate
-        Nodal unknowns at which the modulus is taken, shape (n, block size).
+        Nodal unknowns at which the friction modulus s/(|u_tau| + eps) is kept, (4.32)-(4.33), shape
+        (n, block size). None: it is that of the present ones, (4.3); with a smoothing radius the
+        derivative then leaves out the terms of the smoothed pressure, which would couple the nodes.
     """
 
-    def __init__(self, interface: Interface, eps: Regularisation, iterate: Array) -> None:
+    def __init__(
+        self, interface: Interface, eps: Regularisation, iterate: Array | None = None
+    ) -> None:
         self._interface, self._eps = interface, eps
-        pressure, _ = _pressure(interface, iterate, eps)
-        forces = Multipliers(pressure, np.zeros((iterate.shape[0], interface.dim)))
-        bound = interface.bound(iterate, forces)
-        slip = interface.slip_length(iterate)
-        self._modulus = penalty_friction_modulus(bound, slip, eps.slip)
+        self._modulus = None if iterate is None else self._modulus_at(iterate)
 
     def acts(self) -> bool:
-        """Tell whether there is friction anywhere at that iterate. Collective."""
-        return self._interface.jump.maximum(self._modulus) > 0
+        """Tell whether a kept modulus is above 0 anywhere. Collective."""
+        return self._modulus is None or self._interface.jump.maximum(self._modulus) > 0
 
     def stick(self) -> None:
         """Hold all nodes as stiffly along the foundation as across it."""
-        self._modulus = np.full_like(self._modulus, 1 / self._eps.contact)
+        self._modulus = np.full(self._interface.jump.gap.shape, 1 / self._eps.contact)
 
-    def forces(self, nodal: Array) -> Multipliers:
-        """Return the forces."""
-        pressure, _ = _pressure(self._interface, nodal, self._eps)
-        tangential = self._interface.slip(nodal)
-        return Multipliers(pressure, self._modulus[:, None] * tangential)
-
-    def block(self, nodal: Array) -> Array:
-        """Return the derivative: only the active set of the normal part depends on `nodal`."""
+    def _pressed(self, nodal: Array) -> tuple[Multipliers, Array]:
+        """Return the pressures, and their derivative in u_nu: 1/eps also at first touch."""
         jump = self._interface.jump
-        _, slope = _pressure(self._interface, nodal, self._eps)
-        normal = slope[:, None, None] * outer(jump.normal, jump.normal)
-        return normal + self._modulus[:, None, None] * jump.tangent
+        normal = jump.normal_component(nodal)
+        pressure = penalty_pressure(normal, jump.gap, self._eps.contact)
+        forces = Multipliers(pressure, np.zeros(jump.normal.shape))
+        return forces, (normal >= jump.gap) / self._eps.contact
 
-
-class Implicit:
-    """The laws of (4.3) themselves.
-
-    With a smoothing radius > 0 the derivative leaves out the terms of the smoothed pressure: they
-    would couple the nodes.
-    """
-
-    def __init__(self, interface: Interface, eps: Regularisation) -> None:
-        self._interface, self._eps = interface, eps
+    def _modulus_at(self, nodal: Array) -> Array:
+        """Return the friction modulus, shape (n,). Collective."""
+        interface = self._interface
+        bound = interface.bound(nodal, self._pressed(nodal)[0])
+        return np.asarray(
+            penalty_friction_modulus(bound, interface.slip_length(nodal), self._eps.slip)
+        )
 
     def forces(self, nodal: Array) -> Multipliers:
         """Return the forces. Collective."""
-        interface = self._interface
-        pressure, _ = _pressure(interface, nodal, self._eps)
-        tangential = interface.slip(nodal)
-        forces = Multipliers(pressure, np.zeros_like(tangential))
-        slip = interface.slip_length(nodal)
-        modulus = penalty_friction_modulus(interface.bound(nodal, forces), slip, self._eps.slip)
-        return Multipliers(pressure, modulus[:, None] * tangential)
+        modulus = self._modulus_at(nodal) if self._modulus is None else self._modulus
+        tangential = self._interface.slip(nodal)
+        return Multipliers(self._pressed(nodal)[0].pressure, modulus[:, None] * tangential)
 
     def block(self, nodal: Array) -> Array:
-        """Return the derivative. Collective."""
-        interface, eps = self._interface, self._eps.slip
-        jump = interface.jump
-        pressure, slope = _pressure(interface, nodal, self._eps)
-        forces = Multipliers(pressure, np.zeros((nodal.shape[0], interface.dim)))
-        bound = interface.bound(nodal, forces)
-        slip = interface.slip_length(nodal)
-        modulus = penalty_friction_modulus(bound, slip, eps)
-        # Unit vectors of the slip; zero where there is none, as are the terms with it.
-        tangential = interface.slip(nodal)
-        unit = tangential / np.where(slip > 0, slip, 1.0)[:, None]
-        total, share = interface.pressure(nodal, forces), slip / (slip + eps)
-        along = (interface.friction.by_slip(total, slip) - modulus) * share
-        across = interface.friction.by_pressure(total, slip) * slope * share
+        """Return their derivative, shape (n, d, d). Collective."""
+        interface, jump = self._interface, self._interface.jump
+        forces, slope = self._pressed(nodal)
+        modulus = self._modulus_at(nodal) if self._modulus is None else self._modulus
         block = slope[:, None, None] * outer(jump.normal, jump.normal)
         block = block + modulus[:, None, None] * jump.tangent
+        if self._modulus is not None:
+            return block
+        # Unit vectors of the slip; zero where there is none, as are the terms with it.
+        tangential, slip = interface.slip(nodal), interface.slip_length(nodal)
+        unit = tangential / np.where(slip > 0, slip, 1.0)[:, None]
+        total, share = interface.pressure(nodal, forces), slip / (slip + self._eps.slip)
+        along = (interface.friction.by_slip(total, slip) - modulus) * share
+        across = interface.friction.by_pressure(total, slip) * slope * share
         block = block + along[:, None, None] * outer(unit, unit)
         return block + across[:, None, None] * outer(unit, jump.normal)

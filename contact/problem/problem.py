@@ -245,9 +245,11 @@ class ContactProblem:
         if contact.against is not None:
             sides = contact.on, contact.against
             frictional = contact.friction.given
-            pair = find_pair(body, *sides, contact.foundation, key, contact.press, frictional)
+            nodes, coupling = find_pair(
+                body, *sides, contact.foundation, key, contact.press, frictional
+            )
             laws = contact.friction, contact.layer, contact.conductor
-            return Entry(contact.on, pair.nodes, *laws, coupling=pair.coupling)
+            return Entry(contact.on, nodes, *laws, coupling=coupling)
         nodes, mixing = find_nodes(body, contact.on, contact.foundation, key, contact.press)
         laws = contact.friction, contact.layer, contact.conductor
         return Entry(contact.on, nodes, *laws, self._held(key, contact, nodes), mixing=mixing)

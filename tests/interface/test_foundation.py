@@ -9,7 +9,7 @@ from mpi4py import MPI
 from contact.errors import InputError
 from contact.interface.friction import Friction
 from contact.interface.obstacle import GapFunction, Plane, Sphere
-from contact.interface.penalised import Lagged, Regularisation
+from contact.interface.penalised import PenalisedLaw, Regularisation
 from contact.mesh.grid import box, rectangle
 from contact.methods.thesis.uzawa import augmentation
 from contact.problem.contact import Contact
@@ -107,7 +107,7 @@ def test_penalty_forms(problem, x):
     body, nodes = problem.equilibrium, problem.nodes
     v, nu, ds = ufl.TestFunction(body.space), normal_of(problem), vertex_rule(problem)
     u, nodal = body.function(x), nodes.apply(x)
-    laws = Lagged(problem.interface, Regularisation(EPS, EPS), nodal)
+    laws = PenalisedLaw(problem.interface, Regularisation(EPS, EPS), nodal)
     forces = laws.forces(nodal)
     gap = field(problem, nodes.gap)
     assert 0 < np.count_nonzero(forces.pressure) < nodes.size

@@ -10,11 +10,17 @@ from scipy.spatial import Delaunay
 
 from contact.body.description import Body, Fixed
 from contact.body.equilibrium import BodyEquilibrium
-from contact.interface.mortar.basis import basis, positive_change, rule, size_of
 from contact.interface.mortar.coupling import couple
 from contact.interface.mortar.deviation import deviations, pairs_of
 from contact.interface.mortar.segments import clipped
-from contact.interface.mortar.surface import Surface, surface_of
+from contact.interface.mortar.surface import (
+    Surface,
+    basis,
+    positive_change,
+    rule,
+    size_of,
+    surface_of,
+)
 from contact.mesh.grid import box, rectangle
 from forms.hencky import Linear
 from tests.problems.mechanics import constant

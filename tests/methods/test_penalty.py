@@ -13,7 +13,7 @@ from contact.case.formula import Expression
 from contact.errors import InputError
 from contact.interface.friction import Friction
 from contact.interface.obstacle import GapFunction, Plane
-from contact.interface.penalised import Implicit, Lagged, Regularisation
+from contact.interface.penalised import PenalisedLaw, Regularisation
 from contact.mesh import grid as domain
 from contact.methods.options import FixedPointOptions, PenaltyOptions
 from contact.methods.thesis.fixed_point import FixedPoint
@@ -171,7 +171,7 @@ def test_blocks_are_the_derivative_of_the_forces(law, dim):
     x, d = rng.normal(size=(2, problem.nodes.nodes.size, dim))
     eps = Regularisation(0.3, 0.2)
     interface = problem.interface
-    model = Implicit(interface, eps) if law == "implicit" else Lagged(interface, eps, x + d)
+    model = PenalisedLaw(interface, eps, None if law == "implicit" else x + d)
 
     def forces(t: float):
         return model.forces(x + t * d).vectors(problem.nodes)

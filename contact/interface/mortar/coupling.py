@@ -6,7 +6,7 @@ the slave node j is then
 
     j_j = (S u)_j - sum_l P_jl u_l,     P_jl = int Phi_j (N_l o Pi) / int N~_j,
 
-S being the identity, but for quadratic triangles, where N~ = A N (`basis.positive_change`) and S
+S being the identity, but for quadratic triangles, where N~ = A N (`positive_change`) and S
 is made of the inverse of A^T. Constants pass: rows of S and of P have the sum 1.
 
 `integrate` finds these integrals on the facets of one rank, `couple` sums them up. Where nodes
@@ -30,10 +30,9 @@ from numpy.typing import NDArray
 from scipy import sparse
 from scipy.spatial import cKDTree
 
-from contact.interface.mortar.basis import basis, positive_change
-from contact.interface.mortar.lumping import coefficients, integrals
+from contact.interface.mortar.lumping import Mixing, coefficients, integrals
 from contact.interface.mortar.segments import Points, common_points, facing_pairs
-from contact.interface.mortar.surface import Surface
+from contact.interface.mortar.surface import Surface, basis, positive_change
 from contact.typing import Array
 
 #: Directions that differ less than this from the normals are these.
@@ -244,15 +243,11 @@ LEAST_COVERED = 1e-3
 
 
 @dataclass(frozen=True)
-class Coupling:
+class Coupling(Mixing):
     """The jump of two surfaces at the slave nodes that carry a multiplier.
-
-    Rows are slave nodes in ascending order of their global numbers; the same on all ranks.
 
     Attributes
     ----------
-    nodes
-        Global numbers of the slave nodes, shape (n,).
     weight
         int Phi_j over the part that faces the master, int N~_j, shape (n,) (length^(d - 1)).
     normal
@@ -264,26 +259,13 @@ class Coupling:
         too: means are taken with functions that change their sign.
     covered
         Share of int N~_j that faces the master, shape (n,).
-    slaves
-        Global numbers of all nodes of slave facets that face the master, shape (s,).
-    own
-        S, shape (n, s).
-    masters
-        Global numbers of the master nodes, shape (m,).
-    other
-        P, shape (n, m).
     """
 
-    nodes: NDArray[np.int64]
     weight: Array
     normal: Array
     gap: Array
     apart: Array
     covered: Array
-    slaves: NDArray[np.int64]
-    own: sparse.csr_array
-    masters: NDArray[np.int64]
-    other: sparse.csr_array
 
 
 def couple(
@@ -342,15 +324,6 @@ def _assembled(parts: Parts, d: int, degree: int, without: NDArray[np.int64]) ->
     dual = sparse.csr_array((parts.own.ravel(), places), shape=(every.size, every.size))[kept]
     own = divide @ dual @ coefficients(place, every.size, positive_change(d, degree))
     own.eliminate_zeros()
-    return Coupling(
-        every[kept],
-        weight[kept],
-        normal,
-        gap,
-        apart,
-        covered[kept],
-        every,
-        sparse.csr_array(own),
-        masters,
-        sparse.csr_array(divide @ other[kept]),
-    )
+    other = sparse.csr_array(divide @ other[kept])
+    jumps = every[kept], every, sparse.csr_array(own), masters, other
+    return Coupling(*jumps, weight[kept], normal, gap, apart, covered[kept])

@@ -1,7 +1,7 @@
 """Nodal areas of a surface: integrals of functions that all have some, and their coefficients.
 
 At the vertices of quadratic triangles the basis functions have no mean: a constraint there would
-weigh nothing. The functions N~ = A N of `basis.positive_change` take their place, and with them
+weigh nothing. The functions N~ = A N of `positive_change` take their place, and with them
 the coefficients S u, S = A^-T, that of the nodal values u: in front of a rigid foundation as in
 front of another body. For all other facets A is the identity.
 """
@@ -16,8 +16,7 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 from scipy import sparse
 
-from contact.interface.mortar.basis import basis, positive_change, rule, size_of
-from contact.interface.mortar.surface import Surface
+from contact.interface.mortar.surface import Surface, basis, positive_change, rule, size_of
 from contact.typing import Array
 
 
@@ -58,35 +57,31 @@ def coefficients(place: NDArray[np.intp], count: int, change: Array) -> sparse.c
 
 @dataclass(frozen=True)
 class Mixing:
-    """The jump at the nodes of a part in front of a rigid foundation, S u.
+    """Jumps that are no nodal values, S u less P times the values of another body.
 
     Rows are nodes in ascending order of their global numbers; the same on all ranks.
 
     Attributes
     ----------
     nodes
-        Global numbers of the nodes, shape (n,).
-    own
-        S, shape (n, n).
+        Global numbers of the nodes that carry a multiplier, shape (n,).
+    slaves, own
+        Global numbers of the nodes of their side, shape (s,), and S, shape (n, s).
+    masters, other
+        Those of the other body, shape (m,), and P, shape (n, m); none before a rigid foundation.
     """
 
     nodes: NDArray[np.int64]
+    slaves: NDArray[np.int64]
     own: sparse.csr_array
+    masters: NDArray[np.int64]
+    other: sparse.csr_array
 
-    @property
-    def slaves(self) -> NDArray[np.int64]:
-        """Global numbers of the nodes that jumps are made of: the same."""
-        return self.nodes
-
-    @property
-    def masters(self) -> NDArray[np.int64]:
-        """Global numbers of nodes of another body: none."""
-        return np.zeros(0, dtype=np.int64)
-
-    @property
-    def other(self) -> sparse.csr_array:
-        """Their share of the jumps, shape (n, 0)."""
-        return sparse.csr_array((self.nodes.size, 0))
+    @staticmethod
+    def alone(nodes: NDArray[np.int64], own: sparse.csr_array) -> Mixing:
+        """Return the jumps S u of all nodes of one side, S of shape (n, n)."""
+        none = sparse.csr_array((nodes.size, 0))
+        return Mixing(nodes, nodes, own, np.zeros(0, dtype=np.int64), none)
 
     def apply(self, comm: MPI.Intracomm, numbers: NDArray[np.int64], values: Array) -> Array:
         """Return S times nodal values of owned nodes, shape (k, m). Collective.
@@ -145,7 +140,7 @@ class Lumping:
         change = positive_change(surface.corners.shape[1], surface.degree)
         if np.array_equal(change, np.eye(len(change))):
             return Lumping(nodes, weight, normal, deviation, None)
-        mixing = Mixing(nodes, coefficients(place, nodes.size, change))
+        mixing = Mixing.alone(nodes, coefficients(place, nodes.size, change))
         return Lumping(nodes, weight, normal, deviation, mixing)
 
     def without_axis(self, surface: Surface) -> Lumping:
@@ -164,7 +159,7 @@ class Lumping:
             weight[axis], weight[beside] = 0.0, total
         if np.array_equal(weight, self.weight):
             return self
-        return replace(self, weight=weight, mixing=Mixing(self.nodes, sparse.csr_array(own)))
+        return replace(self, weight=weight, mixing=Mixing.alone(self.nodes, sparse.csr_array(own)))
 
 
 def pairs_at_axis(surface: Surface, numbers: NDArray[Any]) -> NDArray[Any]:

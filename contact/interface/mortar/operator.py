@@ -16,7 +16,6 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from contact.errors import InputError
-from contact.interface.mortar.coupling import Coupling
 from contact.interface.mortar.lumping import Mixing
 from contact.linear.constraint import Change, in_circles
 from contact.mesh.entities import owned_among
@@ -87,7 +86,7 @@ class CouplingOperator:
 def coupling_operator(
     comm: MPI.Intracomm,
     index_map: IndexMap,
-    given: Sequence[Coupling | Mixing],
+    given: Sequence[Mixing],
     nodes: NDArray[np.int32],
     free: NDArray[np.bool_],
 ) -> CouplingOperator | None:
@@ -135,17 +134,10 @@ def coupling_operator(
     return operator.at(index_map.local_to_global(nodes))
 
 
-def _over(rows: Coupling | Mixing, every: NDArray[np.int64]) -> sparse.csr_array:
+def _over(rows: Mixing, every: NDArray[np.int64]) -> sparse.csr_array:
     """Return a contact's jumps by the values of the nodes of all contacts."""
-    count = rows.nodes.size
-    total = sparse.csr_array((count, every.size))
-    for sign, numbers, part in (
-        (1.0, rows.slaves, rows.own),
-        (-1.0, rows.masters, rows.other),
-    ):
-        entries = part.tocoo()
-        columns = np.searchsorted(every, numbers)[entries.col]
-        total = total + sparse.csr_array(
-            (sign * entries.data, (entries.row, columns)), shape=total.shape
-        )
-    return sparse.csr_array(total)
+    entries = sparse.hstack([rows.own, -rows.other], format="coo")
+    columns = np.searchsorted(every, np.concatenate([rows.slaves, rows.masters]))
+    return sparse.csr_array(
+        (entries.data, (entries.row, columns[entries.col])), shape=(rows.nodes.size, every.size)
+    )

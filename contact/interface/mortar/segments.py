@@ -14,8 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from contact.interface.mortar.basis import rule, size_of
-from contact.interface.mortar.surface import Surface
+from contact.interface.mortar.surface import Surface, rule, size_of
 from contact.typing import Array
 
 #: Pairs that are looked at together: bounds the memory.

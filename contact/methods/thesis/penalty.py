@@ -27,9 +27,7 @@ from petsc4py import PETSc
 
 from contact.errors import InputError, SingularError
 from contact.interface.penalised import (
-    Implicit,
-    Lagged,
-    NodalLaw,
+    PenalisedLaw,
     Regularisation,
     outer,
     penalised_forces,
@@ -130,7 +128,7 @@ class PenalisedProblem:
         return self.operator.multiply(values) / self._units
 
     def solve(
-        self, law: NodalLaw, state: State, implicit: bool, poll: Callable[[], None]
+        self, law: PenalisedLaw, state: State, implicit: bool, poll: Callable[[], None]
     ) -> tuple[Array, int, str]:
         """Solve from a state; return the unknowns, the iterations and the fault, if any.
 
@@ -332,7 +330,7 @@ class Penalty(OuterLoop):
         """Return the unknowns that SNES finds, its iterations and the fault, if any."""
         interface = self.problem.interface
         nodal = interface.jump.apply(self.state.x)
-        law: NodalLaw = Implicit(interface, self._eps) if implicit else self._lagged(nodal)
+        law = PenalisedLaw(interface, self._eps) if implicit else self._lagged(nodal)
         symmetric = not (implicit and interface.friction.acts)
         if symmetric not in self._solvers:
             self._solvers[symmetric] = PenalisedProblem(
@@ -348,13 +346,13 @@ class Penalty(OuterLoop):
             del self._solvers[symmetric]  # MUMPS does not begin anew after that
             return self.state.x, taken, LOST
 
-    def _lagged(self, nodal: Array) -> Lagged:
+    def _lagged(self, nodal: Array) -> PenalisedLaw:
         """Return the laws with the friction of an iterate; of stuck nodes where that has none.
 
         At zero displacement there is no pressure, so no friction: a body that friction alone
         constrains would fly away.
         """
-        law = Lagged(self.problem.interface, self._eps, nodal)
+        law = PenalisedLaw(self.problem.interface, self._eps, nodal)
         if self.problem.frictional and not law.acts() and constrained_by_friction(self.problem):
             law.stick()
         return law
