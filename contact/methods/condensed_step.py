@@ -17,7 +17,7 @@ from contact.linear.operator import Counters
 from contact.methods.chord import WORTH, Chord
 from contact.methods.gap_derivative import GapDerivative
 from contact.methods.line_search import FAR, step_length
-from contact.methods.newton_step import NEAR, Iterate, Taken
+from contact.methods.newton_step import Iterate, Taken
 from contact.methods.options import NewtonOptions
 from contact.methods.report import IterationHistory, Outcome
 from contact.problem.condensed import Condensation, CondensedProblem
@@ -32,6 +32,10 @@ CONTACT_PART = 1e-3
 #: Equilibrium residual below which the tangent replaces the secant of a condensed body. Where
 #: contact is solved exactly in each step, the tangent does not overshoot for its sake.
 SECANT_UNTIL = 0.3
+
+#: Residual of the condensed contact problem, over that before the step, from which on it is no
+#: solution of it: a step that gains less is left to the whole body.
+UNSOLVED = 0.05
 
 #: Most Newton steps in one solve of the condensed contact problem.
 MOST_STEPS = 1000
@@ -112,12 +116,12 @@ class CondensedStep:
             max_outer=MOST_STEPS,
             condense=False,
         )
-        history = IterationHistory(self._history.quiet(), level=logging.DEBUG)
+        history = IterationHistory(lambda _: self._history.poll(), level=logging.DEBUG)
         begin = replace(iterate, state=replace(state, x=condensed.equilibrium.at))
         end, outcome = self._solve(condensed, options, self.parameters, history, begin)
         solves = sum(record.inner for record in history.records)
         self.counters.contact_solves += solves
-        if outcome.kkt.significant > max(enough, NEAR * reached.significant):
+        if outcome.kkt.significant > max(enough, UNSOLVED * reached.significant):
             return None
         increment = self.condensation.expand(condensed, end.state.x)
         new = replace(state, x=body.moved(state.x, increment), forces=end.state.forces)

@@ -30,10 +30,6 @@ from contact.problem.protocols import Problem
 from contact.problem.state import State
 from contact.typing import Array
 
-#: Residual below which the conductivity is linearised by the gap too although the active set still
-#: changes: far away, that derivative belongs to nodes that will not be where they are.
-NEAR = 0.05
-
 #: Forcing term of inexact Newton: more digits last longer than the steps that they save. One that
 #: depended on the residuals would ask for more digits on finer meshes, whose residuals pass through
 #: more values between the first and the last.
@@ -271,7 +267,7 @@ class NewtonStep:
         law = interface.law
         if not law.active:
             return 0.0
-        follow = contact.unchanged or reached < NEAR
+        follow = contact.unchanged  # else the derivative is that of nodes that will not be there
         if law.follows_gap:
             follow = self.gap_derivative(reached, follow)
         return law.current_block(nodal, interface.pressure(nodal, contact.forces), follow)

@@ -6,7 +6,7 @@ import logging
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import Protocol, runtime_checkable
+from typing import Protocol, TypeAlias, runtime_checkable
 
 import numpy as np
 
@@ -59,11 +59,8 @@ class Record:
         return sum(step.inner for step in self.steps)
 
 
-class Monitor(Protocol):
-    """Told of every outer iteration, on all ranks."""
-
-    def __call__(self, record: Record) -> None:
-        """Take note of an iteration."""
+#: Told of every outer iteration, on all ranks.
+Monitor: TypeAlias = Callable[[Record], None]
 
 
 @runtime_checkable
@@ -72,17 +69,6 @@ class Poll(Protocol):
 
     def poll(self) -> None:
         """Raise on all ranks if the solve is to end. Collective."""
-
-
-@dataclass(frozen=True)
-class Quiet:
-    """A monitor of a loop within another one: it only looks whether the solve is to end."""
-
-    poll: Callable[[], None]
-
-    def __call__(self, record: Record) -> None:
-        """Look whether the solve is to end. Collective."""
-        self.poll()
 
 
 @dataclass
@@ -120,10 +106,6 @@ class IterationHistory:
         seconds = time.perf_counter() - self._begin
         number = len(self.records) + 1
         self.add(Record(number, inner, kkt, np.nan, seconds, note, sizes, steps))
-
-    def quiet(self) -> Monitor:
-        """Return a monitor for a loop within a step: it looks whether the solve is to end."""
-        return Quiet(self.poll)
 
     def add(self, record: Record) -> None:
         """Append a record."""
