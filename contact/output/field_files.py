@@ -92,16 +92,9 @@ def body_share(
     names: Collection[str] | None = None,
     derived: DerivedFields | None = None,
 ) -> VTU:
-    """Return a body at a state with its fields: this rank's share. Collective.
+    """Return a body at a state with its fields of some names: this rank's share. Collective.
 
-    Parameters
-    ----------
-    problem, state
-        The problem, and where it is.
-    names
-        Which fields; all of them by default.
-    derived
-        The derived fields at the state, where they are at hand.
+    `derived` are the derived fields at the state, where they are at hand.
     """
     body, d = problem.equilibrium, problem.dim
     space = body.space
@@ -140,13 +133,7 @@ def _rows(values: Values) -> Values:
 
 
 def write_share(comm: MPI.Intracomm, share: VTU, path: Path) -> None:
-    """Write a grid with its fields into a VTU file. Collective.
-
-    Raises
-    ------
-    InputError
-        As `write_fields`.
-    """
+    """Write a grid with its fields into a VTU file. Collective."""
     whole = gathered(comm, share)
     on_root(comm, lambda: None if whole is None else write_vtu(path, whole))
 
@@ -223,16 +210,7 @@ OVERHEAD = 16384
 
 
 def claim_room(comm: MPI.Intracomm, folder: Path, own: int) -> None:
-    """Check that there is room for files. Collective.
-
-    Parameters
-    ----------
-    comm
-        The ranks that will write them.
-    folder
-        Where to.
-    own
-        Bytes that this rank will write.
+    """Check that there is room in a folder for the bytes that each rank will write. Collective.
 
     Raises
     ------
@@ -271,13 +249,7 @@ abandoned: list[str] = []
 
 @contextmanager
 def closing(open_: Callable[[], Any]) -> Iterator[Any]:
-    """Yield the writer of a file, and close it; where that fails, it is left as it is.
-
-    Parameters
-    ----------
-    open_
-        Makes the writer, which has a method ``close``.
-    """
+    """Yield the writer of a file, and close it; where that fails, it is left as it is."""
     writer = open_()
     try:
         yield writer

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from functools import cached_property, partial
-from itertools import accumulate
+from itertools import accumulate, chain
 from typing import NamedTuple
 
 import basix.ufl
@@ -40,18 +40,9 @@ DECREASE, SOFTENED = 1e-6, 1e-9
 def nodal_function(
     name: str, source: fem.FunctionSpace, values: Array, shape: tuple[int, ...]
 ) -> fem.Function:
-    """Return a Lagrange function on the nodes of another Lagrange space.
+    """Return a Lagrange function with a value of some shape on the nodes of another Lagrange space.
 
-    Parameters
-    ----------
-    name
-        Name of the function.
-    source
-        Lagrange space, blocked or not, whose degree the function gets.
-    values
-        Values at the local nodes of `source`, shape (nodes, components).
-    shape
-        Shape of the function's value, with as many components.
+    The values are those at the local nodes of `source`, shape (nodes, components).
     """
     mesh, degree = source.mesh, source.ufl_element().embedded_superdegree
     function = fem.Function(fem.functionspace(mesh, ("Lagrange", degree, shape)), name=name)
@@ -91,26 +82,18 @@ class Extremes(NamedTuple):
     strain, von_mises
         The largest |dev eps| and von Mises stress.
     yielded, volume
-        Volume in the plastic range, |dev eps| above first yield, and that of all of it.
-    yields
-        Whether the law has such a limit.
+        Volume in the plastic range, |dev eps| above first yield (None for a law without), and
+        that of all of it.
     """
 
     strain: float
     von_mises: float
-    yielded: float
+    yielded: float | None
     volume: float
-    yields: bool
 
 
 class Point:
-    """A point of a body at some unknowns as the quantities see it, in UFL.
-
-    Parameters
-    ----------
-    body, material, at
-        The body, the material there, and the unknowns.
-    """
+    """A point of a body of some material at some unknowns as the quantities see it, in UFL."""
 
     def __init__(self, body: BodyEquilibrium, material: Material, at: fem.Function) -> None:
         mesh, revolved = body.domain.mesh, body.domain.revolved
@@ -156,12 +139,7 @@ class Point:
 
 
 class DerivedFields:
-    """Fields derived from the unknowns of a body. The methods are collective.
-
-    Parameters
-    ----------
-    body, state
-        The body, and its state.
+    """Fields derived from the unknowns of a body at a state. The methods are collective.
 
     Attributes
     ----------
@@ -205,18 +183,16 @@ class DerivedFields:
         values = [f[i] for f in fields for i in np.ndindex(f.ufl_shape)]
         return ufl.as_vector(values + self.body.variables.updated(point.law, point.strain))
 
-    def _chunks(self) -> Iterator[tuple[NDArray[np.int32], Array]]:
-        """Yield owned cells and the values there, shape (cells, points, components)."""
-        for material in range(len(self.body.cells)):
-            yield from self._chunks_of(material)
-
-    def _chunks_of(self, material: int) -> Iterator[tuple[NDArray[np.int32], Array]]:
-        """Yield the owned cells of one material, likewise."""
+    def _chunks(self, material: int) -> Iterator[tuple[NDArray[np.int32], Array]]:
+        """Yield owned cells of a material and the values, shape (cells, points, components)."""
         body, cells = self.body, self.body.cells[material]
         expression = partial(self._expression, body.body.materials[material])
         name = "fields", material
         body.variables.set(body.variables.of(self._state))
         yield from body.pointwise.values(name, expression, self.points, self._x, cells)
+
+    def _all_chunks(self) -> Iterator[tuple[NDArray[np.int32], Array]]:
+        return chain.from_iterable(map(self._chunks, range(len(self.body.cells))))
 
     def move_to(self, state: Evaluated) -> None:
         """Look at the fields of another state of the same body from now on."""
@@ -226,7 +202,7 @@ class DerivedFields:
         """Return |dev eps| in the owned cells of each material, shape (cells, points)."""
         column = self.columns["dev_strain"]
         return [
-            np.concatenate([values[..., column][..., 0] for _, values in self._chunks_of(material)])
+            np.concatenate([values[..., column][..., 0] for _, values in self._chunks(material)])
             for material in range(len(self.body.cells))
         ]
 
@@ -237,19 +213,15 @@ class DerivedFields:
         for index, material in enumerate(self.body.body.materials):
             limit = getattr(material.law, "first_yield", np.inf)
             largest, sums = np.zeros(2), np.zeros(2)
-            for chosen, values in self._chunks_of(index):
+            for chosen, values in self._chunks(index):
                 largest[0] = max(largest[0], values[..., strain].max(initial=0.0))
                 largest[1] = max(largest[1], values[..., mises].max(initial=0.0))
                 beyond = (values[..., strain] > limit).mean(axis=(1, 2))
                 sums += volume[chosen] @ np.column_stack([beyond, np.ones(chosen.size)])
             self.body.comm.Allreduce(MPI.IN_PLACE, largest, op=MPI.MAX)
             self.body.comm.Allreduce(MPI.IN_PLACE, sums, op=MPI.SUM)
-            yields = bool(np.isfinite(limit))
-            found.append(
-                Extremes(
-                    float(largest[0]), float(largest[1]), float(sums[0]), float(sums[1]), yields
-                )
-            )
+            yielded = float(sums[0]) if np.isfinite(limit) else None
+            found.append(Extremes(float(largest[0]), float(largest[1]), yielded, float(sums[1])))
         return found
 
     def cells(self) -> dict[str, fem.Function]:
@@ -260,7 +232,7 @@ class DerivedFields:
             for name, shape in self.shapes.items()
         }
         corners = 1 if degree == 0 else self.body.dim + 1
-        for chosen, values in self._chunks():
+        for chosen, values in self._all_chunks():
             for name, columns in self.columns.items():
                 dofs = made[name].function_space.dofmap.list[chosen]
                 array = made[name].x.array.reshape(-1, columns.stop - columns.start)
@@ -277,7 +249,7 @@ class DerivedFields:
             fem.functionspace(space.mesh, ("Lagrange", self.body.degree, (count + 1,)))
         )
         sums = total.x.array.reshape(-1, count + 1)
-        for chosen, values in self._chunks():
+        for chosen, values in self._all_chunks():
             dofs = total.function_space.dofmap.list[chosen]
             weight = np.broadcast_to(volume[chosen, None, None], (*dofs.shape, 1))
             at_nodes = np.broadcast_to(values, (*dofs.shape, count)) * weight
@@ -318,13 +290,7 @@ class Deformation(NamedTuple):
 
 
 def deformation(body: BodyEquilibrium, x: Array) -> Deformation:
-    """Return how large the deformation is. Collective.
-
-    Parameters
-    ----------
-    body, x
-        The body, and its local unknowns.
-    """
+    """Return how large the deformation is at local unknowns of a body. Collective."""
     mesh, kinematics = body.domain.mesh, body.domain.kinematics
     nodal, middle = body.nodal(x).ravel(), np.full((1, body.dim), 1 / (body.dim + 1))
 

@@ -60,10 +60,9 @@ def review(solution: Solution) -> None:
     strains = [largest.strain for largest in extremes]
     solution.max_dev_strain = max(strains)
     solution.max_von_mises = max(largest.von_mises for largest in extremes)
-    if any(largest.yields for largest in extremes):
-        solution.plastic_share = sum(largest.yielded for largest in extremes) / sum(
-            largest.volume for largest in extremes
-        )
+    yielded = [largest.yielded for largest in extremes if largest.yielded is not None]
+    if yielded:
+        solution.plastic_share = sum(yielded) / sum(largest.volume for largest in extremes)
     solution.deformation = deformation(body, x)
     for remarks in (
         unloading(solution),

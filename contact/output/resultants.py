@@ -88,15 +88,8 @@ def _reactions(
 ) -> dict[str, tuple[NDArray[np.int32], Array]]:
     """Return the residuals where supports act, part by part: the nodes, and values (n, k) there.
 
-    Parameters
-    ----------
-    problem
-        The problem.
-    residual
-        At the owned nodes, shape (nodes, k).
-    given, columns
-        Prescribed values of each of the body's `fixed`, None for those that are free; and where
-        their components are among all of a node.
+    The residual is that at the owned nodes, shape (nodes, k); `given` are the prescribed values of
+    each of the body's `fixed`, None where free, and `columns` their components of a node.
     """
     found: dict[str, tuple[NDArray[np.int32], Array]] = {}
     left = ~problem.equilibrium.unsupported[:, columns]
@@ -129,10 +122,8 @@ class ChargeBalance:
     electrodes
         Part with a prescribed or one unknown potential -> its charge. A node of two parts with a
         prescribed one counts for the one that is fixed first.
-    given
-        Part -> prescribed surface charge.
-    foundation
-        Charge that passes through the contact part.
+    given, foundation
+        Part -> prescribed surface charge; the charge that passes through the contact part.
     body
         Prescribed volume charge: the sum of all the others, by Gauss's law.
     magnitude
@@ -162,12 +153,7 @@ class ChargeBalance:
 class Reading:
     """The reading of a sensor's electrode.
 
-    Attributes
-    ----------
-    charge
-        Free charge of the part; None where its potential is not prescribed.
-    potential
-        Mean potential over the part.
+    The free charge of the part, None where its potential is not prescribed, and its mean potential.
     """
 
     charge: float | None
@@ -274,9 +260,7 @@ def movements(problem: ContactProblem, state: State) -> dict[str, Any]:
     potential; a key is absent where there are none. Rotations are in degrees. Forces, moments and
     charges act from outside: those given, or the reactions of components that are given.
     """
-    foundations: dict[str, Any] = {}
-    parts: dict[str, Any] = {}
-    electrodes: dict[str, Any] = {}
+    foundations, parts, electrodes = dict[str, Any](), dict[str, Any](), dict[str, Any]()
     body = problem.equilibrium
     global_unknowns, q = body.global_unknowns, body.motion(state.x)
     if global_unknowns.size == 0:

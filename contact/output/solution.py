@@ -56,16 +56,10 @@ class Solution(Solved):
     ----------
     outcome
         Whether it has converged, why it ended, and the residuals.
-    history
-        The outer iterations.
-    counters
-        Factorisations and linear solves.
-    method
-        Name of the method.
+    history, counters
+        The outer iterations; factorisations and linear solves.
     seconds
         Spent on setup, solve and output.
-    notes, warnings
-        Remarks on the solution.
     max_dev_strain, max_von_mises
         The largest |dev eps| and von Mises stress over the cells (their nodes, for degree 2).
     plastic_share
@@ -74,7 +68,7 @@ class Solution(Solved):
     deformation
         How large strains and changes of volume are; None before the solution is reviewed.
     start
-        From where the iteration started, in words.
+        The initial guess, in words.
     case
         The case as `contact check` prints it, empty where there is none.
     energies, driven
@@ -105,11 +99,6 @@ class Solution(Solved):
             f"<Solution{name}: {state}, {self.outcome.reason}; method {self.method}, "
             f"von Mises stress up to {self.max_von_mises:.4g}; {len(self.warnings)} warning(s)>"
         )
-
-    @property
-    def begun(self) -> bool:
-        """Whether there is more than the start: an iteration, or a step of an earlier run."""
-        return bool(self.history.records or self.steps)
 
     @property
     def converged(self) -> bool:
@@ -213,7 +202,7 @@ class Solution(Solved):
 
     @cached_property
     def supports(self) -> Mapping[str, Resultant]:
-        """Force and moment of each part with prescribed displacements on the body. Collective."""
+        """Resultant of each part with prescribed displacements on the body. Collective."""
         return supports(self.problem, self.state)
 
     def reaction(self, part: str) -> Array:

@@ -34,8 +34,6 @@ class StepRecord:
 
     Attributes
     ----------
-    state
-        Its solution.
     row
         The columns of ``steps.csv``.
     table
@@ -67,14 +65,8 @@ class Solved:
 
     Attributes
     ----------
-    problem
-        The problem.
     state
-        Its state: a value, which nothing that is done with the problem changes.
-    title
-        Title of the case.
-    units
-        Names of the units of the case, for labels.
+        A value, which nothing that is done with the problem changes.
     output
         The files that are written besides the summary and the tables.
     steps

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from mpi4py import MPI
@@ -17,8 +16,8 @@ from contact.output.quantities import STEPS, values_of
 from contact.output.resultants import nodes_of
 from contact.output.solution import Solution
 from contact.output.solved import StepRecord
-from contact.output.table import Table, contact_table, csv_columns, write_csv
-from contact.problem.energy import Balance, Moment, balance, moment
+from contact.output.table import contact_table, csv_columns, write_csv
+from contact.problem.energy import Moment, balance, moment
 from contact.problem.problem import ContactProblem
 from contact.typing import Array
 
@@ -41,8 +40,8 @@ class StepRecorder:
             self._before = moment(here, last.state, self._before)
             self._before = replace(self._before, enthalpy=last.enthalpy)
         self._rounding = 0.0 if last is None else last.rounding
-        self._driven = driven_part(problem)
-        self._nodes = None if self._driven is None else nodes_of(problem, self._driven)
+        part = _driven_part(problem)
+        self._nodes = None if part is None else nodes_of(problem, part)
 
     def record(self, step: LoadStep) -> StepRecord:
         """Return the record of a step that follows the last one. Collective."""
@@ -50,30 +49,16 @@ class StepRecorder:
         now = moment(problem, state, self._before)
         energies = balance(problem, state, self._before, now)
         self._before = now
-        driven = None if self._nodes is None else _driven(problem, self._nodes, now)
-        solution = _solution_of(step, energies, driven)
+        solution = Solution(problem, state, step.outcome, step.history, step.counters, "", {})
+        solution.energies = energies
+        if self._nodes is not None:
+            solution.driven = _driven(problem, self._nodes, now)
         table, row = contact_table(solution), values_of(STEPS, solution)
         self._rounding = max(self._rounding, step.outcome.kkt.rounding)
         return StepRecord(state, row, table, now.enthalpy, self._rounding)
 
 
-def _solution_of(step: LoadStep, energies: Balance, driven: tuple[Array, Array] | None) -> Solution:
-    """Return a step as a solution of its own."""
-    return Solution(
-        problem=step.problem,
-        state=step.state,
-        outcome=step.outcome,
-        history=step.history,
-        counters=step.counters,
-        method="",
-        seconds={},
-        start="the step before",
-        energies=energies,
-        driven=driven,
-    )
-
-
-def driven_part(problem: ContactProblem) -> str | None:
+def _driven_part(problem: ContactProblem) -> str | None:
     """Return the part that is moved or loaded in time: its way and its force make a loop.
 
     That is the first one whose displacement is prescribed as a function of time, or the first
@@ -101,17 +86,10 @@ def write_steps(records: Iterable[StepRecord], folder: Path) -> None:
     """Write ``steps.csv`` and ``contact-steps.csv``. On one rank."""
     kept = list(records)
     write_csv(folder / "steps.csv", kept[0].row, (record.row.values() for record in kept))
-    header = ["t", *csv_columns(_table(kept[0]))]
-    write_csv(folder / "contact-steps.csv", header, _contact_rows(kept))
-
-
-def _contact_rows(records: Iterable[StepRecord]) -> Iterator[list[Any]]:
-    for record in records:
-        columns = [column.tolist() for column in csv_columns(_table(record)).values()]
-        for values in zip(*columns, strict=True):
-            yield [record.state.time, *values]
-
-
-def _table(record: StepRecord) -> Table:
-    assert record.table is not None  # rank 0 has it
-    return record.table
+    tables = [csv_columns(record.table or {}) for record in kept]
+    rows = (
+        [record.state.time, *values]
+        for record, table in zip(kept, tables, strict=True)
+        for values in zip(*(column.tolist() for column in table.values()), strict=True)
+    )
+    write_csv(folder / "contact-steps.csv", ["t", *tables[0]], rows)
