@@ -5,8 +5,7 @@ One piece whatever the number of ranks: the shares are gathered on rank 0, which
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -124,58 +123,9 @@ def write_vtu(path: Path, vtu: VTU) -> None:
     path.write_text(writer.GetOutputString(), encoding="ascii")
 
 
-@contextmanager
-def _silent() -> Iterator[None]:
-    """Keep VTK from printing errors, which are raised here."""
-    from vtkmodules.vtkCommonCore import vtkObject
-
-    shown = vtkObject.GetGlobalWarningDisplay()
-    vtkObject.GlobalWarningDisplayOff()
-    try:
-        yield
-    finally:
-        vtkObject.SetGlobalWarningDisplay(shown)
-
-
 def _filled(values: Values) -> Values:
     """Return values with three components where they have two, as VTK has vectors."""
     values = values.astype(np.float64 if values.dtype.kind == "f" else np.int32, copy=False)
     if values.ndim == 2 and values.shape[1] == 2:
         values = np.column_stack([values, np.zeros(len(values))])
     return np.ascontiguousarray(values)
-
-
-def read_vtu(path: Path) -> VTU:
-    """Read a file that `write_vtu` wrote. On one rank.
-
-    Raises
-    ------
-    OSError
-        If it cannot be opened.
-    ValueError
-        If the file is not one of ours.
-    """
-    from vtkmodules.util.numpy_support import vtk_to_numpy
-    from vtkmodules.vtkIOXML import vtkXMLUnstructuredGridReader
-
-    path.open("rb").close()
-    reader = vtkXMLUnstructuredGridReader()
-    reader.SetFileName(str(path))
-    with _silent():
-        reader.Update()
-    found = reader.GetOutput()
-    if reader.GetErrorCode() or not found.GetNumberOfCells():
-        raise ValueError("it has no grid")
-    (number,) = np.unique(vtk_to_numpy(found.GetCellTypesArray()))
-    (shape,) = (shape for shape, kind in KINDS.items() if kind == number)
-    order = np.argsort(ORDER.get(shape, range(shape[1])))
-    nodes = vtk_to_numpy(found.GetCells().GetConnectivityArray()).reshape(-1, shape[1])
-    grid = Grid(vtk_to_numpy(found.GetPoints().GetData()), nodes[:, order], shape[0])
-    at_points, in_cells = (
-        {
-            data.GetArrayName(k): vtk_to_numpy(data.GetArray(k))
-            for k in range(data.GetNumberOfArrays())
-        }
-        for data in (found.GetPointData(), found.GetCellData())
-    )
-    return VTU(grid, at_points, in_cells)

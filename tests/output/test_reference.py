@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 
 from contact.output import quantities as registry
+from contact.output.figures.run import read_grid
 from contact.output.files import write_outputs
 from contact.output.quantities import (
     BODY,
@@ -22,7 +23,6 @@ from contact.output.quantities import (
     quantities,
 )
 from contact.output.reference import files_help
-from contact.output.vtu import read_vtu
 from contact.solving import solve
 from scripts.output_page import PAGE, page
 from tests.output.test_steps import case_of as steps_case
@@ -79,14 +79,14 @@ def test_tables(name: str, written: list[Path]) -> None:
 
 def test_fields(written: list[Path]) -> None:
     for name in (BODY, SURFACE):
-        fields = [read_vtu(folder / name) for folder in written]
+        fields = [read_grid(folder / name) for folder in written]
         for quantity in quantities(name):
-            assert any(quantity.name in found.at_points for found in fields)
+            assert any(quantity.name in found.point_data for found in fields)
         for found in fields:
             known = {quantity.name for quantity in quantities(name)}
-            assert set(found.at_points) <= known
-            derived = set(found.at_points) - {"displacement", "potential"}
-            assert name == SURFACE or set(found.in_cells) == {f"{k}_cell" for k in derived}
+            assert set(found.point_data) <= known
+            derived = set(found.point_data) - {"displacement", "potential"}
+            assert name == SURFACE or set(found.cell_data) == {f"{k}_cell" for k in derived}
 
 
 def test_one_entry_is_a_key_and_a_column(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

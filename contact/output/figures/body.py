@@ -40,15 +40,14 @@ logger = logging.getLogger("contact.plots")
 SMALL, VICINITY = 0.04, 3.0
 #: Scaled gaps up to this part of Gamma_3 are drawn.
 FAR = 0.2
-#: Node a cell of the grids of degree 1 in 2-D and in 3-D.
-LINEAR = {"xy": 3, "rz": 3, "xyz": 4}
 
 
-def magnification(diameter: float, largest: float) -> float:
-    """Return 1, 2 or 5 times a power of ten that makes displacements about 5 % of the body.
+def magnification(diameter: float, *runs: Run) -> float:
+    """Return 1, 2 or 5 times a power of ten that makes displacements about 5 % of a diameter.
 
     Displacements that are visible anyway are drawn as they are.
     """
+    largest = max(float(np.linalg.norm(run.displacement, axis=1).max()) for run in runs)
     if not 0 < largest < 0.02 * diameter:
         return 1.0
     wanted = 0.05 * diameter / largest
@@ -56,27 +55,13 @@ def magnification(diameter: float, largest: float) -> float:
     return float(power * max(k for k in (1, 2, 5) if k * power <= wanted))
 
 
-def largest_displacement(run: Run) -> float:
-    """Return the largest Euclidean norm of the displacement at a node."""
-    return float(np.linalg.norm(run.displacement, axis=1).max())
-
-
-def scale_of(run: Run) -> float:
-    """Return the factor of the displacements in a picture of the whole body."""
-    return magnification(float(np.ptp(run.body.points, axis=0).max()), largest_displacement(run))
-
-
-def near_contact(run: Run) -> tuple[float, Array | None]:
-    """Return the factor of the displacements, and the corners of a small contact zone's vicinity.
-
-    The corners, shape (2, d), are None where the zone is no small part of the body.
-    """
+def vicinity(run: Run) -> Array | None:
+    """Return the corners of a small contact zone's vicinity, shape (2, d); else None."""
     zone = run.points[run.table["status"] != "open"]
     width = float(np.ptp(zone, axis=0).max()) if len(zone) else 0.0
-    if not 0 < width < SMALL * np.ptp(run.body.points, axis=0).max():
-        return scale_of(run), None
-    room, scale = VICINITY * width, magnification(2 * VICINITY * width, largest_displacement(run))
-    return scale, np.array([zone.min(axis=0) - room, zone.max(axis=0) + room])
+    if not 0 < width < SMALL * run.diameter:
+        return None
+    return np.array([zone.min(axis=0) - VICINITY * width, zone.max(axis=0) + VICINITY * width])
 
 
 def scalar(run: Run, field: str) -> tuple[Array, bool]:
@@ -93,7 +78,7 @@ def scalar(run: Run, field: str) -> tuple[Array, bool]:
     """
     at_points, in_cells = run.body.point_data, run.body.cell_data
     name, _, component = field.rpartition("_")
-    linear = run.body.get_cell(0).n_points == LINEAR[run.axes]
+    linear = run.body.get_cell(0).n_points == len(run.axes) + 1
     for whole, part in ((field, ""), (name, component)):
         of_cells = linear and f"{whole}_cell" in in_cells
         fields, key = (in_cells, f"{whole}_cell") if of_cells else (at_points, whole)
@@ -164,7 +149,9 @@ def picture(
     label = named(field, run.units)[1]
     norm, label = (Normalize(*limits), label) if limits else colour_range(values, label)
     if scale is None:
-        scale, box = near_contact(run)
+        box = vicinity(run)
+        shown = run.diameter if box is None else float(np.ptp(box, axis=0).max())
+        scale = magnification(shown, run)
     body = run.body.warp_by_vector("displacement", factor=scale)
     (body.cell_data if in_cells else body.point_data)["values"] = values
     skin = body.extract_surface(nonlinear_subdivision=1)  # triangles; at degree 2 four of each

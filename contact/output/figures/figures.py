@@ -17,13 +17,7 @@ from mpi4py import MPI
 from PIL import Image
 
 from contact.errors import InputError
-from contact.output.figures.body import (
-    body_figure,
-    largest_displacement,
-    magnification,
-    picture,
-    scalar,
-)
+from contact.output.figures.body import body_figure, magnification, picture, scalar
 from contact.output.figures.contact import contact_figure
 from contact.output.figures.run import Run, read_run, read_steps
 from contact.output.figures.steps import steps_figures
@@ -93,18 +87,16 @@ def draw(
     look: Look | None = None,
 ) -> list[Path]:
     """Draw the figures of `figures_of` into a folder; return the files. On one rank."""
-    files = []
     look = look or Look()
     figures = figures_of(run, fields, look)
+    files = [folder / f"figure-{name}.{ending}" for name in figures for ending in formats]
     with matplotlib.rc_context(look.style):
-        for name, figure in figures.items():
-            for ending in formats:
-                files.append(folder / f"figure-{name}.{ending}")
-                try:
-                    figure.savefig(files[-1])
-                except BaseException:  # it is not left half done
-                    files[-1].unlink(missing_ok=True)
-                    raise
+        for file in files:
+            try:
+                figures[file.stem.removeprefix("figure-")].savefig(file)
+            except BaseException:  # it is not left half done
+                file.unlink(missing_ok=True)
+                raise
     return files
 
 
@@ -167,20 +159,23 @@ def _added(folder: Path, draw: Callable[[Path], list[Path]]) -> list[Path]:
 
 def _animation(frames: Sequence[tuple[float, Run]], field: str, folder: Path, look: Look) -> Path:
     runs = [replace(run, title=f"{run.title}, t = {time:.3g}".lstrip(", ")) for time, run in frames]
-    diameter = float(np.ptp(runs[-1].body.points, axis=0).max())
-    scale = magnification(diameter, max(largest_displacement(run) for run in runs))
-    places = np.concatenate([run.body.points + scale * run.displacement for run in runs])
-    box = np.array([places.min(axis=0), places.max(axis=0)])[:, : len(runs[0].axes)]
     # Colours of all frames, without values far beyond the others.
     limits = np.array([np.quantile(scalar(run, field)[0], OUTLIERS) for run in runs])
-    same: Any = {"scale": scale, "limits": (limits[:, 0].min(), limits[:, 1].max())}
+    ends = limits[:, 0].min(), limits[:, 1].max()
+    scale = magnification(runs[-1].diameter, *runs)
+    pictures = [picture(run, field, scale, limits=ends) for run in runs]
+    boxes = np.array([made.box for made in pictures])
+    box = np.array([boxes[:, 0].min(axis=0), boxes[:, 1].max(axis=0)])
     with matplotlib.rc_context(look.style | {"figure.dpi": DPI}):
-        found = [body_figure(replace(picture(run, field, **same), box=box), look) for run in runs]
+        found = [body_figure(replace(made, box=box), look) for made in pictures]
         figures = [figure for figure in found if figure is not None]
         if not figures:
             raise InputError("--animate: pyvista cannot draw here; accepted: a display, or Xvfb")
         if runs[0].plane:
-            _same_axes(figures)
+            axes = [figure.axes[0] for figure in figures]
+            x, y = (np.array([(ax.get_xlim(), ax.get_ylim()) for ax in axes])[:, k] for k in (0, 1))
+            for ax in axes:
+                ax.set(xlim=(x[:, 0].min(), x[:, 1].max()), ylim=(y[:, 0].min(), y[:, 1].max()))
         images = [_image(figure) for figure in figures]
     palette = images[-1].quantize(256)  # one for all, so that nothing flickers; the bar has it
     first, *rest = (image.quantize(palette=palette, dither=Image.Dither.NONE) for image in images)
@@ -188,15 +183,6 @@ def _animation(frames: Sequence[tuple[float, Run]], field: str, folder: Path, lo
     each = int(np.clip(LENGTH / len(frames), SHORTEST, LONGEST))
     first.save(path, save_all=True, append_images=rest, duration=each, loop=0)
     return path
-
-
-def _same_axes(figures: Sequence[Figure]) -> None:
-    """Show the same part of the plane in all figures."""
-    axes = [figure.axes[0] for figure in figures]
-    for get, put in (("get_xlim", "set_xlim"), ("get_ylim", "set_ylim")):
-        limits = np.array([getattr(ax, get)() for ax in axes])
-        for ax in axes:
-            getattr(ax, put)(limits[:, 0].min(), limits[:, 1].max())
 
 
 def _image(figure: Figure) -> Any:

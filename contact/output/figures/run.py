@@ -9,6 +9,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, TypeVar
+from warnings import catch_warnings, simplefilter
 
 import numpy as np
 import pyvista
@@ -83,6 +84,11 @@ class Run:
         """Displacement of the nodes of the body, shape (n, 3)."""
         return np.asarray(self.body.point_data["displacement"])
 
+    @property
+    def diameter(self) -> float:
+        """Largest extent of the body."""
+        return float(np.ptp(self.body.points, axis=0).max())
+
 
 def read_run(folder: Path, summary: Mapping[str, Any] | None = None) -> Run:
     """Read the files of a run. On one rank.
@@ -100,7 +106,7 @@ def read_run(folder: Path, summary: Mapping[str, Any] | None = None) -> Run:
         If the folder has not all that is needed.
     """
     about = summary or read(folder, "summary.json", lambda path: json.loads(path.read_bytes()))
-    surface, body = (read(folder, name, _grid) for name in ("contact.vtu", "fields.vtu"))
+    surface, body = (read(folder, name, read_grid) for name in ("contact.vtu", "fields.vtu"))
     columns = read(folder, "contact.csv", _columns)
     files = about.get("files", [path.name for path in folder.iterdir()])
 
@@ -113,7 +119,7 @@ def read_run(folder: Path, summary: Mapping[str, Any] | None = None) -> Run:
             _moved(columns | _of_surface(surface), columns, body),
             body,
             surface,
-            opposite=read(folder, OPPOSITE, _grid) if OPPOSITE in files else None,
+            opposite=read(folder, OPPOSITE, read_grid) if OPPOSITE in files else None,
             steps=read(folder, "steps.csv", _columns) if "steps.csv" in files else None,
             tables=read(folder, "contact-steps.csv", _tables) if "steps.csv" in files else (),
         )
@@ -132,7 +138,7 @@ def read_steps(folder: Path) -> list[tuple[float, Run]]:
     run, found = read_run(folder), []
     assert run.steps is not None  # where there are fields in time, there are steps
     for time, name in sets[:: -int(np.ceil(len(sets) / MOST))][::-1]:
-        body = read(folder, name, _grid)
+        body = read(folder, name, read_grid)
         step = run.tables[int(np.argmin(abs(run.steps["t"] - float(time))))]
         found.append((float(time), replace(run, body=body, table=_moved(run.table, step, body))))
     return found
@@ -158,11 +164,18 @@ def read(folder: Path, name: str, reader: Callable[[Path], T]) -> T:
         raise InputError(f"{path}: not as a run has left it ({error})") from None
 
 
-def _grid(path: Path) -> Any:
-    """Read a grid with its fields."""
+def read_grid(path: Path) -> Any:
+    """Read a grid of pyvista with its fields.
+
+    Raises
+    ------
+    ValueError
+        If the file is not one of ours.
+    """
     path.open("rb").close()
     errors = pyvista.VtkErrorCatcher(send_to_logging=False)
-    with errors:  # VTK would print them
+    with errors, catch_warnings():  # VTK and pyvista would print them
+        simplefilter("ignore")
         grid = pyvista.read(path)
     if errors.events or not grid.n_cells:
         raise ValueError("it has no grid")
