@@ -15,8 +15,8 @@ that they touch. So q borders the system, [[K, K R], [R^T K, R^T K R]], which ta
 way: a factorisation solves for the columns of K R together with the right-hand side; for an
 iterative solver q is eliminated, which takes a matrix of rank m from K and leaves its
 preconditioner as it is. Where it is asked for a few digits, the remainder is left to the rows of
-nodes: the balance of q is met to rounding. `contact.problem.condensed` has the same C at the kept
-unknowns.
+nodes: the balance of q is met to rounding. `contact.problem.condensed` condenses
+the same system.
 
 Right-hand sides and solutions have the values of q, the same on all ranks, behind the owned ones.
 """
@@ -121,25 +121,6 @@ class Change:
         made = PETSc.Mat().createAIJ(sizes, bsize=size, csr=parts, comm=layout.comm)
         made.assemble()
         return made
-
-    def among(self, numbers: NDArray[np.int64], size: int) -> sparse.csr_array:
-        """Return Q at nodes of all ranks that those which take part are among.
-
-        Parameters
-        ----------
-        numbers
-            Their global numbers, shape (k,).
-        size
-            Number of unknowns of a node.
-        """
-        order = np.argsort(numbers)
-        places = order[np.searchsorted(numbers, self.nodes, sorter=order)]
-        rows = (places[:, None] * size + np.arange(size)).ravel()
-        entries = self.matrix.tocoo()
-        rest = np.setdiff1d(np.arange(numbers.size * size), rows)
-        values = np.concatenate([entries.data, np.ones(rest.size)])
-        where = [np.concatenate([rows[part], rest]) for part in (entries.row, entries.col)]
-        return sparse.csr_array((values, (where[0], where[1])), shape=2 * (numbers.size * size,))
 
 
 def in_circles(rows: NDArray[np.intp], jumps: sparse.csr_array) -> NDArray[np.intp]:

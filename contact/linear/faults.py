@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
 import numpy as np
@@ -11,6 +11,7 @@ from petsc4py import PETSc
 from contact.errors import InputError, SingularError
 from contact.linear.layout import Layout
 from contact.tolerances import HUGE
+from contact.typing import Array
 
 #: MUMPS's INFOG(1) where its workspace was too small: that of integers, and that of numbers.
 TOO_SMALL = (-8, -9)
@@ -24,11 +25,14 @@ def is_mumps(pc: PETSc.PC) -> bool:
     return pc.getType() in ("lu", "cholesky") and pc.getFactorSolverType() == "mumps"
 
 
-def set_up_with_workspace(ksp: PETSc.KSP) -> None:
+def set_up_with_workspace(
+    ksp: PETSc.KSP, prepare: Callable[[PETSc.PC], None] = PETSc.PC.setFactorSetUpSolverType
+) -> None:
     """Set up a direct solver again and again until its workspace does. Collective.
 
     The messages between ranks, and their order, decide how much it takes: MUMPS's estimate may be
-    too low for one run on some ranks and not for the next.
+    too low for one run on some ranks and not for the next. It is far too low where few unknowns are
+    eliminated and many kept, as `prepare` says of a new factorisation.
     """
     ksp.setUp()
     pc, workspace = ksp.getPC(), WORKSPACE
@@ -40,9 +44,22 @@ def set_up_with_workspace(ksp: PETSc.KSP) -> None:
         operators = ksp.getOperators()
         pc.reset()
         ksp.setOperators(*operators)
-        pc.setFactorSetUpSolverType()
+        prepare(pc)
         pc.getFactorMatrix().setMumpsIcntl(14, workspace)
         ksp.setUp()
+
+
+def mat_solve(solver: PETSc.Mat | PETSc.KSP, sides: Array) -> Array:
+    """Solve with the owned parts of right-hand sides at once, shape (owned, k). Collective."""
+    size = ((sides.shape[0], None), (None, sides.shape[1]))
+    given, solution = (PETSc.Mat().createDense(size, comm=solver.comm) for _ in "bx")
+    for matrix in (given, solution):
+        matrix.setUp()
+    given.getDenseArray()[:] = sides
+    given.assemble()
+    solution.assemble()
+    solver.matSolve(given, solution)
+    return np.array(solution.getDenseArray())
 
 
 #: MUMPS's INFOG(1) where its workspace, its memory or the limit ICNTL(23) was too small.

@@ -5,10 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import TypeVar
 
-import numpy as np
 from mpi4py import MPI
-
-from contact.typing import Array
 
 T = TypeVar("T")
 
@@ -38,21 +35,7 @@ def together(comm: MPI.Intracomm, work: Callable[[], T]) -> T:
     return found  # type: ignore[return-value]
 
 
-def from_first(comm: MPI.Intracomm, work: Callable[[], Array], *shape: int) -> Array:
-    """Return the result of the first rank on all, or raise its error. Collective.
-
-    Parameters
-    ----------
-    comm
-        The ranks.
-    work
-        The work of the first rank.
-    shape
-        Of the result.
-    """
-    if comm.size == 1:
-        return work()
-    first = comm.rank == 0
-    found = together(comm, lambda: np.ascontiguousarray(work()) if first else np.empty(shape))
-    comm.Bcast(found)
-    return found
+def from_first(comm: MPI.Intracomm, work: Callable[[], T]) -> T:
+    """Return what the first rank finds on all, or raise its error. Collective."""
+    found = together(comm, lambda: work() if comm.rank == 0 else None)
+    return comm.bcast(found)  # type: ignore[return-value]

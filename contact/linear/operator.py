@@ -16,7 +16,13 @@ from petsc4py import PETSc
 from contact.history import Evaluated
 from contact.linear import multigrid
 from contact.linear.block import BlockPreconditioner
-from contact.linear.faults import check_overflow, no_solution, petsc_options, set_up_with_workspace
+from contact.linear.faults import (
+    check_overflow,
+    mat_solve,
+    no_solution,
+    petsc_options,
+    set_up_with_workspace,
+)
 from contact.linear.krylov import Components, refine
 from contact.linear.layout import Layout, balance, insert_blocks, nodal_blocks
 from contact.linear.multigrid import (
@@ -293,18 +299,14 @@ class SparseOperator:
         InputError
             As `solve`.
         """
-        size = ((sides.shape[0], None), (None, sides.shape[1]))
-        given, solution = (PETSc.Mat().createDense(size, comm=self.layout.comm) for _ in "bx")
-        for matrix in (given, solution):
-            matrix.setUp()
-        given.getDenseArray()[:] = np.column_stack([self.layout.mask(side) for side in sides.T])
-        given.assemble()
+        given = np.column_stack([self.layout.mask(side) for side in sides.T])
+        norm = float(np.sqrt(self.layout.comm.allreduce(np.sum(given**2))))
         if self.ksp.getPC().getFailedReason():
-            check_overflow(self.layout, self.matrix.norm(), given.norm())
+            check_overflow(self.layout, self.matrix.norm(), norm)
             raise no_solution(self.ksp.getPC(), self._prefix)
-        self.ksp.matSolve(given, solution)
-        self._solved(1, given.norm(), solution.norm())
-        return np.column_stack([self.layout.mask(x) for x in solution.getDenseArray().T])
+        found = mat_solve(self.ksp, given)
+        self._solved(1, norm, float(np.sqrt(self.layout.comm.allreduce(np.sum(found**2)))))
+        return np.column_stack([self.layout.mask(x) for x in found.T])
 
     def _solved(self, iterations: int, rhs: float, solution: float) -> None:
         """Count a solve, and see whether it has one, given norms. Collective."""

@@ -49,17 +49,6 @@ def owned_among(
     return here, (numbers[here] - begin).astype(np.int32)
 
 
-def between_ranks(space: fem.FunctionSpace) -> npt.NDArray[np.bool_]:
-    """Return which owned nodes are in cells of several ranks, shape (n,). Collective."""
-    index_map, mesh = space.dofmap.index_map, space.mesh
-    cells = mesh.topology.index_map(mesh.topology.dim).size_local
-    ranks = la.vector(index_map)
-    ranks.array[:] = 0.0
-    ranks.array[space.dofmap.list[:cells].ravel()] = 1.0
-    ranks.scatter_reverse(la.InsertMode.add)
-    return np.asarray(ranks.array[: index_map.size_local] > 1)
-
-
 def cells_at(mesh: dmesh.Mesh, facets: Indices) -> tuple[Indices, npt.NDArray[np.intp]]:
     """Return the cell behind each facet of the boundary, and which of its facets that is."""
     topology, dim = mesh.topology, mesh.topology.dim

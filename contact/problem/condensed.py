@@ -13,23 +13,20 @@ import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
 from petsc4py import PETSc
-from scipy import sparse
 from scipy.linalg import lu_factor, lu_solve
 
 from contact.body.component_norms import ComponentNorms
-from contact.body.equilibrium import BodyEquilibrium
 from contact.history import BodyState, Evaluated
 from contact.interface.interface import Interface
 from contact.interface.jump import Multipliers
 from contact.interface.nodes import ContactNodes
 from contact.linear import multigrid
 from contact.linear.constraint import ConstrainedBulk, Constraint
-from contact.linear.dense import DenseOperator, Factors
+from contact.linear.dense import DenseOperator
 from contact.linear.faults import check_overflow, petsc_options
 from contact.linear.layout import balance
 from contact.linear.operator import Counters
 from contact.linear.schur import SchurComplement
-from contact.mesh.entities import between_ranks, owned_among
 from contact.problem.problem import ContactProblem
 from contact.problem.protocols import Scales
 from contact.problem.state import State
@@ -67,8 +64,8 @@ class CondensedBody:
         Which unknowns of the owned kept nodes are not fixed, shape (nodes, block size).
     rows
         The owned rows of the Schur complement.
-    stiffness, factors
-        All of it, and its factors where some have been made: on the first rank alone.
+    stiffness
+        All of it: on the first rank alone.
     residual
         Condensed internal forces minus loads where the body was linearised, all ranks.
     at, own
@@ -84,7 +81,6 @@ class CondensedBody:
     free: NDArray[np.bool_]
     rows: Array
     stiffness: Array
-    factors: Factors
     residual: Array
     at: Array
     own: slice
@@ -158,7 +154,7 @@ class CondensedBody:
         kind: str,
     ) -> DenseOperator:
         """Return the dense operator; it has blocks at all nodes, in their order."""
-        return DenseOperator(self, counters)
+        return DenseOperator(self.comm, self.free, self.stiffness, counters)
 
     def norm(self, values: Array) -> float:
         """Return the Euclidean norm of owned values. Collective."""
@@ -183,138 +179,6 @@ class CondensedProblem:
         return State(x, Multipliers.zero(self.interface.jump), self.time)
 
 
-class CondensedConstraint:
-    """The constraint of a condensed body: its Schur complement in jumps, the rest eliminated.
-
-    Kept unknowns x are those of contact nodes and of the nodes that their jumps are made of:
-    opposite, or of the same quadratic facets. With the free global unknowns q behind them,
-
-        [x; q] = C [j; z],  z = [y; q],
-
-    where j are the jumps and y the others; a foundation that moves is seen by the jumps alone. The
-    stiffness S becomes C^T S C, and z is eliminated from it: the rest has the size of the contact
-    nodes of one body. Plates and electrodes, which nodes follow, border S by a solve each.
-
-    Parameters
-    ----------
-    body, interface
-        The body and its interface. Collective.
-
-    Attributes
-    ----------
-    bulk
-        The body with nodes that follow q taken out of its matrix.
-    unknowns
-        Kept unknowns that this rank owns, local numbers: those of coupled nodes first.
-    offset
-        Where the coupled unknowns of this rank begin among those of all ranks.
-    """
-
-    def __init__(self, body: BodyEquilibrium, interface: Interface) -> None:
-        self._body, global_unknowns, layout, comm = (
-            body,
-            body.global_unknowns,
-            body.layout,
-            body.comm,
-        )
-        constraint = Constraint(layout, None, global_unknowns.ties, global_unknowns.free)
-        self.bulk = ConstrainedBulk(body, constraint, BodyState(body.rest()))
-        self._free = np.flatnonzero(global_unknowns.free)
-        #: Free unknowns that nodes follow: the others have no columns.
-        sizes = np.abs(global_unknowns.ties).sum(axis=0)
-        followed = np.asarray(comm.allreduce(sizes, op=MPI.SUM)) > 0
-        self._followed = [k for k, column in enumerate(self._free) if followed[column]]
-        self._responses = np.zeros((body.owned, self._free.size))
-        nodes = coupled = interface.coupled
-        if interface.change is not None:
-            _, here = owned_among(layout.index_map, interface.change.nodes)
-            nodes = np.concatenate([coupled, np.setdiff1d(here, coupled)])
-        size = layout.block_size
-        own = np.arange(size, dtype=np.int32)
-        self.unknowns: NDArray[np.int32] = (nodes[:, None] * np.int32(size) + own).ravel()
-        self.offset = size * sum(comm.allgather(coupled.size)[: comm.rank])
-        self._trivial = interface.change is None and global_unknowns.size == 0
-        self._matrix = None if self._trivial else self._made(interface, nodes)
-
-    def _made(self, interface: Interface, nodes: NDArray[np.int32]) -> sparse.csr_array:
-        """Return C, given the kept nodes of this rank. Collective."""
-        layout, comm = self._body.layout, self._body.comm
-        size, count = layout.block_size, interface.coupled.size
-        is_jump = np.repeat(np.concatenate(comm.allgather(np.arange(nodes.size) < count)), size)
-        free = np.concatenate(comm.allgather(layout.free[nodes])).ravel()
-        jumps, others = np.flatnonzero(is_jump), np.flatnonzero(~is_jump & free)
-        self._jumps = jumps.size
-        basis = sparse.eye_array(is_jump.size, format="csr")
-        if interface.change is not None:
-            numbers = np.concatenate(comm.allgather(layout.index_map.local_to_global(nodes)))
-            basis = interface.change.among(numbers, size)
-        moved = np.zeros((count * size, self._body.global_unknowns.size))
-        motion = interface.jump.carried
-        if motion is not None:
-            moved[: motion.shape[0] * motion.shape[1]] = motion.reshape(-1, motion.shape[2])
-        on_jumps = np.concatenate(comm.allgather(moved))[:, self._free]
-        with_q = basis[:, jumps] @ sparse.csr_array(on_jumps)
-        kept = sparse.hstack([basis[:, jumps], basis[:, others], with_q])
-        below = sparse.csr_array((self._free.size, jumps.size + others.size))
-        q = sparse.hstack([below, sparse.eye_array(self._free.size)])
-        return sparse.csr_array(sparse.vstack([kept, q]))
-
-    def eliminate(self, schur: SchurComplement, stiffness: Array) -> Array:
-        """Return the stiffness against jumps, for a body that was condensed. Collective.
-
-        It is not a number where z can move freely.
-        """
-        if self._matrix is None:
-            return stiffness
-        free, columns = self._free, self.bulk.columns[:, self._free]
-        if free.size:
-            across = np.zeros((stiffness.shape[0], free.size))
-            for k in self._followed:
-                across[:, k] = schur.condense(columns[:, k])
-                self._responses[:, k] = schur.expand(np.zeros(stiffness.shape[0]))
-            inside = self._body.comm.allreduce(columns.T @ self._responses, op=MPI.SUM)
-            corner = self.bulk.corner[np.ix_(free, free)] - inside
-            stiffness = np.block([[stiffness, across], [across.T, corner]])
-        j, matrix = self._jumps, self._matrix
-        made = np.asarray(matrix.T @ (matrix.T @ stiffness).T)
-        self._factors = lu_factor(made[j:, j:], check_finite=False)
-        self._answers = self._solve(made[j:, :j])
-        return np.asarray(made[:j, :j] - made[:j, j:] @ self._answers)
-
-    def _solve(self, values: Array) -> Array:
-        return np.asarray(lu_solve(self._factors, values, check_finite=False))
-
-    def forces(self, on_kept: Array, residual: Array) -> Array:
-        """Return the forces on jumps, given those on kept unknowns, and all. Collective.
-
-        `expand` has them then.
-        """
-        body = self._body
-        self._residual = residual[: body.owned]
-        if self._matrix is None:
-            return on_kept
-        inside = self._responses.T @ body.layout.mask(self._residual)
-        on_q = body.unbalanced(residual)[body.owned :][self._free]
-        on_q = on_q - body.comm.allreduce(inside, op=MPI.SUM)
-        made = self._matrix.T @ np.concatenate([on_kept, on_q])
-        self._forces = made[self._jumps :]
-        return np.asarray(made[: self._jumps] - self._answers.T @ self._forces)
-
-    def expand(self, schur: SchurComplement, jumps: Array) -> Array:
-        """Return the increment of all owned unknowns and the global ones. Collective."""
-        if self._matrix is None:
-            return schur.expand(jumps)
-        body = self._body
-        others = -self._solve(self._forces) - self._answers @ jumps
-        moved = self._matrix @ np.concatenate([jumps, others])
-        kept, free = np.split(moved, [moved.size - self._free.size])
-        q = np.zeros(body.global_unknowns.size)
-        q[self._free] = free
-        if self._followed:
-            schur.condense(body.layout.mask(-self._residual) - self.bulk.columns @ q)
-        return np.concatenate([schur.expand(kept) + body.global_unknowns.ties @ q, q])
-
-
 def at_kept_nodes(interface: Interface) -> Interface:
     """Return an interface whose nodes are numbered among the kept ones."""
     count = interface.jump.nodes.size
@@ -336,6 +200,9 @@ def at_kept_nodes(interface: Interface) -> Interface:
 class Condensation:
     """The body of a problem, linearised and condensed onto the contact nodes.
 
+    The constraint of the problem makes jumps the unknowns of these nodes (`linear.constraint`). Its
+    global unknowns q border the system, and are eliminated from the dense one.
+
     Parameters
     ----------
     full
@@ -349,12 +216,17 @@ class Condensation:
         self.nodes = full.interface.coupled
         self.turn_to(full)
         body = full.equilibrium
-        self._constraint = CondensedConstraint(body, full.interface)
-        begin = self._constraint.offset
-        self._own = slice(begin, begin + self.nodes.size * body.block_size)
-        self._matrix = full.equilibrium.create_matrix()
+        none = Constraint(body.layout, None, body.global_unknowns.ties, body.global_unknowns.free)
+        self._constraint = full.constraint or none
+        self._bulk = ConstrainedBulk(body, self._constraint, BodyState(body.rest()))
+        self._free = np.flatnonzero(self._constraint.free)
+        self._matrix = self._bulk.create_matrix()
+        size = body.block_size
+        kept = (self.nodes[:, None] * size + np.arange(size)).astype(np.int32).ravel()
+        self._schur = SchurComplement(self._matrix, kept, PREFIX)
+        begin = self._schur.offset
+        self._own = slice(begin, begin + kept.size)
         self._kind = ""
-        self._schur: SchurComplement | None = None
         self._rows: Array = np.zeros((0, 0))
         self._stiffness: Array = np.zeros((0, 0))
 
@@ -375,7 +247,7 @@ class Condensation:
 
         Returns
         -------
-        The condensed problem; None if it cannot be condensed: many unknowns are kept, or
+        The condensed problem; None if it cannot be condensed: many unknowns are kept, or all, or
         these do not hold the others.
 
         Raises
@@ -384,37 +256,26 @@ class Condensation:
             If numbers overflow.
         """
         body = self.full.equilibrium
-        same = keep or (body.linear and kind == self._kind)
-        if self._schur is None or not same:
-            self._rows = self._stiffness = np.zeros((0, 0))  # room for new ones
-            self._factors = Factors()
-            self._constraint.bulk.assemble(self._matrix, kind, state)
-            balance(self._matrix, body.layout)
-            if self._schur is None:
-                cut = np.repeat(between_ranks(body.space), body.block_size)
-                self._schur = SchurComplement(self._matrix, self._constraint.unknowns, PREFIX, cut)
-            if self._schur.dense_size > LARGEST:
-                return None
-            with petsc_options(PREFIX):
-                self._stiffness = self._schur.factorise(self._matrix)
-            self._stiffness = self._constraint.eliminate(self._schur, self._stiffness)
-            # By columns, as LAPACK wants the copies of which factors are made.
-            self._stiffness = np.asfortranarray(self._stiffness)
-            self._regular = bool(np.isfinite(self._stiffness).all())
-            self._rows = self._stiffness[self._own]
-            if body.comm.rank > 0:  # the others keep no more than that
-                self._rows, self._stiffness = self._rows.copy(), np.zeros((0, 0))
-            self._kind, self._size = kind, self._matrix.norm()
-            self.counters.factorizations += 1
+        if not 0 < self._schur.size <= min(LARGEST, body.layout.unknowns - 1):
+            return None
+        if not self._kind or not (keep or (body.linear and kind == self._kind)):
+            self._factorise(kind, state)
         residual = body.internal_forces(state) - body.external(state.time)
         check_overflow(body.layout, self._size, body.norm(residual))
         reactions = body.sizes(body.reactions(residual))
         acting = body.load_sizes(state.time) + reactions + body.exchanged(state)
+        restricted = self._constraint.restrict(-residual)
+        self._rhs = body.layout.mask(restricted[: body.owned])
         # Where the loads go on as before, the prediction of a step is in equilibrium but for that.
-        inside = body.layout.mask(-residual[: body.owned])
         nothing = ROUNDING * body.component_norms.spread(acting)[: body.owned]
-        forces = -self._schur.condense(inside, nothing)
-        forces = self._constraint.forces(forces, residual)
+        interior: Array = np.zeros(body.owned)
+        if body.comm.allreduce(bool(self._schur.exceeds(self._rhs, nothing)), op=MPI.LOR):
+            interior = self._schur.interior(self._rhs)
+        inside = body.comm.allreduce(self._responses.T @ self._rhs, op=MPI.SUM)
+        self._on_q = restricted[body.owned :][self._free] - inside
+        forces = self._border.T @ self._solve_q(self._on_q) - self._schur.condense(
+            self._rhs, interior
+        )
         if not (self._regular and np.isfinite(forces).all()):
             return None
         condensed = CondensedBody(
@@ -423,7 +284,6 @@ class Condensation:
             body.free[self.nodes],
             self._rows,
             self._stiffness,
-            self._factors,
             forces,
             self._at(state.x),
             self._own,
@@ -431,6 +291,48 @@ class Condensation:
             body.component_norms.at(self.nodes),
         )
         return CondensedProblem(condensed, self._interface, self.full.scales, state.time)
+
+    def _factorise(self, kind: str, state: State) -> None:
+        """Find the dense stiffness of the body at a state. Collective."""
+        body, schur = self.full.equilibrium, self._schur
+        self._rows = self._stiffness = np.zeros((0, 0))  # room for new ones
+        self._bulk.assemble(self._matrix, kind, state)
+        balance(self._matrix, body.layout)
+        with petsc_options(PREFIX):
+            stiffness = schur.factorise(self._matrix)
+        columns = self._bulk.columns[:, self._free].T
+        responses = [schur.interior(np.asarray(column)) for column in columns]
+        border = [schur.condense(*pair) for pair in zip([*columns], responses, strict=True)]
+        self._responses = np.reshape(responses, columns.shape).T
+        #: Forces on q by kept unknowns, shape (free, kept).
+        self._border = np.reshape(border, (self._free.size, schur.size))
+        inside = body.comm.allreduce(columns @ self._responses, op=MPI.SUM)
+        corner = self._bulk.corner[np.ix_(self._free, self._free)] - inside
+        self._corner = lu_factor(corner, check_finite=False) if self._free.size else None
+        if body.comm.rank == 0 and self._free.size:
+            stiffness -= self._border.T @ self._solve_q(self._border)
+        self._regular = body.comm.bcast(bool(np.isfinite(stiffness).all()))
+        self._rows, self._stiffness = self._scattered(stiffness), stiffness
+        self._kind, self._size = kind, self._matrix.norm()
+        self.counters.factorizations += 1
+
+    def _solve_q(self, forces: Array) -> Array:
+        """Solve for q with the kept unknowns at 0."""
+        if self._corner is None:
+            return forces
+        return np.asarray(lu_solve(self._corner, forces, check_finite=False))
+
+    def _scattered(self, stiffness: Array) -> Array:
+        """Return the owned rows of a matrix that the first rank has. Collective."""
+        comm, own = self.full.comm, self._own
+        every = comm.gather(own)
+        if comm.rank > 0:
+            rows = np.empty((own.stop - own.start, self._schur.size))
+            comm.Recv(rows, 0)
+            return rows
+        for rank, other in enumerate(every[1:], 1):
+            comm.Send(np.ascontiguousarray(stiffness[other]), rank)
+        return stiffness[own]
 
     def _at(self, x: Array) -> Array:
         """Return the owned kept unknowns: jumps, then values at the other kept nodes."""
@@ -448,11 +350,12 @@ class Condensation:
         x
             Its solution.
         """
-        assert self._schur is not None
         self.counters.linear_solves += 1
-        moved = x - condensed.equilibrium.at
-        everywhere = np.concatenate(self.full.comm.allgather(moved))
-        return self._constraint.expand(self._schur, everywhere)
+        kept = np.concatenate(self.full.comm.allgather(x - condensed.equilibrium.at))
+        q = np.zeros(self._constraint.free.size)
+        q[self._free] = self._solve_q(self._on_q - self._border @ kept)
+        rhs = self._rhs - self._bulk.columns @ q
+        return self._constraint.expand(np.concatenate([self._schur.expand(rhs, kept), q]))
 
 
 def pays(problem: ContactProblem, kind: str) -> bool:

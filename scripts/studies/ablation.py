@@ -18,12 +18,10 @@ from itertools import islice
 from typing import Any
 from unittest.mock import patch
 
-import numpy as np
-
 from contact import Solution, load_case, solve
 from contact.case.file import Case
 from contact.interface import complementarity
-from contact.linear import block, dense, multigrid
+from contact.linear import block, multigrid
 from contact.linear.operator import SparseOperator
 from contact.methods import (
     chord,
@@ -116,11 +114,6 @@ def _linearised(old: Callable[..., Any]) -> Callable[..., Any]:
     return plain
 
 
-def _same_blocks(operator: dense.DenseOperator) -> bool:
-    operator._changes = False
-    return np.array_equal(operator.bulk.factors.blocks, operator._blocks)
-
-
 def _large(name: str, *changes: str) -> Callable[[], Case]:
     """Return how a case on a finer mesh is made."""
     return lambda: load_case(CASES / f"{name}.toml", changes)
@@ -164,10 +157,6 @@ DEVICES = (
     Device("zero displacement where nothing acts", (progress.undeformed_equilibrium,), "-",
            ((Newton, "_undeformed", _nothing),)),
     Device("static condensation", (condensed_step,), "Guyan 1965", (), (("condense", False),)),
-    Device("low-rank correction of dense factors",
-           (dense.Factors.know, dense.DenseOperator._correct), "Woodbury 1950",
-           ((dense.DenseOperator, "_correct", _same_blocks),), (),
-           _large("hertz-sphere", "mesh.contact_size=0.04", "solver.linear=lu")),
     Device("coarse levels kept from step to step", (multigrid.Hierarchy,),
            "Karlin, Manasse, Rudolph and Sleator 1988", ((multigrid, "PRICE", 0),), (), _block),
     Device("interpolation that follows contact nodes", (multigrid.StiffNodes,), "-",

@@ -5,7 +5,7 @@ import pytest
 from mpi4py import MPI
 
 from contact.history import BodyState
-from contact.linear.dense import DenseOperator, Factors
+from contact.linear.dense import DenseOperator
 from contact.linear.first_rank import from_first, together
 from contact.linear.operator import Counters
 
@@ -19,8 +19,8 @@ def fails():
 @pytest.mark.parallel
 def test_what_the_first_rank_raises():
     with pytest.raises(MemoryError, match="no room"):
-        from_first(COMM, fails, 3)
-    assert np.array_equal(from_first(COMM, lambda: np.arange(3.0), 3), np.arange(3.0))
+        from_first(COMM, fails)
+    assert np.array_equal(from_first(COMM, lambda: np.arange(3.0)), np.arange(3.0))
 
 
 @pytest.mark.parallel
@@ -34,14 +34,8 @@ def test_what_the_last_rank_raises():
 @pytest.mark.parallel
 def test_a_dense_factorisation_without_room(monkeypatch):
     """The others went on to the next solve, and waited there."""
-
-    class Bulk:
-        comm, factors = COMM, Factors()
-        free = np.ones((1, 2), dtype=bool)
-        stiffness = np.eye(2 * COMM.size)
-        own = slice(2 * COMM.rank, 2 * COMM.rank + 2)
-
-    operator = DenseOperator(Bulk(), Counters())
-    monkeypatch.setattr(Factors, "make", lambda *_: fails())
+    free = np.ones((1, 2), dtype=bool)
+    operator = DenseOperator(COMM, free, np.eye(2 * COMM.size), Counters())
+    monkeypatch.setattr(DenseOperator, "_factorise", lambda *_: fails())
     with pytest.raises(MemoryError, match="no room"):
         operator.update("tangent", BodyState(np.zeros(2)), np.ones((1, 2, 2)))
