@@ -7,7 +7,7 @@ places, and knows none of the parts.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Protocol
 
@@ -59,29 +59,8 @@ class InternalVariables:
         return InternalVariables(self.place, dict(arrays))
 
 
-@dataclass(frozen=True)
-class History(Mapping[str, Part]):
-    """The parts of a history by name; without any that of a step from the reference configuration.
-
-    Attributes
-    ----------
-    parts
-        The parts.
-    """
-
-    parts: Mapping[str, Part] = field(default_factory=dict)
-
-    def __getitem__(self, name: str) -> Part:
-        """Return a part."""
-        return self.parts[name]
-
-    def __iter__(self) -> Iterator[str]:
-        """Return the names of the parts."""
-        return iter(self.parts)
-
-    def __len__(self) -> int:
-        """Return the number of parts."""
-        return len(self.parts)
+class History(dict[str, Part]):
+    """The parts of a history by name; none for a step from the reference configuration."""
 
     def near(self, other: History, rtol: float = 0.0, atol: float = 0.0) -> bool:
         """Tell whether another history has the same parts and values on this rank."""
@@ -93,13 +72,13 @@ class History(Mapping[str, Part]):
     @property
     def places(self) -> list[str]:
         """The kinds of places that there are arrays at."""
-        return sorted({part.place for part in self.parts.values()})
+        return sorted({part.place for part in self.values()})
 
     def arrays(self, place: str | None = None) -> dict[str, Array]:
         """Return the arrays at places of a kind, all by default, by "part.name"."""
         return {
             f"{name}.{key}": array
-            for name, part in self.parts.items()
+            for name, part in self.items()
             if place in (None, part.place)
             for key, array in part.arrays.items()
         }
@@ -109,7 +88,7 @@ class History(Mapping[str, Part]):
         return History(
             {
                 name: part.replaced({key: arrays[f"{name}.{key}"] for key in part.arrays})
-                for name, part in self.parts.items()
+                for name, part in self.items()
             }
         )
 
