@@ -65,6 +65,7 @@ class SlipLaw(Section):
 Mu: TypeAlias = Annotated[
     Annotated[NonNegativeFormula, Tag("formula")] | Annotated[SlipLaw, Tag("table")],
     formula_or_table,
+    Accepted('a number >= 0 or a formula or a table { law = "slip", a, b, rho }'),
 ]
 
 

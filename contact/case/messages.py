@@ -11,7 +11,7 @@ import inspect
 import json
 import re
 import types
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import MISSING, fields, is_dataclass
 from functools import cache
 from typing import Annotated, Any, Literal, Union, get_args, get_origin, get_type_hints
@@ -35,6 +35,9 @@ UNKNOWN_KIND = ("union_tag_invalid", "union_tag_not_found")
 class Words(str):
     """Words for a message, as against a text given in the case file."""
 
+
+#: Introduces the nearest of the accepted keys.
+MEANT = ", did you mean {}?"
 
 #: Stands for the given value where the key itself is wrong.
 UNKNOWN = Words("unknown key")
@@ -169,29 +172,12 @@ def accepted_by(annotation: Any, metadata: Iterable[Any] = ()) -> str:
         return accepted_by(get_args(annotation)[0], get_args(annotation)[1:])
     if get_origin(annotation) is Literal:
         return either(shown(value) for value in get_args(annotation))
+    if get_origin(annotation) in (Union, types.UnionType):
+        some = [kind for kind in get_args(annotation) if kind is not type(None)]
+        if len(some) == 1:  # a value that may be missing
+            return accepted_by(some[0])
     key, kinds = kinds_of(sections_of(annotation).values())
-    words = [accepted_by(plain) for plain in _plain(annotation) if plain is not annotation]
-    if kinds:
-        words.append(f"a table {either(_written(key, *kind) for kind in kinds.items())}")
-    return either(words or ["a table"])
-
-
-def _plain(annotation: Any) -> Iterator[Any]:
-    """Give the alternatives of a union that are no tables."""
-    origin, arguments = get_origin(annotation), get_args(annotation)
-    if origin in (Union, types.UnionType):
-        for argument in arguments:
-            yield from _plain(argument)
-    elif origin is Annotated and sections_of(annotation):
-        yield from _plain(arguments[0])
-    elif not sections_of(annotation) and annotation is not type(None):
-        yield annotation
-
-
-def _written(key: str, value: str, kind: type) -> str:
-    """Write a section as a table, all but one of its keys without their values."""
-    others = [name for name in keys_of(kind) if name != key]
-    return "{ " + ", ".join([f"{key} = {shown(value)}", *others]) + " }"
+    return f"a table with {key} = {either(map(shown, kinds))}" if kinds else "a table"
 
 
 def describe(error: ValidationError, root: type[BaseModel], source: str) -> str:
@@ -206,43 +192,38 @@ def describe(error: ValidationError, root: type[BaseModel], source: str) -> str:
 
 def describe_fault(error: PydanticCustomError) -> str:
     """Return the message for a fault that was raised outside of pydantic's validation."""
-    return _fault([], **(error.context or {}))
+    return _line([], **(error.context or {}))
 
 
 def _message(error: ErrorDetails, root: type[BaseModel]) -> str:
     keys, sections, others, accepted = _locate(error["loc"], root)
     kind, context, given = error["type"], error.get("ctx", {}), error["input"]
     if kind == "fault":
-        return _fault(keys, **context)
+        return _line(keys, **context)
     if kind in UNKNOWN_KEY:
         return _unknown([*keys, str(error["loc"][-1])], given, sections, others, root)
     if kind in UNKNOWN_KIND and isinstance(given, Mapping):
         name, kinds = kinds_of(sections)
-        return _fault(keys, name, given.get(name, Words("missing")), either(map(shown, kinds)))
+        return _line(keys, name, given.get(name, Words("missing")), either(map(shown, kinds)))
     if kind == "value_error":
         # Raised by a formula or a dataclass, whose message is complete.
         text = str(context["error"])
         own = [f"{section.__name__}: " for section in sections if section.__name__ in text]
         return f"{path_of(keys)}{'.' if own else ': '}{text.removeprefix(own[0] if own else '')}"
-    words = "missing" if kind == "missing" else _given(given)
-    return f"{path_of(keys)}: {words}; accepted: {accepted}"
+    return _line(keys, "", Words("missing") if kind == "missing" else given, accepted)
 
 
-def _fault(keys: list[str], key: str, given: Any, accepted: str) -> str:
-    keys = [*keys, *key.split(".")]
+def _line(keys: list[str], key: str, given: Any, accepted: str) -> str:
+    """Return the message for a fault of a key below others; see `fault`."""
+    keys = [*keys, *(key.split(".") if key else ())]
     if given is UNKNOWN:
         options = accepted.split(", ")
-        hint = nearest(keys[-1], options, ", did you mean {}?")
-        return f"{path_of(keys)}: {UNKNOWN}{hint}; accepted: {listed(options)}"
-    return f"{path_of(keys)}: {_given(given)}; accepted: {accepted}"
-
-
-def _given(value: Any) -> str:
-    if isinstance(value, Words):
-        return str(value)
-    if isinstance(value, Mapping | BaseModel):
-        return "given a table"
-    return f"given {shown(value)}"
+        given, accepted = f"{UNKNOWN}{nearest(keys[-1], options, MEANT)}", listed(options)
+    elif isinstance(given, Mapping | BaseModel):
+        given = "given a table"
+    elif not isinstance(given, Words):
+        given = f"given {shown(given)}"
+    return f"{path_of(keys)}: {given}; accepted: {accepted}"
 
 
 def _unknown(
@@ -263,35 +244,26 @@ def _unknown(
     name, kinds = kinds_of(others)
     owners = [shown(value) for value, kind in kinds.items() if key in keys_of(kind)]
     if owners:
-        return f"{path_of(keys)}: {_given(given)}; accepted: {key} with {name} = {either(owners)}"
+        return _line(keys, "", given, f"{key} with {name} = {either(owners)}")
     options = dict.fromkeys(key for section in sections for key in keys_of(section))
-    here = next((value for value, kind in kinds.items() if kind in sections), None)
-    hint = "" if here is None else f" with {name} = {shown(here)}"
-    field = keys_of(root).get(key)
+    tables: dict[str, list[type]] = {}
+    for top, field in keys_of(root).items():
+        title = f"[[{top}]]" if get_origin(field.annotation) is tuple else f"[{top}]"
+        tables[title] = list(sections_of(field.annotation).values())
+    own = next((title for title in tables if title.strip("[]") == key and tables[title]), None)
+    homes = [title for title, read in tables.items() if any(key in keys_of(s) for s in read)]
     found = [getattr(section, "hints", {}).get(key) for section in sections]
     hints = [hint for hint in found if hint is not None]
-    homes = dict.fromkeys(table for table, section in _tables(root) if key in keys_of(section))
-    if field is not None and sections_of(field.annotation):
-        table = _table(key, field.annotation)
-        hint = f" here: {table} is a table of its own, at the top level"
+    if own:
+        hint = f" here: {own} is a table of its own, at the top level"
     elif hints:
         hint = f": {hints[0]}"
     elif homes:
         hint = f" here: it belongs to {' or '.join(homes)}"
     else:
-        hint += nearest(key, options, ", did you mean {}?")
-    return f"{path_of(keys)}: {UNKNOWN}{hint}; accepted: {listed(options)}"
-
-
-def _tables(root: type[BaseModel]) -> Iterator[tuple[str, type]]:
-    """Give the tables of a case at its top level with the sections that read them."""
-    for key, field in keys_of(root).items():
-        for section in sections_of(field.annotation).values():
-            yield _table(key, field.annotation), section
-
-
-def _table(key: str, annotation: Any) -> str:
-    return f"[[{key}]]" if get_origin(annotation) is tuple else f"[{key}]"
+        here = [shown(value) for value, kind in kinds.items() if kind in sections]
+        hint = "".join(f" with {name} = {value}" for value in here) + nearest(key, options, MEANT)
+    return _line(keys, "", Words(f"{UNKNOWN}{hint}"), listed(options))
 
 
 def _locate(
