@@ -6,17 +6,14 @@ import re
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import cKDTree
 
 from contact.errors import InputError
 from contact.interface.obstacle.protocol import Shape
 from contact.typing import Array
-
-#: Pairs of a point and a triangle that are looked at together: bounds the memory.
-PAIRS = 2_000_000
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,77 +53,47 @@ class Triangles(Shape):
             )
 
     @cached_property
-    def _tree(self) -> cKDTree:
-        return cKDTree(self.corners.mean(axis=1))
+    def _implicit(self) -> Any:
+        """VTK's signed distance, with angle-weighted pseudonormals at edges and corners."""
+        from vtkmodules.util.numpy_support import numpy_to_vtk, numpy_to_vtkIdTypeArray
+        from vtkmodules.vtkCommonCore import vtkPoints
+        from vtkmodules.vtkCommonDataModel import vtkCellArray, vtkPolyData
+        from vtkmodules.vtkFiltersCore import vtkImplicitPolyDataDistance
 
-    @cached_property
-    def _radius(self) -> Array:
-        """Distances of the farthest corners from the middles, shape (m,)."""
-        middle = self.corners.mean(axis=1, keepdims=True)
-        return np.asarray(np.linalg.norm(self.corners - middle, axis=2).max(axis=1))
-
-    @cached_property
-    def _normals(self) -> Array:
-        """Pseudonormals of face, edges 01, 12, 20 and corners 0, 1, 2, shape (m, 7, 3)."""
-        a, b, c = np.moveaxis(self.corners, 1, 0)
-        face = np.cross(b - a, c - a)
-        face /= np.linalg.norm(face, axis=1)[:, None]
-        vertex = _numbered(_vertices(self.corners))
-        ends = np.sort(np.stack([vertex, np.roll(vertex, -1, axis=1)], axis=2), axis=2)
-        edge = _numbered(ends[..., 0] * (vertex.max() + 1) + ends[..., 1])
-        along = np.roll(self.corners, -1, axis=1) - self.corners
-        along /= np.linalg.norm(along, axis=2)[:, :, None]
-        cosine = -np.einsum("mki,mki->mk", along, np.roll(along, 1, axis=1))
-        angle = np.arccos(np.clip(cosine, -1, 1))
-        shared = _summed(edge, np.repeat(face[:, None], 3, axis=1))
-        corner = _summed(vertex, angle[:, :, None] * face[:, None])
-        return np.concatenate([face[:, None], shared, corner], axis=1)
+        _, first, number = np.unique(
+            _vertices(self.corners).ravel(), return_index=True, return_inverse=True
+        )
+        points, cells, surface = vtkPoints(), vtkCellArray(), vtkPolyData()
+        points.SetData(numpy_to_vtk(self.corners.reshape(-1, 3)[first], deep=True))
+        offsets = 3 * np.arange(len(self.corners) + 1, dtype=np.int64)
+        cells.SetData(*(numpy_to_vtkIdTypeArray(a, deep=True) for a in (offsets, number.ravel())))
+        surface.SetPoints(points)
+        surface.SetPolys(cells)
+        implicit = vtkImplicitPolyDataDistance()
+        implicit.SetInput(surface)
+        return implicit
 
     def distance(self, points: Array) -> tuple[Array, Array]:
         """Return distances and normals: towards the nearest point, on it the pseudonormal."""
-        triangle, nearest, feature = self._closest(points)
-        pseudo = self._normals[triangle, feature]
-        pseudo = pseudo / np.linalg.norm(pseudo, axis=1)[:, None]
-        offset = points - nearest
-        size = np.linalg.norm(offset, axis=1)
-        sign = np.where(np.einsum("ni,ni->n", offset, pseudo) >= 0, 1.0, -1.0)
-        rounding = 1e-9 * np.abs(self.corners).max()
-        away = sign[:, None] * offset / np.where(size > rounding, size, 1.0)[:, None]
-        return sign * size, np.where((size > rounding)[:, None], away, pseudo)
+        distance, normal = self._signed(points)
+        size = np.abs(self.corners).max()
+        on = np.flatnonzero(np.abs(distance) <= 1e-9 * size)
+        # On the surface the nearest point tells no direction, but the slope of the distance does.
+        h = 1e-4 * size * np.eye(3)
+        beside = [(points[on, None] + x).reshape(-1, 3) for x in (h, -h)]
+        ahead, behind = (self._signed(x)[0] for x in beside)
+        slope = (ahead - behind).reshape(-1, 3)
+        normal[on] = slope / np.linalg.norm(slope, axis=1)[:, None]
+        return distance, normal
 
-    def _closest(self, points: Array) -> tuple[NDArray[np.intp], Array, NDArray[np.intp]]:
-        """Return the nearest triangle, point on it, and which of its features that is.
-
-        Twice as many middles of triangles are looked at until the next one is too far for its
-        triangle to be nearer.
-        """
-        count, radius = len(self.corners), self._radius
-        best = np.full(len(points), np.inf)
-        triangle = np.zeros(len(points), dtype=np.intp)
-        nearest = np.zeros_like(points)
-        feature = np.zeros(len(points), dtype=np.intp)
-        left: NDArray[np.intp] = np.arange(len(points))
-        seen, k = 0, min(8, count)
-        while left.size:
-            beyond = np.zeros(left.size)
-            for chunk in np.array_split(np.arange(left.size), 1 + left.size * k // PAIRS):
-                chosen = left[chunk]
-                far, near = self._tree.query(points[chosen], k=range(seen + 1, k + 1))
-                beyond[chunk] = far[:, -1]
-                row, column = np.nonzero(far - radius[near] < best[chosen, None])
-                at, tried = chosen[row], near[row, column]
-                where, kind = _nearest_points(points[at], self.corners[tried])
-                length = np.linalg.norm(points[at] - where, axis=1)
-                # The nearest of each point comes first; a later one has to be nearer still.
-                order = np.lexsort((length, at))
-                order = order[np.unique(at[order], return_index=True)[1]]
-                order = order[length[order] < best[at[order]]]
-                to = at[order]
-                best[to], triangle[to] = length[order], tried[order]
-                nearest[to], feature[to] = where[order], kind[order]
-            left = left[beyond < best[left] + radius.max()] if k < count else left[:0]
-            seen, k = k, min(2 * k, count)
-        return triangle, nearest, feature
+    def _signed(self, points: Array) -> tuple[Array, Array]:
+        """Return distances, and the directions from the nearest points to the side outside."""
+        nearest, distance = np.zeros_like(points), np.zeros(len(points))
+        place = [0.0, 0.0, 0.0]
+        for i, x in enumerate(points):
+            distance[i] = self._implicit.EvaluateFunctionAndGetClosestPoint(x, place)
+            nearest[i] = place
+        return distance, (points - nearest) / np.where(distance == 0, 1.0, distance)[:, None]
 
 
 def _vertices(corners: Array) -> NDArray[np.int64]:
@@ -139,49 +106,6 @@ def _vertices(corners: Array) -> NDArray[np.int64]:
 def _numbered(names: NDArray[np.int64]) -> NDArray[np.int64]:
     """Return names as numbers from 0 on."""
     return np.unique(names, return_inverse=True)[1].reshape(names.shape).astype(np.int64)
-
-
-def _summed(index: NDArray[np.int64], vectors: Array) -> Array:
-    """Return for each entry the sum of the vectors of all entries of its index, (m, 3, 3)."""
-    total = np.stack(
-        [np.bincount(index.ravel(), vectors[..., i].ravel()) for i in range(3)], axis=1
-    )
-    return np.asarray(total[index])
-
-
-def _nearest_points(p: Array, corners: Array) -> tuple[Array, NDArray[np.intp]]:
-    """Return the nearest points of triangles, (n, 3), and the features they lie on, (n,).
-
-    Features are numbered as in `Triangles._normals`. After Ericson, Real-Time Collision Detection
-    (2005), section 5.1.5, with all cases at once.
-    """
-    a, b, c = corners[..., 0, :], corners[..., 1, :], corners[..., 2, :]
-    ab, ac = b - a, c - a
-    d1, d2 = _dot(ab, p - a), _dot(ac, p - a)
-    d3, d4 = _dot(ab, p - b), _dot(ac, p - b)
-    d5, d6 = _dot(ab, p - c), _dot(ac, p - c)
-    va, vb, vc = d3 * d6 - d5 * d4, d5 * d2 - d1 * d6, d1 * d4 - d3 * d2
-    bc = d4 - d3, d5 - d6
-    cases = [
-        (d1 <= 0) & (d2 <= 0),
-        (d3 >= 0) & (d4 <= d3),
-        (d6 >= 0) & (d5 <= d6),
-        (vc <= 0) & (d1 >= 0) & (d3 <= 0),
-        (vb <= 0) & (d2 >= 0) & (d6 <= 0),
-        (va <= 0) & (bc[0] >= 0) & (bc[1] >= 0),
-    ]
-    with np.errstate(invalid="ignore", divide="ignore"):
-        t, s, r = d1 / (d1 - d3), d2 / (d2 - d6), bc[0] / (bc[0] + bc[1])
-        total = va + vb + vc
-        zero, one = np.zeros_like(t), np.ones_like(t)
-        v = np.select(cases, [zero, one, zero, t, zero, 1 - r], vb / total)
-        w = np.select(cases, [zero, zero, one, zero, s, r], vc / total)
-    feature = np.select(cases, [4, 5, 6, 1, 3, 2], 0)
-    return a + v[..., None] * ab + w[..., None] * ac, feature
-
-
-def _dot(x: Array, y: Array) -> Array:
-    return np.asarray(np.einsum("...i,...i->...", x, y))
 
 
 #: Bytes of a binary file before its triangles, and of each triangle.
