@@ -24,7 +24,7 @@ from contact.errors import InputError
 from contact.output.fields import DerivedFields, linear, unknowns
 from contact.output.folder import ROOM, on_root
 from contact.output.solved import Solved
-from contact.output.vtu import VTU, Grid, Values, gathered, write_vtu
+from contact.output.vtu import Grid, Values, gathered, write_vtu
 from contact.problem.problem import ContactProblem
 from contact.problem.state import State
 
@@ -91,7 +91,7 @@ def body_share(
     state: State,
     names: Collection[str] | None = None,
     derived: DerivedFields | None = None,
-) -> VTU:
+) -> Grid:
     """Return a body at a state with its fields of some names: this rank's share. Collective.
 
     `derived` are the derived fields at the state, where they are at hand.
@@ -121,8 +121,10 @@ def body_share(
     if names is None or set(names) - set(at_points):
         at_points |= derived.nodes()
         in_cells = derived.cells()
-    return VTU(
-        Grid(points, cells, d),
+    return Grid(
+        points,
+        cells,
+        d,
         {k: nodal(f) for k, f in at_points.items() if names is None or k in names},
         {f"{k}_cell": mean(f) for k, f in in_cells.items() if names is None or k in names},
     )
@@ -132,7 +134,7 @@ def _rows(values: Values) -> Values:
     return values[:, 0] if values.shape[1] == 1 else values
 
 
-def write_share(comm: MPI.Intracomm, share: VTU, path: Path) -> None:
+def write_share(comm: MPI.Intracomm, share: Grid, path: Path) -> None:
     """Write a grid with its fields into a VTU file. Collective."""
     whole = gathered(comm, share)
     on_root(comm, lambda: None if whole is None else write_vtu(path, whole))

@@ -22,7 +22,7 @@ from contact.mesh.entities import owned_among
 from contact.output.quantities import AGAINST, SURFACE, values_of
 from contact.output.solved import Solved, tangent_of
 from contact.output.table import Table
-from contact.output.vtu import VTU, Grid
+from contact.output.vtu import Grid
 from contact.problem.problem import ContactProblem
 from contact.typing import Array
 
@@ -127,7 +127,7 @@ def contact_result(problem: ContactProblem, table: Table) -> ContactResult:
     )
 
 
-def contact_surface(solution: Solved, table: Table | None) -> VTU | None:
+def contact_surface(solution: Solved, table: Table | None) -> Grid | None:
     """Return the contact part on rank 0, where its table is; None elsewhere. Collective."""
     problem, d = solution.problem, solution.problem.dim
     body, comm = problem.equilibrium, problem.comm
@@ -153,7 +153,7 @@ def contact_surface(solution: Solved, table: Table | None) -> VTU | None:
         none = np.nan if values.dtype.kind == "f" else -1
         fields[name] = np.full((len(known), *values.shape[1:]), none, dtype=values.dtype)
         fields[name][rows] = values
-    return VTU(Grid(points, cells.reshape(facets.shape), d - 1), fields, {})
+    return Grid(points, cells.reshape(facets.shape), d - 1, fields)
 
 
 def _at_nodes(solution: Solved, nodes: NDArray[np.int64]) -> tuple[Array, Array]:
@@ -168,7 +168,7 @@ def _at_nodes(solution: Solved, nodes: NDArray[np.int64]) -> tuple[Array, Array]
     return found[:, : problem.dim], found[:, problem.dim :]
 
 
-def opposite_surface(solution: Solved) -> VTU | None:
+def opposite_surface(solution: Solved) -> Grid | None:
     """Return the parts `against` with the stresses there, the same on all ranks. Collective.
 
     Multipliers live on the other side. Here the forces int N_l lambda act, which belong to nodes of
@@ -206,7 +206,7 @@ def opposite_surface(solution: Solved) -> VTU | None:
     if not sides:
         return None
     fields = {name: np.concatenate([side[name] for side in sides]) for name in sides[0]}
-    return VTU(Grid(fields.pop("points"), np.concatenate(cells), d - 1), fields, {})
+    return Grid(fields.pop("points"), np.concatenate(cells), d - 1, fields)
 
 
 def _acting(
@@ -226,11 +226,11 @@ def _acting(
     return np.where(some[:, None], on_nodes / np.where(some, lumped.weight, 1.0)[:, None], np.nan)
 
 
-def opposite_table(problem: ContactProblem, surface: VTU) -> Table:
+def opposite_table(problem: ContactProblem, surface: Grid) -> Table:
     """Return the rows of ``contact-against.csv``: nodes with an area, contact by contact."""
     fields, size = surface.at_points, problem.domain.size
     # Mesh generators leave coordinates such as -3e-19.
-    points = np.where(np.abs(surface.grid.points) < 1e-15 * size, 0.0, surface.grid.points)
+    points = np.where(np.abs(surface.points) < 1e-15 * size, 0.0, surface.points)
     names = np.array([contact.against or "" for contact in problem.contacts])
     columns = values_of(AGAINST, {"on": names[fields["entry"]], "x": points, **fields})
     rounded = np.round(points / (1e-9 * size))

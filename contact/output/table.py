@@ -13,11 +13,9 @@ from scipy import sparse
 from scipy.sparse import csgraph
 
 from contact.interface.mortar.surface import surface_of
-from contact.interface.placing import candidates
 from contact.output.quantities import NODES, quantities, values_of
 from contact.output.solved import Solved
 from contact.problem.problem import ContactProblem
-from contact.typing import Array
 
 Table = Mapping[str, NDArray[Any]]
 
@@ -40,11 +38,7 @@ def contact_table(solution: Solved) -> Table | None:
     columns |= {
         "node": problem.equilibrium.layout.index_map.local_to_global(nodes.nodes),
         "entry": solution.entry,
-        "rigid": np.array([e.coupling is None for e in problem.entries])[solution.entry],
     }
-    # How far the foundation has moved along the contact direction.
-    own = problem.equilibrium.nodal(solution.state.x)[nodes.nodes]
-    columns["moved"] = nodes.normal_component(own) - solution.normal_displacement
     order = _order(problem)
     gathered = {name: problem.comm.gather(values) for name, values in columns.items()}
     if order is None:
@@ -81,16 +75,6 @@ def by_contact(table: Table) -> list[Table]:
         return [table]
     _, firsts = np.unique(owner, return_index=True)
     return [{name: v[owner == owner[i]] for name, v in table.items()} for i in np.sort(firsts)]
-
-
-def held_points(problem: ContactProblem) -> Array:
-    """Return the nodes of Gamma_3 that are no contact nodes, (n, d), from all ranks. Collective."""
-    parts = []
-    for contact in problem.contacts:
-        found = candidates(problem.domain, problem.equilibrium.space, contact.on)
-        held = ~np.isin(found.nodes, problem.nodes.nodes) & (found.weight > 0)
-        parts.append(found.points[held])
-    return np.concatenate(problem.comm.allgather(np.concatenate(parts)))
 
 
 def _order(problem: ContactProblem) -> NDArray[np.intp] | None:

@@ -6,7 +6,7 @@ One piece whatever the number of ranks: the shares are gathered on rank 0, which
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -30,58 +30,45 @@ ORDER = {
 
 @dataclass(frozen=True)
 class Grid:
-    """Simplices, or this rank's share of them.
+    """Simplices with fields, or this rank's share of them.
 
     Attributes
     ----------
     points
-        Coordinates of the nodes, shape (n, d).
+        Coordinates of the nodes, shape (n, d), those of the ranks one rank after the other.
     cells
         Nodes of each cell in dolfinx's order, numbered over all ranks, shape (m, nodes a cell).
     dimension
         Of the cells.
+    at_points, in_cells
+        Fields by name, one row a node or cell.
     """
 
     points: Array
     cells: NDArray[np.int64]
     dimension: int
-
-
-@dataclass(frozen=True)
-class VTU:
-    """The contents of a file, or this rank's share of it.
-
-    Attributes
-    ----------
-    grid
-        The grid; the nodes of the ranks are numbered one rank after the other.
-    at_points, in_cells
-        Fields by name, one row a node or cell.
-    """
-
-    grid: Grid
     at_points: Mapping[str, Values]
-    in_cells: Mapping[str, Values]
+    in_cells: Mapping[str, Values] = field(default_factory=dict)
 
 
-def gathered(comm: MPI.Intracomm, share: VTU) -> VTU | None:
+def gathered(comm: MPI.Intracomm, share: Grid) -> Grid | None:
     """Return the shares of all ranks together on rank 0, None elsewhere. Collective."""
 
     def together(values: Values) -> Values:
         found = comm.gather(values)
         return values if found is None else np.concatenate(found)
 
-    points, cells = together(share.grid.points), together(share.grid.cells)
-    at_points, in_cells = (
-        {name: together(values) for name, values in fields.items()}
-        for fields in (share.at_points, share.in_cells)
+    whole = Grid(
+        together(share.points),
+        together(share.cells),
+        share.dimension,
+        {name: together(values) for name, values in share.at_points.items()},
+        {name: together(values) for name, values in share.in_cells.items()},
     )
-    if comm.rank > 0:
-        return None
-    return VTU(Grid(points, cells, share.grid.dimension), at_points, in_cells)
+    return whole if comm.rank == 0 else None
 
 
-def write_vtu(path: Path, vtu: VTU) -> None:
+def write_vtu(path: Path, grid: Grid) -> None:
     """Write a file; vectors of the plane get a third component 0. On one rank.
 
     Raises
@@ -94,7 +81,6 @@ def write_vtu(path: Path, vtu: VTU) -> None:
     from vtkmodules.vtkCommonDataModel import vtkCellArray, vtkUnstructuredGrid
     from vtkmodules.vtkIOXML import vtkXMLUnstructuredGridWriter
 
-    grid = vtu.grid
     kind = (grid.dimension, grid.cells.shape[1])
     points = np.zeros((len(grid.points), 3))
     points[:, : grid.points.shape[1]] = grid.points
@@ -106,8 +92,8 @@ def write_vtu(path: Path, vtu: VTU) -> None:
     made.SetPoints(places)
     made.SetCells(KINDS[kind], cells)
     for data, fields in (
-        (made.GetPointData(), vtu.at_points),
-        (made.GetCellData(), vtu.in_cells),
+        (made.GetPointData(), grid.at_points),
+        (made.GetCellData(), grid.in_cells),
     ):
         for name, values in fields.items():
             array = numpy_to_vtk(_filled(values), deep=True)

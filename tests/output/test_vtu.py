@@ -11,7 +11,7 @@ from contact.cli.main import BAD_INPUT, CONVERGED, main
 from contact.output.field_files import write_share
 from contact.output.figures.run import read_grid
 from contact.output.files import write_outputs
-from contact.output.vtu import VTU, Grid, gathered
+from contact.output.vtu import Grid, gathered
 from contact.solving import solve
 from tests.problems.written import block, electric
 
@@ -70,14 +70,14 @@ def test_ranks_with_nothing(shared_tmp_path: Path) -> None:
         first = sum(sizes[: comm.rank]) if comm.size > 1 else 0
         points = np.random.default_rng(comm.rank).random((3 * n, 2))
         cells = 3 * first + np.arange(3 * n).reshape(-1, 3)
-        share = VTU(Grid(points, cells, 2), {"number": np.arange(3 * n)}, {"v": points[:n]})
+        share = Grid(points, cells, 2, {"number": np.arange(3 * n)}, {"v": points[:n]})
         whole, path = gathered(comm, share), shared_tmp_path / "ranks.vtu"
         write_share(comm, share, path)
-        if whole is None or not len(whole.grid.cells):
+        if whole is None or not len(whole.cells):
             continue
         read = read_grid(path)
-        np.testing.assert_array_equal(read.points[:, :2], whole.grid.points)
-        np.testing.assert_array_equal(read.cells.reshape(-1, 4)[:, 1:], whole.grid.cells)
+        np.testing.assert_array_equal(read.points[:, :2], whole.points)
+        np.testing.assert_array_equal(read.cells.reshape(-1, 4)[:, 1:], whole.cells)
         np.testing.assert_array_equal(read.point_data["number"], whole.at_points["number"])
         np.testing.assert_array_equal(read.cell_data["v"][:, :2], whole.in_cells["v"])
 
