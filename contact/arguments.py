@@ -25,22 +25,7 @@ LONGEST = 80
 
 
 def expect(name: str, given: Any, accepted: str, fits: object) -> None:
-    """Refuse a value that does not fit.
-
-    Parameters
-    ----------
-    name, given
-        Name and value.
-    accepted
-        The accepted values in words.
-    fits
-        Whether it fits.
-
-    Raises
-    ------
-    InputError
-        If it does not.
-    """
+    """Raise an InputError that shows a value and the accepted ones in words, unless it fits."""
     if not fits:
         raise InputError(f"{name}: given {shorten(repr(given))}; accepted: {accepted}")
 
@@ -61,13 +46,7 @@ def shorten(text: str) -> str:
 
 
 def several(name: str, given: Any, kind: type[T], accepted: str) -> tuple[T, ...]:
-    """Return one object of a kind, or several, as a tuple.
-
-    Raises
-    ------
-    InputError
-        If something else is among them.
-    """
+    """Return one object of a kind, or several, as a tuple; anything else is an InputError."""
     every = tuple(given) if isinstance(given, list | tuple) else (given,)
     for one in every:
         expect(name, one, accepted, isinstance(one, kind))
@@ -118,15 +97,7 @@ def real(values: Any, shape: tuple[int, ...], each: str) -> Array:
 
 
 def check_finite(values: Array, where: Callable[[int], str]) -> None:
-    """Refuse infinity and NaN, inside `naming`.
-
-    Parameters
-    ----------
-    values
-        Of a function, shape (n,).
-    where
-        A function that says where the i-th of them is.
-    """
+    """Refuse infinity and NaN, shape (n,), inside `naming`; ``where(i)`` names the i-th place."""
     bad = np.flatnonzero(~np.isfinite(values))
     if bad.size > 0:
         raise _Returned(

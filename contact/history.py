@@ -36,15 +36,7 @@ class Part(Protocol):
 
 @dataclass(frozen=True)
 class InternalVariables:
-    """A part that is arrays and no more.
-
-    Attributes
-    ----------
-    place
-        Where they live.
-    arrays
-        By name, shape (places, ...). Not to be written to (they are marked so).
-    """
+    """A part that is arrays and no more, not to be written to (they are marked so)."""
 
     place: str
     arrays: Mapping[str, Array]

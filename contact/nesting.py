@@ -107,19 +107,13 @@ def coarser_cases(case: Case, levels: int | None = None) -> list[Case]:
     """Return the case on coarser and coarser meshes, the coarsest first, without itself.
 
     A generated mesh has its cells halved as often as they are enough, and its parts end at
-    positions of the grid; a mesh that is refined has one refinement less.
-
-    Parameters
-    ----------
-    case
-        The case on the finest mesh.
-    levels
-        Number of meshes, with the finest; None for all that pay.
+    positions of the grid; a mesh that is refined has one refinement less. ``levels`` is the number
+    of meshes, with the finest; None for all that pay.
 
     Raises
     ------
     InputError
-        If there is no coarser mesh, or there are not as many as asked for.
+        If there are not as many as asked for, or none.
     """
     found: list[Case] = []
     mesh = _coarser(case.mesh)

@@ -174,14 +174,8 @@ def _kept_rows(
 ) -> dict[tuple[str, ...], dict[str, Any]]:
     """Return the rows that are there already, by the values of the keys. On one rank.
 
-    Parameters
-    ----------
-    folder
-        Folder of the table.
-    names, first
-        The keys of the sweep, and their values in its first row.
-    load
-        Returns the case of a row, read from the case file or from another.
+    ``first`` has the values of the first row, and ``load`` returns the case of a row, read from
+    the case file or from another.
 
     Raises
     ------

@@ -14,9 +14,8 @@ from pydantic.fields import FieldInfo
 
 import meshes
 from contact.case import formula as formulas
-from contact.case.file import Case
+from contact.case.file import DEFAULT, Case
 from contact.case.messages import accepted_by, either, keys_of, kinds_of, sections_of, shown
-from contact.case.solver import DEFAULT
 from contact.case.text import literal
 from contact.settings import ReadWith
 

@@ -59,20 +59,7 @@ def difference(before: Mapping[str, str], now: Mapping[str, str]) -> str | None:
 
 
 def check_digest(folder: Path, before: Mapping[str, str], now: Mapping[str, str]) -> None:
-    """Refuse to continue checkpoints that were computed from other input.
-
-    Parameters
-    ----------
-    folder
-        Folder of the interrupted run.
-    before, now
-        Digests of its input and of the input at hand.
-
-    Raises
-    ------
-    InputError
-        If they differ.
-    """
+    """Refuse, by an InputError, to continue checkpoints of a folder that other input made."""
     place = difference(before, now)
     if place is not None:
         raise InputError(

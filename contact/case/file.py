@@ -8,10 +8,21 @@ from __future__ import annotations
 
 import tomllib
 from collections.abc import Collection, Iterable, Iterator, Mapping
+from functools import reduce
+from operator import or_
 from pathlib import Path
-from typing import Annotated, Any, Self, TypeAlias, TypeVar
+from typing import TYPE_CHECKING, Annotated, Any, Self, TypeAlias, TypeVar
 
-from pydantic import Field, PrivateAttr, Tag, ValidationError, model_validator
+from pydantic import (
+    AfterValidator,
+    Discriminator,
+    Field,
+    PlainSerializer,
+    PrivateAttr,
+    Tag,
+    ValidationError,
+    model_validator,
+)
 from pydantic_core import PydanticCustomError
 
 from contact.body.fields import Amplitude, steady
@@ -21,11 +32,19 @@ from contact.case.evolution import Evolution
 from contact.case.interface import Contact, Electric, Friction
 from contact.case.material import Material
 from contact.case.mesh import Mesh
-from contact.case.messages import clipped, describe, describe_fault, path_of, shown
+from contact.case.messages import clipped, describe, describe_fault, fault, keys_of, path_of, shown
 from contact.case.rigid import Electrode, Moving, RigidPart
-from contact.case.section import FromTable, Section, Text, as_tuple, one_or_many
-from contact.case.solver import DEFAULT, Solver
+from contact.case.section import (
+    FromTable,
+    Section,
+    Text,
+    as_tuple,
+    check_conditions,
+    one_or_many,
+    without_effect,
+)
 from contact.errors import InputError
+from contact.methods.options import OPTIONS, FixedPointOptions, NewtonOptions, Options
 from contact.output.options import OutputOptions, Units
 from contact.settings import Accepted
 
@@ -52,6 +71,43 @@ Contacts: TypeAlias = Annotated[
     one_or_many,
     Accepted("a table [contact], or tables [[contact]]"),
 ]
+
+
+#: The options where the case file names no method.
+DEFAULT = NewtonOptions()
+
+
+def _method_of(given: Any) -> str:
+    method = given.get("method", DEFAULT.method) if isinstance(given, Mapping) else None
+    return str(getattr(given, "method", method))
+
+
+def _check_options(options: Options) -> Options:
+    check_conditions(options)
+    if isinstance(options, FixedPointOptions) and options.inner_tolerance is not None:
+        if options.inner_tolerance > options.tolerance:
+            accepted = f"at most tolerance = {options.tolerance:g}"
+            raise fault("inner_tolerance", options.inner_tolerance, accepted)
+    return options
+
+
+def _read_by(options: Options) -> dict[str, Any]:
+    of: type = type(options)
+    keys = (key for key in keys_of(of) if key not in without_effect(options))
+    return {key: getattr(options, key) for key in keys if getattr(options, key) is not None}
+
+
+#: `[solver]`: the options of one method, by its name: one of those that `OPTIONS` lists.
+if TYPE_CHECKING:
+    Solver: TypeAlias = Options
+else:
+    Solver = Annotated[
+        reduce(or_, (Annotated[kind, FromTable, Tag(name)] for name, kind in OPTIONS.items())),
+        Discriminator(_method_of),
+        AfterValidator(_check_options),
+        PlainSerializer(_read_by),
+        Accepted("a table"),
+    ]
 
 
 class About(Section):
@@ -153,20 +209,7 @@ class Case(Section):
         return self
 
     def check_mesh(self, dimension: int, parts: Iterable[str]) -> None:
-        """Check the case against its mesh: names of parts, lengths of vectors, use of z.
-
-        Parameters
-        ----------
-        dimension
-            Space dimension of the mesh, 2 or 3.
-        parts
-            Names of the parts of its boundary.
-
-        Raises
-        ------
-        InputError
-            If something does not fit, as in `load_case`.
-        """
+        """Refuse a case that does not fit its mesh, of a dimension and with some parts."""
         try:
             check_mesh(self, dimension, parts)
         except PydanticCustomError as error:

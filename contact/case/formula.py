@@ -112,13 +112,7 @@ class Expression:
 
     @property
     def value(self) -> float:
-        """Value of a constant expression.
-
-        Raises
-        ------
-        ValueError
-            If the expression depends on the coordinates or the time.
-        """
+        """The value of a constant expression; of others a ValueError."""
         if not isinstance(self._read, float):
             raise ValueError(f"{self} depends on the coordinates or the time")
         return self._read
@@ -165,13 +159,7 @@ class Expression:
         return values
 
     def ufl(self, x: Expr, time: Any = None) -> Expr:
-        """Return the scalar UFL expression at ``x``, a vector of length 2 or 3, and a time.
-
-        Raises
-        ------
-        InputError
-            If z is used in 2-D.
-        """
+        """Return the scalar UFL expression at ``x``, a vector of length 2 or 3, and a time."""
         (dimension,) = x.ufl_shape
         return ops.symbolic(self._evaluate(x, dimension, time))
 

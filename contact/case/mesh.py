@@ -204,13 +204,7 @@ class Mesh(Section):
             raise fault(error.key, error.given, error.accepted) from None
 
     def check_grid(self) -> None:
-        """Refuse parts of a rectangle or box that do not end at positions of its grid.
-
-        Raises
-        ------
-        GridError
-            If one does not, or a size is none.
-        """
+        """Raise a GridError if a part of a rectangle or box ends between positions of its grid."""
         assert self.generator is not None
         grid.plan(self.generator, *self._grid)
 

@@ -229,16 +229,9 @@ def _line(keys: list[str], key: str, given: Any, accepted: str) -> str:
 def _unknown(
     keys: list[str], given: Any, sections: list[type], others: list[type], root: type[BaseModel]
 ) -> str:
-    """Return the message for an unknown key, which may have a meaning elsewhere.
+    """Return the message for an unknown key of sections, which may have a meaning elsewhere.
 
-    Parameters
-    ----------
-    keys, given
-        Its path and its value.
-    sections, others
-        The sections that read its table, and all that could stand there.
-    root
-        The whole case.
+    `others` are all sections that could stand there.
     """
     key = keys[-1]
     name, kinds = kinds_of(others)

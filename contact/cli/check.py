@@ -87,13 +87,7 @@ def expectations(problem: ContactProblem) -> list[str]:
 
 
 def mean_ratio(corners: Array) -> Array:
-    """Return the shape of simplices, 1 for regular ones and 0 for flat ones, shape (n,).
-
-    Parameters
-    ----------
-    corners
-        Shape (n, d + 1, d).
-    """
+    """Return the shape of simplices, corners (n, d + 1, d): 1 for regular ones, 0 for flat ones."""
     d = corners.shape[2]
     edges = corners[:, 1:] - corners[:, :1]
     volume = np.abs(np.linalg.det(edges)) / (2 if d == 2 else 6)

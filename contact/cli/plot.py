@@ -46,13 +46,7 @@ def run(options: argparse.Namespace, comm: MPI.Intracomm) -> int:
 
 
 def inches(text: str) -> float:
-    """Return a length that is given as "85mm", "8.5cm" or "3.35in".
-
-    Raises
-    ------
-    InputError
-        If it is not understood, or no width for a figure.
-    """
+    """Return a length that is given as "85mm", "8.5cm" or "3.35in", or raise an InputError."""
     match = _LENGTH.fullmatch(text.strip())
     length = float(match[1]) * _INCHES[match[2]] if match else 0.0
     if not 1.5 <= length <= 40:

@@ -50,15 +50,7 @@ class Role:
     force: Array | None = None
 
     def arrows(self, middle: Array, reach: float) -> tuple[Array, Array]:
-        """Return starts and steps of a load's arrows outside the body, shape (n, d) each.
-
-        Parameters
-        ----------
-        middle
-            Of the body, shape (d,).
-        reach
-            Length of the longest arrow.
-        """
+        """Return starts and steps of a load's arrows, the longest of a length, outside the body."""
         if self.force is None or not np.any(self.force):
             return self.facets[:0, 0], self.facets[:0, 0]
         centre = self.facets.mean(axis=1)
@@ -84,13 +76,7 @@ def save_setup(case: Case, problem: ContactProblem, folder: Path) -> list[Path]:
 
 
 def draw_setup(case: Case, problem: ContactProblem) -> Figure | None:
-    """Draw a set-up on rank 0; None elsewhere. Collective.
-
-    Parameters
-    ----------
-    case, problem
-        The case, and the problem that was built of it.
-    """
+    """Draw a case and the problem that was built of it on rank 0; None elsewhere. Collective."""
     domain = problem.domain
     for other in (0, domain.dim):
         domain.mesh.topology.create_connectivity(domain.dim - 1, other)
@@ -197,19 +183,7 @@ def _gathered(domain: Domain, values: Array) -> Array | None:
 def _draw_plane(
     boundary: Array, cells: Array, roles: Sequence[Role], surface: Array, units: Units, axes: str
 ) -> Figure:
-    """Draw a plane body: mesh, data of its parts, foundation and dimensions.
-
-    Parameters
-    ----------
-    boundary, cells
-        Corners of the edges on the boundary and of the cells, shapes (m, 2, 2) and (n, 3, 2).
-    roles
-        The parts with their data.
-    surface
-        Points of rigid foundations, shape (m, 2).
-    units, axes
-        Names of the units and of the coordinates.
-    """
+    """Draw a plane body by its boundary edges, shape (m, 2, 2), and cells, shape (n, 3, 2)."""
     extent = np.ptp(boundary, axis=(0, 1))
     figure = Figure(figsize=(6.9, float(np.clip(6.0 * extent[1] / extent[0], 1.6, 6.0)) + 1.6))
     ax = figure.subplots()
