@@ -50,12 +50,15 @@ def curve(report: Report, case: Case, electrode: str, factors: Sequence[float]) 
     left_open = [r.potential for r in readings(opened(case, electrode), electrode, factors)]
     figure, axes = subplots(1, 2, size=(7.2, 3.0))
     charges = [np.nan if q is None else q for q in shorted]
-    labels = {"charge, short circuit": charges, "mean potential, open": left_open}
+    labels = {
+        case.case.units.label("charge, short circuit", "charge"): charges,
+        case.case.units.label("mean potential, open", "potential"): left_open,
+    }
     for ax, (label, found) in zip(axes, labels.items(), strict=True):
         ax.plot([0.0, *factors], [0.0, *found], "o-", ms=3)
         slope = found[0] / factors[0]
         ax.plot([0.0, factors[-1]], [0.0, slope * factors[-1]], "k:", lw=0.8)
-        ax.set(xlabel="load / load of the case", ylabel=f"{label} (units of the case)")
+        ax.set(xlabel="load / load of the case", ylabel=label)
     columns = {
         "load factor": factors,
         "charge": charges,
