@@ -71,13 +71,8 @@ def test_files_and_figures_of_both_sides(tmp_path: Path) -> None:
     fields = read_grid(tmp_path / "contact-against.vtu").point_data
     assert set(fields) == {q.name for q in quantities(OPPOSITE)}
     for figures in (solution.plot(), figures_of(read_run(tmp_path))):
-        labels = [text.get_text() for ax in figures["contact"].axes for text in _texts(ax)]
-        assert "pressure on the other side" in labels
-
-
-def _texts(ax):
-    legend = ax.get_legend()
-    return legend.get_texts() if legend else []
+        (legend,) = figures["contact"].legends
+        assert "pressure on the other side" in [text.get_text() for text in legend.get_texts()]
 
 
 def test_without_another_body_there_is_none(tmp_path: Path) -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -107,27 +107,14 @@ def draw_line(run: Run, look: Look) -> Figure:
         _draw_rows(rows, part, run, look)
     for ax in grid[:, 1:].ravel():
         ax.set_ylabel("")
-    if len(parts) == 1:
-        for ax in grid[:, 0]:
-            handles = _handles([ax])
-            # A page has room for four beside each other.
-            columns = 2 if narrow else len(handles) if len(handles) <= 4 else 3
-            ax.legend(handles=handles, ncols=columns, loc="lower left", bbox_to_anchor=(0, 1))
-    else:
-        for ax, part in zip(grid[0], parts, strict=True):
-            ax.set_title(str(part["on"][0]), fontsize="medium")
-        figure.legend(handles=_handles(grid.ravel()), ncols=3, loc="outside lower center")
+    for ax, part in zip(grid[0] if len(parts) > 1 else [], parts, strict=False):
+        ax.set_title(str(part["on"][0]), fontsize="medium")
+    known: dict[str, Any] = {}
+    for ax in grid.ravel():
+        known |= {handle.get_label(): handle for handle in ax.get_legend_handles_labels()[0]}
+    handles = sorted(known.values(), key=lambda handle: not isinstance(handle, Line2D))
+    figure.legend(handles=handles, ncols=2 if narrow else 3, loc="outside lower center")
     return figure
-
-
-def _handles(axes: Iterable[Axes]) -> list[Any]:
-    """Return the entries of a legend: each label once, lines first."""
-    found: dict[str, Any] = {}
-    for ax in axes:
-        handles, labels = ax.get_legend_handles_labels()
-        for label, handle in zip(labels, handles, strict=True):
-            found.setdefault(label, handle)
-    return sorted(found.values(), key=lambda handle: not isinstance(handle, Line2D))
 
 
 def _draw_rows(rows: Any, table: Table, run: Run, look: Look) -> None:

@@ -7,11 +7,9 @@ import io
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import matplotlib
 import numpy as np
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from mpi4py import MPI
 from PIL import Image
@@ -21,7 +19,7 @@ from contact.output.figures.body import body_figure, magnification, picture, sca
 from contact.output.figures.contact import contact_figure
 from contact.output.figures.run import Run, read_run, read_steps
 from contact.output.figures.steps import steps_figures
-from contact.output.figures.style import DEFORMED, OUTLIERS, STYLE, Look, named
+from contact.output.figures.style import DEFORMED, OUTLIERS, PAGE, STYLE, Look, named
 from contact.output.folder import add, begin, discard, refused, result_folder
 
 #: Endings of files that figures may have.
@@ -38,35 +36,36 @@ class Gallery(dict[str, Figure]):
     """Figures by name; a notebook shows them."""
 
     def _repr_html_(self) -> str:
-        images = []
-        for name, figure in self.items():
-            data = io.BytesIO()
-            with matplotlib.rc_context(STYLE):
-                figure.savefig(data, format="png", dpi=110)
-            text = base64.b64encode(data.getvalue()).decode()
-            images.append(f'<img alt="{name}" src="data:image/png;base64,{text}">')
-        return "".join(images)
+        with matplotlib.rc_context(STYLE):
+            texts = {k: base64.b64encode(image(f, "png", 110)).decode() for k, f in self.items()}
+        return "".join(
+            f'<img alt="{name}" src="data:image/png;base64,{text}">' for name, text in texts.items()
+        )
 
 
-def figures_of(run: Run, fields: Sequence[str] = (), look: Look | None = None) -> Gallery:
+def image(figure: Figure, ending: str, dpi: int | None = None) -> bytes:
+    """Return a figure as the contents of a file."""
+    data = io.BytesIO()
+    figure.savefig(data, format=ending, dpi=dpi or "figure")
+    return data.getvalue()
+
+
+def figures_of(run: Run, fields: Sequence[str] = (), look: Look = PAGE) -> Gallery:
     """Return the figures of a run by name.
 
     In 2-D the contact figure shows the stresses along Gamma_3 with the friction bound and the zones
-    of stick and slip, as Figure 7.4 of the thesis does, and the deformed body is coloured by the
-    von Mises stress, as in Figure 7.5. In 3-D the contact nodes are seen along the mean contact
-    direction, and the deformed surface from the side.
+    of stick and slip, as Figure 7.4 of the thesis does. In 3-D the contact nodes are seen along the
+    mean contact direction, and the deformed surface from the side.
 
     Parameters
     ----------
-    run
-        The run.
+    run, look
+        The run, and choices for all figures.
     fields
         Fields to colour the body by, and these figures alone; by default all figures, the body by
         von Mises stress and potential.
-    look
-        Choices for all figures.
     """
-    look, found = look or Look(), Gallery()
+    found = Gallery()
     with matplotlib.rc_context(look.style):
         if not fields:
             found["contact"] = contact_figure(run, look)
@@ -84,36 +83,22 @@ def draw(
     folder: Path,
     fields: Sequence[str] = (),
     formats: Sequence[str] = ("png",),
-    look: Look | None = None,
+    look: Look = PAGE,
 ) -> list[Path]:
     """Draw the figures of `figures_of` into a folder; return the files. On one rank."""
-    look = look or Look()
-    figures = figures_of(run, fields, look)
-    files = [folder / f"figure-{name}.{ending}" for name in figures for ending in formats]
+    files = []
     with matplotlib.rc_context(look.style):
-        for file in files:
-            try:
-                figures[file.stem.removeprefix("figure-")].savefig(file)
-            except BaseException:  # it is not left half done
-                file.unlink(missing_ok=True)
-                raise
+        for name, figure in figures_of(run, fields, look).items():
+            for ending in formats:
+                files.append(folder / f"figure-{name}.{ending}")
+                files[-1].write_bytes(image(figure, ending))
     return files
 
 
 def plot(
-    folder: Path,
-    fields: Sequence[str] = (),
-    formats: Sequence[str] = ("png",),
-    look: Look | None = None,
+    folder: Path, fields: Sequence[str] = (), formats: Sequence[str] = ("png",), look: Look = PAGE
 ) -> list[Path]:
-    """Draw the figures of a run into its folder; return the files. On one rank.
-
-    Parameters
-    ----------
-    folder
-        The results of the run.
-    fields, formats, look
-        As `draw` takes them.
+    """Draw the figures of a run into its folder, as `draw` does; return the files. On one rank.
 
     Raises
     ------
@@ -124,10 +109,10 @@ def plot(
     return _added(folder, lambda new: draw(read_run(folder), new, fields, formats, look))
 
 
-def animate(folder: Path, fields: Sequence[str] = (), look: Look | None = None) -> list[Path]:
-    """Draw ``animation-FIELD.gif`` from the files of an evolution. On one rank.
+def animate(folder: Path, fields: Sequence[str] = (), look: Look = PAGE) -> list[Path]:
+    """Draw ``animation-FIELD.gif`` from the files of an evolution; return the files. On one rank.
 
-    Scale, colours and axes are the same in all frames. The arguments are those of `plot`.
+    Scale, colours and axes are the same in all frames.
 
     Raises
     ------
@@ -136,8 +121,8 @@ def animate(folder: Path, fields: Sequence[str] = (), look: Look | None = None) 
     """
 
     def draw(new: Path) -> list[Path]:
-        frames, chosen = read_steps(folder), look or Look()
-        return [_animation(frames, field, new, chosen) for field in fields or ("von_mises",)]
+        steps = read_steps(folder)
+        return [_animation(steps, field, new, look) for field in fields or ("von_mises",)]
 
     return _added(folder, draw)
 
@@ -157,36 +142,35 @@ def _added(folder: Path, draw: Callable[[Path], list[Path]]) -> list[Path]:
     return [folder / path.name for path in files]
 
 
-def _animation(frames: Sequence[tuple[float, Run]], field: str, folder: Path, look: Look) -> Path:
-    runs = [replace(run, title=f"{run.title}, t = {time:.3g}".lstrip(", ")) for time, run in frames]
+def _animation(steps: Sequence[tuple[float, Run]], field: str, folder: Path, look: Look) -> Path:
+    runs = [replace(run, title=f"{run.title}, t = {time:.3g}".lstrip(", ")) for time, run in steps]
     # Colours of all frames, without values far beyond the others.
     limits = np.array([np.quantile(scalar(run, field)[0], OUTLIERS) for run in runs])
     ends = limits[:, 0].min(), limits[:, 1].max()
     scale = magnification(runs[-1].diameter, *runs)
     pictures = [picture(run, field, scale, limits=ends) for run in runs]
-    boxes = np.array([made.box for made in pictures])
-    box = np.array([boxes[:, 0].min(axis=0), boxes[:, 1].max(axis=0)])
-    with matplotlib.rc_context(look.style | {"figure.dpi": DPI}):
+    box = np.array(
+        [
+            np.min([made.box[0] for made in pictures], 0),
+            np.max([made.box[1] for made in pictures], 0),
+        ]
+    )
+    with matplotlib.rc_context(look.style):
         found = [body_figure(replace(made, box=box), look) for made in pictures]
         figures = [figure for figure in found if figure is not None]
         if not figures:
             raise InputError("--animate: pyvista cannot draw here; accepted: a display, or Xvfb")
         if runs[0].plane:
             axes = [figure.axes[0] for figure in figures]
-            x, y = (np.array([(ax.get_xlim(), ax.get_ylim()) for ax in axes])[:, k] for k in (0, 1))
+            shown = np.array([(ax.get_xlim(), ax.get_ylim()) for ax in axes])
+            low, high = shown[..., 0].min(axis=0), shown[..., 1].max(axis=0)
             for ax in axes:
-                ax.set(xlim=(x[:, 0].min(), x[:, 1].max()), ylim=(y[:, 0].min(), y[:, 1].max()))
-        images = [_image(figure) for figure in figures]
+                ax.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]))
+        files = [io.BytesIO(image(figure, "png", DPI)) for figure in figures]
+    images = [Image.open(file).convert("RGB") for file in files]
     palette = images[-1].quantize(256)  # one for all, so that nothing flickers; the bar has it
-    first, *rest = (image.quantize(palette=palette, dither=Image.Dither.NONE) for image in images)
+    first, *rest = (each.quantize(palette=palette, dither=Image.Dither.NONE) for each in images)
     path = folder / f"animation-{named(field, runs[0].units)[0]}.gif"
-    each = int(np.clip(LENGTH / len(frames), SHORTEST, LONGEST))
-    first.save(path, save_all=True, append_images=rest, duration=each, loop=0)
+    duration = int(np.clip(LENGTH / len(steps), SHORTEST, LONGEST))
+    first.save(path, save_all=True, append_images=rest, duration=duration, loop=0)
     return path
-
-
-def _image(figure: Figure) -> Any:
-    canvas = FigureCanvasAgg(figure)
-    canvas.draw()
-    canvas.draw()  # the second one ends the layout
-    return Image.fromarray(np.asarray(canvas.buffer_rgba())).convert("RGB")

@@ -79,6 +79,10 @@ class Look:
         return STYLE | {"figure.figsize": (self.width, self.width)} | small
 
 
+#: Figures as wide as a page, with axes that suit them.
+PAGE = Look()
+
+
 def page_width() -> float:
     """Return the width of figures by the present settings (inches)."""
     return float(matplotlib.rcParams["figure.figsize"][0])
