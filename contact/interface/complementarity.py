@@ -31,10 +31,6 @@ from contact.interface.jump import Multipliers
 from contact.tolerances import EPS
 from contact.typing import Array
 
-#: Part of a node's own stiffness that a falling friction coefficient may take away: with its
-#: neighbours, which slide along, a node is less stiff than alone.
-SOFTENING = 0.25
-
 
 def project_half_line(z: Array) -> Array:
     """Return max(0, z): the projection onto admissible pressures, equation (3.43)."""
@@ -188,8 +184,7 @@ def linearise(
     forces: Multipliers,
     parameters: ComplementarityParameters,
     before: ActiveSet | None,
-    frozen_bound: Array | None = None,
-    softening: float = SOFTENING,
+    softening: float = np.inf,
 ) -> LinearisedContact:
     """Linearise the contact laws at an iterate. Collective.
 
@@ -201,17 +196,16 @@ def linearise(
         Of the complementarity functions.
     before
         The active set of the step before; None in the first one, where closed nodes stick.
-    frozen_bound
-        A given friction bound: Tresca's law instead of Coulomb's.
     softening
-        Part of a node's own stiffness that a falling friction coefficient may take away.
+        Part of a node's own stiffness that a falling friction coefficient may take away: with its
+        neighbours, which slide along, a node is less stiff than alone.
     """
     jump, frictional, c = interface.jump, interface.friction.acts, parameters.c
     p, lam, n, d = forces.pressure, forces.friction, jump.normal, jump.dim
     opening, slip = interface.opening(nodal), interface.slip(nodal)
     length = np.linalg.norm(slip, axis=1)
     total = interface.pressure(nodal, forces)
-    bound = interface.friction.bound(total, length) if frozen_bound is None else frozen_bound
+    bound = interface.friction.bound(total, length)
     trial = lam + c * slip
     size = np.linalg.norm(trial, axis=1)
 
@@ -222,8 +216,6 @@ def linearise(
     closed, sticks, slips = active.closed, active.sticks, active.slips
     changed = before is None or not active.same(before)
     unchanged = interface.comm.allreduce(int(changed), op=MPI.SUM) == 0
-    if frozen_bound is None and not unchanged and before is not None:
-        bound = np.where(slips, _foreseen_bound(interface, total, length, size, parameters), bound)
 
     pressure = np.where(closed, p - parameters.gamma * opening, 0.0)
     blocks = np.zeros((p.size, jump.block_size, jump.block_size))
@@ -242,36 +234,16 @@ def linearise(
         turning = bound * c / np.maximum(size - bound, least)
         sliding = turning[:, None, None] * across
         friction[slips] = (bound[:, None] * along + np.einsum("nij,nj->ni", sliding, slip))[slips]
-        if frozen_bound is None:
-            limit = softening * parameters.nodal_stiffness if unchanged else None
-            rate = _bound_gradient(interface, total, slip, length, limit)
-            ahead, follows = _follow_pressure(
-                interface, nodal, total, length, slope, opening, parameters, closed
-            )
-            friction[slips] += (ahead[:, None] * along)[slips]
-            rate = rate + follows
-            blocks[slips, :d, :] += along[slips, :, None] * rate[slips, None, :]
+        limit = softening * parameters.nodal_stiffness if unchanged else None
+        rate = _bound_gradient(interface, total, slip, length, limit)
+        ahead, follows = _follow_pressure(
+            interface, nodal, total, length, slope, opening, parameters, closed
+        )
+        friction[slips] += (ahead[:, None] * along)[slips]
+        rate = rate + follows
+        blocks[slips, :d, :] += along[slips, :, None] * rate[slips, None, :]
         blocks[slips, :d, :d] += sliding[slips]
     return LinearisedContact(Multipliers(pressure, friction), blocks, active, unchanged)
-
-
-def _foreseen_bound(
-    interface: Interface,
-    total: Array,
-    length: Array,
-    size: Array,
-    parameters: ComplementarityParameters,
-) -> Array:
-    """Return the bound that a node which lets go will slide on, shape (n,).
-
-    Its coefficient falls on the way: foreseen, this saves steps for each node that the sliding
-    zone gains. With neighbours that slide along it is about half as stiff as alone.
-    """
-    bound = interface.friction.bound(total, length)
-    for _ in range(5):
-        ahead = np.maximum(length, (size - bound) / (0.5 * parameters.nodal_stiffness))
-        bound = interface.friction.bound(total, ahead)
-    return bound
 
 
 def _bound_gradient(

@@ -20,7 +20,6 @@ from unittest.mock import patch
 
 from contact import Solution, load_case, solve
 from contact.case.file import Case
-from contact.interface import complementarity
 from contact.linear import block, multigrid
 from contact.linear.operator import SparseOperator
 from contact.methods import (
@@ -145,9 +144,6 @@ DEVICES = (
            "Dembo, Eisenstat and Steihaug 1982", ((newton_step, "STAGNANT", 10**9),)),
     Device("layer linearised where its law is met", (newton_step.linearised_layer,), "-",
            ((newton_step, "linearised_layer", _linearised(newton_step.linearised_layer)),)),
-    Device("foreseen friction bound", (complementarity._foreseen_bound,), "-",
-           ((complementarity, "_foreseen_bound",
-             lambda interface, total, length, *_: interface.friction.bound(total, length)),)),
     Device("limited softening", (), "-", (), (("softening", float("inf")),)),
     Device("secant of the material far away", (), "Kacanov 1959",
            ((newton, "SECANT_UNTIL", float("inf")),), (("secant_until", float("inf")),)),
