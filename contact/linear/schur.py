@@ -55,12 +55,16 @@ def _complement(factor: PETSc.Mat, size: int) -> Array:
 
 
 def _mirror(matrix: Array) -> None:
-    """Copy the entries below the diagonal, all that MUMPS writes, above it."""
+    """Copy the triangle that MUMPS writes to the other one, which is 0.
+
+    On several ranks it is the lower one at first, and the upper one from the second time on.
+    """
     for begin in range(0, len(matrix), COLUMNS):
         end = begin + COLUMNS
-        matrix[begin:end, end:] = matrix[end:, begin:end].T
-        corner = np.tril(matrix[begin:end, begin:end])
-        matrix[begin:end, begin:end] = corner + np.tril(corner, -1).T
+        corner = matrix[begin:end, begin:end]
+        matrix[begin:end, begin:end] = corner + corner.T - np.diag(np.diag(corner))
+        beside = matrix[end:, begin:end] + matrix[begin:end, end:].T
+        matrix[end:, begin:end], matrix[begin:end, end:] = beside, beside.T
 
 
 class SchurComplement:

@@ -49,6 +49,11 @@ def test_condensing_and_expanding_solves_the_whole_system(cells):
     found = schur.expand(rhs, from_first(WORLD, lambda: np.linalg.solve(stiffness, forces)))
     largest = WORLD.allreduce(np.abs(whole).max(initial=0.0), op=MPI.MAX)
     assert np.allclose(found, whole, rtol=0, atol=1e-9 * largest)
+    for times in (2.0, 4.0):
+        operator.matrix.scale(2.0)
+        again = schur.factorise(operator.matrix)
+        assert np.allclose(again, times * stiffness, rtol=0, atol=1e-12)
+        assert np.allclose(schur.interior(times * rhs), schur.interior(times * rhs))
 
 
 @pytest.mark.parametrize("few", [1, 5, 10])
