@@ -120,7 +120,7 @@ class Picture:
     @property
     def title(self) -> str:
         """The title of the run, with the factor of the displacements."""
-        times = f"displacements $\\times$ {self.scale:g}"
+        times = f"displacements\u00a0$\\times$\u00a0{self.scale:g}"
         times = times if self.scale != 1 else "displacements to scale"
         return fitted(f"{self.run.title} ({times})" if self.run.title else times)
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -37,18 +36,23 @@ STATES = {"open": "#C8C8C8", "stick": BLUE, "slip": ORANGE}
 SMALL = 1 / 3
 
 
-def position(table: Table, axes: str = "xy") -> tuple[Array, str]:
-    """Return the positions of the nodes along Gamma_3, and the name of the coordinate.
+def position(table: Table, run: Run) -> tuple[Array, str, tuple[float, float]]:
+    """Return the positions of nodes along Gamma_3, the coordinate's name, and where Gamma_3 ends.
 
     That is a coordinate where Gamma_3 lies along an axis, and the arc length elsewhere.
     """
     points = np.column_stack([table["x"], table["y"]])
     extent = np.ptp(points, axis=0)
-    for axis, name in enumerate(axes):
+    first, last = np.linalg.norm(ends(table, run.held) - points[[0, -1]], axis=1)
+    for axis in (0, 1):
         if extent[1 - axis] <= 1e-9 * extent[axis]:
-            return points[:, axis], name
-    steps = np.linalg.norm(np.diff(points, axis=0), axis=1)
-    return np.concatenate([[0.0], np.cumsum(steps)]), r"\ell"
+            where, name = points[:, axis], run.axes[axis]
+            break
+    else:
+        steps = np.linalg.norm(np.diff(points, axis=0), axis=1)
+        where, name = first + np.concatenate([[0.0], np.cumsum(steps)]), r"\ell"
+    # The rows begin where x, then y is smaller, and so does the axis.
+    return where, name, (where.min() - first, where.max() + last)
 
 
 def ends(table: Table, held: Array) -> Array:
@@ -65,6 +69,35 @@ def ends(table: Table, held: Array) -> Array:
             if distance.min() < 1.5 * np.linalg.norm(points[last] - points[before]):
                 found[k] = held[np.argmin(distance)]
     return found
+
+
+def zones(ax: Axes, where: Array, outer: tuple[float, float], status: Any, rows: Array) -> None:
+    """Colour the share of each node by its status.
+
+    Parameters
+    ----------
+    ax
+        The axes.
+    where, outer
+        Positions of the nodes, shape (n,), and where Gamma_3 ends.
+    status
+        Of the nodes in each row, shape (m, n).
+    rows
+        Where the rows begin and end, shape (m + 1,); those of one row in shares of the axis.
+    """
+    order, along = np.argsort(where), np.sort(where)
+    borders = np.concatenate([outer[:1], (along[1:] + along[:-1]) / 2, outer[1:]])
+    ax.pcolormesh(
+        borders,
+        rows,
+        np.argmax([status[:, order] == zone for zone in ZONES], axis=0),
+        cmap=ListedColormap([colour for colour, _ in ZONES.values()]),
+        vmin=-0.5,
+        vmax=len(ZONES) - 0.5,
+        rasterized=True,
+        zorder=0,
+        transform=ax.get_xaxis_transform() if len(status) == 1 else ax.transData,
+    )
 
 
 def window(places: Array, touching: NDArray[np.bool_], margin: float) -> tuple[Array, Array]:
@@ -119,12 +152,11 @@ def draw_line(run: Run, look: Look) -> Figure:
 
 def _draw_rows(rows: Any, table: Table, run: Run, look: Look) -> None:
     """Draw one contact: pressure, and below it friction, if there is a second row."""
-    where, name = position(table, run.axes)
+    where, name, whole = position(table, run)
     bound, tau, units = table["bound"], table["tau"], run.units
     frictional = len(rows) > 1
     for ax in rows:
-        for zone, start, stop in _zones(table["status"], where):
-            ax.axvspan(start, stop, color=ZONES[zone][0], lw=0, zorder=0)
+        zones(ax, where, whole, table["status"][None], np.array([0.0, 1.0]))
     for zone, (colour, label) in ZONES.items():
         if np.any(table["status"] == zone):
             words = label if frictional or zone == "open" else "in contact"
@@ -140,34 +172,19 @@ def _draw_rows(rows: Any, table: Table, run: Run, look: Look) -> None:
         rows[1].set_ylabel(units.label(r"$-\sigma_\tau\cdot t$", "stress"))
         _focus(rows[1], bound, -1.0)
     if run.opposite is not None:
-        _draw_opposite(rows[0], table, run.opposite)
+        _draw_opposite(rows[0], table, where, run.opposite)
     rows[-1].set_xlabel(units.label(f"${name}$ along $\\Gamma_3$", "length"))
-    outer = np.column_stack([table["x"], table["y"]])[[0, -1]]
-    # The rows begin where x, then y is smaller, and so does the axis.
-    beyond = np.linalg.norm(ends(table, run.held) - outer, axis=1)
-    whole = where.min() - beyond[0], where.max() + beyond[1]
     (low,), (high,) = window(where[:, None], table["status"] != "open", 0.0)
     cut = low > where.min() or high < where.max()
     rows[0].set_xlim(look.xlim or (tuple(np.clip([low, high], *whole)) if cut else whole))
 
 
-def _zones(status: Any, where: Array) -> Iterator[tuple[str, float, float]]:
-    """Yield the runs of nodes of one status, and between which positions they lie."""
-    order = np.argsort(where)
-    status, where = status[order], where[order]
-    edges = np.concatenate([where[:1], (where[1:] + where[:-1]) / 2, where[-1:]])
-    starts = np.flatnonzero(np.concatenate([[True], status[1:] != status[:-1]]))
-    for start, stop in zip(starts, [*starts[1:], status.size], strict=True):
-        yield str(status[start]), float(edges[start]), float(edges[stop])
-
-
-def _draw_opposite(ax: Axes, table: Table, opposite: Any) -> None:
+def _draw_opposite(ax: Axes, table: Table, where: Array, opposite: Any) -> None:
     """Draw the pressure on the other side where its nodes are opposite of those of a contact."""
     own = opposite["entry"] == table["entry"][0]
     if not own.any():
         return
     points = np.column_stack([table["x"], table["y"]])
-    where, _ = position(table)
     places = opposite.points[own][:, :2]
     near = KDTree(points).query(places)[1]
     # Along the side of the contact nodes, from the nearest of them.

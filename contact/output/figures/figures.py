@@ -168,7 +168,9 @@ def _animation(steps: Sequence[tuple[float, Run]], field: str, folder: Path, loo
                 ax.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]))
         files = [io.BytesIO(image(figure, "png", DPI)) for figure in figures]
     images = [Image.open(file).convert("RGB") for file in files]
-    palette = images[-1].quantize(256)  # one for all, so that nothing flickers; the bar has it
+    palette = images[-1].quantize(
+        256, Image.Quantize.MAXCOVERAGE
+    )  # one for all, so that nothing flickers; the bar has it
     first, *rest = (each.quantize(palette=palette, dither=Image.Dither.NONE) for each in images)
     path = folder / f"animation-{named(field, runs[0].units)[0]}.gif"
     duration = int(np.clip(LENGTH / len(steps), SHORTEST, LONGEST))

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-from matplotlib.colors import ListedColormap
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
-from contact.output.figures.contact import position, window
+from contact.output.figures.contact import position, window, zones
 from contact.output.figures.run import Run
 from contact.output.figures.style import (
     BLUE,
@@ -100,21 +99,12 @@ def draw_energies(run: Run) -> Figure:
 
 def draw_zones(run: Run, look: Look) -> Figure:
     """Draw the status of each node at the end of each step, over its position and the time."""
-    where, name = position(run.tables[0], run.axes)
-    order, kinds = np.argsort(where), list(ZONES)
-    status = np.array([table["status"][order] for table in run.tables])
+    where, name, whole = position(run.tables[0], run)
+    status = np.array([table["status"] for table in run.tables])
     figure = sheet(0.7)
     ax = figure.subplots()
-    ax.pcolormesh(
-        _edges(where[order]),
-        _course(run, "t"),
-        np.argmax([status == kind for kind in kinds], axis=0),
-        cmap=ListedColormap([colour for colour, _ in ZONES.values()]),
-        vmin=-0.5,
-        vmax=len(kinds) - 0.5,
-        rasterized=True,
-    )
-    (low,), (high,) = window(where[order, None], (status != "open").any(axis=0), 0.0)
+    zones(ax, where, whole, status, _course(run, "t"))
+    (low,), (high,) = window(where[:, None], (status != "open").any(axis=0), 0.0)
     if look.xlim or low > where.min() or high < where.max():
         ax.set_xlim(look.xlim or (low, high))
     handles = [Patch(color=colour, label=words) for colour, words in ZONES.values()]
@@ -122,11 +112,3 @@ def draw_zones(run: Run, look: Look) -> Figure:
     ax.set_xlabel(run.units.label(f"${name}$ along $\\Gamma_3$", "length"))
     ax.set_ylabel("time")
     return figure
-
-
-def _edges(where: Array) -> Array:
-    """Return the borders of the nodes' shares of the contact part, one more than nodes."""
-    if where.size == 1:
-        return np.array([where[0] - 0.5, where[0] + 0.5])
-    middle = (where[1:] + where[:-1]) / 2
-    return np.concatenate([[2 * where[0] - middle[0]], middle, [2 * where[-1] - middle[-1]]])
