@@ -29,10 +29,6 @@ from contact.typing import Array
 #: Tolerance of the condensed contact problem, over the residual before the step.
 CONTACT_PART = 1e-3
 
-#: Equilibrium residual below which the tangent replaces the secant of a condensed body. Where
-#: contact is solved exactly in each step, the tangent does not overshoot for its sake.
-SECANT_UNTIL = 0.3
-
 #: Residual of the condensed contact problem, over that before the step, from which on it is no
 #: solution of it: a step that gains less is left to the whole body.
 UNSOLVED = 0.05

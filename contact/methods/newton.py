@@ -44,7 +44,7 @@ from contact.interface.active_set import touching
 from contact.interface.complementarity import ComplementarityParameters
 from contact.interface.jump import Multipliers
 from contact.linear.operator import Counters
-from contact.methods.condensed_step import SECANT_UNTIL, CondensedStep
+from contact.methods.condensed_step import CondensedStep
 from contact.methods.continuation import CONTINUATION, continuation
 from contact.methods.interior_point import INTERIOR_POINT, interior_point
 from contact.methods.newton_step import Iterate, Iteration, NewtonStep, Step
@@ -239,7 +239,7 @@ class Newton:
 
     def _condensed_loop(self, iterate: Iterate) -> tuple[Iterate, Outcome]:
         """Iterate over the material, with contact solved on the condensed body."""
-        return NewtonLoop(self.iteration, self._condensed_step(), SECANT_UNTIL).run(iterate)
+        return NewtonLoop(self.iteration, self._condensed_step()).run(iterate)
 
     def _fall_back(self, iterate: Iterate, outcome: Outcome) -> tuple[Iterate, Outcome]:
         """Solve by continuation or the interior point, on the condensed body where there is one.
@@ -288,7 +288,7 @@ class Newton:
                 self.iteration if part == 1 else replace(self.iteration, problem=less, best=Best())
             )
             step = NewtonStep(iteration.problem, self.options, self._parameters, self.counters)
-            loop = NewtonLoop(iteration, step, self.options.secant_until, CONTINUATION_LIMIT)
+            loop = NewtonLoop(iteration, step, CONTINUATION_LIMIT)
             return loop.run(iterate, CONTINUATION)
 
         return continuation(solve, Iterate(problem.start()))
@@ -299,7 +299,7 @@ class Newton:
 
     def whole_loop(self, stagnation_limit: int | None = None) -> NewtonLoop:
         """Return the iteration on the problem's own body."""
-        return NewtonLoop(self.iteration, self.whole, self.options.secant_until, stagnation_limit)
+        return NewtonLoop(self.iteration, self.whole, stagnation_limit)
 
 
 def _solve_condensed(
@@ -334,9 +334,6 @@ class NewtonLoop:
         The problem with the tolerances; told of every iterate.
     step
         Takes the steps.
-    secant_until
-        Equilibrium residual below which the material's tangent replaces its secant: far from the
-        solution the tangent is too soft, and overshoots.
     stagnation_limit
         Stagnation limit; that of the options by default.
     give_up
@@ -345,7 +342,6 @@ class NewtonLoop:
 
     iteration: Iteration
     step: Step
-    secant_until: float
     stagnation_limit: int | None = None
     give_up: Callable[[State], bool] | None = None
 
@@ -397,9 +393,9 @@ class NewtonLoop:
                 return iterate, self._end(residuals, "Newton's method diverged")
             if not linear:
                 falls = residuals.equilibrium < max(before.equilibrium, options.tolerance)
-                near = residuals.equilibrium < self.secant_until
-                # The energy falls along a step of the line search, where residuals may rise.
-                tangent = taken.line_search or (near and (falls or not tangent))
+                # After a tangent that overshoots, the secant (Kacanov), as where unloading differs
+                # from loading. The energy falls along a line search, where residuals may rise.
+                tangent = taken.line_search or falls or not tangent
             if stagnation(residuals.significant):
                 ended = f"Newton's method stalled at {stagnation.best:.1e}"
                 return iterate, self._end(residuals, ended)

@@ -169,9 +169,6 @@ class NewtonOptions(Options):
         Number of steps allowed in each stage.
     gamma
         Stiffness of the condensed constraints over that of the body.
-    secant_until
-        Equilibrium residual below which the material's tangent replaces its secant, where the
-        body is not condensed.
     stagnation_limit
         Steps without progress after which the stage is given up.
     softening
@@ -194,7 +191,6 @@ class NewtonOptions(Options):
     ] = None
     max_iterations: Annotated[int, Internal()] = 60
     gamma: Annotated[float, Internal()] = 1e4
-    secant_until: Annotated[float, Internal()] = 1e-2
     stagnation_limit: Annotated[int, Internal()] = 12
     softening: Annotated[float, Internal()] = 0.25
     condense: Annotated[bool, Internal()] = True

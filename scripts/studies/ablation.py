@@ -145,8 +145,6 @@ DEVICES = (
     Device("layer linearised where its law is met", (newton_step.linearised_layer,), "-",
            ((newton_step, "linearised_layer", _linearised(newton_step.linearised_layer)),)),
     Device("limited softening", (), "-", (), (("softening", float("inf")),)),
-    Device("secant of the material far away", (), "Kacanov 1959",
-           ((newton, "SECANT_UNTIL", float("inf")),), (("secant_until", float("inf")),)),
     Device("energy line search", (line_search,), "Armijo 1966; Crisfield 1991",
            ((condensed_step, "step_length", lambda _: 1.0),)),
     Device("chord steps", (chord,), "Kelley 1995; Walker and Ni 2011", (), (("keep", "never"),)),
