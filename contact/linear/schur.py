@@ -55,16 +55,12 @@ def _complement(factor: PETSc.Mat, size: int) -> Array:
 
 
 def _mirror(matrix: Array) -> None:
-    """Copy the triangle that MUMPS writes to the other one, which is 0.
-
-    On several ranks it is the lower one at first, and the upper one from the second time on.
-    """
+    """Copy the entries below the diagonal, all that MUMPS promises, above it."""
     for begin in range(0, len(matrix), COLUMNS):
         end = begin + COLUMNS
-        corner = matrix[begin:end, begin:end]
-        matrix[begin:end, begin:end] = corner + corner.T - np.diag(np.diag(corner))
-        beside = matrix[end:, begin:end] + matrix[begin:end, end:].T
-        matrix[end:, begin:end], matrix[begin:end, end:] = beside, beside.T
+        matrix[begin:end, end:] = matrix[end:, begin:end].T
+        corner = np.tril(matrix[begin:end, begin:end])
+        matrix[begin:end, begin:end] = corner + np.tril(corner, -1).T
 
 
 class SchurComplement:
@@ -109,12 +105,14 @@ class SchurComplement:
         It is stored by columns, and not a number where the eliminated block is singular.
         Collective.
         """
-        first = self._matrix is None
-        self._matrix = matrix
+        first, self._matrix = self._matrix is None, matrix
         matrix.setOption(PETSc.Mat.Option.SYMMETRIC, True)
-        self._ksp.setOperators(matrix)
-        if first:
+        # On several ranks MUMPS writes the other triangle where it factorises with an old analysis.
+        if first or self.comm.size > 1:
+            self._ksp.getPC().reset()
+            self._ksp.setOperators(matrix)
             self._prepare(self._ksp.getPC())
+        self._ksp.setOperators(matrix)
         set_up_with_workspace(self._ksp, self._prepare)
         factor = self._ksp.getPC().getFactorMatrix()
         factor.setMumpsIcntl(*INTERIOR_SOLVE)
