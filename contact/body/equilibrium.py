@@ -156,9 +156,6 @@ class BodyEquilibrium:
         """Return the owned ones of local unknowns, and the global ones behind them."""
         return np.concatenate([x[: self.owned], self.motion(x)])
 
-    def take_apart(self, matrix: PETSc.Mat) -> None:
-        """Do nothing: contact is no matter of the bodies."""
-
     def rest(self) -> Array:
         """Return the unknowns of the undeformed body, without prescribed values."""
         return np.zeros(self._at.x.array.size + self.global_unknowns.size)

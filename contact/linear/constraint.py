@@ -34,7 +34,6 @@ from scipy.sparse import csgraph
 
 from contact.history import Evaluated
 from contact.linear.layout import Layout
-from contact.linear.multigrid import quick_products
 from contact.linear.operator import Bulk, Counters, SparseOperator
 from contact.mesh.entities import owned_among
 from contact.typing import Array
@@ -57,15 +56,11 @@ class Change:
         the identity.
     inverse
         Its inverse.
-    unrestrained
-        The inverse if nothing were fixed: its entries are the same for all unknowns of a
-        node.
     """
 
     nodes: NDArray[np.int64]
     matrix: sparse.csr_array
     inverse: sparse.csr_array
-    unrestrained: sparse.csr_array
 
     @staticmethod
     def of(
@@ -92,12 +87,10 @@ class Change:
             Which unknowns are not fixed, shape (c, block size).
         """
         made = [_of_component(rows, jumps, component) for component in free.T]
-        _, unrestrained = _of_component(rows, jumps, np.ones(free.shape[0], dtype=bool))
         return Change(
             nodes,
             _interleaved([matrix for matrix, _ in made]),
             _interleaved([inverse for _, inverse in made]),
-            _interleaved([unrestrained] * free.shape[1]),
         )
 
     def petsc(self, matrix: sparse.csr_array, layout: Layout) -> PETSc.Mat:
@@ -276,8 +269,7 @@ class ConstrainedBulk:
             return made
         self._plain = made
         self._bulk.assemble(made, "secant", self._rest)
-        with quick_products(made):
-            product = made.ptap(self.constraint.matrix)
+        product = made.ptap(self.constraint.matrix)
         product.setLGMap(*made.getLGMap())
         return product
 
@@ -298,17 +290,6 @@ class ConstrainedBulk:
         self.corner = self.constraint.gathered(self.columns)
         self.columns *= self.layout.free.ravel()[:, None]
         self._without_followers(matrix)
-
-    def take_apart(self, matrix: PETSc.Mat) -> PETSc.Mat | None:
-        """Fill a matrix with bodies that do not touch; see `operator.Bulk`. Collective."""
-        change = self.constraint.change
-        if change is None:
-            return self._bulk.take_apart(matrix)
-        matrix.zeroEntries()
-        matrix.axpy(1.0, self._plain, PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN)
-        if self.constraint.free.size > 0:
-            self._without_followers(matrix)
-        return change.petsc(change.unrestrained, self.layout)
 
     def _without_followers(self, matrix: PETSc.Mat) -> None:
         """Take the rows and columns of unknowns that are not free out of a matrix. Collective."""

@@ -1,14 +1,12 @@
 """Algebraic multigrid for contact problems: GAMG with the rigid-body modes as near null space.
 
-Three things are added to it: interpolation that knows contact nodes (`StiffNodes`), coarse levels
-that are renewed when iterations say so (`Hierarchy`), and interpolation made for bodies apart where
-bodies touch (`join_interpolation`).
+Two things are added to it: interpolation that knows contact nodes (`StiffNodes`), and coarse levels
+that are renewed when iterations say so (`Hierarchy`).
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Mapping
 from math import ceil, log10
 
 import numpy as np
@@ -102,31 +100,6 @@ def set_defaults(prefix: str, values: Mapping[str, str]) -> None:
     for name, value in values.items():
         if not options.hasName(name):
             options[name] = value
-
-
-#: The option that says how one rank does it; it has no prefix.
-OPTION = "matptap_via"
-
-#: Unknowns up to which it is done by way of A P, in two thirds of the time or less: that takes a
-#: kilobyte an unknown.
-MOST = 1_000_000
-
-
-@contextmanager
-def quick_products(matrix: PETSc.Mat) -> Iterator[None]:
-    """Have products with a matrix, and with its coarse levels, made in the quick way.
-
-    Of several ranks, or where the user says how, nothing changes.
-    """
-    options = PETSc.Options()
-    quick = matrix.comm.size == 1 and matrix.getSize()[0] <= MOST and not options.hasName(OPTION)
-    if quick:
-        options[OPTION] = "rap"
-    try:
-        yield
-    finally:
-        if quick:
-            options.delValue(OPTION)
 
 
 def rigid_motions(layout: Layout) -> PETSc.NullSpace:
@@ -316,8 +289,7 @@ class Hierarchy:
 
     def _set_up(self) -> None:
         self._ksp.setOperators(*self._ksp.getOperators())
-        matrix = self._ksp.getOperators()[1]
-        with petsc_options(self._ksp.getOptionsPrefix()), quick_products(matrix):
+        with petsc_options(self._ksp.getOptionsPrefix()):
             self._ksp.setUp()
 
     def solve(self, rhs: PETSc.Vec, solution: PETSc.Vec) -> tuple[int, bool]:
@@ -369,34 +341,3 @@ class Hierarchy:
         self._renew()
         ksp.setInitialGuessNonzero(begun)
         return taken + self._iterate(rhs, solution, most - taken)
-
-
-def join_interpolation(pc: PETSc.PC, jumps: PETSc.Mat, layout: Layout) -> None:
-    """Turn interpolation made for bodies apart into that of their jumps. Collective.
-
-    Made for jumps it would mix the sides of a pair, and it would take twice as many coarse
-    functions to follow both.
-
-    Parameters
-    ----------
-    pc
-        GAMG, set up with bodies that do not touch.
-    jumps
-        The unknowns by those of the bodies apart.
-    layout
-        The unknowns.
-    """
-    if pc.getMGLevels() == 1:
-        return
-    finest = pc.getMGLevels() - 1
-    plain = pc.getMGInterpolation(finest).copy()
-    made = jumps.matMult(plain)
-    own = made.createVecLeft()
-    own.array[:] = layout.free.ravel()
-    made.diagonalScale(L=own)
-    # Where an unknown is fixed all is as it was: coarse functions of these alone remain some.
-    own.array[:] = ~layout.free.ravel()
-    plain.diagonalScale(L=own)
-    made.axpy(1.0, plain)
-    pc.setMGInterpolation(finest, made)
-    pc.setMGRestriction(finest, made)

@@ -25,13 +25,7 @@ from contact.linear.faults import (
 )
 from contact.linear.krylov import Components, refine
 from contact.linear.layout import Layout, balance, insert_blocks, nodal_blocks
-from contact.linear.multigrid import (
-    TOUCH,
-    Hierarchy,
-    held_motions,
-    join_interpolation,
-    quick_products,
-)
+from contact.linear.multigrid import TOUCH, Hierarchy, held_motions
 from contact.typing import Array
 
 
@@ -47,15 +41,6 @@ class Bulk(Protocol):
 
     def assemble(self, matrix: PETSc.Mat, kind: str, state: Evaluated) -> None:
         """Assemble the body's "secant" or "tangent" at a state. Collective."""
-
-    def take_apart(self, matrix: PETSc.Mat) -> PETSc.Mat | None:
-        """Fill a matrix with bodies that do not touch each other. Collective.
-
-        Returns
-        -------
-        The unknowns by those of the bodies apart; None, and nothing is done, where these are the
-        same.
-        """
 
 
 @dataclass
@@ -187,10 +172,9 @@ class SparseOperator:
         # To insert nothing would be a reason to set the solver up again.
         inserts = same or not self._all(not rest.any())
         if self._multigrid and self._hierarchy is None:
-            if not self._set_up_apart():
-                if inserts:
-                    insert_blocks(self.matrix, nodes, own + TOUCH * rest)
-                self._set_up(symmetric=True)
+            if inserts:
+                insert_blocks(self.matrix, nodes, own + TOUCH * rest)
+            self._set_up(symmetric=True)
             self._hierarchy = Hierarchy(self.ksp, nodes, self._components)
         if inserts:
             insert_blocks(self.matrix, nodes, own + rest)
@@ -210,28 +194,12 @@ class SparseOperator:
     def _all(self, flag: bool) -> bool:
         return bool(self.layout.comm.allreduce(int(flag)) == self.layout.comm.size)
 
-    def _set_up_apart(self) -> bool:
-        """Set multigrid up for bodies that do not touch; False where none do. Collective."""
-        coupled = self.matrix.copy()
-        jumps = self.bulk.take_apart(self.matrix)
-        if jumps is None:
-            return False
-        balance(self.matrix, self.layout)
-        # Bodies that nothing but contact holds would give a singular coarse matrix.
-        diagonal = self.matrix.getDiagonal()
-        diagonal.scale(1 + TOUCH)
-        self.matrix.setDiagonal(diagonal)
-        self._set_up(symmetric=True)
-        join_interpolation(self.ksp.getPC(), jumps, self.layout)
-        coupled.copy(self.matrix, PETSc.Mat.Structure.SAME_NONZERO_PATTERN)
-        return True
-
     def _set_up(self, symmetric: bool) -> None:
         """Set up the solver for the matrix as it is."""
         self.matrix.setOption(PETSc.Mat.Option.SYMMETRIC, symmetric)
         split = self._split
         self.ksp.setOperators(self.system, split.matrix(self.matrix) if split else self.matrix)
-        with petsc_options(self._prefix), quick_products(self.matrix):
+        with petsc_options(self._prefix):
             set_up_with_workspace(self.ksp)
 
     def _masked(self, at: NDArray[np.int32], blocks: Array) -> Array:

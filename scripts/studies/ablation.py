@@ -21,7 +21,6 @@ from unittest.mock import patch
 from contact import Solution, load_case, solve
 from contact.case.file import Case
 from contact.linear import block, multigrid
-from contact.linear.operator import SparseOperator
 from contact.methods import (
     chord,
     condensed_step,
@@ -156,9 +155,6 @@ DEVICES = (
     Device("interpolation that follows contact nodes", (multigrid.StiffNodes,), "-",
            ((multigrid.StiffNodes, "follow", _nothing),
             (multigrid.StiffNodes, "jump", lambda _, rhs: rhs.duplicate())), (), _block),
-    Device("interpolation made for bodies apart", (multigrid.join_interpolation,), "-",
-           ((SparseOperator, "_set_up_apart", lambda _: False),), (),
-           _large("two-spheres", "mesh.contact_size=0.5")),
     Device("piezoelectric block preconditioner", (block,), "Silvester and Wathen 1994",
            ((multigrid, "LARGE", {**multigrid.LARGE, (3, True): 10**9}),), (),
            _large("piezo-column", "mesh.cells=[20, 20, 40]")),
