@@ -36,6 +36,6 @@ def together(comm: MPI.Intracomm, work: Callable[[], T]) -> T:
 
 
 def from_first(comm: MPI.Intracomm, work: Callable[[], T]) -> T:
-    """Return what the first rank finds on all, or raise its error. Collective."""
+    """Return the result of the first rank on all, or raise its error. Collective."""
     found = together(comm, lambda: work() if comm.rank == 0 else None)
     return comm.bcast(found)  # type: ignore[return-value]

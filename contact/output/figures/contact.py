@@ -214,32 +214,35 @@ def draw_surface(run: Run, look: Look) -> Figure:
     touching = surface["status"] > STATUS["open"]
     mean = np.nanmean(surface["normal"][touching if touching.any() else slice(None)], axis=0)
     view = sorted(int(k) for k in np.argsort(np.abs(mean))[:2])  # the axes most across it
-    sides = [(surface, "contact pressure")]
-    if run.opposite is not None:
-        sides.append((run.opposite, "on the other side"))
+    sides = [(surface, "contact pressure"), (run.opposite, "on the other side")]
+    panels = [(side, name) for side, name in sides if side is not None]
+    panels.append((surface, "status, friction (arrows)"))
     low, high = window(surface.points[:, view], touching, 0.13)  # room for the arrows
     for k, given in enumerate((look.xlim, look.ylim)):
         low[k], high[k] = given or (low[k], high[k])
-    stacked, count = page_width() < NARROW, len(sides) + 1
-    rows, columns = (count, 1) if stacked else (1, count)
+    stacked = page_width() < NARROW
+    rows, columns = (len(panels), 1) if stacked else (1, len(panels))
     aspect = float(np.clip((high - low)[1] / (high - low)[0], 0.25, 0.8 if stacked else 1.25))
     figure = sheet(rows * (aspect / columns + 0.02) + (2.0 if stacked else 1.5) / page_width())
     figure.set_layout_engine("compressed")
-    grid = figure.subplots(rows, columns, sharey=not stacked, sharex=stacked)
-    *lefts, right = grid.ravel()
-    highest = float(np.nanmax(surface["pressure"], initial=0.0))
-    for ax, (side, _) in zip(lefts, sides, strict=True):
-        shown = _draw_pressure(ax, side, view, highest)
-    status = _draw_status(right, surface, view, 0.1 * float((high - low).max()))
-    words = [*(name for _, name in sides), "status, friction (arrows)"]
-    for ax, name in zip(grid.ravel(), words, strict=True):
+    *lefts, right = figure.subplots(rows, columns, sharey=not stacked, sharex=stacked)
+    highest = float(np.nanmax(surface["pressure"], initial=0.0)) or 1.0
+    x, y = (run.units.label(f"${'xyz'[k]}$", "length") for k in view)
+    for ax, (side, name) in zip((*lefts, right), panels, strict=True):
+        skin = side.extract_surface(nonlinear_subdivision=1)  # of degree 2: four triangles each
+        flat, facets = np.asarray(skin.points)[:, view], np.asarray(skin.regular_faces)
+        ax.add_collection(PolyCollection(list(flat[facets]), facecolor="#F2F2F2", lw=0))
+        if ax is right:
+            status = _draw_status(ax, skin, view, 0.1 * float((high - low).max()))
+        else:
+            known = np.isfinite(skin["pressure"][facets]).all(axis=1)
+            drawn = facets[known] if known.any() else facets
+            colours = {"shading": "gouraud", "cmap": "viridis", "vmin": 0.0, "vmax": highest}
+            shown = ax.tripcolor(*flat.T, drawn, np.nan_to_num(skin["pressure"]), **colours)
         ax.set_aspect("equal")
-        ax.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]))
+        ax.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), xlabel=x, ylabel=y)
         ax.set_title(name, fontsize="medium")
-        if not stacked or ax is right:
-            ax.set_xlabel(run.units.label(f"${'xyz'[view[0]]}$", "length"))
-        if stacked or ax is lefts[0]:
-            ax.set_ylabel(run.units.label(f"${'xyz'[view[1]]}$", "length"))
+        ax.label_outer()
     label = run.units.label(r"$-\sigma_\nu$", "stress")
     figure.colorbar(shown, ax=lefts, location="bottom", label=label, aspect=25)
     bar = figure.colorbar(status, ax=right, location="bottom", aspect=25, ticks=range(len(STATES)))
@@ -248,42 +251,23 @@ def draw_surface(run: Run, look: Look) -> Figure:
     return figure
 
 
-def _facets(ax: Axes, side: Any, view: list[int]) -> tuple[Any, Array, Array]:
-    """Draw the facets of a side in grey; return them as triangles, and their nodes in the view."""
-    skin = side.extract_surface(nonlinear_subdivision=1)  # of degree 2: four triangles each
-    flat, facets = np.asarray(skin.points)[:, view], np.asarray(skin.regular_faces)
-    ax.add_collection(PolyCollection(list(flat[facets]), facecolor="#F2F2F2", lw=0))
-    return skin, flat, facets
-
-
-def _draw_pressure(ax: Axes, side: Any, view: list[int], highest: float) -> Any:
-    """Draw the pressure on one side; return its colours."""
-    skin, flat, facets = _facets(ax, side, view)
-    known = np.isfinite(skin["pressure"][facets]).all(axis=1)
-    drawn = facets[known] if known.any() else facets
-    values = np.nan_to_num(skin["pressure"])
-    colours = {"shading": "gouraud", "cmap": "viridis", "vmin": 0.0, "vmax": highest or 1.0}
-    return ax.tripcolor(*flat.T, drawn, values, **colours)
-
-
-def _draw_status(ax: Axes, surface: Any, view: list[int], reach: float) -> Any:
+def _draw_status(ax: Axes, skin: Any, view: list[int], reach: float) -> Any:
     """Draw the status of the nodes, and friction as arrows of a length at most; return colours."""
-    _facets(ax, surface, view)
-    flat, status = surface.points[:, view], surface["status"]
+    flat, status = np.asarray(skin.points)[:, view], skin["status"]
     known = status >= STATUS["open"]
-    size = float(np.clip(2e3 / len(flat), 0.5, 12))
+    dots = float(np.clip(2e3 / len(flat), 0.5, 12))
     colours = {"cmap": ListedColormap(list(STATES.values())), "vmin": -0.5, "vmax": 2.5}
-    shown = ax.scatter(*flat[known].T, c=status[known], s=size, lw=0, **colours)
-    traction, normal = surface["traction"], surface["normal"]
+    shown = ax.scatter(*flat[known].T, c=status[known], s=dots, lw=0, **colours)
+    traction, normal = np.nan_to_num(skin["traction"]), np.nan_to_num(skin["normal"])
     along = traction - np.einsum("ni,ni->n", traction, normal)[:, None] * normal
-    friction = np.nan_to_num(along[:, view])
-    size_of = np.linalg.norm(friction, axis=1)
+    friction = along[:, view]
+    size = np.linalg.norm(friction, axis=1)
     # Rounding of the pressures is no friction.
-    rounding = 1e-9 * np.nan_to_num(np.linalg.norm(traction, axis=1)).max(initial=0.0)
-    acting = np.flatnonzero(size_of > max(1e-6 * size_of.max(initial=0.0), rounding))
+    rounding = 1e-9 * np.linalg.norm(traction, axis=1).max(initial=0.0)
+    acting = np.flatnonzero(size > max(1e-6 * size.max(initial=0.0), rounding))
     if acting.size:
         chosen = acting[_thinned(flat[acting], 16)]
-        exact = {"angles": "xy", "scale_units": "xy", "scale": size_of[chosen].max() / reach}
+        exact = {"angles": "xy", "scale_units": "xy", "scale": size[chosen].max() / reach}
         ax.quiver(*flat[chosen].T, *friction[chosen].T, color="black", width=0.004, **exact)
     return shown
 
