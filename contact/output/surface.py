@@ -102,16 +102,18 @@ class ContactResult:
 
 def contact_result(problem: ContactProblem, table: Table) -> ContactResult:
     """Return the contact nodes of a table."""
-    axes = "xyz"[: problem.dim]
-    normal = np.column_stack([table[f"nu_{axis}"] for axis in axes])
+
+    def vectors(name: str) -> Array:
+        return np.column_stack([table[name.format(axis)] for axis in "xyz"[: problem.dim]])
+
+    normal = vectors("nu_{}")
     if problem.dim == 2:
         tangent = tangent_of(normal)
         slip, friction = table["u_t"][:, None] * tangent, table["tau"][:, None] * tangent
     else:
-        slip = np.column_stack([table[f"u_t{axis}"] for axis in axes])
-        friction = np.column_stack([table[f"tau_{axis}"] for axis in axes])
+        slip, friction = vectors("u_t{}"), vectors("tau_{}")
     return ContactResult(
-        points=np.column_stack([table[axis] for axis in axes]),
+        points=vectors("{}"),
         weight=table["weight"],
         normal=normal,
         gap=table["gap"],

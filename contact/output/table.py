@@ -68,15 +68,6 @@ def write_csv(path: Path, header: Iterable[str], rows: Iterable[Iterable[Any]]) 
         writer.writerows(rows)
 
 
-def by_contact(table: Table) -> list[Table]:
-    """Return the rows of each contact, in their order; of a table that was read too."""
-    owner = table.get("entry", table.get("on"))
-    if owner is None:
-        return [table]
-    _, firsts = np.unique(owner, return_index=True)
-    return [{name: v[owner == owner[i]] for name, v in table.items()} for i in np.sort(firsts)]
-
-
 def _order(problem: ContactProblem) -> NDArray[np.intp] | None:
     """Return the order of the gathered contact nodes, on rank 0."""
     nodes, comm = problem.nodes, problem.comm

@@ -31,7 +31,7 @@ from contact.output.figures.style import (
     page_width,
     sheet,
 )
-from contact.output.table import Table, by_contact
+from contact.output.table import Table
 from contact.typing import Array
 
 logger = logging.getLogger("contact.plots")
@@ -188,7 +188,7 @@ def draw_plane(picture: Picture, look: Look) -> Figure:
         _colour(ax, picture, side)
         # Dashes would be those of an edge each: none where edges are short.
         ax.add_collection(LineCollection(list(outline * [side, 1]), colors="black", lw=0.5))
-        for part in by_contact(run.table):
+        for part in run.contacts:
             if np.all(part["rigid"]):
                 _foundation(ax, part, picture.scale, ends(part, run.held), side)
     _bar(figure, picture)

@@ -26,7 +26,7 @@ from contact.output.figures.style import (
     sheet,
 )
 from contact.output.quantities import STATUS
-from contact.output.table import Table, by_contact
+from contact.output.table import Table
 from contact.typing import Array
 
 #: Colours of the nodes of Gamma_3 in 3-D by their status, in the order of its numbers.
@@ -130,7 +130,7 @@ def contact_figure(run: Run, look: Look) -> Figure:
 
 def draw_line(run: Run, look: Look) -> Figure:
     """Draw pressure, tangential stress and friction bound along Gamma_3 in the plane."""
-    parts = by_contact(run.table)
+    parts = run.contacts
     frictional = bool(np.any(run.table["bound"] > 0))
     narrow = page_width() <= NARROW
     figure = sheet((0.8 if frictional else 0.48) * (1.5 if narrow else 1.0))

@@ -75,6 +75,12 @@ class Run:
         return np.column_stack([self.table[axis] for axis in "xyz" if axis in self.table])
 
     @property
+    def contacts(self) -> list[Table]:
+        """The rows of `table` of each contact."""
+        owner = self.table["entry"]
+        return [{k: v[owner == i] for k, v in self.table.items()} for i in np.unique(owner)]
+
+    @property
     def held(self) -> Array:
         """Nodes of the contact part that are no contact nodes, shape (n, d)."""
         return np.asarray(self.surface.points[self.surface["row"] < 0, : len(self.axes)])
