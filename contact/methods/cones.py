@@ -23,6 +23,8 @@ import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
 
+from contact.tolerances import HUGE
+
 Array = NDArray[np.float64]
 
 
@@ -108,6 +110,15 @@ class Cones:
     def degree(self) -> int:
         """Number of cones."""
         return int(self._comm.allreduce(self.slack.size + self.length.size))
+
+    def interior(self) -> bool:
+        """Tell whether all vectors are inside their cones by more than rounding. Collective.
+
+        Where nothing holds a body, they come to a rim, or go on for ever.
+        """
+        depths = np.concatenate([self.slack, self.force, *self._dets])
+        inside = bool(np.all((depths > 1 / HUGE) & (depths < HUGE)))  # NaN is not
+        return bool(self._comm.allreduce(inside, op=MPI.LAND))
 
     def work(self) -> float:
         """Return the sum of slacks times multipliers."""

@@ -43,9 +43,9 @@ INTERIOR_POINT = "interior point"
 #: Steps of one convex problem at most, and convex problems with one friction bound after the other.
 LIMIT, UPDATES = 60, 8
 
-#: Duality gap over the work of loads and contact, below which the active sets are known, part of it
-#: that the next problem is solved to where they were not, and where no solver tells more.
-CLOSED, CLOSER, VANISHED = 1e-10, 1e-2, 1e-20
+#: Duality gap over the work of loads and contact, below which the active sets are known, and below
+#: which no solver tells more.
+CLOSED, VANISHED = 1e-10, 1e-20
 
 #: Residual of equilibrium then. Where an iterative solver leaves more, the slacks vanish beneath
 #: its tolerance long before: Newton's method, whose right-hand sides are residuals, does better.
@@ -89,9 +89,9 @@ def interior_point(
     stuck = modes.stuck_bound()
     bound = np.zeros(interface.jump.weight.size) if stuck is None else stuck
     aside: tuple[Iterate, Outcome] | None = None
-    for update in range(UPDATES):
+    for _ in range(UPDATES):
         method = InteriorPoint(problem, whole, bound, modes.constrained_by_supports)
-        outcome, state = method.run(iteration, CLOSED * CLOSER**update), method.state
+        outcome, state = method.run(iteration), method.state
         iterate, least = Iterate(state), outcome.kkt.significant
         if not outcome.converged and iteration.left > 0:
             iterate, outcome = finish(state)
@@ -162,7 +162,7 @@ class InteriorPoint:
         length = np.maximum(work / limit, slips)
         self.cones = Cones(slack, work / slack, length, zeros, limit, zeros, jump.comm)
 
-    def run(self, iteration: Iteration, closed: float) -> Outcome:
+    def run(self, iteration: Iteration) -> Outcome:
         """Go towards the solution, until the duality gap is closed. Collective."""
         kkt, ended = evaluate(self.problem, self.state), "the interior point was given no step"
         for steps in range(1, min(LIMIT, iteration.left) + 1):
@@ -179,7 +179,7 @@ class InteriorPoint:
                 ended = f"rounding ends the interior point after {steps} steps"
                 break
             gap = self.gap()
-            if gap <= closed and (
+            if gap <= CLOSED and (
                 kkt.equilibrium <= max(BALANCED, kkt.floors[0]) or gap <= VANISHED
             ):
                 ended = f"duality gap closed after {steps} steps"
@@ -225,6 +225,8 @@ class InteriorPoint:
     def step(self) -> bool:
         """Take a step; False if rounding lets no more be taken. Collective."""
         cones, interface, state = self.cones, self.problem.interface, self.state
+        if not cones.interior():
+            return False
         jump, near, frictional = interface.jump, self._near, self._frictional
         body, d = self.problem.equilibrium, jump.dim
         nodal = jump.apply(state.x)

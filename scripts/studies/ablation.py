@@ -128,8 +128,6 @@ DEVICES = (
            ((newton, "interior_point", _no_fallback),)),
     Device("updates of the friction bound", (), "Haslinger 1983",
            ((interior_point, "UPDATES", 1),)),
-    Device("duality gap closed further in each update", (), "-",
-           ((interior_point, "CLOSER", 1.0),)),
     Device("sticking start where friction alone restrains", (RigidBodyModes.stuck_bound,), "-",
            ((RigidBodyModes, "stuck_bound", _nothing),)),
     Device("continuation in the conductivity", (continuation,), "Allgower and Georg 2003",

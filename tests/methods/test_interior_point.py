@@ -2,6 +2,7 @@
 
 from typing import Any, Literal
 
+import numpy as np
 import pytest
 from mpi4py import MPI
 
@@ -9,6 +10,7 @@ from contact.case.build import build_problem
 from contact.case.file import Case, parse_case
 from contact.cli.main import main
 from contact.interface.friction import Friction
+from contact.methods.cones import Cones
 from contact.methods.interior_point import interior_point
 from contact.methods.newton import Newton
 from contact.methods.options import NewtonOptions
@@ -177,3 +179,14 @@ def test_the_best_iterate_is_what_is_left_of_a_failure():
     assert "interior point" in method.history.records[-1].note
     assert outcome.kkt == evaluate(problem, state)
     assert outcome.kkt.largest == min(record.kkt.largest for record in method.history.records)
+
+
+@pytest.mark.parametrize(
+    ("slack", "length", "inside"),
+    [(1, 2, True), (0, 2, False), (1, 1, False), (np.nan, 2, False), (1e200, 2, False)],
+)
+def test_a_point_on_the_rim_of_a_cone_is_not_inside(slack, length, inside):
+    """No scaling is divided by its determinant there: bodies that nothing holds come to it."""
+    ones, along = np.ones(1), np.array([[1.0, 0.0]])
+    cones = Cones(slack * ones, ones, length * ones, along, 2 * ones, along)
+    assert cones.interior() is inside
