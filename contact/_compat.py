@@ -1,11 +1,10 @@
 """Differences between dolfinx 0.9, 0.10 and 0.11, between their PETSc, and faults around them."""
 
 import inspect
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-from dolfinx import fem, graph
+from dolfinx import fem
 from dolfinx.mesh import Mesh
 from mpi4py import MPI
 from petsc4py import PETSc
@@ -30,13 +29,6 @@ def interpolation_points(space: fem.FunctionSpace) -> npt.NDArray[np.float64]:
     points = space.element.interpolation_points
     # A method up to 0.9.
     return np.asarray(points() if callable(points) else points)
-
-
-def destinations(ranks: npt.NDArray[np.int64]) -> Any:
-    """One rank for each cell, as dolfinx takes it from a partitioner."""
-    links = graph.adjacencylist(ranks[:, None].astype(np.int32))
-    # Wrapped since 0.10.
-    return getattr(links, "_cpp_object", links)
 
 
 def original_cells(mesh: Mesh) -> npt.NDArray[np.int64]:

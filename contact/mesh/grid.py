@@ -1,10 +1,6 @@
-"""Grids of a rectangle or a box, with sides and pieces of sides as parts.
+"""Grids of a rectangle or a box, with sides and pieces of sides as parts."""
 
-Ranks have blocks of a grid with straight cuts: a general partitioner cuts along jagged lines, a
-quarter longer, and the dense matrix of the nodes at cuts is as much larger.
-"""
-
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -13,7 +9,6 @@ import numpy.typing as npt
 from dolfinx import mesh as dmesh
 from mpi4py import MPI
 
-from contact import _compat
 from contact.errors import InputError
 from contact.mesh.domain import Domain, exterior_facets, with_names
 
@@ -127,8 +122,8 @@ def rectangle(
         comm,
         grid[:2],
         list(cells),
-        partitioner=grid_partitioner(cells, size),
         diagonal=kinds[diagonal],
+        ghost_mode=dmesh.GhostMode.none,
     )
     domain = _name_grid(mesh, grid, chosen)
     rotate(mesh, rotation, (0.0, 0.0, 1.0))
@@ -158,7 +153,7 @@ def box(
     grid, chosen = plan("box", origin, size, cells, parts or {})
     if np.shape(axis) != (3,) or not np.linalg.norm(axis) > 0.0:
         raise InputError(f"mesh axis must be 3 numbers, not all zero; given: {axis}")
-    mesh = dmesh.create_box(comm, grid[:2], list(cells), partitioner=grid_partitioner(cells, size))
+    mesh = dmesh.create_box(comm, grid[:2], list(cells), ghost_mode=dmesh.GhostMode.none)
     domain = _name_grid(mesh, grid, chosen)
     rotate(mesh, rotation, axis)
     return domain
@@ -296,72 +291,3 @@ def _name_grid(mesh: dmesh.Mesh, grid: _Grid, parts: Mapping[str, list[_Patch]])
             )
         chosen[name] = facets[inside]
     return with_names(mesh, chosen, {})
-
-
-Ints = npt.NDArray[np.int64]
-
-
-def blocks(positions: Ints, cells: Sequence[int], size: Sequence[float], ranks: int) -> Ints:
-    """Return the rank of each square or cube of a grid.
-
-    The grid is cut across its longest side in proportion to the ranks on both sides, and so are
-    the pieces, until each has one rank.
-
-    Parameters
-    ----------
-    positions
-        Number along each axis, shape (squares, dim).
-    cells, size
-        Squares along the axes, and lengths.
-    ranks
-        How many there are.
-    """
-    owner = np.zeros(len(positions), dtype=np.int64)
-    edges = np.asarray(size, dtype=float) / np.asarray(cells)
-
-    def share(here: Ints, low: Ints, high: Ints, first: int, count: int) -> None:
-        if count == 1:
-            owner[here] = first
-            return
-        axis = int(np.argmax((high - low) * edges))
-        few = count // 2
-        cut = low[axis] + round((high - low)[axis] * few / count)
-        below = positions[here, axis] < cut
-        end, begin = high.copy(), low.copy()
-        end[axis] = begin[axis] = cut
-        share(here[below], low, end, first, few)
-        share(here[~below], begin, high, first + few, count - few)
-
-    everything = np.arange(len(positions))
-    share(everything, np.zeros(len(cells), dtype=np.int64), np.array(cells), 0, ranks)
-    return owner
-
-
-def _squares(simplices: Ints, cells: Sequence[int]) -> Ints:
-    """Return the square or cube of each simplex, shape (simplices, dim).
-
-    Vertices are numbered along the first axis first; those in the middle of squares follow all
-    others.
-    """
-    corners = np.asarray(cells) + 1
-    inner = simplices - np.prod(corners)
-    at = np.stack(np.unravel_index(np.minimum(simplices, np.prod(corners) - 1), corners, "F"))
-    middle = np.stack(np.unravel_index(np.maximum(inner, 0) % np.prod(cells), cells, "F")) + 0.5
-    return np.floor(np.where(inner < 0, at, middle).mean(axis=2)).astype(np.int64).T
-
-
-def grid_partitioner(cells: Sequence[int], size: Sequence[float]) -> Callable[..., Any]:
-    """Return the partitioner of a grid's simplices, as dolfinx takes it.
-
-    Parameters
-    ----------
-    cells, size
-        Squares or cubes along the axes, and lengths.
-    """
-
-    def partition(_comm: Any, ranks: int, _types: Any, vertices: Sequence[Ints]) -> Any:
-        simplices = np.asarray(vertices[0]).reshape(-1, len(cells) + 1)
-        owner = blocks(_squares(simplices, cells), cells, size, ranks)
-        return _compat.destinations(owner)
-
-    return partition
