@@ -35,7 +35,6 @@ from contact.errors import InputError
 from contact.history import BodyState, Evaluated, InternalVariables
 from contact.linear.constraint import ConstrainedBulk, ConstrainedOperator, Constraint
 from contact.linear.layout import Layout
-from contact.linear.multigrid import is_large
 from contact.linear.operator import Counters, SparseOperator
 from contact.mesh.domain import Domain
 from contact.mesh.entities import components
@@ -204,14 +203,6 @@ class BodyEquilibrium:
         variables = self.variables.of(state)
         forces = self._internal(self.nodal(state.x).ravel(), about, variables)
         return np.concatenate([forces, np.zeros(self.global_unknowns.size)])
-
-    def expect_many(self) -> None:
-        """Prepare for forces that are asked for often, those of load steps. Collective.
-
-        Of a linear body a matrix is kept, where a direct solver has room for its factors.
-        """
-        if self.linear and not is_large(self.layout):
-            self._internal.assemble()
 
     def external(self, time: float = 1.0) -> Array:
         """Return the owned nodal loads at a time. Collective."""

@@ -1,8 +1,4 @@
-"""The weak forms of the stresses in one body, and their nodal forces: assembled, or by a matrix.
-
-The matrix of a linear body costs as much as a dozen assemblies of forces, which load steps need
-and static problems mostly do not.
-"""
+"""The weak forms of the stresses in one body, and their nodal forces."""
 
 from __future__ import annotations
 
@@ -14,9 +10,7 @@ from typing import Any
 import numpy as np
 import ufl
 from dolfinx import fem
-from dolfinx.fem.petsc import assemble_matrix, create_matrix
 from mpi4py import MPI
-from petsc4py import PETSc
 from ufl.core.expr import Expr
 
 from contact.body.description import Body
@@ -134,7 +128,6 @@ class InternalForces:
         self._comm, self._forms, self._owned = comm, forms, owned
         # At a state, of its potential alone, and moved to see the effect of rounding.
         self._known: deque[tuple[tuple[Array, ...], Array]] = deque(maxlen=3)
-        self._matrix: PETSc.Mat | None = None
 
     def __call__(
         self, at: Array, secant_at: Array | None, variables: InternalVariables | None
@@ -160,21 +153,9 @@ class InternalForces:
         self._known.append((tuple(array.copy() for array in asked), found))
         return found.copy()
 
-    def assemble(self) -> None:
-        """Keep the matrix of a linear body, by which forces are found from now on. Collective."""
-        if self._matrix is None:
-            self._matrix = create_matrix(self._forms.secant)
-            assemble_matrix(self._matrix, self._forms.secant)
-            self._matrix.assemble()
-
     def _found(
         self, at: Array, secant_at: Array | None, variables: InternalVariables | None
     ) -> Array:
-        if self._matrix is not None:
-            vector, image = self._matrix.createVecs()
-            vector.array[:] = at[: self._owned]
-            self._matrix.mult(vector, image)
-            return np.asarray(image.array)
         self._forms.variables.set(variables)
         self._forms.at.x.array[:] = at
         if secant_at is None:

@@ -30,9 +30,6 @@ logger = logging.getLogger("contact.solve")
 #: How often a step that fails is halved.
 HALVINGS = 4
 
-#: Steps that ask for fewer forces than it costs to prepare for many.
-FEW = 2
-
 #: Part of the body's size that is no motion.
 ROUNDING = 1e-12
 
@@ -105,8 +102,6 @@ class Evolution:
             If supports that move take contact nodes towards the foundation.
         """
         check_gaps(self.problem, times)
-        if len(times) > FEW:
-            self.problem.equilibrium.expect_many()
         for k, end in enumerate(times):
             whole = end - (times[k - 1] if k > 0 else begin)
             while (now := begin if self._last is None else self._last.time) < end:
