@@ -25,6 +25,7 @@ from contact.methods import (
     chord,
     condensed_step,
     continuation,
+    gap_derivative,
     interior_point,
     line_search,
     newton,
@@ -112,6 +113,11 @@ def _linearised(old: Callable[..., Any]) -> Callable[..., Any]:
     return plain
 
 
+def _unaccelerated(rule: chord.Chord, _: Any, new: Any) -> Any:
+    rule._made = True
+    return new
+
+
 def _large(name: str, *changes: str) -> Callable[[], Case]:
     """Return how a case on a finer mesh is made."""
     return lambda: load_case(CASES / f"{name}.toml", changes)
@@ -142,6 +148,16 @@ DEVICES = (
     Device("layer linearised where its law is met", (newton_step.linearised_layer,), "-",
            ((newton_step, "linearised_layer", _linearised(newton_step.linearised_layer)),)),
     Device("limited softening", (), "-", (), (("softening", float("inf")),)),
+    Device("derivative of the conductivity by the gap", (gap_derivative,), "-",
+           ((gap_derivative.GapDerivative, "__call__", lambda *_: False),)),
+    Device("stagnation limit of the steps after a fallback", (), "-",
+           ((newton, "SHORT", NewtonOptions().stagnation_limit),)),
+    Device("stagnation limit of the continuation", (), "-",
+           ((newton, "CONTINUATION_LIMIT", None),)),
+    Device("Anderson acceleration of chord steps", (chord.Chord.accelerated,),
+           "Walker and Ni 2011", ((chord.Chord, "accelerated", _unaccelerated),)),
+    Device("material left as it was linearised last", (), "-", ((newton_step, "SMALL", 0.0),), (),
+           _block),
     Device("energy line search", (line_search,), "Armijo 1966; Crisfield 1991",
            ((condensed_step, "step_length", lambda _: 1.0),)),
     Device("chord steps", (chord,), "Kelley 1995; Walker and Ni 2011", (), (("keep", "never"),)),
