@@ -26,11 +26,11 @@ from ufl.core.expr import Expr
 from contact.body.component_norms import component_norms_of
 from contact.body.description import Body
 from contact.body.global_unknowns import make_global_unknowns
-from contact.body.loads import Loads
+from contact.body.loads import Loads, assembled
 from contact.body.materials import cells_of
 from contact.body.pointwise import Pointwise
 from contact.body.supports import free_components, supports_of, without_field
-from contact.body.weak_forms import InternalForces, WeakForms
+from contact.body.weak_forms import WeakForms
 from contact.errors import InputError
 from contact.history import BodyState, Evaluated, InternalVariables
 from contact.linear.constraint import ConstrainedBulk, ConstrainedOperator, Constraint
@@ -101,7 +101,6 @@ class BodyEquilibrium:
         self._at = self._forms.at
         #: The internal variables of the materials: the body's part of a history.
         self.variables = self._forms.variables
-        self._internal = InternalForces(domain.comm, self._forms, self.owned)
         test = self._forms.split(ufl.TestFunction(self.space))
         self._loads = Loads(domain, body, *test, self.owned)
 
@@ -199,9 +198,14 @@ class BodyEquilibrium:
             Unknowns at which the secant modulus is taken; those of the state by default: the
             material law itself.
         """
-        about = None if secant_at is None or self.linear else self.nodal(secant_at).ravel()
-        variables = self.variables.of(state)
-        forces = self._internal(self.nodal(state.x).ravel(), about, variables)
+        forms = self._forms
+        self.variables.set(self.variables.of(state))
+        forms.at.x.array[:] = self.nodal(state.x).ravel()
+        if secant_at is None or self.linear:
+            forces = assembled(forms.law_forces, self.owned)
+        else:
+            forms.secant_at.x.array[:] = self.nodal(secant_at).ravel()
+            forces = assembled(forms.secant_forces, self.owned)
         return np.concatenate([forces, np.zeros(self.global_unknowns.size)])
 
     def external(self, time: float = 1.0) -> Array:

@@ -1,26 +1,20 @@
-"""The weak forms of the stresses in one body, and their nodal forces."""
+"""The weak forms of the stresses in one body."""
 
 from __future__ import annotations
 
-from collections import deque
 from collections.abc import Sequence
 from functools import cached_property
 from typing import Any
 
-import numpy as np
 import ufl
 from dolfinx import fem
-from mpi4py import MPI
 from ufl.core.expr import Expr
 
 from contact.body.description import Body
 from contact.body.internal_variables import QuadratureVariables
-from contact.body.loads import assembled
 from contact.body.materials import material_measures
-from contact.history import InternalVariables
 from contact.mesh.domain import Domain
 from contact.mesh.entities import Indices
-from contact.typing import Array
 from forms.hencky import secant_form
 from forms.piezo import symmetrised_form
 
@@ -107,62 +101,3 @@ class WeakForms:
             return self.secant
         law = self._internal(self.at, self.at)
         return fem.form(ufl.derivative(law, self.at, self._trial))
-
-
-class InternalForces:
-    """The forces of the stresses at given unknowns, supports and contact apart.
-
-    The last answers are kept, for those who ask for the same forces do not know of each other.
-
-    Parameters
-    ----------
-    comm
-        Ranks that ask together.
-    forms
-        The weak forms of the body.
-    owned
-        Number of unknowns of the nodes that this rank owns.
-    """
-
-    def __init__(self, comm: MPI.Intracomm, forms: WeakForms, owned: int) -> None:
-        self._comm, self._forms, self._owned = comm, forms, owned
-        # At a state, of its potential alone, and moved to see the effect of rounding.
-        self._known: deque[tuple[tuple[Array, ...], Array]] = deque(maxlen=3)
-
-    def __call__(
-        self, at: Array, secant_at: Array | None, variables: InternalVariables | None
-    ) -> Array:
-        """Return the owned forces at local unknowns of the nodes, shape (owned,). Collective.
-
-        Parameters
-        ----------
-        at
-            The unknowns.
-        secant_at
-            Where the secant modulus is taken; None for there too: the material law itself.
-        variables
-            The internal variables at the beginning of the step.
-        """
-        asked: tuple[Array, ...] = (at,) if secant_at is None else (at, secant_at)
-        asked += () if variables is None else tuple(variables.arrays.values())
-        same = np.array([_equal(asked, before) for before, _ in self._known], dtype=bool)
-        self._comm.Allreduce(MPI.IN_PLACE, same, op=MPI.LAND)
-        if same.any():
-            return self._known[int(np.argmax(same))][1].copy()
-        found = self._found(at, secant_at, variables)
-        self._known.append((tuple(array.copy() for array in asked), found))
-        return found.copy()
-
-    def _found(
-        self, at: Array, secant_at: Array | None, variables: InternalVariables | None
-    ) -> Array:
-        self._forms.variables.set(variables)
-        self._forms.at.x.array[:] = at
-        if secant_at is None:
-            return assembled(self._forms.law_forces, self._owned)
-        self._forms.secant_at.x.array[:] = secant_at
-        return assembled(self._forms.secant_forces, self._owned)
-
-
-def _equal(one: tuple[Array, ...], other: tuple[Array, ...]) -> bool:
-    return len(one) == len(other) and all(map(np.array_equal, one, other))
