@@ -32,8 +32,7 @@ from contact.nesting import nested_start, pays
 from contact.output.checkpoint import Checkpoints, kept_digest, read_steps
 from contact.output.folder import on_root
 from contact.output.remarks import announce
-from contact.output.solution import Solution
-from contact.output.solved import StepRecord
+from contact.output.solution import Solution, StepRecord
 from contact.output.steps import StepRecorder
 from contact.problem.checks import check_potential, check_problem, check_supports
 from contact.problem.kkt import evaluate

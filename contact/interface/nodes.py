@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from mpi4py import MPI
@@ -166,6 +167,6 @@ class ContactNodes:
         """Number of contact nodes over all ranks."""
         return int(self.comm.allreduce(self.nodes.size, op=MPI.SUM))
 
-    def gather(self, values: Array) -> Array:
+    def gather(self, values: NDArray[Any]) -> NDArray[Any]:
         """Return the values of all ranks, in rank order, on every rank."""
         return np.concatenate(self.comm.allgather(values))

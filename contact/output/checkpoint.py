@@ -31,8 +31,7 @@ from contact.errors import InputError
 from contact.history import CONTACT_NODES, QUADRATURE_POINTS
 from contact.interface.jump import Multipliers
 from contact.output.folder import kind, on_root, read_json, settle
-from contact.output.solution import Solution
-from contact.output.solved import StepRecord
+from contact.output.solution import Solution, StepRecord
 from contact.problem.problem import ContactProblem
 from contact.problem.state import State
 from contact.typing import Array
@@ -116,7 +115,7 @@ class Checkpoints:
         arrays = _gathered(self._problem, record.state, self._where)
         said = {"enthalpy": record.enthalpy, "rounding": record.rounding}
         arrays |= {"said": np.array(json.dumps(said)), "row": np.array(json.dumps(record.row))}
-        arrays |= {TABLE + name: column for name, column in (record.table or {}).items()}
+        arrays |= {TABLE + name: column for name, column in record.table.items()}
         on_root(self._problem.comm, lambda: self._write(_packed(arrays)))
 
     def _write(self, data: bytes) -> None:
@@ -231,14 +230,8 @@ def _rows(problem: ContactProblem, points: Array) -> NDArray[np.intp] | None:
 
 
 def _read(problem: ContactProblem, path: Path, where: NDArray[np.intp]) -> StepRecord:
-    table = None
     arrays = on_root(problem.comm, lambda: _load(path))
-    if problem.comm.rank == 0:
-        table = {
-            name.removeprefix(TABLE): column
-            for name, column in arrays.items()
-            if name.startswith(TABLE)
-        }
+    table = {k.removeprefix(TABLE): v for k, v in arrays.items() if k.startswith(TABLE)}
     said, row = json.loads(str(arrays["said"])), json.loads(str(arrays["row"]))
     state = _state(problem, arrays, where)
     return StepRecord(state, row, table, said["enthalpy"], said["rounding"])

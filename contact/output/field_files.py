@@ -23,7 +23,7 @@ from mpi4py import MPI
 from contact.errors import InputError
 from contact.output.fields import DerivedFields, linear, unknowns
 from contact.output.folder import ROOM, on_root
-from contact.output.solved import Solved
+from contact.output.solution import Solution
 from contact.output.vtu import Grid, Values, gathered, write_vtu
 from contact.problem.problem import ContactProblem
 from contact.problem.state import State
@@ -35,7 +35,7 @@ Frame: TypeAlias = tuple[float, State]
 SERIES = ("displacement", "potential", "von_mises")
 
 
-def write_fields(solution: Solved, folder: Path) -> None:
+def write_fields(solution: Solution, folder: Path) -> None:
     """Write the fields in the format that is asked for. Collective.
 
     ``fields.vtu`` holds all of them, the derived ones both averaged at the nodes and as they
@@ -64,7 +64,7 @@ def write_fields(solution: Solved, folder: Path) -> None:
             _write_xdmf(problem, frames, folder)
 
 
-def _frames(solution: Solved) -> list[Frame]:
+def _frames(solution: Solution) -> list[Frame]:
     """Return the times and states whose fields are written: the last one always."""
     if not solution.steps:
         return [(0.0, solution.state)]

@@ -9,16 +9,29 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from mpi4py import MPI
 
 from contact.arguments import expect
-from contact.output.field_files import write_fields, write_share
+from contact.output.field_files import write_fields
 from contact.output.folder import ResultFolder, on_root, result_folder
-from contact.output.quantities import AGAINST, HISTORY, OPPOSITE, SUMMARY, quantities, values_of
+from contact.output.quantities import (
+    AGAINST,
+    HISTORY,
+    OPPOSITE,
+    SUMMARY,
+    SURFACE,
+    quantities,
+    values_of,
+)
 from contact.output.solution import Solution
 from contact.output.steps import write_steps
-from contact.output.surface import contact_surface, opposite_surface, opposite_table
-from contact.output.table import contact_table, csv_columns, write_csv, write_table
+from contact.output.surface import (
+    contact_surface,
+    contact_table,
+    opposite_surface,
+    opposite_table,
+)
+from contact.output.table import write_csv, write_table
+from contact.output.vtu import write_vtu
 
 
 def write_outputs(
@@ -62,23 +75,20 @@ def _replace(solution: Solution, folder: ResultFolder, figures: bool) -> None:
     failures: list[Exception] = []
 
     def write(new: Path) -> Mapping[str, Any]:
-        table = contact_table(solution)
-        surface = contact_surface(solution, table)
+        table, surface = contact_table(solution), contact_surface(solution)
         opposite = opposite_surface(solution)
 
         def write_contact() -> None:
-            assert table is not None
-            assert surface is not None
-            write_table(csv_columns(table), new / "contact.csv")
+            write_table(table, new / "contact.csv")
             rows = [values_of(HISTORY, record) for record in solution.history.records]
             header = [quantity.name for quantity in quantities(HISTORY)]
             write_csv(new / "history.csv", header, (row.values() for row in rows))
             if solution.steps:
                 write_steps(solution.steps, new)
-            write_share(MPI.COMM_SELF, surface, new / "contact.vtu")
+            write_vtu(new / SURFACE, surface)
             if opposite is not None:
                 write_table(opposite_table(solution.problem, opposite), new / AGAINST)
-                write_share(MPI.COMM_SELF, opposite, new / OPPOSITE)
+                write_vtu(new / OPPOSITE, opposite)
 
         on_root(comm, write_contact)
         if solution.output.fields != "none":

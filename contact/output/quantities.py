@@ -7,17 +7,14 @@ PETSc's options are read.
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from operator import attrgetter, itemgetter
 from typing import Any
 
 import numpy as np
 
 from contact.output.environment import versions
-
-#: Value of a quantity that a problem does not have: it has no key, column or field then.
-ABSENT = object()
 
 SUMMARY, STEPS, SWEEP = "summary.json", "steps.csv", "sweep.csv"
 NODES, HISTORY, AGAINST = "contact.csv", "history.csv", "contact-against.csv"
@@ -40,8 +37,12 @@ class Quantity:
         The description, with the sign; `unit` is "length", "stress", ..., empty for none.
     value
         A function of `solution.Solution`; in ``history.csv`` of `methods.report.Record`, in
-        ``fields.vtu`` of `fields.Point`, in ``contact.vtu`` of `surface.ContactResult`, on master
-        sides of a mapping. A mapping has several columns, a vector one a component.
+        ``contact.csv`` and ``contact.vtu`` of `surface.ContactResult`, in ``fields.vtu`` of
+        `fields.Point`, on master sides of a mapping. By default the attribute, or entry, of the
+        quantity's name. A mapping has several columns, a vector one a component; None stands for a
+        quantity that a problem does not have, which has no key, column or field then.
+    files
+        Where it stands; the first has the description.
     component
         Of a vector: name of the column of a component.
     """
@@ -49,14 +50,15 @@ class Quantity:
     name: str
     unit: str
     text: str
-    value: Callable[[Any], Any]
+    value: Callable[[Any], Any] | None = None
     files: tuple[str, ...] = (SUMMARY,)
     component: str = ""
 
     def in_file(self, file: str, given: Any) -> dict[str, Any]:
         """Return the keys, columns or field in a file; none where the quantity is absent."""
-        value = self.value(given)
-        if value is ABSENT:
+        get = itemgetter if isinstance(given, Mapping) else attrgetter
+        value = (self.value or get(self.name))(given)
+        if value is None:
             return {}
         table = file.endswith(".csv")
         if table and isinstance(value, Mapping):
@@ -66,11 +68,6 @@ class Quantity:
             parts = np.asarray(value).T
             return dict(zip(names, parts.tolist() if file in ROWS else parts, strict=False))
         return {self.name: value}
-
-    def fits(self, name: str) -> bool:
-        """Whether a key, column or field is the quantity's."""
-        names = [self.name, *(self.component.format(name=self.name, axis=axis) for axis in "xyz")]
-        return any(re.fullmatch(re.sub("PART|KEY|AXIS", ".+", known), name) for known in names)
 
 
 def quantities(file: str) -> list[Quantity]:
@@ -86,12 +83,12 @@ def values_of(file: str, given: Any) -> dict[str, Any]:
     return found
 
 
-def _present(value: Any) -> Any:
-    return ABSENT if value is None else value
+def _elsewhere(given: Any) -> None:
+    """Return nothing: the value of a quantity that is written by who knows it."""
 
 
 def _item(values: Any, index: int) -> Any:
-    return ABSENT if values is None else values[index]
+    return None if values is None else values[index]
 
 
 def _sizes(record: Any) -> str:
@@ -103,18 +100,15 @@ _ALL, _VECTOR = (SUMMARY, STEPS, SWEEP), "{name}_{axis}"
 _STRAIN = {2: "plane_strain", 3: "solid"}
 
 _RUN = (
-    Quantity(
-        "KEY", "", "A swept key, a column each: its value in this row.", lambda r: ABSENT, (SWEEP,)
-    ),
-    Quantity("title", "", "Title of the case.", lambda r: r.title),
+    Quantity("KEY", "", "A swept key, a column each: its value in this row.", _elsewhere, (SWEEP,)),
+    Quantity("title", "", "Title of the case."),
     Quantity("units", "", "Names of the units, those of `[case] units`.", lambda r: r.units.given),
     Quantity("t", "time", "End of the step.", lambda r: r.state.time, (STEPS,)),
     Quantity(
-        "converged", "", "Whether all residuals are within the tolerance.",
-        lambda r: r.converged, (SUMMARY, SWEEP),
+        "converged", "", "Whether all residuals are within the tolerance.", files=(SUMMARY, SWEEP),
     ),
     Quantity("reason", "", "Why the run ended, in words.", lambda r: r.outcome.reason),
-    Quantity("method", "", "The method, as in `[solver]`.", lambda r: r.method),
+    Quantity("method", "", "The method, as in `[solver]`."),
     Quantity(
         "kinematics", "", "`plane_strain`, `axisymmetric` or `solid`.",
         lambda r: "axisymmetric" if r.problem.domain.revolved else _STRAIN[r.problem.dim],
@@ -129,23 +123,20 @@ _RUN = (
         lambda r: r.problem.comm.size,
     ),
     Quantity(
-        "contact_force", "force",
-        "Force that the body exerts on the foundation, a vector; in 2-D a unit of depth. Between "
-        "bodies the one that the body with `on` exerts on the other; of several contacts the sum, "
-        "and `traction`, `weight` and `entry` of `contact.vtu` have the force of each.",
-        lambda r: r.contact_force, _ALL, _VECTOR,
+        "contact_force", "force", "Force that the body exerts on the foundation, a vector; in 2-D "
+        "a unit of depth. Between bodies the one that the body with `on` exerts on the other; of "
+        "several contacts the sum, and `traction`, `weight` and `entry` of `contact.vtu` have the "
+        "force of each.", files=_ALL, component=_VECTOR,
     ),
     Quantity(
-        "contact_moment", "force · length",
-        "Moment of these about the origin of coordinates, of points in the reference "
-        "configuration: in 2-D a list of one, about z and counter-clockwise, in 3-D a vector.",
-        lambda r: r.contact_moment,
+        "contact_moment", "force · length", "Moment of these about the origin of coordinates, of "
+        "points in the reference configuration: in 2-D a list of one, about z and "
+        "counter-clockwise, in 3-D a vector.",
     ),
     Quantity(
-        "reactions", "force",
-        "Force of the support of each part on the body, a vector a part. A node of two parts "
-        "counts for the one that stands first in the case. With the loads and minus "
-        "`contact_force` they add up to nothing; forces between bodies are no part of that.",
+        "reactions", "force", "Force of the support of each part on the body, a vector a part. A "
+        "node of two parts counts for the one that stands first in the case. With the loads and "
+        "minus `contact_force` they add up to nothing; forces between bodies are no part of that.",
         lambda r: {part: held.force for part, held in r.supports.items()},
     ),
     Quantity(
@@ -167,16 +158,13 @@ _RUN = (
     ),
     Quantity(
         "max_displacement", "length", "Largest Euclidean norm of the displacement at a node.",
-        lambda r: r.max_displacement, _ALL,
+        files=_ALL,
     ),
     Quantity(
         "contact_area", "area", "Sum of the weights of the nodes that touch; in 2-D a length.",
-        lambda r: r.contact_area, (SUMMARY, SWEEP),
+        files=(SUMMARY, SWEEP),
     ),
-    Quantity(
-        "max_dev_strain", "", "Largest |dev ε| over the cells (at degree 2 their nodes).",
-        lambda r: r.max_dev_strain,
-    ),
+    Quantity("max_dev_strain", "", "Largest |dev ε| over the cells (at degree 2 their nodes)."),
     Quantity(
         "max_strain", "",
         "Largest Frobenius norm of ε in the middle of a cell; linear kinematics is for small ones.",
@@ -184,24 +172,23 @@ _RUN = (
     ),
     Quantity(
         "volume_ratio", "", "Least and largest deformed volume of a cell over its own.",
-        lambda r: _present(r.deformation and [*r.deformation[1:]]),
+        lambda r: r.deformation and [*r.deformation[1:]],
     ),
     Quantity(
         "max_von_mises", "stress",
         "Largest von Mises stress over the same. At sharp corners it grows with each refinement.",
-        lambda r: r.max_von_mises,
     ),
     Quantity(
-        "plastic_share", "",
-        "Share of the volume in the plastic range, |dev ε| above the material's first yield, 0 to "
-        "1; `null` where no material has such a limit.", lambda r: r.plastic_share,
+        "plastic_share", "", "Share of the volume in the plastic range, |dev ε| above the "
+        "material's first yield, 0 to 1; `null` where no material has such a limit.",
+        lambda r: np.nan if r.plastic_share is None else r.plastic_share,
     ),
     Quantity(
         "contact_direction", "", "`[contact]` `direction`: whose normal ν is.",
         lambda r: ", ".join(dict.fromkeys(c.foundation.direction for c in r.problem.contacts)),
     ),
     Quantity(
-        "work", "work", "Of loads and supports in the step.", lambda r: r.energies.work, (STEPS,)
+        "work", "work", "Of loads and supports in the step.", lambda r: r.energies.work, (STEPS,),
     ),
     Quantity(
         "energy", "work", "Stored in body and layer at its end.",
@@ -217,7 +204,7 @@ _RUN = (
     ),
     Quantity(
         "inner_iterations", "", "Linear solves in each of them, a list.",
-        lambda r: [record.inner for record in r.history.records],
+        lambda r: [r.inner for r in r.history.records],
     ),
     Quantity(
         "linear_solves", "", "Solves with the matrix of the whole body.",
@@ -236,34 +223,30 @@ _RUN = (
         lambda r: r.counters.contact_solves,
     ),
     Quantity(
-        "kkt", "",
-        "Residuals of the equations, each relative to its own size: `equilibrium` (forces; of "
-        "piezoelectric bodies charges, where these are farther from balance), `contact` (no "
-        "penetration, no tension, one of them zero), `friction` (stick or slip).", lambda r: {
-        name: getattr(r.outcome.kkt, name)
-        for name in ("equilibrium", "contact", "friction") },
+        "kkt", "", "Residuals of the equations, each relative to its own size: `equilibrium` "
+        "(forces; of piezoelectric bodies charges, where these are farther from balance), "
+        "`contact` (no penetration, no tension, one of them zero), `friction` (stick or slip).",
+        lambda r: {key: getattr(r.outcome.kkt, key) for key in r.floors},
     ),
     Quantity("kkt", "", "The largest residual.", lambda r: r.outcome.kkt.largest, ROWS),
     Quantity(
-        "rounding", "",
-        "Rounding floors of the same residuals, which are accepted up to them; of `equilibrium` "
-        "in an evolution the most in a step. More than the tolerance in slender bodies alone, with "
-        "a warning then.", lambda r: r.floors,
+        "rounding", "", "Rounding floors of the same residuals, which are accepted up to them; of "
+        "`equilibrium` in an evolution the most in a step. More than the tolerance in slender "
+        "bodies alone, with a warning then.", lambda r: r.floors,
     ),
     Quantity(
-        "rigid", "",
-        "The foundation that moves: its `displacement` and `rotation` (degrees), and the `force` "
-        "and `moment` on it from outside, given or held. Of several, one entry a part.",
-        lambda r: r.movements.get("rigid", ABSENT),
+        "rigid", "", "The foundation that moves: its `displacement` and `rotation` (degrees), and "
+        "the `force` and `moment` on it from outside, given or held. Of several, one entry a part.",
+        lambda r: r.movements.get("rigid"),
     ),
     Quantity(
         "rigid_parts", "", "The same of each part that moves as a rigid body, by part.",
-        lambda r: r.movements.get("rigid_parts", ABSENT),
+        lambda r: r.movements.get("rigid_parts"),
     ),
     Quantity(
         "electrodes", "",
         "`potential` and `charge` of each electrode whose potential was unknown, by part.",
-        lambda r: r.movements.get("electrodes", ABSENT),
+        lambda r: r.movements.get("electrodes"),
     ),
     Quantity(
         "rigid_AXIS", "length",
@@ -279,7 +262,7 @@ _RUN = (
     ),
     Quantity(
         "charge_PART", "charge", "Likewise; `charge_foundation` through the contact part.",
-        lambda r: _present(r.charge_columns), ROWS,
+        lambda r: r.charge_columns, ROWS,
     ),
     Quantity(
         "driven", "length", "Mean displacement of the part that is moved or loaded in time.",
@@ -289,13 +272,10 @@ _RUN = (
         "driven_force", "force", "The force that drives it: with `driven_x` it makes the loop.",
         lambda r: _item(r.driven, 1), (STEPS,), _VECTOR,
     ),
+    Quantity("notes", "", "Assumptions that were checked and found to hold, in words."),
+    Quantity("warnings", "", "Reasons for care, in words."),
     Quantity(
-        "notes", "", "Assumptions that were checked and found to hold, in words.",
-        lambda r: r.notes,
-    ),
-    Quantity("warnings", "", "Reasons for care, in words.", lambda r: r.warnings),
-    Quantity(
-        "phi_min", "potential", "Least potential at a node.", lambda r: _item(r.potential_range, 0)
+        "phi_min", "potential", "Least potential at a node.", lambda r: _item(r.potential_range, 0),
     ),
     Quantity(
         "phi_max", "potential", "Largest potential at a node.",
@@ -303,44 +283,42 @@ _RUN = (
     ),
     Quantity(
         "total_charge", "charge", "Sum of all charges: 0 up to the tolerance, by Gauss's law.",
-        lambda r: _present(r.charges and r.charges.total),
+        lambda r: r.charges and r.charges.total,
     ),
     Quantity(
-        "charges", "charge",
-        "Free charges D·ν integrated, ν out of the body: `electrodes` and `given` part by part, "
-        "`foundation` (through the contact part), `body` (in the volume), `magnitude` (of all "
-        "nodal ones, without sign).", lambda r: _present(r.charges and vars(r.charges)),
+        "charges", "charge", "Free charges D·ν integrated, ν out of the body: `electrodes` and "
+        "`given` part by part, `foundation` (through the contact part), `body` (in the volume), "
+        "`magnitude` (of all nodal ones, without sign).", lambda r: r.charges and vars(r.charges),
     ),
     Quantity(
         "conduction_ramp", "length",
         "1/delta: how far in front of the closed gap the foundation conducts, if it does.",
-        lambda r: r.conduction_ramp if r.problem.piezoelectric else ABSENT,
+        lambda r: (r.conduction_ramp or np.nan) if r.problem.piezoelectric else None,
     ),
     Quantity(
-        "case", "",
-        "The case as it was solved, all defaults written out: a case file to run again. Empty "
-        "where the problem was built or changed in Python.", lambda r: r.case,
+        "case", "", "The case as it was solved, all defaults written out: a case file to run "
+        "again. Empty where the problem was built or changed in Python.",
     ),
-    Quantity("seconds", "s", "For `setup`, `solve` and `output`.", lambda r: r.seconds),
+    Quantity("seconds", "s", "For `setup`, `solve` and `output`."),
     Quantity("versions", "", "Of Python, the libraries and the BLAS.", lambda r: versions()),
-    Quantity("files", "", "Files of this run: a later run replaces them.", lambda r: ABSENT),
-    Quantity("seconds", "s", "Time for this row.", lambda r: ABSENT, (SWEEP,)),
-    Quantity("input", "", "Digests of the case and its files.", lambda r: ABSENT, (SWEEP,)),
+    Quantity("files", "", "Files of this run: a later run replaces them.", _elsewhere),
+    Quantity("seconds", "s", "Time for this row.", _elsewhere, (SWEEP,)),
+    Quantity("input", "", "Digests of the case and its files.", _elsewhere, (SWEEP,)),
 )  # fmt: skip
 
+#: Of the contact nodes; fields of the contact part are NaN, or -1, at nodes that are held.
 _NODES = (
     Quantity(
-        "on", "", "Part of the node; where there are several contacts.",
-        lambda n: _present(n.part), (NODES,),
+        "on", "", "Part of the node; where there are several contacts.", lambda n: n.part, (NODES,),
     ),
     Quantity("x", "length", "Reference place of the node.", lambda n: n.points, (NODES,), "{axis}"),
     Quantity(
         "weight", "area", "Area that the node stands for; sums with it are integrals over Γ₃.",
-        lambda n: n.problem.nodes.weight, (NODES,),
+        files=(NODES, SURFACE),
     ),
     Quantity(
         "gap", "length", "Initial distance to the foundation, along the contact direction ν.",
-        lambda n: n.problem.interface.law.jump.gap, (NODES,),
+        files=(NODES, SURFACE),
     ),
     Quantity(
         "u_n", "length", "Displacement along ν, out of the body; gap - u_n is the open gap. Where "
@@ -355,7 +333,7 @@ _NODES = (
     ),
     Quantity(
         "pressure", "stress", "Contact pressure -σ_ν, of the foundation and its layer.",
-        lambda n: n.pressure, (NODES,),
+        files=(NODES, SURFACE),
     ),
     Quantity(
         "tau", "stress",
@@ -366,122 +344,24 @@ _NODES = (
         "bound", "stress", "Friction bound: `tau` is no larger.",
         lambda n: n.friction_bound, (NODES,),
     ),
-    Quantity("status", "", "`open`, `stick` or `slip`.", lambda n: n.status, (NODES,)),
+    Quantity("status", "", "`open`, `stick` or `slip`.", files=(NODES,)),
     Quantity(
-        "phi", "potential", "Potential; of piezoelectric bodies.",
-        lambda n: _present(n.contact_potential), (NODES,),
+        "phi", "potential", "Potential; of piezoelectric bodies.", lambda n: n.potential, (NODES,),
     ),
     Quantity(
-        "d_n", "charge/area",
-        "Charge D·ν that leaves through the foundation; likewise. Nodes that supports hold "
-        "conduct too, and have no row: `charges` of the summary has all.",
-        lambda n: _present(n.contact_charge), (NODES,),
+        "d_n", "charge/area", "Charge D·ν that leaves through the foundation; likewise. Nodes "
+        "that supports hold conduct too, and have no row: `charges` of the summary has all.",
+        lambda n: n.charge, (NODES,),
     ),
-)  # fmt: skip
-
-_HISTORY = (
-    Quantity(
-        "iteration", "", "Number of the outer iteration; 0 is a frictionless start.",
-        lambda record: record.iteration, (HISTORY,),
-    ),
-    Quantity("inner", "", "Linear solves that it took.", lambda record: record.inner, (HISTORY,)),
-    Quantity(
-        "equilibrium", "", "Residual after it, as in `kkt`.",
-        lambda record: record.kkt.equilibrium, (HISTORY,),
-    ),
-    Quantity("contact", "", "The same.", lambda record: record.kkt.contact, (HISTORY,)),
-    Quantity("friction", "", "The same.", lambda record: record.kkt.friction, (HISTORY,)),
-    Quantity(
-        "change", "", "Relative change of the friction bound, (3.46); `nan` where there is none.",
-        lambda record: record.change, (HISTORY,),
-    ),
-    Quantity("seconds", "s", "Since the solve began.", lambda record: record.seconds, (HISTORY,)),
-    Quantity("note", "", "Its kind, for instance `tangent`.", lambda r: r.note, (HISTORY,)),
-    Quantity(
-        "contact_solves", "", "Linear solves of the condensed problem that it took.",
-        lambda record: record.contact, (HISTORY,),
-    ),
-    Quantity(
-        "active_set", "", "Numbers of open, stick and slip nodes after it, for instance `3/5/1`; "
-        "empty where the active set is not known.", lambda record: _sizes(record), (HISTORY,),
-    ),
-    Quantity(
-        "steps", "",
-        "The same after each of its inner steps, Newton iterations on the condensed problem, one "
-        "after the other with blanks between; `-` where it is not known.",
-        lambda record: " ".join(_sizes(step) or "-" for step in record.steps), (HISTORY,),
-    ),
-)  # fmt: skip
-
-_AGAINST = (
-    Quantity(
-        "on", "", "Part of the node: one that is `against` in a contact.",
-        lambda f: f["on"], (AGAINST,),
-    ),
-    Quantity("x", "length", "Reference place of the node.", lambda f: f["x"], (AGAINST,), "{axis}"),
-    Quantity(
-        "weight", "area", "Area that the node stands for.",
-        lambda f: f["weight"], (AGAINST, OPPOSITE),
-    ),
-    Quantity(
-        "pressure", "stress", "Forces of the contact on the node, over its area: the pressure.",
-        lambda f: f["pressure"], (AGAINST, OPPOSITE),
-    ),
-    Quantity(
-        "traction", "stress", "Of all of the force: the stress of the body with `on`.",
-        lambda f: f["traction"], (AGAINST, OPPOSITE), _VECTOR,
-    ),
-    Quantity(
-        "u", "length", "Displacement of the node.", lambda f: f["displacement"], (AGAINST,), _VECTOR
-    ),
-    Quantity("displacement", "length", "Displacement.", lambda f: f["displacement"], (OPPOSITE,)),
-    Quantity("normal", "", "Out of the body.", lambda f: f["normal"], (OPPOSITE,)),
-    Quantity("entry", "", "Number of its contact, from 0.", lambda f: f["entry"], (OPPOSITE,)),
-)  # fmt: skip
-
-#: Fields of the body; the derived ones have a companion NAME_cell, cell by cell.
-_BODY = (
-    Quantity("displacement", "length", "Displacement.", lambda at: ABSENT, (BODY, SURFACE)),
-    Quantity(
-        "potential", "potential", "Potential; of piezoelectric bodies.", lambda at: ABSENT,
-        (BODY, SURFACE),
-    ),
-    Quantity(
-        "stress", "stress", "σ, nine components, row by row; tension is positive.",
-        lambda at: at.stress, (BODY,),
-    ),
-    Quantity("von_mises", "stress", "Von Mises stress.", lambda at: at.von_mises, (BODY,)),
-    Quantity(
-        "dev_strain", "", "|dev ε|, the norm of the strain deviator.",
-        lambda at: at.dev_strain, (BODY,),
-    ),
-    Quantity(
-        "electric_displacement", "charge/area", "D; of piezoelectric bodies.",
-        lambda at: _present(at.electric_displacement), (BODY,),
-    ),
-    Quantity(
-        "electric_field", "potential/length", "E = -grad φ; likewise.",
-        lambda at: _present(at.electric_field), (BODY,),
-    ),
-)  # fmt: skip
-
-#: Fields of the contact part; `displacement` and `potential` are those of held nodes too.
-_SURFACE = (
-    Quantity("pressure", "stress", "As in `contact.csv`.", lambda n: n.pressure, (SURFACE,)),
     Quantity(
         "traction", "stress", "Stress of the body on the foundation, a vector: p ν - σ_τ.",
-        lambda n: n.traction, (SURFACE,),
+        files=(SURFACE,),
     ),
-    Quantity("gap", "length", "As in `contact.csv`.", lambda n: n.gap, (SURFACE,)),
-    Quantity("opening", "length", "gap - u_n: the open gap.", lambda n: n.opening, (SURFACE,)),
-    Quantity("slip", "length", "Tangential displacement, a vector.", lambda n: n.slip, (SURFACE,)),
-    Quantity("friction_bound", "stress", "As `bound`.", lambda n: n.friction_bound, (SURFACE,)),
-    Quantity("normal", "", "Contact direction ν, out of the body.", lambda n: n.normal, (SURFACE,)),
-    Quantity("weight", "area", "As in `contact.csv`.", lambda n: n.weight, (SURFACE,)),
-    Quantity(
-        "charge", "charge/area", "`d_n` of `contact.csv`; of piezoelectric bodies.",
-        lambda n: _present(n.charge), (SURFACE,),
-    ),
+    Quantity("opening", "length", "gap - u_n: the open gap.", files=(SURFACE,)),
+    Quantity("slip", "length", "Tangential displacement, a vector.", files=(SURFACE,)),
+    Quantity("friction_bound", "stress", "As `bound`.", files=(SURFACE,)),
+    Quantity("normal", "", "Contact direction ν, out of the body.", files=(SURFACE,)),
+    Quantity("charge", "charge/area", "As `d_n`; of piezoelectric bodies.", files=(SURFACE,)),
     Quantity(
         "status", "", "0 open, 1 stick, 2 slip; -1 for a node that is held.",
         lambda n: np.array([STATUS[name] for name in n.status], np.int32), (SURFACE,),
@@ -490,11 +370,81 @@ _SURFACE = (
         "row", "", "Row of the node in `contact.csv`, from 0; -1 for none.",
         lambda n: np.arange(n.status.size, dtype=np.int32), (SURFACE,),
     ),
-    Quantity("entry", "", "Number of its `[[contact]]`, from 0.", lambda n: ABSENT, (SURFACE,)),
+    Quantity("entry", "", "Number of its `[[contact]]`, from 0.", _elsewhere, (SURFACE,)),
     Quantity(
         "rigid", "", "1 in front of a rigid foundation, 0 in front of another body.",
-        lambda n: ABSENT, (SURFACE,),
+        _elsewhere, (SURFACE,),
     ),
 )  # fmt: skip
 
-QUANTITIES = (*_RUN, *_NODES, *_HISTORY, *_AGAINST, *_BODY, *_SURFACE)
+_HISTORY = (
+    Quantity(
+        "iteration", "", "Number of the outer iteration; 0 is a frictionless start.",
+        files=(HISTORY,),
+    ),
+    Quantity("inner", "", "Linear solves that it took.", files=(HISTORY,)),
+    Quantity(
+        "equilibrium", "", "Residual after it, as in `kkt`.",
+        lambda r: r.kkt.equilibrium, (HISTORY,),
+    ),
+    Quantity("contact", "", "The same.", lambda r: r.kkt.contact, (HISTORY,)),
+    Quantity("friction", "", "The same.", lambda r: r.kkt.friction, (HISTORY,)),
+    Quantity(
+        "change", "", "Relative change of the friction bound, (3.46); `nan` where there is none.",
+        files=(HISTORY,),
+    ),
+    Quantity("seconds", "s", "Since the solve began.", files=(HISTORY,)),
+    Quantity("note", "", "Its kind, for instance `tangent`.", files=(HISTORY,)),
+    Quantity(
+        "contact_solves", "", "Linear solves of the condensed problem that it took.",
+        lambda r: r.contact, (HISTORY,),
+    ),
+    Quantity(
+        "active_set", "", "Numbers of open, stick and slip nodes after it, for instance `3/5/1`; "
+        "empty where the active set is not known.", _sizes, (HISTORY,),
+    ),
+    Quantity(
+        "steps", "", "The same after each of its inner steps, Newton iterations on the condensed "
+        "problem, one after the other with blanks between; `-` where it is not known.",
+        lambda r: " ".join(_sizes(step) or "-" for step in r.steps), (HISTORY,),
+    ),
+)  # fmt: skip
+
+_AGAINST = (
+    Quantity("on", "", "Part of the node: one that is `against` in a contact.", files=(AGAINST,)),
+    Quantity("x", "length", "Reference place of the node.", None, (AGAINST,), "{axis}"),
+    Quantity("weight", "area", "Area that the node stands for.", files=(AGAINST, OPPOSITE)),
+    Quantity(
+        "pressure", "stress", "Forces of the contact on the node, over its area: the pressure.",
+        files=(AGAINST, OPPOSITE),
+    ),
+    Quantity(
+        "traction", "stress", "Of all of the force: the stress of the body with `on`.",
+        None, (AGAINST, OPPOSITE), _VECTOR,
+    ),
+    Quantity(
+        "u", "length", "Displacement of the node.",
+        lambda f: f["displacement"], (AGAINST,), _VECTOR,
+    ),
+    Quantity("displacement", "length", "Displacement.", files=(OPPOSITE,)),
+    Quantity("normal", "", "Out of the body.", files=(OPPOSITE,)),
+    Quantity("entry", "", "Number of its contact, from 0.", files=(OPPOSITE,)),
+)  # fmt: skip
+
+#: Fields of the body; the derived ones have a companion NAME_cell, cell by cell.
+_BODY = (
+    Quantity("displacement", "length", "Displacement.", _elsewhere, (BODY, SURFACE)),
+    Quantity(
+        "potential", "potential", "Potential; of piezoelectric bodies.",
+        _elsewhere, (BODY, SURFACE),
+    ),
+    Quantity(
+        "stress", "stress", "σ, nine components, row by row; tension is positive.", files=(BODY,),
+    ),
+    Quantity("von_mises", "stress", "Von Mises stress.", files=(BODY,)),
+    Quantity("dev_strain", "", "|dev ε|, the norm of the strain deviator.", files=(BODY,)),
+    Quantity("electric_displacement", "charge/area", "D; of piezoelectric bodies.", files=(BODY,)),
+    Quantity("electric_field", "potential/length", "E = -grad φ; likewise.", files=(BODY,)),
+)  # fmt: skip
+
+QUANTITIES = (*_RUN, *_NODES, *_HISTORY, *_AGAINST, *_BODY)

@@ -5,18 +5,17 @@ from __future__ import annotations
 import textwrap
 from collections.abc import Iterator
 
-from contact.output.quantities import SUMMARY, Quantity, quantities
+from contact.output.quantities import Quantity, quantities
 
 
 def described(file: str) -> Iterator[tuple[str, Quantity, str]]:
     """Yield the name of a key, column or field, its quantity, and the description there."""
-    known = {quantity.name for quantity in quantities(SUMMARY)}
     for quantity in quantities(file):
         name, text = quantity.name, quantity.text
         if file.endswith(".csv") and quantity.component:
             name = quantity.component.format(name=name, axis="x")
-        if file != SUMMARY and SUMMARY in quantity.files and quantity.name in known:
-            text = "As in `summary.json`."
+        if file != quantity.files[0]:
+            text = f"As in `{quantity.files[0]}`."
         if name != quantity.name:
             text += " Likewise the other components."
         yield name, quantity, text

@@ -19,7 +19,7 @@ from contact.errors import InputError
 from contact.linear.operator import Counters
 from contact.methods.report import IterationHistory, Outcome
 from contact.output.fields import Deformation, DerivedFields, unknowns
-from contact.output.options import OutputOptions
+from contact.output.options import OutputOptions, Units
 from contact.output.resultants import (
     ChargeBalance,
     Resultant,
@@ -29,10 +29,10 @@ from contact.output.resultants import (
     rigid_columns,
     supports,
 )
-from contact.output.solved import Solved
-from contact.output.surface import ContactResult, contact_result
-from contact.output.table import contact_table
+from contact.output.solved import ContactResult, Solved, contact_result
+from contact.output.table import Table
 from contact.problem.energy import Balance
+from contact.problem.state import State
 from contact.typing import Array
 
 if TYPE_CHECKING:
@@ -40,12 +40,43 @@ if TYPE_CHECKING:
     from contact.output.figures.run import Run
 
 
+#: Columns of ``steps.csv`` that a look at a step shows.
+SHOWN = ("t", "max_pressure", "contact_nodes", "max_displacement", "kkt")
+
 #: A text on a solution: a warning, or a `Note`.
 Remark: TypeAlias = str
 
 
 class Note(str):
     """A remark that is no reason for care."""
+
+
+@dataclass(frozen=True, repr=False)
+class StepRecord:
+    """The end of a step of an evolution, and its rows in the tables.
+
+    Attributes
+    ----------
+    row
+        The columns of ``steps.csv``.
+    table
+        The columns of ``contact.csv``, as `surface.contact_table` returns them.
+    enthalpy
+        Where the energy balance of the next step begins, see `problem.energy.Moment`.
+    rounding
+        Largest `rounding` of the residuals of a step so far, see `problem.kkt.KKT`.
+    """
+
+    state: State
+    row: Mapping[str, float]
+    table: Table
+    enthalpy: float
+    rounding: float = 0.0
+
+    def __repr__(self) -> str:
+        """Return the main columns; `row` has all."""
+        shown = {name: self.row[name] for name in SHOWN if name in self.row}
+        return f"<StepRecord: {', '.join(f'{name} = {v:.4g}' for name, v in shown.items())}>"
 
 
 @dataclass(repr=False)
@@ -73,6 +104,10 @@ class Solution(Solved):
         The case as `contact check` prints it, empty where there is none.
     energies, driven
         Of a step: its energies, and displacement and force of the part that is moved or loaded.
+    output
+        The files that are written besides the summary and the tables.
+    steps
+        The steps of an evolution, the last of which this is.
     """
 
     outcome: Outcome
@@ -90,6 +125,10 @@ class Solution(Solved):
     case: str = ""
     energies: Balance | None = None
     driven: tuple[Array, Array] | None = None
+    title: str = ""
+    units: Units = field(default_factory=Units)
+    output: OutputOptions = field(default_factory=OutputOptions)
+    steps: list[StepRecord] = field(default_factory=list)
 
     def __repr__(self) -> str:
         """Return the main results; `summary.json` has all."""
@@ -120,7 +159,7 @@ class Solution(Solved):
     @cached_property
     def contact(self) -> ContactResult:
         """The contact nodes of all ranks as arrays, and as functions. Collective."""
-        return contact_result(self.problem, self.problem.comm.bcast(contact_table(self)))
+        return contact_result(self)
 
     @cached_property
     def _derived(self) -> dict[str, fem.Function]:

@@ -1,59 +1,24 @@
-"""A solved problem as tables and figures see it: its state, and the quantities on Gamma_3."""
+"""The contact nodes of a solved problem: those of this rank, and those of all ranks in order."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from dolfinx import fem
+from dolfinx import mesh as dmesh
 from numpy.typing import NDArray
+from scipy import sparse
+from scipy.sparse import csgraph
+from scipy.spatial import KDTree
 
+from contact.errors import InputError
 from contact.interface.jump import Multipliers
-from contact.output.options import OutputOptions, Units
+from contact.interface.mortar.surface import surface_of
 from contact.problem.problem import ContactProblem
 from contact.problem.state import State
 from contact.typing import Array
-
-#: Columns of ``steps.csv`` that a look at a step shows.
-SHOWN = ("t", "max_pressure", "contact_nodes", "max_displacement", "kkt")
-
-
-def tangent_of(normal: Array) -> Array:
-    """Return the unit tangents t of contact directions nu in the plane, shape (n, 2).
-
-    t is nu turned counter-clockwise by 90 degrees: on the bottom of a body, where
-    nu = (0, -1), t points along x.
-    """
-    return np.column_stack([-normal[:, 1], normal[:, 0]])
-
-
-@dataclass(frozen=True, repr=False)
-class StepRecord:
-    """The end of a step of an evolution, and its rows in the tables.
-
-    Attributes
-    ----------
-    row
-        The columns of ``steps.csv``.
-    table
-        The contact nodes, as `table.contact_table` returns them; None on ranks other than 0.
-    enthalpy
-        Where the energy balance of the next step begins, see `problem.energy.Moment`.
-    rounding
-        Largest `rounding` of the residuals of a step so far, see `problem.kkt.KKT`.
-    """
-
-    state: State
-    row: Mapping[str, float]
-    table: Mapping[str, NDArray[Any]] | None
-    enthalpy: float
-    rounding: float = 0.0
-
-    def __repr__(self) -> str:
-        """Return the main columns; `row` has all."""
-        shown = {name: self.row[name] for name in SHOWN if name in self.row}
-        return f"<StepRecord: {', '.join(f'{name} = {v:.4g}' for name, v in shown.items())}>"
 
 
 @dataclass(repr=False)
@@ -67,18 +32,10 @@ class Solved:
     ----------
     state
         A value, which nothing that is done with the problem changes.
-    output
-        The files that are written besides the summary and the tables.
-    steps
-        The steps of an evolution, the last of which this is.
     """
 
     problem: ContactProblem
     state: State
-    title: str = field(default="", kw_only=True)
-    units: Units = field(default_factory=Units, kw_only=True)
-    output: OutputOptions = field(default_factory=OutputOptions, kw_only=True)
-    steps: list[StepRecord] = field(default_factory=list, kw_only=True)
 
     @property
     def nodal(self) -> Array:
@@ -132,40 +89,186 @@ class Solved:
         sticks = active.sticks & (self.friction_bound > 0)
         return np.where(touches, np.where(sticks, "stick", "slip"), "open")
 
-    @property
-    def entry(self) -> NDArray[np.intp]:
-        """Number of the contact of each node."""
-        sizes = [entry.nodes.nodes.size for entry in self.problem.entries]
-        return np.repeat(np.arange(len(sizes)), sizes)
+
+def tangent_of(normal: Array) -> Array:
+    """Return the unit tangents t of contact directions nu in the plane, shape (n, 2).
+
+    t is nu turned counter-clockwise by 90 degrees: on the bottom of a body, where
+    nu = (0, -1), t points along x.
+    """
+    return np.column_stack([-normal[:, 1], normal[:, 0]])
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class ContactResult:
+    """The contact nodes of all ranks, on each of them, in the order of ``contact.csv``.
+
+    In 2-D that is along Gamma_3 from node to node, each connected component from its end with the
+    smaller x (then y); in 3-D by x, then y, then z. Nodes of one contact follow those of another.
+
+    Attributes
+    ----------
+    points, weight
+        Places in the reference configuration, shape (n, d), and the areas they stand for, (n,).
+    normal
+        Contact direction, out of the body, shape (n, d).
+    gap, opening
+        Initial and present distance to the foundation along it, shape (n,) (length).
+    normal_displacement, slip
+        Displacement along it, shape (n,), and tangential one, shape (n, d) (length).
+    pressure, friction, traction
+        Contact pressure -sigma_nu, (n,), friction stress -sigma_tau, and both together: the stress
+        of the body on the foundation, (n, d).
+    friction_bound
+        Shape (n,) (stress).
+    status
+        "open", "stick" or "slip", shape (n,).
+    potential, charge
+        Of a piezoelectric body: potential, and charge that leaves through the foundation, shape
+        (n,); else None.
+    entry, node
+        Number of the contact, and of the node over all ranks, shape (n,).
+    """
+
+    points: Array
+    weight: Array
+    normal: Array
+    gap: Array
+    opening: Array
+    normal_displacement: Array
+    slip: Array
+    pressure: Array
+    friction: Array
+    traction: Array
+    friction_bound: Array
+    status: NDArray[Any]
+    entry: NDArray[np.intp]
+    node: NDArray[np.int64]
+    _problem: ContactProblem
+    potential: Array | None = None
+    charge: Array | None = None
+
+    def __repr__(self) -> str:
+        """Return how many nodes there are, and how many of them touch."""
+        closed = np.count_nonzero(self.status != "open")
+        words = f"{self.status.size} nodes, {closed} in contact"
+        return f"<ContactResult: {words}, pressure up to {self.pressure.max(initial=0.0):.4g}>"
 
     @property
     def part(self) -> NDArray[Any] | None:
         """Part of each node; None for a single contact."""
-        names = np.array([entry.on for entry in self.problem.entries])
+        names = np.array([entry.on for entry in self._problem.entries])
         return names[self.entry] if names.size > 1 else None
-
-    @property
-    def points(self) -> Array:
-        """Reference places: mesh generators leave coordinates such as -3e-19."""
-        points = self.problem.nodes.points
-        return np.where(np.abs(points) < 1e-15 * self.problem.domain.size, 0.0, points)
 
     def tangential(self, vectors: Array) -> Array:
         """Return the component along `tangent_of` the contact direction; in 3-D the vectors."""
-        if self.problem.dim == 3:
+        if self._problem.dim == 3:
             return vectors
-        return np.asarray(np.einsum("ni,ni->n", vectors, tangent_of(self.problem.nodes.normal)))
+        return np.asarray(np.einsum("ni,ni->n", vectors, tangent_of(self.normal)))
 
-    @property
-    def contact_potential(self) -> Array | None:
-        """Potential at the nodes of a piezoelectric body."""
-        if not self.problem.piezoelectric:
-            return None
-        return np.asarray(self.problem.equilibrium.phi_scale * self.nodal[:, -1])
+    def function(self, name: str) -> fem.Function:
+        """Return one of the arrays as a function on a mesh of the contact surface. Collective.
 
-    @property
-    def contact_charge(self) -> Array | None:
-        """Charge D.nu that leaves a piezoelectric body through the foundation."""
-        if not self.problem.piezoelectric:
-            return None
-        return self.problem.interface.law.charge(self.nodal, self.pressure)
+        It is NaN at nodes that are held, and hence no contact nodes.
+
+        Raises
+        ------
+        InputError
+            If there is no such array of numbers.
+        """
+        known = {k: v for k, v in vars(self).items() if getattr(v, "dtype", None) == np.float64}
+        if name not in known:
+            raise InputError(f"contact.function({name!r}): accepted: {', '.join(known)}")
+        values, domain = known[name], self._problem.domain
+        facets = np.concatenate([domain.facets(contact.on) for contact in self._problem.contacts])
+        surface = dmesh.create_submesh(domain.mesh, domain.dim - 1, np.unique(facets))[0]
+        element = ("Lagrange", self._problem.equilibrium.degree, values.shape[1:])
+        made = fem.Function(fem.functionspace(surface, element), name=name)
+        places = made.function_space.tabulate_dof_coordinates()[:, : domain.dim]
+        distance, nearest = KDTree(self.points).query(places)
+        rows = values[nearest]
+        rows[distance > 1e-9 * domain.size] = np.nan
+        made.x.array[:] = rows.ravel()
+        return made
+
+
+def contact_result(solved: Solved) -> ContactResult:
+    """Return the contact nodes of a solved problem. Collective."""
+    problem, nodes, forces = solved.problem, solved.problem.nodes, solved.forces
+    gap, normal_displacement = problem.interface.law.jump.gap, solved.normal_displacement
+    own: dict[str, NDArray[Any]] = {
+        # Mesh generators leave coordinates such as -3e-19.
+        "points": np.where(np.abs(nodes.points) < 1e-15 * problem.domain.size, 0.0, nodes.points),
+        "weight": nodes.weight,
+        "normal": nodes.normal,
+        "gap": gap,
+        "opening": gap - normal_displacement,
+        "normal_displacement": normal_displacement,
+        "slip": solved.slip,
+        "pressure": solved.pressure,
+        "friction": forces.friction,
+        "traction": solved.pressure[:, None] * nodes.normal + forces.friction,
+        "friction_bound": solved.friction_bound,
+        "status": solved.status,
+        "entry": np.repeat(
+            np.arange(len(problem.entries)), [entry.nodes.nodes.size for entry in problem.entries]
+        ),
+        "node": problem.equilibrium.layout.index_map.local_to_global(nodes.nodes),
+    }
+    if problem.piezoelectric:
+        own["potential"] = problem.equilibrium.phi_scale * solved.nodal[:, -1]
+        own["charge"] = problem.interface.law.charge(solved.nodal, solved.pressure)
+    whole = {name: nodes.gather(values) for name, values in own.items()}
+    order = _order(problem, nodes.gather(nodes.points), whole["node"])
+    order = order[np.argsort(whole["entry"][order], kind="stable")]
+    arrays: dict[str, Any] = {name: values[order] for name, values in whole.items()}
+    return ContactResult(**arrays, _problem=problem)
+
+
+def _order(problem: ContactProblem, points: Array, names: NDArray[np.int64]) -> NDArray[np.intp]:
+    """Return the order of the contact nodes of all ranks, given their points and global numbers.
+
+    In 2-D from node to node along Gamma_3, each connected component from its end with the smaller
+    x (then y); in 3-D by x, then y, then z. Collective.
+    """
+    # Coordinates that differ by rounding alone must not change the order.
+    rounded = np.round(points / (1e-9 * problem.domain.size))
+    by_position = np.lexsort(rounded.T[::-1])
+    if problem.dim == 3:
+        return by_position
+    return _along_chain(names, by_position, problem.nodes.gather(_links(problem)))
+
+
+def _links(problem: ContactProblem) -> NDArray[np.int64]:
+    """Return the global numbers of neighbours on the owned facets of Gamma_3, shape (m, 2)."""
+    space = problem.equilibrium.space
+    parts = [surface_of(problem.domain, space, contact.on).nodes for contact in problem.contacts]
+    nodes = np.concatenate(parts)
+    # Both ends, then the middle node if there is one.
+    chain = nodes if nodes.shape[1] == 2 else nodes[:, [0, 2, 1]]
+    return np.concatenate([chain[:, k : k + 2] for k in range(chain.shape[1] - 1)])
+
+
+def _along_chain(
+    names: NDArray[np.int64], by_position: NDArray[np.intp], links: NDArray[np.int64]
+) -> NDArray[np.intp]:
+    """Follow the links from node to node; pieces come in the order of their first ends."""
+    both = np.isin(links, names).all(axis=1)
+    # Number the nodes by position, so that every choice below is one of position.
+    rank = np.empty_like(by_position)
+    rank[by_position] = np.arange(by_position.size)
+    sorter = np.argsort(names)
+    edges = rank[sorter[np.searchsorted(names, links[both], sorter=sorter)]]
+    n = names.size
+    graph = sparse.coo_array((np.ones(len(edges)), edges.T), shape=(n, n)).tocsr()
+    graph = graph + graph.T
+    degree = np.diff(graph.indptr)
+    count, piece = csgraph.connected_components(graph, directed=False)
+    # The end of a piece; a closed curve has none and begins at its first node.
+    first = np.lexsort((np.arange(n), degree > 1, piece))
+    starts = first[np.searchsorted(piece[first], np.arange(count))]
+    chains = [
+        csgraph.depth_first_order(graph, start, directed=False, return_predecessors=False)
+        for start in np.sort(starts)
+    ]
+    return np.asarray(by_position[np.concatenate(chains)])

@@ -14,9 +14,9 @@ from contact.body.fields import Moving, steady
 from contact.methods.steps import LoadStep
 from contact.output.quantities import STEPS, values_of
 from contact.output.resultants import nodes_of
-from contact.output.solution import Solution
-from contact.output.solved import StepRecord
-from contact.output.table import contact_table, csv_columns, write_csv
+from contact.output.solution import Solution, StepRecord
+from contact.output.surface import contact_table
+from contact.output.table import write_csv
 from contact.problem.energy import Moment, balance, moment
 from contact.problem.problem import ContactProblem
 from contact.typing import Array
@@ -86,10 +86,9 @@ def write_steps(records: Iterable[StepRecord], folder: Path) -> None:
     """Write ``steps.csv`` and ``contact-steps.csv``. On one rank."""
     kept = list(records)
     write_csv(folder / "steps.csv", kept[0].row, (record.row.values() for record in kept))
-    tables = [csv_columns(record.table or {}) for record in kept]
     rows = (
         [record.state.time, *values]
-        for record, table in zip(kept, tables, strict=True)
-        for values in zip(*(column.tolist() for column in table.values()), strict=True)
+        for record in kept
+        for values in zip(*(column.tolist() for column in record.table.values()), strict=True)
     )
-    write_csv(folder / "contact-steps.csv", ["t", *tables[0]], rows)
+    write_csv(folder / "contact-steps.csv", ["t", *kept[0].table], rows)

@@ -1,26 +1,19 @@
-"""The contact nodes of all ranks as arrays, and both sides of contacts as surfaces."""
+"""Both sides of contacts as tables and as surfaces."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Any
-
 import numpy as np
-from dolfinx import fem
-from dolfinx import mesh as dmesh
 from mpi4py import MPI
 from numpy.typing import NDArray
 from scipy.sparse.linalg import splu
-from scipy.spatial import KDTree
 
-from contact.errors import InputError
 from contact.interface.entries import Entry
 from contact.interface.mortar.coupling import Coupling
 from contact.interface.mortar.lumping import Lumping
 from contact.interface.mortar.surface import surface_of
 from contact.mesh.entities import owned_among
-from contact.output.quantities import AGAINST, SURFACE, values_of
-from contact.output.solved import Solved, tangent_of
+from contact.output.quantities import AGAINST, NODES, SURFACE, values_of
+from contact.output.solution import Solution
 from contact.output.table import Table
 from contact.output.vtu import Grid
 from contact.problem.problem import ContactProblem
@@ -30,107 +23,17 @@ from contact.typing import Array
 LEAST_AREA = 1e-9
 
 
-@dataclass(frozen=True, eq=False, repr=False)
-class ContactResult:
-    """The contact nodes of all ranks, on each of them, in the order of ``contact.csv``.
+def contact_table(solution: Solution) -> Table:
+    """Return the columns of ``contact.csv``, the same on all ranks. Collective.
 
-    Attributes
-    ----------
-    points, weight
-        Places in the reference configuration, shape (n, d), and the areas they stand for, (n,).
-    normal
-        Contact direction, out of the body, shape (n, d).
-    gap, opening
-        Initial and present distance to the foundation along it, shape (n,) (length).
-    pressure, traction
-        Contact pressure -sigma_nu, (n,), and stress of the body on the foundation, (n, d).
-    friction_bound, slip
-        Shape (n,) (stress); and tangential displacement, shape (n, d) (length).
-    status
-        "open", "stick" or "slip", shape (n,).
-    potential, charge
-        Of a piezoelectric body: potential, and charge that leaves through the foundation, shape
-        (n,); else None.
+    In 2-D ``u_t`` and ``tau`` are the components of u_tau and lambda_f = -sigma_tau along
+    `tangent_of` the contact direction; in 3-D they are vectors.
     """
-
-    points: Array
-    weight: Array
-    normal: Array
-    gap: Array
-    opening: Array
-    pressure: Array
-    traction: Array
-    friction_bound: Array
-    slip: Array
-    status: NDArray[Any]
-    potential: Array | None
-    charge: Array | None
-    _problem: ContactProblem
-
-    def __repr__(self) -> str:
-        """Return how many nodes there are, and how many of them touch."""
-        closed = np.count_nonzero(self.status != "open")
-        words = f"{self.status.size} nodes, {closed} in contact"
-        return f"<ContactResult: {words}, pressure up to {self.pressure.max(initial=0.0):.4g}>"
-
-    def function(self, name: str) -> fem.Function:
-        """Return one of the arrays as a function on a mesh of the contact surface. Collective.
-
-        It is NaN at nodes that are held, and hence no contact nodes.
-
-        Raises
-        ------
-        InputError
-            If there is no such array of numbers.
-        """
-        arrays = {k: v for k, v in vars(self).items() if isinstance(v, np.ndarray)}
-        known = {k: v for k, v in arrays.items() if v.dtype.kind == "f"}
-        if name not in known:
-            raise InputError(f"contact.function({name!r}): accepted: {', '.join(known)}")
-        values, domain = known[name], self._problem.domain
-        facets = np.concatenate([domain.facets(contact.on) for contact in self._problem.contacts])
-        surface = dmesh.create_submesh(domain.mesh, domain.dim - 1, np.unique(facets))[0]
-        element = ("Lagrange", self._problem.equilibrium.degree, values.shape[1:])
-        made = fem.Function(fem.functionspace(surface, element), name=name)
-        places = made.function_space.tabulate_dof_coordinates()[:, : domain.dim]
-        distance, nearest = KDTree(self.points).query(places)
-        rows = values[nearest]
-        rows[distance > 1e-9 * domain.size] = np.nan
-        made.x.array[:] = rows.ravel()
-        return made
+    return values_of(NODES, solution.contact)
 
 
-def contact_result(problem: ContactProblem, table: Table) -> ContactResult:
-    """Return the contact nodes of a table."""
-
-    def vectors(name: str) -> Array:
-        return np.column_stack([table[name.format(axis)] for axis in "xyz"[: problem.dim]])
-
-    normal = vectors("nu_{}")
-    if problem.dim == 2:
-        tangent = tangent_of(normal)
-        slip, friction = table["u_t"][:, None] * tangent, table["tau"][:, None] * tangent
-    else:
-        slip, friction = vectors("u_t{}"), vectors("tau_{}")
-    return ContactResult(
-        points=vectors("{}"),
-        weight=table["weight"],
-        normal=normal,
-        gap=table["gap"],
-        opening=table["gap"] - table["u_n"],
-        pressure=table["pressure"],
-        traction=table["pressure"][:, None] * normal + friction,
-        friction_bound=table["bound"],
-        slip=slip,
-        status=table["status"],
-        potential=table.get("phi"),
-        charge=table.get("d_n"),
-        _problem=problem,
-    )
-
-
-def contact_surface(solution: Solved, table: Table | None) -> Grid | None:
-    """Return the contact part on rank 0, where its table is; None elsewhere. Collective."""
+def contact_surface(solution: Solution) -> Grid:
+    """Return the contact part, the same on all ranks. Collective."""
     problem, d = solution.problem, solution.problem.dim
     body, comm = problem.equilibrium, problem.comm
     size = body.space.dofmap.index_map.size_global
@@ -143,22 +46,20 @@ def contact_surface(solution: Solved, table: Table | None) -> Grid | None:
     )
     known, cells = np.unique(facets, return_inverse=True)
     points, x = _at_nodes(solution, known % size)
-    if table is None:
-        return None
     owner = (known // size).astype(np.int32)
     rigid = np.array([contact.against is None for contact in problem.contacts], dtype=np.int32)
     fields = {"displacement": x[:, :d], "entry": owner, "rigid": rigid[owner]}
     if problem.piezoelectric:
         fields["potential"] = body.phi_scale * x[:, d]
-    rows = np.searchsorted(known, table["entry"] * size + table["node"])
-    for name, values in values_of(SURFACE, contact_result(problem, table)).items():
+    rows = np.searchsorted(known, solution.contact.entry * size + solution.contact.node)
+    for name, values in values_of(SURFACE, solution.contact).items():
         none = np.nan if values.dtype.kind == "f" else -1
         fields[name] = np.full((len(known), *values.shape[1:]), none, dtype=values.dtype)
         fields[name][rows] = values
     return Grid(points, cells.reshape(facets.shape), d - 1, fields)
 
 
-def _at_nodes(solution: Solved, nodes: NDArray[np.int64]) -> tuple[Array, Array]:
+def _at_nodes(solution: Solution, nodes: NDArray[np.int64]) -> tuple[Array, Array]:
     """Return points and unknowns, (n, d) and (n, k), of nodes by global numbers. Collective."""
     problem, body = solution.problem, solution.problem.equilibrium
     points = body.layout.points
@@ -170,7 +71,7 @@ def _at_nodes(solution: Solved, nodes: NDArray[np.int64]) -> tuple[Array, Array]
     return found[:, : problem.dim], found[:, problem.dim :]
 
 
-def opposite_surface(solution: Solved) -> Grid | None:
+def opposite_surface(solution: Solution) -> Grid | None:
     """Return the parts `against` with the stresses there, the same on all ranks. Collective.
 
     Multipliers live on the other side. Here the forces int N_l lambda act, which belong to nodes of

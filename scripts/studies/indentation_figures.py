@@ -16,7 +16,7 @@ from mpi4py import MPI
 
 from contact import build_problem, evolve
 from contact.output.resultants import charge_balance
-from contact.output.table import contact_table
+from contact.output.surface import contact_table
 from contact.typing import Array
 from scripts.reporting import Report, options, solved, subplots
 from scripts.studies.indentation import (

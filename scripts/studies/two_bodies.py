@@ -13,7 +13,8 @@ import numpy as np
 
 from contact import load_case, parse_case
 from contact.output.solution import Solution
-from contact.output.table import Table, contact_table
+from contact.output.surface import contact_table
+from contact.output.table import Table
 from contact.typing import Array
 from scripts.cases import CASES
 from scripts.reporting import Report, options, solved, subplots

@@ -18,7 +18,8 @@ from contact.output.figures.body import Picture, draw_plane, picture
 from contact.output.figures.contact import draw_line
 from contact.output.figures.style import Look
 from contact.output.solved import tangent_of
-from contact.output.table import Table, contact_table, csv_columns
+from contact.output.surface import contact_table
+from contact.output.table import Table
 from contact.typing import Array
 from forms.foundation import contact_multiplier
 from forms.laws import Compliance, PotentialFactor, RampConductivity, ShiftedConductivity
@@ -148,10 +149,10 @@ def example(
         Appended to the remark on the stresses.
     """
     solution = solution_of(name, cells, *changes)
-    run, share = run_of(solution), solution.plastic_share
+    run, table, share = run_of(solution), contact_table(solution), solution.plastic_share
     if run is None:
         return
-    table, deformed = run.table, picture(run, "potential")
+    deformed = picture(run, "potential")
     dotted, values = number.replace("-", "."), deformed.skin["values"]
     of, ending = (" of the variant", f"-{variant}") if variant else ("", "")
     stress = "normal and tangential stress"
@@ -161,7 +162,7 @@ def example(
         f"figure-{number}a{ending}",
         f"Figure {dotted} (a){of}: {stress} on Gamma_3, {topic}",
         draw_line(run, Look()),
-        csv_columns(table),
+        table,
         f"{remark(solution, table)}{yielding(solution.max_dev_strain, share)} {note}".rstrip(),
     )
     report.figure(

@@ -15,7 +15,8 @@ from contact import Case, Solution
 from contact.output.figures.body import draw_plane, picture
 from contact.output.figures.contact import draw_line
 from contact.output.figures.style import Look
-from contact.output.table import Table, csv_columns
+from contact.output.surface import contact_table
+from contact.output.table import Table
 from scripts.cases import bar
 from scripts.reporting import TWO_COLUMNS, Report, options, run_of, solved, subplots
 
@@ -45,17 +46,17 @@ FIGURES: Mapping[str, tuple[float, tuple[str, ...], str]] = {
 def draw(report: Report, number: str, case: Case, text: str, load: float) -> Table | None:
     """Draw both parts of a figure; return the contact table on rank 0. Collective."""
     solution = solved(case)
-    run = run_of(solution)
+    run, table = run_of(solution), contact_table(solution)
     if run is None:
         return None
-    table, deformed = run.table, picture(run, "von_mises")
+    deformed = picture(run, "von_mises")
     dotted = number.replace("-", ".")
     where = f"Example 7.2, f2 = {load:g}, rho = {RHO:g}, {text}"
     report.figure(
         f"figure-{number}a",
         f"Figure {dotted} (a): stresses on Gamma_3, {where}",
         draw_line(run, Look()),
-        csv_columns(table),
+        table,
         f"{_remark(solution, table)} {OF_7_4 if number == '7-4' else ''}".rstrip(),
     )
     values = deformed.skin["values"]

@@ -14,7 +14,7 @@ from mpi4py import MPI
 from contact import Case, Solution, build_problem
 from contact.output.figures.body import draw_plane, picture
 from contact.output.figures.style import Look
-from contact.output.table import contact_table
+from contact.output.surface import contact_table
 from scripts.reporting import TWO_COLUMNS, Report, append, options, run_of, solved, subplots
 from scripts.thesis.hertz_problems import Cylinder, Sphere, cylinder, sphere
 

@@ -7,7 +7,7 @@ from mpi4py import MPI
 from contact import parse_case, solve
 from contact.case.build import build_problem
 from contact.errors import InputError
-from contact.output.table import contact_table, csv_columns
+from contact.output.surface import contact_table
 from tests.problems.everywhere import displacements
 
 COMM = MPI.COMM_WORLD
@@ -58,7 +58,7 @@ def test_one_law_for_two_feet_is_the_law_of_their_union(common) -> None:
     tables = [contact_table(solution) for solution in (one, two)]
     if tables[0] is None or tables[1] is None:
         return
-    assert next(iter(csv_columns(tables[1]))) == "on" and "on" not in tables[0]
+    assert next(iter(tables[1])) == "on" and "on" not in tables[0]
     assert list(tables[1]["on"]) == ["one"] * 13 + ["two"] * 13
     np.testing.assert_allclose(tables[1]["x"], tables[0]["x"], atol=1e-12)
     np.testing.assert_allclose(tables[1]["pressure"], tables[0]["pressure"], atol=1e-10)

@@ -22,6 +22,7 @@ from contact.problem.contact import Contact
 from contact.problem.problem import ContactProblem
 from contact.solving import Schedule, run_schedule
 from forms.hencky import Linear
+from tests.output.test_reference import fits
 from tests.problems.blocks import Blocks
 from tests.problems.mechanics import constant
 from tests.problems.pairs import case
@@ -62,7 +63,7 @@ def test_files_and_figures_of_both_sides(tmp_path: Path) -> None:
     write_outputs(solution, tmp_path, figures=True)
     with (tmp_path / "contact-against.csv").open() as file:
         rows = list(csv.DictReader(file))
-    named = [next(q.name for q in quantities(AGAINST) if q.fits(name)) for name in rows[0]]
+    named = [next(q.name for q in quantities(AGAINST) if fits(q, name)) for name in rows[0]]
     assert list(dict.fromkeys(named)) == [q.name for q in quantities(AGAINST)]
     assert {row["on"] for row in rows} == {"lower_top"}
     force = [sum(float(r["weight"]) * float(r[f"traction_{a}"]) for r in rows) for a in "xy"]

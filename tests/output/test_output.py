@@ -15,7 +15,7 @@ from contact.methods.options import OPTIONS, with_method
 from contact.output.files import write_outputs
 from contact.output.options import OutputOptions
 from contact.output.solved import tangent_of
-from contact.output.table import contact_table, csv_columns
+from contact.output.surface import contact_table
 from contact.solving import solve
 from tests.problems.written import block, electric, written
 
@@ -90,7 +90,7 @@ def test_same_on_any_number_of_ranks(dim: int, shared_tmp_path: Path) -> None:
     assert alone is not None
     if together is None:
         return
-    for name, values in csv_columns(alone).items():
+    for name, values in alone.items():
         if name == "status":
             assert list(values) == list(together[name])
         else:

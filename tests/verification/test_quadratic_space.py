@@ -11,7 +11,7 @@ from contact.body.description import Body, Fixed
 from contact.interface.obstacle import Sphere
 from contact.mesh.grid import box
 from contact.methods.options import FixedPointOptions, NewtonOptions, PenaltyOptions
-from contact.output.table import contact_table
+from contact.output.surface import contact_table
 from contact.problem.contact import Contact
 from contact.problem.problem import ContactProblem
 from forms.hencky import Linear
