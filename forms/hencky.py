@@ -19,7 +19,7 @@ from numpy.typing import ArrayLike
 from ufl.core.expr import Expr
 
 from forms.elasticity import Anisotropic
-from forms.kinematics import CARTESIAN, Kinematics, deviator_squared, embed, strain
+from forms.kinematics import CARTESIAN, Strained, deviator_squared, embed, strain
 from forms.ops import Value, is_symbolic, log, maximum, sqrt
 
 
@@ -285,7 +285,7 @@ def energy_density(law: Law, eps: Expr) -> Expr:
     return law.bulk / 2 * ufl.tr(eps) ** 2 + law.shear_energy(deviator_squared(eps))
 
 
-def secant_form(law: Law, u: Expr, v: Expr, w: Expr, kinematics: Kinematics = CARTESIAN) -> Expr:
+def secant_form(law: Law, u: Expr, v: Expr, w: Expr, kinematics: Strained = CARTESIAN) -> Expr:
     """Return the integrand of the Kacanov form B(u; v, w) of section 3.4."""
     frozen, eps, test = (strain(f, kinematics) for f in (u, v, w))
     return ufl.inner(secant_stress(law, frozen, eps), test)

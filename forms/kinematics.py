@@ -28,6 +28,24 @@ class Kinematics(Protocol):
     def extent(self, x: Expr) -> Expr | None:
         """Return how much of the body a unit of the mesh stands for; None for a unit of it."""
 
+    def mean_gradient(self, u: Expr, centroid: Expr | None = None) -> Expr:
+        """Return the mean of the gradient of a quadratic u over a cell, a straight simplex.
+
+        Parameters
+        ----------
+        u
+            The displacement.
+        centroid
+            The centroid of the cell; None where the gradient is evaluated there.
+        """
+
+
+class Strained(Protocol):
+    """All that strains ask of a `Kinematics`."""
+
+    def gradient(self, u: Expr) -> Expr:
+        """Return the displacement gradient, a 3 x 3 tensor."""
+
 
 @dataclass(frozen=True)
 class Cartesian:
@@ -42,6 +60,11 @@ class Cartesian:
     def extent(self, x: Expr) -> None:
         """Return None: the mesh is the body."""
         return None
+
+    def mean_gradient(self, u: Expr, centroid: Expr | None = None) -> Expr:
+        """Return grad u at the centroid, by Taylor's formula: it is linear in the cell."""
+        grad = ufl.grad(u)
+        return embed(grad if centroid is None else grad + _directed(grad, _way(u, centroid)))
 
 
 @dataclass(frozen=True)
@@ -73,12 +96,88 @@ class Axisymmetric:
         """Return 2 pi r, the length of the ring through a point of the half plane."""
         return 2 * ufl.pi * x[0]
 
+    def mean_gradient(self, u: Expr, centroid: Expr | None = None) -> Expr:
+        """Return the mean over the ring: that of r times the gradient, over that of r.
+
+        r grad u and u_r are quadratic in the triangle: their means are their values at the
+        centroid, and their second derivatives times half of the triangle's second moments.
+        """
+        mesh = extract_unique_domain(u)
+        r, jacobian = ufl.SpatialCoordinate(mesh)[0], ufl.Jacobian(mesh)
+        moments = jacobian * ufl.as_matrix([[2, -1], [-1, 2]]) / 36 * ufl.transpose(jacobian)
+        weighted = embed(r * ufl.grad(u), u[0])
+        i, j, k, m = ufl.indices(4)
+        second = ufl.grad(ufl.grad(weighted))
+        if centroid is not None:
+            way = _way(u, centroid)
+            moments, r = moments + ufl.outer(way, way), centroid[0]
+            weighted += _directed(weighted, way)
+        return (weighted + ufl.as_tensor(second[i, j, k, m] * moments[k, m] / 2, (i, j))) / r
+
+
+@dataclass(frozen=True)
+class Isochoric:
+    """Another kinematics without its change of volume: strains are dev eps."""
+
+    base: Strained
+
+    def gradient(self, u: Expr) -> Expr:
+        """Return the deviator of the displacement gradient."""
+        return ufl.dev(self.base.gradient(u))
+
+
+@dataclass(frozen=True)
+class CellMean:
+    """The mean of another kinematics over each cell, to be taken at its centroid."""
+
+    base: Kinematics
+
+    def gradient(self, u: Expr) -> Expr:
+        """Return the mean of the displacement gradient."""
+        return self.base.mean_gradient(u)
+
+
+@dataclass(frozen=True)
+class MeanDilatation:
+    """Another kinematics whose volumetric strain is averaged over each cell: nothing locks.
+
+    eps_bar = dev eps + (1/3) mean(tr eps) I (Nagtegaal, Parks and Rice, CMAME 4, 1974; the B-bar
+    method of Hughes, IJNME 15, 1980): with quadratic displacements on straight simplices P2-P0 with
+    the pressure condensed.
+
+    Parameters
+    ----------
+    base
+        The kinematics without the mean.
+    centroid
+        The centroid of the cell, a vector that is constant in it.
+    """
+
+    base: Kinematics
+    centroid: Expr
+
+    def gradient(self, u: Expr) -> Expr:
+        """Return the displacement gradient with the mean of its trace."""
+        gradient, mean = self.base.gradient(u), self.base.mean_gradient(u, self.centroid)
+        return gradient + ufl.tr(mean - gradient) / 3 * ufl.Identity(3)
+
+
+def _way(u: Expr, centroid: Expr) -> Expr:
+    """Return the vector from the point of evaluation to the centroid of its cell."""
+    return centroid - ufl.SpatialCoordinate(extract_unique_domain(u))
+
+
+def _directed(tensor: Expr, way: Expr) -> Expr:
+    """Return the derivative of a tensor along a vector."""
+    i, j, k = ufl.indices(3)
+    return ufl.as_tensor(ufl.grad(tensor)[i, j, k] * way[k], (i, j))
+
 
 #: The kinematics of a mesh that is the body.
 CARTESIAN = Cartesian()
 
 
-def strain(u: Expr, kinematics: Kinematics = CARTESIAN) -> Expr:
+def strain(u: Expr, kinematics: Strained = CARTESIAN) -> Expr:
     """Return the linearised strain eps(u) = (grad u + grad u^T)/2, a 3 x 3 tensor."""
     return ufl.sym(kinematics.gradient(u))
 

@@ -28,7 +28,7 @@ from ufl.core.expr import Expr
 from forms.crystal import PLANE, VOIGT, coupling_tensor, to_axis, turned
 from forms.elasticity import Anisotropic, isotropic, mandel
 from forms.hencky import Law, secant_stress
-from forms.kinematics import CARTESIAN, Kinematics, embed, strain
+from forms.kinematics import CARTESIAN, CellMean, Isochoric, Strained, embed, strain
 
 
 @dataclass(frozen=True)
@@ -157,26 +157,33 @@ def coupling_number(law: Law, piezo: Piezo) -> float:
     return float(np.linalg.eigvals(np.linalg.solve(stiffness, induced)).real.max())
 
 
-def gradient(phi: Expr) -> Expr:
-    """Return grad(phi) as a vector of three components."""
+def gradient(phi: Expr, kinematics: Strained = CARTESIAN) -> Expr:
+    """Return grad(phi) as a vector of three components, its mean where strains are means."""
+    if isinstance(kinematics, Isochoric):
+        return gradient(phi, kinematics.base)
     g = ufl.grad(phi)
+    if isinstance(kinematics, CellMean):
+        along = ufl.as_vector([phi, *[0.0] * (g.ufl_shape[0] - 1)])
+        g = kinematics.gradient(along)[0, :]
     return g if g.ufl_shape == (3,) else ufl.as_vector([g[0], g[1], 0.0])
 
 
-def coupling_stress(piezo: Piezo, phi: Expr) -> Expr:
+def coupling_stress(piezo: Piezo, phi: Expr, kinematics: Strained = CARTESIAN) -> Expr:
     """Return e^T grad(phi), a 3 x 3 stress."""
     i, j, k = ufl.indices(3)
     e = ufl.as_tensor(piezo.e.tolist()) if isinstance(piezo.e, np.ndarray) else piezo.e
-    return ufl.as_tensor(e[i, j, k] * gradient(phi)[i], (j, k))
+    return ufl.as_tensor(e[i, j, k] * gradient(phi, kinematics)[i], (j, k))
 
 
-def electric_displacement(piezo: Piezo, eps: Expr, phi: Expr) -> Expr:
+def electric_displacement(
+    piezo: Piezo, eps: Expr, phi: Expr, kinematics: Strained = CARTESIAN
+) -> Expr:
     """Return D = e eps - beta grad(phi), a vector of three components."""
     i, j, k = ufl.indices(3)
     e = ufl.as_tensor(piezo.e.tolist()) if isinstance(piezo.e, np.ndarray) else piezo.e
     beta = ufl.as_tensor(piezo.beta.tolist()) if isinstance(piezo.beta, np.ndarray) else piezo.beta
     induced = ufl.as_tensor(e[i, j, k] * embed(eps)[j, k], (i,))
-    return induced - ufl.dot(beta, gradient(phi))
+    return induced - ufl.dot(beta, gradient(phi, kinematics))
 
 
 def saddle_form(
@@ -187,7 +194,7 @@ def saddle_form(
     eta: Expr,
     w: Expr,
     xi: Expr,
-    kinematics: Kinematics = CARTESIAN,
+    kinematics: Strained = CARTESIAN,
 ) -> Expr:
     """Return the integrand of B(x; y, z): positive, not symmetric, equation (5.16).
 
@@ -195,9 +202,9 @@ def saddle_form(
     z = (w, xi) the test function.
     """
     frozen, eps, test = (strain(f, kinematics) for f in (u, v, w))
-    sigma = secant_stress(law, frozen, eps) + coupling_stress(piezo, eta)
-    d = electric_displacement(piezo, eps, eta)
-    return ufl.inner(sigma, test) - ufl.inner(d, gradient(xi))
+    sigma = secant_stress(law, frozen, eps) + coupling_stress(piezo, eta, kinematics)
+    d = electric_displacement(piezo, eps, eta, kinematics)
+    return ufl.inner(sigma, test) - ufl.inner(d, gradient(xi, kinematics))
 
 
 def symmetrised_form(
@@ -208,7 +215,7 @@ def symmetrised_form(
     eta: Expr,
     w: Expr,
     xi: Expr,
-    kinematics: Kinematics = CARTESIAN,
+    kinematics: Strained = CARTESIAN,
 ) -> Expr:
     """Return the integrand of B-check(x; y, z) = B(x; y, (w, -xi)), equations (5.27), (5.31).
 

@@ -25,13 +25,13 @@ from ufl.core.expr import Expr
 
 from contact.body.component_norms import component_norms_of
 from contact.body.description import Body
+from contact.body.elements import STANDARD, check_element
 from contact.body.global_unknowns import make_global_unknowns
 from contact.body.loads import Loads, assembled
 from contact.body.materials import cells_of
 from contact.body.pointwise import Pointwise
 from contact.body.supports import free_components, supports_of, without_field
 from contact.body.weak_forms import WeakForms
-from contact.errors import InputError
 from contact.history import BodyState, Evaluated, InternalVariables
 from contact.linear.constraint import ConstrainedBulk, ConstrainedOperator, Constraint
 from contact.linear.layout import Layout
@@ -51,8 +51,8 @@ class BodyEquilibrium:
         Mesh and named parts.
     body
         Material, supports and loads.
-    degree
-        Degree of the Lagrange elements, 1 or 2.
+    degree, element
+        Degree of the Lagrange elements, 1 or 2, and which of `contact.body.elements`.
 
     Raises
     ------
@@ -62,11 +62,12 @@ class BodyEquilibrium:
 
     most_rounding = MOST_ROUNDING
 
-    def __init__(self, domain: Domain, body: Body, degree: int = 1) -> None:
+    def __init__(
+        self, domain: Domain, body: Body, degree: int = 1, element: str = STANDARD
+    ) -> None:
         body.check(domain.dim)
-        if degree not in (1, 2):
-            raise InputError(f"degree: given {degree!r}; accepted: 1 or 2")
-        self.domain, self.body, self.degree = domain, body, degree
+        check_element(element, degree)
+        self.domain, self.body, self.degree, self.element = domain, body, degree, element
         self.dim, self.phi_scale = domain.dim, body.phi_scale
         self.block_size = self.dim + (body.piezo is not None)
         self.space = fem.functionspace(domain.mesh, ("Lagrange", degree, (self.block_size,)))
@@ -97,7 +98,7 @@ class BodyEquilibrium:
             domain.revolved,
         )
         # Where the forms are evaluated is written anew by each query.
-        self._forms = WeakForms(domain, body, self.space, self.cells, degree)
+        self._forms = WeakForms(domain, body, self.space, self.cells, degree, element)
         self._at = self._forms.at
         #: The internal variables of the materials: the body's part of a history.
         self.variables = self._forms.variables
@@ -202,10 +203,10 @@ class BodyEquilibrium:
         self.variables.set(self.variables.of(state))
         forms.at.x.array[:] = self.nodal(state.x).ravel()
         if secant_at is None or self.linear:
-            forces = assembled(forms.law_forces, self.owned)
+            forces = sum(assembled(form, self.owned) for form in forms.law_forces)
         else:
             forms.secant_at.x.array[:] = self.nodal(secant_at).ravel()
-            forces = assembled(forms.secant_forces, self.owned)
+            forces = sum(assembled(form, self.owned) for form in forms.secant_forces)
         return np.concatenate([forces, np.zeros(self.global_unknowns.size)])
 
     def external(self, time: float = 1.0) -> Array:
@@ -229,17 +230,17 @@ class BodyEquilibrium:
 
     def create_matrix(self) -> PETSc.Mat:
         """Return an empty matrix with the pattern of the body. Collective."""
-        return create_matrix(self._forms.secant)
+        return create_matrix(self._forms.secant[0])
 
     def assemble(self, matrix: PETSc.Mat, kind: str, state: Evaluated) -> None:
         """Assemble Kacanov's "secant" or Newton's "tangent" at a state. Collective."""
         forms = self._forms
         self.variables.set(self.variables.of(state))
         forms.at.x.array[:] = forms.secant_at.x.array[:] = self.nodal(state.x).ravel()
-        form = forms.tangent if kind == "tangent" else forms.secant
         matrix.zeroEntries()
-        assemble_matrix(matrix, form, bcs=[s.condition for s in self.supports])
-        matrix.assemble()
+        for form in forms.tangent if kind == "tangent" else forms.secant:
+            assemble_matrix(matrix, form, bcs=[s.condition for s in self.supports])
+            matrix.assemble()
 
     def operator(
         self,

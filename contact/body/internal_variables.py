@@ -17,6 +17,7 @@ from numpy.typing import ArrayLike
 from ufl.core.expr import Expr
 
 from contact.body.description import Material
+from contact.body.elements import kinematics_of
 from contact.body.materials import law_with_constants
 from contact.body.pointwise import Pointwise
 from contact.errors import InputError
@@ -41,6 +42,8 @@ class QuadratureVariables:
         The owned cells of each.
     degree
         Of the quadrature.
+    element
+        Which of `contact.body.elements`.
 
     Attributes
     ----------
@@ -57,10 +60,15 @@ class QuadratureVariables:
     """
 
     def __init__(
-        self, domain: Domain, materials: Sequence[Material], cells: Sequence[Indices], degree: int
+        self,
+        domain: Domain,
+        materials: Sequence[Material],
+        cells: Sequence[Indices],
+        degree: int,
+        element: str,
     ) -> None:
         self._domain, self._materials, self._cells = domain, materials, cells
-        self._degree = degree
+        self._degree, self._kind = degree, element
         mesh = domain.mesh
         self._owned = mesh.topology.index_map(mesh.topology.dim).size_local
         self._functions: dict[str, fem.Function] = {}
@@ -167,7 +175,7 @@ class QuadratureVariables:
         """Return the variables at the end of a step in a material, one after the other."""
         law = self.law(law_with_constants(self._materials[index].law, self._domain.mesh))
         u = ufl.as_vector([at[i] for i in range(self._domain.dim)])
-        return ufl.as_vector(self.updated(law, strain(u, self._domain.kinematics)))
+        return ufl.as_vector(self.updated(law, strain(u, kinematics_of(self._domain, self._kind))))
 
     def updated(self, law: Law, eps: Expr) -> list[Expr]:
         """Return the components of all variables at the end of a step; 0 if a law has them not."""

@@ -8,6 +8,7 @@ from mpi4py import MPI
 from pydantic import Field, model_validator
 
 from contact.body import description
+from contact.body.elements import MEAN_DILATATION, NEEDS
 from contact.case.formula import as_field
 from contact.case.messages import Words, fault
 from contact.case.section import (
@@ -31,10 +32,19 @@ class Space(Section):
 
     degree: Annotated[int, Field(ge=1, le=2), Accepted("1 or 2")] = 1
     """Degree of the Lagrange elements of the displacement and the potential."""
+    element: Literal["standard", "mean_dilatation"] = "standard"
+    """`"mean_dilatation"`: volumetric strains are averaged over each cell, so that nearly
+    incompressible bodies, and yielding ones, do not lock. With `degree = 2`: P2-P0."""
     kinematics: Literal["plane_strain", "axisymmetric"] = "plane_strain"
     """The body of a mesh in 2-D: in plane strain, or a body of revolution whose half plane the
     mesh is, x the radius and y the axis. There displacements are 0 across the axis without being
     asked for, and loads, forces and charges are those of the full turn."""
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        if self.element == MEAN_DILATATION and self.degree != 2:
+            raise fault("element", self.element, NEEDS)
+        return self
 
 
 class Fixed(Section):

@@ -73,7 +73,9 @@ def build_problem(
         )
         own = {"coefficient": coefficient, "law": friction}
         contacts = _contacts(case, domain, foundation, layer, own)
-        problem = ContactProblem(domain, body, contacts, degree=case.space.degree)
+        problem = ContactProblem(
+            domain, body, contacts, degree=case.space.degree, element=case.space.element
+        )
         for time in (1.0,) if case.evolution is None else case.evolution.times[1:]:
             check_problem(problem.at(time))
         for time in () if case.evolution is None else case.evolution.ends:

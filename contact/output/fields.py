@@ -19,6 +19,7 @@ from ufl.core.expr import Expr
 
 from contact import _compat
 from contact.body.description import Material
+from contact.body.elements import kinematics_of
 from contact.body.equilibrium import BodyEquilibrium
 from contact.body.materials import law_with_constants, piezo_with_constants
 from contact.history import BodyState, Evaluated
@@ -28,7 +29,7 @@ from contact.problem.state import State
 from contact.typing import Array
 from forms.elasticity import Anisotropic
 from forms.hencky import HistoryLaw, stress
-from forms.kinematics import Axisymmetric, deviator_squared, strain, von_mises
+from forms.kinematics import deviator_squared, strain, von_mises
 from forms.ops import maximum, sqrt
 from forms.piezo import coupling_stress, electric_displacement
 
@@ -96,10 +97,10 @@ class Point:
     """A point of a body of some material at some unknowns as the quantities see it, in UFL."""
 
     def __init__(self, body: BodyEquilibrium, material: Material, at: fem.Function) -> None:
-        mesh, revolved = body.domain.mesh, body.domain.revolved
+        mesh = body.domain.mesh
         u, self._phi = body.split(at)
         # The nodes may lie on the axis.
-        kinematics = Axisymmetric(on_axis=True) if revolved else body.domain.kinematics
+        kinematics = kinematics_of(body.domain, body.element, on_axis=True)
         self._dim, self.strain = body.dim, strain(u, kinematics)
         self._piezo = material.piezo and piezo_with_constants(material.piezo, mesh)
         self.law = body.variables.law_of_means(law_with_constants(material.law, mesh))

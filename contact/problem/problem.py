@@ -12,6 +12,7 @@ from mpi4py import MPI
 
 from contact.arguments import expect, several
 from contact.body.description import Body
+from contact.body.elements import STANDARD
 from contact.body.equilibrium import BodyEquilibrium
 from contact.body.global_unknowns import GlobalUnknowns
 from contact.body.internal_variables import VARIABLES
@@ -98,8 +99,9 @@ class ContactProblem:
         Friction law of contacts that have none of their own; none by default.
     conductor
         Electric contact, likewise; None for an insulated foundation.
-    degree
-        Degree of the Lagrange elements, 1 or 2.
+    degree, element
+        Degree of the Lagrange elements, 1 or 2, and which of `contact.body.elements`: "standard",
+        or "mean_dilatation" of degree 2.
 
     Attributes
     ----------
@@ -135,6 +137,7 @@ class ContactProblem:
         friction: Friction | None = None,
         conductor: Conductor | None = None,
         degree: int = 1,
+        element: str = STANDARD,
     ) -> None:
         self.domain, self.body = domain, body
         expect("domain", domain, "Domain.from_mesh(...), from_msh(...)", isinstance(domain, Domain))
@@ -150,7 +153,7 @@ class ContactProblem:
             )
             for contact in given
         )
-        self.equilibrium = BodyEquilibrium(domain, body, degree)
+        self.equilibrium = BodyEquilibrium(domain, body, degree, element)
         self.interface = self._interface()
         self.scales = self._scales()
         self.time = 1.0
