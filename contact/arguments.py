@@ -8,9 +8,7 @@ from dataclasses import dataclass, field
 from typing import Any, TypeVar
 
 import numpy as np
-from mpi4py import MPI
 
-from contact._compat import lasting
 from contact.errors import InputError
 from contact.tolerances import HUGE
 from contact.typing import Array
@@ -118,22 +116,6 @@ def naming(name: str) -> Iterator[None]:
         raise InputError(
             f"{name}: the function raises {type(error).__name__}: {shorten(str(error))}"
         ) from error
-
-
-@contextmanager
-def on_all_ranks(comm: MPI.Intracomm) -> Iterator[None]:
-    """Raise on all ranks the error of one of them. Collective."""
-    failure = None
-    try:
-        yield
-    except InputError as error:
-        failure = error
-    messages = lasting(comm).allgather(None if failure is None else str(failure))
-    if failure is not None:
-        raise failure
-    for message in messages:
-        if message is not None:
-            raise InputError(message)
 
 
 @dataclass(frozen=True)

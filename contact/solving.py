@@ -30,7 +30,6 @@ from contact.methods.report import IterationHistory, Monitor, Outcome, tell
 from contact.methods.steps import Evolution, solve_step
 from contact.nesting import nested_start, pays
 from contact.output.checkpoint import Checkpoints, kept_digest, read_steps
-from contact.output.folder import on_root
 from contact.output.remarks import announce
 from contact.output.solution import Solution, StepRecord
 from contact.output.steps import StepRecorder
@@ -38,6 +37,7 @@ from contact.problem.checks import check_potential, check_problem, check_support
 from contact.problem.kkt import evaluate
 from contact.problem.problem import ContactProblem
 from contact.problem.state import State
+from contact.ranks import on_root
 
 logger = logging.getLogger("contact.steps")
 

@@ -17,6 +17,7 @@ LAYERS = (
         "settings",
         "_compat",
         "arguments",
+        "ranks",
         "history",
     },
     {"mesh", "library"},

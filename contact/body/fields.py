@@ -16,8 +16,9 @@ from mpi4py import MPI
 from ufl.core.expr import Expr
 
 from contact import _compat
-from contact.arguments import OfTime, check_finite, expect, naming, on_all_ranks, real
+from contact.arguments import OfTime, check_finite, expect, naming, real
 from contact.errors import InputError
+from contact.ranks import on_all_ranks
 from contact.typing import Array
 
 #: A factor as a function of time.

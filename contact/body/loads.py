@@ -16,11 +16,12 @@ from ufl.constantvalue import ScalarValue
 from ufl.core.expr import Expr
 from ufl.corealg.traversal import traverse_unique_terminals
 
-from contact.arguments import check_finite, naming, on_all_ranks, real
+from contact.arguments import check_finite, naming, real
 from contact.body.description import Body, Field, Load
 from contact.body.fields import Amplitude, Moving, at_time, constant
 from contact.errors import InputError
 from contact.mesh.domain import Domain
+from contact.ranks import on_all_ranks
 from contact.tolerances import HUGE
 from contact.typing import Array
 from forms.piezo import electric_load

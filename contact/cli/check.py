@@ -19,10 +19,10 @@ from contact.methods.options import NewtonOptions
 from contact.nesting import coarser_cases
 from contact.output import environment
 from contact.output.bodies import passing
-from contact.output.folder import on_root
 from contact.output.remarks import fitting
 from contact.problem.checks import expected_displacements
 from contact.problem.problem import ContactProblem
+from contact.ranks import on_root
 from contact.typing import Array
 
 #: Mean ratio below which a cell is called thin.

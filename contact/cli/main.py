@@ -30,7 +30,7 @@ from contact.methods.interrupt import (
     ending_on_signal,
     signals_held,
 )
-from contact.output.folder import on_root, refused
+from contact.ranks import on_root, refused
 
 CONVERGED, NOT_CONVERGED, BAD_INPUT = 0, 1, 2
 #: EX_SOFTWARE: a fault of the program.

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from contact.cli.main import CONVERGED
 from contact.library.materials import PACKAGED, Entry, find, library
-from contact.output.folder import on_root
+from contact.ranks import on_root
 
 
 def run(options: argparse.Namespace, comm: MPI.Intracomm) -> int:

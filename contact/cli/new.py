@@ -15,7 +15,7 @@ from contact.errors import InputError
 from contact.interface.pairing import facing_parts
 from contact.mesh.domain import Domain
 from contact.mesh.reader import from_msh
-from contact.output.folder import on_root
+from contact.ranks import on_root
 
 
 def run(options: argparse.Namespace, comm: MPI.Intracomm) -> int:

@@ -14,7 +14,7 @@ from contact.errors import InputError
 from contact.methods.interrupt import signals_held
 from contact.output.figures.figures import FORMATS, animate, plot
 from contact.output.figures.style import Look
-from contact.output.folder import on_root
+from contact.ranks import on_root
 
 _LENGTH = re.compile(r"(\d+(?:\.\d*)?)\s*(mm|cm|in)")
 _INCHES = {"mm": 1 / 25.4, "cm": 1 / 2.54, "in": 1.0}

@@ -15,7 +15,7 @@ from mpi4py import MPI
 
 from contact.errors import InputError
 from contact.methods.report import Monitor, Record
-from contact.output.folder import on_root
+from contact.ranks import on_root
 
 #: Seconds between two reports of inner iterations: on a terminal, and in plain lines.
 OFTEN, SELDOM = 0.2, 10.0

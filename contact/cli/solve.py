@@ -19,9 +19,10 @@ from contact.errors import InputError
 from contact.methods.interrupt import SIGNALLED, Terminated, signals_held
 from contact.output.checkpoint import case_of, discard, kept_case
 from contact.output.files import write_outputs
-from contact.output.folder import SUMMARY, check_members, on_root, read_json, result_folder
+from contact.output.folder import SUMMARY, check_members, read_json, result_folder
 from contact.output.rerun import check_same
 from contact.output.solution import Solution
+from contact.ranks import on_root
 from contact.solving import SolveInterrupted, solve
 from contact.sweeping import TABLE, Axis, sweep
 

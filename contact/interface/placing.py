@@ -11,7 +11,7 @@ from dolfinx import fem
 from mpi4py import MPI
 from numpy.typing import NDArray
 
-from contact.arguments import naming, on_all_ranks
+from contact.arguments import naming
 from contact.body.equilibrium import BodyEquilibrium
 from contact.errors import InputError
 from contact.interface.mortar.lumping import Lumping, Mixing
@@ -21,6 +21,7 @@ from contact.interface.obstacle import Obstacle, Shape
 from contact.interface.obstacle.protocol import measured
 from contact.mesh.domain import Domain
 from contact.mesh.entities import owned_among
+from contact.ranks import on_all_ranks
 from contact.typing import Array
 
 

@@ -8,8 +8,8 @@ from numpy.typing import NDArray
 from scipy.linalg.lapack import dgetrf, dgetrs
 
 from contact.history import Evaluated
-from contact.linear.first_rank import from_first
 from contact.linear.operator import Counters
+from contact.ranks import on_root
 from contact.typing import Array
 
 
@@ -40,7 +40,7 @@ class DenseOperator:
         """Add up and factorise. Collective; see `operator.SparseOperator.update`."""
         free = self._free.astype(float)
         gathered = self._comm.gather(blocks * free[:, :, None] * free[:, None, :])
-        from_first(self._comm, lambda: self._factorise(np.concatenate(gathered)))
+        on_root(self._comm, lambda: self._factorise(np.concatenate(gathered)))
         self.counters.factorizations += 1
         return True
 
@@ -60,4 +60,4 @@ class DenseOperator:
             return np.asarray(dgetrs(self._factors, self._pivots, np.concatenate(total))[0])
 
         begin = self._comm.scan(rhs.size) - rhs.size
-        return from_first(self._comm, solved)[begin : begin + rhs.size]
+        return on_root(self._comm, solved)[begin : begin + rhs.size]

@@ -30,10 +30,11 @@ from contact import _compat
 from contact.errors import InputError
 from contact.history import CONTACT_NODES, QUADRATURE_POINTS
 from contact.interface.jump import Multipliers
-from contact.output.folder import kind, on_root, read_json, settle
+from contact.output.folder import kind, read_json, settle
 from contact.output.solution import Solution, StepRecord
 from contact.problem.problem import ContactProblem
 from contact.problem.state import State
+from contact.ranks import on_root
 from contact.typing import Array
 
 #: Folder of the checkpoints in that of the results, that of a run which has not ended a step yet,

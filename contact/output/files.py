@@ -12,7 +12,7 @@ import numpy as np
 
 from contact.arguments import expect
 from contact.output.field_files import write_fields
-from contact.output.folder import ResultFolder, on_root, result_folder
+from contact.output.folder import ResultFolder, result_folder
 from contact.output.quantities import (
     AGAINST,
     HISTORY,
@@ -32,6 +32,7 @@ from contact.output.surface import (
 )
 from contact.output.table import write_csv, write_table
 from contact.output.vtu import write_vtu
+from contact.ranks import on_root
 
 
 def write_outputs(

@@ -31,12 +31,13 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 
 from mpi4py import MPI
 
 from contact.errors import InputError
 from contact.methods.interrupt import signals_held
+from contact.ranks import on_root
 
 logger = logging.getLogger("contact.output")
 
@@ -57,39 +58,6 @@ _MEMBER = re.compile(r"[A-Za-z0-9][\w-]*\.(json|csv|bp|npz|xdmf|h5|vtkhdf|pvd|vt
 _ADIOS = re.compile(r"(data|md|mmd)\.(\d+|idx)|profiling\.json|active")
 #: Answers of file systems without locks.
 _NO_LOCKS = (errno.ENOLCK, errno.ENOSYS, errno.EOPNOTSUPP)
-
-T = TypeVar("T")
-
-
-def on_root(comm: MPI.Intracomm, action: Callable[[], T]) -> T:
-    """Do something with files on rank 0; its result, or its InputError, is that of all ranks.
-
-    Raises
-    ------
-    InputError
-        Also where the system refuses something.
-    """
-    result: Any = None
-    if comm.rank == 0:
-        try:
-            result = action()
-        except InputError as error:
-            result = error
-        except OSError as error:
-            result = refused(error)
-    result = comm.bcast(result)
-    if isinstance(result, InputError):
-        raise result
-    return result
-
-
-def refused(error: OSError) -> InputError:
-    """Return a refusal of the system in words."""
-    where = "a file" if error.filename is None else error.filename
-    return InputError(
-        f"{where}: {error.strerror or error}; accepted: a place to write to, with room for the "
-        "results (earlier results are kept)"
-    )
 
 
 @dataclass(frozen=True)

@@ -17,8 +17,8 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 
 from contact.body.rigid import Rigid, rigid_motions
-from contact.linear.first_rank import together
 from contact.problem.problem import ContactProblem
+from contact.ranks import on_root
 from contact.typing import Array
 
 #: Rigid motions in the order of `rigid_motions`.
@@ -332,8 +332,7 @@ class UnilateralSupport:
         work = comm.allreduce(moved[: body.owned].T @ own, op=MPI.SUM)
         work = (work + moved[body.owned :].T @ on_masters) @ self.free
         scale = comm.allreduce(float(np.abs(own).sum()), op=MPI.SUM) + np.abs(on_masters).sum()
-        first = comm.rank == 0
-        return bool(comm.bcast(together(comm, lambda: first and self._balances(work, scale))))
+        return on_root(comm, lambda: self._balances(work, scale))
 
     def _balances(self, work: Array, scale: float) -> bool:
         """Tell whether contact can balance a work of loads, on the rank that has the cone."""

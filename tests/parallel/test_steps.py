@@ -5,7 +5,7 @@ import pytest
 from mpi4py import MPI
 
 from contact import solve
-from contact.output.folder import on_root
+from contact.ranks import on_root
 from tests.output.test_steps import case_of
 
 pytestmark = pytest.mark.parallel

@@ -7,7 +7,6 @@ from petsc4py import PETSc
 
 from contact.history import BodyState
 from contact.interface.friction import Friction
-from contact.linear.first_rank import from_first
 from contact.linear.operator import Counters, SparseOperator
 from contact.linear.schur import SchurComplement
 from contact.methods.newton import Newton
@@ -16,6 +15,7 @@ from contact.problem import condensed
 from contact.problem.kkt import evaluate
 from contact.problem.problem import ContactProblem
 from contact.problem.state import State
+from contact.ranks import on_root
 from forms.hencky import Linear
 from forms.laws import ConstantCoefficient
 from tests.problems import mechanics
@@ -46,7 +46,7 @@ def test_condensing_and_expanding_solves_the_whole_system(cells):
     assert np.allclose(stiffness, stiffness.T, rtol=0, atol=1e-13)
     rhs = body.layout.mask(body.external())
     forces = schur.condense(rhs, schur.interior(rhs))
-    found = schur.expand(rhs, from_first(WORLD, lambda: np.linalg.solve(stiffness, forces)))
+    found = schur.expand(rhs, on_root(WORLD, lambda: np.linalg.solve(stiffness, forces)))
     largest = WORLD.allreduce(np.abs(whole).max(initial=0.0), op=MPI.MAX)
     assert np.allclose(found, whole, rtol=0, atol=1e-9 * largest)
     for times in (2.0, 4.0):

@@ -10,9 +10,10 @@ from typing import Annotated, ClassVar, Protocol
 import numpy as np
 from mpi4py import MPI
 
-from contact.arguments import expect, naming, on_all_ranks, real
+from contact.arguments import expect, naming, real
 from contact.body.fields import Given, field
 from contact.errors import InputError
+from contact.ranks import on_all_ranks
 from contact.settings import Internal
 from contact.typing import Array
 

@@ -20,7 +20,8 @@ from contact.output.figures.contact import contact_figure
 from contact.output.figures.run import Run, read_run, read_steps
 from contact.output.figures.steps import steps_figures
 from contact.output.figures.style import DEFORMED, OUTLIERS, PAGE, STYLE, Look, named
-from contact.output.folder import add, begin, discard, refused, result_folder
+from contact.output.folder import add, begin, discard, result_folder
+from contact.ranks import refused
 
 #: Endings of files that figures may have.
 FORMATS = ("png", "pdf", "svg")

@@ -18,10 +18,10 @@ from scipy.spatial import KDTree
 
 from contact.errors import InputError
 from contact.output.figures.style import heading
-from contact.output.folder import refused
 from contact.output.options import Units
 from contact.output.quantities import OPPOSITE
 from contact.output.table import Table
+from contact.ranks import refused
 from contact.typing import Array
 
 T = TypeVar("T")

@@ -6,8 +6,8 @@ from mpi4py import MPI
 
 from contact.history import BodyState
 from contact.linear.dense import DenseOperator
-from contact.linear.first_rank import from_first, together
 from contact.linear.operator import Counters
+from contact.ranks import on_all_ranks, on_root
 
 COMM = MPI.COMM_WORLD
 
@@ -19,16 +19,19 @@ def fails():
 @pytest.mark.parallel
 def test_what_the_first_rank_raises():
     with pytest.raises(MemoryError, match="no room"):
-        from_first(COMM, fails)
-    assert np.array_equal(from_first(COMM, lambda: np.arange(3.0)), np.arange(3.0))
+        on_root(COMM, fails)
+    assert np.array_equal(on_root(COMM, lambda: np.arange(3.0)), np.arange(3.0))
 
 
 @pytest.mark.parallel
 def test_what_the_last_rank_raises():
     last = COMM.rank == COMM.size - 1
     with pytest.raises(MemoryError, match="no room"):
-        together(COMM, fails if last else lambda: None)
-    assert together(COMM, lambda: COMM.rank) == COMM.rank
+        with on_all_ranks(COMM):
+            if last:
+                fails()
+    with on_all_ranks(COMM):
+        pass
 
 
 @pytest.mark.parallel
