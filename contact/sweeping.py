@@ -21,8 +21,7 @@ from typing import Any
 from mpi4py import MPI
 
 from contact.case.build import build_problem, named
-from contact.case.digest import difference as changed_input
-from contact.case.digest import digest
+from contact.case.digest import changed_input, difference, digest
 from contact.case.file import Case, load_case
 from contact.case.text import literal, to_toml
 from contact.errors import InputError
@@ -33,7 +32,6 @@ from contact.methods.options import NewtonOptions, Options
 from contact.methods.report import Monitor, tell
 from contact.methods.steps import Reached, predicted, since, solve_step
 from contact.output.quantities import SWEEP, values_of
-from contact.output.rerun import difference
 from contact.output.solution import Solution
 from contact.output.table import write_csv
 from contact.problem.checks import check_potential

@@ -1,15 +1,18 @@
-"""Sections of the case file about the body: elements, supports and loads."""
+"""Sections of the case file about the body: elements, supports, loads, rigid parts, load steps."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from itertools import pairwise
 from typing import Annotated, Any, Literal, Self, TypeAlias
 
+import numpy as np
 from mpi4py import MPI
-from pydantic import Field, model_validator
+from pydantic import Field, Tag, model_validator
 
-from contact.body import description
+from contact.body import description, rigid
 from contact.body.elements import MEAN_DILATATION, NEEDS
-from contact.case.formula import as_field
+from contact.case.formula import Expression, as_field, as_number
 from contact.case.messages import Words, fault
 from contact.case.section import (
     AmplitudeName,
@@ -18,10 +21,16 @@ from contact.case.section import (
     FormulaVector,
     Part,
     Section,
+    Text,
+    TimeComponent,
+    TimeFormula,
+    Vector,
+    as_given,
     as_tuple,
     few,
+    one_or_many,
 )
-from contact.settings import SPATIAL, Accepted, Switch
+from contact.settings import SPATIAL, Accepted, Count, Number, Switch
 
 #: `contact.case.file.Case`, of which these are sections.
 Case: TypeAlias = Any
@@ -150,3 +159,216 @@ class Load(Section):
             as_field(f"{key}.{charge}", getattr(self, charge), comm),
             case.amplitude(self.amplitude),
         )
+
+
+ZERO = Expression(0.0)
+
+Components: TypeAlias = Annotated[
+    tuple[TimeComponent, ...],
+    few,
+    as_tuple,
+    SPATIAL,
+    Accepted('a list of 2 components in 2-D, 3 in 3-D, each a number, a formula in t or "free"'),
+]
+Forces: TypeAlias = Annotated[
+    tuple[TimeFormula, ...],
+    few,
+    as_tuple,
+    SPATIAL,
+    Accepted("a list of 2 numbers or formulas in t in 2-D, 3 in 3-D"),
+]
+Rotation: TypeAlias = Annotated[
+    Annotated[TimeComponent, Tag("one")] | Annotated[Components, Tag("many")],
+    one_or_many,
+    Accepted('in 2-D an angle, a formula in t or "free", in 3-D a list of 3 of these'),
+]
+Moment: TypeAlias = Annotated[
+    Annotated[TimeFormula, Tag("one")] | Annotated[Forces, Tag("many")],
+    one_or_many,
+    Accepted("in 2-D a number or a formula in t, in 3-D a list of 3 of these"),
+]
+
+
+class Moving(Section):
+    """A rigid-body motion: each component is given, or free under a given force."""
+
+    displacement: Components | None = None
+    """Displacement; `"free"` for a component that its force determines. Default: 0."""
+    force: Forces | None = None
+    """Force on the free components of the displacement. Default: 0."""
+    rotation: Rotation = ZERO
+    """Rotation about `centre` (degrees, small), or `"free"`."""
+    moment: Moment = ZERO
+    """Moment about `centre` on a free rotation."""
+    centre: Vector | None = None
+    """Centre of rotation. Required where something turns."""
+    amplitude: AmplitudeName | None = None
+    """Factor of all of these as a function of time, see `[evolution]`."""
+
+    @property
+    def turns(self) -> tuple[Expression | str, ...]:
+        """The rotation, as a list."""
+        return self.rotation if isinstance(self.rotation, tuple) else (self.rotation,)
+
+    @property
+    def moments(self) -> tuple[Expression, ...]:
+        """The moment, as a list."""
+        return self.moment if isinstance(self.moment, tuple) else (self.moment,)
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        _check_free("force", self.force or (), self.displacement or (), "displacement")
+        _check_free("moment", self.moments, self.turns, "rotation")
+        if self.centre is None and any(turn != ZERO for turn in self.turns):
+            raise fault("centre", Words("missing"), "a point about which it turns")
+        return self
+
+    def check_dimension(self, key: str, dimension: int) -> None:
+        """Raise a fault if a rotation is none of the space."""
+        for name in ("rotation", "moment"):
+            value = getattr(self, name)
+            if isinstance(value, tuple):
+                fits = dimension == 3 and len(value) == 3
+            else:
+                fits = dimension == 2 or value == ZERO
+            if not fits:
+                accepted = "one angle or moment in 2-D, a list of 3 in 3-D"
+                raise fault(f"{key}.{name}", as_given(value), accepted)
+
+    def check_along_axis(self, key: str) -> None:
+        """Raise a fault if a motion leaves the axis of a body of revolution."""
+        across = (self.displacement or (ZERO,))[0]
+        if across != ZERO:
+            accepted = "0 across the axis of a body of revolution"
+            raise fault(f"{key}.displacement.0", as_given(across), accepted)
+        if any(turn != ZERO for turn in self.turns):
+            raise fault(f"{key}.rotation", Words("given"), "no rotation of a body of revolution")
+
+    def motion(self, case: Case, dim: int) -> rigid.Motion:
+        """Return the motion itself, of a body in 2-D or 3-D."""
+        turns = 2 * dim - 3
+        return rigid.Motion(
+            _components(self.displacement or (), dim),
+            _components(self.turns, turns, np.pi / 180),
+            _components(self.force or (), dim),
+            _components(self.moments, turns),
+            self.centre or (0.0,) * dim,
+            case.amplitude(self.amplitude),
+        )
+
+
+class Rigid(Moving):
+    """`[contact.rigid]`: the foundation moves as a rigid body. Absent: it is fixed."""
+
+
+class RigidPart(Moving):
+    """`[[rigid]]`: a part that moves as a rigid body, such as a plate that loads the body."""
+
+    on: Part
+    """Part of the boundary, or a list of parts."""
+
+
+class Electrode(Section):
+    """`[[electrode]]`: a part with one unknown potential, whose charge is given."""
+
+    on: Part
+    """Part of the boundary, or a list of parts."""
+    charge: TimeFormula = ZERO
+    """Its charge; 0: open circuit."""
+    amplitude: AmplitudeName | None = None
+    """Factor of the charge as a function of time, see `[evolution]`."""
+
+    def build(self, case: Case) -> rigid.Electrode:
+        """Return the electrode itself."""
+        return rigid.Electrode(self.on, as_number(self.charge), case.amplitude(self.amplitude))
+
+
+def _check_free(
+    key: str, forces: Sequence[Expression], moves: Sequence[Expression | str], name: str
+) -> None:
+    """Raise a fault if a force acts on a component that is not free."""
+    for k, force in enumerate(forces):
+        if force != ZERO and moves[k : k + 1] != ("free",):
+            path = f"{key}.{k}" if len(forces) > 1 else key
+            raise fault(path, as_given(force), f'a {key} where the {name} is "free"')
+
+
+def _components(values: Sequence[Expression | str], size: int, unit: float = 1.0) -> list[Any]:
+    """Return components, None for those that are free, and 0 where none are given."""
+    known = [None if isinstance(value, str) else as_number(value, unit) for value in values]
+    return [*known, *[0.0] * (size - len(known))][:size]
+
+
+Increasing: TypeAlias = Annotated[
+    tuple[Number, ...],
+    Field(min_length=2),
+    as_tuple,
+    Accepted("a list of 2 numbers or more that increase"),
+]
+
+
+def _check_increasing(key: str, times: tuple[float, ...]) -> None:
+    if any(after <= before for before, after in pairwise(times)):
+        raise fault(key, times, "numbers that increase")
+
+
+class Amplitude(Section):
+    """`[evolution.amplitudes.NAME]`: a factor as a function of time, linear between the values."""
+
+    time: Increasing
+    """Times; the first and the last step lie within them."""
+    value: Annotated[tuple[Number, ...], as_tuple, Accepted("a list of numbers, one for each time")]
+    """Values at these times."""
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        _check_increasing("time", self.time)
+        if len(self.value) != len(self.time):
+            raise fault("value", self.value, f"{len(self.time)} values, as many as times")
+        return self
+
+    def __call__(self, time: float) -> float:
+        """Return the factor at a time."""
+        return float(np.interp(time, self.time, self.value))
+
+
+class Evolution(Section):
+    """`[evolution]`: quasi-static load steps with incremental friction. Absent: one static step.
+
+    Friction acts on the slip of each step. A step that fails is halved, up to four times.
+    """
+
+    times: Increasing
+    """Ends of the stages; the body is in its reference configuration at the first."""
+    steps: Annotated[
+        tuple[Count, ...],
+        as_tuple,
+        Accepted("a list of whole numbers from 1 to 10000000, one for each stage"),
+    ]
+    """Number of equal steps in each stage."""
+    amplitudes: dict[Text, Amplitude] = Field(default={})
+    """Factors by name, for the key `amplitude` of `[[fixed]]`, `[[load]]`, `[electric]`,
+    `[contact.rigid]`, `[[rigid]]`, `[[electrode]]`. Without one they act all
+    the time."""
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        _check_increasing("times", self.times)
+        stages = len(self.times) - 1
+        if len(self.steps) != stages:
+            raise fault("steps", self.steps, f"{stages} numbers, one for each stage between times")
+        for name, amplitude in self.amplitudes.items():
+            first, last = amplitude.time[0], amplitude.time[-1]
+            if first > self.times[0] or last < self.times[-1]:
+                accepted = f"times that reach from {self.times[0]:g} to {self.times[-1]:g}"
+                raise fault(f"amplitudes.{name}.time", amplitude.time, accepted)
+        return self
+
+    @property
+    def ends(self) -> list[float]:
+        """Ends of all steps."""
+        return [
+            end if k == count - 1 else begin + (end - begin) * (k + 1) / count
+            for (begin, end), count in zip(pairwise(self.times), self.steps, strict=True)
+            for k in range(count)
+        ]

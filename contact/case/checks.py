@@ -6,6 +6,7 @@ import math
 from collections.abc import Iterable
 from typing import Any, TypeAlias
 
+from contact.case.body import ZERO
 from contact.case.formula import Expression
 from contact.case.messages import Words, fault, listed, nearest
 from contact.case.section import (
@@ -20,8 +21,6 @@ from contact.tolerances import HUGE
 
 #: `contact.case.file.Case`, which calls these checks.
 Case: TypeAlias = Any
-
-ZERO = Expression(0.0)
 
 #: Beginnings of the keys that may depend on the time.
 TIMED = ("fixed.", "load.", "rigid.", "electrode.")

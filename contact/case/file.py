@@ -26,14 +26,12 @@ from pydantic import (
 from pydantic_core import PydanticCustomError
 
 from contact.body.fields import Amplitude, steady
-from contact.case.body import Fixed, Load, Space
+from contact.case.body import Electrode, Evolution, Fixed, Load, Moving, RigidPart, Space
 from contact.case.checks import check_mesh, check_sections
-from contact.case.evolution import Evolution
 from contact.case.interface import Contact, Electric, Friction
 from contact.case.material import Material
 from contact.case.mesh import Mesh
 from contact.case.messages import clipped, describe, describe_fault, fault, keys_of, path_of, shown
-from contact.case.rigid import Electrode, Moving, RigidPart
 from contact.case.section import (
     FromTable,
     Section,

@@ -1,37 +1,96 @@
-"""Sections of the case file about Gamma_3: contact, friction and electric contact."""
+"""Sections of the case file about Gamma_3: shapes, contact, friction and electric contact."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
-from typing import Annotated, Any, Literal, Self, TypeAlias
+from functools import partial
+from typing import Annotated, Any, ClassVar, Literal, Self, TypeAlias
 
 import numpy as np
 from mpi4py import MPI
 from pydantic import Field, Tag, model_validator
 
 from contact.body.fields import steady
+from contact.case.body import Rigid
 from contact.case.formula import Expression, NodalField, as_field, as_number
 from contact.case.messages import Words, fault
-from contact.case.rigid import Rigid
 from contact.case.section import (
     AmplitudeName,
     Direction,
+    File,
+    Formula,
+    FromTable,
     NonNegativeFormula,
     Part,
     Section,
     TimeFormula,
     formula_or_table,
 )
-from contact.case.shapes import Foundation
-from contact.interface import friction
+from contact.errors import InputError
+from contact.interface import friction, obstacle
 from contact.interface.law import Conductor
 from contact.interface.layer import Layer
-from contact.interface.obstacle import GapFunction, Obstacle
+from contact.interface.obstacle import GapFunction, Obstacle, Shape
+from contact.interface.obstacle.triangles import read_stl
 from contact.mesh.domain import Domain
 from contact.mesh.together import meet
 from contact.settings import Accepted, NonNegative, Positive, ReadWith, Switch
+from contact.typing import Array
 from forms import laws
+
+
+class Distance(Section):
+    """`foundation = { shape = "distance", ... }`: any rigid shape by a formula."""
+
+    only: ClassVar[int | None] = None
+
+    shape: Literal["distance"]
+    """A body where a formula is negative."""
+    distance: Formula
+    """Signed distance, positive outside. Where its slope is not 1 it is divided by that."""
+
+    def build(self) -> Shape:
+        """Return the shape itself."""
+        return obstacle.Level(partial(_quiet, self.distance))
+
+
+class Surface(Section):
+    """`foundation = { shape = "surface", ... }`: rigid surface of triangles, in 3-D."""
+
+    only: ClassVar[int | None] = 3
+
+    shape: Literal["surface"]
+    """A surface of an STL file."""
+    file: Annotated[File, Accepted("an STL file")]
+    """STL file, binary or text, its normals towards the body. Relative to the case file."""
+
+    def build(self) -> Shape:
+        """Read the shape."""
+        return obstacle.Triangles(read_stl(self.file))
+
+
+def _quiet(expression: Expression, points: Array) -> Array:
+    """Return values at points of shape (n, d), NaN for none: ranks ask at points of their own."""
+    try:
+        return expression.numpy(points)
+    except InputError:
+        return np.full(len(points), np.nan)
+
+
+#: A further shape is a dataclass in `contact.interface.obstacle` with its name as `shape`.
+Foundation: TypeAlias = Annotated[
+    Annotated[obstacle.Plane, FromTable]
+    | Annotated[obstacle.Sphere, FromTable]
+    | Annotated[obstacle.Cylinder, FromTable]
+    | Annotated[obstacle.Cone, FromTable]
+    | Annotated[obstacle.Paraboloid, FromTable]
+    | Annotated[obstacle.Punch, FromTable]
+    | Distance
+    | Surface,
+    Field(discriminator="shape"),
+]
+
 
 #: `contact.case.file.Case`, of which these are sections.
 Case: TypeAlias = Any

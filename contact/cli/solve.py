@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 from mpi4py import MPI
 
+from contact.case.digest import check_same
 from contact.case.file import Case, load_case
 from contact.case.text import to_toml
 from contact.cli.main import CONVERGED, NOT_CONVERGED
@@ -20,7 +21,6 @@ from contact.methods.interrupt import SIGNALLED, Terminated, signals_held
 from contact.output.checkpoint import case_of, discard, kept_case
 from contact.output.files import write_outputs
 from contact.output.folder import SUMMARY, check_members, read_json, result_folder
-from contact.output.rerun import check_same
 from contact.output.solution import Solution
 from contact.ranks import on_root
 from contact.solving import SolveInterrupted, solve

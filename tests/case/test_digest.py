@@ -4,7 +4,7 @@ import shutil
 
 import pytest
 
-from contact.case.digest import difference, digest
+from contact.case.digest import changed_input, digest
 from contact.case.file import load_case
 from contact.case.text import to_toml
 from contact.errors import InputError
@@ -41,11 +41,11 @@ def test_nothing_has_changed(written, tmp_path, monkeypatch):
     assert set(first) == {"case", "mesh.file", "material.library", "contact.foundation.file"}
     monkeypatch.chdir(tmp_path)
     again = load_case("case.toml", ["title=Other", "solver.tolerance=1e-9", "output.fields=vtx"])
-    assert difference(first, digest(again)) is None
+    assert changed_input(first, digest(again)) is None
     (tmp_path / "stored").mkdir()
     stored = tmp_path / "stored" / "case.toml"
     stored.write_text(to_toml(again, anchored=True))
-    assert difference(first, digest(load_case(stored))) is None
+    assert changed_input(first, digest(load_case(stored))) is None
 
 
 @pytest.mark.parametrize(
@@ -60,13 +60,13 @@ def test_a_file_has_changed(written, name, said):
     first = digest(load_case(written))
     with (written.parent / name).open("a") as file:
         file.write("\n")
-    assert difference(first, digest(load_case(written))) == said
+    assert changed_input(first, digest(load_case(written))) == said
 
 
 def test_the_case_has_changed(written):
     first = digest(load_case(written))
     other = digest(load_case(written, ["fixed.0.displacement=[0, 0, 1]"]))
-    assert difference(first, other) == "the case"
+    assert changed_input(first, other) == "the case"
 
 
 def test_a_file_is_not_there(written):
