@@ -7,17 +7,22 @@ import re
 from collections.abc import Iterable
 from pathlib import Path
 
-#: Name -> pattern of the path of its library, in the order of preference where several are
-#: loaded: NumPy's wheels bring an OpenBLAS of their own, which PETSc does not use.
-_LIBRARIES = (
-    ("OpenBLAS", re.compile(r"openblas")),
-    ("MKL", re.compile(r"libmkl_")),
-    ("BLIS", re.compile(r"libblis")),
-    ("FlexiBLAS", re.compile(r"flexiblas")),
-    ("ATLAS", re.compile(r"atlas")),
-)
-_PRIVATE = re.compile(r"numpy\.libs|scipy\.libs|libscipy_openblas")
-_PLAIN = re.compile(r"/lib[ck]?blas\.so")
+#: Name of the slow implementation.
+REFERENCE = "reference"
+
+#: Name -> pattern of the path of its library, in the order of preference where several are loaded.
+#: Debian's alternatives put optimised libraries under the plain name too, in folders that tell;
+#: any other is the reference.
+_LIBRARIES = {
+    "OpenBLAS": r"openblas",
+    "MKL": r"libmkl_",
+    "BLIS": r"libblis",
+    "FlexiBLAS": r"flexiblas",
+    "ATLAS": r"atlas",
+    REFERENCE: r"/lib[ck]?blas\.so",
+}
+#: NumPy's wheels bring an OpenBLAS of their own, which PETSc does not use.
+_PRIVATE = r"numpy\.libs|scipy\.libs|libscipy_openblas"
 
 ADVICE = (
     "warning: the reference BLAS is in use; direct solves are about six times faster with "
@@ -25,25 +30,16 @@ ADVICE = (
 )
 
 
-#: Name of the slow implementation.
-REFERENCE = "reference"
-
-
 def identify(paths: Iterable[str]) -> tuple[str, str]:
     """Return the name of the BLAS among the paths of loaded libraries, and its path.
 
     The name is for instance "OpenBLAS", `REFERENCE` or "unknown"; the path of that is empty.
     """
-    candidates = sorted({path for path in paths if not _PRIVATE.search(path)})
-    for name, pattern in _LIBRARIES:
+    candidates = sorted({path for path in paths if not re.search(_PRIVATE, path)})
+    for name, pattern in _LIBRARIES.items():
         for path in candidates:
-            if pattern.search(path):
+            if re.search(pattern, path):
                 return name, path
-    # Debian's alternatives put optimised libraries under the plain name too, in folders that
-    # tell; any other is the reference.
-    for path in candidates:
-        if _PLAIN.search(path):
-            return REFERENCE, path
     return "unknown", ""
 
 

@@ -388,18 +388,11 @@ def read_json(path: Path) -> dict[str, Any]:
 def kind(path: Path) -> str | None:
     """Return the kind of a file, without following or opening it; None where there is none."""
     try:
-        mode = path.lstat().st_mode
+        mode = stat.filemode(path.lstat().st_mode)
     except FileNotFoundError:
         return None
-    for test, words in (
-        (stat.S_ISREG, "a file"),
-        (stat.S_ISDIR, "a folder"),
-        (stat.S_ISLNK, "a symbolic link"),
-        (stat.S_ISFIFO, "a named pipe"),
-    ):
-        if test(mode):
-            return words
-    return "a device or socket"
+    known = {"-": "a file", "d": "a folder", "l": "a symbolic link", "p": "a named pipe"}
+    return known.get(mode[0], "a device or socket")
 
 
 def _sync(path: Path) -> None:

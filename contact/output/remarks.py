@@ -170,17 +170,15 @@ def coarse_curves(solution: Solution) -> Iterator[Remark]:
     if nodes.cut > 0:
         yield (
             f"straight facets of the curved contact part reach {nodes.cut:.3g} into the "
-            "foundation: the gap there is taken as 0; a mesh that is finer from the beginning has "
-            "less of it"
+            "foundation: the gap there is taken as 0; make the mesh finer from the beginning"
         )
     closed = solution.status != "open"
     size = nodes.maximum(np.where(closed, np.abs(nodes.gap), 0.0))
     if size > 1e-9 * problem.domain.size and nodes.deviation > DEVIATION * size:
         yield (
             f"straight facets deviate by up to {nodes.deviation:.3g} from a curved contact "
-            f"surface, and gaps or overlaps that contact closes are at most {size:.3g}: pressures "
-            "are off by about that share; a mesh that is finer from the beginning, or "
-            "space.degree = 2 without refinement, has less of it"
+            f"surface, and contact closes gaps of at most {size:.3g}: pressures are off by about "
+            "that share; make the mesh finer from the beginning, or take space.degree = 2"
         )
 
 
@@ -266,14 +264,13 @@ def untouched(solution: Solution) -> Iterator[Remark]:
     closed = bool(np.any(solution.status != "open"))
     if problem.since is not None or problem.comm.allreduce(closed, op=MPI.LOR):
         return
-    text = (
+    masters = problem.equilibrium.global_unknowns
+    free = np.any(masters.free & masters.mechanical)
+    yield (
         "nothing touches: no contact node has met the foundation; it is too far away, or narrower "
         "than the elements there"
+        + ("; a rigid part that is free may be anywhere that it touches nothing" if free else "")
     )
-    masters = problem.equilibrium.global_unknowns
-    if np.any(masters.free & masters.mechanical):
-        text += "; a rigid part that is free may be anywhere that it touches nothing"
-    yield text
 
 
 def rounding(solution: Solution) -> Iterator[Remark]:
@@ -281,10 +278,9 @@ def rounding(solution: Solution) -> Iterator[Remark]:
     granted, asked = solution.rounding, solution.outcome.allowed.equilibrium
     if granted > asked:
         yield (
-            f"rounding decides how well the forces balance: {granted:.1e} of them is no more than "
-            "rounding of displacements and potentials makes of stresses and currents, and does not "
-            f"count, though the tolerance is {asked:g}; a mesh with fewer cells along a slender "
-            "body, or less of electric.k_e, has less of it"
+            f"rounding decides how well the forces balance: {granted:.1e} of them does not count, "
+            f"though the tolerance is {asked:g}; a mesh with fewer cells along a slender body, or "
+            "less of electric.k_e, has less of it"
         )
 
 
@@ -295,10 +291,9 @@ def unknown_pressures(solution: Solution) -> Iterator[Remark]:
     loads = solution.problem.equilibrium.load_sizes(solution.state.time)[0].max()
     if solution.converged and unknown > KNOWN and (_moved(solution.problem) or loads > 0):
         yield (
-            f"contact forces are known to {unknown:.1e} of their size only: the residual "
-            "of far larger forces in the bodies does not count as a wrong pressure; "
-            'a smaller solver.tolerance, linear = "lu", or smaller displacements and stresses '
-            "elsewhere, make them known better"
+            f"contact forces are known to {unknown:.1e} of their size only, for far larger forces "
+            'act in the bodies; a smaller solver.tolerance, linear = "lu", or smaller '
+            "displacements elsewhere, make them known better"
         )
 
 
@@ -329,10 +324,9 @@ def beside_loads(solution: Solution) -> Iterator[Remark]:
     worst = np.argmax(np.where(much, left, 0.0) / np.where(much, acting, 1.0))
     left, borne = left[worst] / acting[worst], borne[worst] / acting[worst]
     yield (
-        f"{left:.1e} of loads and contact forces are out of balance, and displacements "
-        f"about as far off: the supports bear {borne:.3g} times as much, beside which it "
-        "is nothing; fewer cells along a slender body, linear elements, or a smaller tolerance "
-        "where rounding allows it, bring them nearer"
+        f"{left:.1e} of loads and contact forces are out of balance, and displacements about as "
+        f"far off: the supports bear {borne:.3g} times as much; fewer cells along a slender body, "
+        "linear elements, or a smaller tolerance, bring them nearer"
     )
 
 
@@ -381,11 +375,10 @@ def _conductor(solution: Solution) -> Conductor | None:
 
 def conductivity(solution: Solution) -> Iterator[Remark]:
     """Say which parts of (h~5) each conductivity gives up."""
-    laws = {
-        type(contact.conductor.psi)
-        for contact in solution.problem.contacts
-        if contact.conductor is not None and _conductor(solution) is not None
-    }
+    if _conductor(solution) is None:
+        return
+    conductors = (contact.conductor for contact in solution.problem.contacts)
+    laws = {type(conductor.psi) for conductor in conductors if conductor is not None}
     if RampConductivity in laws:
         yield (
             'the foundation never conducts, k_e has no effect: electric.law = "ramp" conducts only '
@@ -395,10 +388,8 @@ def conductivity(solution: Solution) -> Iterator[Remark]:
     if PerfectConductivity in laws:
         yield (
             'the current jumps as the gap closes, electric.law = "perfect": (h~5)(e) fails, and no '
-            "theorem says that there is a solution or only one. Where contact ends within the "
-            "part, the place of its edge is not determined: a potential that lifts the body to the "
-            "foundation leaves an interval for it, with a pressure that is singular there, one "
-            'that pushes it off no place; "shifted" with a large delta is continuous and decides'
+            "theorem says that there is a solution or only one: where contact ends within the "
+            'part, its edge is not determined; "shifted" with a large delta decides'
         )
 
 
