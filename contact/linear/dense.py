@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
-from scipy.linalg.lapack import dgetrf, dgetrs
+from scipy.linalg.lapack import dgetrf, dgetrs, dpotrf, dpotrs
 
 from contact.history import Evaluated
 from contact.linear.operator import Counters
@@ -45,19 +47,23 @@ class DenseOperator:
         return True
 
     def _factorise(self, blocks: Array) -> Array:
+        """Factorise, by Cholesky where that is possible: in each step of an interior point."""
         total = self._stiffness.copy(order="F")
         rows = np.arange(len(total)).reshape(blocks.shape[:2])
         total[rows[:, :, None], rows[:, None, :]] += blocks
-        self._factors, self._pivots, _ = dgetrf(total, overwrite_a=True)
+        fault = 1
+        if np.array_equal(blocks, blocks.transpose(0, 2, 1)):
+            lower, fault = dpotrf(total, lower=True, clean=False)
+            self._solve = partial(dpotrs, lower, lower=True)
+        if fault:  # a potential makes it indefinite
+            lower_upper, pivots, _ = dgetrf(total, overwrite_a=True)
+            self._solve = partial(dgetrs, lower_upper, pivots)
         return np.zeros(0)
 
     def solve(self, rhs: Array, rtol: float | None = None, guess: Array | None = None) -> Array:
         """Solve for the owned unknowns. Collective; see `operator.SparseOperator.solve`."""
         total = self._comm.gather(np.where(self._free.ravel(), rhs, 0.0))
         self.counters.linear_solves += 1
-
-        def solved() -> Array:
-            return np.asarray(dgetrs(self._factors, self._pivots, np.concatenate(total))[0])
-
         begin = self._comm.scan(rhs.size) - rhs.size
-        return on_root(self._comm, solved)[begin : begin + rhs.size]
+        solution = on_root(self._comm, lambda: self._solve(np.concatenate(total))[0])
+        return np.asarray(solution)[begin : begin + rhs.size]

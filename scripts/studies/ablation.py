@@ -20,7 +20,7 @@ from unittest.mock import patch
 
 from contact import Solution, load_case, solve
 from contact.case.file import Case
-from contact.linear import block, multigrid
+from contact.linear import block, dense, multigrid
 from contact.methods import (
     chord,
     condensed_step,
@@ -123,6 +123,10 @@ def _large(name: str, *changes: str) -> Callable[[], Case]:
     return lambda: load_case(CASES / f"{name}.toml", changes)
 
 
+def _lifted() -> Case:
+    return next(case for _, case in sweep.problems(False, "lifted-8", hard=True))
+
+
 def _block() -> Case:
     case = bench_one.block(16)
     case._source = "block-16"
@@ -164,6 +168,8 @@ DEVICES = (
     Device("zero displacement where nothing acts", (progress.undeformed_equilibrium,), "-",
            ((Newton, "_undeformed", _nothing),)),
     Device("static condensation", (condensed_step,), "Guyan 1965", (), (("condense", False),)),
+    Device("Cholesky factors of a condensed body", (), "Golub and Van Loan 2013",
+           ((dense, "dpotrf", lambda *_, **__: (None, 1)),), (), _lifted),
     Device("coarse levels kept from step to step", (multigrid.Hierarchy,),
            "Karlin, Manasse, Rudolph and Sleator 1988", ((multigrid, "PRICE", 0),), (), _block),
     Device("interpolation that follows contact nodes", (multigrid.StiffNodes,), "-",

@@ -82,7 +82,7 @@ def test_the_first_rank_alone_holds_the_dense_matrix_and_factors():
     operator = body.operator(nodes, symmetric=False, counters=Counters(), kind="auto")
     blocks = np.tile(np.eye(body.block_size), (nodes.size, 1, 1))
     operator.update("secant", BodyState(body.at), blocks)
-    assert hasattr(operator, "_factors") == (WORLD.rank == 0)
+    assert hasattr(operator, "_solve") == (WORLD.rank == 0)
     rhs = np.where(body.free.ravel(), 1.0, 0.0)
     found = np.concatenate(WORLD.allgather(operator.solve(rhs)))
     own = body.rows @ found + np.where(rhs > 0, found[body.own], 0)
