@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from contact.tolerances import EPS
 from contact.typing import Array
 
 
@@ -71,7 +72,9 @@ class ActiveSet:
         c, rounding
             As in `touching`.
         """
-        within = np.linalg.norm(friction + c * slip, axis=1) <= bound + rounding
+        # A node that was at its bound and does not slip yet sticks, whatever the last digit says.
+        allowed = bound * (1 + 100 * EPS) + rounding
+        within = np.linalg.norm(friction + c * slip, axis=1) <= allowed
         acts = (bound > 0) | closed
         return ActiveSet(closed, within & acts, ~within & acts)
 
