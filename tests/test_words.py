@@ -48,7 +48,7 @@ WORDS = {
 #: Most of them that a package, or a page, may have. Nothing may rise; what is mended lowers it.
 ALLOWED: dict[str, int] = {
     "scripts": 4,
-    "README.md": 18,
+    "README.md": 17,
     "docs/api.md": 1,
     "docs/benchmarks.md": 6,
     "docs/case-file.md": 1,
@@ -63,7 +63,7 @@ ALLOWED: dict[str, int] = {
     "docs/theory.md": 16,
     "docs/troubleshooting.md": 29,
     "docs/tutorial.md": 8,
-    "docs/two-bodies.md": 31,
+    "docs/two-bodies.md": 23,
 }
 
 #: A word ends where its letters do: underscores of identifiers are borders too.

@@ -355,7 +355,13 @@ def hydrostatic(name: str, h: float, degree: int, kind: str) -> Array:
 
 
 def rings(name: str, h: float, degree: int) -> Array:
-    """Return the like for a ring, 1 <= r <= 2, on a shaft of the radius 1.001 or in its bore.
+    """Return the like for a ring on a shaft or in a bore."""
+    problem, exact = ring(name, h, degree)
+    return ratios(solve(problem, NewtonOptions(tolerance=1e-10)), exact)
+
+
+def ring(name: str, h: float, degree: int) -> tuple[Problem, float]:
+    """Return a ring, 1 <= r <= 2, on a shaft of the radius 1.001 or in its bore, and the pressure.
 
     In a bore of its own radius a pressure of 1 acts from within. Lame's solutions, plane strain.
     """
@@ -373,8 +379,8 @@ def rings(name: str, h: float, degree: int) -> Array:
         on, loads = "held", [Load("contact", pressure=1.0)]
     sides = [Fixed("side0", [None, 0.0]), Fixed("side2", [0.0, None])]
     body = Body(Linear(YOUNG, POISSON), sides, loads)
-    problem = Problem(mesh(RING, h, 2), body, Contact(on, shape, press=True), degree=degree)
-    return ratios(solve(problem, NewtonOptions(tolerance=1e-10)), float(exact))
+    contact = Contact(on, shape, press=True)
+    return Problem(mesh(RING, h, 2), body, contact, degree=degree), float(exact)
 
 
 def two_rings(h: float, degree: int, overlap: float = 0.001) -> tuple[Solution, float]:

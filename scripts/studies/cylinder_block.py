@@ -23,7 +23,7 @@ from contact import build_problem, load_case
 from contact.mesh.domain import Domain
 from contact.typing import Array
 from scripts.cases import CASES
-from scripts.reporting import Report, options, solved
+from scripts.reporting import Report, append, options, solved
 from scripts.studies.two_bodies import ALUMINIUM, RADIUS, STEEL, half_width, middle
 
 #: Force of the whole cylinder (N/mm), and Young's moduli (N/mm^2); Poisson's ratio is 0.3.
@@ -75,16 +75,16 @@ def main(arguments: Sequence[str] | None = None) -> None:
         f"Linear: this package, degree 2. With rotations: {100 * more:.2f} % more, which the table "
         "before shows them to make.",
     )
-    found: dict[str, list[Any]] = {"mu": [], "a": [], "p_0": [], "stick": []}
-    for mu in (0.0, 0.1):
-        values = half_planes(mu, 100 if given.coarse else 400)
-        for name, value in zip(found, [mu, *values], strict=True):
-            found[name].append(value)
+    found: dict[str, list[Any]] = {"mu": [], "steps": [], "a": [], "p_0": [], "stick": []}
+    for mu, steps in ((0.0, 1), (0.1, 1), (0.1, 32), (0.1, 128)):
+        values = half_planes(mu, 100 if given.coarse else 400, steps)
+        append(found, mu, steps, *values)
     report.table(
         "cylinder-block-friction",
-        "Two half planes of steel and aluminium, pressed on each other in one step",
+        "Two half planes of steel and aluminium, pressed on each other in steps",
         found,
-        "By boundary elements. stick: share of the contact that sticks.",
+        "By boundary elements. stick: share of the contact that sticks. As the contact grows, "
+        "friction fixes each part of it where it first touches: a single step misses that.",
     )
 
 
@@ -191,8 +191,10 @@ def contact(
     return forces, (gradient.T @ sparse.diags(stiffness) @ gradient).tocsr()
 
 
-def half_planes(mu: float, count: int) -> tuple[float, float, float]:
+def half_planes(mu: float, count: int, steps: int = 1) -> tuple[float, float, float]:
     """Return half width, largest pressure and the share that sticks, by constant elements.
+
+    The force grows in steps, in each of which friction acts on the slip since the last.
 
     With p on both and q on the block they move, relative to each other off and along the surface,
 
@@ -214,29 +216,32 @@ def half_planes(mu: float, count: int) -> tuple[float, float, float]:
     zero, n = np.zeros((count, count)), np.arange(count)
     moves = np.block([[along, across], [-across, along]])
     closed, sticks, sign = np.ones(count, dtype=bool), np.ones(count, dtype=bool), np.sign(x)
-    for _ in range(100):
-        # Unknown are p, q and the approach.
-        matrix, rhs = np.zeros((2 * count + 1, 2 * count + 1)), np.zeros(2 * count + 1)
-        matrix[:-1, :-1] = np.block([[np.eye(count), zero], [zero, np.eye(count)]])
-        rows = n[closed]
-        matrix[rows, :-1], matrix[rows, -1] = moves[rows], -1.0
-        rhs[rows] = -(x[rows] ** 2) / (2 * RADIUS)
-        rows = n[closed & sticks]
-        matrix[count + rows, :-1] = moves[count + rows]
-        rows = n[closed & ~sticks]
-        matrix[count + rows, rows] = -mu * sign[rows]
-        matrix[-1, :count], rhs[-1] = h, FORCE
-        solution = np.linalg.solve(matrix, rhs)
-        p, q, approach = solution[:count], solution[count:-1], solution[-1]
-        w, t = (moves @ solution[:-1]).reshape(2, -1)
-        gap = w + x**2 / (2 * RADIUS) - approach
-        trial = q - modulus / RADIUS * t
-        new = p - modulus / RADIUS * gap > 0, np.abs(trial) <= mu * p, np.sign(trial)
-        if all(np.array_equal(*pair) for pair in zip(new[:2], (closed, sticks), strict=True)):
-            break
-        closed, sticks, sign = new
-    else:
-        raise RuntimeError("the active set still changes")
+    before = np.zeros(count)
+    for force in FORCE * np.arange(1, steps + 1) / steps:
+        for _ in range(100):
+            # Unknown are p, q and the approach.
+            matrix, rhs = np.zeros((2 * count + 1, 2 * count + 1)), np.zeros(2 * count + 1)
+            matrix[:-1, :-1] = np.block([[np.eye(count), zero], [zero, np.eye(count)]])
+            rows = n[closed]
+            matrix[rows, :-1], matrix[rows, -1] = moves[rows], -1.0
+            rhs[rows] = -(x[rows] ** 2) / (2 * RADIUS)
+            rows = n[closed & sticks]
+            matrix[count + rows, :-1], rhs[count + rows] = moves[count + rows], before[rows]
+            rows = n[closed & ~sticks]
+            matrix[count + rows, rows] = -mu * sign[rows]
+            matrix[-1, :count], rhs[-1] = h, force
+            solution = np.linalg.solve(matrix, rhs)
+            p, q, approach = solution[:count], solution[count:-1], solution[-1]
+            w, t = (moves @ solution[:-1]).reshape(2, -1)
+            gap = w + x**2 / (2 * RADIUS) - approach
+            trial = q - modulus / RADIUS * (t - before)
+            new = p - modulus / RADIUS * gap > 0, np.abs(trial) <= mu * p, np.sign(trial)
+            if all(np.array_equal(*pair) for pair in zip(new[:2], (closed, sticks), strict=True)):
+                break
+            closed, sticks, sign = new
+        else:
+            raise RuntimeError("the active set still changes")
+        before = t
     a = 2 * np.sqrt(np.sum(p * x**2) / np.sum(p))
     return float(a), float(p.max()), float(np.sum(closed & sticks) / np.sum(closed))
 

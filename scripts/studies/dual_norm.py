@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from mpi4py import MPI
 
@@ -41,6 +43,14 @@ class DualNorm:
         jump.transpose(vectors, load)
         load = np.where(body.free.ravel(), load, 0.0)
         return self._root(load, self._operator.solve(load))
+
+    def compliance(self, loads: Sequence[Array]) -> Array:
+        """Return what loads work on the displacements that they make, shape (n, n). Collective."""
+        free = self.problem.equilibrium.free.ravel()
+        acting = np.array([np.where(free, load, 0.0) for load in loads])
+        moved = np.array([self._operator.solve(load) for load in acting])
+        work = self.problem.comm.allreduce(acting @ moved[:, : free.size].T, op=MPI.SUM)
+        return np.asarray((work + work.T) / 2)
 
     def displacement(self, x: Array, other: Array) -> float:
         """Return |u - v|_V of local unknowns, the energy of the linear body. Collective."""

@@ -1,6 +1,7 @@
 """How the contact pressure converges in L2 and in the discrete H^-1/2, against exact solutions.
 
-Closed form 4, in the plane and in 3-D, and Hertz's cylinder and ball.
+A pressure like the root of the distance, in 2-D and in 3-D, Hertz's cylinder and ball, and a ring
+on a shaft.
 
 `python3 -m scripts.studies.pressure_convergence [--out DIR] [--coarse]`, also under mpirun.
 """
@@ -14,34 +15,34 @@ from typing import Any
 import numpy as np
 from matplotlib.ticker import NullLocator
 
-from contact import InputError, solve
+from contact import InputError, Problem, solve
 from contact.methods.options import NewtonOptions
 from contact.problem.problem import ContactProblem
 from contact.typing import Array
 from scripts.reporting import TWO_COLUMNS, Report, observed_orders, options, subplots
+from scripts.studies.curved_foundations import ring
 from scripts.studies.dual_norm import DualNorm
 from scripts.studies.exact_solutions import Singular
 from scripts.studies.hertz_exact import Line, Point
 
 NOTE = (
-    "Closed form 4: p = |A| sqrt(x - x_0), in the plane and in a slice of space; Hertz: "
+    "Root-like: p = |A| sqrt(x - x_0), closed form 4, in 2-D and in a slice in 3-D. Hertz: "
     "p = p_0 sqrt(1 - r^2/a^2) of a cylinder and a ball, the body being cut out of the half space "
     "with Hertz's displacements inside it prescribed where it is cut, so that no assumption of "
-    "Hertz's adds an error. All are of H^s for s < 1 on Gamma_3: approximation alone gives order 1 "
-    "in L2 and 3/2 in H^-1/2. Errors are of the nodal pressures against the exact ones at "
+    "Hertz's adds an error. These are of H^s for s < 1 on Gamma_3: approximation alone gives order "
+    "1 in L2 and 3/2 in H^-1/2. Conforming: a ring with an interference on a rigid shaft, 1/h "
+    "elements a unit length, p constant (Lame); straight edges on a curved foundation: a flat "
+    "side shows nothing of the gaps. Errors are of the nodal pressures against the exact ones at "
     "the nodes, relative, in the lumped L2(Gamma_3) and in the norm dual to the energy of the "
-    "displacements of the same mesh, for which the body condensed onto Gamma_3 is inverted. Where "
+    "displacements of the same mesh. The latter is the norm of H^-1/2 for multipliers up to the "
+    "inf-sup constant (`inf_sup`), that is, it measures the distance of p_h from "
+    "sum p(x_i) Phi_i, not from p itself. Where "
     "the contact ends between two nodes matters: they are root mean squares over three places; "
-    "fitted orders are least squares over all meshes. The "
-    "nodal multiplier with lumped products is that of dual (biorthogonal) functions: nodal values "
-    "p_i act with int phi_i, which decouples the contact conditions node by node. The pair is "
-    "inf-sup stable uniformly in h (Wohlmuth, SIAM J. Numer. Anal. 38 (2000) 989); Hueeber and "
+    "fitted orders are least squares over all meshes. Hueeber and "
     "Wohlmuth (SIAM J. Numer. Anal. 43 (2005) 156) prove order 1 in the energy and H^-1/2 for "
     "degree 1, and Hueeber, Mair and Wohlmuth (Appl. Numer. Math. 54 (2005) 555) treat degree 2. "
     "On quadratic triangles the functions are those of Popp, Wohlmuth, Gee and Wall (SIAM J. Sci. "
-    "Comput. 34 (2012) B421), alpha = 1/5, so that vertices carry forces; see docs/theory.md. "
-    "With constraints at mid-edges alone errors there are smaller (closed form 4 in 3-D, 4 and "
-    "8 cells: 0.0763 and 0.0306 in L2; ball, 4 cells: 0.0617), and vertices penetrate."
+    "Comput. 34 (2012) B421), alpha = 1/5, so that vertices carry forces; see docs/theory.md."
 )
 
 #: Where the contact ends between two nodes, as a part of their distance.
@@ -62,12 +63,15 @@ class Series:
         Returns its pressure at points.
     cells
         By degree.
+    places
+        Where the contact ends between two nodes.
     """
 
     make: Callable[[float], Any]
-    problem: Callable[[Any, int, int], ContactProblem]
+    problem: Callable[[Any, int, int], ContactProblem | Problem]
     pressure: Callable[[Any, Array], Array]
     cells: Mapping[int, tuple[int, ...]]
+    places: tuple[float, ...] = PLACES
 
 
 def _singular(problem: Callable[[Any, int, int], ContactProblem], cells: Any) -> Series:
@@ -78,31 +82,39 @@ def _hertz(kind: Callable[[float], Any], cells: Mapping[int, tuple[int, ...]]) -
     return Series(kind, lambda s, n, k: s.problem(n, k), lambda s, x: s.pressure(x), cells)
 
 
+#: The conforming contact, by its name in `curved_foundations`.
+SHAFT = "ring on a shaft"
+
 IN_PLANE = {1: (8, 16, 32, 64), 2: (8, 16, 32, 64)}
 
 SERIES = {
-    "closed form 4": _singular(lambda s, n, k: s.problem(n, k), IN_PLANE),
-    "closed form 4 in 3-D": _singular(
-        lambda s, n, k: s.in_space(n, k), {1: (8, 16, 32), 2: (4, 8, 16)}
-    ),
+    "root-like": _singular(lambda s, n, k: s.problem(n, k), IN_PLANE),
+    "root-like, 3-D": _singular(lambda s, n, k: s.in_space(n, k), {1: (8, 16, 32), 2: (4, 8, 16)}),
     "Hertz's cylinder": _hertz(Line, IN_PLANE),
     "Hertz's ball": _hertz(Point, {1: (4, 8, 16), 2: (2, 4, 8)}),
+    "conforming": Series(
+        lambda _: SHAFT,
+        lambda name, n, k: ring(name, 1 / n, k)[0],
+        lambda name, x: np.full(len(x), ring(name, 1.0, 1)[1]),
+        {1: (8, 16, 32), 2: (8, 16, 32)},
+        PLACES[:1],
+    ),
 }
 
 
 def measured(series: Series, n: int, degree: int) -> tuple[Array, float]:
     """Return the relative errors of the pressure in L2 and H^-1/2, and the residual. Collective."""
     squares, residual = np.zeros(2), 0.0
-    for place in PLACES:
+    for place in series.places:
         exact = series.make((np.floor(0.53 * n) + place) / n)
-        problem = series.problem(exact, n, degree)
-        solution = solve(problem, NewtonOptions(tolerance=1e-10))
+        solution = solve(series.problem(exact, n, degree), NewtonOptions(tolerance=1e-10))
+        problem = solution.problem
         if not solution.converged:
             raise InputError(f"{n} cells: {solution.outcome.reason}")
         given = series.pressure(exact, problem.nodes.points)
         error, dual, norm = solution.pressure - given, DualNorm(problem), problem.nodes.norm
         ratios = norm(error) / norm(given), dual.pressure(error) / dual.pressure(given)
-        squares += np.square(ratios) / len(PLACES)
+        squares += np.square(ratios) / len(series.places)
         residual = max(residual, solution.outcome.kkt.largest)
     return np.sqrt(squares), residual
 
@@ -116,7 +128,7 @@ def main(arguments: Sequence[str] | None = None) -> dict[tuple[str, int], Array]
         "its fit", "residual",
     )  # fmt: skip
     columns: dict[str, list[object]] = {name: [] for name in names}
-    figure, axes = subplots(1, 4, size=(TWO_COLUMNS, 2.6), sharey=True)
+    figure, axes = subplots(1, len(SERIES), size=(TWO_COLUMNS, 2.6), sharey=True)
     found = {}
     for ax, (name, series) in zip(axes, SERIES.items(), strict=True):
         for degree, cells in series.cells.items():
@@ -152,8 +164,7 @@ def _finish(ax: Any, title: str, cells: Sequence[int]) -> None:
         ax.loglog(h, 0.3 * h**power, "k:", lw=0.8)
         ax.annotate(f"{power:g}", (h[0], 0.3 * h[0] ** power), fontsize=6, va="top")
     ax.set(xlabel="$h$")
-    # The number of the closed form is that of the page: its pressure tells a reader more.
-    ax.set_title(title.replace("closed form 4", r"$p \sim \sqrt{x - x_0}$"), fontsize=8)
+    ax.set_title(title.replace("root-like", r"$p \sim \sqrt{x - x_0}$"), fontsize=8)
     ax.set_xticks(1 / np.array(cells), [f"1/{n}" for n in cells], fontsize=6)
     ax.xaxis.set_minor_locator(NullLocator())
 

@@ -2,9 +2,10 @@
 
 The contact grows as the load does, and friction fixes each part of it where it first touches.
 Spence (J. Elasticity, 1975) showed that the stick zone then has a fixed share k = c/a of the
-contact, whatever the load. Where the shear's effect on the pressure is left out, with
-gamma = (1 - 2 nu)/(2 (1 - nu)), K'(k)/K(k) = gamma/mu of the cylinder, and of the ball
-ln((1 + k)/(1 - k))/(2 k) = (mu/gamma) K'(k). A static law knows one step only, and finds far less.
+contact, whatever the load; boundary elements have it (`stick_limit`). Where the shear's effect on
+the pressure is left out, with gamma = (1 - 2 nu)/(2 (1 - nu)), K'(k)/K(k) = gamma/mu of the
+cylinder, and of the ball ln((1 + k)/(1 - k))/(2 k) = (mu/gamma) K'(k). A static law knows one step
+only, and finds far less.
 
     python3 -m scripts.studies.stick_ratio [STEPS...]
 """
@@ -12,7 +13,7 @@ ln((1 + k)/(1 - k))/(2 k) = (mu/gamma) K'(k). A static law knows one step only, 
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -24,6 +25,7 @@ from contact.methods.options import NewtonOptions
 from contact.problem.problem import ContactProblem
 from contact.problem.state import State
 from scripts.cases import CASES
+from scripts.studies import stick_limit
 
 POISSON, HALF_WIDTH = 0.3, 0.02
 
@@ -78,15 +80,19 @@ class Pressed:
     ----------
     make
         The problem of a friction coefficient, whose load grows with the time up to 1.
-    coupled
-        Friction coefficient -> stick ratio with the shear's effect on the pressure, +-0.005.
+    kind
+        Boundary elements of a half plane or a half space.
     alone
         Zero at the stick ratio without it, a function of k and mu.
     """
 
     make: Callable[[float, int], ContactProblem]
-    coupled: Mapping[float, float]
+    kind: Callable[[int, float], tuple[np.ndarray, ...]]
     alone: Callable[[float, float], float]
+
+    def coupled(self, mu: float) -> float:
+        """Return the stick ratio with the shear's effect on the pressure."""
+        return stick_limit.stick_ratio(self.kind, mu, POISSON)
 
     def uncoupled(self, mu: float) -> float:
         """Return Spence's stick ratio without the shear's effect on the pressure."""
@@ -103,9 +109,12 @@ class Pressed:
 
 #: Of the cylinder the force grows, of the ball the depth: the contact with the root of either.
 PRESSED = {
-    "cylinder": Pressed(cylinder, {0.1: 0.035, 0.2: 0.362, 0.3: 0.689, 0.5: 0.941}, cylinder_alone),
-    "ball": Pressed(ball, {0.1: 0.202, 0.2: 0.697, 0.3: 0.896, 0.5: 0.984}, ball_alone),
+    "cylinder": Pressed(cylinder, stick_limit.plane, cylinder_alone),
+    "ball": Pressed(ball, stick_limit.axisymmetric, ball_alone),
 }
+
+#: Friction coefficients of the tables.
+COEFFICIENTS = 0.1, 0.2, 0.3, 0.5
 
 
 def stick_ratio(problem: ContactProblem, state: State) -> float:
@@ -135,11 +144,11 @@ def main(steps: Sequence[int]) -> None:
         print(
             f"\n| {name}, mu | " + " | ".join(f"{n} step{'s' * (n > 1)}" for n in steps), end=" | "
         )
-        print("coupled, limit | Spence, uncoupled |")
+        print("boundary elements | without the shear's effect on the pressure |")
         print("|---" * (len(steps) + 3) + "|")
-        for mu, limit in pressed.coupled.items():
+        for mu in COEFFICIENTS:
             row = [f"{value:.3f}" for value in pressed.ratios(mu, steps)]
-            row += [f"{limit:.3f}", f"{pressed.uncoupled(mu):.3f}"]
+            row += [f"{pressed.coupled(mu):.3f}", f"{pressed.uncoupled(mu):.3f}"]
             print("| " + " | ".join([f"{mu}", *row]) + " |", flush=True)
 
 

@@ -177,25 +177,27 @@ def figure_7_2(report: Report, solutions: Mapping[tuple[object, ...], Solution])
     if run is None:
         return
     deformed = picture(run, "von_mises")
-    x = np.linspace(0, 1.25 * hertz.half_width, 400)
+    width, peak = hertz.half_width, hertz.peak
+    x = np.linspace(0, 1.25 * width, 400)
     data: dict[str, Sequence[float]] = {"x": x, "Hertz": hertz.pressure(x)}
     figure, axes = subplots(2, 1, size=(TWO_COLUMNS, 5.2), sharex=True)
-    axes[0].plot(x, hertz.pressure(x), "k--", lw=1.0, label="Hertz")
+    axes[0].plot(x / width, hertz.pressure(x) / peak, "k--", lw=1.0, label="Hertz")
     for label, table in tables.items():
         assert table is not None
         near = table["x"] <= x[-1]
         where = table["x"][near]
-        (line,) = axes[0].plot(where, table["pressure"][near], label=label)
+        (line,) = axes[0].plot(where / width, table["pressure"][near] / peak, label=label)
         data |= {f"x, {label}": where, f"pressure, {label}": table["pressure"][near]}
         if np.any(table["bound"] > 0):
             colour = line.get_color()
-            axes[1].plot(where, table["tau"][near], color=colour, label=label)
+            axes[1].plot(where / width, table["tau"][near] / peak, color=colour, label=label)
             bound = f"{label}: bound $-s$"
-            axes[1].plot(where, -table["bound"][near], ":", color=colour, label=bound)
+            limit = -table["bound"][near] / peak
+            axes[1].plot(where / width, limit, ":", color=colour, label=bound)
             data |= {f"tau, {label}": table["tau"][near], f"bound, {label}": table["bound"][near]}
-    axes[0].set_ylabel(r"$-\sigma_\nu$")
-    axes[1].set_xlabel(r"$x$ along $\Gamma_3$")
-    axes[1].set_ylabel(r"$-\sigma_\tau\cdot t$")
+    axes[0].set_ylabel(r"$-\sigma_\nu/p_H$")
+    axes[1].set_xlabel(r"$x/b_H$ along $\Gamma_3$")
+    axes[1].set_ylabel(r"$-\sigma_\tau\cdot t/p_H$")
     for ax in axes:
         ax.legend()
     report.figure(
@@ -204,7 +206,8 @@ def figure_7_2(report: Report, solutions: Mapping[tuple[object, ...], Solution])
         figure,
         data,
         "Example 7.1. Hertz's solution is one of small contact widths and without friction; "
-        "friction narrows the contact and raises the pressure.",
+        "friction narrows the contact and raises the pressure. Over Hertz's half width b_H and "
+        "largest pressure p_H; the numbers are in the units of the case.",
     )
     report.figure(
         "figure-7-2b",

@@ -16,7 +16,9 @@ from contact.case.file import parse_case
 from contact.cli.main import main
 
 ROOT = Path(__file__).parents[2]
-_BLOCK = re.compile(r"(?:<!-- file: (\S+) -->\n+)?^```(\w*)\n(.*?)^```", re.DOTALL | re.MULTILINE)
+_BLOCK = re.compile(
+    r"(?:<!-- file: (\S+) -->\n+)?^```([^`\n]*)\n(.*?)^```", re.DOTALL | re.MULTILINE
+)
 
 
 class Block(NamedTuple):

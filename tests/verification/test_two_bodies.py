@@ -62,6 +62,14 @@ def test_steel_cylinder_on_an_aluminium_block(mu):
     assert middle(solution) == pytest.approx(-1.2710 if mu == 0 else -1.2649, rel=3e-3)
 
 
+def test_a_contact_that_grows_sticks_in_more_of_it():
+    """Half planes: Spence's ratio for beta/mu = 1.43, 0.40 where shear does not press, in steps."""
+    _, once, static = half_planes(0.1, 100)
+    _, summit, grown = half_planes(0.1, 100, steps=16)
+    assert static < 0.2 and grown == pytest.approx(0.39, abs=0.02)
+    assert summit == pytest.approx(once, rel=1e-3)
+
+
 def test_finite_rotations_let_the_block_sink_deeper():
     """code_aster has them; the same law by other means tells what linear kinematics leaves out."""
     domain = build_problem(load_case(CASES / "cylinder-on-block.toml", ["mesh.contact_size=1.2"]))
@@ -85,10 +93,10 @@ def test_round_bodies(kinematics, degree, push):
 
 def test_loop_of_two_balls():
     """Mindlin and Deresiewicz: what friction takes of a turn is the area of the loop, in space."""
-    loop = turn(poisson=0.0, elements=4, steps=2)
+    loop = turn(poisson=0.0, elements=6, sectors=6, steps=2)
     assert 0.6 < loop.share < 0.8
     assert loop.area / loop.exact == pytest.approx(1, abs=0.07)
-    assert loop.dissipation / loop.exact == pytest.approx(1, abs=0.07)
+    assert loop.dissipation / loop.exact == pytest.approx(1, abs=0.03)
 
 
 def test_loop_of_two_cylinders():

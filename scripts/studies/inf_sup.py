@@ -1,0 +1,192 @@
+"""The discrete inf-sup constant of the nodal (dual) multipliers.
+
+The multiplier of nodal values lambda_i is lambda_h = sum_i lambda_i Phi_i, with functions Phi_i
+dual to those of Gamma_3. Its constant on a mesh is
+
+    beta = min over lambda_h of sup over V_h of <lambda_h, v_nu>/|v| over the same sup over V,
+
+|v|^2 being the elastic energy: 1 where the mesh sees all of each multiplier, and bounded away from
+zero on all meshes where the pair is stable. Both suprema are energies of the body under the load
+lambda_h (`DualNorm`), so that beta^2 is the smallest eigenvalue of a pair of compliance matrices.
+V stands for the same elements on the mesh after some refinements, on which the integrals of Phi_i
+are exact.
+
+`python3 -m scripts.studies.inf_sup [--out DIR] [--coarse]`
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from mpi4py import MPI
+from scipy.linalg import eigh
+
+from contact import Body, Contact, Domain, Fixed, Linear
+from contact.interface.mortar.coupling import couple
+from contact.interface.mortar.surface import surface_of
+from contact.mesh.grid import box, rectangle
+from contact.mesh.reader import from_generator
+from contact.mesh.transfer import refined
+from contact.problem.problem import ContactProblem
+from contact.typing import Array
+from scripts.reporting import Report, append, options
+from scripts.studies.dual_norm import DualNorm
+
+CAPTION = "Inf-sup constant of the nodal multipliers"
+NOTE = (
+    "The least ratio, over all multipliers, of the supremum over the displacements of the mesh to "
+    "that over the displacements of the mesh after `refined` bisections of all edges; norms are "
+    "elastic energies (nu = 0.3). alternating: edges of Gamma_3 by turns in the ratio 8 to 1, in "
+    "cells of one height. graded: unstructured, by the factor of 100 towards the end of Gamma_3. "
+    "crosspoints: the ends, in 3-D the rim, of Gamma_3 are fixed, and carry no multiplier. "
+    "Degree 2 in 3-D has the change of basis with alpha = 1/5."
+)
+
+#: How much longer every other edge is than its neighbours.
+ALTERNATING = 8.0
+
+
+@dataclass(frozen=True)
+class Mesh:
+    """Meshes of a kind.
+
+    Attributes
+    ----------
+    make
+        The mesh of a number of cells.
+    part
+        Its Gamma_3.
+    fixed
+        The parts that are held.
+    """
+
+    make: Callable[[int], Domain]
+    part: str
+    fixed: Sequence[str]
+
+    def problem(self, domain: Domain, degree: int) -> ContactProblem:
+        """Return the problem on a mesh, or on one that has been refined."""
+        zero = [0.0] * domain.dim
+        body = Body(Linear(1.0, 0.3), [Fixed(part, zero) for part in self.fixed])
+        return ContactProblem(domain, body, Contact(self.part, 0.0), degree=degree)
+
+
+def unit(cells: int, dim: int = 2) -> Domain:
+    """Return the unit square or cube."""
+    if dim == 2:
+        return rectangle(MPI.COMM_SELF, [0.0] * 2, [1.0] * 2, [cells] * 2)
+    return box(MPI.COMM_SELF, [0.0] * 3, [1.0] * 3, [cells] * 3)
+
+
+def alternating(cells: int) -> Domain:
+    """Return the unit square with columns of cells that are wide and narrow by turns."""
+    domain = unit(cells)
+    widths = np.where(np.arange(cells) % 2 == 0, ALTERNATING, 1.0)
+    ends = np.concatenate([[0.0], np.cumsum(widths)]) / widths.sum()
+    x = domain.mesh.geometry.x
+    x[:, 0] = np.interp(x[:, 0], np.linspace(0.0, 1.0, cells + 1), ends)
+    return domain
+
+
+def graded(cells: int) -> Domain:
+    """Return a block whose elements at one end of Gamma_3 are a hundredth of the others."""
+    sizes = {"size": 4 / cells, "contact_size": 1 / cells, "edge_size": 0.01 / cells}
+    return from_generator(MPI.COMM_SELF, "half_space", radius=1.0, extent=2.0, growth=0.3, **sizes)
+
+
+SIDES = ("left", "right")
+
+#: Kinds of meshes, with the numbers of cells and the refinements for V, by degree.
+SERIES: dict[str, tuple[Mesh, dict[int, tuple[tuple[int, ...], int]]]] = {
+    "uniform": (
+        Mesh(unit, "bottom", ["top"]),
+        {1: ((4, 8, 16, 32), 3), 2: ((4, 8, 16, 32), 2)},
+    ),
+    "alternating": (
+        Mesh(alternating, "bottom", ["top"]),
+        {1: ((4, 8, 16, 32), 3), 2: ((4, 8, 16, 32), 2)},
+    ),
+    "graded": (
+        Mesh(graded, "contact", ["bottom", "side"]),
+        {1: ((4, 8, 16), 3), 2: ((4, 8, 16), 2)},
+    ),
+    "crosspoints": (
+        Mesh(unit, "bottom", ["top", *SIDES]),
+        {1: ((4, 8, 16, 32), 3), 2: ((4, 8, 16, 32), 2)},
+    ),
+    "uniform, 3-D": (
+        Mesh(lambda n: unit(n, 3), "bottom", ["top"]),
+        {1: ((2, 4, 6), 2), 2: ((2, 3, 4), 1)},
+    ),
+    "crosspoints, 3-D": (
+        Mesh(lambda n: unit(n, 3), "bottom", ["top", *SIDES, "front", "back"]),
+        {1: ((2, 4, 6), 2), 2: ((2, 3, 4), 1)},
+    ),
+}
+
+
+def constant(kind: Mesh, domain: Domain, degree: int, levels: int) -> tuple[float, int]:
+    """Return beta on a mesh, and the number of nodes that carry a multiplier. Serial.
+
+    Parameters
+    ----------
+    kind, domain, degree
+        The problem.
+    levels
+        Refinements that make V of V_h.
+    """
+    problem = kind.problem(domain, degree)
+    fine = domain
+    for _ in range(levels):
+        fine = refined(fine)
+    reference = kind.problem(fine, degree)
+    slave = surface_of(domain, problem.equilibrium.space, kind.part)
+    master = surface_of(fine, reference.equilibrium.space, kind.part)
+    # As if the finer mesh were the body opposite.
+    opposite = replace(master, normal=-master.normal)
+    without = np.setdiff1d(slave.nodes, problem.nodes.nodes)
+    coupling = couple(slave, opposite, 1e-6, without=without)
+    integrals = (coupling.other.T * coupling.weight).toarray()
+    jump = problem.interface.jump
+    values = np.eye(coupling.nodes.size)[np.searchsorted(coupling.nodes, jump.nodes)]
+    normal = coupling.normal[0]
+
+    def on_mesh(column: Array) -> Array:
+        load = np.zeros(problem.equilibrium.owned)
+        jump.transpose((jump.weight * (values @ column))[:, None] * jump.normal, load)
+        return load
+
+    def on_reference(column: Array) -> Array:
+        load = np.zeros((reference.equilibrium.owned // domain.dim, domain.dim))
+        load[coupling.masters] = (integrals @ column)[:, None] * normal
+        return load.ravel()
+
+    matrices = [
+        DualNorm(of).compliance([load(column) for column in np.eye(coupling.nodes.size)])
+        for of, load in ((problem, on_mesh), (reference, on_reference))
+    ]
+    least = eigh(*matrices, eigvals_only=True, subset_by_index=[0, 0])[0]
+    return float(np.sqrt(max(least, 0.0))), coupling.nodes.size
+
+
+def main(arguments: Sequence[str] | None = None) -> dict[tuple[str, int, int], float]:
+    """Make the table; return the constants by mesh, degree and cells."""
+    chosen = options(__doc__, "inf_sup", arguments)
+    names = ("mesh", "degree", "cells", "multipliers", "refined", "beta")
+    columns: dict[str, list[object]] = {name: [] for name in names}
+    found = {}
+    for name, (kind, degrees) in SERIES.items():
+        for degree, (cells, levels) in degrees.items():
+            for n in cells[:2] if chosen.coarse else cells:
+                beta, count = constant(kind, kind.make(n), degree, levels)
+                found[name, degree, n] = beta
+                append(columns, name, degree, n, count, levels, round(beta, 4))
+                print(name, degree, n, count, levels, f"{beta:.4f}", flush=True)
+    Report(chosen.out).table("inf-sup-table", CAPTION, columns, NOTE)
+    return found
+
+
+if __name__ == "__main__":
+    main()
