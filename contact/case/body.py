@@ -8,7 +8,7 @@ from typing import Annotated, Any, Literal, Self, TypeAlias
 
 import numpy as np
 from mpi4py import MPI
-from pydantic import Field, Tag, model_validator
+from pydantic import Field, model_validator
 
 from contact.body import description, rigid
 from contact.body.elements import MEAN_DILATATION, NEEDS
@@ -17,6 +17,8 @@ from contact.case.messages import Words, fault
 from contact.case.section import (
     AmplitudeName,
     Component,
+    Either,
+    Few,
     Formula,
     FormulaVector,
     Part,
@@ -27,8 +29,6 @@ from contact.case.section import (
     Vector,
     as_given,
     as_tuple,
-    few,
-    one_or_many,
 )
 from contact.settings import SPATIAL, Accepted, Count, Number, Switch
 
@@ -63,9 +63,7 @@ class Fixed(Section):
     """Part of the boundary, or a list of parts."""
     displacement: (
         Annotated[
-            tuple[Component, ...],
-            few,
-            as_tuple,
+            Few[Component],
             SPATIAL,
             Accepted('a list of 2 components in 2-D, 3 in 3-D, each a number, a formula or "free"'),
         ]
@@ -164,27 +162,21 @@ class Load(Section):
 ZERO = Expression(0.0)
 
 Components: TypeAlias = Annotated[
-    tuple[TimeComponent, ...],
-    few,
-    as_tuple,
+    Few[TimeComponent],
     SPATIAL,
     Accepted('a list of 2 components in 2-D, 3 in 3-D, each a number, a formula in t or "free"'),
 ]
 Forces: TypeAlias = Annotated[
-    tuple[TimeFormula, ...],
-    few,
-    as_tuple,
+    Few[TimeFormula],
     SPATIAL,
     Accepted("a list of 2 numbers or formulas in t in 2-D, 3 in 3-D"),
 ]
 Rotation: TypeAlias = Annotated[
-    Annotated[TimeComponent, Tag("one")] | Annotated[Components, Tag("many")],
-    one_or_many,
+    Either[TimeComponent, Components],
     Accepted('in 2-D an angle, a formula in t or "free", in 3-D a list of 3 of these'),
 ]
 Moment: TypeAlias = Annotated[
-    Annotated[TimeFormula, Tag("one")] | Annotated[Forces, Tag("many")],
-    one_or_many,
+    Either[TimeFormula, Forces],
     Accepted("in 2-D a number or a formula in t, in 3-D a list of 3 of these"),
 ]
 

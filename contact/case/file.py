@@ -16,7 +16,6 @@ from typing import TYPE_CHECKING, Annotated, Any, Self, TypeAlias, TypeVar
 from pydantic import (
     AfterValidator,
     Discriminator,
-    Field,
     PlainSerializer,
     PrivateAttr,
     Tag,
@@ -34,11 +33,11 @@ from contact.case.mesh import Mesh
 from contact.case.messages import clipped, describe, describe_fault, fault, keys_of, path_of, shown
 from contact.case.section import (
     FromTable,
+    OneOrSome,
     Section,
     Text,
     as_tuple,
     check_conditions,
-    one_or_many,
     without_effect,
 )
 from contact.errors import InputError
@@ -58,16 +57,10 @@ DEEPEST, LONGEST_INDEX = 15, 9
 
 Kind = TypeVar("Kind")
 Materials: TypeAlias = Annotated[
-    Annotated[Material, Tag("one")]
-    | Annotated[tuple[Material, ...], Field(min_length=1), as_tuple, Tag("many")],
-    one_or_many,
-    Accepted("a table [material], or tables [[material]]"),
+    OneOrSome[Material], Accepted("a table [material], or tables [[material]]")
 ]
 Contacts: TypeAlias = Annotated[
-    Annotated[Contact, Tag("one")]
-    | Annotated[tuple[Contact, ...], Field(min_length=1), as_tuple, Tag("many")],
-    one_or_many,
-    Accepted("a table [contact], or tables [[contact]]"),
+    OneOrSome[Contact], Accepted("a table [contact], or tables [[contact]]")
 ]
 
 

@@ -9,19 +9,19 @@ from typing import Annotated, Any, Literal, Self, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import Field, Tag, ValidationError, model_validator
+from pydantic import Field, ValidationError, model_validator
 
 from contact.arguments import expect
 from contact.body import description
 from contact.case.messages import Words, describe, fault
 from contact.case.section import (
     Axis,
+    Either,
     File,
     Names,
     Section,
     Text,
     as_tuple,
-    one_or_many,
 )
 from contact.errors import InputError
 from contact.library.materials import PACKAGED, Entry, find
@@ -44,9 +44,7 @@ PIEZO = ("e31", "e33", "e15", "beta11", "beta33")
 CONSTANTS = ("law", "young", "poisson", "stiffness", *SHORT, "yield_strain", "piezo")
 
 Poling: TypeAlias = Annotated[
-    Annotated[Number, Tag("one")] | Annotated[Axis, Tag("many")],
-    one_or_many,
-    Accepted("an angle in 2-D, a list of 3 numbers in 3-D"),
+    Either[Number, Axis], Accepted("an angle in 2-D, a list of 3 numbers in 3-D")
 ]
 POSITIVE = "a symmetric, positive definite matrix"
 

@@ -9,19 +9,20 @@ from typing import Annotated, Any, Literal, Self, TypeAlias
 
 import numpy as np
 from mpi4py import MPI
-from pydantic import Field, PrivateAttr, Tag, model_validator
+from pydantic import Field, PrivateAttr, model_validator
 
 import meshes
 from contact.case.messages import UNKNOWN, Words, fault
 from contact.case.section import (
     Axis,
+    Either,
+    Few,
     File,
     Name,
+    OneOrSome,
     Section,
     Vector,
     as_tuple,
-    few,
-    one_or_many,
 )
 from contact.errors import InputError
 from contact.mesh import grid
@@ -47,11 +48,9 @@ MANY = 10_000_000
 
 logger = logging.getLogger("contact.mesh")
 
+Pair: TypeAlias = Annotated[tuple[Number, ...], Field(min_length=2, max_length=2), as_tuple]
 Along: TypeAlias = Annotated[
-    Annotated[Number, Tag("one")]
-    | Annotated[tuple[Number, ...], Field(min_length=2, max_length=2), as_tuple, Tag("many")],
-    one_or_many,
-    Accepted("a number in 2-D, a list of 2 numbers in 3-D"),
+    Either[Number, Pair], Accepted("a number in 2-D, a list of 2 numbers in 3-D")
 ]
 
 
@@ -73,10 +72,7 @@ class Piece(Section):
 
 
 Pieces: TypeAlias = Annotated[
-    Annotated[Piece, Tag("one")]
-    | Annotated[tuple[Piece, ...], Field(min_length=1), as_tuple, Tag("many")],
-    one_or_many,
-    Accepted("a table with side, from, to, or a list of them"),
+    OneOrSome[Piece], Accepted("a table with side, from, to, or a list of them")
 ]
 
 
@@ -93,20 +89,13 @@ class Mesh(Section):
     origin: Vector | None = None
     """Lower left corner of a rectangle or box. Default: zeros."""
     size: (
-        Annotated[
-            tuple[Positive, ...],
-            few,
-            as_tuple,
-            Accepted("a list of 2 numbers > 0 for a rectangle, 3 for a box"),
-        ]
+        Annotated[Few[Positive], Accepted("a list of 2 numbers > 0 for a rectangle, 3 for a box")]
         | None
     ) = None
     """Edge lengths of a rectangle or box; required there."""
     cells: (
         Annotated[
-            tuple[Count, ...],
-            few,
-            as_tuple,
+            Few[Count],
             Accepted("a list of 2 whole numbers from 1 to 10000000 for a rectangle, 3 for a box"),
         ]
         | None

@@ -23,6 +23,7 @@ from pydantic import (
     PlainValidator,
     SerializationInfo,
     SerializerFunctionWrapHandler,
+    Tag,
     ValidationInfo,
     model_serializer,
     model_validator,
@@ -38,6 +39,8 @@ from contact.mesh import together
 from contact.settings import SPATIAL, Accepted, Number, ReadWith
 
 Table = TypeVar("Table")
+One = TypeVar("One")
+Many = TypeVar("Many")
 
 
 class Section(BaseModel):
@@ -213,9 +216,16 @@ formula_or_table = Discriminator(
 as_tuple = BeforeValidator(lambda given: tuple(given) if isinstance(given, list) else given)
 _as_source = PlainSerializer(lambda value: getattr(value, "source", value))
 
+#: A list of 2 or 3, of one or more; a single value, or a list; one, or a list of the same.
+Few: TypeAlias = Annotated[tuple[One, ...], Field(min_length=2, max_length=3), as_tuple]
+Some: TypeAlias = Annotated[tuple[One, ...], Field(min_length=1), as_tuple]
+Either: TypeAlias = Annotated[
+    Annotated[One, Tag("one")] | Annotated[Many, Tag("many")], one_or_many
+]
+OneOrSome: TypeAlias = Either[One, Some[One]]
+
 #: Marks of a part of the mesh, and of a name below evolution.amplitudes.
 PART, AMPLITUDE = "part", "amplitude"
-few = Field(min_length=2, max_length=3)
 
 Text: TypeAlias = Annotated[str, Accepted("a text")]
 Name: TypeAlias = Annotated[str, Field(min_length=1), Accepted("the name of a part")]
@@ -270,9 +280,5 @@ TimeComponent: TypeAlias = Annotated[
     Component, AfterValidator(_of_time), Accepted('a number, a formula in t or "free"')
 ]
 FormulaVector: TypeAlias = Annotated[
-    tuple[Formula, ...],
-    few,
-    as_tuple,
-    SPATIAL,
-    Accepted("a list of 2 numbers or formulas in 2-D, 3 in 3-D"),
+    Few[Formula], SPATIAL, Accepted("a list of 2 numbers or formulas in 2-D, 3 in 3-D")
 ]
