@@ -54,7 +54,7 @@ from contact.methods.progress import Best, Stagnation, undeformed_equilibrium
 from contact.methods.report import IterationHistory, Monitor, Outcome
 from contact.methods.rigid_body_modes import RigidBodyModes
 from contact.problem.condensed import Condensation, CondensedProblem, condensable, pays
-from contact.problem.kkt import KKT, evaluate
+from contact.problem.kkt import KKT, evaluate, residual_forces
 from contact.problem.problem import ContactProblem
 from contact.problem.protocols import Problem
 from contact.problem.state import State
@@ -120,6 +120,11 @@ class Newton:
         if options.condense and isinstance(problem, ContactProblem):
             self._condensable = condensable(problem, options.linear)
             self._pays = self._condensable and pays(problem, options.linear)
+
+    @property
+    def condensation(self) -> Condensation | None:
+        """The body condensed onto its contact nodes, where that has been asked for."""
+        return None if self._condensed is None else self._condensed.condensation
 
     def _condensed_step(self) -> CondensedStep:
         """Return the steps on the condensed body, made when they are first asked for."""
@@ -251,7 +256,7 @@ class Newton:
         if (found := self._undeformed()) is not None:
             return found
         if isinstance(self.problem, CondensedProblem):
-            found = self._conducting(self.problem)
+            found = self._conducting(self.problem) or self._apart(outcome)
             if found is not None:
                 return found
         elif self._condensable and not self._pays and iteration.left > 0:
@@ -292,6 +297,30 @@ class Newton:
             return loop.run(iterate, CONTINUATION)
 
         return continuation(solve, Iterate(problem.start()))
+
+    def _apart(self, outcome: Outcome) -> tuple[Iterate, Outcome] | None:
+        """Return a state in which nothing presses, where pushed bodies come to it. Collective."""
+        problem, modes = self.problem, self.modes
+        if outcome.converged or not isinstance(problem, CondensedProblem):
+            return None
+        assert modes is not None
+        if modes.constrained_by_supports:
+            return None
+        state = modes.apart(problem, self.whole.operator, self._parameters.nodal_stiffness)
+        if state is None:
+            return None
+        # All forces are rounding then: they are measured by those without the motion.
+        body = problem.equilibrium
+        left, first = (
+            body.norm(body.unbalanced(residual_forces(problem, at)))
+            for at in (state, problem.start())
+        )
+        equilibrium = left / first if first > 0 else 0.0
+        residuals = replace(evaluate(problem, state), equilibrium=equilibrium)
+        self.history.record(residuals, "rigid motion", inner=2)
+        outcome = Outcome(residuals, self.options.allowed)
+        self.iteration.see(Iterate(state), residuals)
+        return (Iterate(state), outcome) if outcome.converged else None
 
     def last_steps(self, state: State) -> tuple[Iterate, Outcome]:
         """Take Newton's last steps from the state that a fallback has reached. Collective."""
@@ -387,6 +416,8 @@ class NewtonLoop:
                 iteration.see(iterate, residuals)
             if residuals.significant <= options.tolerance:
                 return iterate, self._end(residuals)
+            if (found := self._let_go(iterate, note)) is not None:
+                return found
             if self.give_up is not None and kept.active_set is None and self.give_up(iterate.state):
                 return iterate, self._end(residuals, OVERESTIMATED)
             if not np.isfinite(residuals.significant):
@@ -401,6 +432,24 @@ class NewtonLoop:
                 return iterate, self._end(residuals, ended)
         steps = len(iteration.history.records)
         return iterate, self._end(residuals, f"not converged in {steps} steps")
+
+    def _let_go(self, iterate: Iterate, note: str) -> tuple[Iterate, Outcome] | None:
+        """Return zero displacement where nothing touches any more and nothing acts. Collective.
+
+        Displacements fall by their rounding in each step then, and so do the forces beside which
+        residuals are measured.
+        """
+        problem = self.iteration.problem
+        sizes = _sizes(iterate, problem)
+        if sizes is None or sizes[1] + sizes[2] > 0:
+            return None
+        found = undeformed_equilibrium(problem)
+        if found is None:
+            return None
+        iterate = replace(iterate, state=found[0])
+        self.iteration.see(iterate, found[1])
+        self.iteration.history.record(found[1], f"{note} zero displacement".strip(), inner=0)
+        return iterate, self._end(found[1])
 
     def _end(self, residuals: KKT, ended: str = "") -> Outcome:
         return Outcome(residuals, self.iteration.options.allowed, ended)

@@ -15,7 +15,7 @@ inequalities by non-negative least squares.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -23,7 +23,9 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 from scipy.optimize import nnls
 
+from contact.linear.operator import Operator
 from contact.mesh.entities import component_sums
+from contact.problem.condensed import CondensedProblem
 from contact.problem.kkt import residual_forces
 from contact.problem.problem import ContactProblem
 from contact.problem.protocols import Problem
@@ -44,6 +46,30 @@ STUCK = 10.0
 
 #: Depth that counts as none, over the size of the bodies.
 PASSES = 1e-9
+
+
+@dataclass(frozen=True)
+class _Least:
+    """Rigid motions that are free at a solution, and how much of each is taken off.
+
+    Attributes
+    ----------
+    motions, columns
+        Of the whole problem's unknowns, shape (unknowns, m), and of the jumps, (n, d, m).
+    wanted, amounts
+        For the least displacements of all, and for the least that pass through nothing, (m,).
+    depth
+        How deep the first would pass through (length); 0 for not at all.
+    limited
+        Whether that is more than rounding.
+    """
+
+    motions: Array
+    columns: Array
+    wanted: Array
+    amounts: Array
+    depth: float
+    limited: bool
 
 
 @dataclass
@@ -108,9 +134,54 @@ class RigidBodyModes:
         The motion of owned and global unknowns of the whole problem, and whether the least
         displacements of all would pass through the foundation; None where nothing is free.
         """
+        found = self._least(problem, state)
+        return None if found is None else (found.motions @ found.amounts, found.limited)
+
+    def apart(
+        self, problem: CondensedProblem, operator: Operator, stiffness: float
+    ) -> State | None:
+        """Return a state in which nothing presses: bodies that others push move off. Collective.
+
+        As far as they are pushed: farther aside, out of a wedge, friction might hold them. None
+        where that does not suffice.
+
+        Parameters
+        ----------
+        problem
+            The condensed problem.
+        operator
+            That of its body.
+        stiffness
+            Of a node (stress/length): next to nothing of it makes the system regular. Rigid
+            motions are left as they are then, and a second, proximal step takes its forces off.
+        """
+        jump, start = problem.interface.jump, problem.start()
+        blocks = np.zeros((jump.nodes.size, jump.block_size, jump.block_size))
+        blocks[:] = np.sqrt(EPS) * stiffness * np.eye(jump.block_size)
+        operator.update("secant", start, problem.interface.weighted(blocks, start.x))
+        state = start
+        for _ in range(2):  # each leaves the root of the rounding
+            increment = operator.solve(-residual_forces(problem, state))
+            state = replace(state, x=problem.equilibrium.moved(state.x, increment))
+        found = self._least(problem, state)
+        if found is None:
+            return None
+        further = found.columns @ (found.amounts - found.wanted)
+        way = jump.maximum(np.linalg.norm(further, axis=1))
+        if not way**2 < 2 * found.depth**2:  # more than 45 degrees off the push
+            return None
+        moved = np.zeros((state.x.size // jump.block_size, jump.block_size))
+        moved[jump.nodes, : jump.dim] = found.columns @ found.amounts
+        return replace(state, x=state.x - moved.ravel())
+
+    def _least(self, problem: Problem, state: State) -> _Least | None:
+        """Return the free rigid motion to take off; None where nothing is free. Collective."""
         interface = problem.interface
         jump, nodal = interface.jump, interface.jump.apply(state.x)
-        pressed = interface.pressure(nodal, state.forces) > 0
+        # Pressures that rounding of displacements makes hold nothing.
+        way = jump.maximum(np.abs(nodal[:, : jump.dim]).max(axis=1, initial=0.0))
+        rounding = 1e3 * EPS * interface.stiffness * way
+        pressed = interface.pressure(nodal, state.forces) > rounding
         motions, columns = [], []
         for group in self._unsupported:
             free = null_space(group.held(self.problem.frictional, pressed))
@@ -125,16 +196,18 @@ class RigidBodyModes:
         products = np.einsum("n,nik,nil->kl", weight, moved, moved)
         sides = np.einsum("n,nik,ni->k", weight, moved, displacement)
         products, sides = (jump.comm.allreduce(part, op=MPI.SUM) for part in (products, sides))
-        amounts = np.linalg.lstsq(products, sides, rcond=EPS)[0]
+        wanted = amounts = np.linalg.lstsq(products, sides, rcond=EPS)[0]
         near, opening = np.isfinite(jump.gap), interface.opening(nodal)
         rising = np.einsum("ni,nik->nk", jump.normal, moved)
-        passes = -(opening + rising @ amounts)[near]
-        limited = jump.maximum(passes) > PASSES * interface.size
+        depth = jump.maximum(-(opening + rising @ wanted)[near])
+        limited = depth > PASSES * interface.size
         if limited:
-            parts = jump.comm.allgather((rising[near], np.maximum(opening[near], 0.0)))
+            # Depths of a solution are rounding.
+            room = np.where(opening < -PASSES * interface.size, opening, np.maximum(opening, 0.0))
+            parts = jump.comm.allgather((rising[near], room[near]))
             cone, room = (np.concatenate(part) for part in zip(*parts, strict=True))
-            amounts = _least_distance(products, amounts, cone, -room)
-        return np.hstack(motions) @ amounts, limited
+            amounts = _least_distance(products, wanted, cone, -room)
+        return _Least(np.hstack(motions), moved, wanted, amounts, depth, limited)
 
     def pushed_aside(self, problem: Problem, state: State) -> bool:
         """Tell whether contact has pushed a body to where nothing holds it. Collective.

@@ -21,7 +21,7 @@ def test_the_least_of_all_places():
     solution = solve(squeezed("newton", way=0.01), domain=between_plates(COMM, 0))
     problem, state, nodes = solution.problem, solution.state, solution.problem.nodes
     assert solution.converged
-    assert nodes.maximum(solution.forces.pressure) == 0
+    assert nodes.maximum(solution.forces.pressure) < 1e-14  # rounding of E
     (said,) = [text for text in solution.warnings if "nothing holds" in text]
     assert "nothing holds ring against a rigid motion" in said
 
