@@ -25,6 +25,7 @@ from contact.case.text import to_toml
 from contact.errors import InputError
 from contact.methods.interrupt import SIGNALLED, stop_on_signal
 from contact.methods.method import METHODS, Method
+from contact.methods.newton import Newton
 from contact.methods.options import NewtonOptions, Options
 from contact.methods.report import IterationHistory, Monitor, Outcome, tell
 from contact.methods.steps import Evolution, solve_step
@@ -33,6 +34,7 @@ from contact.output.checkpoint import Checkpoints, kept_digest, read_steps
 from contact.output.remarks import announce
 from contact.output.solution import Solution, StepRecord
 from contact.output.steps import StepRecorder
+from contact.output.uniqueness import critical_factor
 from contact.problem.checks import check_potential, check_problem, check_supports
 from contact.problem.kkt import evaluate
 from contact.problem.problem import ContactProblem
@@ -283,8 +285,10 @@ def run_schedule(
             state, outcome = solve_step(problem, method, start)
             history.records += method.history.records
     counters = method.counters
+    body = method.condensation if isinstance(method, Newton) else None
+    critical = critical_factor(here, state, body) if outcome.converged else np.inf
     # The review needs the memory that the method's operators take.
-    del method
+    del method, body
     check_potential(here, state)
     solution = Solution(
         problem=here,
@@ -296,6 +300,7 @@ def run_schedule(
         start=BEFORE if records else ZERO if start is None else schedule.guess,
         seconds={"setup": setup, "solve": time.perf_counter() - clock - setup, "output": 0.0},
         steps=records,
+        critical_factor=critical,
     )
     announce(solution)
     return solution

@@ -77,6 +77,7 @@ def review(solution: Solution) -> None:
         unknown_pressures(solution),
         beside_loads(solution),
         sliding(solution),
+        strong_friction(solution),
         conductivity(solution),
         ramp(solution),
         bodies.choices(solution),
@@ -362,6 +363,21 @@ def sliding(solution: Solution) -> Iterator[Remark]:
         yield (
             f"several solutions may exist, and this is one reached from {solution.start}: {text}; "
             "a mu that falls more slowly (a smaller rho) has fewer of them"
+        )
+
+
+def strong_friction(solution: Solution) -> Iterator[Remark]:
+    """Say where friction suffices for several solutions, see `contact.output.uniqueness`."""
+    factor = solution.critical_factor
+    if factor <= 1:
+        law, nodes = solution.problem.interface.friction.law, solution.problem.nodes
+        own = law.maximum if law is not None and nodes.nodes.size else 0.0
+        largest = solution.problem.comm.allreduce(own, op=MPI.MAX)
+        yield (
+            f"several solutions may exist, and this is one reached from {solution.start}: where "
+            f"nodes slide together the linearised problem is singular from {factor:.3g} of this "
+            f"friction on, mu up to {factor * largest:.4g}; load steps choose one by the way of "
+            "loading"
         )
 
 

@@ -100,6 +100,9 @@ class Solution(Solved):
         How large strains and changes of volume are; None before the solution is reviewed.
     start
         The initial guess, in words.
+    critical_factor
+        The factor of mu from which on there may be several solutions, as far as that is known;
+        infinity for none (`contact.output.uniqueness`).
     case
         The case as `contact check` prints it, empty where there is none.
     energies, driven
@@ -122,6 +125,7 @@ class Solution(Solved):
     plastic_share: float | None = None
     deformation: Deformation | None = None
     start: str = "zero slip"
+    critical_factor: float = np.inf
     case: str = ""
     energies: Balance | None = None
     driven: tuple[Array, Array] | None = None

@@ -292,6 +292,18 @@ class Condensation:
         )
         return CondensedProblem(condensed, self._interface, self.full.scales, state.time)
 
+    def stiffness(self, state: State) -> Array | None:
+        """Return the stiffness at the kept nodes, on the first rank. Collective.
+
+        That of the last linearisation, or the tangent at a state before there was one; None if it
+        has too many rows, or is not regular.
+        """
+        if not 0 < self._schur.size <= min(LARGEST, self.full.equilibrium.layout.unknowns - 1):
+            return None
+        if not self._kind:
+            self._factorise("tangent", state)
+        return self._stiffness if self._regular else None
+
     def _factorise(self, kind: str, state: State) -> None:
         """Find the dense stiffness of the body at a state. Collective."""
         body, schur = self.full.equilibrium, self._schur

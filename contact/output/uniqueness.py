@@ -1,0 +1,130 @@
+"""Whether friction is strong enough for several solutions, by the solution's own Jacobian.
+
+Where nodes slide in given directions t, the increments of pressures and of slips satisfy
+S_nt du + w dp = 0 and S_tt du + w mu dp = 0, S being the stiffness of the body condensed onto them
+with nodes that are open left free. So S_tt - mu S_nt is singular at a critical mu: the pencil's
+real eigenvalues (Hassani, Hild, Ionescu and Sakki 2003).
+
+References
+----------
+Hassani, Hild, Ionescu and Sakki, A mixed finite element method and solution multiplicity for
+Coulomb frictional contact, Comput. Methods Appl. Mech. Engrg. 192 (2003) 4517.
+Klarbring, Examples of non-uniqueness and non-existence of solutions to quasistatic contact problems
+with friction, Ing.-Arch. 60 (1990) 529.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import LinAlgError, cho_factor, cho_solve, cholesky, solve_triangular
+
+from contact.interface.active_set import touching
+from contact.linear.operator import Counters
+from contact.problem.condensed import Condensation, condensable, pays
+from contact.problem.problem import ContactProblem
+from contact.problem.state import State
+from contact.ranks import on_root
+from contact.tolerances import EPS
+from contact.typing import Array
+
+#: Contact nodes up to which eigenvalues take no time to speak of.
+MOST = 300
+
+
+def critical_factor(
+    problem: ContactProblem, state: State, condensation: Condensation | None = None
+) -> float:
+    """Return the least factor of mu from which on the Jacobian at a solution may be singular.
+
+    Below 1 the friction that is there is enough for several solutions. The touching nodes slide in
+    the directions of their friction stresses, or all in one direction, or in the opposite ones; of
+    a body that touches nothing those that touch in the reference configuration. Infinity without
+    such a factor, and where nothing is known: with a layer, a potential, a smoothed pressure, more
+    than `MOST` contact nodes, or where sliding bodies meet no resistance but friction. Collective.
+
+    Parameters
+    ----------
+    problem, state
+        The problem and its solution.
+    condensation
+        The body condensed onto its contact nodes, where a method has that already.
+    """
+    interface = problem.interface
+    jump, friction = interface.jump, interface.friction
+    known = friction.acts and friction.local and not interface.law.active
+    known = known and not problem.piezoelectric and interface.coupled.size == jump.nodes.size
+    if not known or not 0 < jump.size <= MOST:
+        return np.inf
+    if condensation is None and not (condensable(problem, "auto") and pays(problem, "auto")):
+        return np.inf
+    nodal = jump.apply(state.x)
+    pressure = interface.pressure(nodal, state.forces)
+    closed = touching(pressure, interface.opening(nodal), interface.stiffness)
+    if jump.maximum(closed.astype(float)) == 0:
+        closed = jump.gap <= EPS * interface.size
+    mu = friction.by_pressure(np.maximum(pressure, EPS), interface.slip_length(nodal))
+    condensation = condensation or Condensation(problem, Counters())
+    stiffness = condensation.stiffness(state)
+    if stiffness is None:
+        return np.inf
+    ranks = jump.comm.gather((jump.normal, jump.tangent, state.forces.friction, closed, mu))
+
+    def factor() -> float:
+        normal, tangent, force, touches, rates = (
+            np.concatenate(part) for part in zip(*ranks, strict=True)
+        )
+        if not np.any(touches & (rates > 0)):
+            return np.inf
+        along = _directions(normal, tangent, None)
+        own = _directions(normal, tangent, force)
+        return min(_factor(stiffness, normal, t, touches, rates) for t in (along, own))
+
+    return on_root(jump.comm, factor)
+
+
+def _directions(normal: Array, tangent: Array, force: Array | None) -> Array:
+    """Return unit tangential vectors along forces, or along one direction; 0 without any."""
+    if force is None:
+        first = np.zeros_like(normal)
+        first[:, 0] = 1.0
+        if normal.shape[1] == 2:  # the tangent turns with the surface
+            first = np.stack([-normal[:, 1], normal[:, 0]], axis=1)
+    else:
+        first = force
+    along = np.einsum("nij,nj->ni", tangent, first)
+    size = np.linalg.norm(along, axis=1)
+    fallback = size <= EPS * max(size.max(initial=0.0), np.finfo(float).tiny)
+    if force is not None and fallback.any():
+        along[fallback] = _directions(normal, tangent, None)[fallback]
+        size = np.linalg.norm(along, axis=1)
+    return np.asarray(along / np.maximum(size, np.finfo(float).tiny)[:, None])
+
+
+def _factor(
+    stiffness: Array, normal: Array, along: Array, touches: NDArray[np.bool_], mu: Array
+) -> float:
+    """Return the least |factor| at which S_tt - factor mu S_nt is singular."""
+    count, dim = normal.shape
+    rows = np.arange(count * dim).reshape(count, dim)
+    closed = np.flatnonzero(touches & (np.linalg.norm(along, axis=1) > 0.5))
+    free = rows[~touches].ravel()
+    free = free[np.diag(stiffness)[free] > 0]
+    kept = np.zeros((2, closed.size, count * dim))
+    kept[0, np.arange(closed.size)[:, None], rows[closed]] = along[closed]
+    kept[1, np.arange(closed.size)[:, None], rows[closed]] = normal[closed]
+    try:
+        to_free = kept[0] @ stiffness[:, free]
+        factors = cho_factor(stiffness[np.ix_(free, free)]) if free.size else None
+        response = cho_solve(factors, to_free.T) if factors is not None else to_free.T
+        slides = kept[0] @ stiffness @ kept[0].T - to_free @ response
+        presses = kept[1] @ stiffness @ kept[0].T - (kept[1] @ stiffness[:, free]) @ response
+        lower = cholesky((slides + slides.T) / 2, lower=True)
+    except LinAlgError:
+        return np.inf
+    if np.diag(lower).min() ** 2 <= 1e-10 * np.abs(stiffness).max():  # friction alone resists
+        return np.inf
+    inner = solve_triangular(lower, mu[closed, None] * presses, lower=True)
+    values = np.linalg.eigvals(solve_triangular(lower, inner.T, lower=True).T)
+    real = np.abs(values[np.abs(values.imag) <= 1e-8 * np.abs(values)].real)
+    return float(1 / real.max()) if real.max(initial=0.0) > 0 else np.inf

@@ -1,0 +1,88 @@
+"""Friction from which on there may be several solutions, by the solution's own Jacobian."""
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+
+from contact import build_problem, solve
+from contact.case.file import parse_case
+from contact.output.uniqueness import critical_factor
+from scripts.studies.fresh_check import Mesh, write_msh
+from scripts.studies.sweep import problems
+
+SAID = "several solutions may exist"
+
+
+def triangle(folder, mu, load, method="newton", height=0.5345, poisson=0.3):
+    """Return one triangle on a plane, clamped along its slope: one contact node, at the origin."""
+    mesh = Mesh(
+        np.array([[0.0, 0.0], [1.0, 0.0], [0.0, height]]), np.array([[0, 1, 2]]), np.array([0]),
+        ["body"], {"bottom": np.array([[0, 1]]), "slope": np.array([[1, 2]]),
+                   "side": np.array([[0, 2]])},
+    )  # fmt: skip
+    write_msh(mesh, folder / "triangle.msh")
+    return parse_case({
+        "mesh": {"file": str(folder / "triangle.msh")},
+        "material": {"young": 1.0, "poisson": poisson},
+        "fixed": [{"on": "slope", "displacement": [0.0, 0.0]}],
+        "load": [{"on": "side", "traction": load}],
+        "contact": {"on": "bottom"},
+        "friction": {"law": "coulomb", "mu": mu},
+        "solver": {"method": method},
+    })  # fmt: skip
+
+
+@pytest.mark.parametrize(("height", "poisson"), [(0.5345, 0.3), (1.0, 0.3), (0.3, 0.45)])
+def test_critical_friction_of_a_triangle_in_closed_form(height, poisson, tmp_path):
+    """K = lambda g g + mu (g g + |g|^2 I), g = (1, 1/h): K_tt/|K_nt| is the critical mu."""
+    case = triangle(tmp_path, 0.5, [0.01, -0.01], height=height, poisson=poisson)
+    solution = solve(case, comm=MPI.COMM_SELF)
+    ratio = 2 * poisson / (1 - 2 * poisson)
+    critical = (ratio + 2 + 1 / height**2) * height / (ratio + 1)
+    assert 0.5 * solution.critical_factor == pytest.approx(critical, rel=1e-10)
+
+
+@pytest.mark.parametrize("method", ["newton", "uzawa"])
+@pytest.mark.parametrize(("mu", "warned"), [(0.5, False), (1.49, False), (1.5, True), (3.0, True)])
+@pytest.mark.parametrize("load", [[0.01, -0.01], [-0.01, -0.01], [-0.01, 0.005]])
+def test_several_solutions_of_a_triangle_are_warned_of(mu, warned, load, method, tmp_path):
+    """The node slips, sticks or has lifted off: one sticks where another method lets it go."""
+    solution = solve(triangle(tmp_path, mu, load, method), comm=MPI.COMM_SELF)
+    assert solution.converged
+    said = [text for text in solution.warnings if SAID in text]
+    assert bool(said) is warned
+    assert not warned or "mu up to 1.497" in said[0]
+
+
+@pytest.mark.parametrize("hard", [False, True])
+def test_single_solutions_are_not_warned_of(hard):
+    """Problems of the sweeps at mu up to 0.5."""
+    seen = 0
+    for _, case in problems(True, None, hard):
+        problem = build_problem(case, MPI.COMM_SELF)
+        law = problem.interface.friction.law
+        if law is None or np.max(law.maximum) > 0.5 or problem.piezoelectric:
+            continue
+        solution = solve(problem)
+        assert solution.critical_factor > 1, case.source
+        seen += 1
+    assert seen >= 2
+
+
+@pytest.mark.parallel
+def test_any_number_of_ranks():
+    """The factor of a beam's contact nodes, which are on all ranks."""
+    tables = {
+        "mesh": {"generator": "rectangle", "size": [4.0, 1.0], "cells": [32, 8]},
+        "material": {"young": 1.0, "poisson": 0.3},
+        "fixed": [{"on": "left", "displacement": [0.0, 0.0]}],
+        "load": [{"on": "top", "traction": [0.002, -0.01]}],
+        "contact": {"on": "bottom"},
+        "friction": {"law": "coulomb", "mu": 0.6},
+    }
+    alone, shared = (solve(parse_case(tables), comm=c) for c in (MPI.COMM_SELF, MPI.COMM_WORLD))
+    assert np.isfinite(alone.critical_factor)
+    assert shared.critical_factor == pytest.approx(alone.critical_factor, rel=1e-8)
+    # Another method has no condensed body: it is made for this.
+    again = critical_factor(shared.problem, shared.state)
+    assert again == pytest.approx(alone.critical_factor, rel=1e-8)
