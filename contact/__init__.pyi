@@ -42,6 +42,10 @@ from contact.solving import solve as solve
 from forms.hencky import Linear as Linear
 from forms.hencky import Log as Log
 from forms.hencky import UserLaw as UserLaw
+from forms.history import Response as Response
+from forms.j2 import J2 as J2
+from forms.j2 import Tabulated as Tabulated
+from forms.j2 import Voce as Voce
 from forms.laws import Coulomb as Coulomb
 from forms.laws import PerfectConductivity as PerfectConductivity
 from forms.laws import RampConductivity as RampConductivity

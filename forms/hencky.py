@@ -8,17 +8,17 @@ and plotting.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Protocol, TypeAlias, runtime_checkable
+from typing import Protocol, TypeAlias
 
 import numpy as np
 import ufl
-from numpy.typing import ArrayLike
 from ufl.core.expr import Expr
 
 from forms.elasticity import Anisotropic
+from forms.history import AtPoints, HistoryLaw
 from forms.kinematics import CARTESIAN, Strained, deviator_squared, embed, strain
 from forms.ops import Value, is_symbolic, log, maximum, sqrt
 
@@ -236,29 +236,17 @@ class UserLaw(Isotropic):
         return total
 
 
-#: Laws of the stress that the forms take.
-Law: TypeAlias = Hencky | Anisotropic
+#: Laws of the stress of a material, and as forms take them.
+Law: TypeAlias = Hencky | Anisotropic | HistoryLaw
+FormLaw: TypeAlias = Hencky | Anisotropic | AtPoints
 
 
-@runtime_checkable
-class HistoryLaw(Protocol):
-    """A law of the stress with internal variables, which a step changes; see `Hencky` for the rest.
-
-    Its own `secant_stress(frozen, eps)`, where it has one, takes the place of (1.13).
-    """
-
-    @property
-    def variables(self) -> Mapping[str, ArrayLike]:
-        """The names of the variables, with their values in the reference configuration."""
-
-    def since(self, variables: Mapping[str, Expr]) -> Law:
-        """Return the law in a step that begins with values of the variables."""
-
-    def updated(self, eps: Expr) -> Mapping[str, Expr]:
-        """Return the variables at the end of that step, with the strain there."""
+def is_linear(law: Law) -> bool:
+    """Tell whether the stress is a linear function of the strain."""
+    return isinstance(law, Linear | Anisotropic)
 
 
-def secant_stress(law: Law, frozen: Expr, eps: Expr) -> Expr:
+def secant_stress(law: FormLaw, frozen: Expr, eps: Expr) -> Expr:
     """Return (k0 - 2g/3) tr(eps) I + 2 g eps with g taken at the frozen strain, (1.13).
 
     A 3 x 3 stress: in plane strain sigma_zz = (k0 - 2g/3) tr eps, which is not zero
@@ -266,26 +254,25 @@ def secant_stress(law: Law, frozen: Expr, eps: Expr) -> Expr:
     """
     if isinstance(law, Anisotropic):
         return law.stress(eps)
-    own = getattr(law, "secant_stress", None)
-    if own is not None:
-        return own(frozen, eps)
+    if isinstance(law, AtPoints):
+        return law.secant_stress(frozen, eps)
     g = law.secant_modulus(deviator_squared(frozen))
     return (law.bulk - 2 * g / 3) * ufl.tr(eps) * ufl.Identity(3) + 2 * g * embed(eps)
 
 
-def stress(law: Law, eps: Expr) -> Expr:
+def stress(law: FormLaw, eps: Expr) -> Expr:
     """Return the 3 x 3 stress sigma = (k0 - 2g/3) tr(eps) I + 2 g eps, equation (1.13)."""
     return secant_stress(law, eps, eps)
 
 
-def energy_density(law: Law, eps: Expr) -> Expr:
+def energy_density(law: Hencky | Anisotropic, eps: Expr) -> Expr:
     """Return M(eps) = (k0/2) (tr eps)^2 + int_0^t 2 g(s) s ds, equation (1.11)."""
     if isinstance(law, Anisotropic):
         return law.energy_density(eps)
     return law.bulk / 2 * ufl.tr(eps) ** 2 + law.shear_energy(deviator_squared(eps))
 
 
-def secant_form(law: Law, u: Expr, v: Expr, w: Expr, kinematics: Strained = CARTESIAN) -> Expr:
+def secant_form(law: FormLaw, u: Expr, v: Expr, w: Expr, kinematics: Strained = CARTESIAN) -> Expr:
     """Return the integrand of the Kacanov form B(u; v, w) of section 3.4."""
     frozen, eps, test = (strain(f, kinematics) for f in (u, v, w))
     return ufl.inner(secant_stress(law, frozen, eps), test)

@@ -27,7 +27,7 @@ from ufl.core.expr import Expr
 
 from forms.crystal import PLANE, VOIGT, coupling_tensor, to_axis, turned
 from forms.elasticity import Anisotropic, isotropic, mandel
-from forms.hencky import Law, secant_stress
+from forms.hencky import FormLaw, Law, secant_stress
 from forms.kinematics import CARTESIAN, CellMean, Isochoric, Strained, embed, strain
 
 
@@ -187,7 +187,7 @@ def electric_displacement(
 
 
 def saddle_form(
-    law: Law,
+    law: FormLaw,
     piezo: Piezo,
     u: Expr,
     v: Expr,
@@ -208,7 +208,7 @@ def saddle_form(
 
 
 def symmetrised_form(
-    law: Law,
+    law: FormLaw,
     piezo: Piezo,
     u: Expr,
     v: Expr,

@@ -17,7 +17,7 @@ from contact.errors import InputError
 from contact.mesh.together import part
 from contact.typing import Array
 from forms.elasticity import Anisotropic
-from forms.hencky import Law, Linear
+from forms.hencky import Law, is_linear
 from forms.piezo import Piezo
 
 
@@ -259,7 +259,12 @@ class Body:
     @property
     def linear(self) -> bool:
         """Whether the stress is a linear function of the strain."""
-        return all(isinstance(material.law, Linear | Anisotropic) for material in self.materials)
+        return all(is_linear(material.law) for material in self.materials)
+
+    @property
+    def symmetric(self) -> bool:
+        """Whether its tangent is a symmetric matrix."""
+        return all(getattr(material.law, "symmetric", True) for material in self.materials)
 
     @property
     def phi_scale(self) -> float:

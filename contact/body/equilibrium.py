@@ -98,10 +98,12 @@ class BodyEquilibrium:
             domain.revolved,
         )
         # Where the forms are evaluated is written anew by each query.
-        self._forms = WeakForms(domain, body, self.space, self.cells, degree, element)
+        self._forms = WeakForms(
+            domain, body, self.space, self.cells, degree, element, self.pointwise
+        )
         self._at = self._forms.at
-        #: The internal variables of the materials: the body's part of a history.
-        self.variables = self._forms.variables
+        #: The laws with internal variables: the body's part of a history.
+        self.laws = self._forms.laws
         test = self._forms.split(ufl.TestFunction(self.space))
         self._loads = Loads(domain, body, *test, self.owned)
 
@@ -127,6 +129,11 @@ class BodyEquilibrium:
     def linear(self) -> bool:
         """Whether the operator is the same at all states."""
         return self.body.linear
+
+    @property
+    def symmetric(self) -> bool:
+        """Whether its tangent is a symmetric matrix."""
+        return self.body.symmetric
 
     @property
     def piezoelectric(self) -> bool:
@@ -186,7 +193,11 @@ class BodyEquilibrium:
 
     def commit(self, state: Evaluated) -> InternalVariables | None:
         """Return the internal variables at the end of the step of a state. Collective."""
-        return self.variables.commit(self.pointwise, state, self.nodal(state.x).ravel())
+        return self.laws.commit(state, self.nodal(state.x).ravel())
+
+    def dissipation(self, state: Evaluated) -> float:
+        """Return the energy that the material dissipated in the step of a state. Collective."""
+        return self.laws.dissipation(state, self.nodal(state.x).ravel())
 
     def internal_forces(self, state: Evaluated, secant_at: Array | None = None) -> Array:
         """Return the owned nodal forces of the stresses at a state. Collective.
@@ -200,12 +211,13 @@ class BodyEquilibrium:
             material law itself.
         """
         forms = self._forms
-        self.variables.set(self.variables.of(state))
         forms.at.x.array[:] = self.nodal(state.x).ravel()
         if secant_at is None or self.linear:
+            self.laws.set(state, forms.at.x.array)
             forces = sum(assembled(form, self.owned) for form in forms.law_forces)
         else:
             forms.secant_at.x.array[:] = self.nodal(secant_at).ravel()
+            self.laws.set(state, forms.secant_at.x.array, "secant")
             forces = sum(assembled(form, self.owned) for form in forms.secant_forces)
         return np.concatenate([forces, np.zeros(self.global_unknowns.size)])
 
@@ -235,8 +247,8 @@ class BodyEquilibrium:
     def assemble(self, matrix: PETSc.Mat, kind: str, state: Evaluated) -> None:
         """Assemble Kacanov's "secant" or Newton's "tangent" at a state. Collective."""
         forms = self._forms
-        self.variables.set(self.variables.of(state))
         forms.at.x.array[:] = forms.secant_at.x.array[:] = self.nodal(state.x).ravel()
+        self.laws.set(state, forms.at.x.array, kind)
         matrix.zeroEntries()
         for form in forms.tangent if kind == "tangent" else forms.secant:
             assemble_matrix(matrix, form, bcs=[s.condition for s in self.supports])

@@ -1,38 +1,50 @@
-"""Internal variables of materials at quadrature points: the history of a body.
+"""Laws with internal variables at quadrature points: their stresses, and the history of a body.
 
-A law of the stress that has some (`forms.hencky.HistoryLaw`) is given those at the beginning of a
-step, and returns those at its end. Nothing else in the program knows of them.
+A law of the stress that has some (`forms.history.HistoryLaw`) is given the strains at the end of a
+step and the variables at its beginning. Forms look at the stress and the stiffness that it returns.
+Nothing else in the program knows of them.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from functools import cached_property, partial
+from collections.abc import Iterator, Mapping, Sequence
+from functools import cached_property
 
+import basix
 import basix.ufl
 import numpy as np
 import ufl
 from dolfinx import fem
+from mpi4py import MPI
 from numpy.typing import ArrayLike
 from ufl.core.expr import Expr
 
 from contact.body.description import Material
-from contact.body.elements import kinematics_of
-from contact.body.materials import law_with_constants
 from contact.body.pointwise import Pointwise
 from contact.errors import InputError
 from contact.history import QUADRATURE_POINTS, Evaluated, InternalVariables
 from contact.mesh.domain import Domain, Indices
 from contact.typing import Array
-from forms.hencky import HistoryLaw, Law
-from forms.kinematics import strain
+from forms.hencky import FormLaw, Law
+from forms.history import (
+    AtPoints,
+    HistoryLaw,
+    Response,
+    components,
+    isotropic_stiffness,
+    to_vector,
+)
+from forms.kinematics import Strained, strain
 
 #: Name of the part of the history.
 VARIABLES = "material"
 
+#: Part of a strain, and the least strain, by which differences of the stress are taken.
+DIFFERENCE, LEAST = 1e-6, 1e-12
 
-class QuadratureVariables:
-    """The internal variables of all materials of a body. Materials share those of one name.
+
+class QuadratureLaws:
+    """The laws with internal variables among the materials of a body. They share those of one name.
 
     Parameters
     ----------
@@ -42,16 +54,17 @@ class QuadratureVariables:
         The owned cells of each.
     degree
         Of the quadrature.
-    element
-        Which of `contact.body.elements`.
+    kinematics
+        Of the strains that the laws see.
+    pointwise
+        Evaluates expressions of the unknowns.
+    fitted
+        Degree of the polynomials that stand for values between the points of a cell.
 
     Attributes
     ----------
     initial
-        Their values in the reference configuration; None without any.
-    means
-        The means in the cells of those that `set` was given last, for fields between the
-        quadrature points.
+        The variables in the reference configuration; None without any.
 
     Raises
     ------
@@ -65,143 +78,232 @@ class QuadratureVariables:
         materials: Sequence[Material],
         cells: Sequence[Indices],
         degree: int,
-        element: str,
+        kinematics: Strained,
+        pointwise: Pointwise,
+        fitted: int,
     ) -> None:
-        self._domain, self._materials, self._cells = domain, materials, cells
-        self._degree, self._kind = degree, element
+        self._domain, self._degree, self._pointwise = domain, degree, pointwise
+        self._kinematics = kinematics
+        self._size, self._fitted = components(domain.dim), fitted
+        pairs = zip((material.law for material in materials), cells, strict=True)
+        self._laws = [(law, own) for law, own in pairs if isinstance(law, HistoryLaw)]
         mesh = domain.mesh
         self._owned = mesh.topology.index_map(mesh.topology.dim).size_local
-        self._functions: dict[str, fem.Function] = {}
-        self.means: dict[str, fem.Function] = {}
+        self.initial: InternalVariables | None = None
+        if self._laws:
+            self.initial = InternalVariables(QUADRATURE_POINTS, self._first_values())
+
+    def _first_values(self) -> dict[str, Array]:
+        """Return the variables in the reference configuration, one cell after the other."""
         values: dict[str, Array] = {}
-        for law, own in zip((material.law for material in materials), cells, strict=True):
-            for name, value in variables_of(law).items():
+        for law, own in self._laws:
+            for name, value in law.variables(self._size).items():
                 first = np.asarray(value, dtype=float)
                 if name not in values:
                     values[name] = np.zeros((self._owned, self.points.shape[0], *first.shape))
-                    space = fem.functionspace(mesh, self._element(first.shape))
-                    self._functions[name] = fem.Function(space, name=name)
-                    constant = fem.functionspace(mesh, ("DG", 0, first.shape))
-                    self.means[name] = fem.Function(constant, name=name)
                 elif values[name].shape[2:] != first.shape:
                     raise InputError(
                         f"material: the variable {name!r} has the shapes {values[name].shape[2:]} "
                         f"and {first.shape} in two materials; accepted: one, or two names"
                     )
                 values[name][own] = first
-        self.initial: InternalVariables | None = None
-        if values:
-            flat = {name: self._flat(array) for name, array in values.items()}
-            self.initial = InternalVariables(QUADRATURE_POINTS, flat)
+        return {name: array.reshape(-1, *array.shape[2:]) for name, array in values.items()}
 
-    def _element(self, shape: tuple[int, ...]) -> basix.ufl._ElementBase:
+    def _function(self, *shape: int) -> fem.Function:
+        """Return a function at the quadrature points."""
         cell = self._domain.mesh.topology.cell_name()
-        return basix.ufl.quadrature_element(cell, shape, degree=self._degree)
-
-    @property
-    def shapes(self) -> dict[str, tuple[int, ...]]:
-        """The shapes of the variables by name."""
-        return {name: function.ufl_shape for name, function in self._functions.items()}
+        element = basix.ufl.quadrature_element(cell, shape, degree=self._degree)
+        return fem.Function(fem.functionspace(self._domain.mesh, element))
 
     @cached_property
+    def _stress(self) -> fem.Function:
+        return self._function(self._size)
+
+    @cached_property
+    def _stiffness(self) -> fem.Function:
+        return self._function(self._size, self._size)
+
+    @cached_property
+    def _rule(self) -> tuple[Array, Array]:
+        """The points of the reference cell and their weights."""
+        cell = self._domain.mesh.topology.cell_name()
+        element = basix.ufl.quadrature_element(cell, degree=self._degree)
+        points, weights = element.custom_quadrature()
+        return np.asarray(points), np.asarray(weights)
+
+    @property
     def points(self) -> Array:
         """The quadrature points of the reference cell, shape (q, d)."""
-        return np.asarray(self._element(()).custom_quadrature()[0])
+        return self._rule[0]
 
     @cached_property
     def places(self) -> Array:
         """The quadrature points of the owned cells, one cell after the other, (places, d)."""
-        coordinate = fem.functionspace(self._domain.mesh, self._element(()))
-        at = coordinate.tabulate_dof_coordinates()[coordinate.dofmap.list[: self._owned]]
+        space = self._function().function_space
+        at = space.tabulate_dof_coordinates()[space.dofmap.list[: self._owned]]
         return np.asarray(at.reshape(-1, at.shape[-1])[:, : self._domain.dim])
 
-    def _flat(self, array: Array) -> Array:
-        """Return values by cell and point as values by place."""
-        return array.reshape(-1, *array.shape[2:])
+    @cached_property
+    def volumes(self) -> Array:
+        """The volume of the body that each place stands for, shape (places,)."""
+        mesh = self._domain.mesh
+        extent = self._domain.kinematics.extent(ufl.SpatialCoordinate(mesh))
+        density = abs(ufl.JacobianDeterminant(mesh))
+        expression = fem.Expression(density if extent is None else density * extent, self.points)
+        found = expression.eval(mesh, np.arange(self._owned, dtype=np.int32))
+        return np.asarray(found.reshape(self._owned, -1) * self._rule[1]).ravel()
 
-    def law(self, law: Law) -> Law:
-        """Return a law in a step that begins with the values which `set` is given."""
-        return _since(law, self._functions)
+    def law(self, law: Law) -> FormLaw:
+        """Return a law as forms see it, which look at what `set` has evaluated last."""
+        return AtPoints(self._stress, self._stiffness) if isinstance(law, HistoryLaw) else law
 
-    def law_of_means(self, law: Law) -> Law:
-        """Return a law likewise, with the means in the cells, for any points."""
-        return _since(law, self.means)
+    def fitted_law(self, law: Law) -> FormLaw:
+        """Return a law with the stress that `fit` has evaluated last, for any points."""
+        return AtPoints(self.fits["stress"]) if isinstance(law, HistoryLaw) else law
 
     def of(self, state: Evaluated) -> InternalVariables | None:
-        """Return the values that the step of a state began with; None without any."""
+        """Return the variables that the step of a state began with; None without any."""
         part = state.history.get(VARIABLES, self.initial)
         assert part is None or isinstance(part, InternalVariables)
         return part
 
-    def set(self, values: InternalVariables | None) -> None:
-        """Let the forms of the laws look at values from now on."""
-        for name, function in self._functions.items():
-            assert values is not None
-            array, mean = values.arrays[name], self.means[name]
-            shape = self._owned, self.points.shape[0], -1
-            _fill(function, array.reshape(self._owned, -1))
-            _fill(mean, array.reshape(shape).mean(axis=1))
+    def _strain(self, at: fem.Function) -> Expr:
+        u = ufl.as_vector([at[i] for i in range(self._domain.dim)])
+        return to_vector(strain(u, self._kinematics), self._size)
 
-    def commit(self, pointwise: Pointwise, state: Evaluated, x: Array) -> InternalVariables | None:
-        """Return the values at the end of the step that led to a state. Collective.
+    def _responses(
+        self, state: Evaluated, x: Array, kind: str = ""
+    ) -> Iterator[tuple[Indices, Response]]:
+        """Yield some cells after others, and the response at their points.
 
         Parameters
         ----------
-        pointwise
-            Evaluates expressions of the unknowns.
         state, x
             The state, and its local unknowns of the nodes.
+        kind
+            "tangent" or "secant"; empty without stiffness.
         """
+        before = self.of(state)
+        for law, own in self._laws:
+            assert before is not None
+            values = self._pointwise.values("strain", self._strain, self.points, x, own)
+            for cells, found in values:
+                variables = {
+                    name: self.by_cell(before.arrays[name])[cells].reshape(-1, *np.shape(first))
+                    for name, first in law.variables(self._size).items()
+                }
+                yield cells, respond(law, found.reshape(-1, self._size), variables, kind)
+
+    def by_cell(self, array: Array) -> Array:
+        """Return values by place as those by cell and point."""
+        return array.reshape(self._owned, self.points.shape[0], *array.shape[1:])
+
+    def set(self, state: Evaluated, x: Array, kind: str = "") -> None:
+        """Let the forms of the laws look at the response at a state from now on."""
+        for cells, response in self._responses(state, x, kind):
+            _fill(self._stress, cells, response.stress)
+            if kind:
+                assert response.stiffness is not None
+                _fill(self._stiffness, cells, response.stiffness)
+
+    def commit(self, state: Evaluated, x: Array) -> InternalVariables | None:
+        """Return the variables at the end of the step that led to a state."""
         before = self.of(state)
         if before is None:
             return None
-        self.set(before)
         arrays = {name: array.copy() for name, array in before.arrays.items()}
-        for index, own in enumerate(self._cells):
-            if not variables_of(self._materials[index].law):
-                continue
-            asked = "internal variables", index
-            found = pointwise.values(asked, partial(self._updated, index), self.points, x, own)
-            for cells, values in found:
-                begin = 0
-                for array in arrays.values():
-                    by_cell = array.reshape(self._owned, self.points.shape[0], -1)
-                    end = begin + by_cell.shape[2]
-                    by_cell[cells] = values[..., begin:end]
-                    begin = end
+        for cells, response in self._responses(state, x):
+            for name, values in response.variables.items():
+                by_cell = self.by_cell(arrays[name])
+                by_cell[cells] = values.reshape(by_cell[cells].shape)
         return before.replaced(arrays)
 
-    def _updated(self, index: int, at: fem.Function) -> Expr:
-        """Return the variables at the end of a step in a material, one after the other."""
-        law = self.law(law_with_constants(self._materials[index].law, self._domain.mesh))
-        u = ufl.as_vector([at[i] for i in range(self._domain.dim)])
-        return ufl.as_vector(self.updated(law, strain(u, kinematics_of(self._domain, self._kind))))
+    def dissipation(self, state: Evaluated, x: Array) -> float:
+        """Return the energy that was dissipated in the step that led to a state. Collective."""
+        total = 0.0
+        for cells, response in self._responses(state, x):
+            if response.dissipation is not None:
+                total += float(self.by_cell(self.volumes)[cells].ravel() @ response.dissipation)
+        return float(self._domain.comm.allreduce(total, op=MPI.SUM))
 
-    def updated(self, law: Law, eps: Expr) -> list[Expr]:
-        """Return the components of all variables at the end of a step; 0 if a law has them not."""
-        values = law.updated(eps) if isinstance(law, HistoryLaw) else {}
-        return [
-            (values[name][index] if index else values[name]) if name in values else ufl.as_ufl(0.0)
-            for name, shape in self.shapes.items()
-            for index in np.ndindex(shape)
-        ]
+    @property
+    def names(self) -> list[str]:
+        """The names of the variables."""
+        return [] if self.initial is None else list(self.initial.arrays)
+
+    @cached_property
+    def fits(self) -> dict[str, fem.Function]:
+        """Polynomials in each cell that stand for the stress and the variables between points."""
+        if self.initial is None:
+            return {}
+        shapes = {name: array.shape[1:] for name, array in self.initial.arrays.items()}
+        shapes["stress"] = (self._size,)
+        mesh, degree = self._domain.mesh, self._fitted
+        return {
+            name: fem.Function(fem.functionspace(mesh, ("DG", degree, shape)), name=name)
+            for name, shape in shapes.items()
+        }
+
+    @cached_property
+    def _fitting(self) -> Array:
+        """Values at points -> coefficients of the polynomial nearest to them, (dofs, points)."""
+        cell = self._domain.mesh.topology.cell_name()
+        element = basix.ufl.element("DG", cell, self._fitted)
+        return np.linalg.pinv(element.tabulate(0, self.points)[0])
+
+    def fit(self, state: Evaluated, x: Array) -> None:
+        """Let `fits` be those at the end of the step that led to a state."""
+        for cells, response in self._responses(state, x):
+            for name, values in {**response.variables, "stress": response.stress}.items():
+                by_cell = values.reshape(cells.size, self.points.shape[0], -1)
+                _fill(self.fits[name], cells, np.einsum("dq,cqi->cdi", self._fitting, by_cell))
 
 
-def variables_of(law: Law) -> Mapping[str, ArrayLike]:
-    """Return the internal variables of a law and their initial values."""
-    return law.variables if isinstance(law, HistoryLaw) else {}
+def respond(law: HistoryLaw, strain: Array, variables: Mapping[str, Array], kind: str) -> Response:
+    """Return the response of a law, with a stiffness where one is asked for and it has none."""
+    found = law.respond(strain, variables, kind)
+    _check(law, strain, variables, found)
+    if not kind or found.stiffness is not None:
+        return found
+    n, size = strain.shape
+    stiffness = np.empty((n, size, size))
+    if kind == "secant":
+        young, poisson = float(law.young), float(law.poisson)
+        moduli = young / (3 - 6 * poisson), young / (2 + 2 * poisson)
+        stiffness[:] = isotropic_stiffness(*moduli, size)
+    else:
+        step = np.maximum(DIFFERENCE * np.linalg.norm(strain, axis=1), LEAST)
+        for k in range(size):
+            moved = np.zeros_like(strain)
+            moved[:, k] = step
+            up, down = (law.respond(strain + s * moved, variables).stress for s in (1, -1))
+            stiffness[:, :, k] = (up - down) / (2 * step[:, None])
+    return Response(found.stress, found.variables, stiffness, found.dissipation)
 
 
-def _since(law: Law, variables: Mapping[str, fem.Function]) -> Law:
-    if not isinstance(law, HistoryLaw):
-        return law
-    return law.since({name: variables[name] for name in law.variables})
+def _check(
+    law: HistoryLaw, strain: Array, variables: Mapping[str, ArrayLike], found: Response
+) -> None:
+    """Refuse a response of other shapes than asked for."""
+    n, size = strain.shape
+    shapes: dict[str, tuple[tuple[int, ...], tuple[int, ...]]] = {}
+    for name, value in variables.items():
+        shapes[name] = np.shape(found.variables.get(name, ())), np.shape(value)
+    shapes["stress"] = np.shape(found.stress), (n, size)
+    if found.stiffness is not None:
+        shapes["stiffness"] = np.shape(found.stiffness), (n, size, size)
+    if found.dissipation is not None:
+        shapes["dissipation"] = np.shape(found.dissipation), (n,)
+    for name, (given, accepted) in shapes.items():
+        if given != accepted:
+            raise InputError(
+                f"{type(law).__name__}: respond: {name} has the shape {given}; accepted: "
+                f"{accepted}, a row a point"
+            )
 
 
-def _fill(function: fem.Function, values: Array) -> None:
-    """Write values of the owned cells, shape (cells, values)."""
-    dofmap = function.function_space.dofmap
-    blocks = function.x.array.reshape(-1, dofmap.index_map_bs)
-    own = dofmap.list[: values.shape[0]]
-    blocks[own] = values.reshape(*own.shape, -1)
-    function.x.scatter_forward()
+def _fill(function: fem.Function, cells: Indices, values: Array) -> None:
+    """Write values in cells: those of their dofs, one after the other."""
+    blocks = function.x.array.reshape(-1, function.function_space.dofmap.index_map_bs)
+    dofs = function.function_space.dofmap.list[cells]
+    blocks[dofs] = values.reshape(*dofs.shape, -1)

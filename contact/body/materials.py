@@ -18,6 +18,7 @@ from contact.mesh.domain import Domain, Indices, Measure
 from contact.mesh.entities import cells_at
 from forms.elasticity import Anisotropic
 from forms.hencky import Law
+from forms.history import HistoryLaw
 from forms.piezo import Piezo
 
 #: A material with form constants for its numbers, and the measure of its cells.
@@ -124,7 +125,7 @@ def law_with_constants(law: Law, mesh: Mesh) -> Law:
     """Return a law with form constants for its numbers."""
     if isinstance(law, Anisotropic):
         return Anisotropic(fem.Constant(mesh, np.asarray(law.stiffness, dtype=float)))
-    if not is_dataclass(law) or getattr(law, "g_min", 0.0) > 0:
+    if not is_dataclass(law) or isinstance(law, HistoryLaw) or getattr(law, "g_min", 0.0) > 0:
         return law
     numbers = {
         f.name: constant(mesh, getattr(law, f.name))

@@ -11,12 +11,14 @@ from dolfinx import fem
 from ufl.core.expr import Expr
 
 from contact.body.description import Body
-from contact.body.elements import MEAN_DILATATION
-from contact.body.internal_variables import QuadratureVariables
+from contact.body.elements import MEAN_DILATATION, kinematics_of
+from contact.body.internal_variables import QuadratureLaws
 from contact.body.materials import material_measures
+from contact.body.pointwise import Pointwise
 from contact.mesh.domain import Domain
 from contact.mesh.entities import Indices
-from forms.hencky import secant_form
+from forms.hencky import is_linear, secant_form
+from forms.history import AtPoints, HistoryLaw
 from forms.kinematics import CellMean, Isochoric
 from forms.piezo import symmetrised_form
 
@@ -34,6 +36,8 @@ class WeakForms:
         Of the unknowns.
     cells
         The owned cells of each material.
+    pointwise
+        Evaluates expressions of the unknowns.
 
     Attributes
     ----------
@@ -49,32 +53,37 @@ class WeakForms:
         cells: Sequence[Indices],
         degree: int,
         element: str,
+        pointwise: Pointwise,
     ) -> None:
         self._body, self._dim = body, domain.dim
         self.at, self.secant_at = fem.Function(space), fem.Function(space)
         self._trial, test = ufl.TrialFunction(space), ufl.TestFunction(space)
         self._test = self.split(test)
-        exact = 1 if degree == 1 else (2 if body.linear else 4)
+        # Stresses at points are no function that more of them would integrate more exactly.
+        smooth = all(is_linear(m.law) or isinstance(m.law, HistoryLaw) for m in body.materials)
+        exact = 1 if degree == 1 else (2 if smooth else 4)
         exact += domain.kinematics.added_degree
-        #: The internal variables of the materials.
-        self.variables = QuadratureVariables(domain, body.materials, cells, exact, element)
-        base, full, means = domain.kinematics, self.variables.law, self.variables.law_of_means
-        rules: list[Any] = [(exact, full, ((1, base),))]
+        base, seen = domain.kinematics, kinematics_of(domain, element)
+        #: The laws with internal variables.
+        self.laws = QuadratureLaws(
+            domain, body.materials, cells, exact, seen, pointwise, degree - 1
+        )
+        rules: list[Any] = [(exact, ((1, base),))]
         if element == MEAN_DILATATION:
             # P2-P0: all that changes of volume do is taken at the centroid, the rest in full.
             mean = CellMean(base)
-            rules = [
-                (exact, full, ((1, Isochoric(base)),)),
-                (1, means, ((1, mean), (-1, Isochoric(mean)))),
-            ]
+            rules = [(exact, ((1, Isochoric(base)),)), (1, ((1, mean), (-1, Isochoric(mean))))]
         #: Integrals by quadrature rule: sign, kinematics, law, piezoelectric tensors, measure.
         self._rules = [
             [
-                (sign, kinematics, since(law), piezo, dx)
+                (sign, kinematics, self.laws.law(law), piezo, dx)
                 for law, piezo, dx in material_measures(domain, body.materials, cells, points)
-                for sign, kinematics in terms
+                # Stresses at points are those of the whole strain there.
+                for sign, kinematics in (
+                    ((1, seen),) * (points == exact) if isinstance(law, HistoryLaw) else terms
+                )
             ]
-            for points, since, terms in rules
+            for points, terms in rules
         ]
 
     def split(self, x: Any) -> tuple[Expr, Expr | None]:
@@ -82,22 +91,24 @@ class WeakForms:
         u = ufl.as_vector([x[i] for i in range(self._dim)])
         return u, (None if self._body.piezo is None else self._body.phi_scale * x[self._dim])
 
-    def _internal(self, secant_at: Any, x: Any) -> list[ufl.Form]:
-        """Return the forms of all quadrature rules, which add up.
+    def _internal(self, secant_at: Any, history_at: Any) -> list[ufl.Form]:
+        """Return the forces at `at`, secants and the stiffness at points being those elsewhere.
 
-        In one form FFCx would take values of a rule of one point for those of the others.
+        They are the forms of all quadrature rules, which add up: in one form FFCx would take values
+        of a rule of one point for those of the others.
         """
-        u, phi = self.split(x)
-        u_0, _ = self.split(secant_at)
-        v, xi = self._test
+        (u, phi), (v, xi) = self.split(self.at), self._test
+        frozen = {False: self.split(secant_at)[0], True: self.split(history_at)[0]}
         return [
             sum(
                 sign * secant_form(law, u_0, u, v, kinematics) * dx
                 if piezo is None
                 else sign * symmetrised_form(law, piezo, u_0, u, phi, v, xi, kinematics) * dx
                 for sign, kinematics, law, piezo, dx in integrals
+                for u_0 in [frozen[isinstance(law, AtPoints)]]
             )
             for integrals in self._rules
+            if integrals
         ]
 
     # For each function of a form dolfinx packs the values in all cells: with the law itself those
@@ -111,17 +122,21 @@ class WeakForms:
     @cached_property
     def secant_forces(self) -> list[fem.Form]:
         """Forces at `at` with the secant modulus at `secant_at`."""
-        return fem.form(self._internal(self.secant_at, self.at))
+        return fem.form(self._internal(self.secant_at, self.secant_at))
 
     @cached_property
     def secant(self) -> list[fem.Form]:
         """Kacanov's matrix at `secant_at`."""
-        return fem.form(self._internal(self.secant_at, self._trial))
+        # The derivative, for with a history the forces are affine.
+        return self._derivative(self._internal(self.secant_at, self.secant_at))
 
     @cached_property
     def tangent(self) -> list[fem.Form]:
         """Newton's matrix at `at`."""
         if self._body.linear:
             return self.secant
-        laws = self._internal(self.at, self.at)
-        return fem.form([ufl.derivative(law, self.at, self._trial) for law in laws])
+        return self._derivative(self._internal(self.at, self.secant_at))
+
+    def _derivative(self, forces: list[ufl.Form]) -> list[fem.Form]:
+        """Compile the derivative of forces by `at`, all else being frozen."""
+        return fem.form([ufl.derivative(form, self.at, self._trial) for form in forces])

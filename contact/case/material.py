@@ -9,11 +9,11 @@ from typing import Annotated, Any, Literal, Self, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import Field, ValidationError, model_validator
+from pydantic import Discriminator, Field, Tag, ValidationError, model_validator
 
 from contact.arguments import expect
 from contact.body import description
-from contact.case.messages import Words, describe, fault
+from contact.case.messages import Words, describe, fault, shown
 from contact.case.section import (
     Axis,
     Either,
@@ -27,6 +27,7 @@ from contact.errors import InputError
 from contact.library.materials import PACKAGED, Entry, find
 from contact.settings import Accepted, NonNegative, Number, Positive, ReadWith
 from contact.typing import Array
+from forms import j2
 from forms.crystal import in_plane, isotropic_about_x3, stiffness_tensor, to_axis
 from forms.elasticity import Anisotropic, hexagonal
 from forms.hencky import Law, Linear, Log
@@ -41,16 +42,18 @@ UNITS = {"SI": 1.0, "GPa": 1e9}
 SHORT = ("c11", "c12", "c13", "c33", "c44")
 PIEZO = ("e31", "e33", "e15", "beta11", "beta33")
 #: Keys that a material of the library does not take.
-CONSTANTS = ("law", "young", "poisson", "stiffness", *SHORT, "yield_strain", "piezo")
+PLASTIC = ("yield_stress", "hardening", "kinematic")
+CONSTANTS = ("law", "young", "poisson", "stiffness", *SHORT, "yield_strain", *PLASTIC, "piezo")
 
 Poling: TypeAlias = Annotated[
     Either[Number, Axis], Accepted("an angle in 2-D, a list of 3 numbers in 3-D")
 ]
 POSITIVE = "a symmetric, positive definite matrix"
 
-ISOTROPIC = ReadWith("law", ("linear", "log"), required=True)
+ISOTROPIC = ReadWith("law", ("linear", "log", "j2"), required=True)
 CRYSTAL = ReadWith("law", "anisotropic")
 LOG = ReadWith("law", "log")
+J2 = ReadWith("law", "j2")
 
 
 def _matrix(rows: int, columns: int) -> Any:
@@ -115,8 +118,61 @@ class Piezo(Section):
         return self
 
 
+class Saturation(Section):
+    """`[material.hardening]`: yield stress R(a) = Y + H a + Q (1 - exp(-q a)) (Voce) of `j2`.
+
+    a is the equivalent plastic strain.
+    """
+
+    saturation: Positive
+    """Q (force/area)."""
+    rate: Positive
+    """q."""
+    modulus: NonNegative = 0.0
+    """H (force/area)."""
+
+
+class BackStress(Section):
+    """`[[material.kinematic]]`: back stress db = (2/3) C de_p - gamma b da of `j2`.
+
+    Each term has one; the yield surface moves by their sum (Armstrong and Frederick, Chaboche).
+    """
+
+    modulus: Positive
+    """C, uniaxial stress over plastic strain (force/area)."""
+    recovery: NonNegative = 0.0
+    """gamma; 0: Prager's."""
+
+
+#: The hardening of `j2`.
+Hardening: TypeAlias = Annotated[
+    Annotated[NonNegative, Tag("number")]
+    | Annotated[Saturation, Tag("table")]
+    | Annotated[tuple[Annotated[tuple[Number, Number], as_tuple], ...], as_tuple, Tag("points")],
+    Discriminator(
+        lambda given: (
+            "points"
+            if isinstance(given, list | tuple)
+            else "table"
+            if isinstance(given, Mapping | Section)
+            else "number"
+        )
+    ),
+    Accepted(
+        "a modulus >= 0, a table { saturation, rate, modulus }, or a list of points "
+        "[plastic strain, stress]"
+    ),
+]
+Kinematic: TypeAlias = Annotated[
+    Either[NonNegative, Annotated[tuple[BackStress, ...], as_tuple]],
+    Accepted("a modulus >= 0, or a list of tables { modulus, recovery }"),
+]
+
+
 class Material(Section):
-    """`[material]`: isotropic Hencky material, sigma = k0 tr(eps) I + 2 g dev(eps), or a crystal.
+    """`[material]`: isotropic material of Hencky or of flow theory (`j2`), or a crystal.
+
+    Hencky's has sigma = k0 tr(eps) I + 2 g dev(eps).
 
     Several materials are a list of tables `[[material]]`, each with its regions. With `name` the
     constants are those of a library (`contact materials` lists them); they are then not given.
@@ -135,8 +191,9 @@ class Material(Section):
     ] = None
     """With `name`: a library of one's own (TOML), relative to the case file. Default: that of the
     package."""
-    law: Literal["linear", "log", "anisotropic"] | None = None
+    law: Literal["linear", "log", "j2", "anisotropic"] | None = None
     """`linear`: g = mu1; `log`: (7.8), g = mu1 (s/t)(ln(t/s) + 1) for t above the yield strain s;
+    `j2`: plastic strain that remains (von Mises, flow theory), step by step of `[evolution]`;
     `anisotropic`: sigma = C eps. Default: `linear`."""
     young: Annotated[Positive | None, ISOTROPIC] = None
     """Young's modulus E (force/area)."""
@@ -170,6 +227,14 @@ class Material(Section):
     """Argument of g: |dev eps|, or its square as printed in (7.8), which softens beyond e xi_0."""
     g_min: Annotated[NonNegative, LOG] = 0.0
     """Floor of g (force/area); 0: none."""
+    yield_stress: Annotated[Positive | None, J2] = None
+    """Y in uniaxial tension (force/area). Required by `j2`, but where `hardening` is a list of
+    points, which begins with it."""
+    hardening: Annotated[Hardening, J2] = 0.0
+    """Isotropic hardening: H of R(a) = Y + H a, a being the equivalent plastic strain; or R by
+    points, linear between them and constant behind."""
+    kinematic: Annotated[Kinematic, J2] = 0.0
+    """Kinematic hardening: Prager's modulus, uniaxial stress over plastic strain."""
     piezo: Piezo | None = None
     """Piezoelectric constants, `[material.piezo]`. Absent: mechanical only."""
 
@@ -224,6 +289,8 @@ class Material(Section):
             raise fault("poling", self.poling, 'an axis with law = "anisotropic" or piezo')
         elif self.law == "log":
             self._check_log()
+        elif self.law == "j2":
+            self._check_j2()
         if self.poling is not None and self.piezo is not None and self.piezo.poling is not None:
             raise fault("piezo.poling", self.piezo.poling, "one of poling and piezo.poling")
         return self
@@ -245,6 +312,21 @@ class Material(Section):
         mu1 = self.young / (2 + 2 * self.poisson)
         if self.g_min > mu1:
             raise fault("g_min", self.g_min, f"at most the shear modulus {mu1:g}")
+
+    def _check_j2(self) -> None:
+        if self.yield_strain is not None:
+            raise fault("yield_strain", self.yield_strain, "yield_stress")
+        points, given = self.hardening, self.yield_stress
+        first = points[0][1] if isinstance(points, tuple) else None
+        if given is None and first is None:
+            raise fault("yield_stress", Words("missing"), 'a number > 0 with law = "j2"')
+        if given is not None and first is not None and given != first:
+            raise fault("yield_stress", given, f"that of the first point of hardening, {first:g}")
+        try:
+            self._law(np.eye(3))
+        except ValueError as error:
+            words, _, accepted = str(error).removeprefix("hardening: ").partition("accepted: ")
+            raise fault("hardening", Words(words or shown(points)), accepted) from None
 
     def _check_stiffness(self) -> None:
         if self.yield_strain is not None:
@@ -280,6 +362,8 @@ class Material(Section):
         assert self.young is not None and self.poisson is not None  # required
         if self.law == "linear":
             return Linear(self.young, self.poisson)
+        if self.law == "j2":
+            return self._plastic()
         assert self.yield_strain is not None
         return Log(
             self.young,
@@ -287,6 +371,29 @@ class Material(Section):
             yield_strain=self.yield_strain,
             argument=self.argument,
             g_min=self.g_min,
+        )
+
+    def _plastic(self) -> Law:
+        """Return the law of flow theory."""
+        assert self.young is not None and self.poisson is not None  # required
+        given, kinematic, limit = self.hardening, self.kinematic, self.yield_stress
+        hardening: j2.Hardening
+        if isinstance(given, tuple):
+            hardening = j2.Tabulated(*map(tuple, zip(*given, strict=True)))
+            limit = hardening.stress[0]
+        elif isinstance(given, Saturation):
+            hardening = j2.Voce(given.modulus, given.saturation, given.rate)
+        else:
+            hardening = j2.Voce(given)
+        assert limit is not None  # checked
+        return j2.J2(
+            self.young,
+            self.poisson,
+            yield_stress=limit,
+            hardening=hardening,
+            kinematic=[(term.modulus, term.recovery) for term in kinematic]
+            if isinstance(kinematic, tuple)
+            else kinematic,
         )
 
     def _piezo_tensors(self) -> PiezoTensors | None:

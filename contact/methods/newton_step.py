@@ -202,8 +202,9 @@ class NewtonStep:
         """The operator of the linear systems."""
         if self._operator is None:
             interface = self.problem.interface
-            asymmetric = interface.friction.acts or interface.law.active
-            self._operator = self.problem.equilibrium.operator(
+            body = self.problem.equilibrium
+            asymmetric = interface.friction.acts or interface.law.active or not body.symmetric
+            self._operator = body.operator(
                 interface.coupled,
                 self.problem.constraint,
                 symmetric=not asymmetric,

@@ -28,7 +28,8 @@ from contact.problem.problem import ContactProblem
 from contact.problem.state import State
 from contact.typing import Array
 from forms.elasticity import Anisotropic
-from forms.hencky import HistoryLaw, stress
+from forms.hencky import stress
+from forms.history import HistoryLaw, components, to_tensor
 from forms.kinematics import deviator_squared, strain, von_mises
 from forms.ops import maximum, sqrt
 from forms.piezo import coupling_stress, electric_displacement
@@ -103,8 +104,8 @@ class Point:
         kinematics = kinematics_of(body.domain, body.element, on_axis=True)
         self._dim, self.strain = body.dim, strain(u, kinematics)
         self._piezo = material.piezo and piezo_with_constants(material.piezo, mesh)
-        self.law = body.variables.law_of_means(law_with_constants(material.law, mesh))
-        self.stress = stress(self.law, self.strain)
+        law = body.laws.fitted_law(law_with_constants(material.law, mesh))
+        self.stress = stress(law, self.strain)
         if self._piezo is not None:
             self.stress += coupling_stress(self._piezo, self._phi)
 
@@ -156,7 +157,7 @@ class DerivedFields:
         self.shapes: dict[str, tuple[int, ...]] = {
             name: expression.ufl_shape for name, expression in values_of(BODY, at).items()
         }
-        self.shapes |= body.variables.shapes
+        self.shapes |= {name: value.ufl_shape for name, value in self._variables.items()}
 
     @property
     def columns(self) -> Mapping[str, slice]:
@@ -181,15 +182,25 @@ class DerivedFields:
         """Return all components of a material's fields, one after the other."""
         point = Point(self.body, material, at)
         fields = values_of(BODY, point).values()
-        values = [f[i] for f in fields for i in np.ndindex(f.ufl_shape)]
-        return ufl.as_vector(values + self.body.variables.updated(point.law, point.strain))
+        every = [*fields, *self._variables.values()]
+        return ufl.as_vector([f[i] for f in every for i in np.ndindex(f.ufl_shape)])
+
+    @property
+    def _variables(self) -> dict[str, Expr]:
+        """The internal variables by name, tensors of strain or stress as such."""
+        fits = self.body.laws.fits
+        tensor = (components(self.body.dim),)
+        return {
+            name: to_tensor(fits[name]) if fits[name].ufl_shape == tensor else fits[name]
+            for name in self.body.laws.names
+        }
 
     def _chunks(self, material: int) -> Iterator[tuple[NDArray[np.int32], Array]]:
         """Yield owned cells of a material and the values, shape (cells, points, components)."""
         body, cells = self.body, self.body.cells[material]
         expression = partial(self._expression, body.body.materials[material])
         name = "fields", material
-        body.variables.set(body.variables.of(self._state))
+        body.laws.fit(self._state, self._x)
         yield from body.pointwise.values(name, expression, self.points, self._x, cells)
 
     def _all_chunks(self) -> Iterator[tuple[NDArray[np.int32], Array]]:

@@ -199,6 +199,10 @@ _RUN = (
         lambda r: r.energies.dissipation, (STEPS,),
     ),
     Quantity(
+        "plastic_dissipation", "work", "By plastic flow in the step; of a body that yields.",
+        lambda r: _present(r.energies.plastic), (STEPS,),
+    ),
+    Quantity(
         "outer_iterations", "", "Outer iterations: rows of `history.csv`.",
         lambda r: len(r.history.records), (SUMMARY, SWEEP),
     ),

@@ -17,6 +17,7 @@ from contact.problem.problem import ContactProblem
 from contact.tolerances import LARGEST_VIOLATION
 from forms.elasticity import Anisotropic
 from forms.hencky import Hencky
+from forms.history import HistoryLaw
 from forms.laws import PerfectConductivity, RampConductivity
 from forms.monotonicity import check_monotonicity
 
@@ -106,9 +107,9 @@ def monotonicity(solution: Solution, strains: Sequence[float]) -> Iterator[Remar
     """Check (h1) on the strains that the solution has in each material."""
     dim = 3 if solution.problem.domain.revolved else solution.problem.dim
     for material, strain in zip(solution.problem.body.materials, strains, strict=True):
-        # (h1) speaks of Hencky laws; a crystal's stiffness is positive definite, or refused.
+        # (h1) speaks of Hencky's laws; a crystal's stiffness is positive definite, or refused.
         law, place = material.law, f" in {', '.join(material.on)}" if material.on else ""
-        if not np.isfinite(strain) or isinstance(law, Anisotropic):
+        if not np.isfinite(strain) or isinstance(law, Anisotropic | HistoryLaw):
             continue
         yield _monotonicity(law, place, strain, dim)
         # g(0) and mu_1, which stands for it wherever a size is asked for.

@@ -87,7 +87,7 @@ class CondensedBody:
     acting: Array
     component_norms: ComponentNorms
 
-    linear, most_rounding = True, MOST_ROUNDING
+    linear, symmetric, most_rounding = True, True, MOST_ROUNDING
 
     @property
     def block_size(self) -> int:
@@ -392,7 +392,7 @@ def condensable(problem: ContactProblem, kind: str) -> bool:
     """Tell whether a problem can be condensed onto its contact nodes.
 
     That is where the contact nodes are few and a direct solver has the memory, unless the user
-    or his options of PETSc ask for another.
+    or his options of PETSc ask for another, and where the matrix is symmetric.
     """
     options = PETSc.Options(PREFIX)
     names = ("ksp_type", "pc_type", "pc_factor_mat_solver_type")
@@ -400,4 +400,4 @@ def condensable(problem: ContactProblem, kind: str) -> bool:
     layout = problem.equilibrium.layout
     large = kind == "auto" and layout.dim == 3 and layout.unknowns > multigrid.DIRECT
     many = problem.nodes.size * layout.block_size > LARGEST
-    return not (chosen or kind == "iterative" or large or many)
+    return problem.equilibrium.symmetric and not (chosen or kind == "iterative" or large or many)

@@ -1,13 +1,14 @@
-"""The energy balance of a step: work, stored energy and dissipation by friction.
+"""The energy balance of a step: work, stored energy, and dissipation by friction and plastic flow.
 
 Work is that of all but the unilateral constraint and friction: loads, supports, electrodes, and
 of layer and conductive foundation on the body, by the trapezoidal rule. Energy is stored
 in the body. Per step
 
-    work - change of energy = dissipation + O(step^2),
+    work - change of energy = dissipation + plastic dissipation + O(step^2),
 
 and the dissipation, sum w lambda_f . Delta j_tau with the friction at the end of the step, is
-never negative. Before the reference configuration nothing has acted before.
+never negative; neither is that of plastic flow, which the material states. Before the reference
+configuration nothing has acted before.
 """
 
 from __future__ import annotations
@@ -38,12 +39,15 @@ class Moment:
         Forces and charges on the owned unknowns: those that do work, and those of the stresses.
     enthalpy
         Stored energy, less charges times potentials of a piezoelectric body (all ranks).
+    plastic
+        Energy that the material has dissipated in the step (all ranks).
     """
 
     x: Array
     given: Array
     internal: Array
     enthalpy: float
+    plastic: float = 0.0
 
     @staticmethod
     def rest(problem: ContactProblem) -> Moment:
@@ -65,11 +69,14 @@ class Balance:
         Stored at its end.
     dissipation
         Taken by friction during the step.
+    plastic
+        Taken by plastic flow; None for a body without.
     """
 
     work: float
     energy: float
     dissipation: float
+    plastic: float | None = None
 
 
 def moment(problem: ContactProblem, state: State, before: Moment) -> Moment:
@@ -92,7 +99,9 @@ def moment(problem: ContactProblem, state: State, before: Moment) -> Moment:
             for s in _POINTS
         ]
         power = 0.5 * _WEIGHTS @ np.array(forces)
-    return Moment(state.x, given, internal, before.enthalpy + body.product(power, moved))
+    plastic = body.dissipation(state)
+    enthalpy = before.enthalpy + body.product(power, moved) - plastic
+    return Moment(state.x, given, internal, enthalpy, plastic)
 
 
 def balance(problem: ContactProblem, state: State, before: Moment, now: Moment) -> Balance:
@@ -110,4 +119,5 @@ def balance(problem: ContactProblem, state: State, before: Moment, now: Moment) 
     friction = interface.jump.weight @ np.einsum("ni,ni->n", state.forces.friction, slip)
     dissipation = float(problem.comm.allreduce(friction, op=MPI.SUM))
     done = body.product(work, np.ones_like(work))
-    return Balance(done, now.enthalpy - stored, dissipation)
+    flows = body.laws.initial is not None
+    return Balance(done, now.enthalpy - stored, dissipation, now.plastic if flows else None)

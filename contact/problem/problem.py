@@ -159,9 +159,7 @@ class ContactProblem:
         self.time = 1.0
         self.since: float | None = None
         #: The history of a body to which nothing has been done.
-        self.initial = self._history(
-            self.interface.friction.history, self.equilibrium.variables.initial
-        )
+        self.initial = self._history(self.interface.friction.history, self.equilibrium.laws.initial)
         self.history = self.initial
 
     def at(
@@ -205,7 +203,7 @@ class ContactProblem:
 
     def points(self, place: str) -> Array:
         """Return the points of the places of a history that this rank owns, shape (n, d)."""
-        return self.nodes.points if place == CONTACT_NODES else self.equilibrium.variables.places
+        return self.nodes.points if place == CONTACT_NODES else self.equilibrium.laws.places
 
     def _interface(self) -> Interface:
         size, one = self.domain.size, len(self.contacts) == 1

@@ -83,6 +83,10 @@ class Equilibrium(Protocol):
         """Whether the operator is the same at all unknowns."""
 
     @property
+    def symmetric(self) -> bool:
+        """Whether its tangent is a symmetric matrix."""
+
+    @property
     def component_norms(self) -> ComponentNorms:
         """Which forces are compared with each other."""
 

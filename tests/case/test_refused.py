@@ -37,6 +37,27 @@ BAD = {
     "incompressible": ({"material__poisson": 0.5}, "a number between -1 and 0.5, both excluded"),
     "unknown law": ({"material__law": "plastic"}, 'given "plastic"; accepted: "linear", "log"'),
     "log without yield": ({"material__yield_strain": None}, "material.yield_strain: missing"),
+    "plastic without yield": (
+        {"material": {"law": "j2", "young": 1.0, "poisson": 0.3}},
+        'material.yield_stress: missing; accepted: a number > 0 with law = "j2"',
+    ),
+    "yield stress of another law": (
+        {"material__yield_stress": 1.0},
+        'material.yield_stress: given 1.0; accepted: yield_stress with law = "j2"',
+    ),
+    "softening": (
+        {"material": {"law": "j2", "young": 1.0, "poisson": 0.3, "hardening": [[0, 2], [1, 1]]}},
+        "material.hardening: [[0.0, 2.0], [1.0, 1.0]]; accepted: stresses > 0 that do not decrease",
+    ),
+    "key of a back stress": (
+        {
+            "material": {
+                **{"law": "j2", "young": 1.0, "poisson": 0.3, "yield_stress": 0.1},
+                "kinematic": [{"modulos": 1.0}],
+            }
+        },
+        "material.kinematic.0.modulos: unknown key, did you mean modulus?",
+    ),
     "floor above the modulus": ({"material__g_min": 1.0}, "at most the shear modulus 0.384615"),
     "degree": ({"space__degree": 3}, "space.degree: given 3; accepted: 1 or 2"),
     "generator": ({"mesh__generator": "circle"}, "mesh.generator: given"),

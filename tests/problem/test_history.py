@@ -9,7 +9,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
-import ufl
 from mpi4py import MPI
 
 from contact import evolve, parse_case, solve
@@ -17,9 +16,8 @@ from contact.case.build import build_problem
 from contact.history import QUADRATURE_POINTS
 from contact.output.checkpoint import read_steps
 from contact.output.fields import DerivedFields
-from forms.hencky import Isotropic, Linear, secant_stress
-from forms.kinematics import embed
-from forms.ops import maximum
+from forms.hencky import Isotropic
+from forms.history import Response, isotropic_stiffness
 
 YOUNG, POISSON, LIMIT, MOST, HEIGHT, WIDTH = 10.0, 0.3, 2e-3, 0.5, 1.0, 2.0
 TIMES, PRESSED = [0.0, 1.0, 2.0, 3.0], [0.0, 4e-3, 1e-3, 6e-3]
@@ -33,25 +31,15 @@ def damage(kappa):
 class Damage(Isotropic):
     """Stress (1 - d(kappa)) C eps."""
 
-    kappa: object = 0.0
-
-    @property
-    def variables(self) -> Mapping[str, float]:
+    def variables(self, size) -> Mapping[str, float]:
         return {"kappa": 0.0}
 
-    def since(self, variables):
-        return replace(self, **variables)
-
-    def updated(self, eps):
-        strain = ufl.sqrt(ufl.inner(embed(eps), embed(eps)) + 1e-30)
-        return {"kappa": maximum(self.kappa, strain)}
-
-    def secant_stress(self, frozen, eps):
-        elastic = secant_stress(Linear(self.young, self.poisson), eps, eps)
-        return (1 - damage(self.updated(frozen)["kappa"])) * elastic
-
-    def secant_modulus(self, q):
-        return (1 - damage(maximum(self.kappa, q**0.5))) * self.shear
+    def respond(self, strain, variables, kind=""):
+        elastic = isotropic_stiffness(self.bulk, self.shear, strain.shape[1])
+        kappa = np.maximum(variables["kappa"], np.linalg.norm(strain, axis=1))
+        secant = (1 - damage(kappa))[:, None, None] * elastic
+        stress = np.einsum("nij,nj->ni", secant, strain)
+        return Response(stress, {"kappa": kappa}, secant if kind == "secant" else None)
 
 
 def case(cells=4, degree=1, stages=3, **more):

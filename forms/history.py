@@ -1,0 +1,143 @@
+"""Laws of the stress with internal variables: a stress update at points, in NumPy.
+
+Tensors are vectors of their components xx, yy, zz, yz, xz, xy, in the plane and of bodies of
+revolution xx, yy, zz, xy, with shears times sqrt(2) (Mandel's notation): products of tensors are
+those of vectors, and a law that takes any number of components is written once.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Protocol, runtime_checkable
+
+import numpy as np
+import ufl
+from numpy.typing import ArrayLike, NDArray
+from ufl.core.expr import Expr
+
+from forms.crystal import VOIGT
+from forms.kinematics import embed
+
+#: Number of components -> the pairs of tensor indices that they stand for.
+PAIRS = {4: ((0, 0), (1, 1), (2, 2), (0, 1)), 6: VOIGT}
+
+
+def components(dim: int) -> int:
+    """Return the number of components of a symmetric tensor in 2-D or 3-D."""
+    return 4 if dim == 2 else 6
+
+
+def to_vector(tensor: Expr, size: int) -> Expr:
+    """Return the components of a symmetric tensor as a UFL vector of 4 or 6."""
+    t = embed(tensor)
+    return ufl.as_vector([t[i, j] if i == j else 2**0.5 * t[i, j] for i, j in PAIRS[size]])
+
+
+def to_tensor(vector: Expr) -> Expr:
+    """Return the 3 x 3 tensor of 4 or 6 components."""
+    rows = [[ufl.as_ufl(0.0)] * 3 for _ in range(3)]
+    for k, (i, j) in enumerate(PAIRS[vector.ufl_shape[0]]):
+        rows[i][j] = rows[j][i] = vector[k] if i == j else vector[k] / 2**0.5
+    return ufl.as_tensor(rows)
+
+
+def isotropic_stiffness(bulk: ArrayLike, shear: ArrayLike, size: int) -> NDArray[np.float64]:
+    """Return k I (x) I + 2 G (1 - I (x) I/3) for moduli of shape (...), shape (..., size, size)."""
+    one = np.zeros(size)
+    one[:3] = 1.0
+    spherical = np.outer(one, one)
+    k, g = (np.asarray(modulus, dtype=float)[..., None, None] for modulus in (bulk, shear))
+    return np.asarray(k * spherical + 2 * g * (np.eye(size) - spherical / 3))
+
+
+@dataclass(frozen=True)
+class Response:
+    """The response of a material at n points to a strain.
+
+    Attributes
+    ----------
+    stress
+        At the end of the step, shape (n, s) with s components.
+    variables
+        The internal variables there, shape (n, ...).
+    stiffness
+        Derivative of the stress by the strain, shape (n, s, s), or another positive matrix where
+        the "secant" is asked for. None: differences of the stress, and the elastic stiffness.
+    dissipation
+        Energy that was dissipated during the step, by volume, shape (n,); None for nothing.
+    """
+
+    stress: NDArray[np.float64]
+    variables: Mapping[str, NDArray[np.float64]]
+    stiffness: NDArray[np.float64] | None = None
+    dissipation: NDArray[np.float64] | None = None
+
+
+@runtime_checkable
+class HistoryLaw(Protocol):
+    """A law of the stress with internal variables, which a step changes; see `hencky.Hencky`.
+
+    `symmetric`, where it has that and it is False, says that its stiffness is not symmetric.
+
+    Examples
+    --------
+    A user's own return mapping is a class with these methods: `forms.j2.J2` is one, and
+    ``tests/problem/test_history.py`` has another, scalar damage in ten lines.
+    """
+
+    @property
+    def young(self) -> float:
+        """Young's modulus of small strains."""
+
+    @property
+    def poisson(self) -> float:
+        """Poisson's ratio of these."""
+
+    def variables(self, size: int) -> Mapping[str, ArrayLike]:
+        """Return the names of the variables, with their values in the reference configuration.
+
+        Parameters
+        ----------
+        size
+            Number of components of a tensor, 4 or 6.
+        """
+
+    def respond(
+        self,
+        strain: NDArray[np.float64],
+        variables: Mapping[str, NDArray[np.float64]],
+        kind: str = "",
+    ) -> Response:
+        """Return the response at n points.
+
+        Parameters
+        ----------
+        strain
+            At the end of the step, shape (n, s).
+        variables
+            At its beginning, shape (n, ...).
+        kind
+            "tangent" or "secant": the stiffness that is asked for; empty for none.
+        """
+
+
+@dataclass(frozen=True)
+class AtPoints:
+    """A law with internal variables as forms see it: its stress and stiffness at given points.
+
+    Attributes
+    ----------
+    stress, stiffness
+        Functions at quadrature points, shapes (s,) and (s, s).
+    """
+
+    stress: Expr
+    stiffness: Expr | None = None
+
+    def secant_stress(self, frozen: Expr, eps: Expr) -> Expr:
+        """Return the stress, linearised about a frozen strain where the strain is another one."""
+        if frozen == eps or self.stiffness is None:
+            return to_tensor(self.stress)
+        change = to_vector(eps - frozen, self.stress.ufl_shape[0])
+        return to_tensor(self.stress + ufl.dot(self.stiffness, change))

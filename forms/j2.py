@@ -1,0 +1,303 @@
+"""Flow theory of plasticity (J2, von Mises), with isotropic and kinematic hardening.
+
+A step is one of backward Euler: with the deviatoric trial stress s_tr = 2G (dev eps - e_p) and
+back stresses b_k,
+
+    xi = s - sum b_k,    |xi| <= sqrt(2/3) R(a),    de_p = dg xi/|xi|,    da = sqrt(2/3) dg,
+    db_k = (2/3) C_k de_p - gamma_k b_k da,
+
+with the terms of Chaboche, which are Armstrong and Frederick's with a recovery gamma, and
+Prager's without. It is a radial return: xi points along z = s_tr - sum b_k/(1 + gamma_k da), and
+one scalar equation is left for dg. Without recovery it is Hencky's law about a moved origin.
+
+References
+----------
+Simo and Hughes, Computational Inelasticity, Springer (1998), boxes 3.1 and 3.2.
+Chaboche, A review of some plasticity and viscoplasticity constitutive theories, Int. J. Plasticity
+24 (2008) 1642.
+Kobayashi and Ohno, Implementation of cyclic plasticity models based on a general form of kinematic
+hardening, Int. J. Numer. Meth. Engng 53 (2002) 2217.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from forms.hencky import Isotropic
+from forms.history import Response, isotropic_stiffness
+
+Array = NDArray[np.float64]
+
+#: |dev| of a uniaxial plastic strain over that, and of a uniaxial stress over that.
+ROOT = np.sqrt(2.0 / 3.0)
+
+#: Residual of the local equation that counts as zero, over the trial stress; iterations at most.
+LOCAL, MOST = 2e-14, 60
+
+
+class Hardening(Protocol):
+    """The yield stress that plastic strain adds, R(a) - Y."""
+
+    def __call__(self, a: Array) -> Array:
+        """Return it at equivalent plastic strains."""
+
+    def slope(self, a: Array) -> Array:
+        """Return its derivative."""
+
+
+@dataclass(frozen=True)
+class Voce:
+    """Linear and saturating hardening, H a + Q (1 - exp(-q a)).
+
+    Parameters
+    ----------
+    modulus, saturation
+        H and Q (stress).
+    rate
+        q.
+    """
+
+    modulus: float = 0.0
+    saturation: float = 0.0
+    rate: float = 0.0
+
+    def __post_init__(self) -> None:
+        """Refuse softening."""
+        for name, value in vars(self).items():
+            if not (np.isfinite(value) and value >= 0):
+                raise ValueError(f"hardening: given {name} {value:g}; accepted: numbers >= 0")
+
+    def __call__(self, a: Array) -> Array:
+        """Return R(a) - Y."""
+        return self.modulus * a - self.saturation * np.expm1(-self.rate * a)
+
+    def slope(self, a: Array) -> Array:
+        """Return R'(a)."""
+        return self.modulus + self.saturation * self.rate * np.exp(-self.rate * a)
+
+
+@dataclass(frozen=True)
+class Tabulated:
+    """A curve by points, linear between them and constant behind.
+
+    Parameters
+    ----------
+    strain, stress
+        Equivalent plastic strains, from 0 on, and the yield stress R there.
+    """
+
+    strain: tuple[float, ...]
+    stress: tuple[float, ...]
+
+    def __post_init__(self) -> None:
+        """Refuse points that are no hardening curve."""
+        strain, stress = np.asarray(self.strain, dtype=float), np.asarray(self.stress, dtype=float)
+        fits = strain.ndim == 1 and strain.shape == stress.shape and strain.size >= 2
+        fits = fits and bool(np.isfinite(strain).all() and np.isfinite(stress).all())
+        if not (fits and strain[0] == 0 and (np.diff(strain) > 0).all()):
+            raise ValueError(
+                "hardening: accepted: two points [strain, stress] at least, plastic strains that "
+                "increase from 0"
+            )
+        if not (stress[0] > 0 and (np.diff(stress) >= 0).all()):
+            raise ValueError("hardening: accepted: stresses > 0 that do not decrease")
+
+    def __call__(self, a: Array) -> Array:
+        """Return R(a) - Y."""
+        return np.interp(a, self.strain, self.stress) - self.stress[0]
+
+    def slope(self, a: Array) -> Array:
+        """Return R'(a), to the right at the points."""
+        slopes = np.append(np.diff(self.stress) / np.diff(self.strain), 0.0)
+        return np.asarray(slopes[np.searchsorted(self.strain, a, side="right") - 1])
+
+
+@dataclass(frozen=True)
+class J2(Isotropic):
+    """Elasto-plasticity of metals by the flow theory of von Mises.
+
+    Parameters
+    ----------
+    young, poisson
+        Elastic constants.
+    yield_stress
+        Y > 0, in uniaxial tension (stress).
+    hardening
+        What plastic strain adds to it: a modulus, `Voce`, `Tabulated`, or another `Hardening`.
+    kinematic
+        Prager's modulus C, uniaxial stress over plastic strain, or pairs of a modulus and a
+        recovery (Armstrong and Frederick, Chaboche).
+
+    Raises
+    ------
+    ValueError
+        If a number is none of a material.
+
+    Examples
+    --------
+    >>> law = J2(200e3, 0.3, yield_stress=250.0, hardening=Voce(saturation=100.0, rate=20.0))
+    >>> law.respond(np.array([[1e-2, 0, 0, 0]]), {
+    ...     name: np.array([value]) for name, value in law.variables(4).items()
+    ... }).variables["equivalent_plastic_strain"].round(6)
+    array([0.005538])
+    """
+
+    yield_stress: float = field(kw_only=True)
+    hardening: Hardening | float = field(default=0.0, kw_only=True)
+    kinematic: Sequence[tuple[float, float]] | float = field(default=0.0, kw_only=True)
+
+    def __post_init__(self) -> None:
+        """Refuse numbers that are none of a material; make functions and pairs of numbers."""
+        if not (np.isfinite(self.yield_stress) and self.yield_stress > 0):
+            raise ValueError(f"yield_stress: given {self.yield_stress:g}; accepted: a number > 0")
+        if isinstance(self.hardening, float | int):
+            object.__setattr__(self, "hardening", Voce(float(self.hardening)))
+        given = self.kinematic
+        pairs = [(given, 0.0)] if isinstance(given, float | int) else given
+        terms = tuple((float(c), float(recovery)) for c, recovery in pairs if c != 0)
+        if not all(np.isfinite(term).all() and min(term) >= 0 for term in terms):
+            raise ValueError(f"kinematic: given {given}; accepted: moduli and recoveries >= 0")
+        object.__setattr__(self, "kinematic", terms)
+
+    @property
+    def symmetric(self) -> bool:
+        """Whether the tangent is: not with recovery."""
+        return all(recovery == 0 for _, recovery in self._terms)
+
+    @property
+    def _terms(self) -> tuple[tuple[float, float], ...]:
+        """The kinematic terms as pairs."""
+        return self.kinematic  # type: ignore[return-value]
+
+    @property
+    def _back(self) -> list[str]:
+        """Names of the back stresses."""
+        return [f"back_stress_{k + 1}" for k in range(len(self._terms))]
+
+    def strength(self, a: Array) -> Array:
+        """Return the yield stress R at equivalent plastic strains."""
+        return self.yield_stress + self.hardening(a)  # type: ignore[operator]
+
+    def variables(self, size: int) -> Mapping[str, ArrayLike]:
+        """Return plastic strain, equivalent plastic strain and back stresses, all zero."""
+        zero = np.zeros(size)
+        fixed: dict[str, ArrayLike] = {"plastic_strain": zero, "equivalent_plastic_strain": 0.0}
+        return fixed | dict.fromkeys(self._back, zero)
+
+    def respond(self, strain: Array, variables: Mapping[str, Array], kind: str = "") -> Response:
+        """Return the response at n points; see `forms.history.HistoryLaw`."""
+        n, size = strain.shape
+        volume, a = strain[:, :3].sum(axis=1), variables["equivalent_plastic_strain"]
+        trial = strain - variables["plastic_strain"]
+        trial[:, :3] -= volume[:, None] / 3
+        trial *= 2 * self.shear
+        back = [variables[name] for name in self._back]
+        relative = np.linalg.norm(trial - sum(back), axis=1)
+        plastic = np.flatnonzero(relative > ROOT * self.strength(a))
+        flow = _Flow(self, trial[plastic], a[plastic], [b[plastic] for b in back])
+        new = {name: value.copy() for name, value in variables.items()}
+        new["plastic_strain"][plastic] += flow.plastic_strain
+        new["equivalent_plastic_strain"][plastic] += ROOT * flow.dg
+        stress, dissipation = trial, np.zeros(n)
+        stress[plastic] -= 2 * self.shear * flow.plastic_strain
+        stress[:, :3] += self.bulk * volume[:, None]
+        dissipation[plastic] = self.yield_stress * ROOT * flow.dg
+        for name, (c, recovery), theta, old in zip(
+            self._back, self._terms, flow.theta, flow.back, strict=True
+        ):
+            at_end = theta[:, None] * (old + 2 / 3 * c * flow.plastic_strain)
+            new[name][plastic] = at_end
+            square = np.einsum("ni,ni->n", at_end, at_end)
+            dissipation[plastic] += 1.5 * recovery / c * square * ROOT * flow.dg
+        stiffness = None
+        if kind:
+            shear = np.full(n, self.shear)
+            shear[plastic] *= 1 - flow.turn
+            stiffness = isotropic_stiffness(self.bulk, shear, size)
+            if kind == "tangent":
+                stiffness[plastic] += flow.softening()
+        return Response(stress, new, stiffness, dissipation)
+
+
+class _Flow:
+    """Plastic flow in a step at points that yield.
+
+    Attributes
+    ----------
+    dg
+        The plastic multiplier |de_p|, shape (n,).
+    plastic_strain
+        de_p, shape (n, s).
+    theta
+        1/(1 + gamma_k da) of each back stress, shape (n,).
+    turn
+        2G dg/|z|: how much stiffness is lost across the direction of flow.
+    """
+
+    def __init__(self, law: J2, trial: Array, a: Array, back: Sequence[Array]) -> None:
+        self._law, self._trial, self._a, self.back = law, trial, a, back
+        self.dg = self._solve()
+        self.theta, along, size, self._slope = self._at(self.dg)
+        self._normal = along / size[:, None]
+        self.plastic_strain = self.dg[:, None] * self._normal
+        self.turn = 2 * law.shear * self.dg / size
+
+    def _at(self, dg: Array) -> tuple[list[Array], Array, Array, Array]:
+        """Return theta, z, its norm and minus the derivative of the local equation."""
+        law, along = self._law, self._trial.copy()
+        terms = law._terms
+        theta = [1 / (1 + recovery * ROOT * dg) for _, recovery in terms]
+        for part, b in zip(theta, self.back, strict=True):
+            along -= part[:, None] * b
+        size = np.linalg.norm(along, axis=1)
+        slope = 2 * law.shear + 2 / 3 * law.hardening.slope(self._a + ROOT * dg)  # type: ignore[union-attr]
+        for (c, recovery), part, b in zip(terms, theta, self.back, strict=True):
+            # d(theta)/d(dg) = -gamma sqrt(2/3) theta^2
+            change = recovery * ROOT * part**2
+            slope += 2 / 3 * c * (part - change * dg)
+            slope -= change * np.einsum("ni,ni->n", along, b) / size
+        return theta, along, size, slope
+
+    def _solve(self) -> Array:
+        """Solve |z| - (2G + sum (2/3) C_k theta_k) dg = sqrt(2/3) R by Newton's method.
+
+        Bisection where a step leaves the interval in which the sign changes.
+        """
+        law = self._law
+        scale = np.linalg.norm(self._trial, axis=1) + sum(
+            np.linalg.norm(b, axis=1) for b in self.back
+        )
+        low, high = np.zeros(scale.size), scale / (2 * law.shear)
+        dg = low.copy()
+        for _ in range(MOST):
+            theta, _, size, slope = self._at(dg)
+            moduli = 2 * law.shear + sum(
+                (2 / 3 * c * part for (c, _), part in zip(law._terms, theta, strict=True)), 0.0
+            )
+            left = size - moduli * dg - ROOT * law.strength(self._a + ROOT * dg)
+            open_ = np.abs(left) > LOCAL * scale
+            if not open_.any():
+                break
+            low, high = np.where(left > 0, dg, low), np.where(left < 0, dg, high)
+            with np.errstate(divide="ignore", invalid="ignore"):
+                step = dg + left / slope
+            inside = (step > low) & (step < high)
+            dg = np.where(open_, np.where(inside, step, (low + high) / 2), dg)
+        return dg
+
+    def softening(self) -> Array:
+        """Return what the derivative of the flow's direction and size takes off the secant."""
+        law, normal = self._law, self._normal
+        g2 = 2 * law.shear
+        left = (g2 * self.turn - g2**2 / self._slope)[:, None] * normal
+        turned = np.zeros_like(normal)
+        for (_, recovery), part, b in zip(law._terms, self.theta, self.back, strict=True):
+            turned -= (recovery * ROOT * part**2)[:, None] * b
+        turned -= np.einsum("ni,ni->n", turned, normal)[:, None] * normal
+        left += (self.turn * g2 / self._slope)[:, None] * turned
+        return np.asarray(left[:, :, None] * normal[:, None, :])

@@ -1,0 +1,102 @@
+"""Bodies of flow theory in evolutions: contact, friction, several materials, methods, ranks."""
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+
+from contact import FixedPointOptions, NewtonOptions, evolve, parse_case, solve
+from contact.case.build import build_problem
+from contact.output.checkpoint import read_steps
+from tests.problems.plasticity import homogeneous, homogeneous_values
+
+YOUNG, LIMIT = 200e3, 250.0
+HARDENING = {
+    "linear": {"hardening": 2e3, "kinematic": 3e3},
+    "voce": {"hardening": {"saturation": 100.0, "rate": 200.0}},
+    "chaboche": {"kinematic": [{"modulus": 50e3, "recovery": 400.0}, {"modulus": 2e3}]},
+}
+
+
+def block(hardening="linear", cells=6, degree=1, mu=0.3, **more):
+    """Return a block that is pressed onto a foundation, sheared, and lifted half of the way."""
+    driven = ["4e-3*min(max(t-1,0),1)", "-4e-3*min(t,1) + 2e-3*max(t-2,0)"]
+    return parse_case(
+        {
+            "mesh": {"generator": "rectangle", "size": [2.0, 1.0], "cells": [2 * cells, cells]},
+            "space": {"degree": degree},
+            "material": {
+                **{"law": "j2", "young": YOUNG, "poisson": 0.3, "yield_stress": LIMIT},
+                **HARDENING[hardening],
+            },
+            "fixed": [{"on": "top", "displacement": driven}],
+            "contact": {"on": "bottom", "friction": {"law": "coulomb", "mu": mu}},
+            "evolution": {"times": [0.0, 1.0, 2.0, 3.0], "steps": [2, 2, 2]},
+            **more,
+        }
+    )
+
+
+def totals(solution):
+    """Return forces of all steps, and the work of plastic flow."""
+    names = ("contact_force_x", "contact_force_y", "plastic_dissipation")
+    return np.array([[step.row[name] for name in names] for step in solution.steps])
+
+
+def test_confined_block_on_a_smooth_foundation():
+    """Yield, unloading, reversed yield and lifting off in the oedometer, in closed form."""
+    pressed = [0.001625, 0.004875, 0.004875 - 875 / 269230.76923, 0.001, 0.0005]
+    given = {"young": YOUNG, "yield_stress": LIMIT}
+    times = [float(i + 1) for i in range(len(pressed))]
+    solution = solve(homogeneous("oedometer", given, times, [-value for value in pressed]))
+    assert solution.converged
+    forces = [step.row["contact_force_y"] for step in solution.steps]
+    last = 979.1667 - 875
+    known = [437.5, 979.1667, last, last - 166666.667 * (pressed[2] - 0.001), 0.0]
+    assert forces == pytest.approx([-p for p in known], abs=1e-4)
+    stress, _, _ = homogeneous_values(solution, 3)
+    assert stress[0, 0] == pytest.approx(-250.0, abs=1e-4)
+
+
+@pytest.mark.parallel
+@pytest.mark.parametrize("hardening", list(HARDENING))
+def test_a_restart_goes_on_with_the_same_history(tmp_path, hardening):
+    comm = MPI.COMM_WORLD
+    tmp_path = comm.bcast(tmp_path)
+    given = block(hardening)
+    whole = solve(given, comm=comm, folder=tmp_path)
+    assert whole.converged and len(whole.steps) == 6
+    steps = read_steps(tmp_path, build_problem(given, comm))
+    for one, two in zip(whole.steps, steps, strict=True):
+        assert one.state.near(two.state, rtol=1e-12, atol=1e-18)
+    # From any step on, on any number of ranks, and with another prediction than before.
+    problem = build_problem(given, MPI.COMM_SELF)
+    alone = read_steps(tmp_path, problem)[2].state
+    *_, last = evolve(problem, [step.state.time for step in steps[3:]], start=alone)
+    here = comm.allreduce(accumulated(whole.problem, whole.state), op=MPI.SUM)
+    assert accumulated(problem, last) == pytest.approx(here, rel=1e-7)
+
+
+def accumulated(problem, state):
+    """Return the integral of the equivalent plastic strain over the cells of this rank."""
+    a = problem.commit(state).arrays()["material.equivalent_plastic_strain"]
+    return float(problem.equilibrium.laws.volumes @ a)
+
+
+@pytest.mark.parametrize("degree", [1, 2])
+@pytest.mark.parametrize("hardening", list(HARDENING))
+def test_methods_agree(hardening, degree):
+    """Condensed and whole body, chord steps or not, and the fixed points of the thesis."""
+    given, found = block(hardening, cells=4, degree=degree), {}
+    for name, options in {
+        "condensed": NewtonOptions(),
+        "no chord steps": NewtonOptions(keep="never"),
+        "whole": NewtonOptions(condense=False),
+        "uzawa": FixedPointOptions(max_outer=500),
+    }.items():
+        solution = solve(given, options)
+        assert solution.converged, (name, solution.outcome.reason)
+        found[name] = totals(solution)
+    scale = np.abs(found["whole"]).max(axis=0)
+    for name, values in found.items():
+        assert np.abs((values - found["whole"]) / scale).max() < 1e-6, name
+    assert found["whole"][:, 2].min() >= 0 and found["whole"][:, 2].max() > 0

@@ -1,0 +1,130 @@
+"""Flow theory in homogeneous states: every number of the specification, with the same steps."""
+
+import numpy as np
+import pytest
+
+from contact import solve
+from forms.j2 import Tabulated, Voce
+from tests.problems.plasticity import homogeneous, homogeneous_values, integrated, path
+
+YOUNG, YIELD = 1.0, 0.004
+#: Hardening -> the keys of the case; then the function and the terms for the integration.
+VOCE = {"saturation": 0.004, "rate": 60.0}
+POINTS = [[0.0, 0.004], [0.004, 0.005], [0.01, 0.0055], [0.1, 0.01]]
+LAWS = {
+    "none": ({}, Voce(), []),
+    "H": ({"hardening": 0.05}, Voce(0.05), []),
+    "K": ({"kinematic": 0.05}, Voce(), [(0.05, 0.0)]),
+    "voce": ({"hardening": VOCE}, Voce(0.0, 0.004, 60.0), []),
+    "table": ({"hardening": POINTS}, Tabulated(*map(tuple, zip(*POINTS, strict=True))), []),
+    "chaboche": (
+        {
+            "hardening": VOCE,
+            "kinematic": [{"modulus": 0.5, "recovery": 200.0}, {"modulus": 0.05}],
+        },
+        Voce(0.0, 0.004, 60.0),
+        [(0.5, 200.0), (0.05, 0.0)],
+    ),
+}
+#: At -.02: stress along, out of plane, a; at -.014 both stresses; at +.004 both, a.
+EXPECTED = {
+    "none": (-0.00461878, -0.00229633, 0.018080521, 0.00197463, -0.00031831,
+             0.00461869, 0.00228163, 0.035869274),
+    "H": (-0.00560090, -0.00272418, 0.017022397, 0.00099251, -0.00074616,
+          0.00645133, 0.00302151, 0.031814819),
+    "K": (-0.00559853, -0.00269161, 0.017030837, 0.00099488, -0.00071359,
+          0.00459519, 0.00218571, 0.033803274),
+    "voce": (-0.00736973, -0.00346046, 0.015129630, -0.00077633, -0.00148244,
+             0.00824324, 0.00346328, 0.026193295),
+}  # fmt: skip
+ENDS = (-0.02, -0.014, 0.004)
+
+
+def material(law, young=YOUNG, limit=YIELD):
+    return {"young": young, "yield_stress": limit, **LAWS[law][0]}
+
+
+def run(kind, given, values, **more):
+    case = homogeneous(kind, given, [float(i + 1) for i in range(len(values))], values, **more)
+    solution = solve(case)
+    assert solution.converged and len(solution.steps) == len(values)
+    return solution
+
+
+def found(solution, step=-1):
+    """Return stress and equivalent plastic strain of a step, which are the same in all cells."""
+    stress, a, spread = homogeneous_values(solution, step)
+    assert spread < 1e-7
+    return stress, a
+
+
+@pytest.mark.parametrize("law", list(EXPECTED))
+def test_plane_strain_between_plates(law):
+    solution = run("plane", material(law), path(*ENDS, steps=50))
+    known = np.split(np.array(EXPECTED[law]), [3, 5])
+    for step, expected in zip((49, 99, 149), known, strict=True):
+        stress, a = found(solution, step)
+        assert stress[1, 1] == pytest.approx(expected[0], abs=1e-8)
+        assert stress[2, 2] == pytest.approx(expected[1], abs=1e-8)
+        assert a == pytest.approx(expected[-1], abs=2e-9) or len(expected) == 2
+        assert abs(stress[0, 0]) < 1e-9
+    # Work is stored, or lost to plastic flow; the trapezoidal rule meets the corners of a curve.
+    rows = [step.row for step in solution.steps]
+    work, lost = (sum(row[name] for row in rows) for name in ("work", "plastic_dissipation"))
+    assert all(row["plastic_dissipation"] >= 0 and row["dissipation"] == 0 for row in rows)
+    assert work - rows[-1]["energy"] == pytest.approx(lost, rel=2e-3)
+    assert lost == pytest.approx(YIELD * known[2][-1], rel=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("kind", "degree", "law"),
+    [
+        (kind, degree, law)
+        for kind, degree in (("plane", 2), ("space", 1), ("uniaxial", 2), ("revolved", 1))
+        for law in LAWS
+        # Uniaxial stress without hardening is a limit load: strains are not unique.
+        if law != "none" or kind in ("plane", "space")
+    ],
+)
+def test_against_an_integration_of_its_own(kind, degree, law):
+    values = path(*ENDS, steps=4)
+    # The first direction is the driven one, the last one is held in plane strain.
+    free = [1] if kind in ("plane", "space") else [1, 2]
+    known = integrated(YOUNG, 0.3, YIELD, *LAWS[law][1:], free, values)
+    solution = run(kind, material(law), values, degree=degree)
+    up = 2 if kind in ("space", "uniaxial") else 1
+    for step, expected in enumerate(known):
+        stress, a = found(solution, step)
+        assert stress[up, up] == pytest.approx(expected[0], abs=1e-10)
+        assert a == pytest.approx(expected[3], abs=1e-10)
+        held = {"plane": (2, 2), "space": (1, 1)}.get(kind)
+        assert held is None or stress[held] == pytest.approx(expected[2], abs=1e-10)
+
+
+@pytest.mark.parametrize("kind", ["oedometer", "oedometer-space", "oedometer-revolved"])
+def test_oedometer(kind):
+    """Exact in one step, and on the way back to where it yields again."""
+    solution = run(kind, material("none"), [-0.02, -0.01])
+    up = 2 if kind == "oedometer-space" else 1
+    for step, (across, along) in enumerate([(-0.01533333, -0.01933333), (-0.0095641, -0.00587179)]):
+        stress, a = found(solution, step)
+        assert stress[up, up] == pytest.approx(along, abs=1e-8)
+        assert np.diag(stress)[np.arange(3) != up] == pytest.approx(across, abs=1e-8)
+        assert step == 1 or a == pytest.approx(0.00986667, abs=1e-8)
+
+
+@pytest.mark.parametrize(
+    ("keys", "known"),
+    [
+        ({"hardening": 20e3}, (318.181818, -442.148760, 543.576258)),
+        ({"kinematic": 20e3}, (318.181818, -318.181818, 318.181818)),
+        ({"hardening": 10e3, "kinematic": 10e3}, (318.181818, -380.165289, 436.513899)),
+    ],
+)
+@pytest.mark.parametrize("kind", ["uniaxial", "revolved"])
+def test_uniaxial_cycle(kind, keys, known):
+    given = {"young": 200e3, "yield_stress": 250.0, **keys}
+    solution = run(kind, given, [0.005, -0.005, 0.005])
+    up = 2 if kind == "uniaxial" else 1
+    for step, expected in enumerate(known):
+        assert found(solution, step)[0][up, up] == pytest.approx(expected, abs=1e-6)
