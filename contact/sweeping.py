@@ -290,8 +290,10 @@ class _Runner:
 
     def _static(self, problem: ContactProblem, name: str, method: Method) -> Solution:
         counted, ends = replace(method.counters), self._reached
-        start = predicted(problem, ends[-1], ends[0] if len(ends) > 1 else None) if ends else None
-        state, outcome = solve_step(problem, method, start)
+        start = about = None
+        if ends:
+            start, about = predicted(problem, ends[-1], ends[0] if len(ends) > 1 else None)
+        state, outcome = solve_step(problem, method, start, about)
         if start is not None and not outcome.converged and not outcome.signal:
             state, outcome = solve_step(problem, method, None)
         end = Reached.of(problem, state)

@@ -8,7 +8,7 @@ those of vectors, and a law that takes any number of components is written once.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Protocol, runtime_checkable
 
 import numpy as np
@@ -21,6 +21,9 @@ from forms.kinematics import embed
 
 #: Number of components -> the pairs of tensor indices that they stand for.
 PAIRS = {4: ((0, 0), (1, 1), (2, 2), (0, 1)), 6: VOIGT}
+
+#: Part of a strain, and the least strain, by which differences of the stress are taken.
+DIFFERENCE, LEAST = 1e-6, 1e-12
 
 
 def components(dim: int) -> int:
@@ -120,6 +123,40 @@ class HistoryLaw(Protocol):
         kind
             "tangent" or "secant": the stiffness that is asked for; empty for none.
         """
+
+
+def with_stiffness(
+    law: HistoryLaw,
+    strain: NDArray[np.float64],
+    variables: Mapping[str, NDArray[np.float64]],
+    kind: str,
+    found: Response,
+) -> Response:
+    """Return the response of a law with a stiffness, where one is asked for and it has none.
+
+    Parameters
+    ----------
+    law, strain, variables, kind
+        As of `HistoryLaw.respond`.
+    found
+        The response to these.
+    """
+    if not kind or found.stiffness is not None:
+        return found
+    n, size = strain.shape
+    stiffness = np.empty((n, size, size))
+    if kind == "secant":
+        young, poisson = float(law.young), float(law.poisson)
+        moduli = young / (3 - 6 * poisson), young / (2 + 2 * poisson)
+        stiffness[:] = isotropic_stiffness(*moduli, size)
+    else:
+        step = np.maximum(DIFFERENCE * np.linalg.norm(strain, axis=1), LEAST)
+        for k in range(size):
+            moved = np.zeros_like(strain)
+            moved[:, k] = step
+            up, down = (law.respond(strain + s * moved, variables).stress for s in (1, -1))
+            stiffness[:, :, k] = (up - down) / (2 * step[:, None])
+    return replace(found, stiffness=stiffness)
 
 
 @dataclass(frozen=True)

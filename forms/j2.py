@@ -128,7 +128,7 @@ class J2(Isotropic):
     yield_stress
         Y > 0, in uniaxial tension (stress).
     hardening
-        What plastic strain adds to it: a modulus, `Voce`, `Tabulated`, or another `Hardening`.
+        Its increase with plastic strain: a modulus, `Voce`, `Tabulated`, or another `Hardening`.
     kinematic
         Prager's modulus C, uniaxial stress over plastic strain, or pairs of a modulus and a
         recovery (Armstrong and Frederick, Chaboche).
@@ -291,7 +291,7 @@ class _Flow:
         return dg
 
     def softening(self) -> Array:
-        """Return what the derivative of the flow's direction and size takes off the secant."""
+        """Return the tangent less the secant."""
         law, normal = self._law, self._normal
         g2 = 2 * law.shear
         left = (g2 * self.turn - g2**2 / self._slope)[:, None] * normal

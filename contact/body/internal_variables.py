@@ -31,16 +31,13 @@ from forms.history import (
     HistoryLaw,
     Response,
     components,
-    isotropic_stiffness,
     to_vector,
+    with_stiffness,
 )
 from forms.kinematics import Strained, strain
 
 #: Name of the part of the history.
 VARIABLES = "material"
-
-#: Part of a strain, and the least strain, by which differences of the stress are taken.
-DIFFERENCE, LEAST = 1e-6, 1e-12
 
 
 class QuadratureLaws:
@@ -154,7 +151,7 @@ class QuadratureLaws:
         return np.asarray(found.reshape(self._owned, -1) * self._rule[1]).ravel()
 
     def law(self, law: Law) -> FormLaw:
-        """Return a law as forms see it, which look at what `set` has evaluated last."""
+        """Return a law as forms see it, with the stress and stiffness that `set` evaluates."""
         return AtPoints(self._stress, self._stiffness) if isinstance(law, HistoryLaw) else law
 
     def fitted_law(self, law: Law) -> FormLaw:
@@ -192,7 +189,10 @@ class QuadratureLaws:
                     name: self.by_cell(before.arrays[name])[cells].reshape(-1, *np.shape(first))
                     for name, first in law.variables(self._size).items()
                 }
-                yield cells, respond(law, found.reshape(-1, self._size), variables, kind)
+                strains = found.reshape(-1, self._size)
+                response = law.respond(strains, variables, kind)
+                _check(law, strains, variables, response)
+                yield cells, with_stiffness(law, strains, variables, kind, response)
 
     def by_cell(self, array: Array) -> Array:
         """Return values by place as those by cell and point."""
@@ -225,6 +225,10 @@ class QuadratureLaws:
             if response.dissipation is not None:
                 total += float(self.by_cell(self.volumes)[cells].ravel() @ response.dissipation)
         return float(self._domain.comm.allreduce(total, op=MPI.SUM))
+
+    def variables(self, law: Law) -> Mapping[str, ArrayLike]:
+        """Return the internal variables of a law in the reference configuration."""
+        return law.variables(self._size) if isinstance(law, HistoryLaw) else {}
 
     @property
     def names(self) -> list[str]:
@@ -259,28 +263,6 @@ class QuadratureLaws:
                 _fill(self.fits[name], cells, np.einsum("dq,cqi->cdi", self._fitting, by_cell))
 
 
-def respond(law: HistoryLaw, strain: Array, variables: Mapping[str, Array], kind: str) -> Response:
-    """Return the response of a law, with a stiffness where one is asked for and it has none."""
-    found = law.respond(strain, variables, kind)
-    _check(law, strain, variables, found)
-    if not kind or found.stiffness is not None:
-        return found
-    n, size = strain.shape
-    stiffness = np.empty((n, size, size))
-    if kind == "secant":
-        young, poisson = float(law.young), float(law.poisson)
-        moduli = young / (3 - 6 * poisson), young / (2 + 2 * poisson)
-        stiffness[:] = isotropic_stiffness(*moduli, size)
-    else:
-        step = np.maximum(DIFFERENCE * np.linalg.norm(strain, axis=1), LEAST)
-        for k in range(size):
-            moved = np.zeros_like(strain)
-            moved[:, k] = step
-            up, down = (law.respond(strain + s * moved, variables).stress for s in (1, -1))
-            stiffness[:, :, k] = (up - down) / (2 * step[:, None])
-    return Response(found.stress, found.variables, stiffness, found.dissipation)
-
-
 def _check(
     law: HistoryLaw, strain: Array, variables: Mapping[str, ArrayLike], found: Response
 ) -> None:
@@ -297,7 +279,7 @@ def _check(
     for name, (given, accepted) in shapes.items():
         if given != accepted:
             raise InputError(
-                f"{type(law).__name__}: respond: {name} has the shape {given}; accepted: "
+                f"{type(law).__name__}: respond: {name}: given the shape {given}; accepted: "
                 f"{accepted}, a row a point"
             )
 

@@ -88,7 +88,7 @@ class Chord:
         if not self._made or self._worth <= 0:
             keep = False
         elif before is None:
-            keep = iterate.active_set is not None
+            keep = iterate.active_set is not None and iterate.about is None
         elif reached >= last and self._keeps:
             iterate, reached, keep = before, last, False
         else:

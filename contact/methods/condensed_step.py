@@ -99,7 +99,8 @@ class CondensedStep:
         body = self.condensation.full.equilibrium
         iterate, keep = self._chord.choose(iterate, reached.significant)
         state = iterate.state
-        condensed = self.condensation.linearise("tangent" if tangent else "secant", state, keep)
+        kind = "tangent" if tangent else "secant"
+        condensed = self.condensation.linearise(kind, state, keep, iterate.about)
         if condensed is None:
             return None
         # No more accurate than the material is linearised, nor than the end asks for.
@@ -113,7 +114,7 @@ class CondensedStep:
             condense=False,
         )
         history = IterationHistory(lambda _: self._history.poll(), level=logging.DEBUG)
-        begin = replace(iterate, state=replace(state, x=condensed.equilibrium.at))
+        begin = replace(iterate, state=replace(state, x=condensed.equilibrium.at), about=None)
         end, outcome = self._solve(condensed, options, self.parameters, history, begin)
         solves = sum(record.inner for record in history.records)
         self.counters.contact_solves += solves

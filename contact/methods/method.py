@@ -12,6 +12,7 @@ from contact.methods.thesis.fixed_point import FixedPoint
 from contact.methods.thesis.penalty import Penalty
 from contact.problem.problem import ContactProblem
 from contact.problem.state import State
+from contact.typing import Array
 
 
 class Method(Protocol):
@@ -45,13 +46,18 @@ class Method(Protocol):
         Factorisations are kept: the body is the same.
         """
 
-    def solve(self, start: State | None = None) -> tuple[State, Outcome]:
+    def solve(
+        self, start: State | None = None, about: Array | None = None
+    ) -> tuple[State, Outcome]:
         """Iterate until convergence or a limit. Collective.
 
         Parameters
         ----------
         start
             Initial guess; zero by default.
+        about
+            Unknowns at which the material is linearised first, by its secant; those of the start by
+            default. Prescribed values that have changed strain the elements beside them alone.
 
         Raises
         ------

@@ -58,6 +58,7 @@ from contact.problem.kkt import KKT, evaluate, residual_forces
 from contact.problem.problem import ContactProblem
 from contact.problem.protocols import Problem
 from contact.problem.state import State
+from contact.typing import Array
 
 logger = logging.getLogger("contact.solver")
 
@@ -165,18 +166,26 @@ class Newton:
         """The state after the last step."""
         return self.iteration.at.state
 
-    def solve(self, start: State | None = None) -> tuple[State, Outcome]:
+    def solve(
+        self, start: State | None = None, about: Array | None = None
+    ) -> tuple[State, Outcome]:
         """Iterate until convergence or the limit. Collective.
 
         Parameters
         ----------
         start
-            Initial guess; zero by default.
+            Initial guess; zero by default, where the material is linearised in the reference
+            configuration.
+        about
+            Unknowns at which the material is linearised first; those of the start by default.
         """
         self._begin()
         if self._condensed is not None:
             self._condensed.forget()
         iterate = self.iteration.at if start is None else self.iterate_at(start)
+        body = self.problem.equilibrium
+        if not body.linear:
+            iterate = replace(iterate, about=body.rest() if start is None else about)
         iterate, outcome = self.run(iterate)
         return iterate.state, outcome
 
@@ -395,7 +404,7 @@ class NewtonLoop:
             return iterate, self._end(residuals)
         self.step.begin()
         # A start from elsewhere is near the solution; zero displacement has no better tangent.
-        tangent = iterate.active_set is not None and not linear
+        tangent = iterate.active_set is not None and iterate.about is None and not linear
         for _ in range(min(options.max_iterations, iteration.left)):
             before, kept = residuals, iterate
             taken = self.step(iterate, tangent, residuals)

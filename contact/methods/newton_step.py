@@ -60,11 +60,15 @@ class Iterate:
         Which nodes were open, stuck or slipped in that step; None before the first one.
     layer_pressure
         Pressure of the linearised layer after it, shape (n,); None for that of the state.
+    about
+        Unknowns at which the material is linearised in the next step, by its secant; None for those
+        of the state. Prescribed values that have changed strain the elements beside them alone.
     """
 
     state: State
     active_set: ActiveSet | None = None
     layer_pressure: Array | None = None
+    about: Array | None = None
 
 
 @dataclass(frozen=True)
@@ -239,10 +243,11 @@ class NewtonStep:
             along = jump.normal[:, :, None] * jump.normal[:, None, :]
             blocks[:, : body.dim, : body.dim] += stiffness * (along + jump.tangent)
         blocks = interface.weighted(blocks, state.x)
-        self.operator.update(kind, state, blocks, constant=body.linear or remains)
+        about = state if iterate.about is None else replace(state, x=iterate.about)
+        self.operator.update(kind, about, blocks, constant=body.linear or remains)
         self._kind = kind
         here = replace(state, forces=contact.forces)
-        residual = residual_forces(self.problem, here)
+        residual = residual_forces(self.problem, here, iterate.about)
         jump.transpose((jump.weight * shift)[:, None] * jump.normal, residual)
         try:
             increment = self.operator.solve(-residual, self._forcing_term(reached.significant))

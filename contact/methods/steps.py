@@ -147,11 +147,11 @@ class Evolution:
         problem = self._at(time)
         method.turn_to(problem)
         counted = replace(method.counters)
-        start = None
+        start = about = None
         if last is not None:
             before = None if self._before is None else Reached.of(problem, self._before)
-            start = predicted(problem, Reached.of(problem, last), before)
-        state, outcome = solve_step(problem, method, start)
+            start, about = predicted(problem, Reached.of(problem, last), before)
+        state, outcome = solve_step(problem, method, start, about)
         return LoadStep(problem, state, outcome, method.history, since(method.counters, counted))
 
 
@@ -188,11 +188,11 @@ def check_gaps(problem: ContactProblem, times: Sequence[float]) -> None:
 
 
 def solve_step(
-    problem: ContactProblem, method: Method, start: State | None
+    problem: ContactProblem, method: Method, start: State | None, about: Array | None = None
 ) -> tuple[State, Outcome]:
     """Solve by a method, and evaluate the residuals once more. Collective."""
     try:
-        state, outcome = method.solve(start)
+        state, outcome = method.solve(start, about)
     except Interrupted as interrupt:
         state = method.state
         outcome = Outcome(NOTHING, NOTHING, str(interrupt), interrupt.number)
@@ -254,8 +254,13 @@ class Reached:
         return Reached(state, _given(problem, state.time))
 
 
-def predicted(problem: ContactProblem, last: Reached, before: Reached | None) -> State:
+def predicted(
+    problem: ContactProblem, last: Reached, before: Reached | None
+) -> tuple[State, Array | None]:
     """Return the initial guess of a step, by extrapolation of the last two. Collective.
+
+    Where loads turn the last solution is none: the material is linearised there first, with the
+    prescribed values as an increment. They would strain the elements beside them alone.
 
     Parameters
     ----------
@@ -264,11 +269,12 @@ def predicted(problem: ContactProblem, last: Reached, before: Reached | None) ->
     last, before
         The solution that it follows, and the one before that; None where there is none.
     """
-    x, body = last.state.x, problem.equilibrium
+    x, body, factor = last.state.x, problem.equilibrium, 0.0
     if before is not None:
-        x = x + _extrapolation(problem, last, before) * (x - before.state.x)
-    x = body.prescribe(x, problem.time)
-    return State(x, last.state.forces, problem.time, problem.history)
+        factor = _extrapolation(problem, last, before)
+        x = x + factor * (x - before.state.x)
+    start = State(body.prescribe(x, problem.time), last.state.forces, problem.time, problem.history)
+    return start, None if factor > 0 else x
 
 
 def _extrapolation(problem: ContactProblem, last: Reached, before: Reached) -> float:

@@ -38,6 +38,9 @@ from forms.piezo import coupling_stress, electric_displacement
 #: modulus, over that of small strains, that counts as yielding.
 DECREASE, SOFTENED = 1e-6, 1e-9
 
+#: The internal variable that says where a body has yielded.
+EQUIVALENT = "equivalent_plastic_strain"
+
 
 def nodal_function(
     name: str, source: fem.FunctionSpace, values: Array, shape: tuple[int, ...]
@@ -84,14 +87,17 @@ class Extremes(NamedTuple):
     strain, von_mises
         The largest |dev eps| and von Mises stress.
     yielded, volume
-        Volume in the plastic range, |dev eps| above first yield (None for a law without), and
-        that of all of it.
+        Volume in the plastic range, |dev eps| above first yield or with plastic strain (None for a
+        law without), and that of all of it.
+    plastic
+        The largest equivalent plastic strain; None for a law without.
     """
 
     strain: float
     von_mises: float
     yielded: float | None
     volume: float
+    plastic: float | None
 
 
 class Point:
@@ -222,18 +228,28 @@ class DerivedFields:
         """Return the largest values over the cells (their nodes, for degree 2), a material."""
         volume, found = self._volumes(), []
         strain, mises = self.columns["dev_strain"], self.columns["von_mises"]
+        laws, comm = self.body.laws, self.body.comm
+        after = laws.commit(self._state, self._x)
         for index, material in enumerate(self.body.body.materials):
             limit = getattr(material.law, "first_yield", np.inf)
-            largest, sums = np.zeros(2), np.zeros(2)
+            flows = EQUIVALENT in laws.variables(material.law)
+            largest, sums = np.zeros(3), np.zeros(2)
             for chosen, values in self._chunks(index):
                 largest[0] = max(largest[0], values[..., strain].max(initial=0.0))
                 largest[1] = max(largest[1], values[..., mises].max(initial=0.0))
                 beyond = (values[..., strain] > limit).mean(axis=(1, 2))
                 sums += volume[chosen] @ np.column_stack([beyond, np.ones(chosen.size)])
-            self.body.comm.Allreduce(MPI.IN_PLACE, largest, op=MPI.MAX)
-            self.body.comm.Allreduce(MPI.IN_PLACE, sums, op=MPI.SUM)
-            yielded = float(sums[0]) if np.isfinite(limit) else None
-            found.append(Extremes(float(largest[0]), float(largest[1]), yielded, float(sums[1])))
+            if flows and after is not None:
+                cells = self.body.cells[index]
+                plastic = laws.by_cell(after.arrays[EQUIVALENT])[cells]
+                largest[2] = plastic.max(initial=0.0)
+                sums[0] = laws.by_cell(laws.volumes)[cells][plastic > 0].sum()
+            comm.Allreduce(MPI.IN_PLACE, largest, op=MPI.MAX)
+            comm.Allreduce(MPI.IN_PLACE, sums, op=MPI.SUM)
+            yielded = float(sums[0]) if np.isfinite(limit) or flows else None
+            plastic_strain = float(largest[2]) if flows else None
+            here = float(largest[0]), float(largest[1]), yielded, float(sums[1]), plastic_strain
+            found.append(Extremes(*here))
         return found
 
     def cells(self) -> dict[str, fem.Function]:

@@ -180,8 +180,13 @@ _RUN = (
     ),
     Quantity(
         "plastic_share", "", "Share of the volume in the plastic range, |dev ε| above the "
-        "material's first yield, 0 to 1; `null` where no material has such a limit.",
+        "material's first yield, 0 to 1; with `j2` where plastic strain remains. `null` where no "
+        "material has such a limit.",
         lambda r: np.nan if r.plastic_share is None else r.plastic_share,
+    ),
+    Quantity("plastic_volume", "volume", "The same as a volume, of bodies with `j2`."),
+    Quantity(
+        "equivalent_plastic_strain", "", "Largest equivalent plastic strain; likewise, as the next."
     ),
     Quantity(
         "contact_direction", "", "`[contact]` `direction`: whose normal ν is.",
@@ -199,8 +204,8 @@ _RUN = (
         lambda r: r.energies.dissipation, (STEPS,),
     ),
     Quantity(
-        "plastic_dissipation", "work", "By plastic flow in the step; of a body that yields.",
-        lambda r: _present(r.energies.plastic), (STEPS,),
+        "plastic_dissipation", "work", "By plastic flow in the step; in the summary in all steps.",
+        files=(SUMMARY, STEPS),
     ),
     Quantity(
         "outer_iterations", "", "Outer iterations: rows of `history.csv`.",
@@ -447,6 +452,14 @@ _BODY = (
     ),
     Quantity("von_mises", "stress", "Von Mises stress.", files=(BODY,)),
     Quantity("dev_strain", "", "|dev ε|, the norm of the strain deviator.", files=(BODY,)),
+    Quantity(
+        "plastic_strain", "", "Of `j2`, nine components; `back_stress_1`, ... likewise.",
+        _elsewhere, (BODY,),
+    ),
+    Quantity(
+        "equivalent_plastic_strain", "", "Of `j2`; a field of each other internal variable too.",
+        _elsewhere, (BODY,),
+    ),
     Quantity("electric_displacement", "charge/area", "D; of piezoelectric bodies.", files=(BODY,)),
     Quantity("electric_field", "potential/length", "E = -grad φ; likewise.", files=(BODY,)),
 )  # fmt: skip

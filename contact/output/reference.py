@@ -29,7 +29,7 @@ def files_help(*names: str) -> str:
         for name, quantity, text in described(file):
             unit = f" ({quantity.unit})" if quantity.unit else ""
             text = f"{_first(text)}{unit}"
-            lines += textwrap.wrap(f"  {name:<20}{text}", 98, subsequent_indent=22 * " ")
+            lines += textwrap.wrap(f"  {name:<19} {text}", 98, subsequent_indent=22 * " ")
     return "\n".join([*lines, "", "signs, units, all files: docs/output.md"]).lstrip("\n")
 
 

@@ -64,6 +64,12 @@ def review(solution: Solution) -> None:
     yielded = [largest.yielded for largest in extremes if largest.yielded is not None]
     if yielded:
         solution.plastic_share = sum(yielded) / sum(largest.volume for largest in extremes)
+    plastic = [largest.plastic for largest in extremes if largest.plastic is not None]
+    if plastic:
+        solution.equivalent_plastic_strain = max(plastic)
+        solution.plastic_volume = sum(
+            e.yielded for e in extremes if e.plastic is not None and e.yielded is not None
+        )
     solution.deformation = deformation(body, x)
     for remarks in (
         unloading(solution),
@@ -99,7 +105,7 @@ def unloading(solution: Solution) -> Iterator[Remark]:
         yield (
             f"{share:.1%} of the body unload from the plastic range in a step: Hencky's law is "
             "nonlinear elasticity, and they come back the way they went; a metal would keep a part "
-            "of its strain"
+            'of its strain, as material.law = "j2" does'
         )
 
 

@@ -96,6 +96,8 @@ class Solution(Solved):
     plastic_share
         Share of the body's volume in the plastic range, |dev eps| above the material's first
         yield; None where no material has such a limit.
+    plastic_volume, equivalent_plastic_strain
+        Volume with plastic strain, and the largest equivalent one; None without a law that has it.
     deformation
         How large strains and changes of volume are; None before the solution is reviewed.
     start
@@ -123,6 +125,8 @@ class Solution(Solved):
     max_dev_strain: float = np.nan
     max_von_mises: float = np.nan
     plastic_share: float | None = None
+    plastic_volume: float | None = None
+    equivalent_plastic_strain: float | None = None
     deformation: Deformation | None = None
     start: str = "zero slip"
     critical_factor: float = np.inf
@@ -220,6 +224,16 @@ class Solution(Solved):
     def potential(self) -> fem.Function | None:
         """The electric potential; None for a body without. The first use is collective."""
         return self._unknowns.get("potential")
+
+    @property
+    def plastic_dissipation(self) -> float | None:
+        """The energy that plastic flow took, in a step or in all of them. Collective."""
+        body = self.problem.equilibrium
+        if self.energies is not None or body.laws.initial is None:
+            return None if self.energies is None else self.energies.plastic
+        if not self.steps:
+            return body.dissipation(self.state)
+        return sum(float(step.row["plastic_dissipation"]) for step in self.steps)
 
     @property
     def contact_force(self) -> Array:

@@ -48,7 +48,9 @@ def rigid():
 def written(tmp_path_factory: pytest.TempPathFactory) -> list[Path]:
     """Return folders with the results of all kinds of problems."""
     folders = []
-    for case in (block(2), block(3), electric(2), electric(3), two_contacts(), *rigid()):
+    metal = {"law": "j2", "young": 10.0, "poisson": 0.3, "yield_stress": 0.05}
+    plastic = block(2, 2, material=metal)
+    for case in (block(2), block(3), plastic, electric(2), electric(3), two_contacts(), *rigid()):
         folders.append(tmp_path_factory.mktemp("out"))
         write_outputs(solve(case), folders[-1])
     return folders

@@ -65,13 +65,15 @@ class FixedPoint(OuterLoop):
             kind="many" if self.options.linear == "auto" else self.options.linear,
         )
 
-    def solve(self, start: State | None = None) -> tuple[State, Outcome]:
+    def solve(
+        self, start: State | None = None, about: Array | None = None
+    ) -> tuple[State, Outcome]:
         """Iterate until convergence, stagnation or the limit. Collective.
 
         Parameters
         ----------
-        start
-            Initial guess; zero by default.
+        start, about
+            Initial guess, zero by default; and unknowns at which the first secant is taken.
         """
         self._stalled, self._residual = False, np.inf
         self._gap_derivative = GapDerivative(NEAR)
@@ -90,7 +92,7 @@ class FixedPoint(OuterLoop):
             self._z = self._about(0.0, frictional and first > 0)
             self.bound = np.zeros(interface.jump.gap.size) if stuck is None else stuck
         else:
-            self.state, self._secant_at, first = start, start.x, 1
+            self.state, self._secant_at, first = start, start.x if about is None else about, 1
             nodal, pressure = interface.jump.apply(start.x), start.forces.pressure
             if interface.law.normal_law(nodal) is not None:
                 pressure = interface.pressure(nodal, start.forces)

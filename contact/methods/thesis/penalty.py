@@ -297,7 +297,9 @@ class Penalty(OuterLoop):
         for solver in self._solvers.values():
             solver.turn_to(problem, self._eps)
 
-    def solve(self, start: State | None = None) -> tuple[State, Outcome]:
+    def solve(
+        self, start: State | None = None, about: Array | None = None
+    ) -> tuple[State, Outcome]:
         """Iterate until convergence, stagnation or the limit. Collective.
 
         Parameters
@@ -305,6 +307,8 @@ class Penalty(OuterLoop):
         start
             Initial guess; zero by default. From the solution of a somewhat larger eps, small
             ones are reached that are too hard from there.
+        about
+            Of no effect.
         """
         self.state = self.problem.start() if start is None else start
         self.bound = np.zeros_like(self.bound)

@@ -14,6 +14,7 @@ from contact.output.figures.style import (
     GREY,
     NARROW,
     ORANGE,
+    SKY,
     ZONES,
     Look,
     fitted,
@@ -80,16 +81,21 @@ def draw_loop(run: Run, moves: str) -> Figure:
 
 
 def draw_energies(run: Run) -> Figure:
-    """Draw the work of loads and supports, the elastic energy and the dissipation."""
+    """Draw the work of loads and supports, the stored energy and the dissipated one."""
     narrow = page_width() < NARROW
     time, stored = _course(run, "t"), _course(run, "energy")
+    assert run.steps is not None
     work, taken = (np.cumsum(_course(run, name)) for name in ("work", "dissipation"))
+    flows = "plastic_dissipation" in run.steps
+    plastic = np.cumsum(_course(run, "plastic_dissipation")) if flows else 0 * taken
     figure = sheet(0.9 if narrow else 0.6)
     ax = figure.subplots()
     ax.plot(time, work, color=BLUE, label="work done")
-    ax.plot(time, stored + taken, "--", color=ORANGE, label="stored and dissipated")
+    ax.plot(time, stored + taken + plastic, "--", color=ORANGE, label="stored and dissipated")
     ax.plot(time, stored, color=GREEN, label="stored")
     ax.plot(time, taken, color=GREY, label="dissipated by friction")
+    if flows:
+        ax.plot(time, plastic, color=SKY, label="dissipated by plastic flow")
     ax.set_xlabel("time")
     ax.set_ylabel(f"energy{_unit(run, 2)}")
     ax.legend(ncols=1 if narrow else 2, loc="lower left", bbox_to_anchor=(0, 1))

@@ -41,8 +41,9 @@ ZONES = {
     "open": ("#F2F2F2", "open"),
 }
 #: Fields of the deformed body that are drawn by default: name of the figure, label, quantity.
-DEFORMED: dict[str, tuple[str, str, Quantity]] = {
+DEFORMED: dict[str, tuple[str, str, Quantity | None]] = {
     "von_mises": ("deformed", "von Mises stress", "stress"),
+    "equivalent_plastic_strain": ("plastic", "equivalent plastic strain", None),
     "potential": ("potential", r"potential $\varphi$", "potential"),
 }
 #: Other fields, with their components, whose unit may have a name.
@@ -111,7 +112,7 @@ def named(field: str, units: Units) -> tuple[str, str]:
     """Return the name of the figure of a field, and the label of its colours."""
     if field in DEFORMED:
         name, words, quantity = DEFORMED[field]
-        return name, units.label(words, quantity)
+        return name, words if quantity is None else units.label(words, quantity)
     words, base = field.replace("_", " "), field.partition("_")[0]
     return field, units.label(words, QUANTITIES[base]) if base in QUANTITIES else words
 
