@@ -162,7 +162,7 @@ class Electric(Section):
     `ramp`, (1.34) as printed, zero where u_nu <= rho. `shifted` gives up (h~5)(d), psi = 0 for
     u_nu <= rho, with which no contact conducts."""
     k_e: NonNegative
-    """Conductivity k_e of the foundation."""
+    """k_e of the foundation: a capacitance an area, for D.nu is a charge and has no memory."""
     phi_f: TimeFormula = Expression(0.0)
     """Potential phi_F of the foundation."""
     amplitude: AmplitudeName | None = None

@@ -41,7 +41,9 @@ NOTE = (
     "elastic energies (nu = 0.3). alternating: edges of Gamma_3 by turns in the ratio 8 to 1, in "
     "cells of one height. graded: unstructured, by the factor of 100 towards the end of Gamma_3. "
     "crosspoints: the ends, in 3-D the rim, of Gamma_3 are fixed, and carry no multiplier. "
-    "Degree 2 in 3-D has the change of basis with alpha = 1/5."
+    "Degree 2 in 3-D has the change of basis with alpha = 1/5. More refinements lower beta a "
+    "little: uniform, degree 1, 8 cells, 2, 3, 4 of them: 0.656, 0.626, 0.617; uniform, 3-D, "
+    "degree 2, 2 cells, 1 and 2: 0.558, 0.474."
 )
 
 #: How much longer every other edge is than its neighbours.
@@ -102,11 +104,11 @@ SIDES = ("left", "right")
 SERIES: dict[str, tuple[Mesh, dict[int, tuple[tuple[int, ...], int]]]] = {
     "uniform": (
         Mesh(unit, "bottom", ["top"]),
-        {1: ((4, 8, 16, 32), 3), 2: ((4, 8, 16, 32), 2)},
+        {1: ((4, 8, 16), 3), 2: ((4, 8, 16), 2)},
     ),
     "alternating": (
         Mesh(alternating, "bottom", ["top"]),
-        {1: ((4, 8, 16, 32), 3), 2: ((4, 8, 16, 32), 2)},
+        {1: ((4, 8, 16), 3), 2: ((4, 8, 16), 2)},
     ),
     "graded": (
         Mesh(graded, "contact", ["bottom", "side"]),
@@ -114,15 +116,15 @@ SERIES: dict[str, tuple[Mesh, dict[int, tuple[tuple[int, ...], int]]]] = {
     ),
     "crosspoints": (
         Mesh(unit, "bottom", ["top", *SIDES]),
-        {1: ((4, 8, 16, 32), 3), 2: ((4, 8, 16, 32), 2)},
+        {1: ((4, 8, 16), 3), 2: ((4, 8, 16), 2)},
     ),
     "uniform, 3-D": (
         Mesh(lambda n: unit(n, 3), "bottom", ["top"]),
-        {1: ((2, 4, 6), 2), 2: ((2, 3, 4), 1)},
+        {1: ((2, 3, 4), 2), 2: ((2, 3), 1)},
     ),
     "crosspoints, 3-D": (
         Mesh(lambda n: unit(n, 3), "bottom", ["top", *SIDES, "front", "back"]),
-        {1: ((2, 4, 6), 2), 2: ((2, 3, 4), 1)},
+        {1: ((2, 3, 4), 2), 2: ((2, 3), 1)},
     ),
 }
 
