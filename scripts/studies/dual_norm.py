@@ -45,7 +45,7 @@ class DualNorm:
         return self._root(load, self._operator.solve(load))
 
     def compliance(self, loads: Sequence[Array]) -> Array:
-        """Return what loads work on the displacements that they make, shape (n, n). Collective."""
+        """Return the work of loads on each other's displacements, shape (n, n). Collective."""
         free = self.problem.equilibrium.free.ravel()
         acting = np.array([np.where(free, load, 0.0) for load in loads])
         moved = np.array([self._operator.solve(load) for load in acting])

@@ -4,8 +4,8 @@ python3 -m scripts.studies.mindlin [--out DIR] [--coarse]
 
 One half, y >= 0, of two half balls in 3-D, or two half cylinders in the plane. Their cuts stay at
 a distance while one is moved along x and back: the dissipation of a turn is the area of the
-loop, and both have a closed form. That of balls is the one of half spaces: what the finite size of
-the balls changes is in proportion to a/R. The mesh of the balls is that of a half plane, fine where
+loop, and both have a closed form. That of balls is the one of half spaces: the finite size of the
+balls changes it in proportion to a/R. The mesh of the balls is that of a half plane, fine where
 the contact slips, turned about the axis.
 """
 
