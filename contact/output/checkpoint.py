@@ -13,8 +13,8 @@ import json
 import logging
 import os
 import re
-from collections.abc import Mapping, Sequence
-from contextlib import suppress
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 from zipfile import BadZipFile
@@ -34,7 +34,7 @@ from contact.output.folder import kind, read_json, settle
 from contact.output.solution import Solution, StepRecord
 from contact.problem.problem import ContactProblem
 from contact.problem.state import State
-from contact.ranks import on_root
+from contact.ranks import on_all_ranks, on_root
 from contact.typing import Array
 
 #: Folder of the checkpoints in that of the results, that of a run which has not ended a step yet,
@@ -189,7 +189,20 @@ def read_checkpoint(path: str | Path, problem: ContactProblem) -> State:
         raise InputError(
             f"{path}: the checkpoint does not fit the problem; accepted: that of the same case"
         )
-    return _state(problem, arrays, where)
+    with _as_written(Path(path), problem.comm):
+        return _state(problem, arrays, where)
+
+
+@contextmanager
+def _as_written(path: Path, comm: MPI.Intracomm) -> Iterator[None]:
+    """Refuse arrays that are missing, or have other shapes, on all ranks. Collective."""
+    with on_all_ranks(comm):
+        try:
+            yield
+        except (KeyError, IndexError, TypeError, ValueError) as error:
+            raise InputError(
+                f"{path}: no checkpoint, or a damaged one ({error}); accepted: as a run has left it"
+            ) from None
 
 
 def read_steps(folder: Path, problem: ContactProblem) -> list[StepRecord]:
@@ -209,7 +222,10 @@ def read_steps(folder: Path, problem: ContactProblem) -> list[StepRecord]:
 
 def _where(folder: Path, problem: ContactProblem) -> NDArray[np.intp]:
     """Return the rows of the owned nodes in the files of a folder. Collective."""
-    points = on_root(problem.comm, lambda: _load(_files(folder)[0].parent / _NODES)["points"])
+    path = on_root(problem.comm, lambda: _files(folder)[0].parent / _NODES)
+    arrays = on_root(problem.comm, lambda: _load(path))
+    with _as_written(path, problem.comm):
+        points = arrays["points"]
     where = _rows(problem, points)
     if where is None:
         raise InputError(
@@ -233,9 +249,13 @@ def _rows(problem: ContactProblem, points: Array) -> NDArray[np.intp] | None:
 def _read(problem: ContactProblem, path: Path, where: NDArray[np.intp]) -> StepRecord:
     arrays = on_root(problem.comm, lambda: _load(path))
     table = {k.removeprefix(TABLE): v for k, v in arrays.items() if k.startswith(TABLE)}
-    said, row = json.loads(str(arrays["said"])), json.loads(str(arrays["row"]))
-    state = _state(problem, arrays, where)
-    return StepRecord(state, row, table, said["enthalpy"], said["rounding"])
+    with _as_written(path, problem.comm):
+        said, row = (dict(json.loads(str(arrays[name]))) for name in ("said", "row"))
+        if len({column.shape for column in table.values()}) > 1:
+            raise ValueError("columns of unequal lengths")
+        state = _state(problem, arrays, where)
+        numbers = float(said["enthalpy"]), float(said["rounding"])
+    return StepRecord(state, row, table, *numbers)
 
 
 def _state(

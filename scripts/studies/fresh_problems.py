@@ -470,7 +470,7 @@ def judge(mesh: Mesh, tables: Tables, solution: Solution, folder: Path) -> dict[
 def solves(solution: Solution) -> tuple[float, ...]:
     """Return the solves of the body, of its contact nodes, and both in linear solves, a step.
 
-    A dense solve of k unknowns has k^3 operations, a sparse factorisation of n with fronts of b
+    A dense step of k unknowns has k^3 operations, a sparse factorisation of n with fronts of b
     n b^2, at a fiftieth of the speed (`contact.problem.condensed.pays`).
     """
     steps, counters, problem = max(1, len(solution.steps)), solution.counters, solution.problem

@@ -186,6 +186,11 @@ def damaged(number: int, seed: int) -> tuple[str, str]:
 
 def run(file: Path, folder: Path) -> tuple[int | str, str, float]:
     """Solve a case in a child; return its status or its signal, its messages and seconds."""
+    return started(["solve", str(file), "--out", str(folder)])
+
+
+def started(arguments: Sequence[str]) -> tuple[int | str, str, float]:
+    """Run a command in a child; return its status or its signal, its messages and seconds."""
     begin = time.monotonic()
     with tempfile.TemporaryFile() as said:
         child = os.fork()
@@ -196,8 +201,7 @@ def run(file: Path, folder: Path) -> tuple[int | str, str, float]:
             status = 70
             resource.setrlimit(resource.RLIMIT_CPU, (LIMIT, LIMIT))
             try:
-                out = ["--out", str(folder), "--quiet"]
-                status = command_line(["solve", str(file), *out])
+                status = command_line([*arguments, "--quiet"])
             except SystemExit as ended:
                 status = int(ended.code or 0)
             finally:
