@@ -181,10 +181,10 @@ def tried(number: int, made: dict[str, Path], scratch: Path) -> tuple[str, int |
         damage(place / name, rng)
     before, file = contents(place), made[command].parent / "case.toml"
     arguments = {
-        "restart": ["solve", "--restart", str(place)],
-        "sweep": _sweep(file, place),
+        "restart": ["solve", "--restart", str(place), "--quiet"],
+        "sweep": [*_sweep(file, place), "--quiet"],
         "plot": ["plot", str(place)],
-        "solve": ["solve", str(file), "--out", str(place)],
+        "solve": ["solve", str(file), "--out", str(place), "--quiet"],
     }[command]
     status, said, _ = started(arguments)
     after, wrong = contents(place), fault(status, said)

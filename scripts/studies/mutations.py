@@ -186,7 +186,7 @@ def damaged(number: int, seed: int) -> tuple[str, str]:
 
 def run(file: Path, folder: Path) -> tuple[int | str, str, float]:
     """Solve a case in a child; return its status or its signal, its messages and seconds."""
-    return started(["solve", str(file), "--out", str(folder)])
+    return started(["solve", str(file), "--out", str(folder), "--quiet"])
 
 
 def started(arguments: Sequence[str]) -> tuple[int | str, str, float]:
@@ -201,7 +201,7 @@ def started(arguments: Sequence[str]) -> tuple[int | str, str, float]:
             status = 70
             resource.setrlimit(resource.RLIMIT_CPU, (LIMIT, LIMIT))
             try:
-                status = command_line([*arguments, "--quiet"])
+                status = command_line([*arguments])
             except SystemExit as ended:
                 status = int(ended.code or 0)
             finally:
