@@ -52,15 +52,12 @@ ALLOWED: dict[str, int] = {
     "docs/api.md": 1,
     "docs/benchmarks.md": 6,
     "docs/case-file.md": 1,
-    "docs/evolution.md": 24,
     "docs/how-to.md": 4,
-    "docs/indentation.md": 10,
     "docs/python.md": 11,
     "docs/results.md": 33,
     "docs/scaling.md": 11,
     "docs/troubleshooting.md": 29,
     "docs/tutorial.md": 8,
-    "docs/two-bodies.md": 23,
 }
 
 #: A word ends where its letters do: underscores of identifiers are borders too.
