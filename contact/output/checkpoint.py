@@ -251,8 +251,8 @@ def _read(problem: ContactProblem, path: Path, where: NDArray[np.intp]) -> StepR
     table = {k.removeprefix(TABLE): v for k, v in arrays.items() if k.startswith(TABLE)}
     with _as_written(path, problem.comm):
         said, row = (dict(json.loads(str(arrays[name]))) for name in ("said", "row"))
-        if len({column.shape for column in table.values()}) > 1:
-            raise ValueError("columns of unequal lengths")
+        if not row or len({column.shape for column in table.values()}) > 1:
+            raise ValueError("columns are missing, or of unequal lengths")
         state = _state(problem, arrays, where)
         numbers = float(said["enthalpy"]), float(said["rounding"])
     return StepRecord(state, row, table, *numbers)

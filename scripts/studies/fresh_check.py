@@ -263,7 +263,8 @@ def _balance(
             passed += vectors[mine].sum(axis=0)
         turn = 1 - np.einsum("ni,ni->n", normals[mine], _normals(mesh, edges)[nodes[order]])
         pressed = pressure[mine] > 1e-6 * pressure.max()
-        worst_turn = max(worst_turn, turn[pressed].max(initial=0.0))
+        if "against" in entry:  # in front of a shape its normal is the one
+            worst_turn = max(worst_turn, turn[pressed].max(initial=0.0))
     against = folder / "contact-against.csv"
     answered = np.zeros(2)
     if against.exists():

@@ -50,6 +50,7 @@ PARTS = (
     Part("corner", "The singular corner of Example 7.2", figures=False, package="studies"),
     Part("pressure_convergence", "Convergence of the contact pressure", package="studies"),
     Part("curved_foundations", "Curved foundations", figures=False, package="studies"),
+    Part("pressure_on_axis", "Pressure on the axis", figures=False, package="studies"),
     Part("nonlocal_friction", "Non-local friction at work", package="studies"),
     Part("tables_piezo", "Examples 8.1 and 8.2: Tables 8.2 and 8.3", figures=False),
     Part("figures_piezo", "Examples 8.1 and 8.2: Figures 8.2 to 8.7", tables=False),

@@ -113,7 +113,7 @@ def read_run(folder: Path, summary: Mapping[str, Any] | None = None) -> Run:
     """
     about = summary or read(folder, "summary.json", lambda path: json.loads(path.read_bytes()))
     surface, body = (read(folder, name, read_grid) for name in ("contact.vtu", "fields.vtu"))
-    columns = read(folder, "contact.csv", _columns)
+    columns = read(folder, "contact.csv", _nodes)
     files = about.get("files", [path.name for path in folder.iterdir()])
 
     def run(_: Path) -> Run:
@@ -126,7 +126,7 @@ def read_run(folder: Path, summary: Mapping[str, Any] | None = None) -> Run:
             body,
             surface,
             opposite=read(folder, OPPOSITE, read_grid) if OPPOSITE in files else None,
-            steps=read(folder, "steps.csv", _columns) if "steps.csv" in files else None,
+            steps=read(folder, "steps.csv", _steps) if "steps.csv" in files else None,
             tables=read(folder, "contact-steps.csv", _tables) if "steps.csv" in files else (),
         )
 
@@ -166,7 +166,9 @@ def read(folder: Path, name: str, reader: Callable[[Path], T]) -> T:
         raise InputError(f"{path}: no such file; accepted: a run's results{hint}") from None
     except OSError as error:
         raise refused(error) from None
-    except (ValueError, KeyError, IndexError, TypeError, AttributeError) as error:
+    except KeyError as error:
+        raise InputError(f"{path}: not as a run has left it (no {error})") from None
+    except (ValueError, IndexError, TypeError, AttributeError) as error:
         raise InputError(f"{path}: not as a run has left it ({error})") from None
 
 
@@ -196,9 +198,36 @@ def _columns(path: Path) -> dict[str, NDArray[Any]]:
     return {k: v if k in ("status", "on") else v.astype(float) for k, v in columns.items()}
 
 
+def _with(columns: dict[str, NDArray[Any]], *names: str) -> dict[str, NDArray[Any]]:
+    """Return columns, or raise a KeyError with the first that is missing of some."""
+    for name in names:
+        if name not in columns:
+            raise KeyError(name)
+    return columns
+
+
+def _nodes(path: Path) -> dict[str, NDArray[Any]]:
+    """Read ``contact.csv``, or the table of all steps, with the columns that figures ask for."""
+    columns, tangential = _columns(path), ["u_t", "tau"]
+    if "z" in columns:
+        tangential = [f"{name}{axis}" for name in ("u_t", "tau_") for axis in "xyz"]
+    names = "x", "y", "weight", "gap", "u_n", "pressure", "bound", "status"
+    return _with(columns, *names, *tangential)
+
+
+def _steps(path: Path) -> dict[str, NDArray[Any]]:
+    """Read ``steps.csv`` with the columns that figures ask for."""
+    columns = _columns(path)
+    forces = re.findall(r"\b(?:driven|rigid)_force_[xyz]\b", " ".join(columns))
+    moved = re.findall(r"\b(?:driven|rigid)_[xyz]\b", " ".join(columns))
+    names = [force.replace("_force", "") for force in forces]
+    names += [way.replace("_", "_force_") for way in moved]
+    return _with(columns, "t", "work", "energy", "dissipation", *names)
+
+
 def _tables(path: Path) -> list[Table]:
     """Read ``contact-steps.csv``: a table a step."""
-    columns = _columns(path)
+    columns = _nodes(path)
     starts = np.flatnonzero(np.diff(columns["t"])) + 1
     parts = {name: np.split(values, starts) for name, values in columns.items()}
     return [{name: values[k] for name, values in parts.items()} for k in range(len(starts) + 1)]
