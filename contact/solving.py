@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 from mpi4py import MPI
 
+from contact.adapting import adapted
 from contact.arguments import expect
 from contact.case.build import REPLACEMENTS, build_problem, named, replaced_by
 from contact.case.digest import check_digest, digest
@@ -181,9 +182,22 @@ def solve(
         computed_from = on_root(comm, lambda: digest(case))
     if restart is not None:
         on_root(comm, lambda: check_digest(restart, kept_digest(restart), computed_from))
-    problem = build_problem(case, comm, **replacements)
+    adapt = case.mesh.adapt is not None
+    if adapt:
+        _refuse({"restart": restart, "start": start, "nested": nested or None}, "[mesh.adapt]")
+        _refuse(replacements, "[mesh.adapt]")
+    problem = None if adapt else build_problem(case, comm, **replacements)
     with named(case.source):
-        if case.evolution is not None:
+        if problem is None:
+            evolution = case.evolution
+            ends, begin = ((), 0.0) if evolution is None else (evolution.ends, evolution.times[0])
+
+            def once(problem: ContactProblem, start: State | None) -> Solution:
+                schedule = Schedule(ends, begin, start=start, guess=COARSE)
+                return run_schedule(problem, settings, monitor, schedule)
+
+            solution = adapted(case, comm, once)
+        elif case.evolution is not None:
             kept = [] if restart is None else read_steps(restart, problem)
             keep = None
             if folder is not None:
@@ -198,7 +212,8 @@ def solve(
             schedule = Schedule(start=start)
             if nested:
                 schedule = Schedule(start=nested_start(case, problem, **replacements), guess=COARSE)
-        solution = run_schedule(problem, settings, monitor, schedule)
+        if problem is not None:
+            solution = run_schedule(problem, settings, monitor, schedule)
     solution.title, solution.output, solution.units = case.title, case.output, case.case.units
     if not replacements:
         solution.case = to_toml(case)

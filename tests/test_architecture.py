@@ -28,7 +28,7 @@ LAYERS = (
     {"methods"},
     {"output"},
     {"case"},
-    {"evolving", "nesting", "solving", "sweeping"},
+    {"adapting", "evolving", "nesting", "solving", "sweeping"},
     {"cli"},
 )
 

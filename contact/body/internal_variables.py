@@ -255,6 +255,14 @@ class QuadratureLaws:
         element = basix.ufl.element("DG", cell, self._fitted)
         return np.linalg.pinv(element.tabulate(0, self.points)[0])
 
+    def secant_shear(self, state: Evaluated, x: Array) -> Array:
+        """Return the means of the secant shear modulus in the owned cells, 0 without history."""
+        found = np.zeros(self._owned)
+        for cells, response in self._responses(state, x, "secant"):
+            assert response.stiffness is not None
+            found[cells] = response.stiffness[:, -1, -1].reshape(cells.size, -1).mean(axis=1) / 2
+        return found
+
     def fit(self, state: Evaluated, x: Array) -> None:
         """Let `fits` be those at the end of the step that led to a state."""
         for cells, response in self._responses(state, x):

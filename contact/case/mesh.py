@@ -35,7 +35,7 @@ from contact.settings import Accepted, Count, Number, Positive
 from meshes.grading import memory
 
 #: Keys of `[mesh]` that go with every generator and file.
-COMMON = ("generator", "file", "rotation", "axis", "refine")
+COMMON = ("generator", "file", "rotation", "axis", "refine", "adapt")
 
 #: Bytes that making the mesh takes for a cell, without any unknowns (seen: 235 to 345).
 CELL_MEMORY = 200
@@ -76,6 +76,21 @@ Pieces: TypeAlias = Annotated[
 ]
 
 
+class Adapt(Section):
+    """`[mesh.adapt]`: the mesh is refined where the error is, and the case solved again.
+
+    It ends when the estimated error, or the number of unknowns, is reached. A curved boundary keeps
+    the facets of the first mesh.
+    """
+
+    error: Annotated[float, Field(gt=0, lt=1), Accepted("a number between 0 and 1")] | None = None
+    """Largest estimated relative error in the energy norm, `error` of the summary."""
+    max_unknowns: Count = 200_000
+    """No mesh with more unknowns is solved, the first one excepted."""
+    fraction: Annotated[float, Field(gt=0, le=1), Accepted("a number above 0, up to 1")] = 0.5
+    """Share of the square of the error that the refined cells have (Dörfler's); 1 is uniform."""
+
+
 class Mesh(Section):
     """`[mesh]`: a generator with its parameters, or a Gmsh file."""
 
@@ -110,6 +125,8 @@ class Mesh(Section):
     """Axis of the rotation in 3-D. Default: y, `[0, 1, 0]`."""
     refine: Annotated[int, Field(ge=0, le=10), Accepted("a whole number from 0 to 10")] = 0
     """Uniform refinements of the mesh after it is made or read."""
+    adapt: Adapt | None = None
+    """Adaptive refinement, `[mesh.adapt]`. Default: none."""
     parts: dict[Name, Pieces] = Field(default={})
     """Further parts of a rectangle or box by name: `[mesh.parts.NAME]`."""
     parameters: dict[Name, Number] = Field(default={})

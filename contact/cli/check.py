@@ -27,6 +27,8 @@ from contact.typing import Array
 
 #: Mean ratio below which a cell is called thin.
 THIN = 0.1
+#: Poisson's ratio from which on elements of degree 1 lock: the bulk modulus is 19.7 times mu.
+INCOMPRESSIBLE = 0.475
 #: Displacements above this share of the body are not small.
 LARGE = 0.05
 
@@ -83,7 +85,21 @@ def _counts(sets: Mapping[str, Indices], comm: MPI.Intracomm) -> list[str]:
 def expectations(problem: ContactProblem) -> list[str]:
     """Return lines on the mesh and on the expected effect of the loads. Collective."""
     warnings = [f"# warning: {text}" for text in (*fitting(problem), *passing(problem))]
-    return [*_quality(problem), *_sizes(problem), *warnings]
+    return [*_quality(problem), *_sizes(problem), *_locking(problem), *warnings]
+
+
+def _locking(problem: ContactProblem) -> list[str]:
+    """Say which materials change their volume so little that elements of degree 1 lock."""
+    if problem.equilibrium.degree > 1:
+        return []
+    ratios = [float(m.law.poisson) for m in problem.body.materials]
+    return [
+        f"# warning: Poisson's ratio {ratio:g}, and from {INCOMPRESSIBLE:g} on elements of degree "
+        "1 are much too stiff, they lock: space.degree = 2 does not, least of all with "
+        'element = "mean_dilatation"'
+        for ratio in dict.fromkeys(ratios)
+        if ratio >= INCOMPRESSIBLE
+    ]
 
 
 def mean_ratio(corners: Array) -> Array:

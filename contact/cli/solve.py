@@ -19,6 +19,7 @@ from contact.cli.progress import progress
 from contact.errors import InputError
 from contact.methods.interrupt import SIGNALLED, Terminated, signals_held
 from contact.output.checkpoint import case_of, discard, kept_case
+from contact.output.discretisation import locks
 from contact.output.files import write_outputs
 from contact.output.folder import SUMMARY, check_members, read_json, result_folder
 from contact.output.solution import Solution
@@ -92,7 +93,12 @@ def _results(solution: Solution) -> list[str]:
         "sticking": share,
         "seconds": seconds,
     }
-    return [f"  {name:18}{value}".rstrip() for name, value in rows.items()]
+    lines = [f"  {name:18}{value}".rstrip() for name, value in rows.items()]
+    if solution.error is not None:
+        bound = ", a lower bound: the mesh locks" if locks(solution) else ""
+        share = f"{100 * solution.error.relative:.2g} % (energy norm){bound}"
+        lines.append(f"estimated discretisation error {share}")
+    return lines
 
 
 def _load(options: argparse.Namespace) -> Case:

@@ -1,4 +1,4 @@
-"""From one mesh of a body to another: uniform refinement, and functions carried over."""
+"""From one mesh of a body to another: refinement, and functions carried over."""
 
 from __future__ import annotations
 
@@ -13,20 +13,32 @@ from numpy.typing import NDArray
 from contact import _compat
 from contact._compat import lasting
 from contact.mesh.domain import Domain, exterior_facets, with_names
+from contact.mesh.entities import Indices
 
 
-def refined(domain: Domain) -> Domain:
-    """Cut every edge in two; parts and regions are inherited. Collective.
+def refined(domain: Domain, marked: Indices | None = None) -> Domain:
+    """Cut every edge, or those of marked cells, in two; names are inherited. Collective.
 
     The cells of the new mesh lie in the cells of the old one, on the same rank. A curved
     boundary keeps its old straight facets.
+
+    Parameters
+    ----------
+    domain
+        The mesh with its parts and regions.
+    marked
+        Owned cells whose edges are cut; others are cut as far as that asks for (Plaza and Carey,
+        Appl. Numer. Math. 32, 2000). All by default.
     """
     coarse = domain.mesh
     tdim = coarse.topology.dim
     coarse.topology.create_entities(1)
+    edges = None
+    if marked is not None:
+        edges = dmesh.compute_incident_entities(coarse.topology, marked, tdim, 1)
     # Without a partitioner the refined cells stay on the rank of their parent.
     fine, parent_cells, parent_facets = dmesh.refine(
-        coarse, partitioner=None, option=dmesh.RefinementOption.parent_cell_and_facet
+        coarse, edges, partitioner=None, option=dmesh.RefinementOption.parent_cell_and_facet
     )
     facets = exterior_facets(fine)
     coarse_facets = coarse.topology.connectivity(tdim, tdim - 1).array.reshape(-1, tdim + 1)
@@ -50,7 +62,7 @@ def refined(domain: Domain) -> Domain:
     made_of = with_names(fine, parts, regions, domain.size)
     return replace(
         made_of,
-        levels=domain.levels + 1,
+        levels=domain.levels + (marked is None),
         unusable=domain.unusable,
         notes=domain.notes,
         revolved=domain.revolved,

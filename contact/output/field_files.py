@@ -13,6 +13,7 @@ import errno
 import os
 from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, TypeAlias
 
@@ -56,6 +57,8 @@ def write_fields(solution: Solution, folder: Path) -> None:
     match solution.output.fields:
         case "vtu":
             share = body_share(problem, solution.state)
+            if solution.error is not None:
+                share = replace(share, in_cells={**share.in_cells, "error": solution.error.cells})
             write_share(problem.comm, share, folder / "fields.vtu")
             if solution.steps:
                 _write_series(problem, frames, folder)

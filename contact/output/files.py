@@ -14,6 +14,7 @@ from contact.arguments import expect
 from contact.output.field_files import write_fields
 from contact.output.folder import ResultFolder, result_folder
 from contact.output.quantities import (
+    ADAPT,
     AGAINST,
     HISTORY,
     OPPOSITE,
@@ -86,6 +87,9 @@ def _replace(solution: Solution, folder: ResultFolder, figures: bool) -> None:
             write_csv(new / "history.csv", header, (row.values() for row in rows))
             if solution.steps:
                 write_steps(solution.steps, new)
+            if solution.adaptation:
+                rows = solution.adaptation
+                write_csv(new / ADAPT, rows[0], (row.values() for row in rows))
             write_vtu(new / SURFACE, surface)
             if opposite is not None:
                 write_table(opposite_table(solution.problem, opposite), new / AGAINST)

@@ -49,7 +49,7 @@ MANIFEST = "files"
 
 #: Names that each run may write, and those that a summary may name: it may be of anybody.
 _RESULT = re.compile(
-    r"summary\.json|(history|steps|contact(-steps|-against)?)\.csv|contact(-against)?\.vtu|"
+    r"summary\.json|(history|steps|adapt|contact(-steps|-against)?)\.csv|contact(-against)?\.vtu|"
     r"fields(-\d{4,})?\.vtu|fields\.(pvd|bp|xdmf|h5)|cells\.bp|checkpoint\.npz|"
     r"figure-(contact|loop|zones|energy|deformed|potential)\.png"
 )

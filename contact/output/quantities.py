@@ -17,10 +17,11 @@ import numpy as np
 from contact.output.environment import versions
 
 SUMMARY, STEPS, SWEEP = "summary.json", "steps.csv", "sweep.csv"
+ADAPT = "adapt.csv"
 NODES, HISTORY, AGAINST = "contact.csv", "history.csv", "contact-against.csv"
 BODY, SURFACE, OPPOSITE = "fields.vtu", "contact.vtu", "contact-against.vtu"
 #: Tables with a row a solution; the others have columns of arrays.
-ROWS = (STEPS, SWEEP)
+ROWS = (STEPS, SWEEP, ADAPT)
 #: Status of a node -> its number in ``contact.vtu``.
 STATUS = {"none": -1, "open": 0, "stick": 1, "slip": 2}
 
@@ -97,6 +98,7 @@ def _sizes(record: Any) -> str:
 
 
 _ALL, _VECTOR = (SUMMARY, STEPS, SWEEP), "{name}_{axis}"
+_MESHES = (*_ALL, ADAPT)
 _STRAIN = {2: "plane_strain", 3: "solid"}
 
 _RUN = (
@@ -123,10 +125,15 @@ _RUN = (
         lambda r: r.problem.comm.size,
     ),
     Quantity(
+        "unknowns", "", "Number of unknowns of a mesh of `[mesh.adapt]`, a row each.",
+        lambda r: r.problem.equilibrium.layout.unknowns, (ADAPT,),
+    ),
+    Quantity("error", "", "`energy` of `error`.", lambda r: r.error.relative, (ADAPT,)),
+    Quantity(
         "contact_force", "force", "Force that the body exerts on the foundation, a vector; in 2-D "
         "a unit of depth. Between bodies the one that the body with `on` exerts on the other; of "
         "several contacts the sum, and `traction`, `weight` and `entry` of `contact.vtu` have the "
-        "force of each.", files=_ALL, component=_VECTOR,
+        "force of each.", files=_MESHES, component=_VECTOR,
     ),
     Quantity(
         "contact_moment", "force · length", "Moment of these about the origin of coordinates, of "
@@ -144,8 +151,15 @@ _RUN = (
         lambda r: {part: held.moment for part, held in r.supports.items()},
     ),
     Quantity(
+        "error", "",
+        "Estimated discretisation error: `energy`, relative, in the energy norm, about the root of "
+        "that of displacements under given loads; and its `effectivity`, the estimate over the "
+        "error itself, `null` where that is not known.",
+        lambda r: r.error and {"energy": r.error.relative, "effectivity": None},
+    ),
+    Quantity(
         "max_pressure", "stress", "Largest contact pressure, -σ_ν >= 0.",
-        lambda r: r.problem.nodes.maximum(r.pressure), _ALL,
+        lambda r: r.problem.nodes.maximum(r.pressure), _MESHES,
     ),
     Quantity(
         "contact_nodes", "", "Number of contact nodes that touch: sticking and sliding ones.",
@@ -158,7 +172,7 @@ _RUN = (
     ),
     Quantity(
         "max_displacement", "length", "Largest Euclidean norm of the displacement at a node.",
-        files=_ALL,
+        files=_MESHES,
     ),
     Quantity(
         "contact_area", "area", "Sum of the weights of the nodes that touch; in 2-D a length.",
@@ -462,6 +476,12 @@ _BODY = (
     ),
     Quantity("electric_displacement", "charge/area", "D; of piezoelectric bodies.", files=(BODY,)),
     Quantity("electric_field", "potential/length", "E = -grad φ; likewise.", files=(BODY,)),
+    Quantity(
+        "error", "",
+        "Estimated discretisation error of the cell, over the energy norm of all: the squares add "
+        "up to that of `error` in the summary. In `fields.vtu`, cell by cell alone.",
+        _elsewhere, (BODY,),
+    ),
 )  # fmt: skip
 
 QUANTITIES = (*_RUN, *_NODES, *_HISTORY, *_AGAINST, *_BODY)

@@ -9,7 +9,8 @@ import numpy as np
 from mpi4py import MPI
 
 from contact.interface.law import Conductor
-from contact.output import bodies
+from contact.output import bodies, discretisation
+from contact.output.error_estimate import estimated
 from contact.output.fields import DerivedFields, deformation, unloaded
 from contact.output.solution import Note, Remark, Solution
 from contact.problem.kkt import left_as_pressures, residual_forces
@@ -71,6 +72,7 @@ def review(solution: Solution) -> None:
             e.yielded for e in extremes if e.plastic is not None and e.yielded is not None
         )
     solution.deformation = deformation(body, x)
+    solution.error = estimated(solution.problem, solution.state)
     for remarks in (
         unloading(solution),
         monotonicity(solution, strains),
@@ -78,6 +80,7 @@ def review(solution: Solution) -> None:
         coarse_curves(solution),
         fitting(solution.problem),
         layers(solution),
+        discretisation.remarks(solution),
         untouched(solution),
         resolution(solution),
         rounding(solution),

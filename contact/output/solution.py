@@ -18,6 +18,7 @@ from mpi4py import MPI
 from contact.errors import InputError
 from contact.linear.operator import Counters
 from contact.methods.report import IterationHistory, Outcome
+from contact.output.error_estimate import Estimate
 from contact.output.fields import Deformation, DerivedFields, unknowns
 from contact.output.options import OutputOptions, Units
 from contact.output.resultants import (
@@ -100,6 +101,10 @@ class Solution(Solved):
         Volume with plastic strain, and the largest equivalent one; None without a law that has it.
     deformation
         How large strains and changes of volume are; None before the solution is reviewed.
+    error
+        The estimated discretisation error; None likewise.
+    adaptation
+        The rows of ``adapt.csv``, one a mesh; none without `[mesh.adapt]`.
     start
         The initial guess, in words.
     critical_factor
@@ -128,6 +133,8 @@ class Solution(Solved):
     plastic_volume: float | None = None
     equivalent_plastic_strain: float | None = None
     deformation: Deformation | None = None
+    error: Estimate | None = None
+    adaptation: list[dict[str, Any]] = field(default_factory=list)
     start: str = "zero slip"
     critical_factor: float = np.inf
     case: str = ""

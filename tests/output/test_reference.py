@@ -90,12 +90,18 @@ def test_fields(written: list[Path]) -> None:
     for name in (BODY, SURFACE):
         fields = [read_grid(folder / name) for folder in written]
         for quantity in quantities(name):
-            assert any(quantity.name in found.point_data for found in fields)
+            assert any(
+                quantity.name in found.point_data or quantity.name in found.cell_data
+                for found in fields
+            )
         for found in fields:
             known = {quantity.name for quantity in quantities(name)}
             assert set(found.point_data) <= known
             derived = set(found.point_data) - {"displacement", "potential"}
-            assert name == SURFACE or set(found.cell_data) == {f"{k}_cell" for k in derived}
+            assert name == SURFACE or set(found.cell_data) == {
+                "error",
+                *(f"{k}_cell" for k in derived),
+            }
 
 
 def test_one_entry_is_a_key_and_a_column(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -77,6 +77,8 @@ def scalar(run: Run, field: str) -> tuple[Array, bool]:
         If the body has no such field.
     """
     at_points, in_cells = run.body.point_data, run.body.cell_data
+    if field in in_cells:
+        return np.asarray(in_cells[field]), True
     name, _, component = field.rpartition("_")
     linear = run.body.get_cell(0).n_points == len(run.axes) + 1
     for whole, part in ((field, ""), (name, component)):

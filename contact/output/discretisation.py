@@ -1,0 +1,39 @@
+"""Remarks on the discretisation error: elements that lock, meshes that are too coarse."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from contact.output.solution import Remark, Solution
+
+#: Ratio of bulk to shear modulus, of nu = 0.475, from which on elements of degree 1 lock.
+LOCKED = 20.0
+
+#: Largest estimated error without a warning: its square is that of displacements under loads.
+COARSE = 0.15
+
+
+def locks(solution: Solution) -> bool:
+    """Whether elements of degree 1 are much too stiff, for volumes hardly change."""
+    ratio = None if solution.error is None else solution.error.stiffness_ratio
+    return solution.problem.equilibrium.degree == 1 and ratio is not None and ratio >= LOCKED
+
+
+def remarks(solution: Solution) -> Iterator[Remark]:
+    """Say where the mesh locks, or the estimated error is large, as where slender parts bend."""
+    error = solution.error
+    assert error is not None
+    if locks(solution):
+        yield (
+            f"the mesh locks: the bulk modulus is {error.stiffness_ratio:.3g} times the shear "
+            f"modulus where the energy is, and from {LOCKED:g} on elements of degree 1 are too "
+            "stiff: displacements are too small, and the estimated error is a lower bound; "
+            'space.degree = 2 does not lock, least of all with element = "mean_dilatation"'
+        )
+    elif error.relative > COARSE:
+        yield (
+            f"the mesh is too coarse: the estimated discretisation error is "
+            f"{error.relative:.1%} (energy norm), and the body is too stiff by about "
+            f"{error.relative**2:.1%}, more where slender parts bend; a finer mesh, or "
+            "space.degree = 2, has less of it"
+        )

@@ -1,0 +1,153 @@
+"""The estimate of the discretisation error beside known errors, and what it makes of locking."""
+
+import json
+
+import numpy as np
+import pytest
+import ufl
+from dolfinx import fem
+from mpi4py import MPI
+
+from contact import parse_case, solve, write_outputs
+from contact.body.description import Body, Fixed, Material
+from contact.case.build import build_problem
+from contact.cli.check import expectations
+from contact.mesh.domain import from_mesh
+from contact.mesh.grid import box, rectangle
+from contact.methods.newton import Newton
+from contact.methods.options import NewtonOptions
+from contact.output.error_estimate import estimated
+from contact.output.fields import Point
+from contact.problem.contact import Contact
+from contact.problem.problem import ContactProblem
+from contact.problem.state import State
+from forms.hencky import Linear
+from scripts.studies.error_norms import errors
+from scripts.studies.exact_solutions import Singular, exact, manufactured
+from tests.problems.bar import changed
+from tests.problems.mechanics import flat
+from tests.problems.piezo import pzt
+from tests.problems.revolution import Tube
+
+#: Problem, displacement, and cells of P1 and P2.
+KNOWN = {
+    "hencky": (lambda n, p: manufactured(2, p, n), exact(2), (16, 8)),
+    "solid": (lambda n, p: manufactured(3, p, n), exact(3), (6, 3)),
+    "tube": (lambda n, p: Tube().problem(n, p), Tube().displacement, (16, 8)),
+}
+
+
+def state_of(problem):
+    return Newton(problem, NewtonOptions(tolerance=1e-9)).solve(problem.start())[0]
+
+
+@pytest.mark.parametrize("degree", [1, 2])
+@pytest.mark.parametrize("name", KNOWN)
+def test_effectivity(name, degree):
+    make, displacement, cells = KNOWN[name]
+    problem = make(cells[degree - 1], degree)
+    state = state_of(problem)
+    error = errors(problem.equilibrium, state.x, displacement).energy
+    norm = errors(problem.equilibrium, state.x, None).energy
+    found = estimated(problem, state)
+    assert found.energy == pytest.approx(norm**2, rel=2e-3)
+    assert 0.75 < np.sqrt(found.total) / error < 1.15
+    assert np.sum(found.squares) == pytest.approx(found.total)
+    assert np.sum(found.cells**2) == pytest.approx(found.relative**2)
+
+
+@pytest.mark.parametrize("degree", [1, 2])
+def test_effectivity_at_the_end_of_contact(degree):
+    known = Singular()
+    problem = known.problem(16, degree)
+    state = state_of(problem)
+    found = estimated(problem, state)
+    assert 0.9 < np.sqrt(found.total) / known.errors(problem, state)[0].energy < 1.1
+    assert 0 < found.contact < 0.3 * found.total
+
+
+@pytest.mark.parametrize("degree", [1, 2])
+def test_no_error_where_the_solution_is_exact_in_each_material(degree):
+    """A column of two materials, held sideways: sigma_xx jumps, and no recovery may see that."""
+    plane = rectangle(MPI.COMM_SELF, (0.0, 0.0), (1.0, 2.0), (4, 8))
+    regions = {"low": lambda x: x[1] <= 1 + 1e-9, "high": lambda x: x[1] >= 1 - 1e-9}
+    domain = from_mesh(plane.mesh, plane.parts, regions=regions)
+    materials = [Material(Linear(1.0, 0.1), on="low"), Material(Linear(3.0, 0.4), on="high")]
+    sides = [Fixed(part, [0.0, "free"]) for part in ("left", "right")]
+    held = [*sides, Fixed("top", ["free", -0.02])]
+    for law in (materials, Linear(1.0, 0.1)):
+        problem = ContactProblem(domain, Body(law, held), Contact("bottom", flat()), degree=degree)
+        found = estimated(problem, state_of(problem))
+        assert found.total - found.contact < 1e-18 * found.energy
+        # Of gaps there is their rounding.
+        assert found.contact < 1e-9 * found.energy
+
+
+@pytest.mark.parametrize("dim", [2, 3])
+def test_the_energy_of_a_piezoelectric_body(dim):
+    """That of (sigma, D) is eps : F eps + E . beta E, by forms; also off equilibrium."""
+    make = rectangle if dim == 2 else box
+    domain = make(MPI.COMM_SELF, [0.0] * dim, [1.0] * dim, [2] * dim)
+    material = Material(Linear(58.7, 0.39), pzt(dim))
+    held = Fixed("top", [0.0] * dim, potential=0.0)
+    problem = ContactProblem(domain, Body(material, held), Contact("bottom", flat()), degree=2)
+    body, start = problem.equilibrium, problem.start()
+    x = np.random.default_rng(1).standard_normal(start.x.size)
+    point = Point(body, material, body.function(x))
+    field = -ufl.grad(body.split(body.function(x))[1])
+    density = ufl.inner(point.stress, point.strain) + ufl.dot(point.electric_displacement, field)
+    found = estimated(problem, State(x, start.forces))
+    assert found.energy == pytest.approx(fem.assemble_scalar(fem.form(density * domain.dx)))
+    assert found.total > 0
+
+
+@pytest.mark.parallel
+def test_ranks_agree():
+    data = changed(mesh__cells=[16, 4])
+    alone, together = (solve(parse_case(data), comm=c) for c in (MPI.COMM_SELF, MPI.COMM_WORLD))
+    for name in ("relative", "total", "contact", "energy", "stiffness_ratio"):
+        assert getattr(together.error, name) == pytest.approx(getattr(alone.error, name), rel=1e-8)
+    largest = together.problem.comm.allreduce(together.error.squares.max(initial=0.0), op=MPI.MAX)
+    assert largest == pytest.approx(alone.error.squares.max(), rel=1e-8)
+
+
+def test_it_is_written_with_the_results(tmp_path):
+    solution = solve(parse_case(changed(mesh__cells=[16, 4])))
+    write_outputs(solution, tmp_path)
+    error = json.loads((tmp_path / "summary.json").read_text())["error"]
+    assert error == {"energy": solution.error.relative, "effectivity": None}
+    assert b'Name="error"' in (tmp_path / "fields.vtu").read_bytes()
+
+
+YIELDING = {"material__yield_strain": 0.005, "load__0__traction": [0.0, -0.05]}
+SOFT = {"material__law": "linear", "material__yield_strain": None, "material__poisson": 0.4999}
+
+
+@pytest.mark.parametrize("changes", [YIELDING, SOFT])
+def test_locking_is_seen_on_elements_of_degree_1_alone(changes):
+    data = changed(mesh__cells=[32, 8], **changes)
+    locked = solve(parse_case(data))
+    assert locked.error.stiffness_ratio > 20
+    assert any("the mesh locks" in text for text in locked.warnings)
+    data["space"]["degree"] = 2
+    assert not any("the mesh locks" in text for text in solve(parse_case(data)).warnings)
+
+
+def test_a_beam_of_three_cells_is_said_to_be_too_stiff():
+    """80 x 1 under a load at its tip: 30 % too stiff."""
+    data = changed(
+        mesh__size=[80.0, 1.0], mesh__cells=[240, 3], mesh__parts__loaded=None, **SOFT,
+        load__0={"on": "right", "traction": [0.0, -1e-6]}, contact__gap=10.0,
+    )  # fmt: skip
+    data["material"]["poisson"] = 0.3
+    solution = solve(parse_case(data))
+    assert solution.error.relative > 0.3
+    assert any("slender parts bend" in text for text in solution.warnings)
+
+
+def test_check_says_which_materials_lock():
+    for poisson, degree, warns in ((0.3, 1, False), (0.49, 1, True), (0.49, 2, False)):
+        data = changed(**SOFT)
+        data["material"]["poisson"], data["space"]["degree"] = poisson, degree
+        lines = expectations(build_problem(parse_case(data)))
+        assert any("Poisson's ratio 0.49" in line for line in lines) == warns
