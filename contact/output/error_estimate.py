@@ -23,9 +23,9 @@ from ufl.core.expr import Expr
 
 from contact.body.description import Material
 from contact.body.equilibrium import BodyEquilibrium
-from contact.body.recovery import Recovery, barycentric
 from contact.mesh.together import members, part
 from contact.output.fields import Point, nodal_function
+from contact.output.recovery import Recovery, barycentric
 from contact.problem.problem import ContactProblem
 from contact.problem.state import State
 from contact.typing import Array
