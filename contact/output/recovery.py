@@ -2,7 +2,8 @@
 
 At each vertex a polynomial is fitted to the values in the cells around it (Zienkiewicz and Zhu,
 IJNME 33, 1992); in a cell those of its vertices are blended by its barycentric coordinates
-(Blacker and Belytschko, IJNME 37, 1994). Constant polynomials are nodal means.
+(Blacker and Belytschko, IJNME 37, 1994), those of vertices with more cells around them counting
+more: at the boundary few cells determine them. Constant polynomials are nodal means.
 """
 
 from __future__ import annotations
@@ -86,7 +87,12 @@ class Recovery:
         basis = powers(here[:, None] - corners[:, :, None], self._degree)
         coefficients = self._fitted(basis, values)[self._vertices]
         there = powers((at @ corners)[:, None] - corners[:, :, None], self._degree)
-        return np.asarray(np.einsum("qv,cvqm,cvmk->cqk", at, there, coefficients, optimize=True))
+        # A mean is determined by any number of cells.
+        trust = self._around[self._vertices][:, None] ** (3 if self._degree > 0 else 0)
+        blend = at * trust / (at @ trust.swapaxes(1, 2))
+        return np.asarray(
+            np.einsum("cqv,cvqm,cvmk->cqk", blend, there, coefficients, optimize=True)
+        )
 
     def _fitted(self, basis: Array, values: Array) -> Array:
         """Return the coefficients at local vertices, shape (vertices, monomials, components)."""
@@ -96,6 +102,8 @@ class Recovery:
         both = np.concatenate([matrix, right], axis=3)
         sums = self._summed(both.reshape(*both.shape[:2], -1)).reshape(-1, *both.shape[2:])
         matrix, right = sums[..., :count], sums[..., count:]
+        #: Numbers of points around each vertex.
+        self._around = matrix[:, 0, 0]
         size = np.sqrt(np.einsum("vmm->vm", matrix))
         size[size == 0] = 1.0  # around the vertex none of the cells
         degrees = [0] * 1 + [1] * self._domain.dim + [2] * count
