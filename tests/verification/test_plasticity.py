@@ -5,7 +5,13 @@ import pytest
 
 from contact import solve
 from forms.j2 import Tabulated, Voce
-from tests.problems.plasticity import homogeneous, homogeneous_values, integrated, path
+from tests.problems.plasticity import (
+    hollow_sphere,
+    homogeneous,
+    homogeneous_values,
+    integrated,
+    path,
+)
 
 YOUNG, YIELD = 1.0, 0.004
 #: Hardening -> the keys of the case; then the function and the terms for the integration.
@@ -128,3 +134,31 @@ def test_uniaxial_cycle(kind, keys, known):
     up = 2 if kind == "uniaxial" else 1
     for step, expected in enumerate(known):
         assert found(solution, step)[0][up, up] == pytest.approx(expected, abs=1e-6)
+
+
+#: Hill's solution: after the pressure, and unloaded; none where the table has none.
+SPHERES = {
+    "c 1.415": (
+        (1.0, 0.004, 0.0045),
+        [
+            [0.0061359479, 0.0019839870, np.nan, np.nan],
+            [0.0025359479, 0.0006339870, -0.0037142857, 0.00045284784],
+        ],
+    ),
+    "c 1.25": (
+        (200e3, 250.0, 237.548338),
+        [
+            [1.2338877e-3, 4.2724609e-4, np.nan, np.nan],
+            [2.8369435e-4, np.nan, -157.225723, np.nan],
+        ],
+    ),
+}
+
+
+@pytest.mark.parametrize("name", list(SPHERES))
+def test_hollow_sphere_under_pressure_and_unloaded(name):
+    """Within .2 %, of second order: straight edges follow the sphere no better."""
+    given, known = SPHERES[name]
+    errors = [np.abs(hollow_sphere(cells, 2, *given) / np.array(known) - 1) for cells in (16, 32)]
+    assert np.nanmax(errors[1]) < 2e-3
+    assert np.nanmin((errors[0] / errors[1])[:, 0]) > 3.3
