@@ -97,9 +97,7 @@ def estimated(problem: ContactProblem, state: State) -> Estimate:
     return Estimate(squares, float(contact), float(energy), float(total), ratio)
 
 
-def _of_material(
-    body: BodyEquilibrium, index: int, x: Array, secant: Array
-) -> tuple[Array, Array]:
+def _of_material(body: BodyEquilibrium, index: int, x: Array, secant: Array) -> tuple[Array, Array]:
     """Return eta_K^2 in the cells of a material; its energy, that times k/g, and where k/g is."""
     material, cells, d = body.body.materials[index], body.cells[index], body.dim
     cell = basix.CellType.triangle if d == 2 else basix.CellType.tetrahedron

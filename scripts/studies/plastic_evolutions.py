@@ -97,7 +97,8 @@ def main(first: int = 0, last: int = 60) -> None:
         words = " | ".join(map(str, about.values()))
         more = f" ({steps - STAGES * STEPS} more)" if steps > STAGES * STEPS else ""
         end = f"{balance(solution):.1e}" if solution.converged else solution.outcome.reason
-        print(f"| {number} | {words} | {steps}{more} | {iterations / steps:.1f} | {end} |", flush=True)
+        row = f"| {number} | {words} | {steps}{more} | {iterations / steps:.1f} | {end} |"
+        print(row, flush=True)
     print(f"\n{last - first - failed} of {last - first} converge")
 
 
