@@ -216,7 +216,7 @@ def solve(
             solution = run_schedule(problem, settings, monitor, schedule)
     solution.title, solution.output, solution.units = case.title, case.output, case.case.units
     if not replacements:
-        solution.case = to_toml(case)
+        solution.case, solution.source = to_toml(case), case
     solution.seconds["setup"] += time.perf_counter() - clock - sum(solution.seconds.values())
     return _uninterrupted(solution)
 

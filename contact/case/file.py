@@ -252,8 +252,8 @@ def load_case(
         raise InputError(f"{path}: not a TOML file: {clipped(str(error), 200)}") from None
     if isinstance(overrides, Mapping):
         overrides = [f"{key}={value}" for key, value in overrides.items()]
-    for override in overrides:
-        _override(data, override, str(path))
+    for given in overrides:
+        override(data, given, str(path))
     return parse_case(data, path.parent if folder is None else folder, str(path), without)
 
 
@@ -318,7 +318,7 @@ def _stand_ins(
     return made, filled
 
 
-def _override(data: dict[str, Any], text: str, source: str) -> None:
+def override(data: dict[str, Any], text: str, source: str) -> None:
     """Set a value of a case, ``"path.to.key=value"``, in its tables."""
     path, equals, given = text.partition("=")
     if not equals or not path.strip():

@@ -5,10 +5,12 @@ from __future__ import annotations
 import json
 import os
 import re
+import tomllib
 from collections.abc import Iterator, Mapping
 from typing import Any
 
-from contact.case.file import Case
+from contact.case.file import Case, override, parse_case
+from contact.errors import InputError
 
 _BARE = re.compile(r"[A-Za-z0-9_-]+")
 
@@ -29,6 +31,35 @@ def to_toml(case: Case, dimension: int | None = None, anchored: bool = False) ->
     context = {"path": os.path.abspath} if anchored else None
     data = case.model_dump(by_alias=True, exclude_none=True, exclude=ignored, context=context)
     return "\n".join(_table(data, ())).strip() + "\n"
+
+
+def number_at(case: Case, key: str) -> float:
+    """Return the number at a key of a case, ``load.0.traction.1``.
+
+    Raises
+    ------
+    InputError
+        If there is none.
+    """
+    place: Any = tomllib.loads(to_toml(case))
+    for name in key.split("."):
+        if isinstance(place, list) and name.isdigit() and int(name) < len(place):
+            place = place[int(name)]
+        else:
+            place = place.get(name) if isinstance(place, Mapping) else None
+    if isinstance(place, bool) or not isinstance(place, int | float):
+        words = "nothing" if place is None else f"{place!r}"
+        raise InputError(
+            f"{case.source}: {key}: {words} stands there; accepted: a key with a number"
+        )
+    return float(place)
+
+
+def with_number(case: Case, key: str, value: float) -> Case:
+    """Return a case with another number at a key; see `number_at`."""
+    data = tomllib.loads(to_toml(case, anchored=True))
+    override(data, f"{key}={value!r}", case.source)
+    return parse_case(data, ".", case.source)
 
 
 def _table(table: Mapping[str, Any], path: tuple[str, ...]) -> Iterator[str]:

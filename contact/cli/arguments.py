@@ -37,7 +37,7 @@ COMMON: dict[str, Any] = {
 }
 
 #: Names of arguments that are no options.
-POSITIONAL = ("command", "case", "folder", "name", "mesh")
+POSITIONAL = ("command", "case", "folder", "name", "mesh", "data", "keys")
 
 #: The one positional argument of a command, where that is no case file.
 ONE = {
@@ -91,7 +91,7 @@ def _parser() -> Parser:
         "--version", action="version", version=f"contact {__version__}", help="show the version"
     )
     commands = parser.add_subparsers(
-        dest="command", required=True, metavar="new|check|solve|sweep|plot|materials"
+        dest="command", required=True, metavar="new|check|solve|sweep|plot|identify|materials"
     )
     for usage, text, epilog, arguments in _commands():
         command = commands.add_parser(
@@ -204,6 +204,20 @@ def _commands() -> Iterator[tuple[str, str, str | None, dict[str, dict[str, Any]
             "--animate": _flag(
                 "draw animation-FIELD.gif instead, the deformed body over the steps of an evolution"
             ),
+        },
+    )
+    yield (
+        "identify CASE.toml DATA.csv --for KEY,... [options]",
+        "find the parameters with which a case fits measured columns of steps.csv best",
+        None,
+        {
+            "case": case,
+            "data": _value("DATA.csv", "measurements: t, and columns of steps.csv"),
+            "--for": _value("KEY,...", "keys of the case whose numbers are sought", dest="keys"),
+            "--bound": _values("KEY=A:B", "least and largest value of a parameter"),
+            "--set": replaced,
+            "--plot": _value("FILE", "draw fit and residuals into a new file"),
+            "--quiet": shown["--quiet"],
         },
     )
     yield (

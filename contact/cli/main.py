@@ -43,6 +43,7 @@ COMMANDS = {
     "solve": "contact.cli.solve",
     "sweep": "contact.cli.solve",
     "plot": "contact.cli.plot",
+    "identify": "contact.cli.identify",
     "materials": "contact.cli.materials",
 }
 
@@ -98,7 +99,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
                 # PETSc would call it a crash that a reader, such as head, has seen enough.
                 signal.signal(signal.SIGPIPE, signal.SIG_IGN)
                 command = import_module(COMMANDS[options.command])
-                if options.command in ("check", "solve", "sweep"):
+                if options.command in ("check", "solve", "sweep", "identify"):
                     on_root(comm, _check_cache)
             status = int(command.run(options, comm))
             sys.stdout.flush()  # it has been read: else it is a broken pipe

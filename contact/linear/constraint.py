@@ -356,7 +356,7 @@ class ConstrainedOperator:
             if self._behind:
                 first, *responses = self._inner.solve_all(np.column_stack([own, columns])).T
                 self._responses, self._behind = np.column_stack(responses), False
-                self._condense(columns)
+                self._inverse = self._condensed(columns, self._responses)
             else:
                 first = self._inner.solve(own)
             moved = self._inverse @ (forces - self._on_q(columns, first))
@@ -381,12 +381,30 @@ class ConstrainedOperator:
         on_q = self._on_q(bulk.columns, own) + bulk.corner @ q
         return self._constraint.forces(np.concatenate([forces, on_q]))
 
-    def _condense(self, columns: Array) -> None:
-        """Find the inverse of the stiffness against q, given the columns' responses. Collective."""
+    def solve_transposed(self, rhs: Array) -> Array:
+        """Solve with the transposed operator; see `SparseOperator.solve_transposed`. Collective."""
+        constraint, free = self._constraint, self._free
+        restricted = constraint.restrict(rhs)
+        own, forces = restricted[: self._owned], restricted[self._owned :][free]
+        columns = self._bulk.columns[:, free]
+        first = self._inner.solve_transposed(own)
+        responses = np.zeros_like(columns)
+        for k, column in enumerate(columns.T):
+            responses[:, k] = self._inner.solve_transposed(column)
+        moved = self._condensed(columns, responses) @ (forces - self._on_q(columns, first))
+        q = np.zeros(constraint.free.size)
+        q[free] = moved
+        return constraint.expand(np.concatenate([first - responses @ moved, q]))
+
+    def _condensed(self, columns: Array, responses: Array) -> Array:
+        """Return the inverse of the stiffness against q, given the columns' responses.
+
+        Collective.
+        """
         corner = self._bulk.corner[np.ix_(self._free, self._free)]
-        left, size, right = np.linalg.svd(corner - self._on_q(columns, self._responses))
+        left, size, right = np.linalg.svd(corner - self._on_q(columns, responses))
         resists = size > NOTHING * np.abs(corner).max(initial=0.0)
-        self._inverse = (right[resists].T / size[resists]) @ left[:, resists].T
+        return (right[resists].T / size[resists]) @ left[:, resists].T
 
     def _on_q(self, columns: Array, values: Array) -> Array:
         """Return columns^T times values, summed over the ranks. Collective."""

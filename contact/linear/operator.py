@@ -245,6 +245,14 @@ class SparseOperator:
         # An iterative solver leaves fixed unknowns to its tolerance.
         return self.layout.mask(self._solution.array)
 
+    def solve_transposed(self, rhs: Array) -> Array:
+        """Solve with the transposed matrix; see `solve`. Collective."""
+        self._rhs.array[:] = self.layout.mask(rhs)
+        self.ksp.setInitialGuessNonzero(False)
+        self.ksp.solveTranspose(self._rhs, self._solution)
+        self._solved(self.ksp.getIterationNumber(), self._rhs.norm(), self._solution.norm())
+        return self.layout.mask(self._solution.array)
+
     def _refine(self) -> int:
         """Correct a solution that leaves too much; return the iterations that took. Collective."""
         taken = 0

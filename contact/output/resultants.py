@@ -105,6 +105,23 @@ def _reactions(
     return found
 
 
+def reaction_masks(
+    problem: ContactProblem, electric: bool
+) -> dict[str, tuple[NDArray[np.int32], Array]]:
+    """Return where the residuals are reactions of a support, or charges of an electrode, by part.
+
+    Collective.
+
+    Returns
+    -------
+    Part -> its nodes, and 1 at their held components, shape (n, d) or (n, 1).
+    """
+    d, fixed = problem.dim, problem.body.fixed
+    ones = np.ones((problem.equilibrium.unsupported.shape[0], 1 if electric else d))
+    held = [(f.potential,) if electric else f.displacement or (None,) * d for f in fixed]
+    return _reactions(problem, ones, held, slice(d, None) if electric else slice(d))
+
+
 def nodes_of(problem: ContactProblem, part: str) -> NDArray[np.int32]:
     """Return the owned nodes of a part of the boundary."""
     body = problem.equilibrium

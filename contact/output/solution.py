@@ -37,6 +37,7 @@ from contact.problem.state import State
 from contact.typing import Array
 
 if TYPE_CHECKING:
+    from contact.case.file import Case
     from contact.output.figures.figures import Gallery
     from contact.output.figures.run import Run
 
@@ -112,6 +113,8 @@ class Solution(Solved):
         infinity for none (`contact.output.uniqueness`).
     case
         The case as `contact check` prints it, empty where there is none.
+    source
+        The case itself; None of a problem that was built in Python, or with objects in its places.
     energies, driven
         Of a step: its energies, and displacement and force of the part that is moved or loaded.
     output
@@ -138,6 +141,7 @@ class Solution(Solved):
     start: str = "zero slip"
     critical_factor: float = np.inf
     case: str = ""
+    source: Case | None = None
     energies: Balance | None = None
     driven: tuple[Array, Array] | None = None
     title: str = ""

@@ -1,0 +1,274 @@
+"""Parameters from measurements: least squares on the columns of ``steps.csv``.
+
+The derivatives are those of `contact.derivatives`, so that an evaluation costs one run and a few
+back-substitutions a step, however many parameters there are.
+
+References
+----------
+Nocedal and Wright, Numerical Optimization, 2nd ed. (2006), chapter 10; Bates and Watts, Nonlinear
+Regression Analysis and Its Applications (1988), for the intervals.
+"""
+
+from __future__ import annotations
+
+import csv
+import logging
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from mpi4py import MPI
+from numpy.typing import ArrayLike
+from scipy.optimize import least_squares
+from scipy.stats import t as student
+
+from contact.arguments import expect
+from contact.case.file import Case
+from contact.case.text import number_at, with_number
+from contact.derivatives import sensitivity
+from contact.errors import InputError
+from contact.methods.report import Monitor
+from contact.output.solution import Solution
+from contact.solving import solve
+from contact.typing import Array
+
+logger = logging.getLogger("contact.identify")
+
+#: The column with the times of a measurement.
+TIME = "t"
+
+#: Changes of the parameters, and of the misfit, over themselves at which the search ends.
+ENOUGH = 1e-10
+
+
+@dataclass(frozen=True)
+class Identified:
+    """Parameters that fit measurements best.
+
+    Attributes
+    ----------
+    parameters
+        Key -> value.
+    intervals
+        Key -> the bounds of its interval, with the probability `level`.
+    level
+        0.95 by default.
+    covariance, correlation
+        Of the parameters in this order, shape (k, k), from the derivatives at the solution and the
+        scatter that is left.
+    fits
+        Of each measurement: column -> its values in the model at the measured times.
+    misfit
+        Root mean square of the residuals, each over the largest value of its column.
+    solutions
+        The run of each case with these parameters.
+    evaluations
+        Runs that the search took.
+    """
+
+    parameters: dict[str, float]
+    intervals: dict[str, tuple[float, float]]
+    level: float
+    covariance: Array
+    correlation: Array
+    fits: tuple[dict[str, Array], ...]
+    misfit: float
+    solutions: tuple[Solution, ...]
+    evaluations: int
+
+
+def identify(
+    case: Case | Sequence[Case],
+    data: Mapping[str, ArrayLike] | Sequence[Mapping[str, ArrayLike]],
+    parameters: Sequence[str],
+    bounds: Mapping[str, tuple[float, float]] | None = None,
+    level: float = 0.95,
+    monitor: Monitor | None = None,
+    comm: MPI.Intracomm = MPI.COMM_WORLD,
+) -> Identified:
+    """Return the parameters of a case with which it fits measurements best. Collective.
+
+    Parameters
+    ----------
+    case
+        A case with [evolution], or several that share the parameters. Its own numbers are the
+        initial guess.
+    data
+        Measurements: column of ``steps.csv`` -> values, with the times ``t``, which lie within
+        those of the case. Several cases have one each. Between the ends of steps the model is
+        linear.
+    parameters
+        Keys of the case with a number, ``friction.mu``, in all cases.
+    bounds
+        Key -> least and largest value; none by default.
+    level
+        Probability of the intervals.
+    monitor
+        Called after every outer iteration of a run.
+    comm
+        Communicator of the meshes.
+
+    Raises
+    ------
+    InputError
+        If a key, a column or a time does not fit, there are fewer measurements than parameters, or
+        a run does not converge.
+
+    Examples
+    --------
+    >>> found = identify(case, read_data("loop.csv"), ["friction.mu"])  # doctest: +SKIP
+    >>> found.intervals["friction.mu"]  # doctest: +SKIP
+    (0.297, 0.303)
+    """
+    cases = [case] if isinstance(case, Case) else list(case)
+    given = [data] if isinstance(data, Mapping) else list(data)
+    expect("data", len(given), f"{len(cases)}, one a case", len(given) == len(cases))
+    expect("parameters", parameters, "one key or more", len(parameters) > 0)
+    models = [_Model(*pair, comm, monitor) for pair in zip(cases, given, strict=True)]
+    first = np.array([number_at(cases[0], key) for key in parameters])
+    limits = [(bounds or {}).get(key, (-np.inf, np.inf)) for key in parameters]
+    count = sum(model.count for model in models)
+    enough = f"more than {len(parameters)}, the number of parameters"
+    expect("data", f"{count} values", enough, count > len(parameters))
+
+    def residuals(values: Array) -> Array:
+        runs = [model.run(dict(zip(parameters, values, strict=True))) for model in models]
+        return np.concatenate(runs)
+
+    def jacobian(values: Array) -> Array:
+        return np.concatenate([model.jacobian(parameters) for model in models])
+
+    scale = np.where(first == 0, 1.0, np.abs(first))
+    found = least_squares(
+        residuals,
+        first,
+        jac=jacobian,
+        bounds=tuple(np.transpose(limits)),
+        x_scale=scale,
+        ftol=ENOUGH,
+        xtol=ENOUGH,
+        gtol=ENOUGH,
+    )
+    left = residuals(found.x)  # the last trial may have been another
+    slopes = jacobian(found.x)
+    freedom = left.size - found.x.size
+    covariance = np.linalg.pinv(slopes.T @ slopes) * (left @ left / freedom)
+    deviation = np.sqrt(np.diag(covariance))
+    half = student.ppf(0.5 * (1 + level), freedom) * deviation
+    size = np.where(deviation > 0, deviation, 1.0)
+    return Identified(
+        dict(zip(parameters, found.x.tolist(), strict=True)),
+        {
+            key: (float(value - way), float(value + way))
+            for key, value, way in zip(parameters, found.x, half, strict=True)
+        },
+        level,
+        covariance,
+        covariance / np.outer(size, size),
+        tuple(model.fit for model in models),
+        float(np.sqrt(np.mean(left**2))),
+        tuple(model.solution for model in models),
+        found.nfev,
+    )
+
+
+class _Model:
+    """A case beside a measurement."""
+
+    solution: Solution
+    fit: dict[str, Array]
+
+    def __init__(
+        self,
+        case: Case,
+        data: Mapping[str, ArrayLike],
+        comm: MPI.Intracomm,
+        monitor: Monitor | None,
+    ) -> None:
+        self._case, self._comm, self._monitor = case, comm, monitor
+        if case.evolution is None:
+            raise InputError(f"{case.source}: evolution: missing; accepted: a case with load steps")
+        arrays = {name: np.asarray(values, dtype=float) for name, values in data.items()}
+        if TIME not in arrays or len(arrays) < 2:
+            raise InputError(
+                f"data: columns {', '.join(arrays)}; accepted: t and columns of steps.csv"
+            )
+        self._time = arrays.pop(TIME)
+        self._measured = arrays
+        for name, values in arrays.items():
+            fits = values.shape == self._time.shape and bool(np.all(np.isfinite(values)))
+            expect(f"data: {name}", values, f"{self._time.size} finite numbers, as of t", fits)
+        begin, end = case.evolution.times[0], case.evolution.times[-1]
+        inside = bool(np.all((self._time >= begin) & (self._time <= end)))
+        expect("data: t", self._time, f"times between {begin:g} and {end:g}", inside)
+        self._scale = {name: np.abs(v).max() or 1.0 for name, v in arrays.items()}
+
+    @property
+    def count(self) -> int:
+        """Number of measured values."""
+        return self._time.size * len(self._measured)
+
+    def run(self, values: Mapping[str, float]) -> Array:
+        """Solve the case with values of the parameters; return the scaled residuals."""
+        case = self._case
+        for key, value in values.items():
+            case = with_number(case, key, float(value))
+        self.solution = solve(case, monitor=self._monitor, comm=self._comm)
+        shown = ", ".join(f"{key} = {value:g}" for key, value in values.items())
+        if not self.solution.converged:
+            raise InputError(
+                f"{shown}: {self.solution.outcome.reason}; accepted: bounds that leave it out"
+            )
+        rows = [record.row for record in self.solution.steps]
+        known = ", ".join(rows[0])
+        for name in self._measured:
+            expect("data", name, f"columns of steps.csv: {known}", name in rows[0])
+        self.fit = {name: self._at([row[name] for row in rows]) for name in self._measured}
+        left = [
+            (self.fit[name] - measured) / self._scale[name]
+            for name, measured in self._measured.items()
+        ]
+        misfit = float(np.sqrt(np.mean(np.square(left))))
+        logger.info("%s: misfit %.3g of the largest values", shown, misfit)
+        return np.concatenate(left)
+
+    def jacobian(self, keys: Sequence[str]) -> Array:
+        """Return the derivatives of the residuals of the last run."""
+        found = sensitivity(self.solution, [*self._measured], keys, "tangent").steps
+        return np.concatenate(
+            [
+                np.column_stack([self._at(found[name][key]) / self._scale[name] for key in keys])
+                for name in self._measured
+            ]
+        )
+
+    def _at(self, values: ArrayLike) -> Array:
+        """Return values at the ends of steps at the measured times, from 0 at the beginning."""
+        assert self._case.evolution is not None
+        begin = self._case.evolution.times[0]
+        ends = [record.state.time for record in self.solution.steps]
+        course = np.concatenate([[0.0], np.asarray(values, dtype=float)])
+        return np.interp(self._time, [begin, *ends], course)
+
+
+def read_data(path: str | Path) -> dict[str, Array]:
+    """Read measurements from a CSV file with a row of names.
+
+    Raises
+    ------
+    InputError
+        If it is none.
+    """
+    path = Path(path)
+    try:
+        with path.open(newline="", encoding="utf-8-sig") as file:
+            names, *rows = [row for row in csv.reader(file) if row]
+        values = np.array([[float(value) for value in row] for row in rows]).reshape(-1, len(names))
+    except OSError as error:
+        raise InputError(f"{path}: {error.strerror}; accepted: a CSV file") from None
+    except ValueError as error:
+        raise InputError(
+            f"{path}: {error}; accepted: a row of names, then rows of numbers"
+        ) from None
+    return {name.strip(): column for name, column in zip(names, values.T, strict=True)}

@@ -1,0 +1,282 @@
+"""Named results of a state with their derivatives by unknowns and contact forces."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import Protocol, runtime_checkable
+
+import numpy as np
+from mpi4py import MPI
+
+from contact.body.rigid import Electrode
+from contact.output.resultants import reaction_masks
+from contact.problem.kkt import residual_forces
+from contact.problem.problem import ContactProblem
+from contact.problem.state import State
+from contact.typing import Array
+
+AXES = "xyz"
+
+
+class Quantity(Protocol):
+    """A result as a function of problem and state; any callable is one."""
+
+    def __call__(self, problem: ContactProblem, state: State) -> float:
+        """Return the value. Collective."""
+
+
+@runtime_checkable
+class Differentiable(Quantity, Protocol):
+    """A result that knows its derivatives, which the adjoint asks for."""
+
+    def gradient(self, problem: ContactProblem, state: State) -> tuple[Array, Array]:
+        """Return them by the owned unknowns, and by the forces at the nodes, shape (n, d).
+
+        Collective.
+        """
+
+
+#: Relative change of the unknowns in the central difference of internal forces.
+STEP = 1e-6
+
+
+@dataclass(frozen=True)
+class ContactForce:
+    """A component of the force of the body on the foundations, as ``contact_force_x``."""
+
+    axis: int
+
+    def __call__(self, problem: ContactProblem, state: State) -> float:
+        """Return it. Collective."""
+        nodes = problem.nodes
+        stress = problem.interface.stress(problem.nodal(state), state.forces)
+        return self._turn(problem) * nodes.sum(stress[:, self.axis])
+
+    def _turn(self, problem: ContactProblem) -> float:
+        """Return how much of a force per radian there is: the full turn of a ring."""
+        unit = np.eye(problem.dim)[self.axis]
+        return float(problem.domain.resultant(unit)[self.axis])
+
+    def gradient(self, problem: ContactProblem, state: State) -> tuple[Array, Array]:
+        """Return the derivatives. Collective."""
+        jump, turn = problem.nodes, self._turn(problem)
+        by_force = np.zeros_like(jump.normal)
+        by_force[:, self.axis] = turn * jump.weight
+        layer = problem.interface.law.layer_gradient(problem.nodal(state))
+        by_x = np.zeros_like(problem.equilibrium.owned_part(state.x))
+        jump.transpose((turn * jump.weight * jump.normal[:, self.axis])[:, None] * layer, by_x)
+        return by_x, by_force
+
+
+@dataclass(frozen=True)
+class MaxPressure:
+    """The largest contact pressure; its derivative is that at the node."""
+
+    def __call__(self, problem: ContactProblem, state: State) -> float:
+        """Return it. Collective."""
+        pressure = problem.interface.pressure(problem.nodal(state), state.forces)
+        return problem.nodes.maximum(pressure)
+
+    def gradient(self, problem: ContactProblem, state: State) -> tuple[Array, Array]:
+        """Return the derivatives. Collective."""
+        jump, nodal = problem.nodes, problem.nodal(state)
+        at = _largest(problem, problem.interface.pressure(nodal, state.forces))
+        layer = problem.interface.law.layer_gradient(nodal)
+        by_x = np.zeros_like(problem.equilibrium.owned_part(state.x))
+        jump.transpose(at[:, None] * layer, by_x)
+        return by_x, at[:, None] * jump.normal
+
+
+@dataclass(frozen=True)
+class MaxDisplacement:
+    """The largest norm of the displacement over the nodes."""
+
+    def __call__(self, problem: ContactProblem, state: State) -> float:
+        """Return it. Collective."""
+        own = np.linalg.norm(self._nodal(problem, state), axis=1).max(initial=0.0)
+        return float(problem.comm.allreduce(float(own), op=MPI.MAX))
+
+    @staticmethod
+    def _nodal(problem: ContactProblem, state: State) -> Array:
+        body = problem.equilibrium
+        return body.nodal(body.owned_part(state.x))[:, : problem.dim]
+
+    def gradient(self, problem: ContactProblem, state: State) -> tuple[Array, Array]:
+        """Return the derivatives. Collective."""
+        body, u = problem.equilibrium, self._nodal(problem, state)
+        length = np.linalg.norm(u, axis=1)
+        at = _largest(problem, length) / np.maximum(length, np.finfo(float).tiny)
+        by_x = np.zeros_like(body.owned_part(state.x))
+        body.nodal(by_x)[:, : problem.dim] = at[:, None] * u
+        return by_x, np.zeros_like(problem.nodes.normal)
+
+
+@dataclass(frozen=True)
+class Reaction:
+    """A weighted sum of residual forces: of a support, an electrode, or a rigid foundation.
+
+    Attributes
+    ----------
+    weights
+        Returns those of the residual of a problem, on the owned unknowns and the global ones.
+    """
+
+    weights: Callable[[ContactProblem], Array]
+
+    def __call__(self, problem: ContactProblem, state: State) -> float:
+        """Return it. Collective."""
+        residual = residual_forces(problem, state)
+        return problem.equilibrium.product(self.weights(problem), residual)
+
+    def gradient(self, problem: ContactProblem, state: State) -> tuple[Array, Array]:
+        """Return the derivatives: those of the residual are symmetric in the body. Collective."""
+        body, interface, jump = problem.equilibrium, problem.interface, problem.nodes
+        weights = self.weights(problem)
+        size = body.norm(weights)
+        along = weights * (
+            STEP * max(body.norm(body.owned_part(state.x)), STEP) / max(size, 1e-300)
+        )
+        ways = [replace(state, x=body.moved(state.x, sign * along)) for sign in (1, -1)]
+        ahead, back = (body.internal_forces(way) for way in ways)
+        by_x = (ahead - back) * (size / (2 * max(body.norm(along), 1e-300)))
+        seen = jump.apply(body.local(weights))
+        by_force = jump.weight[:, None] * seen[:, : jump.dim]
+        for law, nodal, pressure in interface.acting(state.x, state.forces):
+            block = law.block(nodal, pressure, full=law is interface.law)
+            there = law.jump.apply(body.local(weights))
+            law.jump.transpose(
+                law.jump.weight[:, None] * np.einsum("nji,nj->ni", block, there), by_x
+            )
+        return by_x, by_force
+
+
+@dataclass(frozen=True)
+class GlobalUnknown:
+    """A motion of a rigid foundation, or the potential of an electrode.
+
+    Attributes
+    ----------
+    member, component
+        Which of the global unknowns it is.
+    unit
+        In which unit, of that of the unknowns: degrees.
+    """
+
+    member: int
+    component: int
+    unit: float = 1.0
+
+    def _place(self, problem: ContactProblem) -> tuple[int, float]:
+        member = problem.equilibrium.global_unknowns.members[self.member]
+        return member.begin + self.component, float(member.units[self.component]) * self.unit
+
+    def __call__(self, problem: ContactProblem, state: State) -> float:
+        """Return it."""
+        at, unit = self._place(problem)
+        return float(problem.equilibrium.motion(state.x)[at] * unit)
+
+    def gradient(self, problem: ContactProblem, state: State) -> tuple[Array, Array]:
+        """Return the derivatives."""
+        body, (at, unit) = problem.equilibrium, self._place(problem)
+        by_x = np.zeros_like(body.owned_part(state.x))
+        body.motion(by_x)[at] = unit
+        return by_x, np.zeros_like(problem.nodes.normal)
+
+
+@dataclass(frozen=True)
+class FoundationCharge:
+    """The charge that passes through the contact nodes."""
+
+    def __call__(self, problem: ContactProblem, state: State) -> float:
+        """Return it. Collective."""
+        found = 0.0
+        for law, nodal, pressure in problem.interface.acting(state.x, state.forces):
+            found += law.jump.sum(law.charge(nodal, pressure))
+        return found
+
+    def gradient(self, problem: ContactProblem, state: State) -> tuple[Array, Array]:
+        """Return the derivatives. Collective."""
+        by_x = np.zeros_like(problem.equilibrium.owned_part(state.x))
+        for law, nodal, pressure in problem.interface.acting(state.x, state.forces):
+            full = law is problem.interface.law
+            slope = -law.current_block(nodal, pressure, full)[:, -1] / law.phi_scale
+            law.jump.transpose(law.jump.weight[:, None] * slope, by_x)
+        return by_x, np.zeros_like(problem.nodes.normal)
+
+
+def _largest(problem: ContactProblem, values: Array) -> Array:
+    """Return 1 at the first of the largest values of all ranks, 0 elsewhere. Collective."""
+    comm, at = problem.comm, np.zeros_like(values)
+    own = float(values.max(initial=-np.inf))
+    _, rank = comm.allreduce((own, -comm.rank), op=MPI.MAX)
+    if comm.rank == -rank and values.size:
+        at[np.argmax(values)] = 1.0
+    return at
+
+
+def named_quantities(problem: ContactProblem) -> dict[str, Differentiable]:
+    """Return the results of a problem that have derivatives, by name. Collective.
+
+    The names are those of ``steps.csv``, and ``reactions.PART.x`` of the summary.
+    """
+    axes, body = AXES[: problem.dim], problem.equilibrium
+    found: dict[str, Differentiable] = {
+        "max_pressure": MaxPressure(),
+        "max_displacement": MaxDisplacement(),
+    }
+    found |= {f"contact_force_{axis}": ContactForce(i) for i, axis in enumerate(axes)}
+    for part in reaction_masks(problem, electric=False):
+        for i, axis in enumerate(axes):
+            found[f"reactions.{part}.{axis}"] = Reaction(partial(_on_support, part=part, axis=i))
+    if problem.piezoelectric:
+        found["charge_foundation"] = FoundationCharge()
+        for part in reaction_masks(problem, electric=True):
+            found[f"charge_{part}"] = Reaction(partial(_on_electrode, part=part))
+    foundations = [member for member in body.global_unknowns.members if member.foundation]
+    for index, member in enumerate(body.global_unknowns.members):
+        part = member.description.on
+        if isinstance(member.description, Electrode):
+            found[f"potential_{part}"] = GlobalUnknown(index, 0)
+            continue
+        end = f"_{part}" if len(foundations) > 1 else ""
+        motions = len(member.description.motion.displacement)
+        turns = [""] if member.free.size == motions + 1 else [f"_{axis}" for axis in axes]
+        names = [f"_{axis}" for axis in axes[:motions]] + [f"_rotation{turn}" for turn in turns]
+        if member.foundation:
+            for i, name in enumerate(names[: member.free.size]):
+                degrees = np.rad2deg(1.0) if i >= motions else 1.0
+                found[f"rigid{name}{end}"] = GlobalUnknown(index, i, degrees)
+                if i < motions:
+                    found[f"rigid_force{name}{end}"] = Reaction(
+                        partial(_on_foundation, index=index, i=i)
+                    )
+    return found
+
+
+def _on_support(problem: ContactProblem, part: str, axis: int) -> Array:
+    """Return the weights of a support's reaction. Collective."""
+    nodes, mask = reaction_masks(problem, electric=False)[part]
+    weights = np.zeros(problem.equilibrium.owned + problem.equilibrium.global_unknowns.size)
+    turn = float(problem.domain.resultant(np.eye(problem.dim)[axis])[axis])
+    problem.equilibrium.nodal(weights)[nodes, axis] = turn * mask[:, axis]
+    return weights
+
+
+def _on_electrode(problem: ContactProblem, part: str) -> Array:
+    """Return the weights of the charge of a prescribed potential. Collective."""
+    nodes, mask = reaction_masks(problem, electric=True)[part]
+    body = problem.equilibrium
+    weights = np.zeros(body.owned + body.global_unknowns.size)
+    body.nodal(weights)[nodes, -1] = mask[:, 0] / body.phi_scale
+    return weights
+
+
+def _on_foundation(problem: ContactProblem, index: int, i: int) -> Array:
+    """Return the weights of the force that holds a moving foundation."""
+    body = problem.equilibrium
+    member = body.global_unknowns.members[index]
+    weights = np.zeros(body.owned + body.global_unknowns.size)
+    body.motion(weights)[member.begin + i] = 1 / member.units[i]
+    return weights

@@ -1,0 +1,292 @@
+"""The equations of a contact problem linearised at a solution, and their transpose.
+
+At a solution whose active set does not change nearby, the unknowns x and the contact forces f of
+the nodes satisfy smooth equations,
+
+    F(x) + J^T W f = 0,     c(J x, f) = 0,
+
+equilibrium and, node by node, one vector condition: f = 0 (open), gap - u_nu = 0 (in contact),
+u_tau = 0 (stick), lambda = s u_tau/|u_tau| (slip). `Linearised` solves with their derivative
+[[K, J^T W], [C_u J, C_f]] and with its transpose. f is condensed node by node, with gamma as in
+Newton's method; the remainder that gamma leaves in c is corrected by further back-substitutions
+with the same factorisation (augmented Lagrangian iterations), and so is the coupling of the nodes
+by a smoothed pressure.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from contact.interface.active_set import ActiveSet
+from contact.interface.complementarity import ComplementarityParameters
+from contact.interface.jump import Multipliers
+from contact.linear import multigrid
+from contact.linear.operator import Counters
+from contact.problem.kkt import residual_forces
+from contact.problem.problem import ContactProblem
+from contact.problem.state import State
+from contact.tolerances import EPS
+from contact.typing import Array
+
+#: Back-substitutions of a solve, at most, and the relative correction after which it ends.
+CORRECTIONS, ENOUGH = 40, 1e-14
+
+#: Share of the largest pressure, or of the stress that the largest displacement costs, within which
+#: a node counts as weakly active.
+WEAK = 1e-6
+
+
+@dataclass(frozen=True)
+class Equations:
+    """The residuals of equilibrium and of the contact conditions, or a change of both.
+
+    Attributes
+    ----------
+    forces
+        On the owned unknowns, global ones behind them.
+    conditions
+        At the contact nodes, shape (n, d).
+    """
+
+    forces: Array
+    conditions: Array
+
+
+def active_set(problem: ContactProblem, state: State) -> ActiveSet:
+    """Return the active set of a solution. Collective."""
+    interface, nodal = problem.interface, problem.nodal(state)
+    found = interface.active_set(nodal, state.forces, interface.bound(nodal, state.forces))
+    if interface.friction.acts:
+        return found
+    return ActiveSet.without_slip(found.closed, False)
+
+
+def equations(problem: ContactProblem, state: State, active: ActiveSet) -> Equations:
+    """Return the residuals of the equations that belong to an active set. Collective."""
+    interface, jump, nodal = problem.interface, problem.nodes, problem.nodal(state)
+    vectors = state.forces.vectors(jump)
+    slip, pressure = interface.slip(nodal), interface.pressure(nodal, state.forces)
+    length = np.linalg.norm(slip, axis=1)
+    bound = interface.friction.bound(pressure, length)
+    along = slip / np.maximum(length, np.finfo(float).tiny)[:, None]
+    friction = jump.tangential_component(vectors)
+    tangential = np.where(
+        active.sticks[:, None], slip, friction - np.where(active.slips, bound, 0.0)[:, None] * along
+    )
+    normal = np.where(active.closed, -interface.opening(nodal), jump.normal_component(vectors))
+    conditions = normal[:, None] * jump.normal + tangential
+    return Equations(residual_forces(problem, state), conditions)
+
+
+def weakly_active(problem: ContactProblem, state: State) -> Array:
+    """Return the points of nodes at the border of two states, shape (n, d). Collective.
+
+    There the solution has one-sided derivatives only: a node in contact without pressure, one that
+    sticks at its friction bound, one that slips by nothing.
+    """
+    interface, nodal, forces = problem.interface, problem.nodal(state), state.forces
+    active, c = active_set(problem, state), interface.stiffness
+    moved = c * np.linalg.norm(nodal[:, : problem.dim], axis=1)
+    small = WEAK * problem.nodes.maximum(np.maximum(interface.pressure(nodal, forces), moved))
+    opening, length = np.abs(interface.opening(nodal)), interface.slip_length(nodal)
+    weak = np.where(active.closed, np.abs(forces.pressure) < small, c * opening < small)
+    if interface.friction.acts:
+        bound = interface.bound(nodal, forces)
+        left = np.abs(bound - np.linalg.norm(forces.friction, axis=1))
+        weak |= active.sticks & active.closed & (left < small) & (bound > 0)
+        weak |= active.slips & (c * length < small)
+    return problem.nodes.gather(problem.nodes.points[weak])
+
+
+class Linearised:
+    """The linearised equations at a solution, factorised once.
+
+    Parameters
+    ----------
+    problem, state
+        The problem, and its solution: of a step of an evolution that of the step.
+    parameters
+        Those of Newton's method; gamma is taken.
+    counters
+        Where the factorisation and the back-substitutions are counted.
+
+    Attributes
+    ----------
+    active
+        The active set of the solution.
+    """
+
+    def __init__(
+        self,
+        problem: ContactProblem,
+        state: State,
+        parameters: ComplementarityParameters,
+        counters: Counters,
+    ) -> None:
+        self.problem, self.state = problem, state
+        self.active = active_set(problem, state)
+        interface, jump, nodal = problem.interface, problem.nodes, problem.nodal(state)
+        self._pressure = interface.pressure(nodal, state.forces)
+        law = interface.law.block(nodal, self._pressure, full=True)
+        self._conditions(nodal)
+        regular = self._by_force.copy()
+        normal = jump.normal[:, :, None] * jump.normal[:, None, :]
+        regular -= np.where(self.active.closed, 1 / parameters.gamma, 0.0)[:, None, None] * normal
+        sticks = np.where(self.active.sticks, 1 / parameters.gamma, 0.0)
+        regular -= sticks[:, None, None] * jump.tangent
+        # Components that supports hold have no condition of their own.
+        fixed = np.eye(jump.dim) - normal - jump.tangent
+        self._regular = np.linalg.inv(regular + fixed)
+        d = jump.dim
+        law[:, :d] -= self._regular @ self._by_jump
+        body = problem.equilibrium
+        kind = "auto" if multigrid.is_large(body.layout) else "lu"
+        self._operator = body.operator(
+            interface.coupled, problem.constraint, symmetric=False, counters=counters, kind=kind
+        )
+        self._operator.update("tangent", state, interface.weighted(law, state.x))
+
+    def _conditions(self, nodal: Array) -> None:
+        """Find the derivatives C_u and C_f, shapes (n, d, block size) and (n, d, d)."""
+        interface, jump, active = self.problem.interface, self.problem.nodes, self.active
+        d, slip = jump.dim, interface.slip(nodal)
+        length = np.linalg.norm(slip, axis=1)
+        size = np.maximum(length, np.finfo(float).tiny)
+        along = slip / size[:, None]
+        normal = jump.normal[:, :, None] * jump.normal[:, None, :]
+        friction, closed = interface.friction, active.closed[:, None, None]
+        bound = friction.bound(self._pressure, length)
+        across = jump.tangent - along[:, :, None] * along[:, None, :]
+        by_slip = friction.by_slip(self._pressure, length)
+        turning = (bound / size)[:, None, None] * across
+        falls = turning + by_slip[:, None, None] * (along[:, :, None] * along[:, None, :])
+        slips, sticks = active.slips[:, None, None], active.sticks[:, None, None]
+        self._along = np.where(active.slips[:, None], along, 0.0)
+        #: Derivative of the bound by the smoothed pressure; the one by the node's own in C_f.
+        self._rate = np.zeros_like(length)
+        if friction.law is not None:
+            total, smooth = friction.history.accumulated + length, friction.smooth(self._pressure)
+            rate = np.asarray(friction.law.by_pressure(total, smooth), dtype=float)
+            self._rate = np.broadcast_to(rate, length.shape) * (smooth > 0)
+        self._layer = interface.law.layer_gradient(nodal)
+        local = self._rate * friction.local
+        self._by_jump = np.zeros((length.size, d, jump.block_size))
+        self._by_jump[:, :, :d] = np.where(closed, normal, 0.0)
+        self._by_jump[:, :, :d] += np.where(sticks, jump.tangent, 0.0) - np.where(slips, falls, 0.0)
+        self._by_jump -= (local[:, None] * self._along)[:, :, None] * self._layer[:, None, :]
+        pressed = (local[:, None] * self._along)[:, :, None] * jump.normal[:, None, :]
+        self._by_force = np.where(closed, 0.0, normal) + np.where(sticks, 0.0, jump.tangent)
+        self._by_force -= pressed
+        #: Derivative of the conditions by the slip alone, and by its length.
+        self.by_slip = np.where(sticks, jump.tangent, 0.0) - np.where(slips, falls, 0.0)
+        self.by_length = -by_slip[:, None] * self._along
+
+    @property
+    def local(self) -> bool:
+        """Whether the conditions of a node depend on the values there alone."""
+        return self.problem.interface.friction.local
+
+    def solve(self, change: Equations) -> tuple[Array, Array]:
+        """Return the changes of the owned unknowns and of f that answer a residual. Collective.
+
+        Parameters
+        ----------
+        change
+            The change of the residuals; that of the solution takes it away.
+        """
+        jump = self.problem.nodes
+        rhs, left = -change.forces, -change.conditions
+        x, f = np.zeros_like(rhs), np.zeros_like(left)
+        size, last = 0.0, np.inf
+        for _ in range(CORRECTIONS):
+            known = np.einsum("nij,nj->ni", self._regular, left)
+            jump.transpose(-jump.weight[:, None] * known, rhs)
+            dx = self._operator.solve(rhs, ENOUGH)
+            moved = jump.apply(self._local(dx))
+            df = known - np.einsum(
+                "nij,nj->ni", self._regular, np.einsum("nij,nj->ni", self._by_jump, moved)
+            )
+            x, f = x + dx, f + df
+            left = left - self._conditions_of(moved, df)
+            rhs = np.zeros_like(rhs)
+            size, taken = max(size, self._norm(x, f)), self._norm(dx, df)
+            # The next correction is as much smaller than this one as this one than the last.
+            if taken >= last or taken**2 <= ENOUGH * size * min(last, size):
+                break
+            last = taken
+        return x, f
+
+    def solve_transposed(self, by_x: Array, by_force: Array) -> tuple[Array, Array]:
+        """Return the adjoint unknowns and conditions of a gradient. Collective.
+
+        Parameters
+        ----------
+        by_x
+            Derivative of a quantity by the owned unknowns.
+        by_force
+            By the contact forces at the nodes, shape (n, d).
+        """
+        jump, weight = self.problem.nodes, self.problem.nodes.weight[:, None]
+        rhs, left = by_x.copy(), by_force
+        x, c = np.zeros_like(rhs), np.zeros_like(left)
+        size, last = 0.0, np.inf
+        for _ in range(CORRECTIONS):
+            known = np.einsum("nji,nj->ni", self._regular, left)
+            jump.transpose(-np.einsum("nji,nj->ni", self._by_jump, known), rhs)
+            dx = self._operator.solve_transposed(rhs)
+            moved = weight * jump.apply(self._local(dx))[:, : jump.dim]
+            dc = known - np.einsum("nji,nj->ni", self._regular, moved)
+            x, c = x + dx, c + dc
+            left = left - moved - np.einsum("nji,nj->ni", self._by_force, dc)
+            rhs = np.zeros_like(rhs)
+            size, taken = max(size, self._norm(x, c)), self._norm(dx, dc)
+            # The next correction is as much smaller than this one as this one than the last.
+            if taken >= last or taken**2 <= ENOUGH * size * min(last, size):
+                break
+            last = taken
+        return x, c
+
+    def by_gap(self, x: Array, conditions: Array) -> Array:
+        """Return the derivatives of a quantity by the gap at each node, shape (n,), given w.
+
+        The gap is met by the normal displacement alone, which it takes its place of.
+
+        Parameters
+        ----------
+        x, conditions
+            The adjoint, as `solve_transposed` returns it.
+        """
+        jump, d = self.problem.nodes, self.problem.dim
+        by_normal = np.einsum("nij,nj->ni", self._by_jump[:, :, :d], jump.normal)
+        found = np.einsum("ni,ni->n", conditions, by_normal)
+        pressed = jump.weight * jump.normal_component(jump.apply(self._local(x)))
+        return found + pressed * np.einsum("ni,ni->n", self._layer[:, :d], jump.normal)
+
+    def _conditions_of(self, moved: Array, f: Array) -> Array:
+        """Return the change of the conditions with jumps and contact forces. Collective."""
+        changed = np.einsum("nij,nj->ni", self._by_jump, moved)
+        changed += np.einsum("nij,nj->ni", self._by_force, f)
+        if self.local:
+            return changed
+        pressure = self.problem.nodes.normal_component(f)
+        pressure = pressure + np.einsum("ni,ni->n", self._layer, moved)
+        bound = self._rate * self.problem.interface.friction.smoothing(pressure)
+        return changed - bound[:, None] * self._along
+
+    def _local(self, owned: Array) -> Array:
+        """Return an increment of owned unknowns with those of the ghosts. Collective."""
+        return self.problem.equilibrium.local(owned)
+
+    def _norm(self, x: Array, nodal: Array) -> float:
+        """Return the norm of owned unknowns, or of nodal values where these are larger."""
+        return self.problem.equilibrium.norm(x) + EPS * self.problem.nodes.norm(nodal)
+
+
+def moved_state(problem: ContactProblem, state: State, x: Array, f: Array) -> State:
+    """Return a state moved by changes of owned unknowns and contact forces. Collective."""
+    jump = problem.nodes
+    vectors = state.forces.vectors(jump) + f
+    forces = Multipliers.of(jump, jump.normal_component(vectors), vectors)
+    return replace(state, x=problem.equilibrium.moved(state.x, x), forces=forces)

@@ -1,0 +1,90 @@
+"""Parameters from synthetic measurements of a block that is pressed, sheared and sheared back."""
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+
+from contact import InputError, identify, parse_case, read_data, solve
+from contact.case.text import number_at, to_toml, with_number
+from contact.cli.main import main
+from scripts.studies.derivatives import FAMILIES, problem
+
+SELF = MPI.COMM_SELF
+COLUMNS = ("contact_force_x", "contact_force_y")
+
+
+def case():
+    return parse_case(problem(FAMILIES.index("evolution"))[1])
+
+
+def measured(noise=0.0, seed=0):
+    """Return t and the columns of a run, with noise relative to the largest value of each."""
+    rows = [record.row for record in solve(case(), comm=SELF).steps]
+    rng, data = np.random.default_rng(seed), {"t": np.array([row["t"] for row in rows])}
+    for name in COLUMNS:
+        values = np.array([row[name] for row in rows])
+        data[name] = values + noise * np.abs(values).max() * rng.standard_normal(values.size)
+    return data
+
+
+def test_exact_measurements_give_the_parameters_back():
+    wrong = with_number(with_number(case(), "friction.mu", 0.4), "material.young", 1.0)
+    right = case()
+    found = identify(wrong, measured(), ["friction.mu", "material.young"], comm=SELF)
+    assert found.parameters["friction.mu"] == pytest.approx(
+        number_at(right, "friction.mu"), rel=1e-6
+    )
+    assert found.parameters["material.young"] == pytest.approx(
+        number_at(right, "material.young"), rel=1e-6
+    )
+    assert found.misfit < 1e-7
+
+
+def test_noise_widens_the_intervals():
+    keys, data = ["friction.mu", "material.young"], measured(noise=0.01)
+    found = identify(case(), data, keys, bounds={"friction.mu": (0, 1)}, level=0.999, comm=SELF)
+    right = {key: number_at(case(), key) for key in keys}
+    for key in keys:
+        least, largest = found.intervals[key]
+        assert least < right[key] < largest
+        assert 1e-3 < (largest - least) / right[key] < 0.3
+    assert found.correlation == pytest.approx(found.correlation.T)
+    assert np.diag(found.correlation) == pytest.approx([1, 1])
+    assert 0.003 < found.misfit < 0.02
+
+
+@pytest.mark.parametrize(
+    ("data", "message"),
+    [
+        ({"contact_force_x": [1.0]}, "data: columns contact_force_x; accepted: t and columns"),
+        ({"t": [1.0, 4.0], "contact_force_x": [1.0, 1.0]}, "data: t: .*times between 0 and 3"),
+        ({"t": [1.0, 2.0], "force": [1.0, 1.0]}, "data: given 'force'; accepted: columns of"),
+        ({"t": [1.0], "contact_force_x": [1.0]}, "data: given '1 values'; accepted: more than 1"),
+        ({"t": [1.0, 2.0], "contact_force_x": [1.0, np.nan]}, "data: contact_force_x: given"),
+    ],
+)
+def test_refused(data, message):
+    with pytest.raises(InputError, match=message):
+        identify(case(), data, ["friction.mu"], comm=SELF)
+
+
+def test_the_command(tmp_path, capsys):
+    data, file = measured(noise=0.005), tmp_path / "loop.csv"
+    rows = np.column_stack([*data.values()])
+    np.savetxt(file, rows, delimiter=",", header=",".join(data), comments="")
+    assert read_data(file).keys() == data.keys()
+    path = tmp_path / "block.toml"
+    path.write_text(to_toml(case()))
+    picture = tmp_path / "fit.png"
+    command = ["identify", str(path), str(file), "--for", "friction.mu", "--plot", str(picture)]
+    assert main([*command, "--quiet"]) == 0
+    text = capsys.readouterr().out
+    assert "friction.mu" in text and "95% interval" in text
+    assert picture.stat().st_size > 10_000
+    assert main(command) == 2
+    assert "fit.png: it exists; accepted: a new file" in capsys.readouterr().err
+    picture.unlink()
+    file.write_text("t,contact_force_x\n1.0,much\n")
+    assert main(command) == 2
+    assert "accepted: a row of names, then rows of numbers" in capsys.readouterr().err
+    assert not picture.exists()
