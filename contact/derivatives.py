@@ -126,7 +126,7 @@ def sensitivity(
         Keys of the case with a number: ``material.young``, ``friction.mu``, ``contact.gap``,
         ``load.0.traction.1``. Or `Parameter` by name, for problems that were built in Python.
     method
-        "tangent", "adjoint", or "auto": what takes fewer back-substitutions.
+        "tangent", "adjoint", or "auto": the one with fewer back-substitutions.
 
     Returns
     -------

@@ -28,7 +28,7 @@ LAYERS = (
     {"methods"},
     {"output"},
     {"case"},
-    {"adapting", "evolving", "nesting", "solving", "sweeping"},
+    {"adapting", "nesting", "solving", "sweeping", "derivatives", "identification"},
     {"cli"},
 )
 

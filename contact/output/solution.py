@@ -37,7 +37,6 @@ from contact.problem.state import State
 from contact.typing import Array
 
 if TYPE_CHECKING:
-    from contact.case.file import Case
     from contact.output.figures.figures import Gallery
     from contact.output.figures.run import Run
 
@@ -141,7 +140,7 @@ class Solution(Solved):
     start: str = "zero slip"
     critical_factor: float = np.inf
     case: str = ""
-    source: Case | None = None
+    source: Any = None
     energies: Balance | None = None
     driven: tuple[Array, Array] | None = None
     title: str = ""

@@ -30,9 +30,6 @@ from contact.problem.state import State
 from contact.tolerances import EPS
 from contact.typing import Array
 
-#: Back-substitutions of a solve, at most, and the relative correction after which it ends.
-CORRECTIONS, ENOUGH = 40, 1e-14
-
 #: Share of the largest pressure, or of the stress that the largest displacement costs, within which
 #: a node counts as weakly active.
 WEAK = 1e-6
@@ -200,10 +197,10 @@ class Linearised:
         rhs, left = -change.forces, -change.conditions
         x, f = np.zeros_like(rhs), np.zeros_like(left)
         size, last = 0.0, np.inf
-        for _ in range(CORRECTIONS):
+        while True:
             known = np.einsum("nij,nj->ni", self._regular, left)
             jump.transpose(-jump.weight[:, None] * known, rhs)
-            dx = self._operator.solve(rhs, ENOUGH)
+            dx = self._operator.solve(rhs, EPS)
             moved = jump.apply(self._local(dx))
             df = known - np.einsum(
                 "nij,nj->ni", self._regular, np.einsum("nij,nj->ni", self._by_jump, moved)
@@ -213,10 +210,9 @@ class Linearised:
             rhs = np.zeros_like(rhs)
             size, taken = max(size, self._norm(x, f)), self._norm(dx, df)
             # The next correction is as much smaller than this one as this one than the last.
-            if taken >= last or taken**2 <= ENOUGH * size * min(last, size):
-                break
+            if not taken < last or taken**2 <= EPS * size * min(last, size):
+                return x, f
             last = taken
-        return x, f
 
     def solve_transposed(self, by_x: Array, by_force: Array) -> tuple[Array, Array]:
         """Return the adjoint unknowns and conditions of a gradient. Collective.
@@ -232,7 +228,7 @@ class Linearised:
         rhs, left = by_x.copy(), by_force
         x, c = np.zeros_like(rhs), np.zeros_like(left)
         size, last = 0.0, np.inf
-        for _ in range(CORRECTIONS):
+        while True:
             known = np.einsum("nji,nj->ni", self._regular, left)
             jump.transpose(-np.einsum("nji,nj->ni", self._by_jump, known), rhs)
             dx = self._operator.solve_transposed(rhs)
@@ -243,10 +239,9 @@ class Linearised:
             rhs = np.zeros_like(rhs)
             size, taken = max(size, self._norm(x, c)), self._norm(dx, dc)
             # The next correction is as much smaller than this one as this one than the last.
-            if taken >= last or taken**2 <= ENOUGH * size * min(last, size):
-                break
+            if not taken < last or taken**2 <= EPS * size * min(last, size):
+                return x, c
             last = taken
-        return x, c
 
     def by_gap(self, x: Array, conditions: Array) -> Array:
         """Return the derivatives of a quantity by the gap at each node, shape (n,), given w.
