@@ -23,6 +23,7 @@ from __future__ import annotations
 import logging
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 
 import numpy as np
 from mpi4py import MPI
@@ -230,7 +231,7 @@ def _parameters(
         kept = None if key.split(".")[0] == "mesh" else domain
         return build_problem(with_number(case, key, value), comm, domain=kept)
 
-    return [(key, Parameter(number_at(case, key), lambda v, k=key: build(k, v))) for key in given]
+    return [(key, Parameter(number_at(case, key), partial(build, key))) for key in given]
 
 
 @dataclass(frozen=True)
@@ -239,6 +240,10 @@ class _Family:
 
     problems: tuple[ContactProblem, ContactProblem]
     ways: tuple[float, float]
+
+    def slope(self, ahead: Array, behind: Array) -> Array:
+        """Return the difference quotient of values at both."""
+        return np.asarray((ahead - behind) / self.over, dtype=np.float64)
 
     @property
     def over(self) -> float:
@@ -339,9 +344,9 @@ def _explicit(
     still = _Direction(zero, np.zeros_like(linearised.problem.nodes.normal), history)
     sides = _beside(family, state, still)
     ahead, behind = (equations(*side, linearised.active) for side in sides)
-    over = family.over
     change = Equations(
-        (ahead.forces - behind.forces) / over, (ahead.conditions - behind.conditions) / over
+        family.slope(ahead.forces, behind.forces),
+        family.slope(ahead.conditions, behind.conditions),
     )
     return change, sides
 
@@ -383,7 +388,7 @@ def _tangent(
             if index + 1 < len(path.steps):
                 ends = [problem.commit(end).arrays() for problem, end in sides]
                 histories[key] = {
-                    part: (ends[0][part] - ends[1][part]) / family.over for part in ends[0]
+                    part: family.slope(ends[0][part], ends[1][part]) for part in ends[0]
                 }
     for name, columns in rows.items():
         found.steps[name] = {key: np.array(values) for key, values in columns.items()}
@@ -431,9 +436,9 @@ def _adjoint(
                     found[name][key] += (ahead - behind) / family.over
                     continue
                 one, other = (_slip(here.commit(there)) for here, there in sides)
-                by_jump = _total(problem, after.jump, one.jump - other.jump)
-                way = _total(problem, after.accumulated, one.accumulated - other.accumulated)
-                found[name][key] += (by_jump + way) / family.over
+                moved = _total(problem, after.jump, one.jump - other.jump)
+                moved += _total(problem, after.accumulated, one.accumulated - other.accumulated)
+                found[name][key] += moved / family.over
 
 
 def _slip(history: History) -> SlipHistory:

@@ -324,7 +324,7 @@ class ConstrainedOperator:
         #: Whether the responses to the columns are those of another matrix.
         self._behind = False
         self._responses = np.zeros((self._owned, self._free.size))
-        self._inverse = np.zeros((self._free.size, self._free.size))
+        self._inverse: Array = np.zeros((self._free.size, self._free.size))
         self._gives = np.zeros_like(self._inverse)
 
     @property
@@ -388,9 +388,8 @@ class ConstrainedOperator:
         own, forces = restricted[: self._owned], restricted[self._owned :][free]
         columns = self._bulk.columns[:, free]
         first = self._inner.solve_transposed(own)
-        responses = np.zeros_like(columns)
-        for k, column in enumerate(columns.T):
-            responses[:, k] = self._inner.solve_transposed(column)
+        solved = [self._inner.solve_transposed(columns[:, k]) for k in range(free.size)]
+        responses = np.stack([*solved], axis=1) if solved else np.zeros_like(columns)
         moved = self._condensed(columns, responses) @ (forces - self._on_q(columns, first))
         q = np.zeros(constraint.free.size)
         q[free] = moved
@@ -404,7 +403,7 @@ class ConstrainedOperator:
         corner = self._bulk.corner[np.ix_(self._free, self._free)]
         left, size, right = np.linalg.svd(corner - self._on_q(columns, responses))
         resists = size > NOTHING * np.abs(corner).max(initial=0.0)
-        return (right[resists].T / size[resists]) @ left[:, resists].T
+        return np.asarray((right[resists].T / size[resists]) @ left[:, resists].T)
 
     def _on_q(self, columns: Array, values: Array) -> Array:
         """Return columns^T times values, summed over the ranks. Collective."""
