@@ -44,7 +44,7 @@ def test_ranks_mark_the_same_cells():
     for one, other in zip(alone, together, strict=True):
         assert one["unknowns"] == other["unknowns"]
         for name in ("error", "contact_force_y", "max_displacement", "max_pressure"):
-            assert other[name] == pytest.approx(one[name], rel=1e-6)
+            assert other[name] == pytest.approx(one[name], rel=1e-8)
 
 
 @pytest.mark.parallel
