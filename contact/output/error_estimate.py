@@ -107,7 +107,9 @@ def _of_material(body: BodyEquilibrium, index: int, x: Array, secant: Array) -> 
     chunks = body.pointwise.values(
         ("error", index), partial(_fluxes, body, material), samples, x, cells
     )
-    values = np.concatenate([found for _, found in chunks])
+    components = 7 if material.piezo is None else 10
+    none = np.zeros((0, len(samples), components))  # a rank may have no cells of a material
+    values = np.concatenate([none, *(found for _, found in chunks)])
     flux, law = values[..., :-1], material.law
     if isinstance(law, Anisotropic | HistoryLaw):
         shear = secant[cells]

@@ -100,7 +100,8 @@ class Recovery:
         matrix = np.einsum("cvsm,cvsn->cvmn", basis, basis, optimize=True)
         right = np.einsum("cvsm,csk->cvmk", basis, values, optimize=True)
         both = np.concatenate([matrix, right], axis=3)
-        sums = self._summed(both.reshape(*both.shape[:2], -1)).reshape(-1, *both.shape[2:])
+        flat = both.reshape(*both.shape[:2], count * (count + components))
+        sums = self._summed(flat).reshape(-1, *both.shape[2:])
         matrix, right = sums[..., :count], sums[..., count:]
         #: Numbers of points around each vertex.
         self._around = matrix[:, 0, 0]
