@@ -8,7 +8,6 @@ from typing import Any, TypeVar
 
 from mpi4py import MPI
 
-from contact._compat import lasting
 from contact.errors import InputError
 
 T = TypeVar("T")
@@ -22,6 +21,8 @@ def on_all_ranks(comm: MPI.Intracomm) -> Iterator[None]:
         yield
     except Exception as error:
         failure = error
+    from contact._compat import lasting  # loads PETSc, whose options come before it
+
     failures = lasting(comm).allgather(failure)
     for known in (failure, *failures):
         if known is not None:

@@ -32,7 +32,7 @@ PHASES = {
     "contact in multigrid": ("linear/multigrid.py", "follow"),
     "iterations, solves": ("~", "<method 'solve' of 'petsc4py.PETSc.KSP' objects>"),
     "solves with the factors": ("~", "<method 'solve' of 'petsc4py.PETSc.Mat' objects>"),
-    "residual forces": ("body/weak_forms.py", "_found"),
+    "residual forces": ("body/loads.py", "assembled"),
     "contact laws": ("interface/complementarity.py", "linearise"),
     "iterations on the condensed problem": ("methods/newton.py", "_solve_condensed"),
     "transfer from mesh to mesh": ("nesting.py", "prolong"),

@@ -18,8 +18,8 @@ def failing(problem, largest: float, options=TIGHT["newton"]):
     """Return Newton's method that fails for steps longer than `largest`."""
 
     class Careful(type(METHODS[options.method](problem, options, None))):
-        def solve(self, start=None):
-            state, outcome = super().solve(start)
+        def solve(self, *given):
+            state, outcome = super().solve(*given)
             since = self.problem.since or 0.0
             if self.problem.time - since > largest * (1 + 1e-9):
                 kkt = KKT(1.0, 1.0, 1.0)

@@ -167,7 +167,7 @@ def test_the_number_of_outer_iterations_is_limited(method):
 def test_a_method_cannot_call_itself_converged(monkeypatch):
     """What it says of its end is one thing, the residuals of the whole problem another."""
 
-    def boast(method: Newton, start=None):
+    def boast(method: Newton, *given):
         outcome = Outcome(KKT(0.0, 0.0, 0.0), KKT(1.0, 1.0, 1.0), "all is well")
         return method.problem.start(0.1), outcome
 
