@@ -122,6 +122,7 @@ class SchurComplement:
     def _prepare(self, pc: PETSc.PC) -> None:
         """Let a factorisation keep unknowns before it begins."""
         pc.setFactorSetUpSolverType()
+        pc.getFactorMatrix().setOptionsPrefix(pc.getOptionsPrefix())
         if self.size > 0:
             _set_kept(pc.getFactorMatrix(), self._numbers)
 
