@@ -111,7 +111,7 @@ def no_solution(pc: PETSc.PC, prefix: str) -> InputError:
     prefix
         Prefix of its PETSc options.
     """
-    if _out_of_memory(pc):
+    if out_of_memory(pc):
         return InputError(
             "out of memory in the factorisation; accepted: a smaller mesh, more memory or "
             f"ranks, a larger -{prefix}mat_mumps_icntl_23 where that limits it (MB a "
@@ -142,7 +142,7 @@ def _functions_vanish(pc: PETSc.PC) -> bool:
     return False
 
 
-def _out_of_memory(pc: PETSc.PC) -> bool:
+def out_of_memory(pc: PETSc.PC) -> bool:
     """Whether the factorisation had too little memory. PETSc knows of some cases only."""
     if pc.getFailedReason() == PETSc.PC.FailedReason.FACTOR_OUTMEMORY:
         return True

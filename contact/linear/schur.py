@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from petsc4py import PETSc
 
 from contact._compat import lasting
-from contact.linear.faults import mat_solve, set_up_with_workspace
+from contact.linear.faults import mat_solve, no_solution, out_of_memory, set_up_with_workspace
 from contact.typing import Array
 
 #: MUMPS's ICNTL(26): 0 solves with the eliminated unknowns, the kept ones being 0.
@@ -104,6 +104,11 @@ class SchurComplement:
 
         It is stored by columns, and not a number where the eliminated block is singular.
         Collective.
+
+        Raises
+        ------
+        InputError
+            If there is too little memory.
         """
         first, self._matrix = self._matrix is None, matrix
         matrix.setOption(PETSc.Mat.Option.SYMMETRIC, True)
@@ -114,6 +119,8 @@ class SchurComplement:
             self._prepare(self._ksp.getPC())
         self._ksp.setOperators(matrix)
         set_up_with_workspace(self._ksp, self._prepare)
+        if out_of_memory(self._ksp.getPC()):
+            raise no_solution(self._ksp.getPC(), self._ksp.getOptionsPrefix())
         factor = self._ksp.getPC().getFactorMatrix()
         factor.setMumpsIcntl(*INTERIOR_SOLVE)
         left = _complement(factor, self.size if self.comm.rank == 0 else 0)
