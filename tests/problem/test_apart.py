@@ -33,12 +33,13 @@ def of_second(solution, values):
 @pytest.mark.parametrize("method", METHODS)
 def test_a_body_beside_one_that_is_pressed_far_more(method, linear):
     """Newton's method with multigrid left its contact forces off by 5e-6, and had converged."""
-    options = METHODS[method](linear=linear)
+    # Forces are off by some five times the residual, which is anything below the tolerance.
+    options = METHODS[method](linear=linear, tolerance=1e-9)
     beside = solve(pressed(blocks(COMM), 0.01, 0.01 * LITTLE), options, comm=COMM)
     exact = solve(pressed(blocks(COMM), 0.01, 0.01), NewtonOptions(tolerance=1e-12), comm=COMM)
     assert beside.converged, beside.outcome.reason
     found, known = (of_second(one, one.state.forces.pressure) for one in (beside, exact))
-    assert np.linalg.norm(found / LITTLE - known) < 3e-8 * np.linalg.norm(known)
+    assert np.linalg.norm(found / LITTLE - known) < 1e-8 * np.linalg.norm(known)
 
 
 @pytest.mark.parametrize("linear", ["lu", "iterative"])
