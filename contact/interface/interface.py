@@ -175,6 +175,11 @@ class Interface:
         opened, stick, slip = self.comm.allreduce(local, op=MPI.SUM).tolist()
         return opened, stick, slip
 
+    def rounding(self, nodal: Array) -> float:
+        """Return a pressure that rounding of the displacements makes (stress). Collective."""
+        displacement = np.abs(nodal[:, : self.jump.dim]).max(axis=1, initial=0.0)
+        return 1e3 * EPS * self.stiffness * self.jump.maximum(displacement)
+
     def acting(self, x: Array, forces: Multipliers) -> Iterator[tuple[InterfaceLaw, Array, Array]]:
         """Yield the law, unknowns and pressures of contact nodes, then of held ones. Collective."""
         nodal = self.jump.apply(x)

@@ -218,11 +218,12 @@ class Cones:
         )
 
     def longest(self, step: Step) -> float:
-        """Return how much of a step leads to the rim of a cone."""
+        """Return how much of a step leads to the rim of a cone; nothing of one that is NaN."""
         rates = [-step.slack / self.slack, -step.force / self.force]
         for lead, size in self._relative(step):
             rates.append(size - lead)
         fastest = float(np.max(np.concatenate(rates), initial=0.0))
+        fastest = np.inf if np.isnan(fastest) else fastest
         fastest = self._comm.allreduce(fastest, op=MPI.MAX)
         return 1 / fastest if fastest > 0 else np.inf
 

@@ -103,7 +103,11 @@ def interior_point(
             break
         if aside is None and outcome.kkt.significant < least:
             state = iterate.state
-        bound = interface.bound(interface.jump.apply(state.x), state.forces)
+        nodal = interface.jump.apply(state.x)
+        bound = interface.bound(nodal, state.forces)
+        # Where nothing presses, the next problem is solved by the same state.
+        if aside is not None and interface.jump.maximum(bound) <= interface.rounding(nodal):
+            break
     return aside or (iterate, outcome)
 
 
@@ -177,6 +181,11 @@ class InteriorPoint:
             ended = f"the interior point has not converged in {steps} steps"
             if not taken or not np.isfinite(kkt.significant):
                 ended = f"rounding ends the interior point after {steps} steps"
+                break
+            nodal = self.problem.interface.jump.apply(self._state.x)
+            pressure = self.problem.interface.jump.maximum(self.state.forces.pressure)
+            if pressure <= self.problem.interface.rounding(nodal):
+                ended = f"nothing presses after {steps} steps"
                 break
             gap = self.gap()
             if gap <= CLOSED and (
@@ -279,8 +288,10 @@ def central(cones: Cones, solve: Solve) -> tuple[Array, Step, float]:
         Solves the linearised problem; both times with the same matrix.
     """
     now, degree = cones.work(), max(cones.degree, 1)
-    _, affine = solve(cones.affine_target())
+    dx, affine = solve(cones.affine_target())
     length = min(1.0, cones.longest(affine))
+    if length == 0:  # the system is singular to rounding
+        return dx, affine, length
     centre = (cones.work_after(affine, length) / now) ** 3 if now > 0 else 0.0
     centre = max(0.0, centre)
     dx, step = solve(cones.target(affine, centre * now / degree))

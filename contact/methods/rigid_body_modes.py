@@ -178,10 +178,8 @@ class RigidBodyModes:
         """Return the free rigid motion to take off; None where nothing is free. Collective."""
         interface = problem.interface
         jump, nodal = interface.jump, interface.jump.apply(state.x)
-        # Pressures that rounding of displacements makes hold nothing.
-        way = jump.maximum(np.abs(nodal[:, : jump.dim]).max(axis=1, initial=0.0))
-        rounding = 1e3 * EPS * interface.stiffness * way
-        pressed = interface.pressure(nodal, state.forces) > rounding
+        # Pressures that are rounding hold nothing.
+        pressed = interface.pressure(nodal, state.forces) > interface.rounding(nodal)
         motions, columns = [], []
         for group in self._unsupported:
             free = null_space(group.held(self.problem.frictional, pressed))
