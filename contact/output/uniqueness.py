@@ -108,6 +108,8 @@ def _factor(
     count, dim = normal.shape
     rows = np.arange(count * dim).reshape(count, dim)
     closed = np.flatnonzero(touches & (np.linalg.norm(along, axis=1) > 0.5))
+    if closed.size == 0:  # supports let none of them slide
+        return np.inf
     free = rows[~touches].ravel()
     free = free[np.diag(stiffness)[free] > 0]
     kept = np.zeros((2, closed.size, count * dim))

@@ -86,3 +86,10 @@ def test_any_number_of_ranks():
     # Another method has no condensed body: it is made for this.
     again = critical_factor(shared.problem, shared.state)
     assert again == pytest.approx(alone.critical_factor, rel=1e-8)
+
+
+def test_no_critical_friction_where_supports_let_no_node_slide():
+    """A single node of 15 touches, at the corner of a clamped side."""
+    ((_, case),) = problems(False, "few-5", True)
+    solution = solve(case, comm=MPI.COMM_SELF)
+    assert solution.converged and solution.critical_factor == np.inf
