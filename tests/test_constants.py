@@ -5,7 +5,7 @@ import ast
 from tests.test_architecture import ROOT
 
 #: Number of constants as it stands. It may only fall; the goal is 70.
-MOST = 96
+MOST = 92
 
 #: Constants that tune nothing: codes of MUMPS, formats, nodes of quadrature.
 FORMATS = {

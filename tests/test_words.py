@@ -32,7 +32,7 @@ WORDS = {
     r"from rest": "zero initial guess, reference configuration",
     r"at rest": "in the reference configuration",
     r"remember(s|ed)?": "history, incremental friction",
-    r"lengthen(s|ed|ing)?": "energy line search",
+    r"lengthen(s|ed|ing)?": "longer step (of a chord), greater",
     r"frozen friction": "fixed point on the friction bound",
     r"(conductivity|load) steps? of a static": "continuation",
     r"dense solves?": "Newton iterations on the condensed problem",

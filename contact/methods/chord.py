@@ -21,7 +21,6 @@ from typing import TypeAlias
 import numpy as np
 
 from contact.interface.jump import Multipliers
-from contact.methods.line_search import FAR
 from contact.methods.newton_step import Iterate
 from contact.problem.state import State
 from contact.typing import Array
@@ -31,6 +30,9 @@ WORTH = 10.0
 
 #: Rate of convergence that a new factorisation would at least have.
 FAST = 0.1
+
+#: Residual above which no factorisation is frozen: the tangent is not good there.
+FAR = 0.05
 
 #: Number of earlier steps that the acceleration uses.
 DEPTH = 8

@@ -2,7 +2,7 @@
 
 Where the contact nodes are few, the linearised body is condensed onto them (static condensation).
 Active sets and friction are iterated there, in small dense steps on the Schur complement; the outer
-iteration is over the material alone, with chord steps and an energy line search.
+iteration is over the material alone, with chord steps.
 """
 
 from __future__ import annotations
@@ -16,15 +16,12 @@ from contact.interface.jump import Multipliers
 from contact.linear.operator import Counters
 from contact.methods.chord import WORTH, Chord
 from contact.methods.gap_derivative import GapDerivative
-from contact.methods.line_search import FAR, step_length
 from contact.methods.newton_step import Iterate, Taken
 from contact.methods.options import NewtonOptions
 from contact.methods.report import IterationHistory, Outcome
 from contact.problem.condensed import Condensation, CondensedProblem
-from contact.problem.kkt import KKT, residual_forces
+from contact.problem.kkt import KKT
 from contact.problem.problem import ContactProblem
-from contact.problem.state import State
-from contact.typing import Array
 
 #: Tolerance of the condensed contact problem, over the residual before the step.
 CONTACT_PART = 1e-3
@@ -122,28 +119,11 @@ class CondensedStep:
             return None
         increment = self.condensation.expand(condensed, end.state.x)
         new = replace(state, x=body.moved(state.x, increment), forces=end.state.forces)
-        far = reached.significant > FAR and not keep
-        length = self._length(new, state, increment) if far else 1.0
-        if length > 1:
-            new = replace(new, x=body.moved(state.x, length * increment))
-            self._chord.forget()
-        elif not body.linear:
+        if not body.linear:
             new = self._chord.accelerated(state, new)
             jump, mixed = self.condensation.full.interface.jump, new.forces
             new = replace(new, forces=Multipliers.of(jump, mixed.pressure, mixed.friction))
         notes = [record.note for record in history.records]
         taken = [word for word in self._fallbacks if any(word in note for note in notes)]
-        note = ", ".join([*["chord step"] * keep, *["line search"] * (length > 1), *taken])
-        return Taken(replace(end, state=new), note, length > 1, tuple(history.records))
-
-    def _length(self, new: State, state: State, increment: Array) -> float:
-        """Return the step length of the energy line search between two states. Collective."""
-        problem, body = self.condensation.full, self.condensation.full.equilibrium
-        if body.linear or body.block_size > body.dim:  # a potential's energy is no minimum
-            return 1.0
-
-        def slope(length: float) -> float:
-            at = replace(new, x=body.moved(state.x, length * increment))
-            return body.product(increment, residual_forces(problem, at))
-
-        return step_length(slope)
+        note = ", ".join([*["chord step"] * keep, *taken])
+        return Taken(replace(end, state=new), note, tuple(history.records))

@@ -7,14 +7,12 @@
    multipliers are condensed node by node, so that one linear system in the unknowns of the body is
    left. Where the contact nodes are few, the body is condensed onto them first
    (`condensed_step`): a step then linearises the material, and iterates contact there.
-3. Where the material yields on the way, a line search goes on along the step to where the energy
-   is least (`line_search`).
-4. The iteration ends with the residuals of the problem, computed from scratch, or with their
+3. The iteration ends with the residuals of the problem, computed from scratch, or with their
    stagnation: the active sets cycle.
-5. A primal-dual interior point then finds the active sets on the same operator, with the friction
+4. A primal-dual interior point then finds the active sets on the same operator, with the friction
    bound updated outside (`interior_point`), and Newton's method takes the last steps. Where the
    body can be condensed onto its contact nodes, this happens there.
-6. Where a current flows through the contact nodes, the solutions are followed from a foundation
+5. Where a current flows through the contact nodes, the solutions are followed from a foundation
    that hardly conducts instead (`continuation`).
 
 The notes of the history say which.
@@ -436,8 +434,8 @@ class NewtonLoop:
             if not linear:
                 falls = residuals.equilibrium < max(before.equilibrium, options.tolerance)
                 # After a tangent that overshoots, the secant (Kacanov), as where unloading differs
-                # from loading. The energy falls along a line search, where residuals may rise.
-                tangent = taken.line_search or falls or not tangent
+                # from loading.
+                tangent = falls or not tangent
             if stagnation(residuals.significant):
                 ended = f"Newton's method stalled at {stagnation.best:.1e}"
                 return iterate, self._end(residuals, ended)

@@ -81,15 +81,12 @@ class Taken:
         Where it led.
     note
         Its kind in the history, empty for a plain step.
-    line_search
-        Whether it has gone on to where the energy is least along it.
     inner
         Newton iterations on the condensed problem that it took.
     """
 
     iterate: Iterate
     note: str = ""
-    line_search: bool = False
     inner: tuple[Record, ...] = ()
 
 

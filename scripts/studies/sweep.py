@@ -229,7 +229,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
             settings = with_method(case.solver, OPTIONS[method])
             solution = solve(problem, settings)
             notes = {r.note for r in solution.history.records}
-            own = "chord step", "line search", "tangent", "rejected", "initial guess"
+            own = "chord step", "tangent", "rejected", "initial guess"
             for word in own:
                 notes = {note.replace(word, "").strip(" ,") for note in notes}
             fallback = ", ".join(sorted(notes - {""}))

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
+from contact import build_problem, solve
 from contact.interface.friction import Friction
 from contact.methods.chord import Chord
 from contact.methods.newton import Newton
@@ -14,6 +15,7 @@ from contact.methods.options import NewtonOptions
 from contact.problem.problem import ContactProblem
 from forms.hencky import Log
 from forms.laws import ConstantCoefficient
+from scripts.studies.sweep import problems
 from tests.problems import mechanics
 
 SELF = MPI.COMM_SELF
@@ -116,3 +118,17 @@ def test_the_acceleration_solves_what_is_linear_in_as_many_steps_as_there_are_ra
         end = replace(state, x=goal + rates * (state.x - goal))
         state = kept.accelerated(state, end)
     assert np.allclose(state.x, goal, rtol=0, atol=1e-9)
+
+
+@pytest.mark.parametrize(("name", "solves"), [("yielding-0", 12), ("yielding-1", 14)])
+def test_steps_far_in_the_plastic_range_are_taken_whole(name, solves):
+    """Strains of 8, and of 3e4; the method on the whole body agrees."""
+    ((_, case),) = problems(False, name, True)
+    problem = build_problem(case, SELF)
+    solution = solve(problem, NewtonOptions(tolerance=1e-10))
+    assert solution.converged, solution.outcome.reason
+    assert solve(problem, NewtonOptions()).counters.linear_solves <= solves
+    other = solve(problem, NewtonOptions(tolerance=1e-10, condense=False))
+    assert other.converged, other.outcome.reason
+    u, v = solution.displacement.x.array, other.displacement.x.array
+    assert np.abs(u - v).max() <= 1e-6 * np.abs(v).max()
