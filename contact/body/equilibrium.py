@@ -12,6 +12,7 @@ is given the state that it is about.
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -220,6 +221,14 @@ class BodyEquilibrium:
             self.laws.set(state, forms.secant_at.x.array, "secant")
             forces = sum(assembled(form, self.owned) for form in forms.secant_forces)
         return np.concatenate([forces, np.zeros(self.global_unknowns.size)])
+
+    @cached_property
+    def loads_by_cell(self) -> tuple[fem.FunctionSpace, Loads]:
+        """Discontinuous cubics, and the loads on those of the owned cells. Collective."""
+        space = fem.functionspace(self.domain.mesh, ("DG", 3, (self.block_size,)))
+        test = self._forms.split(ufl.TestFunction(space))
+        size = space.dofmap.index_map.size_local * self.block_size
+        return space, Loads(self.domain, self.body, *test, size)
 
     def external(self, time: float = 1.0) -> Array:
         """Return the owned nodal loads at a time. Collective."""

@@ -1,31 +1,29 @@
-"""An estimate of the discretisation error in the energy norm, from recovered stresses.
+"""An estimate of the discretisation error in the energy norm.
 
-eta_K^2 = int_K (G sigma - sigma) : S : (G sigma - sigma) (Zienkiewicz and Zhu): G sigma is the
-stress recovered inside each material, S the compliance of the last linearisation, that of the
-secant modulus. In a piezoelectric body sigma is the pair (sigma, D), and S that of
-[F, -e^T; e, beta], whose energy is eps : F eps + E . beta E. At the contact, where recovery sees
-nothing, pressures times gaps between the nodes are added, and friction times slip that is not
-dissipated (Krause, Veeser and Walloth, Numer. Math. 130, 2015).
+Degree 1: eta_K^2 = int_K (G sigma - sigma) : S : (G sigma - sigma), G sigma being the nodal means
+of the stress inside each material (Zienkiewicz and Zhu, IJNME 24, 1987). Degree 2: the energy of
+the errors of `contact.output.local_problems`. S is the compliance of the last linearisation, with
+the secant modulus. In a piezoelectric body sigma is the pair (sigma, D), and S that of
+[F, -e^T; e, beta], whose energy is eps : F eps + E . beta E. At the contact pressures times gaps
+between the nodes are added, and friction times slip that is not dissipated (Krause, Veeser and
+Walloth, Numer. Math. 130, 2015).
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
-from functools import partial
-from typing import Any
 
-import basix
 import numpy as np
-import ufl
-from dolfinx import fem
 from mpi4py import MPI
-from ufl.core.expr import Expr
 
 from contact.body.description import Material
-from contact.body.equilibrium import BodyEquilibrium
+from contact.mesh.entities import cells_at
 from contact.mesh.together import members, part
-from contact.output.fields import Point, nodal_function
-from contact.output.recovery import Recovery, barycentric
+from contact.output.fields import DerivedFields
+from contact.output.local_problems import LocalProblems
+from contact.output.recovery import nodal_means
+from contact.output.simplices import corners, inverse_jacobians, lagrange, measures, rule
 from contact.problem.problem import ContactProblem
 from contact.problem.state import State
 from contact.typing import Array
@@ -33,11 +31,10 @@ from forms.crystal import VOIGT
 from forms.elasticity import Anisotropic, mandel
 from forms.hencky import Hencky, is_linear
 from forms.history import HistoryLaw
-from forms.kinematics import deviator_squared
 from forms.piezo import Piezo
 
-#: Degree of the recovered polynomials: of P1 nodal means.
-RECOVERED = {1: 0, 2: 2}
+#: Factors of the components of a tensor in the basis of Mandel.
+MANDEL = np.array([1.0] * 3 + [np.sqrt(2.0)] * 3)
 
 
 @dataclass(frozen=True)
@@ -77,56 +74,70 @@ class Estimate:
         return float(np.sqrt(self.total / whole)) if whole > 0 else 0.0
 
 
-def estimated(problem: ContactProblem, state: State) -> Estimate:
-    """Estimate the error of a state. Collective."""
+def estimated(
+    problem: ContactProblem, state: State, fields: DerivedFields | None = None
+) -> Estimate:
+    """Estimate the error of a state. Collective.
+
+    Parameters
+    ----------
+    problem, state
+        The problem, and its unknowns and multipliers.
+    fields
+        The fields of the state, where they are known already.
+    """
     body = problem.equilibrium
-    mesh, d = body.domain.mesh, body.dim
-    squares = np.zeros(mesh.topology.index_map(d).size_local)
-    sums = np.zeros(3)
-    x = body.nodal(state.x).flatten()
-    body.laws.fit(state, x)
-    secant = body.laws.secant_shear(state, x)
-    for index in range(len(body.cells)):
-        squares[body.cells[index]], parts = _of_material(body, index, x, secant)
-        sums += parts
+    fields = fields or DerivedFields(body, state)
+    flux, strain = _sampled(fields)
+    secant = body.laws.secant_shear(state, body.nodal(state.x).ravel())
+    local = LocalProblems(problem, state, flux) if body.degree == 2 else None
+    at, weights = rule(body.dim, 2 * body.degree)
+    places = corners(body.domain)
+    volumes = measures(body.domain, places, at, weights, inverse_jacobians(places)[1])
+    shapes = lagrange(2 if body.degree == 2 else 0, at)
+    squares, sums = np.zeros(len(flux)), np.zeros(3)
+    for material, cells in zip(body.body.materials, body.cells, strict=True):
+        law, own = material.law, flux[cells]
+        if isinstance(law, Anisotropic | HistoryLaw):
+            shear = secant[cells]
+        else:
+            shear = np.asarray(law.secant_modulus(strain[cells] ** 2)).mean(axis=1)
+        energy = _density(material, shear)
+        if local is not None:
+            squares[cells] = local.squares(cells, _moduli(material, shear))
+        else:
+            smooth = nodal_means(body.domain, cells, own[:, 0])
+            squares[cells] = np.sum(volumes[cells] * energy(at @ (smooth - own)), axis=1)
+        known = np.sum(volumes[cells] * energy(shapes @ own), axis=1)
+        sums[0] += known.sum()
+        if not isinstance(law, Anisotropic):
+            sums[1:] += known @ (_bulk(law) / shear), known.sum()
     at_contact = _at_contact(problem, state)
     squares += at_contact
     sums = body.comm.allreduce(np.append(sums, [squares.sum(), at_contact.sum()]), op=MPI.SUM)
-    energy, locked, known, total, contact = sums
-    ratio = float(locked / known) if known > 0 else None
-    return Estimate(squares, float(contact), float(energy), float(total), ratio)
+    energy_sum, locked, shearing, total, contact = sums
+    ratio = float(locked / shearing) if shearing > 0 else None
+    return Estimate(squares, float(contact), float(energy_sum), float(total), ratio)
 
 
-def _of_material(body: BodyEquilibrium, index: int, x: Array, secant: Array) -> tuple[Array, Array]:
-    """Return eta_K^2 in the cells of a material; its energy, that times k/g, and where k/g is."""
-    material, cells, d = body.body.materials[index], body.cells[index], body.dim
-    cell = basix.CellType.triangle if d == 2 else basix.CellType.tetrahedron
-    points, weights = basix.make_quadrature(cell, 2 * body.degree)
-    # Of degree 1 the stress is constant in the cell.
-    samples = points if body.degree == 2 else points.mean(axis=0, keepdims=True)
-    chunks = body.pointwise.values(
-        ("error", index), partial(_fluxes, body, material), samples, x, cells
-    )
-    components = 7 if material.piezo is None else 10
-    none = np.zeros((0, len(samples), components))  # a rank may have no cells of a material
-    values = np.concatenate([none, *(found for _, found in chunks)])
-    flux, law = values[..., :-1], material.law
-    if isinstance(law, Anisotropic | HistoryLaw):
-        shear = secant[cells]
-    else:
-        shear = np.asarray(law.secant_modulus(np.maximum(values[..., -1], 0.0))).mean(axis=1)
-    recovery = Recovery(body.domain, cells, RECOVERED[body.degree])
-    at = barycentric(points)
-    smooth = recovery.recovered(barycentric(samples), flux, at)
-    volume = recovery.volumes(at, weights)
-    compliance = _compliance(material, shear)
-    error, energy = (
-        np.einsum("cq,cqi,cij,cqj->c", volume, f, compliance, f, optimize=True)
-        for f in (smooth - flux, np.broadcast_to(flux, smooth.shape))
-    )
-    if isinstance(law, Anisotropic):
-        return error, np.array([energy.sum(), 0.0, 0.0])
-    return error, np.array([energy.sum(), energy @ (_bulk(law) / shear), energy.sum()])
+def _sampled(fields: DerivedFields) -> tuple[Array, Array]:
+    """Return the fluxes and |dev eps| at the points of the owned cells.
+
+    Fluxes are the stress in the basis of Mandel, and D where there is coupling.
+    """
+    body, columns = fields.body, fields.columns
+    count = body.domain.mesh.topology.index_map(body.dim).size_local
+    flux = np.zeros((count, len(fields.points), 9 if body.piezoelectric else 6))
+    strain = np.zeros(flux.shape[:2])
+    stress = columns["stress"].start
+    for chosen, values in fields.chunks():
+        for m, (i, j) in enumerate(VOIGT):
+            flux[chosen, :, m] = MANDEL[m] * values[..., stress + 3 * i + j]
+        if body.piezoelectric:
+            charge = values[..., columns["electric_displacement"]]
+            flux[chosen, :, 6 : 6 + body.dim] = charge
+        strain[chosen] = values[..., columns["dev_strain"].start]
+    return flux, strain
 
 
 def _bulk(law: Hencky | HistoryLaw) -> float:
@@ -134,39 +145,42 @@ def _bulk(law: Hencky | HistoryLaw) -> float:
     return float(law.young) / (3 - 6 * float(law.poisson))
 
 
-def _fluxes(body: BodyEquilibrium, material: Material, at: fem.Function) -> Expr:
-    """Return the stress in the basis of Mandel, D where there is coupling, and |dev eps|^2."""
-    point = Point(body, material, at)
-    factors = [1.0] * 3 + [float(np.sqrt(2.0))] * 3
-    flux = [f * point.stress[i, j] for f, (i, j) in zip(factors, VOIGT, strict=True)]
-    if material.piezo is not None:
-        charge: Any = point.electric_displacement
-        flux += [charge[i] if i < body.dim else ufl.as_ufl(0.0) for i in range(3)]
-    return ufl.as_vector([*flux, deviator_squared(point.strain)])
+def _density(material: Material, shear: Array) -> Callable[[Array], Array]:
+    """Return the energy density of fluxes of shape (cells, q, components) in a material."""
+    if material.piezo is None and not isinstance(material.law, Anisotropic):
+        bulk = _bulk(material.law)
+
+        def isotropic(flux: Array) -> Array:
+            trace = flux[..., :3].sum(axis=-1)
+            size = np.einsum("cqi,cqi->cq", flux, flux)
+            return trace**2 / (9 * bulk) + (size - trace**2 / 3) / (2 * shear[:, None])
+
+        return isotropic
+    compliance = np.linalg.inv(_moduli(material, shear))
+    # Without coupling a neighbour's D is zero here.
+    size = compliance.shape[1]
+    return lambda flux: np.sum((flux[..., :size] @ compliance) * flux[..., :size], axis=-1)
 
 
-def _compliance(material: Material, shear: Array) -> Array:
-    """Return the compliance of each cell, shape (cells, 6, 6), with coupling (cells, 9, 9)."""
+def _moduli(material: Material, shear: Array) -> Array:
+    """Return the moduli of each cell, shape (cells, 6, 6), with coupling (cells, 9, 9); or of all.
+
+    They map strains to stresses in the basis of Mandel, and (eps, E) to (sigma, D).
+    """
     law = material.law
     if isinstance(law, Anisotropic):
-        stiffness = np.broadcast_to(mandel(law.stiffness), (shear.size, 6, 6))
+        moduli = mandel(law.stiffness)[None]
     else:
         volumetric = np.zeros((6, 6))
         volumetric[:3, :3] = 1 / 3
-        stiffness = 3 * _bulk(law) * volumetric + 2 * shear[:, None, None] * (
-            np.eye(6) - volumetric
-        )
-    if material.piezo is not None:
-        stiffness = _coupled(stiffness, material.piezo)
-    if is_linear(law):
-        return np.broadcast_to(np.linalg.inv(stiffness[:1]), stiffness.shape)
-    return np.asarray(np.linalg.inv(stiffness))
+        own = shear[:1] if is_linear(law) else shear
+        moduli = 3 * _bulk(law) * volumetric + 2 * own[:, None, None] * (np.eye(6) - volumetric)
+    return moduli if material.piezo is None else _coupled(moduli, material.piezo)
 
 
 def _coupled(stiffness: Array, piezo: Piezo) -> Array:
     """Return the matrix from (eps, E) to (sigma, D), shape (cells, 9, 9)."""
-    factors = np.array([1.0] * 3 + [np.sqrt(2.0)] * 3)
-    coupling = np.array([np.asarray(piezo.e)[:, j, k] for j, k in VOIGT]).T * factors
+    coupling = np.array([np.asarray(piezo.e)[:, j, k] for j, k in VOIGT]).T * MANDEL
     whole = np.zeros((len(stiffness), 9, 9))
     whole[:, :6, :6], whole[:, 6:, 6:] = stiffness, np.asarray(piezo.beta)
     whole[:, :6, 6:], whole[:, 6:, :6] = -coupling.T, coupling
@@ -174,24 +188,43 @@ def _coupled(stiffness: Array, piezo: Piezo) -> Array:
 
 
 def _at_contact(problem: ContactProblem, state: State) -> Array:
-    """Return the share of contact in eta_K^2 of the owned cells, shape (cells,). Collective.
+    """Return the share of contact in eta_K^2 of the owned cells, shape (cells,).
 
     Between its nodes, all values linear: p |u_n - g| and s |u_t| - lambda_f . u_t, where
     complementarity holds at the nodes alone.
     """
     body, interface = problem.equilibrium, problem.interface
-    mesh, d, nodal = body.domain.mesh, body.dim, problem.nodal(state)
-    slip, friction = interface.slip(nodal), state.forces.friction
-    opening, bound = interface.opening(nodal), interface.bound(nodal, state.forces)
-    columns = [state.forces.pressure, opening, bound]
+    domain, d, nodal = body.domain, body.dim, problem.nodal(state)
+    sides = tuple(dict.fromkeys(name for c in problem.contacts for name in members(c.on)))
+    squares = np.zeros(domain.mesh.topology.index_map(d).size_local)
+    cells, place = cells_at(domain.mesh, domain.facets(part(sides)))
+    layout = body.space.dofmap.dof_layout
+    closures = np.array([layout.entity_closure_dofs(d - 1, i) for i in range(d + 1)])
+    nodes = np.take_along_axis(body.space.dofmap.list[cells], closures[place], axis=1)
     index_map = body.space.dofmap.index_map
     values = np.zeros((index_map.size_local + index_map.num_ghosts, 3 + 2 * d))
-    values[interface.jump.nodes] = np.column_stack([*columns, slip, friction])
-    at = nodal_function("contact", body.space, values, (3 + 2 * d,))
-    u_t, stress = (ufl.as_vector([at[3 + i + j] for i in range(d)]) for j in (0, d))
-    density = at[0] * abs(at[1]) + abs(at[2] * ufl.sqrt(ufl.dot(u_t, u_t)) - ufl.dot(stress, u_t))
-    piece = ufl.TestFunction(fem.functionspace(mesh, ("DG", 0)))
-    sides = tuple(dict.fromkeys(name for c in problem.contacts for name in members(c.on)))
-    measure = body.domain.ds(part(sides))(metadata={"quadrature_degree": 4})
-    found = fem.assemble_vector(fem.form(density * piece * measure)).array
-    return np.asarray(found[: mesh.topology.index_map(d).size_local])
+    values[interface.jump.nodes] = np.column_stack(
+        [
+            state.forces.pressure,
+            interface.opening(nodal),
+            interface.bound(nodal, state.forces),
+            interface.slip(nodal),
+            state.forces.friction,
+        ]
+    )
+    at, weights = rule(d - 1, 4)
+    found = lagrange(body.degree, at) @ values[nodes]
+    pressure, opening, bound = (found[..., i] for i in range(3))
+    slip, friction = found[..., 3 : 3 + d], found[..., 3 + d :]
+    density = pressure * np.abs(opening) + np.abs(
+        bound * np.linalg.norm(slip, axis=-1) - np.sum(slip * friction, axis=-1)
+    )
+    behind = corners(domain)[cells]
+    others = np.array([np.delete(np.arange(d + 1), i) for i in range(d + 1)])[place]
+    of_facet = np.take_along_axis(behind, others[..., None], axis=1)
+    # The size of a facet over that of the reference one is that of its cell over the height.
+    inverse, det = inverse_jacobians(behind)
+    inverse = np.concatenate([-inverse.sum(axis=1, keepdims=True), inverse], axis=1)
+    size = det * np.linalg.norm(inverse[np.arange(len(cells)), place], axis=1)
+    np.add.at(squares, cells, np.sum(measures(domain, of_facet, at, weights, size) * density, 1))
+    return squares

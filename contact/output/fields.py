@@ -209,7 +209,8 @@ class DerivedFields:
         body.laws.fit(self._state, self._x)
         yield from body.pointwise.values(name, expression, self.points, self._x, cells)
 
-    def _all_chunks(self) -> Iterator[tuple[NDArray[np.int32], Array]]:
+    def chunks(self) -> Iterator[tuple[NDArray[np.int32], Array]]:
+        """Yield owned cells and the values there, shape (cells, points, components)."""
         return chain.from_iterable(map(self._chunks, range(len(self.body.cells))))
 
     def move_to(self, state: Evaluated) -> None:
@@ -260,7 +261,7 @@ class DerivedFields:
             for name, shape in self.shapes.items()
         }
         corners = 1 if degree == 0 else self.body.dim + 1
-        for chosen, values in self._all_chunks():
+        for chosen, values in self.chunks():
             for name, columns in self.columns.items():
                 dofs = made[name].function_space.dofmap.list[chosen]
                 array = made[name].x.array.reshape(-1, columns.stop - columns.start)
@@ -277,7 +278,7 @@ class DerivedFields:
             fem.functionspace(space.mesh, ("Lagrange", self.body.degree, (count + 1,)))
         )
         sums = total.x.array.reshape(-1, count + 1)
-        for chosen, values in self._all_chunks():
+        for chosen, values in self.chunks():
             dofs = total.function_space.dofmap.list[chosen]
             weight = np.broadcast_to(volume[chosen, None, None], (*dofs.shape, 1))
             at_nodes = np.broadcast_to(values, (*dofs.shape, count)) * weight

@@ -58,7 +58,8 @@ def announce(solution: Solution) -> None:
 def review(solution: Solution) -> None:
     """Add all remarks to the notes and warnings of a solution. Collective."""
     body, x = solution.problem.equilibrium, solution.state.x
-    extremes = DerivedFields(body, solution.state).extremes()
+    fields = DerivedFields(body, solution.state)
+    extremes = fields.extremes()
     strains = [largest.strain for largest in extremes]
     solution.max_dev_strain = max(strains)
     solution.max_von_mises = max(largest.von_mises for largest in extremes)
@@ -72,7 +73,7 @@ def review(solution: Solution) -> None:
             e.yielded for e in extremes if e.plastic is not None and e.yielded is not None
         )
     solution.deformation = deformation(body, x)
-    solution.error = estimated(solution.problem, solution.state)
+    solution.error = estimated(solution.problem, solution.state, fields)
     for remarks in (
         unloading(solution),
         monotonicity(solution, strains),

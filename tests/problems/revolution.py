@@ -62,12 +62,19 @@ class Tube:
         first, second = self.constants
         return ufl.as_vector([first * x[0] + second / x[0], 0.0])
 
-    def problem(self, n: int, degree: int = 1, comm: MPI.Comm = MPI.COMM_WORLD) -> ContactProblem:
+    def problem(
+        self,
+        n: int,
+        degree: int = 1,
+        comm: MPI.Comm = MPI.COMM_WORLD,
+        element: str = "standard",
+    ) -> ContactProblem:
         domain = half_plane(comm, self.inner, self.outer, 0.5, n)
         held = [Fixed(side, [None, ZERO]) for side in ("bottom", "top")]
         load = Load("left", pressure=constant(self.pressure, 2))
         body = Body(self.law, held, [load])
-        return ContactProblem(domain, body, Contact("right", flat(self.gap)), degree=degree)
+        contact = Contact("right", flat(self.gap))
+        return ContactProblem(domain, body, contact, degree=degree, element=element)
 
 
 @dataclass(frozen=True)
