@@ -20,7 +20,7 @@ from mpi4py import MPI
 from contact.adapting import adapted
 from contact.arguments import expect
 from contact.case.build import REPLACEMENTS, build_problem, named, replaced_by
-from contact.case.digest import check_digest, digest
+from contact.case.digest import check_restart, digest
 from contact.case.file import Case, load_case
 from contact.case.text import to_toml
 from contact.errors import InputError
@@ -31,7 +31,7 @@ from contact.methods.options import NewtonOptions, Options
 from contact.methods.report import IterationHistory, Monitor, Outcome, tell
 from contact.methods.steps import Evolution, solve_step
 from contact.nesting import nested_start, pays
-from contact.output.checkpoint import Checkpoints, kept_digest, read_steps
+from contact.output.checkpoint import Checkpoints, read_steps
 from contact.output.remarks import announce
 from contact.output.solution import Solution, StepRecord
 from contact.output.steps import StepRecorder
@@ -177,11 +177,8 @@ def solve(
     else:
         _refuse({"start": start}, "[evolution]; evolve(problem, times, start=state) goes on")
         _refuse({"nested": nested or None}, "[evolution]")
-    computed_from: dict[str, str] = {}
-    if case.evolution is not None and (folder is not None or restart is not None):
-        computed_from = on_root(comm, lambda: digest(case))
     if restart is not None:
-        on_root(comm, lambda: check_digest(restart, kept_digest(restart), computed_from))
+        on_root(comm, lambda: check_restart(restart, case))
     adapt = case.mesh.adapt is not None
     if adapt:
         _refuse({"restart": restart, "start": start, "nested": nested or None}, "[mesh.adapt]")
@@ -202,8 +199,8 @@ def solve(
             keep = None
             if folder is not None:
                 here = restart is not None and restart.samefile(folder)
-                text = to_toml(case, anchored=True)
-                keep = Checkpoints(folder, problem, text, kept, here, computed_from).keep
+                text, files = to_toml(case, anchored=True), on_root(comm, lambda: digest(case))
+                keep = Checkpoints(folder, problem, text, kept, here, files).keep
             ends, begin = case.evolution.ends, case.evolution.times[0]
             schedule = Schedule(ends, begin, kept=kept, keep=keep)
         else:

@@ -21,7 +21,7 @@ from typing import Any
 from mpi4py import MPI
 
 from contact.case.build import build_problem, named
-from contact.case.digest import changed_input, difference, digest
+from contact.case.digest import check_files, check_same, digest
 from contact.case.file import Case, load_case
 from contact.case.text import literal, to_toml
 from contact.errors import InputError
@@ -44,7 +44,7 @@ logger = logging.getLogger("contact.sweep")
 #: Names of the table and of the case that was swept.
 TABLE, CASE = "sweep.csv", "sweep.toml"
 
-#: Column with the digests of the input of a row: of its case, and of each file that this reads.
+#: Column with the digests of the files that the case of a row reads.
 INPUT = "input"
 
 #: Columns that every table has.
@@ -163,7 +163,7 @@ def _set(point: Mapping[str, str]) -> list[str]:
 
 
 def _input(case: Case) -> str:
-    """Return short digests of a case and of each file that it reads. On one rank."""
+    """Return short digests of the files that a case reads. On one rank."""
     return " ".join(f"{key}={value[:12]}" for key, value in digest(case).items())
 
 
@@ -195,13 +195,11 @@ def _kept_rows(
             )
     text = to_toml(load(first), anchored=True)
     if before.exists():
-        stored = to_toml(load(first, before), anchored=True)
-        place = difference(tomllib.loads(stored), tomllib.loads(text))
-        if place is not None:
-            raise InputError(
-                f"{refused} a sweep of another case: there {place}; accepted: the same case, or "
-                "another folder"
-            )
+        stored, accepted = (
+            to_toml(load(first, before), anchored=True),
+            "the same, or another folder",
+        )
+        check_same(f"--out {folder}", "a sweep", stored, text, accepted, ignored=frozenset())
     elif table.exists():
         raise InputError(
             f"{refused} a {TABLE} without the {CASE} that a sweep leaves beside it; accepted: "
@@ -209,13 +207,12 @@ def _kept_rows(
         )
     for row in rows:
         point = {name: row[name] for name in names}
-        now, then = _input(load(point)), row[INPUT]
-        if now != then:
-            pairs = (dict(pair.partition("=")[::2] for pair in t.split()) for t in (then, now))
-            raise InputError(
-                f"--out {folder}: {changed_input(*pairs) or 'the input'} has changed since the row "
-                f"{', '.join(_set(point))} was computed; accepted: the same one, or another folder"
-            )
+        then, now = (
+            dict(pair.partition("=")[::2] for pair in text.split())
+            for text in (row[INPUT], _input(load(point)))
+        )
+        made = f"the row {', '.join(_set(point))} was computed"
+        check_files(f"--out {folder}", made, then, now)
     if not before.exists():
         before.write_text(text, encoding="utf-8")
     return {tuple(row[name] for name in names): dict(row) for row in rows}

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 from mpi4py import MPI
 
-from contact.case.digest import check_same
+from contact.case.digest import check_restart, check_same
 from contact.case.file import Case, load_case
 from contact.case.text import to_toml
 from contact.cli.main import CONVERGED, NOT_CONVERGED
@@ -110,11 +110,8 @@ def _load(options: argparse.Namespace) -> Case:
             raise InputError("--out: missing; accepted: a folder to write to")
         return load_case(options.case, options.set)
     folder = Path(options.restart)
-    stored = case_of(folder)
-    case = load_case(options.case or stored, options.set)
-    accepted = "the same case, solved and shown as you like"
-    before, now = to_toml(load_case(stored)), to_toml(case, anchored=True)
-    check_same(f"--restart {folder}", "checkpoints", before, now, accepted)
+    case = load_case(options.case or case_of(folder), options.set)
+    check_restart(folder, case)
     return case
 
 

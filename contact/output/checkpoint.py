@@ -1,8 +1,8 @@
 """Checkpoints: the state of a solution, and of each step of an evolution, for any number of ranks.
 
-A file a step, written under another name and renamed when it is whole: whatever ends a run, the
-steps before remain. Nodes are found again by where they are, on other ranks too. A manifest names
-the files with their checksums: it alone says which of them belong to a run.
+A file a step: whatever ends a run, the steps before remain. Nodes are found again by where they
+are, on other ranks too. A manifest names the files with their checksums: it alone says which of
+them belong to a run.
 """
 
 from __future__ import annotations
@@ -11,7 +11,6 @@ import hashlib
 import io
 import json
 import logging
-import os
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
@@ -30,7 +29,7 @@ from contact import _compat
 from contact.errors import InputError
 from contact.history import CONTACT_NODES, QUADRATURE_POINTS
 from contact.interface.jump import Multipliers
-from contact.output.folder import kind, read_json, settle
+from contact.output.folder import kind, listed, read_json, settle, write_whole
 from contact.output.solution import Solution, StepRecord
 from contact.problem.problem import ContactProblem
 from contact.problem.state import State
@@ -40,8 +39,8 @@ from contact.typing import Array
 #: Folder of the checkpoints in that of the results, that of a run which has not ended a step yet,
 #: and the case in it.
 FOLDER, FRESH, CASE = "checkpoints", "checkpoints.new", "case.toml"
-#: The files in a folder of checkpoints with their SHA-256, and the digests of their input; a file
-#: before it has its name.
+#: The files in a folder of checkpoints with their SHA-256, and the digests of their input; the
+#: name of a file until it is whole.
 MANIFEST, DRAFT = "manifest.json", ".contact-draft"
 _NODES = "nodes.npz"
 #: Names that a manifest may have: it is data of whoever wrote it.
@@ -91,20 +90,20 @@ class Checkpoints:
         self._folder, self._problem, self._count = folder, problem, 0
         if here:
             self._count, self._where = len(kept), _where(folder, problem)
-            self._place: Path = on_root(problem.comm, lambda: _cut(folder, self._count))
+            on_root(problem.comm, lambda: _cut(folder, self._count))
             return
-        self._place, points = folder / FRESH, _places(problem)
+        points = _places(problem)
         #: Rows of the owned nodes in the files.
         self._where = (problem.comm.exscan(len(points)) or 0) + np.arange(len(points))
-        gathered = problem.comm.gather(points)
+        gathered = np.concatenate(problem.comm.gather(points) or [points])
 
         def begin() -> None:
             _check_own(folder)
-            _remove(self._place)
-            self._place.mkdir(parents=True, exist_ok=True)
-            _list(self._place, {}, digest or {})
-            _save(self._place, CASE, case.encode())
-            _save(self._place, _NODES, _packed({"points": np.concatenate(gathered or [points])}))
+            fresh = folder / FRESH
+            _remove(fresh)
+            fresh.mkdir(parents=True, exist_ok=True)
+            _save(fresh, CASE, case.encode(), digest)
+            _save(fresh, _NODES, _packed({"points": gathered}))
 
         on_root(problem.comm, begin)
         for record in kept:
@@ -120,11 +119,13 @@ class Checkpoints:
         on_root(self._problem.comm, lambda: self._write(_packed(arrays)))
 
     def _write(self, data: bytes) -> None:
-        _save(self._place, _name(self._count), data)
-        if self._place.name == FRESH:
+        place, fresh = self._folder / FOLDER, self._folder / FRESH
+        first = self._count == 1
+        _save(fresh if first else place, _name(self._count), data)
+        if first:
             _check_own(self._folder)
-            _remove(self._folder / FOLDER)
-            self._place = self._place.rename(self._folder / FOLDER)
+            _remove(place)
+            fresh.rename(place)
 
 
 def _gathered(problem: ContactProblem, state: State, where: NDArray[np.intp]) -> dict[str, Any]:
@@ -298,28 +299,35 @@ def case_of(folder: Path) -> Path:
 def kept_case(folder: Path) -> str | None:
     """Return the case of the checkpoints in a folder; None without any. On one rank."""
     with suppress(InputError):
-        return case_of(folder).read_text(encoding="utf-8")
+        return case_of(folder).read_text(encoding="utf-8", errors="replace")
     return None
 
 
-def kept_digest(folder: Path) -> dict[str, str]:
-    """Return the digests of the input of the checkpoints in a folder. On one rank."""
-    digest = read_json(case_of(folder).with_name(MANIFEST)).get("digest")
-    return digest if isinstance(digest, dict) else {}
+def stored_input(folder: Path) -> tuple[Path, dict[str, str]]:
+    """Return the file of the case, as it was written, and the digests of its files. On one rank.
+
+    Raises
+    ------
+    InputError
+        If there are no checkpoints, or the case has changed.
+    """
+    path = case_of(folder)
+    _read_whole(path)
+    digests = read_json(path.with_name(MANIFEST)).get("digest")
+    return path, digests if isinstance(digests, dict) else {}
 
 
 def discard(folder: Path) -> None:
     """Remove the checkpoints of a run that has come to its end. On one rank."""
     for name in (FOLDER, FRESH):
-        if _manifest(folder / name) is not None:
-            _remove(folder / name)
+        _remove(folder / name)
 
 
 def _files(folder: Path) -> list[Path]:
     """Return the checkpoints in a folder, one after the other."""
     for name in (FOLDER, FRESH):  # where a run was ended between removal and renaming
-        listed, found = _manifest(folder / name) or {}, list[Path]()
-        while (path := folder / name / _name(len(found) + 1)).is_file() and path.name in listed:
+        known, found = _manifest(folder / name), list[Path]()
+        while (path := folder / name / _name(len(found) + 1)).is_file() and path.name in known:
             found.append(path)
         if found:
             return found
@@ -351,18 +359,16 @@ def _name(count: int) -> str:
     return f"{count:05d}.npz"
 
 
-def _manifest(place: Path) -> dict[str, str] | None:
-    """Return the SHA-256 of the files that a run has left in a folder; None without a list."""
-    listed = read_json(place / MANIFEST).get("files") if kind(place) == "a folder" else None
-    if not isinstance(listed, dict):
-        return None
-    return {name: str(sum_) for name, sum_ in listed.items() if _LISTED.fullmatch(name)}
+def _manifest(place: Path) -> dict[str, str]:
+    """Return the SHA-256 of the files that a run has left in a folder; nothing without any."""
+    return listed(place / MANIFEST, _LISTED) if kind(place) == "a folder" else {}
 
 
-def _list(place: Path, files: Mapping[str, str], digest: Any = None) -> None:
+def _list(place: Path, files: Mapping[str, str], digest: Mapping[str, str] | None = None) -> None:
     """Write a manifest, by default with the digests of the one before."""
     digest = read_json(place / MANIFEST).get("digest") if digest is None else digest
-    _put(place / MANIFEST, json.dumps({"files": files, "digest": digest}, indent=1).encode())
+    text = json.dumps({"files": files, "digest": digest}, indent=1)
+    write_whole(place / MANIFEST, text.encode(), place / DRAFT)
 
 
 def _check_own(folder: Path) -> None:
@@ -376,8 +382,8 @@ def _check_own(folder: Path) -> None:
     for place in (folder / FOLDER, folder / FRESH):
         given = kind(place)
         if given == "a folder":
-            listed = _manifest(place)
-            own = {DRAFT} if listed is None else {DRAFT, MANIFEST, *listed}
+            known = _manifest(place)
+            own = {DRAFT, MANIFEST, *known} if known else {DRAFT}
             given = next((path.name for path in place.iterdir() if path.name not in own), None)
         if given is not None:
             raise InputError(
@@ -388,22 +394,23 @@ def _check_own(folder: Path) -> None:
 
 def _remove(place: Path) -> None:
     """Remove the files that a manifest names, the first step first, and an empty folder."""
-    for name in (*sorted(_manifest(place) or ()), DRAFT, MANIFEST):
+    known = _manifest(place)
+    for name in (*sorted(known), DRAFT, MANIFEST) if known else ():
         (place / name).unlink(missing_ok=True)
-    with suppress(OSError):  # it is not there, or not empty
+    with suppress(OSError):  # it is not empty
         place.rmdir()
 
 
-def _cut(folder: Path, count: int) -> Path:
-    """Remove the checkpoints after a step, for those of another course; return where all are."""
+def _cut(folder: Path, count: int) -> None:
+    """Keep the checkpoints up to a step, for those of another course to follow."""
     place = _files(folder)[0].parent
-    kept = _manifest(place) or {}
-    for name in sorted(kept):
-        if name[0].isdigit() and name > _name(count):
-            (place / name).unlink(missing_ok=True)
-            del kept[name]
-    _list(place, kept)
-    return place
+    kept = _manifest(place)
+    later = [name for name in kept if name[0].isdigit() and name > _name(count)]
+    for name in later:
+        (place / name).unlink(missing_ok=True)
+    _list(place, {name: kept[name] for name in kept if name not in later})
+    if place.name == FRESH:
+        place.rename(folder / FOLDER)
 
 
 def _packed(arrays: dict[str, Any]) -> bytes:
@@ -412,25 +419,17 @@ def _packed(arrays: dict[str, Any]) -> bytes:
     return file.getvalue()
 
 
-def _save(place: Path, name: str, data: bytes) -> None:
+def _save(place: Path, name: str, data: bytes, digest: Mapping[str, str] | None = None) -> None:
     """Write a file and its name in the manifest, which comes first: no file is without one."""
-    if name not in (listed := _manifest(place) or {}) and kind(place / name) is not None:
+    known = _manifest(place)
+    if name not in known and kind(place / name) is not None:
         raise InputError(f"{place / name}: no run has left it; accepted: a folder without it")
-    _list(place, listed | {name: hashlib.sha256(data).hexdigest()})
-    _put(place / name, data)
+    _list(place, known | {name: hashlib.sha256(data).hexdigest()}, digest)
+    write_whole(place / name, data, place / DRAFT)
 
 
-def _put(path: Path, data: bytes) -> None:
-    draft = path.with_name(DRAFT)
-    with draft.open("wb") as file:
-        file.write(data)
-        file.flush()
-        os.fsync(file.fileno())
-    os.replace(draft, path)
-
-
-def _load(path: Path) -> dict[str, NDArray[Any]]:
-    """Return the arrays in a file of the manifest.
+def _read_whole(path: Path) -> bytes:
+    """Return the contents of a file of the manifest.
 
     Raises
     ------
@@ -438,9 +437,13 @@ def _load(path: Path) -> dict[str, NDArray[Any]]:
         If they are not as they were written.
     """
     data = path.read_bytes() if path.is_file() else b""
-    if hashlib.sha256(data).hexdigest() != (_manifest(path.parent) or {}).get(path.name):
+    if hashlib.sha256(data).hexdigest() != _manifest(path.parent).get(path.name):
         raise InputError(f"{path}: no checkpoint, or a damaged one; accepted: as a run has left it")
-    return _unpacked(data)
+    return data
+
+
+def _load(path: Path) -> dict[str, NDArray[Any]]:
+    return _unpacked(_read_whole(path))
 
 
 def _unpacked(data: bytes) -> dict[str, NDArray[Any]]:

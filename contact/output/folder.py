@@ -222,7 +222,7 @@ def check_members(folder: Path, names: Iterable[str] | None = None, overwrite: b
         a folder is: nothing of that kind is ours, and it is neither followed nor overwritten.
         Without `overwrite` also if something is there that the summary does not name.
     """
-    own = _members(folder / SUMMARY)
+    own = listed(folder / SUMMARY)
     for name in filter(_RESULT.fullmatch, sorted(os.listdir(folder))) if names is None else names:
         path = folder / name
         found, expected = kind(path), "a folder" if path.suffix == ".bp" else "a file"
@@ -272,7 +272,7 @@ def add(folder: Path, files: Sequence[Path]) -> None:
     names = [path.name for path in files]
     check_members(folder, names, overwrite=False)
     summary = json.loads((folder / SUMMARY).read_bytes())
-    members = sorted({*_members(folder / SUMMARY), *names})
+    members = sorted({*listed(folder / SUMMARY), *names})
     os.replace(_draft(folder, summary, members), folder / SUMMARY)
     for path in files:
         os.replace(path, folder / path.name)
@@ -335,8 +335,8 @@ def discard(folder: Path) -> None:
 def _advance(folder: Path) -> None:
     new, old = folder / STAGE / "new", folder / STAGE / "old"
     left = {path.name for path in new.iterdir()}
-    arrived = set(_members(new / SUMMARY)) - left
-    earlier = _members(folder / SUMMARY) or _members(old / SUMMARY)
+    arrived = set(listed(new / SUMMARY)) - left
+    earlier = listed(folder / SUMMARY) or listed(old / SUMMARY)
     leaving = (set(earlier) - arrived) | left
     for name in sorted(leaving, key=lambda name: name != SUMMARY):
         check_members(folder, [name])
@@ -350,7 +350,7 @@ def _advance(folder: Path) -> None:
 def _return(folder: Path) -> None:
     """Undo `_advance`, from wherever it has come to."""
     new, old = folder / STAGE / "new", folder / STAGE / "old"
-    for name in _members(new / SUMMARY):
+    for name in listed(new / SUMMARY):
         if kind(new / name) is None and kind(folder / name) is not None:
             os.rename(folder / name, new / name)
     if old.is_dir():
@@ -368,11 +368,22 @@ def _is_stage(path: Path) -> bool:
     return all(name == ROOM or _MEMBER.fullmatch(name) for name in os.listdir(path))
 
 
-def _members(summary: Path) -> list[str]:
-    """Return the members that a summary names; none if it is not there or not ours."""
-    names = read_json(summary).get(MANIFEST)
-    known = names if isinstance(names, list) else []
-    return [name for name in known if isinstance(name, str) and _MEMBER.fullmatch(name)]
+def listed(manifest: Path, pattern: re.Pattern[str] = _MEMBER) -> dict[str, str]:
+    """Return the files that a manifest names, with their checksums, if it has any.
+
+    It may be of anybody: names that do not match the pattern are left out.
+    """
+    known = read_json(manifest).get(MANIFEST)
+    sums = known if isinstance(known, dict) else {}
+    names = known if isinstance(known, list | dict) else ()
+    return {n: str(sums.get(n)) for n in names if isinstance(n, str) and pattern.fullmatch(n)}
+
+
+def write_whole(path: Path, data: bytes, draft: Path) -> None:
+    """Write a file under another name, and rename it when it is on the disk. On one rank."""
+    draft.write_bytes(data)
+    _sync(draft)
+    os.replace(draft, path)
 
 
 def read_json(path: Path) -> dict[str, Any]:

@@ -85,8 +85,6 @@ def review(solution: Solution) -> None:
         untouched(solution),
         resolution(solution),
         rounding(solution),
-        unknown_pressures(solution),
-        beside_loads(solution),
         sliding(solution),
         strong_friction(solution),
         conductivity(solution),
@@ -286,60 +284,44 @@ def untouched(solution: Solution) -> Iterator[Remark]:
 
 
 def rounding(solution: Solution) -> Iterator[Remark]:
-    """Say where forces balance to their rounding alone, which is more than the tolerance."""
-    granted, asked = solution.rounding, solution.outcome.allowed.equilibrium
-    if granted > asked:
-        yield (
-            f"rounding decides how well the forces balance: {granted:.1e} of them does not count, "
-            f"though the tolerance is {asked:g}; a mesh with fewer cells along a slender body, or "
-            "less of electric.k_e, has less of it"
-        )
+    """Say where forces are small beside those that balance in the bodies, and hardly known.
 
-
-def unknown_pressures(solution: Solution) -> Iterator[Remark]:
-    """Say where contact forces are hardly more than the residual of far larger ones. Collective."""
-    left = left_as_pressures(solution.problem, solution.state)
-    unknown = max(solution.outcome.kkt.unknown, left)
-    loads = solution.problem.equilibrium.load_sizes(solution.state.time)[0].max()
-    if solution.converged and unknown > KNOWN and (_moved(solution.problem) or loads > 0):
-        yield (
-            f"contact forces are known to {unknown:.1e} of their size only, for far larger forces "
-            'act in the bodies; a smaller solver.tolerance, linear = "lu", or smaller '
-            "displacements elsewhere, make them known better"
-        )
-
-
-def _moved(problem: ContactProblem) -> bool:
-    """Whether supports move the body. Collective."""
-    return bool(problem.comm.allreduce(bool(np.any(problem.start().x)), op=MPI.LOR))
-
-
-def beside_loads(solution: Solution) -> Iterator[Remark]:
-    """Say where a residual that is small beside the reactions is large beside the loads.
-
-    Clamps of a slender beam bear moments of a thousand times the loads. Where supports move the
-    body, their reactions are among its loads.
+    Long bodies, or stretched ones, bear forces of many times the loads or the contact forces, and
+    residuals are relative to all of them. Where supports move the body, their reactions are among
+    its loads. Collective.
     """
-    problem, state = solution.problem, solution.state
-    body, moved = problem.equilibrium, _moved(problem)
+    problem, state, outcome = solution.problem, solution.state, solution.outcome
+    body, known, asked = problem.equilibrium, list[str](), outcome.allowed.equilibrium
+    if solution.rounding > asked:
+        known.append(
+            f"rounding decides how well the forces balance, to {solution.rounding:.1e} of them for "
+            f"a tolerance of {asked:g}"
+        )
+    unknown = max(outcome.kkt.unknown, left_as_pressures(problem, state))
+    moved = bool(problem.comm.allreduce(bool(np.any(problem.start().x)), op=MPI.LOR))
+    loads = body.load_sizes(state.time)
+    if solution.converged and unknown > KNOWN and (moved or loads[0].max() > 0):
+        known.append(f"contact forces are known to {unknown:.1e} of their size only")
     residual = residual_forces(problem, state)
     on_contact = np.zeros_like(residual)
     problem.interface.add_forces(on_contact, state.x, state.forces)
-    acting = (body.load_sizes(state.time) + body.sizes(on_contact))[0]
+    acting = (loads + body.sizes(on_contact))[0]
     left = body.sizes(body.unbalanced(residual))[0]
     borne = body.sizes(body.reactions(residual))[0]
-    most = max(LEFT, solution.outcome.allowed.equilibrium)
     # Where supports bear no more than the loads, the residual is rounding.
-    much = (acting > 0) & (left > most * acting) & (borne > acting)
-    if moved or not solution.converged or not much.any():
-        return
-    worst = np.argmax(np.where(much, left, 0.0) / np.where(much, acting, 1.0))
-    left, borne = left[worst] / acting[worst], borne[worst] / acting[worst]
-    yield (
-        f"{left:.1e} of loads and contact forces are out of balance, and displacements about as "
-        f"far off: the supports bear {borne:.3g} times as much; fewer cells along a slender body, "
-        "linear elements, or a smaller tolerance, bring them nearer"
-    )
+    much = (acting > 0) & (left > max(LEFT, asked) * acting) & (borne > acting)
+    if solution.converged and not moved and much.any():
+        worst = np.max(left[much] / acting[much])
+        known.append(
+            f"{worst:.1e} of loads and contact forces are out of balance, and displacements about "
+            "as far off"
+        )
+    if known:
+        yield (
+            f"{'; '.join(known)}: far larger forces act in the bodies; fewer cells along a slender "
+            'body, linear elements, linear = "lu", a smaller solver.tolerance, smaller '
+            "displacements elsewhere, or less of electric.k_e, make them known better"
+        )
 
 
 def sliding(solution: Solution) -> Iterator[Remark]:

@@ -1,10 +1,10 @@
-"""The digests of a case tell whether it, or a file that it reads, has changed."""
+"""A case, or a file that it reads, that has changed is told."""
 
 import shutil
 
 import pytest
 
-from contact.case.digest import changed_input, digest
+from contact.case.digest import check_files, check_same, digest
 from contact.case.file import load_case
 from contact.case.text import to_toml
 from contact.errors import InputError
@@ -38,14 +38,17 @@ def written(tmp_path):
 
 def test_nothing_has_changed(written, tmp_path, monkeypatch):
     first = digest(load_case(written))
-    assert set(first) == {"case", "mesh.file", "material.library", "contact.foundation.file"}
+    before = to_toml(load_case(written), anchored=True)
+    assert set(first) == {"mesh.file", "material.library", "contact.foundation.file"}
     monkeypatch.chdir(tmp_path)
     again = load_case("case.toml", ["title=Other", "solver.tolerance=1e-9", "output.fields=vtx"])
-    assert changed_input(first, digest(again)) is None
+    assert digest(again) == first
+    check_same("here", "results", before, to_toml(again, anchored=True), "")
     (tmp_path / "stored").mkdir()
     stored = tmp_path / "stored" / "case.toml"
     stored.write_text(to_toml(again, anchored=True))
-    assert changed_input(first, digest(load_case(stored))) is None
+    assert digest(load_case(stored)) == first
+    check_same("here", "results", before, to_toml(load_case(stored), anchored=True), "")
 
 
 @pytest.mark.parametrize(
@@ -60,13 +63,16 @@ def test_a_file_has_changed(written, name, said):
     first = digest(load_case(written))
     with (written.parent / name).open("a") as file:
         file.write("\n")
-    assert changed_input(first, digest(load_case(written))) == said
+    with pytest.raises(InputError, match=f"{said} has changed since then; accepted"):
+        check_files("here", "then", first, digest(load_case(written)))
 
 
 def test_the_case_has_changed(written):
-    first = digest(load_case(written))
-    other = digest(load_case(written, ["fixed.0.displacement=[0, 0, 1]"]))
-    assert changed_input(first, other) == "the case"
+    first, other = (
+        to_toml(load_case(written, changes)) for changes in ([], ["fixed.0.displacement=[0, 0, 1]"])
+    )
+    with pytest.raises(InputError, match=r"there fixed\.0\.displacement\.2 is 0\.0, here 1\.0"):
+        check_same("here", "results", first, other, "")
 
 
 def test_a_file_is_not_there(written):
