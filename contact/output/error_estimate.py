@@ -203,10 +203,11 @@ def _at_contact(problem: ContactProblem, state: State) -> Array:
     nodes = np.take_along_axis(body.space.dofmap.list[cells], closures[place], axis=1)
     index_map = body.space.dofmap.index_map
     values = np.zeros((index_map.size_local + index_map.num_ghosts, 3 + 2 * d))
+    opening = interface.opening(nodal)
     values[interface.jump.nodes] = np.column_stack(
         [
             state.forces.pressure,
-            interface.opening(nodal),
+            np.where(np.isfinite(opening), opening, 0.0),  # no rigid part: no pressure on it
             interface.bound(nodal, state.forces),
             interface.slip(nodal),
             state.forces.friction,
@@ -216,7 +217,8 @@ def _at_contact(problem: ContactProblem, state: State) -> Array:
     found = lagrange(body.degree, at) @ values[nodes]
     pressure, opening, bound = (found[..., i] for i in range(3))
     slip, friction = found[..., 3 : 3 + d], found[..., 3 + d :]
-    density = pressure * np.abs(opening) + np.abs(
+    # Next to a single node the quadratic function of its pressure is negative.
+    density = np.maximum(pressure, 0.0) * np.abs(opening) + np.abs(
         bound * np.linalg.norm(slip, axis=-1) - np.sum(slip * friction, axis=-1)
     )
     behind = corners(domain)[cells]

@@ -104,6 +104,39 @@ def test_the_energy_of_a_piezoelectric_body(dim):
 
 
 @pytest.mark.parallel
+def test_a_layer_without_a_rigid_part():
+    """Its gap is infinite: the estimate was no number, and was given as 0."""
+    found = []
+    for layer in ({"layer": np.inf}, {"layer": 2.0, "gap": 2.0}):  # both touch from the beginning
+        case = {
+            "mesh": {"generator": "rectangle", "size": [2.0, 1.0], "cells": [6, 3]},
+            "material": {"young": 1.0, "poisson": 0.3},
+            "fixed": [{"on": "top", "displacement": [0.0, -0.1]}],
+            "contact": {"on": "bottom", "law": "compliance", "limit": np.inf, **layer},
+        }
+        solution = solve(parse_case(case), comm=MPI.COMM_SELF)
+        found.append(estimated(solution.problem, solution.state).relative)
+    assert found[0] == pytest.approx(found[1], rel=1e-9)
+    assert found[0] > 0.01
+
+
+def test_the_share_of_contact_is_never_negative():
+    """At degree 2 the functions of nodes that touch are negative beside them."""
+    beam = {
+        "mesh": {"generator": "rectangle", "size": [8.0, 1.0], "cells": [8, 2]},
+        "space": {"degree": 2},
+        "material": {"young": 1.0, "poisson": 0.3},
+        "fixed": [{"on": "left", "displacement": [0.0, 0.0]}],
+        "load": [{"on": "right", "traction": [0.0, -1e-2]}],
+        "contact": {"on": "bottom", "gap": 0.1},
+    }
+    solution = solve(parse_case(beam), comm=MPI.COMM_SELF)
+    found = estimated(solution.problem, solution.state)
+    assert np.count_nonzero(solution.pressure > 1e-3) == 2
+    assert found.contact > 0
+    assert found.squares.min() >= 0
+
+
 def test_ranks_agree():
     data = changed(mesh__cells=[16, 4])
     alone, together = (solve(parse_case(data), comm=c) for c in (MPI.COMM_SELF, MPI.COMM_WORLD))
