@@ -15,6 +15,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
+from dolfinx import la
 from mpi4py import MPI
 
 from contact.body.description import Material
@@ -188,7 +189,7 @@ def _coupled(stiffness: Array, piezo: Piezo) -> Array:
 
 
 def _at_contact(problem: ContactProblem, state: State) -> Array:
-    """Return the share of contact in eta_K^2 of the owned cells, shape (cells,).
+    """Return the share of contact in eta_K^2 of the owned cells, shape (cells,). Collective.
 
     Between its nodes, all values linear: p |u_n - g| and s |u_t| - lambda_f . u_t, where
     complementarity holds at the nodes alone.
@@ -202,7 +203,8 @@ def _at_contact(problem: ContactProblem, state: State) -> Array:
     closures = np.array([layout.entity_closure_dofs(d - 1, i) for i in range(d + 1)])
     nodes = np.take_along_axis(body.space.dofmap.list[cells], closures[place], axis=1)
     index_map = body.space.dofmap.index_map
-    values = np.zeros((index_map.size_local + index_map.num_ghosts, 3 + 2 * d))
+    vector = la.vector(index_map, 3 + 2 * d)
+    values = vector.array.reshape(-1, 3 + 2 * d)
     opening = interface.opening(nodal)
     values[interface.jump.nodes] = np.column_stack(
         [
@@ -213,6 +215,7 @@ def _at_contact(problem: ContactProblem, state: State) -> Array:
             state.forces.friction,
         ]
     )
+    vector.scatter_forward()
     at, weights = rule(d - 1, 4)
     found = lagrange(body.degree, at) @ values[nodes]
     pressure, opening, bound = (found[..., i] for i in range(3))
