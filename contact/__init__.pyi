@@ -14,9 +14,10 @@ from contact.case.file import parse_case as parse_case
 from contact.case.material import make_material as make_material
 from contact.derivatives import Parameter as Parameter
 from contact.derivatives import Sensitivities as Sensitivities
-from contact.derivatives import gap_gradient as gap_gradient
 from contact.derivatives import sensitivity as sensitivity
 from contact.errors import InputError as InputError
+from contact.gradients import field_gradient as field_gradient
+from contact.gradients import gap_gradient as gap_gradient
 from contact.identification import Identified as Identified
 from contact.identification import identify as identify
 from contact.identification import read_data as read_data

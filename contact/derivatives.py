@@ -21,7 +21,7 @@ transient non-linear coupled problems, Int. J. Numer. Methods Engrg. 37 (1994).
 from __future__ import annotations
 
 import logging
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 
@@ -33,11 +33,10 @@ from contact.case.build import build_problem
 from contact.case.text import number_at, with_number
 from contact.errors import InputError
 from contact.history import History
-from contact.interface.jump import SlipHistory
 from contact.linear.operator import Counters
 from contact.methods.options import NewtonOptions
 from contact.methods.parameters import complementarity_parameters
-from contact.output.differentiable import Differentiable, Quantity, named_quantities
+from contact.output.differentiable import Differentiable, Quantity, Reaction, named_quantities
 from contact.output.solution import Solution
 from contact.problem.linearised import (
     Equations,
@@ -46,8 +45,9 @@ from contact.problem.linearised import (
     moved_state,
     weakly_active,
 )
-from contact.problem.problem import SLIP, ContactProblem
+from contact.problem.problem import ContactProblem
 from contact.problem.state import State
+from contact.problem.transposed import before_transposed, commit_transposed
 from contact.typing import Array
 
 logger = logging.getLogger("contact.sensitivity")
@@ -94,16 +94,12 @@ class Sensitivities(dict[str, dict[str, float]]):
         Factorisations and back-substitutions that they took.
     method
         "tangent" or "adjoint".
-    by_gap
-        Of the adjoint: quantity -> its derivatives by the gap at the nodes of this rank; see
-        `gap_gradient`.
     """
 
     def __init__(self, method: str, counters: Counters, weakly_active: Array) -> None:
         super().__init__()
         self.method, self.counters, self.weakly_active = method, counters, weakly_active
         self.steps: dict[str, dict[str, Array]] = {}
-        self.by_gap: dict[str, Array] = {}
 
 
 def sensitivity(
@@ -137,7 +133,7 @@ def sensitivity(
     ------
     InputError
         If the solution has not converged, a name is not known, a parameter has no number or changes
-        the contact nodes, or the adjoint is asked for where the material has a history.
+        the contact nodes, or the adjoint is asked for where a quantity has no gradient.
 
     Examples
     --------
@@ -145,21 +141,26 @@ def sensitivity(
     >>> found["contact_force_x"]["friction.mu"]  # doctest: +SKIP
     -0.00062189744
     """
-    expect("solution", solution, "a Solution", isinstance(solution, Solution))
-    if not solution.converged:
-        raise InputError(f"solution: {solution.outcome.reason}; accepted: one that has converged")
     accepted = f"{AUTO!r}, {TANGENT!r} or {ADJOINT!r}"
     expect("method", method, accepted, method in (AUTO, TANGENT, ADJOINT))
-    path = _Path(solution)
-    asked = _quantities(solution, quantities)
-    families = {name: path.family(name, given) for name, given in _parameters(solution, parameters)}
-    reason = _no_adjoint(path, asked)
-    if method == ADJOINT and reason:
-        raise InputError(f"method: given 'adjoint'; {reason}; accepted: 'tangent'")
-    fewer = len(asked) < len(families)
-    adjoint = method == ADJOINT or (method == AUTO and fewer and not reason)
+    path = Path(solution)
+    asked = quantities_of(solution, quantities)
+    families = {
+        name: path.family(name, given) for name, given in parameters_of(solution, parameters)
+    }
+    smooth = _with_gradients(asked)
+    blind = [name for name in asked if name not in smooth]
+    if method == ADJOINT and blind:
+        raise InputError(
+            f"method: given 'adjoint'; the quantity {blind[0]!r} has no gradient; accepted: "
+            "'tangent'"
+        )
+    adjoint = method == ADJOINT or (method == AUTO and len(asked) < len(families) and not blind)
     found = Sensitivities(ADJOINT if adjoint else TANGENT, path.counters, path.weakly_active())
-    (_adjoint if adjoint else _tangent)(path, asked, families, found)
+    if adjoint:
+        _adjoint(path, smooth, families, found)
+    else:
+        _tangent(path, asked, families, found)
     if found.weakly_active.size:
         logger.warning(
             "%d contact nodes are between two states, the first at %s: derivatives are one-sided",
@@ -169,42 +170,10 @@ def sensitivity(
     return found
 
 
-def gap_gradient(solution: Solution, quantity: str) -> Array:
-    """Return the derivatives of a result by the gap at each contact node. Collective.
-
-    One adjoint gives them all: the gradient for the shape of a foundation.
-
-    Parameters
-    ----------
-    solution
-        A converged solution; of an evolution the gap is that of all steps.
-    quantity
-        As of `sensitivity`; no layer or conductive foundation may depend on the gap.
-
-    Returns
-    -------
-    Those of the nodes of this rank, in the order of ``solution.problem.nodes``, shape (n,).
-
-    Raises
-    ------
-    InputError
-        As `sensitivity`, and where a layer or a current depends on the gap.
-
-    Examples
-    --------
-    >>> gradient = gap_gradient(solution, "max_pressure")  # doctest: +SKIP
-    >>> points = solution.problem.nodes.points  # doctest: +SKIP
-    """
-    law = solution.problem.interface.law
-    if law.layer is not None or law.follows_gap:
-        raise InputError("gap_gradient: the layer or current depends on the gap; accepted: neither")
-    found = sensitivity(solution, [quantity], {}, ADJOINT)
-    return found.by_gap[quantity]
-
-
-def _quantities(
+def quantities_of(
     solution: Solution, given: Sequence[str] | Mapping[str, Quantity]
 ) -> Mapping[str, Quantity]:
+    """Return quantities by name. Collective."""
     if isinstance(given, Mapping):
         return given
     known = named_quantities(solution.problem)
@@ -214,9 +183,10 @@ def _quantities(
     return {name: known[name] for name in given}
 
 
-def _parameters(
+def parameters_of(
     solution: Solution, given: Sequence[str] | Mapping[str, Parameter]
 ) -> list[tuple[str, Parameter]]:
+    """Return parameters with their names."""
     if isinstance(given, Mapping):
         return [*given.items()]
     case = solution.source
@@ -235,7 +205,7 @@ def _parameters(
 
 
 @dataclass(frozen=True)
-class _Family:
+class Family:
     """The problems at two values of a parameter, that far away from its own."""
 
     problems: tuple[ContactProblem, ContactProblem]
@@ -251,11 +221,28 @@ class _Family:
         return self.ways[0] - self.ways[1]
 
 
-class _Path:
-    """The steps that have led to a solution."""
+class Path:
+    """The steps that have led to a solution.
+
+    Raises
+    ------
+    InputError
+        If it has not converged, or its linear systems are not those of the derivatives.
+    """
 
     def __init__(self, solution: Solution) -> None:
+        expect("solution", solution, "a Solution", isinstance(solution, Solution))
+        if not solution.converged:
+            reason = solution.outcome.reason
+            raise InputError(f"solution: {reason}; accepted: one that has converged")
         base = solution.problem
+        body = base.equilibrium
+        if not body.symmetric and body.global_unknowns.free.any():
+            raise InputError(
+                "sensitivity: the stiffness of the material is not symmetric, and a foundation or "
+                "part moves freely; accepted: kinematic hardening without recovery, or prescribed "
+                "motions"
+            )
         states = [record.state for record in solution.steps] or [solution.state]
         self.steps = [(base.at(state.time, state.history), state) for state in states]
         self.base, self.counters = base, Counters()
@@ -270,7 +257,7 @@ class _Path:
         """Return the points of weakly active nodes of all steps. Collective."""
         return np.unique(np.concatenate([weakly_active(*step) for step in self.steps]), axis=0)
 
-    def family(self, name: str, parameter: Parameter) -> _Family:
+    def family(self, name: str, parameter: Parameter) -> Family:
         """Return the problems beside that of a parameter. Collective."""
         step = STEP * (abs(parameter.value) or 1.0)
         problems, ways = [], []
@@ -290,19 +277,12 @@ class _Path:
                     f"{name}: {parameter.value:g} is a border at which the contact nodes or the "
                     "mesh change; accepted: a parameter that leaves them"
                 )
-        return _Family((problems[0], problems[1]), (ways[0], ways[1]))
+        return Family((problems[0], problems[1]), (ways[0], ways[1]))
 
 
-def _no_adjoint(path: _Path, quantities: Mapping[str, Quantity]) -> str:
-    """Say why there is no adjoint; nothing where there is one."""
-    blind = [name for name, given in quantities.items() if not isinstance(given, Differentiable)]
-    if blind:
-        return f"the quantity {blind[0]!r} has no gradient"
-    if len(path.steps) > 1 and set(path.base.initial) != {SLIP}:
-        return "the material has a history"
-    if not path.base.interface.friction.local:
-        return "friction is non-local"
-    return ""
+def _with_gradients(quantities: Mapping[str, Quantity]) -> dict[str, Differentiable]:
+    """Return those of the quantities that the adjoint can take."""
+    return {name: it for name, it in quantities.items() if isinstance(it, Differentiable)}
 
 
 @dataclass
@@ -314,7 +294,7 @@ class _Direction:
     history: dict[str, Array] = field(default_factory=dict)
 
 
-def _beside(family: _Family, state: State, direction: _Direction) -> _Sides:
+def _beside(family: Family, state: State, direction: _Direction) -> _Sides:
     """Return problems and states at both sides of a parameter, moved along a direction.
 
     Collective.
@@ -337,7 +317,7 @@ def _moved_history(history: History, change: Mapping[str, Array], way: float) ->
 
 
 def _explicit(
-    family: _Family, state: State, linearised: Linearised, history: dict[str, Array]
+    family: Family, state: State, linearised: Linearised, history: dict[str, Array]
 ) -> tuple[Equations, _Sides]:
     """Return dR/dm + dR/dh dh/dm at the fixed state, and the problems beside it. Collective."""
     zero = np.zeros_like(linearised.problem.equilibrium.owned_part(state.x))
@@ -352,9 +332,9 @@ def _explicit(
 
 
 def _tangent(
-    path: _Path,
+    path: Path,
     quantities: Mapping[str, Quantity],
-    families: Mapping[str, _Family],
+    families: Mapping[str, Family],
     found: Sensitivities,
 ) -> None:
     """Carry the derivatives by each parameter forwards through the steps. Collective."""
@@ -366,8 +346,7 @@ def _tangent(
         linearised = path.linearised(index)
         gradients = {
             name: given.gradient(problem, state)
-            for name, given in quantities.items()
-            if isinstance(given, Differentiable)
+            for name, given in _with_gradients(quantities).items()
         }
         for key, family in families.items():
             change, still = _explicit(family, state, linearised, histories[key])
@@ -395,83 +374,80 @@ def _tangent(
         found[name] = {key: values[-1] for key, values in columns.items()}
 
 
+@dataclass(frozen=True)
+class Adjoint:
+    """The adjoint of a step and quantity.
+
+    Attributes
+    ----------
+    x, conditions
+        On the owned unknowns and on the contact conditions; see `Linearised.solve_transposed`.
+    along
+        Derivatives of the quantity by the forces of the stresses on the owned unknowns: -x, but
+        for a reaction, which sums up such forces itself.
+    after
+        Derivatives of the quantity by the history at the end of the step; None for the last step,
+        whose state gives the quantity itself.
+    """
+
+    x: Array
+    conditions: Array
+    along: Array
+    after: History | None
+
+
+def backwards(
+    path: Path, quantities: Mapping[str, Differentiable]
+) -> Iterator[tuple[Linearised, dict[str, Adjoint]]]:
+    """Yield the steps from the last to the first, and the adjoint of each quantity. Collective."""
+    after: dict[str, History | None] = dict.fromkeys(quantities)
+    for index in reversed(range(len(path.steps))):
+        problem, state = path.steps[index]
+        linearised, adjoints = path.linearised(index), {}
+        for name, quantity in quantities.items():
+            end = after[name]
+            if end is None:
+                by_x, by_force = quantity.gradient(problem, state)
+            else:
+                by_x = commit_transposed(problem, state, end)
+                by_force = np.zeros_like(problem.nodes.normal)
+            x, conditions = linearised.solve_transposed(by_x, by_force)
+            own = quantity.weights(problem) if isinstance(quantity, Reaction) and not end else 0.0
+            adjoints[name] = Adjoint(x, conditions, own - x, end)
+        yield linearised, adjoints
+        if index > 0:
+            after = {
+                name: before_transposed(linearised, one.along, one.conditions, one.after)
+                for name, one in adjoints.items()
+            }
+
+
 def _adjoint(
-    path: _Path,
-    quantities: Mapping[str, Quantity],
-    families: Mapping[str, _Family],
+    path: Path,
+    quantities: Mapping[str, Differentiable],
+    families: Mapping[str, Family],
     found: Sensitivities,
 ) -> None:
     """Carry the derivatives of each quantity backwards through the steps. Collective."""
-    for name, quantity in quantities.items():
-        assert isinstance(quantity, Differentiable)
+    for name in quantities:
         found[name] = dict.fromkeys(families, 0.0)
-    backwards: dict[str, SlipHistory] = {}
-    for index in reversed(range(len(path.steps))):
-        problem, state = path.steps[index]
-        linearised = path.linearised(index)
-        last = index == len(path.steps) - 1
-        adjoints = {}
-        for name, quantity in quantities.items():
-            assert isinstance(quantity, Differentiable)
-            if last:
-                by_x, by_force = quantity.gradient(problem, state)
-            else:
-                by_x = np.zeros_like(problem.equilibrium.owned_part(state.x))
-                by_force = np.zeros_like(problem.nodes.normal)
-            after, before = backwards.get(name), None
-            if after is not None:
-                by_jump, before = _slip_transposed(problem, state, after)
-                problem.nodes.transpose(by_jump, by_x)
-            x, c = linearised.solve_transposed(by_x, by_force)
-            adjoints[name] = x, c, after
-            found.by_gap[name] = found.by_gap.get(name, 0.0) + linearised.by_gap(x, c)
-            backwards[name] = _history_transposed(linearised, c, before)
+    for linearised, adjoints in backwards(path, quantities):
+        problem, state = linearised.problem, linearised.state
         for key, family in families.items():
             change, sides = _explicit(family, state, linearised, {})
-            for name, (x, c, after) in adjoints.items():
-                found[name][key] -= problem.equilibrium.product(x, change.forces)
-                found[name][key] -= _total(problem, c, change.conditions)
-                if after is None:
+            for name, one in adjoints.items():
+                found[name][key] -= problem.equilibrium.product(one.x, change.forces)
+                found[name][key] -= _total(problem, one.conditions, change.conditions)
+                if one.after is None:
                     ahead, behind = (quantities[name](*side) for side in sides)
                     found[name][key] += (ahead - behind) / family.over
                     continue
-                one, other = (_slip(here.commit(there)) for here, there in sides)
-                moved = _total(problem, after.jump, one.jump - other.jump)
-                moved += _total(problem, after.accumulated, one.accumulated - other.accumulated)
-                found[name][key] += moved / family.over
-
-
-def _slip(history: History) -> SlipHistory:
-    part = history[SLIP]
-    assert isinstance(part, SlipHistory)
-    return part
+                ends = [here.commit(there).arrays() for here, there in sides]
+                for part, weights in one.after.arrays().items():
+                    moved = family.slope(ends[0][part], ends[1][part])
+                    found[name][key] += _total(problem, weights, moved)
 
 
 def _total(problem: ContactProblem, one: Array, other: Array) -> float:
-    """Return the inner product of values at the contact nodes of all ranks. Collective."""
+    """Return the inner product of values at places of all ranks. Collective."""
     return float(problem.comm.allreduce(float(np.sum(one * other)), op=MPI.SUM))
-
-
-def _slip_transposed(
-    problem: ContactProblem, state: State, after: SlipHistory
-) -> tuple[Array, SlipHistory]:
-    """Return the derivatives by jump and history of a step from those by the history after it."""
-    jump, nodal = problem.nodes, problem.nodal(state)
-    slip = problem.interface.slip(nodal)
-    length = np.linalg.norm(slip, axis=1)
-    along = slip / np.maximum(length, np.finfo(float).tiny)[:, None]
-    by_slip = after.accumulated[:, None] * along
-    by_jump = np.zeros_like(nodal)
-    by_jump[:, : jump.dim] = jump.tangential_component(after.jump) + by_slip
-    return by_jump, SlipHistory(-by_slip, after.accumulated.copy())
-
-
-def _history_transposed(
-    linearised: Linearised, conditions: Array, before: SlipHistory | None
-) -> SlipHistory:
-    """Return the derivatives by the history at the beginning of a step, given the adjoint."""
-    jump = np.einsum("nji,nj->ni", linearised.by_slip, conditions)
-    accumulated = -np.einsum("ni,ni->n", linearised.by_length, conditions)
-    if before is not None:
-        jump, accumulated = jump + before.jump, accumulated + before.accumulated
-    return SlipHistory(jump, accumulated)

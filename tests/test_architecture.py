@@ -28,7 +28,15 @@ LAYERS = (
     {"methods"},
     {"output"},
     {"case"},
-    {"adapting", "nesting", "solving", "sweeping", "derivatives", "identification"},
+    {
+        "adapting",
+        "nesting",
+        "solving",
+        "sweeping",
+        "derivatives",
+        "gradients",
+        "identification",
+    },
     {"cli"},
 )
 

@@ -98,14 +98,14 @@ class BodyEquilibrium:
             float(body.law.young),
             domain.revolved,
         )
-        # Where the forms are evaluated is written anew by each query.
-        self._forms = WeakForms(
+        #: Where the forms are evaluated is written anew by each query.
+        self.forms = WeakForms(
             domain, body, self.space, self.cells, degree, element, self.pointwise
         )
-        self._at = self._forms.at
+        self._at = self.forms.at
         #: The laws with internal variables: the body's part of a history.
-        self.laws = self._forms.laws
-        test = self._forms.split(ufl.TestFunction(self.space))
+        self.laws = self.forms.laws
+        test = self.forms.split(ufl.TestFunction(self.space))
         self._loads = Loads(domain, body, *test, self.owned)
 
     @property
@@ -143,7 +143,7 @@ class BodyEquilibrium:
 
     def split(self, x: Any) -> tuple[Expr, Expr | None]:
         """Split a function or argument into displacement and scaled-back potential."""
-        return self._forms.split(x)
+        return self.forms.split(x)
 
     def function(self, x: Array, name: str = "x") -> fem.Function:
         """Return local unknowns as a function in `space`."""
@@ -196,6 +196,60 @@ class BodyEquilibrium:
         """Return the internal variables at the end of the step of a state. Collective."""
         return self.laws.commit(state, self.nodal(state.x).ravel())
 
+    def commit_transposed(self, state: Evaluated, after: InternalVariables) -> Array:
+        """Return the derivatives of a quantity by the owned unknowns at the end of a step.
+
+        Collective.
+
+        Parameters
+        ----------
+        state
+            The end of the step.
+        after
+            Its derivatives by the internal variables there.
+        """
+        forms = self.forms
+        self.laws.commit_transposed(state, self.nodal(state.x).ravel(), after)
+        forms.at.x.array[:] = 0.0  # no other material has stresses
+        forces = sum(assembled(form, self.owned) for form in forms.law_forces)
+        return np.concatenate([forces, np.zeros(self.global_unknowns.size)])
+
+    def before_transposed(
+        self, state: Evaluated, along: Array, after: InternalVariables | None
+    ) -> InternalVariables | None:
+        """Return the derivatives of a quantity by the internal variables before a step. Collective.
+
+        Parameters
+        ----------
+        state
+            The end of the step.
+        along
+            Its derivatives by the internal forces on the owned unknowns.
+        after
+            Its derivatives by the variables at the end; None for a last step.
+        """
+        x, along = (self.nodal(values).ravel() for values in (state.x, self.local(along)))
+        return self.laws.before_transposed(state, x, along, after)
+
+    def tangent_transposed(self, state: Evaluated, weights: Array) -> Array:
+        """Return the derivatives of weighted internal forces by the owned unknowns. Collective.
+
+        Parameters
+        ----------
+        state
+            Where.
+        weights
+            Those of the forces on the owned unknowns, those of supports among them.
+        """
+        matrix = self.create_matrix()
+        self.assemble(matrix, "tangent", state, held=False)
+        vector, image = matrix.createVecs()
+        vector.array[:] = weights[: self.owned]
+        matrix.multTranspose(vector, image)
+        found = np.concatenate([image.array, np.zeros(self.global_unknowns.size)])
+        matrix.destroy()
+        return found
+
     def dissipation(self, state: Evaluated) -> float:
         """Return the energy that the material dissipated in the step of a state. Collective."""
         return self.laws.dissipation(state, self.nodal(state.x).ravel())
@@ -211,7 +265,7 @@ class BodyEquilibrium:
             Unknowns at which the secant modulus is taken; those of the state by default: the
             material law itself.
         """
-        forms = self._forms
+        forms = self.forms
         forms.at.x.array[:] = self.nodal(state.x).ravel()
         if secant_at is None or self.linear:
             self.laws.set(state, forms.at.x.array)
@@ -251,16 +305,24 @@ class BodyEquilibrium:
 
     def create_matrix(self) -> PETSc.Mat:
         """Return an empty matrix with the pattern of the body. Collective."""
-        return create_matrix(self._forms.secant[0])
+        return create_matrix(self.forms.secant[0])
 
-    def assemble(self, matrix: PETSc.Mat, kind: str, state: Evaluated) -> None:
-        """Assemble Kacanov's "secant" or Newton's "tangent" at a state. Collective."""
-        forms = self._forms
+    def assemble(self, matrix: PETSc.Mat, kind: str, state: Evaluated, held: bool = True) -> None:
+        """Assemble Kacanov's "secant" or Newton's "tangent" at a state. Collective.
+
+        Parameters
+        ----------
+        matrix, kind, state
+            The matrix, which of them, and where.
+        held
+            Whether rows and columns of unknowns that supports hold are those of the identity.
+        """
+        forms, conditions = self.forms, [s.condition for s in self.supports] if held else []
         forms.at.x.array[:] = forms.secant_at.x.array[:] = self.nodal(state.x).ravel()
         self.laws.set(state, forms.at.x.array, kind)
         matrix.zeroEntries()
         for form in forms.tangent if kind == "tangent" else forms.secant:
-            assemble_matrix(matrix, form, bcs=[s.condition for s in self.supports])
+            assemble_matrix(matrix, form, bcs=conditions)
             matrix.assemble()
 
     def operator(

@@ -27,6 +27,8 @@ from contact.mesh.domain import Domain, Indices
 from contact.typing import Array
 from forms.hencky import FormLaw, Law
 from forms.history import (
+    DIFFERENCE,
+    LEAST,
     AtPoints,
     HistoryLaw,
     Response,
@@ -38,6 +40,9 @@ from forms.kinematics import Strained, strain
 
 #: Name of the part of the history.
 VARIABLES = "material"
+
+#: Name of strain and stress among the variables of a point.
+OF_STRAIN = ""
 
 
 class QuadratureLaws:
@@ -121,6 +126,10 @@ class QuadratureLaws:
         return self._function(self._size, self._size)
 
     @cached_property
+    def _weighed(self) -> fem.Function:
+        return self._function()
+
+    @cached_property
     def _rule(self) -> tuple[Array, Array]:
         """The points of the reference cell and their weights."""
         cell = self._domain.mesh.topology.cell_name()
@@ -180,19 +189,29 @@ class QuadratureLaws:
         kind
             "tangent" or "secant"; empty without stiffness.
         """
+        for law, cells, strains, variables in self._points(state, x):
+            response = law.respond(strains, variables, kind)
+            _check(law, strains, variables, response)
+            yield cells, with_stiffness(law, strains, variables, kind, response)
+
+    def _points(
+        self, state: Evaluated, x: Array
+    ) -> Iterator[tuple[HistoryLaw, Indices, Array, dict[str, Array]]]:
+        """Yield a law, some of its cells, and strains and variables before at their points."""
         before = self.of(state)
         for law, own in self._laws:
             assert before is not None
             values = self._pointwise.values("strain", self._strain, self.points, x, own)
             for cells, found in values:
-                variables = {
-                    name: self.by_cell(before.arrays[name])[cells].reshape(-1, *np.shape(first))
-                    for name, first in law.variables(self._size).items()
-                }
-                strains = found.reshape(-1, self._size)
-                response = law.respond(strains, variables, kind)
-                _check(law, strains, variables, response)
-                yield cells, with_stiffness(law, strains, variables, kind, response)
+                variables = self._at(before.arrays, law, cells)
+                yield law, cells, found.reshape(-1, self._size), variables
+
+    def _at(self, arrays: Mapping[str, Array], law: HistoryLaw, cells: Indices) -> dict[str, Array]:
+        """Return those of the variables of a law at the points of some of its cells."""
+        return {
+            name: self.by_cell(arrays[name])[cells].reshape(-1, *np.shape(first))
+            for name, first in law.variables(self._size).items()
+        }
 
     def by_cell(self, array: Array) -> Array:
         """Return values by place as those by cell and point."""
@@ -217,6 +236,78 @@ class QuadratureLaws:
                 by_cell = self.by_cell(arrays[name])
                 by_cell[cells] = values.reshape(by_cell[cells].shape)
         return before.replaced(arrays)
+
+    def commit_transposed(self, state: Evaluated, x: Array, after: InternalVariables) -> None:
+        """Let the forms look at the stresses whose forces are those of the variables' derivatives.
+
+        Parameters
+        ----------
+        state, x
+            The state that a step has led to, and its local unknowns of the nodes.
+        after
+            Derivatives of a quantity by the variables at the end of the step. The forces are then
+            its derivatives by the unknowns.
+        """
+        self._stress.x.array[:] = 0.0
+        for law, cells, strains, variables in self._points(state, x):
+            given = self._at(after.arrays, law, cells)
+            by_strain = _gradient(law, strains, variables, given, OF_STRAIN)
+            volumes = self.by_cell(self.volumes)[cells].ravel()
+            _fill(self._stress, cells, by_strain / volumes[:, None])
+
+    def before_transposed(
+        self, state: Evaluated, x: Array, along: Array, after: InternalVariables | None
+    ) -> InternalVariables | None:
+        """Return the derivatives of a quantity by the variables at the beginning of a step.
+
+        Parameters
+        ----------
+        state, x
+            As of `commit_transposed`.
+        along
+            Its derivatives by the forces of the stresses, local values of the nodes.
+        after
+            Its derivatives by the variables at the end of the step; None for a last step.
+        """
+        before = self.of(state)
+        if before is None:
+            return None
+        arrays = {name: np.zeros_like(array) for name, array in before.arrays.items()}
+        moved = self._points(state, along)
+        for (law, cells, strains, variables), (_, _, by_stress, _) in zip(
+            self._points(state, x), moved, strict=True
+        ):
+            given = {} if after is None else self._at(after.arrays, law, cells)
+            volumes = self.by_cell(self.volumes)[cells].ravel()
+            given[OF_STRAIN] = volumes[:, None] * by_stress
+            for name in variables:
+                by_cell = self.by_cell(arrays[name])
+                slopes = _gradient(law, strains, variables, given, name)
+                by_cell[cells] = slopes.reshape(by_cell[cells].shape)
+        return before.replaced(arrays)
+
+    def weigh(self, state: Evaluated, x: Array, after: InternalVariables) -> None:
+        """Let the form of `divided` look at a sum of weighted variables at the end of a step.
+
+        Parameters
+        ----------
+        state, x
+            As of `commit_transposed`.
+        after
+            The weights.
+        """
+        ends = self.commit(state, x)
+        assert ends is not None
+        total = sum(_dot(after.arrays[name], ends.arrays[name]) for name in after.arrays)
+        cells = np.arange(self._owned, dtype=np.int32)
+        _fill(self._weighed, cells, total / self.volumes)
+
+    def divided(self, functions: ufl.Argument) -> fem.Form | None:
+        """Return the form of the sum of `weigh`, divided among functions; None without any."""
+        if self.initial is None:
+            return None
+        dx = self._domain.dx(metadata={"quadrature_degree": self._degree})
+        return fem.form(functions * self._weighed * dx)
 
     def dissipation(self, state: Evaluated, x: Array) -> float:
         """Return the energy that was dissipated in the step that led to a state. Collective."""
@@ -269,6 +360,49 @@ class QuadratureLaws:
             for name, values in {**response.variables, "stress": response.stress}.items():
                 by_cell = values.reshape(cells.size, self.points.shape[0], -1)
                 _fill(self.fits[name], cells, np.einsum("dq,cqi->cdi", self._fitting, by_cell))
+
+
+def _gradient(
+    law: HistoryLaw,
+    strain: Array,
+    variables: Mapping[str, Array],
+    given: Mapping[str, Array],
+    name: str,
+) -> Array:
+    """Return a derivative of the response at each point, by central differences.
+
+    Parameters
+    ----------
+    law, strain, variables
+        The law, and the points.
+    given
+        Weights of the variables at the end, and of the stress under `OF_STRAIN`, whose sum is
+        differentiated.
+    name
+        By which variable at the beginning; `OF_STRAIN` by the strain.
+    """
+    point = {**variables, OF_STRAIN: strain}
+
+    def value(there: Array) -> Array:
+        moved = point | {name: there}
+        found = law.respond(moved.pop(OF_STRAIN), moved)
+        response = {**found.variables, OF_STRAIN: found.stress}
+        return np.sum([_dot(weight, response[part]) for part, weight in given.items()], axis=0)
+
+    flat = point[name].reshape(len(strain), -1)
+    step = max(DIFFERENCE * float(np.abs(flat).max(initial=0.0)), LEAST)
+    slopes = np.empty_like(flat)
+    for k in range(flat.shape[1]):
+        moved = np.zeros_like(flat)
+        moved[:, k] = step
+        way = moved.reshape(point[name].shape)
+        slopes[:, k] = (value(point[name] + way) - value(point[name] - way)) / (2 * step)
+    return slopes.reshape(point[name].shape)
+
+
+def _dot(one: Array, other: Array) -> Array:
+    """Return the products of values at each point, shape (n,)."""
+    return np.asarray((one * other).reshape(len(one), -1).sum(axis=1))
 
 
 def _check(

@@ -91,19 +91,36 @@ class WeakForms:
         u = ufl.as_vector([x[i] for i in range(self._dim)])
         return u, (None if self._body.piezo is None else self._body.phi_scale * x[self._dim])
 
-    def _internal(self, secant_at: Any, history_at: Any) -> list[ufl.Form]:
+    def work(self, along: fem.Function, functions: ufl.Argument) -> list[fem.Form]:
+        """Compile the work of the stresses at `at` along unknowns, divided among functions.
+
+        Parameters
+        ----------
+        along
+            The unknowns.
+        functions
+            The test function of a scalar space, whose functions add up to 1.
+        """
+        forms = self._internal(self.at, self.at, self.split(along), functions)
+        return fem.form(forms)
+
+    def _internal(
+        self, secant_at: Any, history_at: Any, test: Any = None, functions: Any = 1
+    ) -> list[ufl.Form]:
         """Return the forces at `at`, secants and the stiffness at points being those elsewhere.
 
         They are the forms of all quadrature rules, which add up: in one form FFCx would take values
         of a rule of one point for those of the others.
         """
-        (u, phi), (v, xi) = self.split(self.at), self._test
+        (u, phi), (v, xi) = self.split(self.at), test or self._test
         frozen = {False: self.split(secant_at)[0], True: self.split(history_at)[0]}
         return [
             sum(
-                sign * secant_form(law, u_0, u, v, kinematics) * dx
+                (sign * functions) * secant_form(law, u_0, u, v, kinematics) * dx
                 if piezo is None
-                else sign * symmetrised_form(law, piezo, u_0, u, phi, v, xi, kinematics) * dx
+                else (sign * functions)
+                * symmetrised_form(law, piezo, u_0, u, phi, v, xi, kinematics)
+                * dx
                 for sign, kinematics, law, piezo, dx in integrals
                 for u_0 in [frozen[isinstance(law, AtPoints)]]
             )

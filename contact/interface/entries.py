@@ -96,7 +96,7 @@ class Grouped:
 
     __call__, derivative = _each("__call__"), _each("derivative")
     by_slip, by_pressure = _each("by_slip"), _each("by_pressure")
-    at, gap_slope = _each("at"), _each("gap_slope")
+    at, gap_slope, transposed = _each("at"), _each("gap_slope"), _each("transposed")
     maximum, lipschitz, radius = _largest("maximum"), _largest("lipschitz"), _largest("radius")
     k_e, delta, follows_gap = _largest("k_e"), _largest("delta"), _largest("follows_gap")
 

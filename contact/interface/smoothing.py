@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Protocol
 
 import numpy as np
+from mpi4py import MPI
 from scipy import sparse
 from scipy.spatial import cKDTree
 
@@ -24,6 +25,9 @@ class Smoother(Protocol):
 
     def __call__(self, values: Array) -> Array:
         """Return R applied to nodal values, shape (n,). Collective."""
+
+    def transposed(self, values: Array) -> Array:
+        """Return R^T applied to nodal values, shape (n,). Collective."""
 
 
 class Smoothing:
@@ -52,6 +56,15 @@ class Smoothing:
         if self._matrix is None:
             return values
         return self._matrix @ self._nodes.gather(values)
+
+    def transposed(self, values: Array) -> Array:
+        """Return R^T applied to nodal values, shape (n,). Collective."""
+        if self._matrix is None:
+            return values
+        comm, own = self._nodes.comm, values.size
+        every = comm.allreduce(self._matrix.T @ values, op=MPI.SUM)
+        begin = comm.exscan(own) or 0  # none is before the first rank
+        return np.asarray(every[begin : begin + own])
 
 
 def _mollifier(nodes: ContactNodes, radius: float) -> sparse.csr_array:

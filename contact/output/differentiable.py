@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import partial
 from typing import Protocol, runtime_checkable
 
@@ -36,10 +36,6 @@ class Differentiable(Quantity, Protocol):
 
         Collective.
         """
-
-
-#: Relative change of the unknowns in the central difference of internal forces.
-STEP = 1e-6
 
 
 @dataclass(frozen=True)
@@ -131,16 +127,10 @@ class Reaction:
         return problem.equilibrium.product(self.weights(problem), residual)
 
     def gradient(self, problem: ContactProblem, state: State) -> tuple[Array, Array]:
-        """Return the derivatives: those of the residual are symmetric in the body. Collective."""
+        """Return the derivatives. Collective."""
         body, interface, jump = problem.equilibrium, problem.interface, problem.nodes
         weights = self.weights(problem)
-        size = body.norm(weights)
-        along = weights * (
-            STEP * max(body.norm(body.owned_part(state.x)), STEP) / max(size, 1e-300)
-        )
-        ways = [replace(state, x=body.moved(state.x, sign * along)) for sign in (1, -1)]
-        ahead, back = (body.internal_forces(way) for way in ways)
-        by_x = (ahead - back) * (size / (2 * max(body.norm(along), 1e-300)))
+        by_x = body.tangent_transposed(state, weights)
         seen = jump.apply(body.local(weights))
         by_force = jump.weight[:, None] * seen[:, : jump.dim]
         for law, nodal, pressure in interface.acting(state.x, state.forces):

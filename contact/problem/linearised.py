@@ -19,6 +19,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from contact.errors import InputError
 from contact.interface.active_set import ActiveSet
 from contact.interface.complementarity import ComplementarityParameters
 from contact.interface.jump import Multipliers
@@ -196,7 +197,7 @@ class Linearised:
         jump = self.problem.nodes
         rhs, left = -change.forces, -change.conditions
         x, f = np.zeros_like(rhs), np.zeros_like(left)
-        size, last = 0.0, np.inf
+        size, steps = 0.0, list[float]()
         while True:
             known = np.einsum("nij,nj->ni", self._regular, left)
             jump.transpose(-jump.weight[:, None] * known, rhs)
@@ -208,11 +209,9 @@ class Linearised:
             x, f = x + dx, f + df
             left = left - self._conditions_of(moved, df)
             rhs = np.zeros_like(rhs)
-            size, taken = max(size, self._norm(x, f)), self._norm(dx, df)
-            # The next correction is as much smaller than this one as this one than the last.
-            if not taken < last or taken**2 <= EPS * size * min(last, size):
+            size, steps = max(size, self._norm(x, f)), [*steps, self._norm(dx, df)]
+            if self._enough(steps, size):
                 return x, f
-            last = taken
 
     def solve_transposed(self, by_x: Array, by_force: Array) -> tuple[Array, Array]:
         """Return the adjoint unknowns and conditions of a gradient. Collective.
@@ -227,7 +226,7 @@ class Linearised:
         jump, weight = self.problem.nodes, self.problem.nodes.weight[:, None]
         rhs, left = by_x.copy(), by_force
         x, c = np.zeros_like(rhs), np.zeros_like(left)
-        size, last = 0.0, np.inf
+        size, steps = 0.0, list[float]()
         while True:
             known = np.einsum("nji,nj->ni", self._regular, left)
             jump.transpose(-np.einsum("nji,nj->ni", self._by_jump, known), rhs)
@@ -235,13 +234,13 @@ class Linearised:
             moved = weight * jump.apply(self._local(dx))[:, : jump.dim]
             dc = known - np.einsum("nji,nj->ni", self._regular, moved)
             x, c = x + dx, c + dc
-            left = left - moved - np.einsum("nji,nj->ni", self._by_force, dc)
+            by_jump, by_own = self._smoothed_transposed(dc)
+            left = left - moved - np.einsum("nji,nj->ni", self._by_force, dc) - by_own
             rhs = np.zeros_like(rhs)
-            size, taken = max(size, self._norm(x, c)), self._norm(dx, dc)
-            # The next correction is as much smaller than this one as this one than the last.
-            if not taken < last or taken**2 <= EPS * size * min(last, size):
+            jump.transpose(-by_jump, rhs)
+            size, steps = max(size, self._norm(x, c)), [*steps, self._norm(dx, dc)]
+            if self._enough(steps, size):
                 return x, c
-            last = taken
 
     def by_gap(self, x: Array, conditions: Array) -> Array:
         """Return the derivatives of a quantity by the gap at each node, shape (n,), given w.
@@ -270,9 +269,43 @@ class Linearised:
         bound = self._rate * self.problem.interface.friction.smoothing(pressure)
         return changed - bound[:, None] * self._along
 
+    def _smoothed_transposed(self, conditions: Array) -> tuple[Array, Array]:
+        """Return the derivatives by jumps and forces through a smoothed pressure. Collective."""
+        if self.local:
+            return np.zeros_like(self._layer), np.zeros_like(conditions)
+        by_bound = -self._rate * np.einsum("ni,ni->n", self._along, conditions)
+        by_pressure = self.problem.interface.friction.smoothing.transposed(by_bound)[:, None]
+        return by_pressure * self._layer, by_pressure * self.problem.nodes.normal
+
     def _local(self, owned: Array) -> Array:
         """Return an increment of owned unknowns with those of the ghosts. Collective."""
         return self.problem.equilibrium.local(owned)
+
+    @staticmethod
+    def _enough(taken: list[float], size: float) -> bool:
+        """Tell whether no correction is to follow the last one.
+
+        Parameters
+        ----------
+        taken
+            The norms of all corrections.
+        size
+            That of the solution.
+
+        Raises
+        ------
+        InputError
+                If they do not halve from one to the next.
+        """
+        last, now = (np.inf, *taken)[-2:]
+        if EPS * 2.0 ** len(taken) > 1:
+            raise InputError(
+                "friction.radius: the coupling of the nodes by a smoothed pressure is too strong "
+                "for derivatives; accepted: a smaller radius or coefficient of friction"
+            )
+        # Rounding, or the next correction is as much smaller than this one as this one than the
+        # last. The first ones may grow, as the smoothed pressure follows.
+        return (now >= last and now <= WEAK * size) or now**2 <= EPS * size * min(last, size)
 
     def _norm(self, x: Array, nodal: Array) -> float:
         """Return the norm of owned unknowns, or of nodal values where these are larger."""

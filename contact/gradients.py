@@ -1,0 +1,169 @@
+"""Gradients of results by fields: the gap along a surface, a constant of a material in the body.
+
+A field has one parameter a node or cell. One adjoint gives the derivatives by all of them, for
+dR/dm of each is local to its place: that of the gap is known node by node, and of a constant of a
+material the central difference of the work of the stresses along the adjoint, divided among the
+functions of the field.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+from dolfinx import fem
+from dolfinx.mesh import Mesh
+
+from contact.arguments import expect
+from contact.body.field_work import FieldWork
+from contact.body.internal_variables import VARIABLES
+from contact.derivatives import (
+    Adjoint,
+    Family,
+    Parameter,
+    Path,
+    backwards,
+    parameters_of,
+    quantities_of,
+)
+from contact.errors import InputError
+from contact.history import InternalVariables
+from contact.output.differentiable import Differentiable, Quantity
+from contact.output.solution import Solution
+from contact.problem.linearised import Linearised
+from contact.typing import Array
+
+#: Section of a case with the constants that may be fields.
+MATERIAL = "material"
+
+
+def gap_gradient(solution: Solution, quantity: str | Quantity) -> Array:
+    """Return the derivatives of a result by the gap at each contact node. Collective.
+
+    One adjoint gives them all: the gradient for the shape of a foundation.
+
+    Parameters
+    ----------
+    solution
+        A converged solution; of an evolution the gap is that of all steps.
+    quantity
+        A name as of `sensitivity`, or a quantity with a `gradient`; no layer or conductive
+        foundation may depend on the gap.
+
+    Returns
+    -------
+    Those of the nodes of this rank, in the order of ``solution.problem.nodes``, shape (n,).
+
+    Raises
+    ------
+    InputError
+        As `sensitivity`, and where a layer or a current depends on the gap.
+
+    Examples
+    --------
+    >>> gradient = gap_gradient(solution, "max_pressure")  # doctest: +SKIP
+    >>> points = solution.problem.nodes.points  # doctest: +SKIP
+    """
+    path, asked = Path(solution), _one(solution, quantity)
+    law = solution.problem.interface.law
+    if law.layer is not None or law.follows_gap:
+        raise InputError("gap_gradient: the layer or current depends on the gap; accepted: neither")
+    found = np.zeros_like(solution.problem.nodes.gap)
+    for linearised, adjoints in backwards(path, asked):
+        for one in adjoints.values():
+            found += linearised.by_gap(one.x, one.conditions)
+    return found
+
+
+def field_gradient(
+    solution: Solution,
+    quantity: str | Quantity,
+    parameter: str | Parameter = "material.young",
+    degree: int = 0,
+) -> fem.Function:
+    """Return the derivatives of a result by a constant of a material as a field. Collective.
+
+    One adjoint gives them all, whatever the number of cells: the gradient for the identification
+    or the design of a modulus in the body.
+
+    Parameters
+    ----------
+    solution
+        A converged solution.
+    quantity
+        A name as of `sensitivity`, or a quantity with a `gradient`.
+    parameter
+        Key of a constant of a material: ``material.young``, ``material.1.poisson``,
+        ``material.piezo.e33``. Or a `Parameter`, for a problem that was built in Python.
+    degree
+        0: one value a cell. 1: one a vertex, linear between them.
+
+    Returns
+    -------
+    Coefficient i is the derivative by the coefficient m_i of the field sum m_i phi_i (DG0 or P1),
+    of the unit of the result over that of the constant. They add up to the derivative by the
+    constant itself; cells of other materials have none.
+
+    Raises
+    ------
+    InputError
+        As `sensitivity`, and where the parameter is none of a material.
+
+    Examples
+    --------
+    >>> gradient = field_gradient(solution, "max_pressure")  # doctest: +SKIP
+    >>> gradient.x.array  # doctest: +SKIP
+    """
+    expect("field_gradient: degree", degree, "0 (cells) or 1 (vertices)", degree in (0, 1))
+    key = parameter if isinstance(parameter, str) else "parameter"
+    inside = not isinstance(parameter, str) or key.split(".")[0] == MATERIAL
+    expect("field_gradient: parameter", key, "a constant of a material: material.young", inside)
+    path, asked = Path(solution), _one(solution, quantity)
+    given = [parameter] if isinstance(parameter, str) else {key: parameter}
+    ((_, made),) = parameters_of(solution, given)
+    gradient = _FieldGradient(path.base.domain.mesh, path.family(key, made), degree)
+    for linearised, adjoints in backwards(path, asked):
+        for one in adjoints.values():
+            gradient.add(linearised, one)
+    return gradient.function()
+
+
+def _one(solution: Solution, quantity: str | Quantity) -> Mapping[str, Differentiable]:
+    """Return a quantity that has a gradient by a name. Collective."""
+    given = [quantity] if isinstance(quantity, str) else {"quantity": quantity}
+    ((name, found),) = quantities_of(solution, given).items()
+    words = "a quantity with a gradient"
+    expect("quantity", found, words, isinstance(found, Differentiable))
+    return {name: found}  # type: ignore[dict-item]
+
+
+class _FieldGradient:
+    """The gradient by a field, which each step adds to.
+
+    Parameters
+    ----------
+    mesh, degree
+        Of the field.
+    family
+        The problems at two values of the constant.
+    """
+
+    def __init__(self, mesh: Mesh, family: Family, degree: int) -> None:
+        self._space = fem.functionspace(mesh, ("DG" if degree == 0 else "Lagrange", degree))
+        self._works = [FieldWork(there.equilibrium, self._space) for there in family.problems]
+        self._family, self._found = family, np.zeros(self._space.dofmap.index_map.size_local)
+
+    def add(self, linearised: Linearised, adjoint: Adjoint) -> None:
+        """Add the part of a step. Collective."""
+        state, scale = linearised.state, linearised.problem.equilibrium.phi_scale
+        weights = None if adjoint.after is None else adjoint.after.get(VARIABLES)
+        assert weights is None or isinstance(weights, InternalVariables)
+        ahead, behind = (work(state, adjoint.along, scale, weights) for work in self._works)
+        self._found += self._family.slope(ahead, behind)
+
+    def function(self) -> fem.Function:
+        """Return the gradient as a function of the field's space. Collective."""
+        made = fem.Function(self._space, name="gradient")
+        made.x.array[: self._found.size] = self._found
+        made.x.scatter_forward()
+        return made
