@@ -52,9 +52,9 @@ from contact.typing import Array
 
 logger = logging.getLogger("contact.sensitivity")
 
-#: Relative change of parameters in central differences: their error and that of rounding are some
-#: 1e-10 then.
-STEP = 1e-5
+#: Relative change of parameters in central differences: their error, largest with plastic flow, and
+#: that of rounding are some 1e-10 then.
+STEP = 2e-6
 
 #: Problems and states a little above and below a parameter.
 _Sides = list[tuple[ContactProblem, State]]

@@ -43,12 +43,13 @@ def test_bar_by_its_friction_coefficient():
     assert [found[name]["material.young"] for name in names] == pytest.approx([0, 0, 0], abs=1e-11)
 
 
-@pytest.mark.parametrize("family", [f for f in FAMILIES if not f.startswith("evolution")])
+@pytest.mark.parametrize("family", FAMILIES)
 def test_differences_and_adjoint(family):
-    _, apart, adjoint, weak = compared(FAMILIES.index(family), SELF)
-    assert weak == 0
-    assert apart < 1e-6
-    assert adjoint < 1e-10
+    found = compared(FAMILIES.index(family), SELF, each=False)
+    assert found.weak == 0
+    assert found.apart < 1e-6
+    # The update of internal variables is differentiated numerically.
+    assert found.adjoint < (1e-9 if "j2" in family else 1e-10)
 
 
 @pytest.mark.parallel
@@ -78,15 +79,15 @@ def test_steps_and_their_adjoint():
     assert adjoint.method == "adjoint"
     for key in keys:
         steps = found.steps["contact_force_x"][key]
-        assert steps.shape == (9,)
+        assert steps.shape == (6,)
         assert adjoint["contact_force_x"][key] == pytest.approx(steps[-1], rel=1e-9)
     # each step by itself is the end of a shorter run
     data = problem(FAMILIES.index("evolution, slip"))[1]
-    data["evolution"] |= {"times": [0.0, 1.0, 2.0], "steps": [3, 3]}
+    data["evolution"] |= {"times": [0.0, 1.0, 2.0], "steps": [2, 2]}
     shorter = sensitivity(solve(parse_case(data), comm=SELF), ["contact_force_x"], keys)
     for key in keys:
         assert shorter["contact_force_x"][key] == pytest.approx(
-            found.steps["contact_force_x"][key][5], rel=1e-8
+            found.steps["contact_force_x"][key][3], rel=1e-8
         )
 
 

@@ -58,7 +58,7 @@ def number_at(case: Case, key: str) -> float:
 def with_number(case: Case, key: str, value: float) -> Case:
     """Return a case with another number at a key; see `number_at`."""
     data = tomllib.loads(to_toml(case, anchored=True))
-    override(data, f"{key}={value!r}", case.source)
+    override(data, f"{key}={float(value)!r}", case.source)
     return parse_case(data, ".", case.source)
 
 

@@ -1,30 +1,33 @@
 """Derivatives by every parameter of random problems, against central differences of solutions.
 
-`python3 -m scripts.studies.derivatives [COUNT] [FIRST]` prints a row a problem: the largest
-relative difference of tangent and central differences, and of tangent and adjoint.
+`python3 -m scripts.studies.derivatives [--out DIR] [--count N] [--together] [--coarse]`, also under
+mpirun.
 """
 
-import logging
-import sys
+import csv
 import time
 import tomllib
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from mpi4py import MPI
 
 from contact import solve
+from contact.case.build import build_problem
 from contact.case.file import Case, parse_case
 from contact.case.text import number_at, to_toml, with_number
-from contact.derivatives import sensitivity
+from contact.derivatives import Parameter, sensitivity
 from contact.output.differentiable import named_quantities
 from contact.output.solution import Solution
+from contact.problem.problem import ContactProblem
 from contact.typing import Array
+from scripts.reporting import Report, append, parser
 
 #: Relative change of a parameter in the central differences, and sections with parameters.
 STEP = 1e-4
-SECTIONS = ("material", "fixed", "load", "contact", "friction", "electric")
+SECTIONS = ("material", "fixed", "load", "contact", "friction", "electric", "electrode")
 
 #: Numbers that are no parameters: they choose, or leave the problem as it is.
 CHOICES = ("radius", "layer", "yield_strain")
@@ -48,7 +51,7 @@ def block(rng: np.random.Generator, cells: int = 12) -> dict[str, Any]:
     }
 
 
-def evolving(data: dict[str, Any], steps: int = 3) -> dict[str, Any]:
+def evolving(data: dict[str, Any], steps: int = 2) -> dict[str, Any]:
     """Return a block that is pressed, sheared and sheared back."""
     (top,) = data["fixed"]
     push, press = top["displacement"]
@@ -106,6 +109,7 @@ def problem(seed: int) -> tuple[str, dict[str, Any]]:
         ]
         data["fixed"] = [{"on": "lower_bottom", "displacement": [0.0, 0.0]}]
         traction = [rng.uniform(-0.003, 0.003), -rng.uniform(0.01, 0.02)]
+        data["friction"]["mu"] = max(data["friction"]["mu"], 0.4)  # which holds the upper one
         data["load"] = [{"on": "upper_top", "traction": traction}]
         data["contact"] = {"on": "upper_bottom", "against": "lower_top"}
     elif family == "ball under a force":
@@ -119,6 +123,17 @@ def problem(seed: int) -> tuple[str, dict[str, Any]]:
         data["mesh"] = {"generator": "box", "size": [2.0, 1.0, 1.0], "cells": [4, 3, 3]}
         data["fixed"] = [{"on": "top", "displacement": [push, 0.3 * push, press]}]
         data["contact"]["gap"] = "0.01*((x - 0.9)**2 + (y - 0.4)**2)"
+    elif family == "smoothed":
+        data["friction"]["radius"] = rng.uniform(0.1, 0.3)
+    elif family == "evolution, j2":
+        hardening = {"yield_stress": 0.01 * data["material"]["young"], "hardening": 0.2}
+        data["material"] |= {"law": "j2", **hardening}
+        data = evolving(data)
+    elif family == "evolution, electrode":
+        data["material"] = {"young": 100.0, "poisson": 0.3, "piezo": PIEZO}
+        data["electric"] = {"law": "perfect", "k_e": rng.uniform(0.5, 2), "phi_f": 0.05}
+        data["electrode"] = [{"on": "top", "charge": rng.uniform(-0.1, 0.1)}]
+        data = evolving(data)
     elif family == "revolution":
         data["space"] = {"kinematics": "axisymmetric", "degree": 2}
         data["fixed"] = [{"on": "top", "displacement": [0.0, -0.01]}]
@@ -139,6 +154,9 @@ FAMILIES = (
     "ball under a force",
     "3-D",
     "revolution",
+    "smoothed",
+    "evolution, j2",
+    "evolution, electrode",
 )
 
 
@@ -159,71 +177,150 @@ def _numbers(value: Any, path: str) -> Iterator[str]:
         yield path
 
 
-def differences(
-    solution: Solution, names: list[str], given: list[str], comm: MPI.Intracomm
-) -> Array:
-    """Return the derivatives by central differences of solutions, (quantities, parameters)."""
-    case, columns = solution.source, []
-    assert case is not None
-    for key in given:
-        at = number_at(case, key)
-        ends = []
-        for sign in (1, -1):
-            here = solve(with_number(case, key, at * (1 + sign * STEP)), comm=comm)
-            known = named_quantities(here.problem)
-            problem = here.problem.at(here.state.time, here.state.history)
-            ends.append([known[name](problem, here.state) for name in names])
-        columns.append((np.array(ends[0]) - np.array(ends[1])) / (2 * STEP * at))
-    return np.array(columns).T
+def values(solution: Solution, names: list[str]) -> Array:
+    """Return results of the end of a solution. Collective."""
+    known, state = named_quantities(solution.problem), solution.state
+    problem = solution.problem.at(state.time, state.history)
+    return np.array([known[name](problem, state) for name in names])
 
 
-def compared(seed: int, comm: MPI.Intracomm) -> tuple[str, float, float, int]:
-    """Return the family, the largest differences with central differences and with the adjoint.
+def moved(case: Case, way: Mapping[str, float], by: float) -> Case:
+    """Return a case with each of some numbers changed by so many times its way, relatively."""
+    for key, change in way.items():
+        case = with_number(case, key, number_at(case, key) * (1 + by * change))
+    return case
 
-    Both are relative. And the number of nodes that are weakly active.
+
+def differences(solution: Solution, names: list[str], way: Mapping[str, float]) -> Array:
+    """Return the derivatives along a way of parameters by central differences of solutions.
+
+    Parameters
+    ----------
+    solution, names
+        The solution, and results of it.
+    way
+        Key -> change of the parameter, relative to its value.
+    """
+    comm, case = solution.problem.comm, solution.source
+    ends = [values(solve(moved(case, way, by), comm=comm), names) for by in (STEP, -STEP)]
+    return (ends[0] - ends[1]) / (2 * STEP)
+
+
+@dataclass(frozen=True)
+class Compared:
+    """Relative differences of the tangent, the largest over results and ways.
+
+    Attributes
+    ----------
+    apart, adjoint
+        To central differences of solutions, and to the adjoint.
+    weak
+        Number of weakly active nodes.
+    parameters, results
+        How many there are; of all parameters along one way one.
+    """
+
+    family: str
+    apart: float
+    adjoint: float
+    weak: int
+    parameters: int
+    results: int
+
+
+def compared(seed: int, comm: MPI.Intracomm, each: bool = True) -> Compared:
+    """Compare the derivatives of a random problem by all of its parameters. Collective.
+
+    Parameters
+    ----------
+    seed, comm
+        Number of the problem, and the ranks.
+    each
+        Derivatives by each parameter; else along one random way of all at once, beside which two
+        solutions are enough.
     """
     family, data = problem(seed)
     solution = solve(parse_case(data), comm=comm)
     given = keys(solution.source)
     names = ["contact_force_x", "contact_force_y", "max_pressure", "max_displacement"]
-    if family == "revolution":
-        names = names[1:]
+    names = names[1:] if family == "revolution" else names
     if family == "ball under a force":
         names += ["rigid_x", "rigid_y"]
     if family == "piezo":
         names += ["charge_foundation", "charge_top"]
-    found = sensitivity(solution, names, given, "tangent")
-    adjoint = sensitivity(solution, names, given, "adjoint")
-    tangent, other = (
-        np.array([[of[name][key] for key in given] for name in names]) for of in (found, adjoint)
+    if family == "evolution, electrode":
+        names += ["charge_foundation", "potential_top", "reactions.top.x"]
+    size = np.array([number_at(solution.source, key) for key in given])
+    ways, parameters = np.eye(len(given)), given
+    if not each:
+        size, ways = np.ones(1), np.random.default_rng(seed).uniform(-1, 1, (len(given), 1))
+        way = dict(zip(given, ways[:, 0], strict=True))
+
+        def along(by: float) -> ContactProblem:
+            return build_problem(moved(solution.source, way, by), comm)
+
+        parameters = {"way": Parameter(0.0, along)}
+    found = sensitivity(solution, names, parameters, "tangent")
+    other = sensitivity(solution, names, parameters, "adjoint")
+    # By relative changes of the parameters: in the units of the results.
+    tangent, adjoint = (
+        np.array([[of[name][key] for key in parameters] for name in names]) * size
+        for of in (found, other)
     )
-    apart = differences(solution, names, given, comm)
-    size = np.abs([number_at(solution.source, key) for key in given])
-    known = named_quantities(solution.problem)
-    values = np.abs([[known[name](solution.problem, solution.state)] for name in names])
-    natural = np.maximum(values, 1e-300) / size
-    return (
+    apart = np.column_stack(
+        [differences(solution, names, dict(zip(given, way, strict=True))) for way in ways.T]
+    )
+    natural = np.maximum(np.abs(values(solution, names)), 1e-300)[:, None]
+    return Compared(
         family,
         float((np.abs(tangent - apart) / np.maximum(np.abs(apart), LEAST * natural)).max()),
-        float((np.abs(tangent - other) / np.maximum(np.abs(tangent), natural)).max()),
+        float((np.abs(tangent - adjoint) / np.maximum(np.abs(tangent), natural)).max()),
         len(found.weakly_active),
+        len(parameters),
+        len(names),
     )
 
 
-def main() -> None:
-    """Print a row a problem."""
-    logging.disable(logging.WARNING)
-    count, first = (int(text) for text in [*sys.argv[1:], *("60", "0")[len(sys.argv) - 1 :]])
-    comm = MPI.COMM_WORLD
-    for seed in range(first, first + count):
-        begin = time.perf_counter()
-        family, apart, adjoint, weak = compared(seed, comm)
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Compare the problems, and tabulate what is there of all numbers of ranks."""
+    made = parser(__doc__, "derivatives")
+    made.add_argument("--count", type=int, default=60, help="number of problems")
+    made.add_argument("--together", action="store_true", help="all parameters along one way")
+    given, comm = made.parse_args(arguments), MPI.COMM_WORLD
+    report = Report(given.out)
+    rows: dict[str, list[Any]] = {name: [] for name in ("ranks", *Compared.__annotations__)}
+    for seed in range(len(FAMILIES) if given.coarse else given.count):
+        begin, one = time.perf_counter(), compared(seed, comm, not (given.together or given.coarse))
+        append(rows, comm.size, *vars(one).values())
         if comm.rank == 0:
-            seconds = time.perf_counter() - begin
-            print(
-                f"{seed:3} {family:20} {apart:8.1e} {adjoint:8.1e} {weak:3} {seconds:6.1f} s",
-                flush=True,
-            )
+            print(seed, *vars(one).values(), f"{time.perf_counter() - begin:.1f} s", flush=True)
+    report.numbers(f"problems-{comm.size}", rows)
+    if comm.rank == 0:
+        tabulate(report)
+
+
+def tabulate(report: Report) -> None:
+    """Tabulate the problems of all runs in the folder by family."""
+    columns: dict[str, list[Any]] = {
+        name: [] for name in ("family", "ranks", "problems", "derivatives", "apart", "adjoint")
+    }
+    for path in sorted(report.out.glob("problems-*.csv")):
+        with path.open(newline="") as stream:
+            every = list(csv.DictReader(stream))
+        for family in FAMILIES:
+            own = [row for row in every if row["family"] == family]
+            number = sum(int(row["parameters"]) * int(row["results"]) for row in own)
+            worst = [max(float(row[name]) for row in own) for name in ("apart", "adjoint")]
+            append(columns, family, every[0]["ranks"], len(own), number, *worst)
+    report.table(
+        "problems",
+        "Derivatives of random problems by all their parameters",
+        columns,
+        "Largest relative difference of the tangent to central differences of solutions (apart), "
+        "and to the adjoint. Derivatives are compared relative to themselves, but to not less than "
+        "a hundredth of the result (apart) or the result (adjoint) over the parameter. On several "
+        "ranks along one random way of all parameters.",
+    )
 
 
 if __name__ == "__main__":
