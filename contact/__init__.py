@@ -21,8 +21,8 @@ and a problem that is put together in Python by
   `Level`, `Triangles`, a `Shape` of your own; `Layer`; `Friction`, `SlipCoefficient`, `Coulomb`;
   `Conductor` with `ShiftedConductivity`, `RampConductivity`, `PerfectConductivity`.
 - Solving: `Problem`, `solve`, `evolve`; `NewtonOptions`, `FixedPointOptions`, `PenaltyOptions`.
-- Derivatives: `sensitivity` by `Parameter` gives `Sensitivities`; `gap_gradient`; `identify` with
-  `read_data` finds parameters from measurements, `Identified`.
+- Derivatives: `sensitivity` by `Parameter` gives `Sensitivities`; `gap_gradient` and
+  `field_gradient`; `identify` with `read_data` finds parameters from measurements, `Identified`.
 - Case files: `Case`, `load_case`, `parse_case`, `build_problem`.
 - Results: `Solution`, `write_outputs`. Errors: `InputError`; `NotConvergedError` of a load step;
   `SolveInterrupted` by Ctrl-C.

@@ -5,12 +5,21 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from dolfinx.mesh import create_rectangle, locate_entities_boundary
 from mpi4py import MPI
 
 from contact import (
+    Body,
+    Contact,
+    Fixed,
+    Friction,
     InputError,
+    Linear,
+    Material,
     NewtonOptions,
     Parameter,
+    Problem,
+    field_gradient,
     gap_gradient,
     load_case,
     parse_case,
@@ -20,8 +29,12 @@ from contact import (
 from contact.case.build import build_problem
 from contact.case.text import with_number
 from contact.derivatives import logger
+from contact.linear.operator import SparseOperator
+from contact.mesh.domain import from_mesh
 from contact.output.differentiable import named_quantities
-from scripts.studies.derivatives import FAMILIES, compared, problem
+from contact.problem.linearised import Linearised
+from scripts.studies.derivative_values import products
+from scripts.studies.derivatives import FAMILIES, compared, problem, values
 from tests.problems.rigid import indented
 
 SELF = MPI.COMM_SELF
@@ -146,21 +159,163 @@ def test_gradient_by_the_gap(family):
     assert gradient @ change == pytest.approx((force(way) - force(-way)) / (2 * way), rel=1e-6)
 
 
-def test_weakly_active_nodes_are_named(monkeypatch):
-    # a block that rests without friction on a plane: pushed by exactly mu p it is at the border
-    data = {
+def pushed(mu, press=-0.01):
+    """Return a small block that rests on a plane, and is pressed and pushed on its top."""
+    return {
         "mesh": {"generator": "rectangle", "size": [1.0, 1.0], "cells": [4, 4]},
         "material": {"young": 1.0, "poisson": 0.0},
-        "fixed": [{"on": "top", "displacement": [0.0, -0.01]}],
-        "contact": {"on": "bottom", "gap": 0.01},
-        "friction": {"law": "coulomb", "mu": 0.3},
+        "fixed": [{"on": "top", "displacement": [0.001, press]}],
+        "contact": {"on": "bottom"},
+        "friction": {"law": "coulomb", "mu": mu},
+        "solver": {"tolerance": 1e-12},
     }
+
+
+def test_nodes_that_touch_without_pressure_are_named(monkeypatch):
+    data = pushed(0.3) | {"contact": {"on": "bottom", "gap": 0.01}}
+    data["fixed"] = [{"on": "top", "displacement": [0.0, -0.01]}]
     run, said = solve(parse_case(data), comm=SELF), []
     monkeypatch.setattr(logger, "warning", lambda text, *_: said.append(text))
     found = sensitivity(run, ["max_pressure"], ["fixed.0.displacement.1"])
     assert len(found.weakly_active) == 5
     assert found.weakly_active[:, 1] == pytest.approx(np.zeros(5), abs=1e-12)
     assert "between two states" in said[0]
+
+
+def test_a_node_at_its_bound_is_named_and_the_derivative_is_one_sided():
+    # all stick at mu = 3; with mu the largest ratio of friction to pressure one node is at its
+    # bound, and the solution is the same
+    forces = solve(parse_case(pushed(3.0)), comm=SELF).state.forces
+    ratio = np.linalg.norm(forces.friction, axis=1) / forces.pressure
+    case, name = parse_case(pushed(float(ratio.max()))), "contact_force_x"
+    run = solve(case, comm=SELF)
+    found = sensitivity(run, [name], ["friction.mu"])
+    at = run.problem.nodes.points[np.isclose(ratio, ratio.max(), rtol=1e-9)]
+    assert len(at) < 5  # the others are away from it
+    order = np.lexsort(at.T)
+    assert found.weakly_active == pytest.approx(at[order])
+    # above, all stick and nothing changes; below, it slips: the derivative is one of these
+    step = 1e-4 * ratio.max()
+    here, above, below = (
+        values(solve(with_number(case, "friction.mu", ratio.max() + by), comm=SELF), [name])[0]
+        for by in (0.0, step, -step)
+    )
+    sides = (above - here) / step, (here - below) / step
+    assert abs(sides[0]) < 1e-8 < 1e-5 < abs(sides[1])
+    one = found[name]["friction.mu"]
+    assert min(abs(one - side) for side in sides) < 1e-3 * abs(sides[1])
+
+
+@pytest.mark.parallel
+@pytest.mark.parametrize("family", ["evolution, j2", "evolution, slip", "two bodies", "piezo"])
+def test_gradient_by_a_field_adds_up(family):
+    key = "material.0.young" if family == "two bodies" else "material.young"
+    names = ["contact_force_y", "max_pressure"]
+    names += ["charge_top"] if family == "piezo" else ["max_displacement"]
+    run = solve(parse_case(problem(FAMILIES.index(family))[1]), comm=MPI.COMM_WORLD)
+    found = sensitivity(run, names, [key])
+    for name, degree in zip(names, (0, 1, 0), strict=True):
+        gradient = field_gradient(run, name, key, degree)
+        owned = gradient.function_space.dofmap.index_map.size_local
+        total = MPI.COMM_WORLD.allreduce(float(gradient.x.array[:owned].sum()))
+        assert total == pytest.approx(found[name][key], rel=1e-7, abs=1e-10)
+
+
+def test_gradient_by_a_field_cell_by_cell():
+    # three cells are regions of their own, whose moduli can be changed
+    mesh = create_rectangle(SELF, [[0.0, 0.0], [2.0, 1.0]], [8, 4])
+    cells = mesh.topology.index_map(2).size_local
+    alone = np.array([5, 20, 40], dtype=np.int32)
+    rest = np.setdiff1d(np.arange(cells, dtype=np.int32), alone)
+    parts = {
+        name: locate_entities_boundary(mesh, 1, lambda x, y=y: np.isclose(x[1], y))
+        for name, y in (("top", 1.0), ("bottom", 0.0))
+    }
+    regions = {"rest": rest} | {f"cell {k}": alone[k : k + 1] for k in range(3)}
+    domain = from_mesh(mesh, parts, regions=regions)
+
+    def build(*changes):
+        moduli = {"rest": 1.0} | {f"cell {k}": 1.0 + change for k, change in enumerate(changes)}
+        body = Body(
+            [Material(Linear(young, 0.3), on=name) for name, young in moduli.items()],
+            [Fixed("top", [0.005, -0.02])],
+        )
+        contact = Contact("bottom", lambda x: 0.01 * (x[0] - 0.9) ** 2)
+        return Problem(domain, body, contact, Friction(mu=0.3))
+
+    def solved(*changes):
+        run = solve(build(*changes), NewtonOptions(tolerance=1e-13))
+        return run, values(run, ["contact_force_x"])[0]
+
+    step, run = 1e-4, solved(0.0, 0.0, 0.0)[0]
+    for k, cell in enumerate(alone):
+
+        def one(value, k=k):
+            return build(*np.where(np.arange(3) == k, value - 1, 0.0))
+
+        gradient = field_gradient(run, "contact_force_x", Parameter(1.0, one)).x.array
+        up, down = (solved(*np.where(np.arange(3) == k, by, 0.0))[1] for by in (step, -step))
+        assert gradient[cell] == pytest.approx((up - down) / (2 * step), rel=1e-6)
+        assert np.count_nonzero(gradient) == 1
+    # one adjoint gives all cells the same values
+    every = Parameter(1.0, lambda value: build(*[value - 1] * 3))
+    gradient = field_gradient(run, "contact_force_x", every).x.array
+    assert np.array_equal(np.flatnonzero(gradient), alone)
+
+
+def test_gradients_cost_no_more_than_one_parameter(monkeypatch):
+    run, taken = solution(0), []
+    transposed = SparseOperator.solve_transposed
+
+    def counted(self, rhs):
+        taken.append(rhs.size)
+        return transposed(self, rhs)
+
+    monkeypatch.setattr(SparseOperator, "solve_transposed", counted)
+    counts = []
+    for made in (
+        lambda: sensitivity(run, ["contact_force_x"], ["friction.mu"], "adjoint"),
+        lambda: gap_gradient(run, "contact_force_x"),
+        lambda: field_gradient(run, "contact_force_x"),
+    ):
+        taken.clear()
+        made()
+        counts.append(len(taken))
+    assert counts[0] == counts[1] == counts[2] > 0
+
+
+@pytest.mark.parametrize(
+    "family", ["slip", "smoothed", "evolution, electrode", "ball under a force"]
+)
+def test_transposed_solves(family):
+    assert products(solution(FAMILIES.index(family))) < 1e-12
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (("max_pressure", "friction.mu"), "field_gradient: parameter: given 'friction.mu'; accept"),
+        (("max_pressure", "material.young", 2), "field_gradient: degree: given 2; accepted: 0"),
+        ((lambda problem, state: 0.0,), "quantity: given .*; accepted: a quantity with a gradient"),
+    ],
+)
+def test_gradients_refused(arguments, message):
+    with pytest.raises(InputError, match=message):
+        field_gradient(solution(0), *arguments)
+
+
+def test_an_unsymmetric_stiffness_beside_a_free_foundation_is_refused():
+    data = problem(FAMILIES.index("ball under a force"))[1]
+    kinematic = [{"modulus": 0.3, "recovery": 5.0}]
+    data["material"] = {"law": "j2", "young": 1.0, "poisson": 0.3, "yield_stress": 1.0}
+    data["material"]["kinematic"] = kinematic
+    with pytest.raises(InputError, match=r"is not symmetric, .* accepted: kinematic hardening"):
+        sensitivity(solve(parse_case(data), comm=SELF), ["rigid_y"], ["friction.mu"])
+
+
+def test_a_smoothed_pressure_that_couples_too_much_is_refused():
+    with pytest.raises(InputError, match=r"friction.radius: the coupling .* accepted: a smaller"):
+        Linearised._enough([0.9**k for k in range(60)], 1.0)
 
 
 @pytest.mark.parametrize(

@@ -282,7 +282,7 @@ def compared(seed: int, comm: MPI.Intracomm, each: bool = True) -> Compared:
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
-    """Compare the problems, and tabulate what is there of all numbers of ranks."""
+    """Compare the problems, and tabulate those of all numbers of ranks in the folder."""
     made = parser(__doc__, "derivatives")
     made.add_argument("--count", type=int, default=60, help="number of problems")
     made.add_argument("--together", action="store_true", help="all parameters along one way")

@@ -1,0 +1,341 @@
+"""Derivatives beside closed forms and published values, and their cost.
+
+`python3 -m scripts.studies.derivative_values [--out DIR] [--coarse]`: exponents of indentation,
+Cattaneo's and Mindlin's balls, the current through a column, the bar of Example 7.2; remainders of
+Taylor's series, transposed solves, and the cost beside that of a solution.
+"""
+
+from __future__ import annotations
+
+import time
+import tomllib
+from collections.abc import Sequence
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+import numpy as np
+
+from contact import field_gradient, gap_gradient, load_case, parse_case, sensitivity
+from contact.case.file import Case
+from contact.case.text import number_at, to_toml, with_number
+from contact.derivatives import Path as Steps
+from contact.output.differentiable import named_quantities
+from contact.output.solution import Solution
+from contact.typing import Array
+from forms.elasticity import hexagonal
+from forms.piezo import hexagonal_voigt
+from scripts.cases import CASES
+from scripts.reporting import Report, append, options, solved
+from scripts.studies.derivatives import block, evolving
+from scripts.studies.half_space import HalfSpace
+from scripts.studies.indentation import Setting
+from scripts.studies.mindlin import MU, RADIUS, YOUNG, write_mesh
+
+#: Constants of PZT-4 (GPa, C/m2, nF/m).
+STIFFNESS = {"c11": 139.0, "c12": 77.8, "c13": 74.3, "c33": 113.0, "c44": 25.6}
+PIEZO = {"e31": -6.98, "e33": 13.84, "e15": 13.44, "beta11": 6.0, "beta33": 5.47}
+
+#: Those by which the exponents of the force are tabulated.
+BY = ("c11", "c33", "c44", "c13", "e31", "e33", "e15", "beta11", "beta33")
+
+#: Extents of the boxes that stand for a half space, in contact radii.
+BOXES = (15.0, 30.0)
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Make the tables."""
+    given = options(__doc__, "derivatives", arguments)
+    report, coarse = Report(given.out), given.coarse
+    known(report, coarse)
+    exponents(report, 4.0 if coarse else 12.0)
+    remainders(report)
+    cost(report, coarse)
+
+
+def relative(solution: Solution, name: str, keys: Sequence[str]) -> Array:
+    """Return d ln Q/d ln m of a result by parameters."""
+    found = sensitivity(solution, [name], keys)[name]
+    value = named_quantities(solution.problem)[name](solution.problem, solution.state)
+    return np.array([found[key] * number_at(solution.source, key) / value for key in keys])
+
+
+def closed_exponents(potential: float | None) -> Array:
+    """Return the exponents of the force of a ball on a half space of PZT-4 by its constants."""
+
+    def stiffness(constants: dict[str, float]) -> float:
+        coupling = hexagonal_voigt(**{key: constants[key] for key in PIEZO})
+        elastic = hexagonal(*(constants[key] for key in ("c11", "c12", "c13", "c33", "c44")))
+        body = HalfSpace(elastic, *coupling)
+        return body.insulating if potential is None else body.conducting
+
+    constants, step = STIFFNESS | PIEZO, 1e-5
+    return np.array(
+        [
+            np.log(
+                stiffness(constants | {key: constants[key] * (1 + step)})
+                / stiffness(constants | {key: constants[key] * (1 - step)})
+            )
+            / (2 * step)
+            for key in BY
+        ]
+    )
+
+
+def ball(potential: float | None, fineness: float, material: dict[str, Any]) -> list[Solution]:
+    """Return a ball on a half space of a material in two boxes."""
+    found = []
+    for extent in BOXES:
+        data = tomllib.loads(to_toml(Setting("PZT-4", "ball", potential, fineness).case(extent)))
+        data["material"], data["solver"] = material, {"tolerance": 1e-11}
+        if "piezo" not in material:
+            del data["fixed"][0]["potential"], data["fixed"][1]["potential"]
+        found.append(solved(parse_case(data)))
+    return found
+
+
+def exponents(report: Report, fineness: float) -> None:
+    """Tabulate the exponents of the force on a ball, of PZT-4 and of Hertz."""
+    crystal = {"law": "anisotropic", "poling": -90.0, **STIFFNESS, "piezo": PIEZO}
+    shape = ["contact.foundation.radius", "contact.rigid.displacement.1"]
+    columns: dict[str, list[Any]] = {
+        name: [] for name in ("ball", "parameter", *(f"box {box:g} a" for box in BOXES))
+    }
+    columns |= {"extrapolated": [], "closed form": []}
+    for kind, potential, material, own in (
+        ("insulating", None, crystal, BY),
+        ("conducting", 0.0, crystal, BY),
+        ("Hertz", None, {"young": 100.0, "poisson": 0.3}, ("young",)),
+    ):
+        keys = [f"material.{'' if key in STIFFNESS or kind == 'Hertz' else 'piezo.'}{key}"
+                for key in own]  # fmt: skip
+        first, second = (
+            relative(solution, "contact_force_y", [*keys, *shape])
+            for solution in ball(potential, fineness, material)
+        )
+        exact = [1.0] if kind == "Hertz" else closed_exponents(potential)
+        rows = zip(
+            [*own, "R", "delta"], first, second, 2 * second - first, [*exact, 0.5, 1.5], strict=True
+        )
+        for row in rows:
+            append(columns, kind, *row)
+    report.table(
+        "exponents",
+        "Exponents of the force on a ball: d ln P/d ln m at a given depth",
+        columns,
+        f"Quadratic elements in a body of revolution, {fineness:g} of them on the contact radius a "
+        "= 0.1 R. The error by the box is of first order in a over its size, and is extrapolated.",
+    )
+
+
+def known(report: Report, coarse: bool) -> None:
+    """Tabulate derivatives that are known."""
+    columns: dict[str, list[Any]] = {
+        name: [] for name in ("problem", "derivative", "found", "known")
+    }
+    changes = ["mesh.cells=[64,16]", "material.law=linear", "friction.mu=0.3"]
+    bar = solved(load_case(CASES / "bar.toml", [*changes, "solver.tolerance=1e-12"]))
+    names = ["contact_force_x", "contact_force_y", "max_pressure"]
+    found = sensitivity(bar, names, ["friction.mu", "material.young"])
+    for name, value in zip(names, (-6.2189744e-4, 1.4790623e-4, 1.25772757e-2), strict=True):
+        append(columns, "bar 64 x 16", f"d {name}/d mu", found[name]["friction.mu"], value)
+    append(columns, "bar 64 x 16", "d contact_force_x/d E", found[names[0]]["material.young"], 0.0)
+    height, k, b, top = 0.5, 2.0, PIEZO["beta33"], 3.0
+    column = solved(parse_case(charged_column(height, k, top)))
+    slope = sensitivity(column, ["charge_foundation"], ["electric.k_e"])["charge_foundation"]
+    sign = np.sign(slope["electric.k_e"])
+    exact = top / (k * height / b + 1) ** 2
+    append(columns, "column", "d current/d k", sign * slope["electric.k_e"], exact)
+    for name, one, other in balls(2.0 if coarse else 8.0, 4 if coarse else 12):
+        append(columns, "two balls", name, one, other)
+    report.table(
+        "known",
+        "Derivatives beside known ones",
+        columns,
+        "Two balls, pressed on each other by P and moved along by Q in one step: the closed form "
+        "of Cattaneo and Mindlin is that of half spaces, the balls have eight linear elements on "
+        "a and twelve sectors.",
+    )
+
+
+def charged_column(height: float, k: float, top: float) -> dict[str, Any]:
+    """Return a column without coupling on a foundation that conducts with a constant k."""
+    return {
+        "mesh": {"generator": "rectangle", "size": [1.0, height], "cells": [2, 4]},
+        "material": {
+            "young": 1.0,
+            "poisson": 0.3,
+            "piezo": PIEZO | {"e31": 0.0, "e33": 0.0, "e15": 0.0},
+        },
+        "fixed": [{"on": "top", "displacement": [0.0, -0.01], "potential": top}],
+        "contact": {"on": "bottom"},
+        "electric": {"law": "perfect", "k_e": k, "phi_f": 0.0},
+        "solver": {"tolerance": 1e-12},
+    }
+
+
+def balls(elements: float, sectors: int) -> list[tuple[str, float, float]]:
+    """Return derivatives of two balls beside those of the closed form of Cattaneo and Mindlin.
+
+    A force Q moves them by d = 3 mu P k/(16 a) [1 - (1 - Q/(mu P))^(2/3)], k the compliance
+    sum (2 - nu)/G, and by more of their own, in proportion to Q. At a given Q that has no part in
+    dd/dmu = -(dQ/dmu)/(dQ/dway).
+    """
+    press, way = 0.125, 0.022
+    with TemporaryDirectory() as folder:
+        path = Path(folder) / "balls.msh"
+        write_mesh(path, np.sqrt(RADIUS / 2 * press), elements, sectors)
+        times = [0.0, 1.0, 2.0]
+        case = {
+            "mesh": {"file": str(path)},
+            "material": {"young": YOUNG, "poisson": 0.0},
+            "fixed": [
+                {"on": "symmetry", "displacement": ["free", 0.0, "free"]},
+                {"on": "lower_cut", "displacement": [0.0, 0.0, 0.0]},
+                {"on": "upper_cut", "displacement": [way, 0.0, "free"], "amplitude": "shear"},
+                {
+                    "on": "upper_cut",
+                    "displacement": ["free", "free", -press],
+                    "amplitude": "press",
+                },
+            ],
+            "contact": {"on": "upper_round", "against": "lower_round"},
+            "friction": {"law": "coulomb", "mu": MU},
+            "solver": {"tolerance": 1e-10},
+            "evolution": {
+                "times": times,
+                "steps": [1, 1],
+                "amplitudes": {
+                    "press": {"time": times, "value": [0.0, 1.0, 1.0]},
+                    "shear": {"time": times, "value": [0.0, 0.0, 1.0]},
+                },
+            },
+        }
+        solution = solved(parse_case(case))
+        keys = ["friction.mu", "fixed.2.displacement.0"]
+        found = sensitivity(solution, ["contact_force_x"], keys)["contact_force_x"]
+    row = solution.steps[-1].row
+    # Both halves of the balls.
+    tangential, normal = (2 * abs(row[f"contact_force_{axis}"]) for axis in "xz")
+    width = (3 * normal * RADIUS / 2 / (4 * YOUNG / 2)) ** (1 / 3)
+    unit, x = normal * (4 / (YOUNG / 2)) / width, tangential / (MU * normal)
+    exact = 3 / 16 * (1 - (1 - x) ** (2 / 3) - 2 / 3 * x * (1 - x) ** (-1 / 3))
+    slope = -found["friction.mu"] / found["fixed.2.displacement.0"] / unit
+    return [(f"a/(P k) d delta_x/d mu at Q = {x:.4f} mu P", slope, exact)]
+
+
+def remainders(report: Report) -> None:
+    """Tabulate the remainder of Taylor's series, and products with transposed solves."""
+    data = evolving(block(np.random.default_rng(1))) | {"solver": {"tolerance": 1e-13}}
+    solution, key, name = solved(parse_case(data)), "friction.mu", "contact_force_x"
+    at = number_at(solution.source, key)
+
+    def force(case: Case) -> float:
+        run = solved(case)
+        problem = run.problem.at(run.state.time, run.state.history)
+        return named_quantities(problem)[name](problem, run.state)
+
+    first, slope = force(solution.source), sensitivity(solution, [name], [key])[name][key]
+    steps = [at * 2.0**-k for k in range(7, 12)]
+    left = [
+        abs(force(with_number(solution.source, key, at + h)) - first - h * slope) for h in steps
+    ]
+    orders = [np.nan, *np.log2(np.array(left[:-1]) / left[1:])]
+    report.table(
+        "taylor",
+        "Remainder of Taylor's series of first order in h",
+        {"h": steps, "remainder": left, "order": orders},
+        "Tangential force of a block that is pressed, sheared and sheared back, by mu.",
+    )
+
+
+def products(solution: Solution) -> float:
+    """Return the relative difference of <J^-1 a, b> and <a, J^-T b>, for random a and b."""
+    from contact.problem.linearised import Equations
+
+    linearised = Steps(solution).linearised(-1)
+    body, rng = solution.problem.equilibrium, np.random.default_rng(0)
+    shapes = body.owned_part(solution.state.x).shape, solution.problem.nodes.normal.shape
+    mask = np.concatenate([body.free.ravel(), np.ones(body.global_unknowns.size)])
+    a, b = ([rng.standard_normal(shape) for shape in shapes] for _ in range(2))
+    jump = solution.problem.nodes
+    for pair in (a, b):
+        pair[0] *= mask
+        normal = jump.normal_component(pair[1])[:, None] * jump.normal
+        pair[1] = normal + jump.tangential_component(pair[1])
+    x, f = linearised.solve(Equations(-a[0], -a[1]))
+    y, c = linearised.solve_transposed(*b)
+    one = float(np.sum(x * b[0]) + np.sum(f * b[1]))
+    other = float(np.sum(a[0] * y) + np.sum(a[1] * c))
+    size = np.linalg.norm(x) * np.linalg.norm(b[0]) + np.linalg.norm(f) * np.linalg.norm(b[1])
+    return abs(one - other) / size
+
+
+def cost(report: Report, coarse: bool) -> None:
+    """Tabulate factorisations, back-substitutions and time beside those of the solution."""
+    n = 8 if coarse else 125
+    pressed = {
+        "mesh": {"generator": "rectangle", "size": [4.0, 1.0], "cells": [4 * n - 1, n // 4]},
+        "material": {"young": 1.0, "poisson": 0.3},
+        "fixed": [{"on": "top", "displacement": [0.002, -0.01]}],
+        "contact": {"on": "bottom", "gap": "0.001*(x - 2)**2"},
+        "friction": {"law": "coulomb", "mu": 0.3},
+    }
+    space = {
+        "mesh": {
+            "generator": "box",
+            "size": [2.0, 1.0, 1.0],
+            "cells": [4, 2, 2] if coarse else [24, 12, 12],
+        },
+        "material": {"young": 1.0, "poisson": 0.3},
+        "fixed": [{"on": "top", "displacement": [0.002, 0.0, -0.01]}],
+        "contact": {"on": "bottom", "gap": "0.01*((x - 1)**2 + (y - 0.5)**2)"},
+        "friction": {"law": "coulomb", "mu": 0.3},
+    }
+    loop = evolving(pressed | {"mesh": pressed["mesh"] | {"cells": [64, 16]}}, 1 if coarse else 4)
+    plastic = loop | {"material": {"law": "j2", "young": 1.0, "poisson": 0.3, "yield_stress": 0.01}}
+    columns: dict[str, list[Any]] = {
+        name: []
+        for name in ("problem", "unknowns", "parameters", "by", "factorisations", "solves", "s")
+    }
+    many = ["friction.mu", "material.young", "material.poisson", "fixed.0.displacement.1"]
+    for title, data in (
+        ("plane", pressed),
+        ("3-D", space),
+        ("loop", loop),
+        ("loop, J2", plastic),
+    ):
+        begin = time.perf_counter()
+        solution = solved(parse_case(data))
+        seconds, summary = time.perf_counter() - begin, solution.counters
+        size = solution.problem.equilibrium.layout.unknowns
+        append(columns, title, size, 0, "solution", summary.factorizations,
+               summary.linear_solves, seconds)  # fmt: skip
+        name, nodes = "contact_force_x", solution.problem.nodes.size
+        for parameters, method in ((many[:1], "tangent"), (many, "tangent"), (many[:1], "adjoint"),
+                                   (many, "adjoint")):  # fmt: skip
+            begin = time.perf_counter()
+            found = sensitivity(solution, [name], parameters, method)
+            seconds, taken = time.perf_counter() - begin, found.counters
+            append(columns, title, size, len(parameters), method, taken.factorizations,
+                   taken.linear_solves, seconds)  # fmt: skip
+        for count, label, made in (
+            (nodes, "gap_gradient", gap_gradient),
+            (solution.problem.domain.mesh.topology.index_map(solution.problem.dim).size_local,
+             "field_gradient", field_gradient),
+        ):  # fmt: skip
+            begin = time.perf_counter()
+            made(solution, name)
+            append(columns, title, size, count, label, len(solution.steps) or 1, "—",
+                   time.perf_counter() - begin)  # fmt: skip
+    report.table(
+        "cost",
+        "Cost of derivatives of one result beside that of the solution",
+        columns,
+        "Factorisations, back-substitutions and seconds on one thread. Two residuals a parameter "
+        "and step, and the two problems beside a parameter, are in the time.",
+    )
+
+
+if __name__ == "__main__":
+    main()
