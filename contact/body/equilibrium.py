@@ -280,7 +280,7 @@ class BodyEquilibrium:
     def loads_by_cell(self) -> tuple[fem.FunctionSpace, Loads]:
         """Discontinuous cubics, and the loads on those of the owned cells. Collective."""
         space = fem.functionspace(self.domain.mesh, ("DG", 3, (self.block_size,)))
-        test = self._forms.split(ufl.TestFunction(space))
+        test = self.forms.split(ufl.TestFunction(space))
         size = space.dofmap.index_map.size_local * self.block_size
         return space, Loads(self.domain, self.body, *test, size)
 
