@@ -10,6 +10,7 @@ import signal
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from numbers import Real
 from pathlib import Path
 from typing import Any
@@ -183,34 +184,32 @@ def solve(
     if adapt:
         _refuse({"restart": restart, "start": start, "nested": nested or None}, "[mesh.adapt]")
         _refuse(replacements, "[mesh.adapt]")
+    evolution = case.evolution
+    ends, begin = ((), 0.0) if evolution is None else (evolution.ends, evolution.times[0])
+
+    def run(problem: ContactProblem, start: State | None = None, **schedule: Any) -> Solution:
+        planned = Schedule(ends, begin, start, **schedule)
+        return run_schedule(problem, settings, monitor, planned)
+
     problem = None if adapt else build_problem(case, comm, **replacements)
     with named(case.source):
         if problem is None:
-            evolution = case.evolution
-            ends, begin = ((), 0.0) if evolution is None else (evolution.ends, evolution.times[0])
-
-            def once(problem: ContactProblem, start: State | None) -> Solution:
-                schedule = Schedule(ends, begin, start=start, guess=COARSE)
-                return run_schedule(problem, settings, monitor, schedule)
-
-            solution = adapted(case, comm, once)
-        elif case.evolution is not None:
+            solution = adapted(case, comm, partial(run, guess=COARSE))
+        elif evolution is not None:
             kept = [] if restart is None else read_steps(restart, problem)
             keep = None
             if folder is not None:
                 here = restart is not None and restart.samefile(folder)
                 text, files = to_toml(case, anchored=True), on_root(comm, lambda: digest(case))
                 keep = Checkpoints(folder, problem, text, kept, here, files).keep
-            ends, begin = case.evolution.ends, case.evolution.times[0]
-            schedule = Schedule(ends, begin, kept=kept, keep=keep)
+            solution = run(problem, kept=kept, keep=keep)
+        elif nested or (
+            nested is None and start is None and not replacements and pays(case, problem)
+        ):
+            coarse = nested_start(case, problem, **replacements)
+            solution = run(problem, coarse, guess=COARSE)
         else:
-            if nested is None and start is None:
-                nested = not replacements and pays(case, problem)
-            schedule = Schedule(start=start)
-            if nested:
-                schedule = Schedule(start=nested_start(case, problem, **replacements), guess=COARSE)
-        if problem is not None:
-            solution = run_schedule(problem, settings, monitor, schedule)
+            solution = run(problem, start)
     solution.title, solution.output, solution.units = case.title, case.output, case.case.units
     if not replacements:
         solution.case, solution.source = to_toml(case), case

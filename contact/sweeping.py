@@ -31,9 +31,9 @@ from contact.methods.method import METHODS, Method
 from contact.methods.options import NewtonOptions, Options
 from contact.methods.report import Monitor, tell
 from contact.methods.steps import Reached, predicted, since, solve_step
+from contact.output.formats import write_csv
 from contact.output.quantities import SWEEP, values_of
 from contact.output.solution import Solution
-from contact.output.table import write_csv
 from contact.problem.checks import check_potential
 from contact.problem.problem import ContactProblem
 from contact.ranks import on_root

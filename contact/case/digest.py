@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import json
 import tomllib
 from collections.abc import Iterator, Mapping
 from contextlib import suppress
@@ -11,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from contact.case.file import Case, load_case
+from contact.case.messages import shown
 from contact.case.section import FilePath, walk
 from contact.case.text import to_toml
 from contact.errors import InputError
@@ -19,9 +19,6 @@ from contact.output.checkpoint import stored_input
 
 #: Sections that say how a problem is solved and shown, not which one it is.
 MANNER = frozenset({"title", "case", "solver", "output"})
-
-#: Most characters of a value that a message shows.
-_SHOWN = 60
 
 
 def digest(case: Case) -> dict[str, str]:
@@ -124,9 +121,4 @@ def _differences(before: Any, now: Any, path: str = "") -> Iterator[str]:
         for i, pair in enumerate(zip(before, now, strict=True)):
             yield from _differences(*pair, f"{path}.{i}")
     elif before != now and not (before != before and now != now):
-        yield f"{path} is {_short(before)}, here {_short(now)}"
-
-
-def _short(value: Any) -> str:
-    text = " ".join(json.dumps(value, ensure_ascii=False).split())
-    return text if len(text) <= _SHOWN else text[:_SHOWN] + "..."
+        yield f"{path} is {shown(before)}, here {shown(now)}"

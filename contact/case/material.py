@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from functools import cached_property
 from pathlib import Path
-from typing import Annotated, Any, Literal, Self, TypeAlias
+from typing import Annotated, Any, Literal, Self, TypeAlias, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -50,8 +50,11 @@ Poling: TypeAlias = Annotated[
 ]
 POSITIVE = "a symmetric, positive definite matrix"
 
-ISOTROPIC = ReadWith("law", ("linear", "log", "j2"), required=True)
-CRYSTAL = ReadWith("law", "anisotropic")
+#: The laws of the stress; all but the last are isotropic.
+LawName: TypeAlias = Literal["linear", "log", "j2", "anisotropic"]
+
+ISOTROPIC = ReadWith("law", get_args(LawName)[:-1], required=True)
+CRYSTAL = ReadWith("law", get_args(LawName)[-1])
 LOG = ReadWith("law", "log")
 J2 = ReadWith("law", "j2")
 
@@ -191,7 +194,7 @@ class Material(Section):
     ] = None
     """With `name`: a library of one's own (TOML), relative to the case file. Default: that of the
     package."""
-    law: Literal["linear", "log", "j2", "anisotropic"] | None = None
+    law: LawName | None = None
     """`linear`: g = mu1; `log`: (7.8), g = mu1 (s/t)(ln(t/s) + 1) for t above the yield strain s;
     `j2`: plastic strain that remains (von Mises, flow theory), step by step of `[evolution]`;
     `anisotropic`: sigma = C eps. Default: `linear`."""

@@ -24,8 +24,8 @@ from mpi4py import MPI
 from contact.errors import InputError
 from contact.output.fields import DerivedFields, linear, unknowns
 from contact.output.folder import ROOM
+from contact.output.formats import Grid, Values, gathered, write_vtu
 from contact.output.solution import Solution
-from contact.output.vtu import Grid, Values, gathered, write_vtu
 from contact.problem.problem import ContactProblem
 from contact.problem.state import State
 from contact.ranks import on_root

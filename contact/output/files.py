@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +13,7 @@ import numpy as np
 from contact.arguments import expect
 from contact.output.field_files import write_fields
 from contact.output.folder import ResultFolder, result_folder
+from contact.output.formats import write_csv, write_table, write_vtu
 from contact.output.quantities import (
     ADAPT,
     AGAINST,
@@ -23,16 +24,13 @@ from contact.output.quantities import (
     quantities,
     values_of,
 )
-from contact.output.solution import Solution
-from contact.output.steps import write_steps
+from contact.output.solution import Solution, StepRecord
 from contact.output.surface import (
     contact_surface,
     contact_table,
     opposite_surface,
     opposite_table,
 )
-from contact.output.table import write_csv, write_table
-from contact.output.vtu import write_vtu
 from contact.ranks import on_root
 
 
@@ -86,7 +84,7 @@ def _replace(solution: Solution, folder: ResultFolder, figures: bool) -> None:
             header = [quantity.name for quantity in quantities(HISTORY)]
             write_csv(new / "history.csv", header, (row.values() for row in rows))
             if solution.steps:
-                write_steps(solution.steps, new)
+                _write_steps(solution.steps, new)
             if solution.adaptation:
                 rows = solution.adaptation
                 write_csv(new / ADAPT, rows[0], (row.values() for row in rows))
@@ -114,6 +112,17 @@ def _replace(solution: Solution, folder: ResultFolder, figures: bool) -> None:
     folder.replace(write)
     # A figure that fails is no reason to lose the rest.
     on_root(comm, lambda: _raise(failures))
+
+
+def _write_steps(records: Sequence[StepRecord], folder: Path) -> None:
+    """Write ``steps.csv`` and ``contact-steps.csv``. On one rank."""
+    write_csv(folder / "steps.csv", records[0].row, (record.row.values() for record in records))
+    rows = (
+        [record.state.time, *values]
+        for record in records
+        for values in zip(*(column.tolist() for column in record.table.values()), strict=True)
+    )
+    write_csv(folder / "contact-steps.csv", ["t", *records[0].table], rows)
 
 
 def _draw(solution: Solution, folder: Path, summary: Mapping[str, Any]) -> None:

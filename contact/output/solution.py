@@ -20,6 +20,7 @@ from contact.linear.operator import Counters
 from contact.methods.report import IterationHistory, Outcome
 from contact.output.error_estimate import Estimate
 from contact.output.fields import Deformation, DerivedFields, unknowns
+from contact.output.formats import Table
 from contact.output.options import OutputOptions, Units
 from contact.output.resultants import (
     ChargeBalance,
@@ -31,7 +32,6 @@ from contact.output.resultants import (
     supports,
 )
 from contact.output.solved import ContactResult, Solved, contact_result
-from contact.output.table import Table
 from contact.problem.energy import Balance
 from contact.problem.state import State
 from contact.typing import Array

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 from mpi4py import MPI
@@ -16,7 +14,6 @@ from contact.output.quantities import STEPS, values_of
 from contact.output.resultants import nodes_of
 from contact.output.solution import Solution, StepRecord
 from contact.output.surface import contact_table
-from contact.output.table import write_csv
 from contact.problem.energy import Moment, balance, moment
 from contact.problem.problem import ContactProblem
 from contact.typing import Array
@@ -80,15 +77,3 @@ def _driven(problem: ContactProblem, nodes: NDArray[np.int32], now: Moment) -> t
     local = np.concatenate([x.sum(axis=0), given.sum(axis=0), [nodes.size]])
     total = problem.comm.allreduce(local, op=MPI.SUM)
     return total[:d] / max(total[-1], 1.0), total[d:-1]
-
-
-def write_steps(records: Iterable[StepRecord], folder: Path) -> None:
-    """Write ``steps.csv`` and ``contact-steps.csv``. On one rank."""
-    kept = list(records)
-    write_csv(folder / "steps.csv", kept[0].row, (record.row.values() for record in kept))
-    rows = (
-        [record.state.time, *values]
-        for record in kept
-        for values in zip(*(column.tolist() for column in record.table.values()), strict=True)
-    )
-    write_csv(folder / "contact-steps.csv", ["t", *kept[0].table], rows)

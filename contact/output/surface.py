@@ -12,10 +12,9 @@ from contact.interface.mortar.coupling import Coupling
 from contact.interface.mortar.lumping import Lumping
 from contact.interface.mortar.surface import surface_of
 from contact.mesh.entities import owned_among
+from contact.output.formats import Grid, Table
 from contact.output.quantities import AGAINST, NODES, SURFACE, values_of
 from contact.output.solution import Solution
-from contact.output.table import Table
-from contact.output.vtu import Grid
 from contact.problem.problem import ContactProblem
 from contact.typing import Array
 

@@ -17,9 +17,9 @@ from contact.interface.layer import NormalLaw
 from contact.output.figures.body import Picture, draw_plane, picture
 from contact.output.figures.contact import draw_line
 from contact.output.figures.style import Look
+from contact.output.formats import Table
 from contact.output.solved import tangent_of
 from contact.output.surface import contact_table
-from contact.output.table import Table
 from contact.typing import Array
 from forms.foundation import contact_multiplier
 from forms.laws import Compliance, PotentialFactor, RampConductivity, ShiftedConductivity

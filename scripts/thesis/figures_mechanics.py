@@ -15,8 +15,8 @@ from contact import Case, Solution
 from contact.output.figures.body import draw_plane, picture
 from contact.output.figures.contact import draw_line
 from contact.output.figures.style import Look
+from contact.output.formats import Table
 from contact.output.surface import contact_table
-from contact.output.table import Table
 from scripts.cases import bar
 from scripts.reporting import TWO_COLUMNS, Report, options, run_of, solved, subplots
 

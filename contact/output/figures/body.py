@@ -31,7 +31,7 @@ from contact.output.figures.style import (
     page_width,
     sheet,
 )
-from contact.output.table import Table
+from contact.output.formats import Table
 from contact.typing import Array
 
 logger = logging.getLogger("contact.plots")

@@ -25,8 +25,8 @@ from contact.output.figures.style import (
     page_width,
     sheet,
 )
+from contact.output.formats import Table
 from contact.output.quantities import STATUS
-from contact.output.table import Table
 from contact.typing import Array
 
 #: Colours of the nodes of Gamma_3 in 3-D by their status, in the order of its numbers.

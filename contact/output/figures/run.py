@@ -18,9 +18,9 @@ from scipy.spatial import KDTree
 
 from contact.errors import InputError
 from contact.output.figures.style import heading
+from contact.output.formats import Table
 from contact.output.options import Units
 from contact.output.quantities import OPPOSITE
-from contact.output.table import Table
 from contact.ranks import refused
 from contact.typing import Array
 

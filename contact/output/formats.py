@@ -1,11 +1,12 @@
-"""VTK's XML files of unstructured grids (.vtu), by VTK: ParaView, pyvista and meshio open them.
+"""Tables as csv files; grids as VTK's XML files (.vtu), which ParaView, pyvista and meshio open.
 
-One piece whatever the number of ranks: the shares are gathered on rank 0, which writes.
+A grid is one piece whatever the number of ranks: the shares are gathered on rank 0, which writes.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import csv
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -17,6 +18,8 @@ from numpy.typing import NDArray
 from contact.typing import Array
 
 Values = NDArray[Any]
+#: Columns of equal length by name.
+Table = Mapping[str, Values]
 
 #: VTK's number of a kind of cells, by their dimension and their number of nodes.
 KINDS = {(1, 2): 3, (1, 3): 21, (2, 3): 5, (2, 6): 22, (3, 4): 10, (3, 10): 24}
@@ -115,3 +118,17 @@ def _filled(values: Values) -> Values:
     if values.ndim == 2 and values.shape[1] == 2:
         values = np.column_stack([values, np.zeros(len(values))])
     return np.ascontiguousarray(values)
+
+
+def write_table(columns: Table, path: Path) -> None:
+    """Write columns. On one rank."""
+    rows = zip(*(column.tolist() for column in columns.values()), strict=True)
+    write_csv(path, columns, rows)
+
+
+def write_csv(path: Path, header: Iterable[str], rows: Iterable[Iterable[Any]]) -> None:
+    """Write a table, numbers to the last digit. On one rank."""
+    with path.open("w", newline="", encoding="utf-8") as file:
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow(header)
+        writer.writerows(rows)
