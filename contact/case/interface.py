@@ -25,7 +25,7 @@ from contact.case.section import (
     Part,
     Section,
     TimeFormula,
-    formula_or_table,
+    formula_or_law,
 )
 from contact.errors import InputError
 from contact.interface import friction, obstacle
@@ -119,11 +119,11 @@ class SlipLaw(Section):
         return laws.Coulomb(laws.SlipCoefficient(self.a, self.b, self.rho))
 
 
-#: A coefficient of friction. A further law is a section like that above, told apart by its `law`:
-#: `Annotated[SlipLaw | Another, Field(discriminator="law")]` in place of `SlipLaw`.
+#: A coefficient of friction. A further law is a section like that above, and a line here with its
+#: `law`.
 Mu: TypeAlias = Annotated[
-    Annotated[NonNegativeFormula, Tag("formula")] | Annotated[SlipLaw, Tag("table")],
-    formula_or_table,
+    Annotated[NonNegativeFormula, Tag("formula")] | Annotated[SlipLaw, Tag("slip")],
+    formula_or_law,
     Accepted('a number >= 0 or a formula or a table { law = "slip", a, b, rho }'),
 ]
 

@@ -207,10 +207,12 @@ def _members(name: str) -> str | list[str]:
     return list(name.members) if isinstance(name, together.Together) else name
 
 
-#: Tell a list, "many", from a single value, "one", and a table from a formula, for pydantic's tags.
+#: Tell a list, "many", from a single value, "one"; and a law, by its name, from a formula.
 one_or_many = Discriminator(lambda given: "many" if isinstance(given, list | tuple) else "one")
-formula_or_table = Discriminator(
-    lambda given: "table" if isinstance(given, Mapping | BaseModel) else "formula"
+formula_or_law = Discriminator(
+    lambda given: (
+        given.get("law") if isinstance(given, Mapping) else getattr(given, "law", "formula")
+    )
 )
 
 as_tuple = BeforeValidator(lambda given: tuple(given) if isinstance(given, list) else given)
