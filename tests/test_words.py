@@ -47,9 +47,8 @@ WORDS = {
 
 #: Most of them that a package, or a page, may have. Nothing may rise; what is mended lowers it.
 ALLOWED: dict[str, int] = {
-    "scripts": 3,
+    "scripts": 2,
     "docs/benchmarks.md": 6,
-    "docs/case-file.md": 1,
     "docs/results.md": 33,
 }
 

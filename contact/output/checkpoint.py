@@ -123,9 +123,7 @@ class Checkpoints:
         first = self._count == 1
         _save(fresh if first else place, _name(self._count), data)
         if first:
-            _check_own(self._folder)
-            _remove(place)
-            fresh.rename(place)
+            _replace(self._folder)
 
 
 def _gathered(problem: ContactProblem, state: State, where: NDArray[np.intp]) -> dict[str, Any]:
@@ -319,13 +317,14 @@ def stored_input(folder: Path) -> tuple[Path, dict[str, str]]:
 
 def discard(folder: Path) -> None:
     """Remove the checkpoints of a run that has come to its end. On one rank."""
-    for name in (FOLDER, FRESH):
-        _remove(folder / name)
+    for place in (folder / FOLDER, folder / FRESH):
+        if _manifest(place):
+            _remove(place)
 
 
 def _files(folder: Path) -> list[Path]:
     """Return the checkpoints in a folder, one after the other."""
-    for name in (FOLDER, FRESH):  # where a run was ended between removal and renaming
+    for name in (FOLDER, FRESH):
         known, found = _manifest(folder / name), list[Path]()
         while (path := folder / name / _name(len(found) + 1)).is_file() and path.name in known:
             found.append(path)
@@ -394,11 +393,17 @@ def _check_own(folder: Path) -> None:
 
 def _remove(place: Path) -> None:
     """Remove the files that a manifest names, the first step first, and an empty folder."""
-    known = _manifest(place)
-    for name in (*sorted(known), DRAFT, MANIFEST) if known else ():
+    for name in (*sorted(_manifest(place)), DRAFT, MANIFEST):
         (place / name).unlink(missing_ok=True)
-    with suppress(OSError):  # it is not empty
+    with suppress(OSError):  # it is not there, or not empty
         place.rmdir()
+
+
+def _replace(folder: Path) -> None:
+    """Put the checkpoints of a new run in the place of those of an earlier one."""
+    _check_own(folder)
+    _remove(folder / FOLDER)
+    (folder / FRESH).rename(folder / FOLDER)
 
 
 def _cut(folder: Path, count: int) -> None:
@@ -409,8 +414,8 @@ def _cut(folder: Path, count: int) -> None:
     for name in later:
         (place / name).unlink(missing_ok=True)
     _list(place, {name: kept[name] for name in kept if name not in later})
-    if place.name == FRESH:
-        place.rename(folder / FOLDER)
+    if place.name == FRESH:  # where a run was ended between removal and renaming
+        _replace(folder)
 
 
 def _packed(arrays: dict[str, Any]) -> bytes:

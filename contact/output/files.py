@@ -31,7 +31,7 @@ from contact.output.surface import (
     opposite_surface,
     opposite_table,
 )
-from contact.ranks import on_root
+from contact.ranks import on_all_ranks, on_root
 
 
 def write_outputs(
@@ -111,7 +111,9 @@ def _replace(solution: Solution, folder: ResultFolder, figures: bool) -> None:
 
     folder.replace(write)
     # A figure that fails is no reason to lose the rest.
-    on_root(comm, lambda: _raise(failures))
+    with on_all_ranks(comm):
+        for failure in failures:
+            raise failure
 
 
 def _write_steps(records: Sequence[StepRecord], folder: Path) -> None:
@@ -136,11 +138,6 @@ def _draw(solution: Solution, folder: Path, summary: Mapping[str, Any]) -> None:
         run = read_run(folder, summary)
     if run is not None:
         draw(run, folder, look=Look(mirror=solution.output.mirror))
-
-
-def _raise(failures: list[Exception]) -> None:
-    if failures:
-        raise failures[0]
 
 
 def _plain(value: Any) -> Any:

@@ -120,6 +120,24 @@ def test_all_steps_were_there(tmp_path):
     assert again.history.records == []
 
 
+@pytest.mark.parametrize("rest", [False, True])
+def test_a_run_that_was_ended_while_it_replaced_checkpoints_goes_on(tmp_path, ended, rest):
+    """Between the removal of the earlier ones, or a part of them, and the renaming."""
+    heal = ended(2)
+    with pytest.raises(Killed):
+        solve(steps_case(), comm=SELF, folder=tmp_path)
+    heal()
+    place = tmp_path / "checkpoints"
+    place.rename(tmp_path / "checkpoints.new")
+    if rest:
+        place.mkdir()
+        (place / ".contact-draft").touch()
+    solution = solve(steps_case(), comm=SELF, folder=tmp_path, restart=tmp_path)
+    assert solution.converged and len(solution.steps) == 5
+    assert len(list(place.glob("0*.npz"))) == 5
+    assert not (tmp_path / "checkpoints.new").exists()
+
+
 def test_another_mesh(tmp_path):
     solve(steps_case(), comm=SELF, folder=tmp_path)
     for cells in ([8, 4], [16, 2]):
