@@ -187,14 +187,20 @@ def solve(
     evolution = case.evolution
     ends, begin = ((), 0.0) if evolution is None else (evolution.ends, evolution.times[0])
 
-    def run(problem: ContactProblem, start: State | None = None, **schedule: Any) -> Solution:
+    def run(
+        problem: ContactProblem,
+        start: State | None = None,
+        reviewed: bool = True,
+        **schedule: Any,
+    ) -> Solution:
         planned = Schedule(ends, begin, start, **schedule)
-        return run_schedule(problem, settings, monitor, planned)
+        return run_schedule(problem, settings, monitor, planned, reviewed)
 
     problem = None if adapt else build_problem(case, comm, **replacements)
     with named(case.source):
         if problem is None:
-            solution = adapted(case, comm, partial(run, guess=COARSE))
+            solution = adapted(case, comm, partial(run, guess=COARSE, reviewed=False))
+            announce(solution)
         elif evolution is not None:
             kept = [] if restart is None else read_steps(restart, problem)
             keep = None
@@ -270,12 +276,16 @@ def evolve(
 
 
 def run_schedule(
-    problem: ContactProblem, settings: Options, monitor: Monitor | None, schedule: Schedule
+    problem: ContactProblem,
+    settings: Options,
+    monitor: Monitor | None,
+    schedule: Schedule,
+    reviewed: bool = True,
 ) -> Solution:
     """Take the steps of a schedule, and return the last one that has converged. Collective.
 
     A signal or a step that fails ends them; all complete steps remain, with the outcome of the
-    one that has ended them.
+    one that has ended them. Where it is not `reviewed` the solution has no warnings yet.
 
     Raises
     ------
@@ -313,7 +323,8 @@ def run_schedule(
         steps=records,
         critical_factor=critical,
     )
-    announce(solution)
+    if reviewed:
+        announce(solution)
     return solution
 
 

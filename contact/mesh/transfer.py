@@ -19,6 +19,14 @@ from contact.mesh.entities import Indices
 def refined(domain: Domain, marked: Indices | None = None) -> Domain:
     """Cut every edge, or those of marked cells, in two; names are inherited. Collective.
 
+    As `with_parents`.
+    """
+    return with_parents(domain, marked)[0]
+
+
+def with_parents(domain: Domain, marked: Indices | None = None) -> tuple[Domain, Indices]:
+    """Cut every edge, or those of marked cells, in two; names are inherited. Collective.
+
     The cells of the new mesh lie in the cells of the old one, on the same rank. A curved
     boundary keeps its old straight facets.
 
@@ -29,6 +37,10 @@ def refined(domain: Domain, marked: Indices | None = None) -> Domain:
     marked
         Owned cells whose edges are cut; others are cut as far as that asks for (Plaza and Carey,
         Appl. Numer. Math. 32, 2000). All by default.
+
+    Returns
+    -------
+    The new mesh, and the cell of the old one in which each of its owned cells lies.
     """
     coarse = domain.mesh
     tdim = coarse.topology.dim
@@ -60,13 +72,14 @@ def refined(domain: Domain, marked: Indices | None = None) -> Domain:
         for name, old in domain.regions.items()
     }
     made_of = with_names(fine, parts, regions, domain.size)
-    return replace(
+    made_of = replace(
         made_of,
         levels=domain.levels + (marked is None),
         unusable=domain.unusable,
         notes=domain.notes,
         revolved=domain.revolved,
     )
+    return made_of, owned
 
 
 #: How far outside of a mesh a node may lie, over the extent of the mesh, and over its largest cell.

@@ -73,7 +73,7 @@ def review(solution: Solution) -> None:
             e.yielded for e in extremes if e.plastic is not None and e.yielded is not None
         )
     solution.deformation = deformation(body, x)
-    solution.error = estimated(solution.problem, solution.state, fields)
+    solution.error = solution.error or estimated(solution.problem, solution.state, fields)
     for remarks in (
         unloading(solution),
         monotonicity(solution, strains),
