@@ -15,6 +15,7 @@ from contact.mesh.transfer import with_parents
 from contact.methods.report import tell
 from contact.nesting import prolong
 from contact.output.error_estimate import estimated
+from contact.output.intervals import intervals
 from contact.output.quantities import ADAPT, values_of
 from contact.output.solution import Solution
 from contact.problem.problem import ContactProblem
@@ -67,6 +68,8 @@ def adapted(case: Case, comm: MPI.Intracomm, solve: Solver) -> Solution:
         room = asked.max_unknowns / unknowns
         domain = grown(domain, squares, asked.fraction, goal, room, problem.equilibrium.degree)
     solution.adaptation = rows
+    if asked.fraction == 1:
+        solution.intervals = intervals(rows)
     return solution
 
 

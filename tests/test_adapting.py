@@ -87,6 +87,23 @@ def test_the_files_have_the_history(tmp_path):
     assert "[mesh.adapt]" in summary["case"]
 
 
+def test_intervals_hold_the_values_of_a_much_finer_mesh():
+    """The pressure at the clamped corner is infinite, and has none."""
+    solution = bar(max_unknowns=3000, fraction=1)
+    assert [row["unknowns"] for row in solution.adaptation] == [54, 170, 594, 2210]
+    # By P2 on 16,000 adapted unknowns.
+    known = {
+        "contact_force_x": 1.6308e-4,
+        "contact_force_y": -0.010040,
+        "max_displacement": 0.0057987,
+    }
+    for name, value in known.items():
+        low, high = solution.intervals[name]
+        assert low <= value <= high and high - low < 0.2 * abs(value)
+    assert solution.intervals["max_pressure"] is None
+    assert bar(max_unknowns=600).intervals is None
+
+
 def test_the_steps_of_an_evolution_have_one_mesh():
     """The load moves from one end to the other: both are refined."""
     data = changed(mesh__cells=[16, 4], **LINEAR)

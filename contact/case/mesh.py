@@ -88,7 +88,8 @@ class Adapt(Section):
     max_unknowns: Count = 200_000
     """No mesh with more unknowns is solved, the first one excepted."""
     fraction: Annotated[float, Field(gt=0, le=1), Accepted("a number above 0, up to 1")] = 0.5
-    """Share of the square of the error that the refined cells have (Dörfler's); 1 is uniform."""
+    """Share of the square of the error that the refined cells have (Dörfler's). With 1 meshes are
+    uniform, and from the third one on the summary has `intervals`."""
 
 
 class Mesh(Section):

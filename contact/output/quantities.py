@@ -153,9 +153,13 @@ _RUN = (
     Quantity(
         "error", "",
         "Estimated discretisation error: `energy`, relative, in the energy norm, about the root of "
-        "that of displacements under given loads; and its `effectivity`, the estimate over the "
-        "error itself, `null` where that is not known.",
-        lambda r: r.error and {"energy": r.error.relative, "effectivity": None},
+        "that of displacements under given loads; its `effectivity`, the estimate over the "
+        "error itself, `null` where that is not known; and `intervals`, in which forces, the "
+        "largest displacement and pressure lie: of the last three meshes of `[mesh.adapt]` with "
+        "`fraction = 1`, `null` of one that does not converge, as a pressure at a corner.",
+        lambda r: r.error and {
+            "energy": r.error.relative, "effectivity": None, "intervals": r.intervals,
+        },
     ),
     Quantity(
         "max_pressure", "stress", "Largest contact pressure, -σ_ν >= 0.",

@@ -21,6 +21,7 @@ from contact.methods.report import IterationHistory, Outcome
 from contact.output.error_estimate import Estimate
 from contact.output.fields import Deformation, DerivedFields, unknowns
 from contact.output.formats import Table
+from contact.output.intervals import Intervals
 from contact.output.options import OutputOptions, Units
 from contact.output.resultants import (
     ChargeBalance,
@@ -105,6 +106,8 @@ class Solution(Solved):
         The estimated discretisation error; None likewise.
     adaptation
         The rows of ``adapt.csv``, one a mesh; none without `[mesh.adapt]`.
+    intervals
+        In which its quantities lie; None unless there are three nested uniform meshes.
     start
         The initial guess, in words.
     critical_factor
@@ -137,6 +140,7 @@ class Solution(Solved):
     deformation: Deformation | None = None
     error: Estimate | None = None
     adaptation: list[dict[str, Any]] = field(default_factory=list)
+    intervals: Intervals | None = None
     start: str = "zero slip"
     critical_factor: float = np.inf
     case: str = ""
