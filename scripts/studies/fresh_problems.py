@@ -34,6 +34,8 @@ ALLOWED = {"normal turned": 0.3, "status": 0.5}
 SMALL = 1e-6
 #: Largest component of friction along the normal, over the largest pressure.
 ALONG = 1e-14
+#: Stress that is none: what an interior point leaves where nothing touches.
+NOTHING = 1e-150
 #: Linear solves of a step of a linear material that is slow.
 SLOW = 20
 
@@ -454,7 +456,8 @@ def along_normal(solution: Solution) -> float:
     """Return the largest normal component of friction over the largest pressure."""
     nodes, forces = solution.problem.nodes, solution.forces
     largest = np.abs(nodes.normal_component(forces.friction)).max(initial=0.0)
-    return float(largest / max(forces.pressure.max(initial=0.0), 1e-300))
+    pressure = forces.pressure.max(initial=0.0)
+    return float(largest / pressure) if pressure > NOTHING else float(largest > NOTHING)
 
 
 def judge(mesh: Mesh, tables: Tables, solution: Solution, folder: Path) -> dict[str, float]:

@@ -220,10 +220,21 @@ def main(arguments: Sequence[str] | None = None) -> None:
     command.add_argument("--only", help="a family, or one problem such as bar-7")
     command.add_argument("--hard", action="store_true", help="those that bend, stick and stretch")
     given = command.parse_args(arguments)
-    keys = ("problem", "method", "converged", "solves", "seconds", "why", "difference")
+    keys = (
+        "problem",
+        "method",
+        "converged",
+        "solves",
+        "seconds",
+        "why",
+        "difference",
+        "mu",
+        "critical",
+    )
     rows: dict[str, list[Any]] = {key: [] for key in keys}
     for _, case in problems(given.coarse, given.only, given.hard):
         problem, first = build_problem(case), None
+        law = problem.interface.friction.law
         for method in given.methods:
             begin = time.perf_counter()
             settings = with_method(case.solver, OPTIONS[method])
@@ -241,11 +252,13 @@ def main(arguments: Sequence[str] | None = None) -> None:
                 round(time.perf_counter() - begin, 2),
                 fallback if solution.converged else solution.outcome.reason,
                 _difference(solution, first or solution),
+                0.0 if law is None else float(np.max(law.maximum)),
+                solution.critical_factor,
             )
             first = first or solution
             append(rows, *row)
             if MPI.COMM_WORLD.rank == 0 and (
-                not solution.converged or fallback or not row[-1] <= AGREE
+                not solution.converged or fallback or not row[-3] <= AGREE or row[-1] <= 1
             ):
                 print(*row, flush=True)
     report = Report(given.out)
