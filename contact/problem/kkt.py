@@ -196,8 +196,9 @@ def evaluate(problem: Problem, state: State) -> KKT:
         rounding = np.where(acted, np.minimum(rounding, most), largest)
         nothing = ~acted & (unbalanced <= rounding)
         unbalanced, rounding = (np.where(nothing, 0.0, sizes) for sizes in (unbalanced, rounding))
-    # Of a component on which nothing acts there is the rounding of the others.
-    scale = np.maximum(scale, EPS * scale.max(axis=1, keepdims=True))
+    # Of a component on which nothing acts there is the rounding of the others, and of charges, in
+    # units of forces by the scale of the potential, that of a body without a field.
+    scale = np.maximum(scale, EPS * scale.max())
     size = np.where(scale > 0, scale, 1.0)
     balance = worst((unbalanced / size).reshape(1, -1), (rounding / size).reshape(1, -1))
     nodal = interface.jump.apply(state.x)
