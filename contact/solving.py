@@ -229,6 +229,7 @@ def evolve(
     settings: Options | None = None,
     monitor: Monitor | None = None,
     start: State | Solution | None = None,
+    before: State | None = None,
 ) -> Iterator[State]:
     """Load a problem in steps, and give the state at the end of each. Collective.
 
@@ -250,6 +251,9 @@ def evolve(
     start
         A state that was given before, to continue from; the reference configuration at time 0 by
         default.
+    before
+        The state before that: with it the initial guess of the first step, and all digits, are
+        those without the interruption. Without it they are within the tolerance.
 
     Raises
     ------
@@ -262,12 +266,14 @@ def evolve(
     _check_options(settings, monitor)
     start = start.state if isinstance(start, Solution) else start
     expect("start", start, "an earlier state, or solution", isinstance(start, State | None))
+    earlier = before is None or (isinstance(before, State) and start is not None)
+    expect("before", before, "the state before start", earlier)
     expect("evolve", problem, "a Problem", isinstance(problem, ContactProblem))
     begin = 0.0 if start is None else start.time
     ends = _checked_times(problem, times, begin)
     settings = settings or NewtonOptions()
     method = METHODS[settings.method](problem, settings, monitor)
-    for step in Evolution(problem, method, start).run(ends, begin):
+    for step in Evolution(problem, method, start, before).run(ends, begin):
         if not step.outcome.converged:
             raise NotConvergedError(
                 f"no step to {step.problem.time:g}: {step.outcome.reason}; the states before remain"

@@ -18,6 +18,7 @@ from contact.methods.newton import Newton
 from contact.methods.report import IterationHistory
 from contact.output.checkpoint import Checkpoints, case_of, discard, read_steps
 from tests.output.test_steps import case_of as steps_case
+from tests.problem.test_plasticity import block
 
 SELF = MPI.COMM_SELF
 MESHES = Path(__file__).parents[2] / "meshes" / "fixtures"
@@ -92,6 +93,23 @@ def test_going_on(tmp_path, ended, count, elsewhere):
         assert np.array_equal(one.table["status"], two.table["status"])
     assert len(list((out / "checkpoints").glob("0*.npz"))) == 5
     assert whole.warnings == solution.warnings
+
+
+@pytest.mark.parametrize("count", [1, 4])
+def test_plastic_strain_goes_on_to_the_same_numbers(tmp_path, ended, count):
+    """Of press, shear and unload with friction: bit for bit on the same ranks."""
+    case = block("chaboche", cells=3)
+    whole = solve(case, comm=SELF)
+    heal = ended(count)
+    with pytest.raises(Killed):
+        solve(case, comm=SELF, folder=tmp_path)
+    heal()
+    solution = solve(case, comm=SELF, folder=tmp_path, restart=tmp_path)
+    assert solution.converged and len(solution.steps) == len(whole.steps)
+    assert whole.plastic_dissipation > 0
+    for one, two in zip(whole.steps, solution.steps, strict=True):
+        assert one.state.near(two.state, rtol=1e-12, atol=0.0)
+        assert one.state.history.near(two.state.history, rtol=1e-12, atol=0.0)
 
 
 def test_a_new_run_leaves_the_earlier_checkpoints_until_its_first_step(tmp_path, monkeypatch):

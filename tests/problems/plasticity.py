@@ -154,11 +154,8 @@ def integrated(young, poisson, yield_stress, hardening, kinematic, free, driven)
     return np.array(rows)
 
 
-def hollow_sphere(cells, degree, young, yield_stress, pressure, steps=10):
-    """Return a hollow sphere, radii 1 and 2, after an inner pressure and after its removal.
-
-    Rows are the two states, columns u_r(1), u_r(2) and the hoop stresses there, on the equator.
-    """
+def sphere_problem(cells, young, yield_stress, pressure, degree=2, element="standard"):
+    """Return the problem of a hollow sphere, radii 1 and 2, under a pressure that comes and goes."""
     ends = [[1.0, 0.0], [2.0, np.pi / 2]]
     grid = create_rectangle(MPI.COMM_SELF, ends, [cells] * 2, diagonal=DiagonalType.crossed)
     where = {"inner": (0, 1.0), "outer": (0, 2.0), "base": (1, 0.0)}
@@ -173,7 +170,16 @@ def hollow_sphere(cells, degree, young, yield_stress, pressure, steps=10):
         [Fixed("base", [None, 0.0])],
         [Load("inner", pressure=pressure, amplitude=lambda t: min(t, 2.0 - t))],
     )
-    problem = Problem(revolved(from_mesh(grid, parts)), body, Contact("outer", FAR), degree=degree)
+    domain = revolved(from_mesh(grid, parts))
+    return Problem(domain, body, Contact("outer", FAR), degree=degree, element=element)
+
+
+def hollow_sphere(cells, degree, young, yield_stress, pressure, steps=10):
+    """Return a hollow sphere, radii 1 and 2, after an inner pressure and after its removal.
+
+    Rows are the two states, columns u_r(1), u_r(2) and the hoop stresses there, on the equator.
+    """
+    problem = sphere_problem(cells, young, yield_stress, pressure, degree)
     solution = solve(problem, times=[*np.linspace(0, 1, steps + 1)[1:], 2.0])
     assert solution.converged and len(solution.steps) == steps + 1
     rows, equilibrium = [], problem.equilibrium

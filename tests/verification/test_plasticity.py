@@ -2,15 +2,20 @@
 
 import numpy as np
 import pytest
+import ufl
+from dolfinx import fem
 
-from contact import solve
+from contact import NewtonOptions, solve
+from contact.output.fields import DerivedFields
 from forms.j2 import Tabulated, Voce
+from scripts.studies.plasticity import STEEL, hencky
 from tests.problems.plasticity import (
     hollow_sphere,
     homogeneous,
     homogeneous_values,
     integrated,
     path,
+    sphere_problem,
 )
 
 YOUNG, YIELD = 1.0, 0.004
@@ -162,3 +167,69 @@ def test_hollow_sphere_under_pressure_and_unloaded(name):
     errors = [np.abs(hollow_sphere(cells, 2, *given) / np.array(known) - 1) for cells in (16, 32)]
     assert np.nanmax(errors[1]) < 2e-3
     assert np.nanmin((errors[0] / errors[1])[:, 0]) > 3.3
+
+
+@pytest.mark.parametrize("kind", ["uniaxial", "revolved"])
+def test_j2_is_hencky_s_law_in_proportional_loading(kind):
+    """Uniaxial stress, digit for digit; they part where the strain turns."""
+    values = [0.001, 0.002, 0.005, 0.02, 0.019]
+    given, hardening = {key: STEEL[key] for key in ("young", "yield_stress")}, 20e3
+    times = [float(k + 1) for k in range(len(values))]
+    case = homogeneous(kind, {**given, "hardening": hardening}, times, values, cells=1)
+    up, found = 2 if kind == "uniaxial" else 1, []
+    for solution in (solve(case), solve(case, law=hencky(hardening))):
+        assert solution.converged and len(solution.steps) == len(values)
+        stresses = []
+        for step in solution.steps:
+            cells = DerivedFields(solution.problem.equilibrium, step.state).cells()
+            stresses.append(cells["stress"].x.array.reshape(-1, 3, 3)[:, up, up].mean())
+        found.append(np.array(stresses))
+    flow, theory = found
+    assert flow[2] > 1.05 * STEEL["yield_stress"]
+    assert theory[:4] == pytest.approx(flow[:4], rel=1e-12)
+    drop = STEEL["young"] * 0.001
+    assert flow[3] - flow[4] == pytest.approx(drop, rel=1e-10)
+    assert theory[3] - theory[4] < 0.1 * drop
+
+
+def test_the_mean_dilatation_is_p2_p0_with_the_return_map_at_the_points():
+    """The body's solution balances the mixed form, with a pressure of each cell of its own.
+
+    The element is softer than the sphere near its limit load (16 % in u at 4 cells, 0.9 % at 32):
+    so is the mixed method.
+    """
+    young, limit, pressure, nu = YOUNG, YIELD, 0.0045, 0.3
+    problem = sphere_problem(4, young, limit, pressure, element="mean_dilatation")
+    solution = solve(problem, NewtonOptions(tolerance=1e-11), times=[1.0])
+    assert solution.converged and len(solution.steps) == 1
+    body = problem.equilibrium
+    u, mesh = body.function(solution.state.x), body.domain.mesh
+    dx = ufl.dx(mesh, metadata={"quadrature_degree": 3})
+    r, n = ufl.SpatialCoordinate(mesh)[0], ufl.FacetNormal(mesh)
+    v = ufl.TestFunction(body.space)
+
+    def strain(w):
+        g = ufl.sym(ufl.grad(w))
+        return ufl.as_tensor([[g[0, 0], g[0, 1], 0], [g[1, 0], g[1, 1], 0], [0, 0, w[0] / r]])
+
+    flat = fem.functionspace(mesh, ("DG", 0))
+    p, q = fem.Function(flat), ufl.TestFunction(flat)
+    volume, dilated = (
+        fem.assemble_vector(fem.form(value * q * r * dx)).array
+        for value in (1.0, ufl.tr(strain(u)))
+    )
+    p.x.array[:] = young / (3 - 6 * nu) * dilated / volume
+    e, shear = ufl.dev(strain(u)), young / (2 + 2 * nu)
+    t, most = ufl.sqrt(ufl.inner(e, e)), np.sqrt(2 / 3) * limit / (2 * shear)
+    s = 2 * shear * e * ufl.conditional(ufl.lt(t, most), 1.0, most / t)
+    ds = body.domain.ds("inner")  # of the whole turn
+    inner = (ufl.inner(s, strain(v)) + p * ufl.tr(strain(v))) * r * dx
+    forces, loads = (
+        fem.assemble_vector(fem.form(form)).array
+        for form in (inner, -pressure / (2 * np.pi) * ufl.dot(n, v) * ds)
+    )
+    left = (forces - loads)[body.free.ravel()]
+    assert np.linalg.norm(left) < 1e-9 * np.linalg.norm(loads)
+    points = body.space.tabulate_dof_coordinates()
+    at = np.argmin(np.abs(points[:, 0] - 1) + np.abs(points[:, 1]))
+    assert body.nodal(solution.state.x)[at, 0] / 0.0061359479 - 1 == pytest.approx(0.1558, abs=1e-3)
