@@ -23,6 +23,7 @@ from meshes.hertz import disc, half_disc, quarter_disc, sphere
 from meshes.indentation import half_cylinder, half_space
 from meshes.pairs import (
     ball_between_plates,
+    bimorph_on_stop,
     cylinder_on_block,
     two_balls,
     two_blocks,
@@ -54,6 +55,7 @@ GENERATORS: Mapping[str, Callable[..., None]] = {
         two_balls,
         two_spheres,
         ball_between_plates,
+        bimorph_on_stop,
     )
 }
 

@@ -245,3 +245,45 @@ def ball_between_plates(
         Sizes(size, contact_size, contact_width, growth),
         points=[low, high],
     )
+
+
+def bimorph_on_stop(
+    *,
+    length: float = 6.0,
+    thickness: float = 1.0,
+    gap: float = 0.003,
+    stop_width: float = 0.2,
+    stop_height: float = 0.3,
+    size: float = 0.25,
+    contact_size: float = 0.02,
+) -> None:
+    """Beam of two layers from x = 0 on, y = 0 its lower side, over a stop below its tip.
+
+    Regions: ``upper``, ``lower`` (the layers, each half of ``thickness``), ``stop``. Parts:
+    ``clamped`` (x = 0), ``upper_top``, ``lower_bottom`` (the electrodes), ``tip``; ``stop_top``
+    lies ``gap`` below, its middle 1.5 ``stop_width`` from the tip; ``stop_bottom``. The elements
+    have ``contact_size`` at the stop's top, ``size`` far away.
+    """
+    import gmsh
+
+    if 2 * stop_width >= length:
+        raise InputError(f"stop_width must be less than half of {length}; given: {stop_width}")
+    geo = gmsh.model.geo
+    heights = (0.0, thickness / 2, thickness)
+    left, right = ([geo.addPoint(x, y, 0) for y in heights] for x in (0.0, length))
+    along = [geo.addLine(a, b) for a, b in zip(left, right, strict=True)]
+    bodies: dict[str, list[int]] = {}
+    ends: list[list[int]] = [[], []]
+    for k, name in enumerate(("lower", "upper")):
+        for column, points in zip(ends, (left, right), strict=True):
+            column.append(geo.addLine(points[k], points[k + 1]))
+        loop = [along[k], ends[1][k], -along[k + 1], -ends[0][k]]
+        bodies[name] = [geo.addPlaneSurface([geo.addCurveLoop(loop)])]
+    at, top = length - 2 * stop_width, -gap
+    corners = [(at, top - stop_height), (at + stop_width, top - stop_height)]
+    corners += [(at + stop_width, top), (at, top)]
+    bodies["stop"], (bottom, _, touched, _) = polygon(geo, corners)
+    parts = {"clamped": ends[0], "tip": ends[1], "lower_bottom": along[:1], "upper_top": along[2:]}
+    parts |= {"stop_top": [touched], "stop_bottom": [bottom]}
+    sizes = Sizes(size, contact_size, 0.0, 0.3)
+    finish(gmsh, 2, bodies, parts, sizes, curves=[touched])

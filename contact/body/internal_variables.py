@@ -259,6 +259,7 @@ class QuadratureLaws:
             Derivatives of a quantity by the variables at the end of the step. The forces are then
             its derivatives by the unknowns.
         """
+        self._seen = None
         self._stress.x.array[:] = 0.0
         for law, cells, strains, variables in self._points(state, x):
             given = self._at(after.arrays, law, cells)

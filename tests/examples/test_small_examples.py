@@ -11,6 +11,7 @@ from scripts.examples import (
     fretting,
     own_contact,
     own_material,
+    own_return_mapping,
     refinement,
 )
 
@@ -30,6 +31,15 @@ def test_own_material():
     solutions = own_material.main((16, 4))
     assert all(solution.converged for solution in solutions.values())
     assert solutions["softening"].max_dev_strain > 1.2 * solutions["linear"].max_dev_strain
+
+
+def test_own_return_mapping():
+    solution = own_return_mapping.main(0.03)
+    assert solution.converged
+    forces = np.array([step.row["contact_force_y"] for step in solution.steps])
+    assert forces.argmax() == 4 and forces[-1] == 0  # loaded in five steps, and a mark remains
+    assert all(step.row["plastic_dissipation"] >= 0 for step in solution.steps)
+    assert solution.plastic_dissipation > 0
 
 
 def test_own_contact():

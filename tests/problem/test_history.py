@@ -18,6 +18,7 @@ from contact.output.checkpoint import read_steps
 from contact.output.fields import DerivedFields
 from forms.hencky import Isotropic
 from forms.history import Response, isotropic_stiffness
+from scripts.examples.own_return_mapping import DruckerPrager
 
 YOUNG, POISSON, LIMIT, MOST, HEIGHT, WIDTH = 10.0, 0.3, 2e-3, 0.5, 1.0, 2.0
 TIMES, PRESSED = [0.0, 1.0, 2.0, 3.0], [0.0, 4e-3, 1e-3, 6e-3]
@@ -135,3 +136,27 @@ def test_a_state_without_its_history_is_of_another_step():
     assert forces[0] / forces[1] == pytest.approx(ratio / undamaged, rel=1e-6)
     assert not second.near(virgin)
     assert problem.commit(first).near(second.history, rtol=1e-14)
+
+
+@pytest.mark.parametrize("size", [4, 6])
+def test_drucker_and_prager_s_cone_of_the_example(size):
+    """The oedometer in closed form, the apex, and no more than the cone at random strains."""
+    law = DruckerPrager(10.0, 0.3, cohesion=0.01)
+    k, g, a, c = law.bulk, law.shear, law.friction, law.cohesion
+    none = {"plastic_strain": np.zeros((2, size))}
+    pressed = -2 * c / g
+    strain = np.zeros((2, size))
+    strain[0, 1], strain[1, :3] = pressed, 2 * c / k
+    found = law.respond(strain, none)
+    flow = ((2 * g * np.sqrt(2 / 3) - a * k) * -pressed - c) / (2 * g + k * a**2)
+    along = -np.sqrt(2 / 3) * (-2 * g * np.sqrt(2 / 3) * pressed - 2 * g * flow)
+    assert flow > 0
+    assert found.stress[0, 1] == pytest.approx(along + k * pressed - k * a * flow, rel=1e-12)
+    assert found.stress[1] == pytest.approx(c / a * np.eye(3, size).sum(axis=0), rel=1e-12)
+    none = {"plastic_strain": np.zeros((200, size))}
+    found = law.respond(3 * c / g * np.random.default_rng(0).standard_normal((200, size)), none)
+    mean = found.stress[:, :3].mean(axis=1)
+    s = found.stress.copy()
+    s[:, :3] -= mean[:, None]
+    assert (np.linalg.norm(s, axis=1) + a * mean - c).max() < 1e-12 * c
+    assert found.dissipation.min() > -1e-12 * found.dissipation.max()

@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 
-from contact import FixedPointOptions, NewtonOptions, parse_case, solve
+from contact import FixedPointOptions, NewtonOptions, load_case, parse_case, solve
 from contact.output.resultants import charge_balance
+from scripts.cases import CASES
 
 #: GPa, C/m^2, GV: a stack of PZT-5A's coupling and isotropic elasticity, and a metal.
 STACK = {"young": 58.7102, "poisson": 0.3912}
@@ -18,7 +19,7 @@ def pressed(mu=0.0, confined=True, size=1.0, coupling=COUPLING, metal=METAL, **m
     sides = {"upper_top": [0.0, 0.0], "lower_bottom": ["free" if confined else 0.0, 0.0]}
     if confined:
         names = [f"{body}_{side}" for body in ("upper", "lower") for side in ("left", "right")]
-        sides |= dict.fromkeys(names, [0.0, "free"])
+        sides |= {name: [0.0, "free"] for name in names}
     fixed = [{"on": name, "displacement": values} for name, values in sides.items()]
     if coupling is not None:
         fixed[0] |= {"potential": 1.0, "amplitude": "volts"}
@@ -130,3 +131,17 @@ def test_without_coupling_the_field_changes_nothing():
         body = solution.problem.equilibrium
         found.append([body.nodal(step.state.x)[:, :2] for step in solution.steps])
     assert np.abs(np.array(found[0]) - found[1]).max() < 1e-10 * np.abs(found[0]).max()
+
+
+def test_a_bimorph_marks_its_stop():
+    """The case on a coarse mesh: without a halved step, and later to touch the second time."""
+    sizes = ["mesh.size=0.5", "mesh.contact_size=0.1", "evolution.steps=[4, 1, 4]"]
+    solution = solve(load_case(CASES / "bimorph-stop.toml", sizes))
+    assert solution.converged and len(solution.steps) == 9
+    rows = [step.row for step in solution.steps]
+    force, lost = (
+        np.array([row[name] for row in rows]) for name in ("contact_force_y", "plastic_dissipation")
+    )
+    assert force[0] > 0 and force[4] == 0 and force[5] == 0
+    assert (force[[6, 7, 8]] < force[[1, 2, 3]]).all() and force[8] > 0.9 * force[3]
+    assert lost[2] > 0 and lost[5:].sum() < 0.2 * lost[:4].sum()

@@ -155,7 +155,7 @@ def integrated(young, poisson, yield_stress, hardening, kinematic, free, driven)
 
 
 def sphere_problem(cells, young, yield_stress, pressure, degree=2, element="standard"):
-    """Return the problem of a hollow sphere, radii 1 and 2, under a pressure that comes and goes."""
+    """Return a hollow sphere, radii 1 and 2, under a pressure that comes and goes."""
     ends = [[1.0, 0.0], [2.0, np.pi / 2]]
     grid = create_rectangle(MPI.COMM_SELF, ends, [cells] * 2, diagonal=DiagonalType.crossed)
     where = {"inner": (0, 1.0), "outer": (0, 2.0), "base": (1, 0.0)}
