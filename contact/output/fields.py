@@ -27,6 +27,7 @@ from contact.output.quantities import BODY, values_of
 from contact.problem.problem import ContactProblem
 from contact.problem.state import State
 from contact.typing import Array
+from forms.elasticity import Anisotropic
 from forms.hencky import is_linear, stress
 from forms.history import HistoryLaw, components, to_tensor
 from forms.kinematics import deviator_squared, strain, von_mises
@@ -350,10 +351,8 @@ def unloaded(problem: ContactProblem, states: Sequence[State]) -> float:
         The problem, and the states at the ends of all of its steps.
     """
     body = problem.equilibrium
-    curved = [
-        not is_linear(m.law) and not isinstance(m.law, HistoryLaw) for m in body.body.materials
-    ]
-    if not states or not any(curved):
+    laws = [material.law for material in body.body.materials]
+    if not states or all(is_linear(law) or isinstance(law, HistoryLaw) for law in laws):
         return 0.0
     fields = DerivedFields(body, BodyState(body.rest()))
     of_cells = fields._volumes()
@@ -363,12 +362,10 @@ def unloaded(problem: ContactProblem, states: Sequence[State]) -> float:
     for k, state in enumerate(states):
         fields.move_to(state)
         before, after = after, fields.strains()
-        for material, own, old, new, counts in zip(
-            body.body.materials, volumes, before, after, curved, strict=True
-        ):
-            if counts:
-                modulus = np.asarray(material.law.secant_modulus(old**2), dtype=float)
-                yielded = modulus < (1 - SOFTENED) * float(material.law.shear)
+        for law, own, old, new in zip(laws, volumes, before, after, strict=True):
+            if not isinstance(law, Anisotropic | HistoryLaw):
+                modulus = np.asarray(law.secant_modulus(old**2), dtype=float)
+                yielded = modulus < (1 - SOFTENED) * float(law.shear)
                 sums[k] += own @ (yielded & (new < (1 - DECREASE) * old)).mean(axis=1)
     body.comm.Allreduce(MPI.IN_PLACE, sums, op=MPI.SUM)
     return float(sums[:-1].max() / sums[-1])
