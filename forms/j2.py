@@ -275,8 +275,9 @@ class _Flow:
         """
         law = self._law
         scale = _norm(self._trial) + sum(_norm(b) for b in self.back)
-        low, high = np.zeros(scale.size), scale / (2 * law.shear)
-        dg = low.copy()
+        low: Array = np.zeros(scale.size)
+        high: Array = scale / (2 * law.shear)
+        dg: Array = low.copy()
         for _ in range(MOST):
             theta, _, size, slope = self._at(dg)
             moduli = 2 * law.shear + sum(
