@@ -276,7 +276,7 @@ class _Flow:
         law = self._law
         scale = _norm(self._trial) + sum(_norm(b) for b in self.back)
         low: Array = np.zeros(scale.size)
-        high: Array = scale / (2 * law.shear)
+        high: Array = np.asarray(scale / (2 * law.shear), dtype=float)
         dg: Array = low.copy()
         for _ in range(MOST):
             theta, _, size, slope = self._at(dg)

@@ -266,8 +266,6 @@ def bimorph_on_stop(
     """
     import gmsh
 
-    if 2 * stop_width >= length:
-        raise InputError(f"stop_width must be less than half of {length}; given: {stop_width}")
     geo = gmsh.model.geo
     heights = (0.0, thickness / 2, thickness)
     left, right = ([geo.addPoint(x, y, 0) for y in heights] for x in (0.0, length))

@@ -159,9 +159,11 @@ class LocalProblems:
         moduli
             From strains to fluxes, shape (cells, 6 or 9, 6 or 9), or one for all.
         """
-        moduli = np.broadcast_to(moduli, (len(cells), *moduli.shape[1:]))
+        # Of a material without a field those of a field are zero.
+        whole = np.zeros((len(cells), *2 * (9 if self._body.piezoelectric else 6,)))
+        whole[:, : moduli.shape[1], : moduli.shape[2]] = moduli
         pieces = np.array_split(np.arange(len(cells)), len(cells) // CHUNK + 1)
-        found = [self._solved(cells[piece], moduli[piece]) for piece in pieces]
+        found = [self._solved(cells[piece], whole[piece]) for piece in pieces]
         return np.concatenate(found)
 
     def _solved(self, cells: Indices, moduli: Array) -> Array:
@@ -207,6 +209,8 @@ class LocalProblems:
             right += values.T @ (areas[..., None] * flux)
             acts = np.abs(values).max(axis=0) > 0
             held |= acts[None, :, None] & self._held[cells, facet][:, None]
+        if body.piezoelectric:
+            held[..., d] |= (moduli[:, -1, -1] == 0)[:, None]
         held, right = held.reshape(count, -1), right.reshape(count, -1)
         right[held] = 0.0
         matrix[held[:, :, None] | held[:, None, :]] = 0.0

@@ -156,7 +156,7 @@ def first_yield(shape: str, fineness: float) -> tuple[float, float]:
         after = solution.problem.at(step.state.time, step.state.history).commit(step.state)
         strain = after.arrays()["material.equivalent_plastic_strain"]
         if strain.max() > 0:
-            # The stress is flat at its maximum: the middle of what has yielded.
+            # The stress is flat at its maximum: the middle of the plastic zone.
             depth = -np.average(laws.places[:, 1], weights=strain * laws.volumes)
             pressure = pressures[k] - 0.005
             return float(pressure), float(depth / (a * pressure / known))
@@ -182,7 +182,7 @@ def ball_and_cylinder(report: Report, coarse: bool) -> None:
 
 
 def pressed_ball(report: Report, coarse: bool) -> None:
-    """Make the table of forces on a ball that is pressed into steel beyond yield. Collective."""
+    """Make the table of forces on a ball that is pressed into steel that yields. Collective."""
     # The case's mesh, or one of twice the size.
     changes = ["mesh.contact_size=0.008", "mesh.edge_size=0.008"] if coarse else []
     solution = solved(load_case(CASES / "ball-in-steel.toml", changes))

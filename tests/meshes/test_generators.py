@@ -84,6 +84,17 @@ GENERATORS = {
             "bottom": np.pi * 18,
         },
     ),
+    "bimorph_on_stop": (
+        6.0 * 1.0 + 0.2 * 0.3,
+        {
+            "clamped": 1.0,
+            "tip": 1.0,
+            "upper_top": 6.0,
+            "lower_bottom": 6.0,
+            "stop_top": 0.2,
+            "stop_bottom": 0.2,
+        },
+    ),
     "two_blocks": (
         6.0,
         {
