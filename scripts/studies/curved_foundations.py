@@ -69,9 +69,12 @@ NOTE = (
     "Hertz's cylinder: nodes within 0.7 a. All others: the body shrinks by 0.001 under hydrostatic "
     "pressure. Errors of gaps are multiplied by E/h: at degree 2 gaps in the middle of edges are "
     "those of the curved surface, by curvatures fitted to the vertices; before they were those of "
-    "the chord. The triangles are chords of the sphere themselves, by 2e-6. "
-    "In 3-D, where the curvature jumps at the edge of the punch's face, nodes of degree 2 beside "
-    "it stay off by up to 95 % at h = 0.05."
+    "the chord. The triangles are chords of the sphere themselves, by 5e-7, and errors are theirs: "
+    "at degree 1 and h = 0.1 triangles twice and four times as large have the least and largest "
+    "ratios 0.966, 1.030 and 0.886, 1.106. "
+    "In 3-D nodes of degree 2 near the edge of the punch's face, where the curvature jumps, are "
+    "off by more than 10 %: 8.4 % of the area at h = 0.1 and 1.4 % at h = 0.05, the most within "
+    "h/2 of the edge."
 )
 
 #: Ratios and weights of the nodes, given a mesh size and a degree.
@@ -123,7 +126,7 @@ def ellipsoid(dim: int, factor: float) -> Level:
     return Level(lambda x: np.sum(((x - middle) / (factor * axes)) ** 2, axis=1) - 1)
 
 
-def triangulated(_dim: int, factor: float, cells: int = 400) -> Triangles:
+def triangulated(_dim: int, factor: float, cells: int = 800) -> Triangles:
     """Return an octant of the unit sphere, and a little more, as triangles."""
     a, b = np.meshgrid(*[np.linspace(-0.1, np.pi / 2 + 0.1, cells + 1)] * 2, indexing="ij")
     a, b = np.clip(a, -0.1, np.pi / 2 + 0.1), np.clip(b, -0.1, np.pi / 2)

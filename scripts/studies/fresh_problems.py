@@ -453,11 +453,15 @@ def draw(family: Callable[[Rng, Bodies], Tables], number: int, folder: Path) -> 
 
 
 def along_normal(solution: Solution) -> float:
-    """Return the largest normal component of friction over the largest pressure."""
+    """Return the largest normal component of friction over the largest stress of both.
+
+    That is the largest pressure but for bodies that touch nothing, where rounding is left of both.
+    """
     nodes, forces = solution.problem.nodes, solution.forces
+    stresses = np.abs(forces.pressure), np.linalg.norm(forces.friction, axis=1)
+    scale = max(stress.max(initial=0.0) for stress in stresses)
     largest = np.abs(nodes.normal_component(forces.friction)).max(initial=0.0)
-    pressure = forces.pressure.max(initial=0.0)
-    return float(largest / pressure) if pressure > NOTHING else float(largest > NOTHING)
+    return float(largest / max(scale, 1e-300))
 
 
 def judge(mesh: Mesh, tables: Tables, solution: Solution, folder: Path) -> dict[str, float]:
