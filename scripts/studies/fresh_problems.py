@@ -34,8 +34,6 @@ ALLOWED = {"normal turned": 0.3, "status": 0.5}
 SMALL = 1e-6
 #: Largest component of friction along the normal, over the largest pressure.
 ALONG = 1e-14
-#: Stress that is none: what an interior point leaves where nothing touches.
-NOTHING = 1e-150
 #: Linear solves of a step of a linear material that is slow.
 SLOW = 20
 
