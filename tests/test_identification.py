@@ -8,6 +8,7 @@ from contact import InputError, identify, parse_case, read_data, solve
 from contact.case.text import number_at, to_toml, with_number
 from contact.cli.main import main
 from scripts.studies.derivatives import FAMILIES, problem
+from scripts.studies.identification import coverage
 
 SELF = MPI.COMM_SELF
 COLUMNS = ("contact_force_x", "contact_force_y")
@@ -88,3 +89,33 @@ def test_the_command(tmp_path, capsys):
     assert main(command) == 2
     assert "accepted: a row of names, then rows of numbers" in capsys.readouterr().err
     assert not picture.exists()
+
+
+@pytest.mark.parametrize(
+    ("text", "more", "message"),
+    [
+        ("t,contact_force_x\n1.0,much\n", [], "accepted: a row of names, then rows of numbers"),
+        (None, [], "accepted: a CSV file"),
+        ("t,contact_force_x\n1.0,0.1\n2.0,0.1\n", ["--for", ""], "--for: missing; accepted: keys"),
+        ("t,contact_force_x\n1.0,0.1\n2.0,0.1\n", ["--for", "friction.nu"], "friction.nu: nothing"),
+        ("t,contact_force_x\n1.0,0.1\n9.0,0.1\n", [], "data: t: given"),
+        ("t\n1.0\n2.0\n", [], "data: columns t; accepted: t and columns of steps.csv"),
+        ("t,contact_force_x\n1.0,0.1\n", [], "data: given '1 values'; accepted: more than 2"),
+        ("t,contact_force_x\n1.0,0.1\n", ["--bound", "friction.mu=1:0"], "--bound friction.mu=1:0"),
+    ],
+)
+def test_bad_input_ends_the_command_with_one_line(tmp_path, capsys, text, more, message):
+    file, path = tmp_path / "loop.csv", tmp_path / "block.toml"
+    path.write_text(to_toml(case()))
+    if text is not None:
+        file.write_text(text)
+    keys = ["--for", "friction.mu,material.young"]
+    assert main(["identify", str(path), str(file), *keys, *more, "--quiet"]) == 2
+    said = capsys.readouterr().err.strip()
+    assert message in said and len(said.splitlines()) == 1
+
+
+def test_intervals_contain_the_parameters_as_often_as_they_say():
+    # of a linear model, in ten thousand repetitions
+    shares = coverage(solve(case(), comm=SELF), COLUMNS)
+    assert shares == pytest.approx([0.95, 0.95], abs=0.01)

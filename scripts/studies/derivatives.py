@@ -25,9 +25,8 @@ from contact.problem.problem import ContactProblem
 from contact.typing import Array
 from scripts.reporting import Report, append, parser
 
-#: Relative change of a parameter in the central differences, which is to change no active set; and
-#: sections with parameters.
-STEP = 1e-5
+#: Relative change of a parameter in the central differences, and sections with parameters.
+STEP = 1e-4
 SECTIONS = ("material", "fixed", "load", "contact", "friction", "electric", "electrode")
 
 #: Numbers that are no parameters: they choose, or leave the problem as it is.

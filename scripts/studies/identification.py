@@ -97,15 +97,15 @@ def main(arguments: Sequence[str] | None = None) -> None:
     )
 
 
-def coverage(right: Solution) -> Array:
+def coverage(right: Solution, measured: Sequence[str] = MEASURED) -> Array:
     """Return the shares of linearised repetitions whose intervals contain the parameters."""
-    slopes = sensitivity(right, MEASURED, KEYS, "tangent").steps
+    slopes = sensitivity(right, measured, KEYS, "tangent").steps
     rows = [record.row for record in right.steps]
     jacobian = np.concatenate(
         [
             np.column_stack([slopes[name][key] for key in KEYS])
             / max(abs(row[name]) for row in rows)
-            for name in MEASURED
+            for name in measured
         ]
     )
     freedom = len(jacobian) - len(KEYS)
