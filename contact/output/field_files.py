@@ -33,7 +33,7 @@ from contact.ranks import on_root
 #: A time, and the state then.
 Frame: TypeAlias = tuple[float, State]
 
-#: Fields that are written for every step.
+#: Fields that are written for every step, and internal variables.
 SERIES = ("displacement", "potential", "von_mises")
 
 
@@ -79,11 +79,11 @@ def _frames(solution: Solution) -> list[Frame]:
 def _write_series(problem: ContactProblem, frames: Sequence[Frame], folder: Path) -> None:
     """Write a file of the main fields for each step, and ``fields.pvd``, which names them."""
     derived = DerivedFields(problem.equilibrium, frames[0][1])
-    lines = []
+    names, lines = (*SERIES, *problem.equilibrium.laws.names), []
     for k, (time, state) in enumerate(frames):
         name = f"fields-{k:04d}.vtu"
         derived.move_to(state)
-        write_share(problem.comm, body_share(problem, state, SERIES, derived), folder / name)
+        write_share(problem.comm, body_share(problem, state, names, derived), folder / name)
         lines.append(f'<DataSet timestep="{time!r}" file="{name}"/>')
     collection = "\n".join(['<VTKFile type="Collection">', "<Collection>", *lines, "</Collection>"])
     if problem.comm.rank == 0:

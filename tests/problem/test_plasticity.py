@@ -7,6 +7,7 @@ from mpi4py import MPI
 from contact import FixedPointOptions, NewtonOptions, evolve, parse_case, solve
 from contact.case.build import build_problem
 from contact.output.checkpoint import read_steps
+from contact.output.field_files import write_fields
 from tests.problems.plasticity import homogeneous, homogeneous_values
 
 YOUNG, LIMIT = 200e3, 250.0
@@ -106,3 +107,15 @@ def test_methods_agree(hardening, degree):
     for name, values in found.items():
         assert np.abs((values - found["whole"]) / scale).max() < 1e-6, name
     assert found["whole"][:, 2].min() >= 0 and found["whole"][:, 2].max() > 0
+
+
+def test_the_files_of_all_steps_have_the_plastic_strain(tmp_path):
+    solution = solve(block(cells=2))
+    write_fields(solution, tmp_path)
+    files = sorted(tmp_path.glob("fields-*.vtu"))
+    assert len(files) == len(solution.steps) == 6
+    for path in files:
+        text = path.read_text(errors="replace")
+        for name in ("plastic_strain", "equivalent_plastic_strain", "back_stress_1"):
+            assert f'Name="{name}"' in text
+            assert f'Name="{name}_cell"' in text
