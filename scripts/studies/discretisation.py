@@ -17,6 +17,7 @@ from mpi4py import MPI
 from contact import load_case, parse_case, solve
 from contact.body.description import Body, Fixed, Load
 from contact.case.build import build_problem
+from contact.case.file import Case
 from contact.mesh.grid import box
 from contact.mesh.transfer import carry
 from contact.methods.newton import Newton
@@ -32,6 +33,7 @@ from scripts.studies.error_norms import errors
 from scripts.studies.exact_solutions import Singular, exact, manufactured
 from tests.problems.bar import changed
 from tests.problems.mechanics import flat
+from tests.problems.membrane import cook
 from tests.problems.revolution import Drum, Tube, pressed_cylinder
 
 LINEAR = {"material__law": "linear", "material__yield_strain": None}
@@ -43,6 +45,8 @@ LOCKING = {
     },
     "nu = 0.4999, mu = 0": {**LINEAR, "material__poisson": 0.4999, "friction__mu": 0.0},
 }
+#: The rise of Cook's membrane, P2 on 64 cells (19.43) beside the mean dilatation on as many.
+COOK = 19.43
 ELEMENTS = {"P1": (1, "standard"), "P2": (2, "standard"), "P2, mean": (2, "mean_dilatation")}
 
 
@@ -90,8 +94,8 @@ def effectivity(report: Report, coarse: bool) -> None:
         "Estimated error over the error, in the energy norm, relative",
         columns,
         "Exact: manufactured solutions (Hencky), Lamé's tube under a pressed-on casing (also "
-        "nearly incompressible), contact without friction of a half plane that ends at a point. Bars, "
-        "cylinder (Hencky's law and friction, revolved) and block (3-D, clamped at an end) are set "
+        "nearly incompressible), contact without friction of a half plane that ends at a point. "
+        "Bars, cylinder (Hencky's law and friction, revolved) and block (3-D, clamped at an end) are set "
         "beside P2 on 64, 48 and 8 cells a unit. At nu = 0.4999 P1 locks: there the estimate is a "
         "lower bound, as the run says. Of degree 2 the local problems are cubic, overestimate "
         "smooth solutions in 3-D, and see less where the material is nearly incompressible.",
@@ -176,6 +180,131 @@ def locking(report: Report, coarse: bool) -> None:
     )
 
 
+def prandtl(n: int, degree: int, element: str) -> float:
+    """Return the mean pressure under a smooth punch of half width 1, n cells a unit, Y = 1."""
+    tables = {
+        "mesh": {
+            "generator": "rectangle", "size": [5.0, 2.5], "cells": [5 * n, 5 * n // 2],
+            "parts": {"punch": {"side": "top", "to": 1.0}},
+        },
+        "space": {"degree": degree, "element": element},
+        "material": {"law": "j2", "young": 1000.0, "poisson": 0.3, "yield_stress": 1.0},
+        "fixed": [
+            {"on": "left", "displacement": [0.0, "free"]},
+            {"on": "right", "displacement": [0.0, "free"]},
+            {"on": "punch", "displacement": ["free", "-0.02*t"]},
+        ],
+        "contact": {"on": "bottom"},
+        "evolution": {"times": [0.0, 1.0], "steps": [10]},
+    }  # fmt: skip
+    solution = solve(parse_case(tables))
+    assert solution.converged, solution.outcome.reason
+    return abs(float(solution.supports["punch"].force[1]))
+
+
+def limits(report: Report, coarse: bool) -> None:
+    """Make the table of Cook's membrane and Prandtl's punch. Collective."""
+    columns: dict[str, list[Any]] = {
+        name: [] for name in ("problem", "element", "cells", "found", "limit", "ratio")
+    }
+    for label, (degree, element) in ELEMENTS.items():
+        for n in (8,) if coarse else (8, 16, 32):
+            rise = cook(n, degree, element)
+            append(columns, "Cook's membrane", label, n, rise, COOK, rise / COOK)
+    punch = (2 + np.pi) / np.sqrt(3)
+    for label, (degree, element) in ELEMENTS.items():
+        for n in (2,) if coarse else (4, 8):
+            found = prandtl(n, degree, element)
+            append(columns, "Prandtl's punch", label, n, found, punch, found / punch)
+    report.table(
+        "limits",
+        "Limits that elements of degree 1 do not reach",
+        columns,
+        "Cook's membrane in plane strain, ν = 0.4999, cells along an edge: the rise of its corner, "
+        "beside that of P2 on 64 cells. Prandtl's smooth punch, cells a unit of its half width, "
+        "J2 without hardening, pressed by 0.02: the mean pressure over the yield stress, beside "
+        "(2 + π)/√3.",
+    )
+
+
+def quantities(report: Report, coarse: bool) -> None:
+    """Make the table of intervals beside values on a finer mesh. Collective."""
+    columns: dict[str, list[Any]] = {
+        name: [] for name in ("problem", "element", "unknowns", "quantity", "low", "high",
+                              "value", "inside")
+    }  # fmt: skip
+    cases: dict[str, dict[str, Any]] = {
+        "bar with friction": {**LINEAR, "friction__mu": 0.6},
+        "bar without friction": {**LINEAR, "friction__mu": 0.0},
+        "yielding bar": {"friction__mu": 0.6, "material__yield_strain": 0.005},
+        "bar, nu = 0.4999": LOCKING["nu = 0.4999, mu = 0"],
+    }
+    most = {1: 1000 if coarse else 10_000, 2: 3000 if coarse else 10_000}
+    for name, changes in cases.items():
+        known = solve(_uniform(2, 10 * most[2], **changes)).adaptation[-1]
+        for degree, unknowns in most.items():
+            solution = solve(_uniform(degree, unknowns, **changes))
+            size = solution.adaptation[-1]["unknowns"]
+            for quantity, interval in (solution.intervals or {}).items():
+                value = known[quantity]
+                if interval is not None and abs(value) > 1e-12:
+                    low, high = interval
+                    append(columns, name, f"P{degree}", size, quantity, low, high, value,
+                           low <= value <= high)  # fmt: skip
+    report.table(
+        "quantities",
+        "Intervals of quantities from three uniform meshes, and the values of a finer one",
+        columns,
+        "Value: P2 on 128 cells a unit. Pressures without an interval are infinite at a corner.",
+    )
+
+
+def _uniform(degree: int, unknowns: int, **changes: Any) -> Case:
+    tables = changed(mesh__cells=[16, 4], space__degree=degree, **changes)
+    tables["mesh"]["adapt"] = {"fraction": 1.0, "max_unknowns": unknowns}
+    return parse_case(tables)
+
+
+def per_second(report: Report, coarse: bool) -> None:
+    """Make the table of errors and times by element. Collective."""
+    columns: dict[str, list[Any]] = {
+        name: [] for name in ("problem", "element", "unknowns", "seconds", "estimate",
+                              "largest displacement")
+    }  # fmt: skip
+    tip = {"on": "right", "traction": [0.0, -1e-6]}
+    beam = {**LINEAR, "mesh__size": [80.0, 1.0], "mesh__parts__loaded": None, "load__0": tip,
+            "contact__gap": 10.0}  # fmt: skip
+    folder = Path(__file__).parents[1] / "cases"
+    files = {"Hertz, 2-D": "hertz.toml", "ball, 3-D": "hertz-sphere.toml"}
+    for label, (degree, element) in ELEMENTS.items():
+        space = {"space__degree": degree, "space__element": element}
+        keys = [f"space.degree={degree}", f'space.element="{element}"']
+        cases: list[tuple[str, Case]] = []
+        for n in (8, 16) if coarse else (8, 16, 32, 64):
+            friction = {**LINEAR, "friction__mu": 0.6, "mesh__cells": [4 * n, n]}
+            cases.append(("bar", parse_case(changed(**friction, **space))))
+        for n in (3,) if coarse else (3, 6, 12):
+            cells = {"mesh__cells": [80 * n, n]}
+            cases.append(("beam", parse_case(changed(**beam, **space, **cells))))
+        for name, file in files.items():
+            refine = (0, 1) if name == "ball, 3-D" and degree == 1 and not coarse else (0,)
+            for k in refine:
+                cases.append((name, load_case(folder / file, [*keys, f"mesh.refine={k}"])))
+        for name, case in cases:
+            begin = time.perf_counter()
+            solution = solve(case)
+            seconds = time.perf_counter() - begin
+            assert solution.error is not None
+            append(columns, name, label, solution.problem.equilibrium.layout.unknowns, seconds,
+                   solution.error.relative, solution.max_displacement)  # fmt: skip
+    report.table(
+        "per-second",
+        "Error and time by element",
+        columns,
+        "Compiled forms at hand, one thread; the whole of `solve`, mesh and review included.",
+    )
+
+
 def adaptive(report: Report, coarse: bool) -> None:
     """Draw the error on adapted and uniform meshes. Collective."""
     figure, axes = subplots(1, 2)
@@ -230,6 +359,9 @@ def main(arguments: Sequence[str] | None = None) -> None:
     report = Report(chosen.out)
     effectivity(report, chosen.coarse)
     locking(report, chosen.coarse)
+    limits(report, chosen.coarse)
+    quantities(report, chosen.coarse)
+    per_second(report, chosen.coarse)
     adaptive(report, chosen.coarse)
 
 

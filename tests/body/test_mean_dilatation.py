@@ -4,17 +4,16 @@ import numpy as np
 import pytest
 import ufl
 from dolfinx import fem
-from dolfinx.fem.petsc import assemble_vector
 from mpi4py import MPI
 from petsc4py import PETSc
 
 from contact import parse_case, solve
-from contact.body.description import Body, Fixed
+from contact.body.description import Body
 from contact.body.elements import kinematics_of
 from contact.body.equilibrium import BodyEquilibrium
 from contact.errors import InputError
 from contact.history import BodyState
-from contact.mesh.domain import from_mesh, revolved
+from contact.mesh.domain import revolved
 from contact.mesh.grid import box, rectangle
 from contact.methods.newton import Newton
 from contact.methods.options import NewtonOptions
@@ -24,6 +23,7 @@ from forms.hencky import Linear, Log
 from forms.kinematics import deviator_squared, strain
 from scripts.studies.error_norms import errors
 from tests.problems.bar import changed
+from tests.problems.membrane import cook
 from tests.problems.piezo import pzt
 from tests.problems.revolution import Tube
 
@@ -132,30 +132,6 @@ def test_the_tangent_is_symmetric_and_that_of_the_forces(kind, material):
     ahead, behind = (body.internal_forces(BodyState(x + t * step)) for t in (1e-6, -1e-6))
     slope = body.layout.mask((ahead - behind) / 2e-6)
     assert np.linalg.norm(slope - change.array) < 1e-6 * np.linalg.norm(slope)
-
-
-def cook(cells, degree, element="standard", poisson=0.4999):
-    """Return the rise of the upper corner of Cook's membrane, E = 1, traction 1/16 up."""
-    plane = rectangle(MPI.COMM_WORLD, (0.0, 0.0), (1.0, 1.0), (cells, cells))
-    x = plane.mesh.geometry.x
-    x[:, 1] = 44 * x[:, 0] + x[:, 1] * (44 - 28 * x[:, 0])
-    x[:, 0] *= 48
-    domain = from_mesh(plane.mesh, plane.parts)
-    described = Body(Linear(1.0, poisson), Fixed("left", [0, 0]))
-    body = BodyEquilibrium(domain, described, degree, element)
-    matrix = body.create_matrix()
-    body.assemble(matrix, "secant", BodyState(body.rest()))
-    test = ufl.TestFunction(body.space)
-    right = assemble_vector(fem.form(test[1] / 16 * domain.ds("right")))
-    fem.petsc.set_bc(right, [s.condition for s in body.supports])
-    solver = PETSc.KSP().create(MPI.COMM_WORLD)
-    solver.setOperators(matrix)
-    solver.setType("preonly")
-    solver.getPC().setType("lu")
-    found = right.duplicate()
-    solver.solve(right, found)
-    corner = np.argmax(body.space.tabulate_dof_coordinates()[:, :2].sum(axis=1))
-    return found.array[2 * corner + 1]
 
 
 def test_cooks_membrane_does_not_lock():
