@@ -19,6 +19,7 @@ from dolfinx import la
 from mpi4py import MPI
 
 from contact.body.description import Material
+from contact.body.elements import MEAN_DILATATION
 from contact.mesh.entities import cells_at
 from contact.mesh.together import members, part
 from contact.output.fields import DerivedFields
@@ -106,6 +107,11 @@ def estimated(
         energy = _density(material, shear)
         if local is not None:
             squares[cells] = local.squares(cells, _moduli(material, shear))
+            if body.element == MEAN_DILATATION and not isinstance(law, Anisotropic):
+                # The pressure is constant in a cell.
+                rough = own[..., :3].sum(axis=2).mean(axis=1)[:, None] / 3
+                between = at @ (nodal_means(body.domain, cells, rough) - rough[:, None])
+                squares[cells] += np.sum(volumes[cells] * between[..., 0] ** 2, 1) / _bulk(law)
         else:
             smooth = nodal_means(body.domain, cells, own[:, 0])
             squares[cells] = np.sum(volumes[cells] * energy(at @ (smooth - own)), axis=1)

@@ -95,10 +95,11 @@ def effectivity(report: Report, coarse: bool) -> None:
         columns,
         "Exact: manufactured solutions (Hencky), Lamé's tube under a pressed-on casing (also "
         "nearly incompressible), contact without friction of a half plane that ends at a point. "
-        "Bars, cylinder (Hencky's law and friction, revolved) and block (3-D, clamped at an end) are set "
-        "beside P2 on 64, 48 and 8 cells a unit. At nu = 0.4999 P1 locks: there the estimate is a "
-        "lower bound, as the run says. Of degree 2 the local problems are cubic, overestimate "
-        "smooth solutions in 3-D, and see less where the material is nearly incompressible.",
+        "Bars, cylinder (Hencky's law and friction, revolved) and block (3-D, clamped at an "
+        "end) are set beside P2 on 64, 48 and 8 cells a unit. At nu = 0.4999 P1 locks: there the "
+        "estimate is a lower bound, as the run says. Of degree 2 the local problems are cubic, "
+        "overestimate smooth solutions in 3-D, and see less where the material is nearly "
+        "incompressible.",
     )
 
 
@@ -185,17 +186,18 @@ def prandtl(n: int, degree: int, element: str) -> float:
     tables = {
         "mesh": {
             "generator": "rectangle", "size": [5.0, 2.5], "cells": [5 * n, 5 * n // 2],
-            "parts": {"punch": {"side": "top", "to": 1.0}},
+            "parts": {"punch": {"side": "top", "to": 1.0}, "rest": {"side": "top", "from": 1.0}},
         },
         "space": {"degree": degree, "element": element},
         "material": {"law": "j2", "young": 1000.0, "poisson": 0.3, "yield_stress": 1.0},
         "fixed": [
             {"on": "left", "displacement": [0.0, "free"]},
             {"on": "right", "displacement": [0.0, "free"]},
-            {"on": "punch", "displacement": ["free", "-0.02*t"]},
+            {"on": "bottom", "displacement": [0.0, 0.0]},
+            {"on": "punch", "displacement": ["free", "-0.08*t"]},
         ],
-        "contact": {"on": "bottom"},
-        "evolution": {"times": [0.0, 1.0], "steps": [10]},
+        "contact": {"on": "rest", "gap": 10.0},
+        "evolution": {"times": [0.0, 1.0], "steps": [16]},
     }  # fmt: skip
     solution = solve(parse_case(tables))
     assert solution.converged, solution.outcome.reason
@@ -222,7 +224,7 @@ def limits(report: Report, coarse: bool) -> None:
         columns,
         "Cook's membrane in plane strain, ν = 0.4999, cells along an edge: the rise of its corner, "
         "beside that of P2 on 64 cells. Prandtl's smooth punch, cells a unit of its half width, "
-        "J2 without hardening, pressed by 0.02: the mean pressure over the yield stress, beside "
+        "J2 without hardening, pressed by 0.08: the mean pressure over the yield stress, beside "
         "(2 + π)/√3.",
     )
 
@@ -275,21 +277,18 @@ def per_second(report: Report, coarse: bool) -> None:
     beam = {**LINEAR, "mesh__size": [80.0, 1.0], "mesh__parts__loaded": None, "load__0": tip,
             "contact__gap": 10.0}  # fmt: skip
     folder = Path(__file__).parents[1] / "cases"
-    files = {"Hertz, 2-D": "hertz.toml", "ball, 3-D": "hertz-sphere.toml"}
+    files = {"Hertz, 2-D": "hertz.toml"}
     for label, (degree, element) in ELEMENTS.items():
         space = {"space__degree": degree, "space__element": element}
         keys = [f"space.degree={degree}", f'space.element="{element}"']
         cases: list[tuple[str, Case]] = []
-        for n in (8, 16) if coarse else (8, 16, 32, 64):
+        for n in (8, 16) if coarse else (8, 16, 32):
             friction = {**LINEAR, "friction__mu": 0.6, "mesh__cells": [4 * n, n]}
             cases.append(("bar", parse_case(changed(**friction, **space))))
-        for n in (3,) if coarse else (3, 6, 12):
+        for n in (3,) if coarse or degree == 2 else (3, 6):
             cells = {"mesh__cells": [80 * n, n]}
             cases.append(("beam", parse_case(changed(**beam, **space, **cells))))
-        for name, file in files.items():
-            refine = (0, 1) if name == "ball, 3-D" and degree == 1 and not coarse else (0,)
-            for k in refine:
-                cases.append((name, load_case(folder / file, [*keys, f"mesh.refine={k}"])))
+        cases += [(name, load_case(folder / file, keys)) for name, file in files.items()]
         for name, case in cases:
             begin = time.perf_counter()
             solution = solve(case)
