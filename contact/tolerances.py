@@ -8,6 +8,13 @@ LARGEST_VIOLATION = 0.1
 #: Distance of 1 from the next larger number.
 EPS = sys.float_info.epsilon
 
+#: Rounding of a result of many operations, over its terms: 1e-13.
+ROUNDING = 500 * EPS
+
+#: Share of a length, of a motion or of an overlap that is taken for none. Positions in files have
+#: ten digits and more, and an orthogonal basis knows a motion to some root of `EPS`.
+NEGLIGIBLE = 1e-9
+
 #: The least tolerance: rounding keeps relative residuals from falling below.
 PRECISION = 1e-15
 

@@ -4,10 +4,10 @@ import ast
 
 from tests.test_architecture import ROOT
 
-#: Number of constants as it stands. It may only fall; the goal is 70.
-MOST = 92
+#: Number of constants as it stands. It may only fall.
+MOST = 67
 
-#: Constants that tune nothing: codes of MUMPS, formats, nodes of quadrature.
+#: Constants that tune nothing: codes of MUMPS, formats, nodes of quadrature, geometry.
 FORMATS = {
     "TOO_SMALL",
     "OUT_OF_MEMORY",
@@ -17,6 +17,7 @@ FORMATS = {
     "EACH",
     "SIGNALLED",
     "ORBITS",
+    "CORNERS",
 }
 
 

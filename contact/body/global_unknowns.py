@@ -24,10 +24,8 @@ from contact.body.description import Body
 from contact.body.rigid import Electrode, Rigid, rigid_motions
 from contact.errors import InputError
 from contact.mesh.domain import Domain
+from contact.tolerances import NEGLIGIBLE
 from contact.typing import Array
-
-#: Share of a motion that is taken for none.
-ROUNDING = 1e-9
 
 
 @dataclass(frozen=True)
@@ -245,7 +243,7 @@ def _tie(
             f"{key}: it shares nodes with another rigid part or electrode; accepted: parts apart"
         )
     # A node that a support holds cannot follow.
-    moves = np.abs(motion[:, :, member.free]).max(axis=2, initial=0.0) > ROUNDING
+    moves = np.abs(motion[:, :, member.free]).max(axis=2, initial=0.0) > NEGLIGIBLE
     if _anywhere(domain, moves & follows & ~free[nodes]):
         if isinstance(member.description, Electrode):
             raise InputError(

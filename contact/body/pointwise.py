@@ -11,7 +11,7 @@ from ufl.core.expr import Expr
 
 from contact.typing import Array
 
-#: Cells that are evaluated at once: bounds the memory that large meshes need.
+#: Cells, or pairs of facets, that are evaluated at once: bounds the memory.
 CHUNK = 100_000
 
 

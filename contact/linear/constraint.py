@@ -36,11 +36,8 @@ from contact.history import Evaluated
 from contact.linear.layout import Layout
 from contact.linear.operator import Bulk, Counters, SparseOperator
 from contact.mesh.entities import owned_among
+from contact.tolerances import ROUNDING
 from contact.typing import Array
-
-#: Share of the stiffness against q that is taken for none: rounding. Where nothing holds it, q is
-#: left where it is.
-NOTHING = 1e-13
 
 
 @dataclass(frozen=True)
@@ -402,7 +399,7 @@ class ConstrainedOperator:
         """
         corner = self._bulk.corner[np.ix_(self._free, self._free)]
         left, size, right = np.linalg.svd(corner - self._on_q(columns, responses))
-        resists = size > NOTHING * np.abs(corner).max(initial=0.0)
+        resists = size > ROUNDING * np.abs(corner).max(initial=0.0)
         return np.asarray((right[resists].T / size[resists]) @ left[:, resists].T)
 
     def _on_q(self, columns: Array, values: Array) -> Array:
@@ -415,7 +412,7 @@ class ConstrainedOperator:
         motion, pushed = self._pushed(blocks)
         held = self._held(pushed)
         resists = bulk.layout.comm.allreduce(motion.T @ pushed, op=MPI.SUM)
-        self._gives = np.linalg.pinv(resists, rcond=NOTHING)
+        self._gives = np.linalg.pinv(resists, rcond=ROUNDING)
         stiffness, turned = np.linalg.eigh(held.T @ bulk.corner[np.ix_(free, free)] @ held)
         basis = held @ turned
         self._inverse = basis / stiffness @ basis.T
@@ -452,4 +449,4 @@ class ConstrainedOperator:
         parts = bulk.layout.comm.allreduce(tied.T @ tied, op=MPI.SUM)
         gram = sum(part / max(np.abs(part).max(initial=0.0), 1e-300) for part in (gram, parts))
         resistance, directions = np.linalg.eigh(gram)
-        return np.asarray(directions[:, resistance > NOTHING * resistance.max(initial=0.0)])
+        return np.asarray(directions[:, resistance > ROUNDING * resistance.max(initial=0.0)])

@@ -10,7 +10,7 @@ from petsc4py import PETSc
 
 from contact.errors import InputError, SingularError
 from contact.linear.layout import Layout
-from contact.tolerances import HUGE
+from contact.tolerances import EPS, HUGE
 from contact.typing import Array
 
 #: MUMPS's INFOG(1) where its workspace was too small: that of integers, and that of numbers.
@@ -66,7 +66,7 @@ def mat_solve(solver: PETSc.Mat | PETSc.KSP, sides: Array) -> Array:
 OUT_OF_MEMORY = (-8, -9, -11, -12, -13, -17, -19, -20)
 
 #: Stiffness of a function, over the largest one, that is rounding.
-VANISHES = 1e-14
+VANISHES = 50 * EPS
 
 
 @contextmanager

@@ -28,9 +28,6 @@ from contact.typing import Array
 #: Steps that a new factorisation is worth: as many are taken with the old one at most.
 WORTH = 10.0
 
-#: Rate of convergence that a new factorisation would at least have.
-FAST = 0.1
-
 #: Residual above which no factorisation is frozen: the tangent is not good there.
 FAR = 0.05
 
@@ -66,12 +63,10 @@ class Chord:
     def forget(self) -> None:
         """Let the next step make a new factorisation."""
         self._made = self._keeps = False
-        self._slow = 0
 
     def begin(self) -> None:
         """Begin another loop, with other loads or another initial guess."""
         self._before: Iterate | None = None
-        self._first = False
         self._reached = np.inf
         self._last: tuple[Array, Array] | None = None
         self._changes.clear()
@@ -96,14 +91,10 @@ class Chord:
         else:
             rate = reached / last
             left = np.log(self._goal / reached) / np.log(rate) if rate < 1 else np.inf
-            self._slow += self._keeps and rate > FAST
-            # The steps that earlier loads took are the estimate for the next ones.
-            outdated = self._first and self._slow > self._worth / 2
-            keep = bool(left <= self._worth and reached <= FAR) and not outdated
-        self._first = before is None
+            keep = bool(left <= self._worth and reached <= FAR)
         if not keep:
             self._changes.clear()
-            self._last, self._slow = None, 0
+            self._last = None
         self._before, self._reached, self._keeps = iterate, reached, keep
         return iterate, keep
 

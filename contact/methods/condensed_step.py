@@ -8,6 +8,7 @@ iteration is over the material alone, with chord steps.
 from __future__ import annotations
 
 import logging
+import sys
 from collections.abc import Callable
 from dataclasses import replace
 
@@ -29,9 +30,6 @@ CONTACT_PART = 1e-3
 #: Residual of the condensed contact problem, over that before the step, from which on it is no
 #: solution of it: a step that gains less is left to the whole body.
 UNSOLVED = 0.05
-
-#: Most Newton steps in one solve of the condensed contact problem.
-MOST_STEPS = 1000
 
 #: Solves a condensed problem from an iterate, with a history of its own.
 Solver = Callable[
@@ -107,7 +105,7 @@ class CondensedStep:
         options = replace(
             self.options,
             tolerance=enough,
-            max_outer=MOST_STEPS,
+            max_outer=sys.maxsize,  # each of its stages has a limit
             condense=False,
         )
         history = IterationHistory(lambda _: self._history.poll(), level=logging.DEBUG)

@@ -20,11 +20,11 @@ from contact.methods.report import Outcome
 #: Note of its steps in the history.
 CONTINUATION = "continuation"
 
-#: Smallest part of the conductivity, and the factor by which it grows: first, and at least.
-FIRST_PART, FACTOR, LEAST_FACTOR = 1e-9, 1e3, 1.2
+#: Factor by which the conductivity grows: at first, and at least.
+FACTOR, LEAST_FACTOR = 1e3, 1.2
 
-#: From here on it is the whole.
-ALMOST = 0.9
+#: Smallest part of it: three of the first factors from the whole.
+FIRST_PART = FACTOR**-3
 
 
 def continuation(
@@ -53,5 +53,5 @@ def continuation(
         else:
             factor = factor**0.5
         part = reached * factor
-        part = part if part < ALMOST else 1.0
+        part = part if part * LEAST_FACTOR < 1 else 1.0
     return None

@@ -43,16 +43,14 @@ INTERIOR_POINT = "interior point"
 #: Steps of one convex problem at most, and convex problems with one friction bound after the other.
 LIMIT, UPDATES = 60, 8
 
-#: Duality gap over the work of loads and contact, below which the active sets are known, and below
-#: which no solver tells more.
-CLOSED, VANISHED = 1e-10, 1e-20
-
-#: Residual of equilibrium then. Where an iterative solver leaves more, the slacks vanish beneath
-#: its tolerance long before: Newton's method, whose right-hand sides are residuals, does better.
-BALANCED = 1e-4
+#: Duality gap over the work of loads and contact, below which the active sets are known. Below its
+#: square no solver tells more.
+CLOSED = 1e-10
 
 #: Forcing term of inexact Newton: relative residual of an iterative solve. With a hundredth of that
-#: there are as many steps, and a third to a half more iterations.
+#: there are as many steps, and a third to a half more iterations. As large may the residual of
+#: equilibrium be in the end: where an iterative solver leaves more, the slacks vanish beneath its
+#: tolerance long before, and Newton's method, whose right-hand sides are residuals, does better.
 FORCING = 1e-4
 
 #: Work at the start, over that of the loads in the way that the foundation bars.
@@ -189,7 +187,7 @@ class InteriorPoint:
                 break
             gap = self.gap()
             if gap <= CLOSED and (
-                kkt.equilibrium <= max(BALANCED, kkt.floors[0]) or gap <= VANISHED
+                kkt.equilibrium <= max(FORCING, kkt.floors[0]) or gap <= CLOSED**2
             ):
                 ended = f"duality gap closed after {steps} steps"
                 break

@@ -63,11 +63,9 @@ logger = logging.getLogger("contact.solver")
 #: Notes of the fallbacks in the history.
 FALLBACKS = CONTINUATION, INTERIOR_POINT
 
-#: Stagnation limit of Newton's steps after a fallback.
+#: Stagnation limit where another way follows, or has gone before: the whole body where it can be
+#: condensed, and Newton's last steps.
 SHORT = 4
-
-#: The same in a continuation: condensed steps cost little beside another value of the parameter.
-CONTINUATION_LIMIT = 20
 
 #: Part of the least residual below which a step is progress.
 PROGRESS = 0.5
@@ -130,12 +128,10 @@ class Newton:
         if self._condensed is None:
             assert isinstance(self.problem, ContactProblem) and self.modes is not None
             body = Condensation(self.problem, self.counters)
-            # Where the whole body comes first, its active sets have cycled already.
             short = replace(self.options, stagnation_limit=SHORT)
-            inner = self.options if self._pays else short
             self._condensed = CondensedStep(
                 body,
-                inner,
+                self.options if self._pays else short,
                 self._parameters,
                 partial(_solve_condensed, modes=self.modes),
                 self.history,
@@ -262,8 +258,6 @@ class Newton:
         active sets cycle, a body may have moved far away.
         """
         iteration = self.iteration
-        if (found := self._undeformed()) is not None:
-            return found
         if isinstance(self.problem, CondensedProblem):
             found = self._conducting(self.problem) or self._apart(outcome)
             if found is not None:
@@ -279,16 +273,6 @@ class Newton:
             iterate, outcome = interior_point(iteration, self.whole, self.modes, self.last_steps)
         return iterate, outcome
 
-    def _undeformed(self) -> tuple[Iterate, Outcome] | None:
-        """Return zero displacement where that is in equilibrium. Collective."""
-        found = undeformed_equilibrium(self.problem)
-        if found is None:
-            return None
-        iterate, residuals = Iterate(found[0]), found[1]
-        self.iteration.see(iterate, residuals)
-        self.history.record(residuals, "zero displacement")
-        return iterate, Outcome(residuals, self.options.allowed, "nothing acts")
-
     def _conducting(self, problem: CondensedProblem) -> tuple[Iterate, Outcome] | None:
         """Follow solutions from a foundation that hardly conducts, if it conducts."""
         interface = problem.interface
@@ -302,8 +286,7 @@ class Newton:
                 self.iteration if part == 1 else replace(self.iteration, problem=less, best=Best())
             )
             step = NewtonStep(iteration.problem, self.options, self._parameters, self.counters)
-            loop = NewtonLoop(iteration, step, CONTINUATION_LIMIT)
-            return loop.run(iterate, CONTINUATION)
+            return NewtonLoop(iteration, step).run(iterate, CONTINUATION)
 
         return continuation(solve, Iterate(problem.start()))
 

@@ -36,8 +36,8 @@ from contact.typing import Array
 FORCING = 1e-2
 
 #: Steps in a row without progress after which the forcing term becomes a hundredth of itself: with
-#: two digits the active set may cycle. And its least value.
-STAGNANT, LEAST = 3, 1e-8
+#: two digits the active set may cycle. Its least value is the tolerance.
+STAGNANT = 3
 
 #: Levenberg-Marquardt regularisation of underconstrained bodies, over a node's stiffness and the
 #: residual.
@@ -195,7 +195,7 @@ class NewtonStep:
         self._stagnant = 0 if reached < self._nearest else self._stagnant + 1
         self._nearest = min(self._nearest, reached)
         if self._stagnant >= STAGNANT:
-            self._stagnant, self._forcing = 0, max(self._forcing * FORCING, LEAST)
+            self._stagnant, self._forcing = 0, max(self._forcing * FORCING, self.options.tolerance)
         return self._forcing
 
     @property

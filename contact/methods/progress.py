@@ -10,11 +10,9 @@ import numpy as np
 from contact.problem.kkt import KKT, evaluate
 from contact.problem.protocols import Problem
 from contact.problem.state import State
+from contact.tolerances import ROUNDING
 
 T = TypeVar("T")
-
-#: Residuals of zero displacement that are rounding.
-ROUNDING = 1e-13
 
 
 @dataclass

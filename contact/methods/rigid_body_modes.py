@@ -38,14 +38,11 @@ from contact.problem.rigid_modes import (
     null_space,
 )
 from contact.problem.state import State
-from contact.tolerances import EPS
+from contact.tolerances import EPS, NEGLIGIBLE
 from contact.typing import Array
 
 #: Force that a node can bear by friction then, over all loads.
 STUCK = 10.0
-
-#: Depth that counts as none, over the size of the bodies.
-PASSES = 1e-9
 
 
 @dataclass(frozen=True)
@@ -198,10 +195,11 @@ class RigidBodyModes:
         near, opening = np.isfinite(jump.gap), interface.opening(nodal)
         rising = np.einsum("ni,nik->nk", jump.normal, moved)
         depth = jump.maximum(-(opening + rising @ wanted)[near])
-        limited = depth > PASSES * interface.size
+        limited = depth > NEGLIGIBLE * interface.size
         if limited:
             # Depths of a solution are rounding.
-            room = np.where(opening < -PASSES * interface.size, opening, np.maximum(opening, 0.0))
+            deep = opening < -NEGLIGIBLE * interface.size
+            room = np.where(deep, opening, np.maximum(opening, 0.0))
             parts = jump.comm.allgather((rising[near], room[near]))
             cone, room = (np.concatenate(part) for part in zip(*parts, strict=True))
             amounts = _least_distance(products, wanted, cone, -room)

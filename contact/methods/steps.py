@@ -23,15 +23,13 @@ from contact.problem.kkt import KKT, evaluate
 from contact.problem.problem import ContactProblem
 from contact.problem.rigid_modes import released, unilateral_supports
 from contact.problem.state import State
+from contact.tolerances import ROUNDING
 from contact.typing import Array
 
 logger = logging.getLogger("contact.solve")
 
 #: How often a step that fails is halved.
 HALVINGS = 4
-
-#: Part of the body's size that is no motion.
-ROUNDING = 1e-12
 
 #: Stands for residuals until they are measured.
 NOTHING = KKT(np.inf, np.inf, np.inf)

@@ -30,7 +30,7 @@ from contact.problem.rigid_modes import (
     null_space,
 )
 from contact.problem.state import State
-from contact.tolerances import HUGE
+from contact.tolerances import EPS, HUGE, NEGLIGIBLE
 from contact.typing import Array
 
 
@@ -58,13 +58,6 @@ def expected_displacements(
     given = np.abs(np.append(body.nodal(prescribed)[:, : body.dim], body.motion(prescribed)))
     largest = body.comm.allreduce(float(given.max(initial=0.0)), op=MPI.MAX)
     return float(force / scales.area / scales.young * scales.size), largest
-
-
-#: Share of values up to which they are the same.
-ROUNDING = 1e-9
-
-#: Of numbers of the size of the body, or of the potential at strains of 1.
-EPS = float(np.finfo(float).eps)
 
 
 def check_problem(problem: ContactProblem) -> None:
@@ -145,7 +138,7 @@ def check_supports(problem: ContactProblem) -> None:
             size = problem.comm.allreduce(size, op=MPI.MAX)
             # Rounding of a zero, such as sin(pi), is no value.
             unit = problem.equilibrium.phi_scale if name == "potential" else 1.0
-            allowed = ROUNDING * size + EPS * unit * problem.domain.size
+            allowed = NEGLIGIBLE * size + EPS * unit * problem.domain.size
             differ = np.ptp(values, axis=1) > allowed
             found = np.concatenate(problem.comm.allgather(values[differ][:1])) + 0.0  # no -0
             if found.size > 0:

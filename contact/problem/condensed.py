@@ -30,13 +30,11 @@ from contact.linear.schur import SchurComplement
 from contact.problem.problem import ContactProblem
 from contact.problem.protocols import Scales
 from contact.problem.state import State
+from contact.tolerances import ROUNDING
 from contact.typing import Array
 
 #: Unknowns that are kept at most: the dense matrix then takes 130 MB.
 LARGEST = 4200
-
-#: Residual of equilibrium inside the body that counts as zero, over the forces that act on it.
-ROUNDING = 1e-13
 
 #: Most that counts as rounding at the contact nodes, over the loads. Not as little as for the whole
 #: body, by which the solution is judged once more.

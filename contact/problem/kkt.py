@@ -19,7 +19,7 @@ from contact.tolerances import EPS
 from contact.typing import Array
 
 #: How far unknowns are moved to see the effect of rounding, over their size.
-PERTURBATION = 1e-8
+PERTURBATION = EPS**0.5
 
 #: Rounding that is allowed for, over the change of forces by moving all unknowns by rounding.
 #: Residuals that fall no further are 0.6 to 1 of that; solves leave a few times as much.

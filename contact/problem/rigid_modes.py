@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from contact.body.rigid import Rigid, rigid_motions
 from contact.problem.problem import ContactProblem
 from contact.ranks import on_root
+from contact.tolerances import NEGLIGIBLE
 from contact.typing import Array
 
 #: Rigid motions in the order of `rigid_motions`.
@@ -26,9 +27,6 @@ NAMES = {
     2: ["translation along x", "translation along y", "rotation"],
     3: [f"{kind} {axis}" for kind in ("translation along", "rotation about") for axis in "xyz"],
 }
-
-#: Eigenvalues of the Gram matrices below are between 0 and about 1.
-ROUNDING = 1e-9
 
 
 @dataclass(frozen=True)
@@ -265,9 +263,9 @@ def _gram(problem: ContactProblem, rows: Array) -> Array:
 
 
 def null_space(gram: Array) -> Array:
-    """Return an orthonormal basis of the null space, shape (m, k)."""
+    """Return a basis of the null space, shape (m, k), of a matrix with eigenvalues up to some 1."""
     values, vectors = np.linalg.eigh(gram)
-    return vectors[:, values < ROUNDING]
+    return vectors[:, values < NEGLIGIBLE]
 
 
 #: Directions in 3-D, of half a turn, in which friction is asked for its bound.
@@ -336,7 +334,7 @@ class UnilateralSupport:
 
     def _balances(self, work: Array, scale: float) -> bool:
         """Tell whether contact can balance a work of loads, on the rank that has the cone."""
-        if np.abs(work).max() <= ROUNDING * scale:
+        if np.abs(work).max() <= NEGLIGIBLE * scale:
             return True
         from scipy.optimize import linprog  # takes a while to load
 

@@ -33,13 +33,8 @@ from scipy.spatial import cKDTree
 from contact.interface.mortar.lumping import Mixing, coefficients, integrals
 from contact.interface.mortar.segments import Points, common_points, facing_pairs
 from contact.interface.mortar.surface import Surface, basis, positive_change
+from contact.tolerances import NEGLIGIBLE, ROUNDING
 from contact.typing import Array
-
-#: Directions that differ less than this from the normals are these.
-FLAT = 1e-12
-
-#: Facets less than this share of which faces the master are left out: rounding.
-LEAST_SHARE = 1e-9
 
 #: Rows, columns and values of a sparse matrix.
 Entries = tuple[NDArray[np.int64], NDArray[np.int64], Array]
@@ -172,7 +167,7 @@ def _facing(slave: Surface, master: Surface, reach: float) -> tuple[Array, list[
     direction = slave.normal
     found = [common_points(slave, master, pair, direction, degree) for pair in pairs]
     middle = _middle(slave, master, found)
-    if np.abs(middle - direction).max(initial=0.0) > FLAT:
+    if np.abs(middle - direction).max(initial=0.0) > ROUNDING:
         direction = middle
         found = [common_points(slave, master, pair, direction, degree) for pair in pairs]
     return direction, found
@@ -191,7 +186,7 @@ def _dual(slave: Surface, found: Sequence[Points], change: Array) -> tuple[Array
         n = _functions(points, slave, change)
         _add(mass, points.slave, points.weight[:, None, None] * n[:, :, None] * n[:, None, :])
         _add(weight, points.slave, points.weight[:, None] * n)
-    faces = weight.sum(axis=1) > LEAST_SHARE * integrals(slave).sum(axis=1)
+    faces = weight.sum(axis=1) > NEGLIGIBLE * integrals(slave).sum(axis=1)
     dual = np.zeros_like(mass)
     dual[faces] = weight[faces, :, None] * np.linalg.inv(mass[faces])
     return dual, np.where(faces[:, None], weight, 0.0)
@@ -309,7 +304,7 @@ def _assembled(parts: Parts, d: int, degree: int, without: NDArray[np.int64]) ->
     weight, whole = summed(parts.own.sum(axis=2)), summed(parts.whole)
     # The integral of a quadratic function on the axis of revolution is rounding.
     around = summed(np.broadcast_to(parts.whole.sum(axis=1, keepdims=True), place.shape))
-    some = whole > LEAST_SHARE * around
+    some = whole > NEGLIGIBLE * around
     covered = np.where(some, weight / np.where(some, whole, 1.0), 0.0)
     kept = np.flatnonzero((covered > LEAST_COVERED) & ~np.isin(every, without))
     normal = summed(parts.normal)[kept]

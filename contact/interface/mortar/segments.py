@@ -14,11 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
+from contact.body.pointwise import CHUNK
 from contact.interface.mortar.surface import Surface, rule, size_of
+from contact.tolerances import ROUNDING
 from contact.typing import Array
-
-#: Pairs that are looked at together: bounds the memory.
-CHUNK = 500_000
 
 #: Least cosine between a normal and the opposite of the other.
 FACING = 0.1
@@ -62,7 +61,7 @@ def facing_pairs(
 
 
 #: Corners of the intersection of two triangles, at most.
-MOST = 6
+CORNERS = 6
 
 
 def clipped(triangles: Array) -> tuple[Array, NDArray[np.intp]]:
@@ -81,7 +80,7 @@ def clipped(triangles: Array) -> tuple[Array, NDArray[np.intp]]:
         Number of corners, 0 where nothing is common, shape (n,).
     """
     n = triangles.shape[0]
-    polygon: Array = np.zeros((n, MOST, 3))
+    polygon: Array = np.zeros((n, CORNERS, 3))
     polygon[:, :3] = triangles
     count: NDArray[np.intp] = np.full(n, 3, dtype=np.intp)
     for side in range(3):
@@ -112,10 +111,6 @@ def _cut(polygon: Array, count: NDArray[np.intp], side: int) -> tuple[Array, NDA
     left = emitted.sum(axis=1)
     kept[np.arange(most)[None, :] >= left[:, None]] = 0.0
     return kept, left
-
-
-#: Segments smaller than this share of the slave facet are rounding.
-SMALLEST = 1e-12
 
 
 @dataclass(frozen=True)
@@ -169,7 +164,7 @@ def common_points(
     d = corners.shape[1]
     parts, share = (_segments if d == 2 else _triangles)(projected)
     # Parts of the slave facet by barycentric coordinates of their corners: (n, parts, d, d).
-    pair, part = np.nonzero(share > SMALLEST)
+    pair, part = np.nonzero(share > ROUNDING)
     places, weights = rule(d, degree)
     on_slave = np.einsum("qc,pcb->pqb", places, parts[pair, part])
     # The projection is affine: x = sum_c lambda_c x_c on both.

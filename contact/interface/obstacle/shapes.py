@@ -17,6 +17,7 @@ from annotated_types import Gt, Lt
 from contact.arguments import expect, real
 from contact.interface.obstacle.protocol import Shape
 from contact.settings import Accepted, Direction, NonNegative, Positive, Switch, Vector
+from contact.tolerances import EPS
 from contact.typing import Array
 
 
@@ -260,7 +261,7 @@ class Punch(AboutAxis):
 
 
 #: Step of the central differences, over the size of the coordinates: the third root of rounding.
-STEP = 6e-6
+STEP = EPS ** (1 / 3)
 
 
 @dataclass(frozen=True)

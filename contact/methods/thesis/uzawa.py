@@ -29,6 +29,7 @@ from contact.methods.thesis.acceleration import ResidualMinimiser
 from contact.problem.kkt import residual_forces
 from contact.problem.protocols import Problem
 from contact.problem.state import State
+from contact.tolerances import ROUNDING
 from contact.typing import Array
 from forms.foundation import contact_multiplier
 
@@ -39,8 +40,8 @@ logger = logging.getLogger("contact.inner")
 STAGNATION_LIMIT, STAGNATION_LIMIT_PLAIN, PROGRESS = 100, 500, 0.99
 
 #: Tolerance of an iterative solver over that of the relaxation: with one as large it returns its
-#: initial guess, and rounding decides when it does. And the least one.
-SHARE, LEAST = 0.1, 1e-13
+#: initial guess, and rounding decides when it does.
+SHARE = 0.1
 
 
 def augmentation(jump: ContactNodes, r: float, friction: bool) -> Array:
@@ -218,7 +219,7 @@ def uzawa_block_relaxation(
     accelerator: ResidualMinimiser | None = None
     beside: Array = np.ones_like(jump.weight)
     last: tuple[Array, Array] | None = None
-    rtol = max(SHARE * options.inner, LEAST)
+    rtol = max(SHARE * options.inner, ROUNDING)
     increment: Array = np.zeros(own.size)
     stagnation = Stagnation(STAGNATION_LIMIT if accelerated else STAGNATION_LIMIT_PLAIN, PROGRESS)
     for iteration in range(1, options.max_inner + 1):
