@@ -67,6 +67,10 @@ FALLBACKS = CONTINUATION, INTERIOR_POINT
 #: condensed, and Newton's last steps.
 SHORT = 4
 
+#: The same in a continuation: condensed steps cost little beside another value of the parameter,
+#: and Example 8.4 with its steep ramp needs them.
+CONTINUATION_LIMIT = 20
+
 #: Part of the least residual below which a step is progress.
 PROGRESS = 0.5
 
@@ -286,7 +290,7 @@ class Newton:
                 self.iteration if part == 1 else replace(self.iteration, problem=less, best=Best())
             )
             step = NewtonStep(iteration.problem, self.options, self._parameters, self.counters)
-            return NewtonLoop(iteration, step).run(iterate, CONTINUATION)
+            return NewtonLoop(iteration, step, CONTINUATION_LIMIT).run(iterate, CONTINUATION)
 
         return continuation(solve, Iterate(problem.start()))
 

@@ -155,6 +155,8 @@ DEVICES = (
            ((gap_derivative.GapDerivative, "__call__", lambda *_: False),)),
     Device("stagnation limit of the steps after a fallback", (), "-",
            ((newton, "SHORT", NewtonOptions().stagnation_limit),)),
+    Device("stagnation limit of the continuation", (), "-",
+           ((newton, "CONTINUATION_LIMIT", None),)),
     Device("Anderson acceleration of chord steps", (chord.Chord.accelerated,),
            "Walker and Ni 2011", ((chord.Chord, "accelerated", _unaccelerated),)),
     Device("material left as it was linearised last", (), "-", ((newton_step, "SMALL", 0.0),), (),

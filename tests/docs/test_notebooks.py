@@ -1,11 +1,22 @@
 """The notebooks run, as scripts; `make docs` runs them as notebooks."""
 
+import logging
 import runpy
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
 NOTEBOOKS = sorted((Path(__file__).parents[2] / "scripts" / "notebooks").glob("[a-z]*.py"))
+
+
+@pytest.fixture(autouse=True)
+def _warnings_afterwards() -> Iterator[None]:
+    """Let no notebook that silences warnings do so for the tests after it."""
+    logger = logging.getLogger("contact")
+    level = logger.level
+    yield
+    logger.setLevel(level)
 
 
 @pytest.mark.filterwarnings("ignore:FigureCanvasAgg is non-interactive")  # nobody sees them
