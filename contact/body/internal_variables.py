@@ -159,7 +159,7 @@ class QuadratureLaws:
         density = abs(ufl.JacobianDeterminant(mesh))
         expression = fem.Expression(density if extent is None else density * extent, self.points)
         found = expression.eval(mesh, np.arange(self._owned, dtype=np.int32))
-        return np.asarray(found.reshape(self._owned, -1) * self._rule[1]).ravel()
+        return np.asarray(found.reshape(self._owned, self._rule[1].size) * self._rule[1]).ravel()
 
     def law(self, law: Law) -> FormLaw:
         """Return a law as forms see it, with the stress and stiffness that `set` evaluates."""
@@ -205,6 +205,8 @@ class QuadratureLaws:
             assert before is not None
             values = self._pointwise.values("strain", self._strain, self.points, x, own)
             for cells, found in values:
+                if cells.size == 0:  # a rank may have no cells of a law
+                    continue
                 variables = self._at(before.arrays, law, cells)
                 yield law, cells, found.reshape(-1, self._size), variables
 
@@ -264,11 +266,12 @@ class QuadratureLaws:
         """
         self._seen = None
         self._stress.x.array[:] = 0.0
+        volumes = self.by_cell(self.volumes)
         for law, cells, strains, variables in self._points(state, x):
             given = self._at(after.arrays, law, cells)
             by_strain = _gradient(law, strains, variables, given, OF_STRAIN)
-            volumes = self.by_cell(self.volumes)[cells].ravel()
-            _fill(self._stress, cells, by_strain / volumes[:, None])
+            volume = volumes[cells].ravel()
+            _fill(self._stress, cells, by_strain / volume[:, None])
 
     def before_transposed(
         self, state: Evaluated, x: Array, along: Array, after: InternalVariables | None
@@ -288,13 +291,13 @@ class QuadratureLaws:
         if before is None:
             return None
         arrays = {name: np.zeros_like(array) for name, array in before.arrays.items()}
-        moved = self._points(state, along)
+        moved, volumes = self._points(state, along), self.by_cell(self.volumes)
         for (law, cells, strains, variables), (_, _, by_stress, _) in zip(
             self._points(state, x), moved, strict=True
         ):
             given = {} if after is None else self._at(after.arrays, law, cells)
-            volumes = self.by_cell(self.volumes)[cells].ravel()
-            given[OF_STRAIN] = volumes[:, None] * by_stress
+            volume = volumes[cells].ravel()
+            given[OF_STRAIN] = volume[:, None] * by_stress
             for name in variables:
                 by_cell = self.by_cell(arrays[name])
                 slopes = _gradient(law, strains, variables, given, name)
@@ -326,10 +329,10 @@ class QuadratureLaws:
 
     def dissipation(self, state: Evaluated, x: Array) -> float:
         """Return the energy that was dissipated in the step that led to a state. Collective."""
-        total = 0.0
+        total, volumes = 0.0, self.by_cell(self.volumes)
         for cells, response in self._responses(state, x):
             if response.dissipation is not None:
-                total += float(self.by_cell(self.volumes)[cells].ravel() @ response.dissipation)
+                total += float(volumes[cells].ravel() @ response.dissipation)
         return float(self._domain.comm.allreduce(total, op=MPI.SUM))
 
     def variables(self, law: Law) -> Mapping[str, ArrayLike]:
@@ -371,10 +374,11 @@ class QuadratureLaws:
 
     def fit(self, state: Evaluated, x: Array) -> None:
         """Let `fits` be those at the end of the step that led to a state."""
+        fits = self.fits
         for cells, response in self._responses(state, x):
             for name, values in {**response.variables, "stress": response.stress}.items():
                 by_cell = values.reshape(cells.size, self.points.shape[0], -1)
-                _fill(self.fits[name], cells, np.einsum("dq,cqi->cdi", self._fitting, by_cell))
+                _fill(fits[name], cells, np.einsum("dq,cqi->cdi", self._fitting, by_cell))
 
 
 def _gradient(
@@ -445,4 +449,4 @@ def _fill(function: fem.Function, cells: Indices, values: Array) -> None:
     """Write values in cells: those of their dofs, one after the other."""
     blocks = function.x.array.reshape(-1, function.function_space.dofmap.index_map_bs)
     dofs = function.function_space.dofmap.list[cells]
-    blocks[dofs] = values.reshape(*dofs.shape, -1)
+    blocks[dofs] = values.reshape(*dofs.shape, blocks.shape[1])

@@ -126,7 +126,8 @@ class LocalProblems:
         out = self._normal_flux()
         topology = mesh.topology
         facets = topology.connectivity(d, d - 1).array.reshape(-1, d + 1)[: len(self._flux)]
-        ordered = np.take_along_axis(out, order[..., None], axis=2).reshape(*facets.shape, -1)
+        ordered = np.take_along_axis(out, order[..., None], axis=2)
+        ordered = ordered.reshape(*facets.shape, int(np.prod(out.shape[2:])))
         total = la.vector(topology.index_map(d - 1), ordered.shape[2] + 1)
         sums = total.array.reshape(-1, ordered.shape[2] + 1)
         np.add.at(sums, facets, np.concatenate([ordered, np.ones((*facets.shape, 1))], axis=2))
@@ -162,9 +163,11 @@ class LocalProblems:
         # Of a material without a field those of a field are zero.
         whole = np.zeros((len(cells), *2 * (9 if self._body.piezoelectric else 6,)))
         whole[:, : moduli.shape[1], : moduli.shape[2]] = moduli
-        pieces = np.array_split(np.arange(len(cells)), len(cells) // CHUNK + 1)
-        found = [self._solved(cells[piece], whole[piece]) for piece in pieces]
-        return np.concatenate(found)
+        found = np.zeros(len(cells))
+        for first in range(0, len(cells), CHUNK):  # a rank may have none
+            piece = slice(first, first + CHUNK)
+            found[piece] = self._solved(cells[piece], whole[piece])
+        return found
 
     def _solved(self, cells: Indices, moduli: Array) -> Array:
         body, d = self._body, self._body.dim

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from mpi4py import MPI
 
 from contact import FixedPointOptions, NewtonOptions, load_case, parse_case, solve
 from contact.output.resultants import charge_balance
@@ -145,3 +146,29 @@ def test_a_bimorph_marks_its_stop():
     assert force[0] > 0 and force[4] == 0 and force[5] == 0
     assert (force[[6, 7, 8]] < force[[1, 2, 3]]).all() and force[8] > 0.9 * force[3]
     assert lost[2] > 0 and lost[5:].sum() < 0.2 * lost[:4].sum()
+
+
+@pytest.mark.parallel
+@pytest.mark.parametrize("degree", [1, 2])
+def test_ranks_without_cells_of_a_metal(degree):
+    """Volumes were first asked for where there are cells, by some of the ranks; others waited."""
+    metal = {"law": "j2", "young": 200e3, "poisson": 0.3, "yield_stress": 250.0}
+    data = {
+        "mesh": {"generator": "two_blocks", "lower_size": 0.5, "upper_size": 0.4},
+        "space": {"degree": degree},
+        "material": [{"on": "upper", **metal}, {"on": "lower", **metal, "hardening": 4e3}],
+        "fixed": [
+            {"on": "upper_top", "displacement": [0.0, -4e-3]},
+            {"on": "lower_bottom", "displacement": [0.0, 0.0]},
+        ],
+        "contact": {"on": "upper_bottom", "against": "lower_top"},
+        "evolution": {"times": [0.0, 1.0], "steps": [2]},
+    }
+    alone, together = (solve(parse_case(data), comm=c) for c in (MPI.COMM_SELF, MPI.COMM_WORLD))
+    for name in ("equivalent_plastic_strain", "plastic_volume"):
+        assert getattr(together, name) == pytest.approx(getattr(alone, name), rel=1e-8)
+    for name in ("max_pressure", "plastic_dissipation"):
+        known, found = (sum(step.row[name] for step in one.steps) for one in (alone, together))
+        assert known > 0
+        assert found == pytest.approx(known, rel=1e-8)
+    assert together.error.relative == pytest.approx(alone.error.relative, rel=1e-8)
