@@ -143,7 +143,7 @@ def sensitivity(
     """
     accepted = f"{AUTO!r}, {TANGENT!r} or {ADJOINT!r}"
     expect("method", method, accepted, method in (AUTO, TANGENT, ADJOINT))
-    path = Path(solution)
+    path = LoadPath(solution)
     asked = quantities_of(solution, quantities)
     families = {
         name: path.family(name, given) for name, given in parameters_of(solution, parameters)
@@ -221,7 +221,7 @@ class Family:
         return self.ways[0] - self.ways[1]
 
 
-class Path:
+class LoadPath:
     """The steps that have led to a solution.
 
     Raises
@@ -332,7 +332,7 @@ def _explicit(
 
 
 def _tangent(
-    path: Path,
+    path: LoadPath,
     quantities: Mapping[str, Quantity],
     families: Mapping[str, Family],
     found: Sensitivities,
@@ -397,7 +397,7 @@ class Adjoint:
 
 
 def backwards(
-    path: Path, quantities: Mapping[str, Differentiable]
+    path: LoadPath, quantities: Mapping[str, Differentiable]
 ) -> Iterator[tuple[Linearised, dict[str, Adjoint]]]:
     """Yield the steps from the last to the first, and the adjoint of each quantity. Collective."""
     after: dict[str, History | None] = dict.fromkeys(quantities)
@@ -423,7 +423,7 @@ def backwards(
 
 
 def _adjoint(
-    path: Path,
+    path: LoadPath,
     quantities: Mapping[str, Differentiable],
     families: Mapping[str, Family],
     found: Sensitivities,

@@ -20,8 +20,8 @@ from contact.body.internal_variables import VARIABLES
 from contact.derivatives import (
     Adjoint,
     Family,
+    LoadPath,
     Parameter,
-    Path,
     backwards,
     parameters_of,
     quantities_of,
@@ -64,7 +64,7 @@ def gap_gradient(solution: Solution, quantity: str | Quantity) -> Array:
     >>> gradient = gap_gradient(solution, "max_pressure")  # doctest: +SKIP
     >>> points = solution.problem.nodes.points  # doctest: +SKIP
     """
-    path, asked = Path(solution), _one(solution, quantity)
+    path, asked = LoadPath(solution), _one(solution, quantity)
     law = solution.problem.interface.law
     if law.layer is not None or law.follows_gap:
         raise InputError("gap_gradient: the layer or current depends on the gap; accepted: neither")
@@ -118,7 +118,7 @@ def field_gradient(
     key = parameter if isinstance(parameter, str) else "parameter"
     inside = not isinstance(parameter, str) or key.split(".")[0] == MATERIAL
     expect("field_gradient: parameter", key, "a constant of a material: material.young", inside)
-    path, asked = Path(solution), _one(solution, quantity)
+    path, asked = LoadPath(solution), _one(solution, quantity)
     given = [parameter] if isinstance(parameter, str) else {key: parameter}
     ((_, made),) = parameters_of(solution, given)
     gradient = _FieldGradient(path.base.domain.mesh, path.family(key, made), degree)

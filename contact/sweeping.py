@@ -195,11 +195,9 @@ def _kept_rows(
             )
     text = to_toml(load(first), anchored=True)
     if before.exists():
-        stored, accepted = (
-            to_toml(load(first, before), anchored=True),
-            "the same, or another folder",
-        )
-        check_same(f"--out {folder}", "a sweep", stored, text, accepted, ignored=frozenset())
+        stored, where = to_toml(load(first, before), anchored=True), f"--out {folder}"
+        accepted = "the same, or another folder"
+        check_same(where, "a sweep", stored, text, accepted, ignored=frozenset())
     elif table.exists():
         raise InputError(
             f"{refused} a {TABLE} without the {CASE} that a sweep leaves beside it; accepted: "

@@ -24,6 +24,7 @@ from contact.body.pointwise import Pointwise
 from contact.errors import InputError
 from contact.history import QUADRATURE_POINTS, Evaluated, InternalVariables
 from contact.mesh.domain import Domain, Indices
+from contact.mesh.simplices import barycentric, corners, inverse_jacobians, measures
 from contact.typing import Array
 from forms.hencky import FormLaw, Law
 from forms.history import (
@@ -154,12 +155,9 @@ class QuadratureLaws:
     @cached_property
     def volumes(self) -> Array:
         """The volume of the body that each place stands for, shape (places,)."""
-        mesh = self._domain.mesh
-        extent = self._domain.kinematics.extent(ufl.SpatialCoordinate(mesh))
-        density = abs(ufl.JacobianDeterminant(mesh))
-        expression = fem.Expression(density if extent is None else density * extent, self.points)
-        found = expression.eval(mesh, np.arange(self._owned, dtype=np.int32))
-        return np.asarray(found.reshape(self._owned, self._rule[1].size) * self._rule[1]).ravel()
+        (points, weights), of = self._rule, corners(self._domain)
+        size = inverse_jacobians(of)[1]
+        return measures(self._domain, of, barycentric(points), weights, size).ravel()
 
     def law(self, law: Law) -> FormLaw:
         """Return a law as forms see it, with the stress and stiffness that `set` evaluates."""
@@ -217,8 +215,11 @@ class QuadratureLaws:
     def _in(self, cells: Indices, array: Array) -> Array:
         """Return values by place in ascending cells, those themselves where the cells are all."""
         if cells.size == self._owned:
-            return array
-        return self.by_cell(array)[cells].reshape(-1, *array.shape[1:])
+            found = array.view()
+        else:
+            found = self.by_cell(array)[cells].reshape(-1, *array.shape[1:])
+        found.flags.writeable = False  # a law of the user's shall not change the history
+        return found
 
     def by_cell(self, array: Array) -> Array:
         """Return values by place as those by cell and point."""

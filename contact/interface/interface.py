@@ -16,7 +16,7 @@ from contact.interface.law import InterfaceLaw
 from contact.interface.nodes import ContactNodes
 from contact.linear.constraint import Change
 from contact.mesh.entities import component_sums
-from contact.tolerances import EPS
+from contact.tolerances import EPS, ROUNDING
 from contact.typing import Array
 
 
@@ -178,7 +178,7 @@ class Interface:
     def rounding(self, nodal: Array) -> float:
         """Return a pressure that rounding of the displacements makes (stress). Collective."""
         displacement = np.abs(nodal[:, : self.jump.dim]).max(axis=1, initial=0.0)
-        return 1e3 * EPS * self.stiffness * self.jump.maximum(displacement)
+        return 2 * ROUNDING * self.stiffness * self.jump.maximum(displacement)
 
     def acting(self, x: Array, forces: Multipliers) -> Iterator[tuple[InterfaceLaw, Array, Array]]:
         """Yield the law, unknowns and pressures of contact nodes, then of held ones. Collective."""

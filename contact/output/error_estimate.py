@@ -21,11 +21,11 @@ from mpi4py import MPI
 from contact.body.description import Material
 from contact.body.elements import MEAN_DILATATION
 from contact.mesh.entities import cells_at
+from contact.mesh.simplices import corners, inverse_jacobians, lagrange, measures, rule
 from contact.mesh.together import members, part
 from contact.output.fields import DerivedFields
 from contact.output.local_problems import LocalProblems
 from contact.output.recovery import nodal_means
-from contact.output.simplices import corners, inverse_jacobians, lagrange, measures, rule
 from contact.problem.problem import ContactProblem
 from contact.problem.state import State
 from contact.typing import Array

@@ -17,12 +17,12 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 from ufl.core.expr import Expr
 
-from contact import _compat
 from contact.body.description import Material
 from contact.body.elements import kinematics_of
 from contact.body.equilibrium import BodyEquilibrium
 from contact.body.materials import law_with_constants, piezo_with_constants
 from contact.history import BodyState, Evaluated
+from contact.mesh.simplices import corners, inverse_jacobians, measures, rule
 from contact.output.quantities import BODY, values_of
 from contact.problem.problem import ContactProblem
 from contact.problem.state import State
@@ -292,14 +292,10 @@ class DerivedFields:
         }
 
     def _volumes(self) -> Array:
-        """Return the volumes of the local cells: straight simplices, or rings of them."""
-        mesh, d = self.body.domain.mesh, self.body.dim
-        corners = mesh.geometry.x[_compat.geometry_dofmap(mesh)][:, : d + 1, :d]
-        edges = corners[:, 1:] - corners[:, :1]
-        volumes = np.abs(np.linalg.det(edges)) / math.factorial(d)
-        if self.body.domain.revolved:
-            volumes *= 2 * np.pi * corners[:, :, 0].mean(axis=1)
-        return np.asarray(volumes)
+        """Return the volumes of the owned cells, or of the rings that they are."""
+        domain, of = self.body.domain, corners(self.body.domain)
+        middle, weights = rule(domain.dim, 1)
+        return measures(domain, of, middle, weights, inverse_jacobians(of)[1]).sum(axis=1)
 
 
 class Deformation(NamedTuple):

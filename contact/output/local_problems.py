@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from contact.body.equilibrium import BodyEquilibrium
 from contact.mesh.domain import Indices
-from contact.output.simplices import (
+from contact.mesh.simplices import (
     barycentric,
     corners,
     inverse_jacobians,
@@ -125,6 +125,7 @@ class LocalProblems:
         order = np.argsort(numbers.reshape(nodes.shape), axis=2)
         out = self._normal_flux()
         topology = mesh.topology
+        topology.create_connectivity(d, d - 1)
         facets = topology.connectivity(d, d - 1).array.reshape(-1, d + 1)[: len(self._flux)]
         ordered = np.take_along_axis(out, order[..., None], axis=2)
         ordered = ordered.reshape(*facets.shape, int(np.prod(out.shape[2:])))
@@ -142,9 +143,8 @@ class LocalProblems:
         own = np.zeros(body.owned + body.global_unknowns.size)
         own[: body.owned] = body.free.ravel()
         free = body.nodal(body.local(own))[nodes].any(axis=2)
-        loaded = np.isin(
-            facets, [f for load in body.body.loads if load.on for f in body.domain.facets(load.on)]
-        )
+        sides = [body.domain.facets(load.on) for load in body.body.loads if load.on]
+        loaded = np.isin(facets, np.concatenate([[], *sides]))
         known = ~(inside | touch)[..., None, None]
         through = np.where(known, 0.0, out - np.where(inside[..., None, None], jump / 2, 0.0))
         held = ~inside[..., None] & ((free == 0) | (touch & loaded)[..., None])

@@ -295,7 +295,7 @@ class Linearised:
         Raises
         ------
         InputError
-                If they do not halve from one to the next.
+            If they do not halve from one to the next.
         """
         last, now = (np.inf, *taken)[-2:]
         if EPS * 2.0 ** len(taken) > 1:

@@ -160,3 +160,18 @@ def test_drucker_and_prager_s_cone_of_the_example(size):
     s[:, :3] -= mean[:, None]
     assert (np.linalg.norm(s, axis=1) + a * mean - c).max() < 1e-12 * c
     assert found.dissipation.min() > -1e-12 * found.dissipation.max()
+
+
+@dataclass(frozen=True)
+class Careless(Damage):
+    """A law that writes into the variables it is given."""
+
+    def respond(self, strain, variables, kind=""):
+        variables["kappa"][:] = 1.0
+        return super().respond(strain, variables, kind)
+
+
+def test_a_law_cannot_change_the_history():
+    """Trials of a step would be in it, where one law has all cells."""
+    with pytest.raises(ValueError, match="read-only"):
+        solve(case(cells=2, stages=1), law=Careless(YOUNG, POISSON), comm=MPI.COMM_SELF)
