@@ -19,7 +19,7 @@ import numpy as np
 from contact import field_gradient, gap_gradient, load_case, parse_case, sensitivity
 from contact.case.file import Case
 from contact.case.text import number_at, to_toml, with_number
-from contact.derivatives import Path as Steps
+from contact.derivatives import LoadPath
 from contact.output.differentiable import named_quantities
 from contact.output.solution import Solution
 from contact.typing import Array
@@ -262,7 +262,7 @@ def products(solution: Solution) -> float:
     """Return the relative difference of <J^-1 a, b> and <a, J^-T b>, for random a and b."""
     from contact.problem.linearised import Equations
 
-    linearised = Steps(solution).linearised(-1)
+    linearised = LoadPath(solution).linearised(-1)
     body, rng = solution.problem.equilibrium, np.random.default_rng(0)
     shapes = body.owned_part(solution.state.x).shape, solution.problem.nodes.normal.shape
     mask = np.concatenate([body.free.ravel(), np.ones(body.global_unknowns.size)])

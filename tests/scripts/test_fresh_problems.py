@@ -6,6 +6,7 @@ from mpi4py import MPI
 
 from contact.case.file import parse_case
 from contact.solving import solve
+from scripts.studies import fresh_families as families
 from scripts.studies import fresh_problems as study
 from scripts.studies.fresh_check import Mesh, internal_forces, recheck
 
@@ -18,7 +19,7 @@ CHOSEN = [
 
 def problem(name, folder):
     family, number = name.rsplit("-", 1)
-    mesh, tables = study.draw(getattr(study, family), int(number), folder)
+    mesh, tables = families.draw(getattr(families, family), int(number), folder)
     return mesh, tables, parse_case(tables)
 
 
