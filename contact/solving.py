@@ -252,8 +252,8 @@ def evolve(
         A state that was given before, to continue from; the reference configuration at time 0 by
         default.
     before
-        The state before that: with it the initial guess of the first step, and all digits, are
-        those without the interruption. Without it they are within the tolerance.
+        The state before that: with it the initial guess of the first step is that without the
+        interruption, and so are the results, to rounding. Without it, within the tolerance.
 
     Raises
     ------

@@ -69,10 +69,11 @@ def test_a_restart_goes_on_with_the_same_history(tmp_path, hardening):
     steps = read_steps(tmp_path, build_problem(given, comm))
     for one, two in zip(whole.steps, steps, strict=True):
         assert one.state.near(two.state, rtol=1e-12, atol=1e-18)
-    # From any step on, on any number of ranks; on the same number bit for bit.
+    # From any step on, on any number of ranks; on one bit for bit. On several, sums are rounded as
+    # messages arrive: two uninterrupted runs differ as well.
     here = comm.allreduce(accumulated(whole.problem, whole.state), op=MPI.SUM)
     times = [step.state.time for step in steps]
-    for other, rel in ((comm, 0.0), (MPI.COMM_SELF, 1e-12)):
+    for other, rel in ((comm, 0.0 if comm.size == 1 else 1e-12), (MPI.COMM_SELF, 1e-12)):
         problem = build_problem(given, other)
         states = [step.state for step in read_steps(tmp_path, problem)]
         *_, last = evolve(problem, times[3:], start=states[2], before=states[1])
