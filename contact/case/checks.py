@@ -15,6 +15,7 @@ from contact.case.section import (
     as_given,
     walk,
 )
+from contact.case.units import check_units
 from contact.mesh.together import meet, members
 from contact.settings import SPATIAL
 from contact.tolerances import HUGE
@@ -35,6 +36,7 @@ def check_sections(case: Case) -> None:
         if AMPLITUDE in marks and value is not None:
             _check_amplitude(case, path, value)
     _check_regions(case)
+    check_units(case)
     piezoelectric = any(material.piezoelectric for _, material in case.materials)
     if piezoelectric:
         _check_potential(case)

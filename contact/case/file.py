@@ -40,6 +40,7 @@ from contact.case.section import (
     check_conditions,
     without_effect,
 )
+from contact.case.units import Labels, share
 from contact.errors import InputError
 from contact.methods.options import OPTIONS, FixedPointOptions, NewtonOptions, Options
 from contact.output.options import OutputOptions, Units
@@ -102,11 +103,12 @@ else:
 
 
 class About(Section):
-    """`[case]`: names for labels. Nothing is computed with them."""
+    """`[case]`: the names of its units, for labels; materials of the library have to fit them."""
 
-    units: Annotated[Units, FromTable] = Units()
-    """Names of units for labels: `{ length = "mm", stress = "MPa", potential = "V", charge = "C"
-    }`, any of them. None is assumed."""
+    units: Labels = Units()
+    """Names of units for labels: `{ length = "mm", stress = "MPa", potential = "V", charge = "mC"
+    }`, any of them, or a system by name, such as `"N-mm-MPa"`: that of all materials by name, too.
+    None is assumed. Numbers of the case are not converted."""
 
 
 class Case(Section):
@@ -193,6 +195,11 @@ class Case(Section):
         if self.evolution is None:
             return None
         return steady if name is None else self.evolution.amplitudes[name]
+
+    @model_validator(mode="before")
+    @classmethod
+    def _share_units(cls, given: Any) -> Any:
+        return share(given)
 
     @model_validator(mode="after")
     def _check(self) -> Self:

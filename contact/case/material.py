@@ -23,7 +23,9 @@ from contact.case.section import (
     Text,
     as_tuple,
 )
+from contact.case.units import SystemOfUnits, UnitSystem
 from contact.errors import InputError
+from contact.library import units as systems
 from contact.library.materials import PACKAGED, Entry, find
 from contact.settings import Accepted, NonNegative, Number, Positive, ReadWith
 from contact.typing import Array
@@ -33,10 +35,6 @@ from forms.elasticity import Anisotropic, hexagonal
 from forms.hencky import Law, Linear, Log
 from forms.piezo import Piezo as PiezoTensors
 from forms.piezo import from_voigt, hexagonal_voigt
-
-#: Units of a case -> that of stress in Pa. Lengths and charges are SI; so is the potential times
-#: the coupling, which has the unit of stress times length.
-UNITS = {"SI": 1.0, "GPa": 1e9}
 
 #: The constants of a crystal of class 6mm: elastic; coupling and permittivity.
 SHORT = ("c11", "c12", "c13", "c33", "c44")
@@ -186,9 +184,10 @@ class Material(Section):
     mesh, where this is the only material."""
     name: Text | None = None
     """Name of a material of the library, with its coupling."""
-    units: Annotated[Literal["SI", "GPa"] | None, ReadWith("name")] = None
-    """With `name`: units of the case. `SI`: Pa, V, C/m2; `GPa`: lengths in m, GPa, GV, C/m2.
-    Default: `SI`."""
+    units: Annotated[SystemOfUnits | None, ReadWith("name")] = None
+    """With `name`: the case's system of units, into which the constants are converted. The
+    potential of those with a force and a length is in V; `GPa`: GPa, GV/m, C/m2, and any length.
+    Default: `[case] units` where that is a system, else `SI`."""
     library: Annotated[
         Annotated[File, Accepted("a library of materials (TOML)")] | None, ReadWith("name")
     ] = None
@@ -247,6 +246,12 @@ class Material(Section):
         if self.name is None:
             return None
         return find(self.name, PACKAGED if self.library is None else Path(self.library))
+
+    def system(self, labels: Mapping[str, str]) -> systems.System:
+        """Return the system of units of a material by name, the labels those of the case."""
+        if isinstance(self.units, UnitSystem):
+            return self.units.system
+        return systems.named(self.units or "SI", labels)
 
     @property
     def piezoelectric(self) -> bool:
@@ -355,7 +360,7 @@ class Material(Section):
     def _law(self, turn: Array) -> Law:
         """Return the law of the stress, the crystal turned into the body."""
         if self.entry is not None:
-            unit = UNITS[self.units or "SI"]
+            unit = self.system({}).stress
             if self.entry.isotropic is not None:
                 young, poisson = self.entry.isotropic
                 return Linear(young / unit, poisson)
@@ -406,7 +411,9 @@ class Material(Section):
         if self.entry is None or self.entry.piezo is None:
             return None
         tensors = self.entry.piezo
-        return PiezoTensors(tensors.e, np.asarray(tensors.beta) * UNITS[self.units or "SI"])
+        units = self.system({})
+        coupling, beta = np.asarray(tensors.e), np.asarray(tensors.beta)
+        return PiezoTensors(coupling / units.coupling, beta / units.permittivity)
 
     def check_revolved(self, key: str) -> None:
         """Refuse a crystal that is not transversely isotropic, for a body of revolution."""
