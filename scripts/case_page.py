@@ -33,8 +33,9 @@ python3 -m contact check CASE.toml
 python3 -m contact solve CASE.toml --out DIR [--set path.to.key=value]... [PETSc options]
 ```
 
-`check` prints the case with all defaults, the parts of the mesh and the number of unknowns. Each
-`--set` replaces a value of the file: its path is dotted, entries of lists are numbered from 0
+`check` prints the case with all defaults, the parts of the mesh with area, centroid and normal, the
+volume of its regions, the number of unknowns, and the resultant of the loads. Each `--set` replaces
+a value of the file: its path is dotted, entries of lists are numbered from 0
 (`--set load.0.traction='[0, -0.05]'`), its value is TOML, and a bare word is a text.
 
 Lengths, forces and charges are in any consistent system of units; no key has a unit built in.

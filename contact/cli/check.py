@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Mapping
+from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 from mpi4py import MPI
@@ -13,14 +15,15 @@ from contact import _compat
 from contact.case.build import build_problem
 from contact.case.file import Case, load_case
 from contact.case.text import to_toml
+from contact.cli.geometry import parts, regions
 from contact.cli.main import CONVERGED
-from contact.mesh.domain import Indices
 from contact.methods.options import NewtonOptions
 from contact.nesting import coarser_cases
 from contact.output import environment
 from contact.output.bodies import passing
 from contact.output.remarks import fitting
 from contact.problem.checks import expected_displacements
+from contact.problem.kkt import residual_forces
 from contact.problem.problem import ContactProblem
 from contact.ranks import on_root
 from contact.typing import Array
@@ -31,6 +34,11 @@ THIN = 0.1
 INCOMPRESSIBLE = 0.475
 #: Displacements above this share of the body are not small.
 LARGE = 0.05
+#: Loads over the contact part and Young's modulus from which on units are asked for: sharp
+#: indenters come to a tenth.
+SOFT = 0.25
+#: Most steps of an evolution whose loads are looked at.
+LOOKS = 20
 
 
 def run(options: argparse.Namespace, comm: MPI.Intracomm) -> int:
@@ -60,14 +68,12 @@ def describe(case: Case, problem: ContactProblem) -> str:
         to_toml(case, domain.dim),
         f"# mesh: {cells} cells in {domain.dim}-D on {comm.size} rank(s), largest extent "
         f"{domain.size:g}",
-        "# parts of its boundary, with their facets:",
-        *_counts(domain.parts, comm),
-        "# regions, with their cells:",
-        *_counts(domain.regions, comm),
+        *parts(domain),
+        *regions(domain),
         *(f"# note: {note}" for note in domain.notes),
         f"# unknowns: {layout.unknowns} ({layout.block_size} a node), contact nodes: "
         f"{problem.nodes.size}",
-        *expectations(problem),
+        *expectations(problem, _times(case)),
         f"# blas: {library} {path}".rstrip(),
         "# versions: " + ", ".join(f"{k} {v}" for k, v in environment.versions().items()),
     ]
@@ -76,16 +82,16 @@ def describe(case: Case, problem: ContactProblem) -> str:
     return "\n".join(lines)
 
 
-def _counts(sets: Mapping[str, Indices], comm: MPI.Intracomm) -> list[str]:
-    """Return a line for each set of indices, with its number over all ranks. Collective."""
-    width = max(map(len, sets))
-    return [f"#   {name:{width}}  {comm.allreduce(sets[name].size)}" for name in sorted(sets)]
+def _times(case: Case) -> list[float]:
+    """Return times at which loads are looked at: ends of steps, of some where there are many."""
+    ends = [1.0] if case.evolution is None else case.evolution.ends
+    return [*ends[: -1 : 1 + len(ends) // LOOKS], ends[-1]]
 
 
-def expectations(problem: ContactProblem) -> list[str]:
-    """Return lines on the mesh and on the expected effect of the loads. Collective."""
+def expectations(problem: ContactProblem, times: Sequence[float] = (1.0,)) -> list[str]:
+    """Return lines on the mesh, and on loads and prescribed values at some times. Collective."""
     warnings = [f"# warning: {text}" for text in (*fitting(problem), *passing(problem))]
-    return [*_quality(problem), *_sizes(problem), *_locking(problem), *warnings]
+    return [*_quality(problem), *_given(problem, times), *_locking(problem), *warnings]
 
 
 def _locking(problem: ContactProblem) -> list[str]:
@@ -129,29 +135,74 @@ def _quality(problem: ContactProblem) -> list[str]:
     return lines
 
 
-def _sizes(problem: ContactProblem) -> list[str]:
-    """Say how far loads and prescribed values move the body, about, and how far it may go."""
-    comm, scales, loads = problem.comm, problem.scales, problem.equilibrium.external(problem.time)
-    pressed, moved = expected_displacements(problem, loads, problem.start().x)
-    # Beyond a small contact part, as deep as it is wide, forces spread over all of the body.
-    wide = scales.area if problem.dim == 2 and not problem.domain.revolved else scales.area**0.5
-    pressed *= min(1.0, wide / scales.size + scales.size / scales.height)
-    expected = max(pressed, moved)
+def _given(problem: ContactProblem, times: Sequence[float]) -> list[str]:
+    """Say which loads, prescribed values and gaps there are, and where they are all nothing."""
+    comm, size = problem.comm, problem.domain.size
     gap = problem.nodes.gap
-    gap = np.where(np.abs(gap) < 1e-12 * scales.size, 0.0, gap)  # rounding is no gap
+    gap = np.where(np.abs(gap) < 1e-12 * size, 0.0, gap)  # rounding is no gap
     least = comm.allreduce(float(gap.min(initial=np.inf)), op=MPI.MIN)
     largest = comm.allreduce(float(gap.max(initial=-np.inf)), op=MPI.MAX)
-    if expected == 0:
+    found = [_Acting.of(problem.at(time)) for time in times]
+    if least >= 0 and all(acting.nothing for acting in found):
         return ["# warning: nothing is loaded or moved: all results will be 0"]
+    moved, pressed = (max(getattr(a, name) for a in found) for name in ("moved", "pressed"))
+    when = f" at t = {times[-1]:g}" if len(times) > 1 else ""
+    total = ", ".join(f"{force:.4g}" for force in found[-1].resultant)
     lines = [
-        f"# expected: displacements of some {expected:.2g} (prescribed {moved:.2g}; the loads on a "
-        f"block of the body's size {pressed:.2g}); gap {least:.3g} to {largest:.3g}"
+        f"# given: loads on the body with the resultant ({total}){when}; displacements of up to "
+        f"{moved:.3g}; gap {least:.3g} to {largest:.3g}"
     ]
-    if expected > LARGE * scales.size:
+    if moved > LARGE * size:
         lines.append(
-            f"# warning: that is {expected / scales.size:.0%} of the body, and strains are taken "
-            "as small; are loads and Young's modulus in the same units?"
+            f"# warning: displacements of {moved / size:.0%} of the body are prescribed, and "
+            "strains are taken as small"
         )
-    if least > 10 * expected:
+    if pressed > SOFT:
+        lines.append(
+            f"# warning: the loads over the area of the contact part are {pressed:.0%} of Young's "
+            "modulus, and strains are taken as small; are both in the same units?"
+        )
+    if least > 10 * moved and not any(acting.forces for acting in found):
         lines.append("# warning: the gap is far larger: the body may not touch at all")
     return lines
+
+
+class _Acting(NamedTuple):
+    """Loads and prescribed values at a time.
+
+    Attributes
+    ----------
+    nothing, forces
+        Whether the undeformed body is the solution; whether loads, charges or fields act.
+    moved
+        The largest component of a prescribed displacement.
+    pressed
+        Sum of the absolute loads, over the area of the contact part and Young's modulus.
+    resultant
+        Of the loads on the body, shape (d,).
+    """
+
+    nothing: bool
+    forces: bool
+    moved: float
+    pressed: float
+    resultant: Array
+
+    @staticmethod
+    def of(problem: ContactProblem) -> _Acting:
+        """Look at a problem at its time. Collective."""
+        body, comm = problem.equilibrium, problem.comm
+        start, loads = problem.start(), body.external(problem.time)
+        pressed, moved = expected_displacements(problem, loads, start.x)
+        acting = residual_forces(problem, replace(start, x=body.rest()))
+        potentials = body.nodal(start.x)[:, body.dim :]
+        conductors = [c.conductor for c in problem.contacts if c.conductor is not None]
+        # One that conducts in contact alone draws nothing before there is some.
+        foundations = [np.asarray(found.at(problem.time).phi_f) for found in conductors]
+        parts = (acting, potentials, *foundations)
+        here = [float(np.abs(part).max(initial=0.0)) for part in parts]
+        forces = comm.allreduce(max(here), op=MPI.MAX) > 0
+        total = comm.allreduce(body.nodal(loads)[:, : body.dim].sum(axis=0), op=MPI.SUM)
+        resultant = problem.domain.resultant(total)
+        size = problem.domain.size
+        return _Acting(not forces and moved == 0, forces, moved, pressed / size, resultant)

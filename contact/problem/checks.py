@@ -54,8 +54,11 @@ def expected_displacements(
     """
     body, scales = problem.equilibrium, problem.scales
     nodal = np.abs(body.nodal(loads)[:, : body.dim]).sum()
-    force = body.comm.allreduce(float(nodal), op=MPI.SUM) + np.abs(body.motion(loads)).sum()
-    given = np.abs(np.append(body.nodal(prescribed)[:, : body.dim], body.motion(prescribed)))
+    motions = body.global_unknowns.mechanical
+    force = body.comm.allreduce(float(nodal), op=MPI.SUM)
+    force += np.abs(body.motion(loads)[motions]).sum()
+    moved = body.motion(prescribed)[motions]
+    given = np.abs(np.append(body.nodal(prescribed)[:, : body.dim], moved))
     largest = body.comm.allreduce(float(given.max(initial=0.0)), op=MPI.MAX)
     return float(force / scales.area / scales.young * scales.size), largest
 

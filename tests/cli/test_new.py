@@ -97,11 +97,12 @@ def test_shapes_of_cells() -> None:
     [
         ([], "gap 0 to 0"),
         (["mesh.size=[400, 1]", "mesh.parts={}", "load.0.on=right"], "thinner than 0.1"),
-        (["load.0.traction=[0, -5]"], "of the body, and strains are taken"),
-        (["contact.gap=0.9"], "the body may not touch at all"),
+        (["load.0.traction=[0, -5]"], "of Young's modulus, and strains are taken"),
+        (["fixed.0.displacement=[0, -0.5]"], "of the body are prescribed"),
+        (["load=[]", "fixed.0.displacement=[0, -0.01]", "contact.gap=0.9"], "may not touch at all"),
     ],
 )
-def test_what_is_expected(
+def test_what_is_said(
     changes: list[str], words: str, bar: Path, capsys: pytest.CaptureFixture
 ) -> None:
     options = [option for change in changes for option in ("--set", change)]
@@ -111,9 +112,9 @@ def test_what_is_expected(
     assert ("# warning" in printed) == bool(changes)
 
 
-def test_what_is_expected_of_a_small_contact_part(capsys: pytest.CaptureFixture) -> None:
-    """A ball of radius 4 goes a^2/R = 0.25 deep into a half space, without friction."""
+def test_what_is_said_of_a_small_contact_part(capsys: pytest.CaptureFixture) -> None:
+    """Local strains of a quarter of a/R are no sign of other units."""
     assert main(["check", str(CASES / "indent-ball-force.toml")]) == CONVERGED
     printed = capsys.readouterr().out
-    assert "displacements of some 0.2 (prescribed 0.00019" in printed
+    assert "displacements of up to 0.000188;" in printed
     assert "# warning" not in printed

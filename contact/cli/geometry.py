@@ -1,0 +1,95 @@
+"""Sizes of the parts and regions of a mesh, as `contact check` prints them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import Any
+
+import numpy as np
+import ufl
+from dolfinx import fem
+from mpi4py import MPI
+
+from contact import _compat
+from contact.mesh.domain import Domain
+from contact.typing import Array
+
+#: Length of the mean of a part's normals from which on the part counts as flat, and below which
+#: they cancel.
+FLAT, CLOSED = 1 - 1e-6, 1e-6
+
+
+def parts(domain: Domain) -> list[str]:
+    """Return a line for each part: its facets, area, centroid and mean normal. Collective."""
+    d, mesh = domain.dim, domain.mesh
+    x, normal = ufl.SpatialCoordinate(mesh), ufl.FacetNormal(mesh)
+    values = [1.0, *(x[i] for i in range(d)), *(normal[i] for i in range(d))]
+    rows = []
+    for name in sorted(domain.parts):
+        facets = domain.parts[name]
+        data = [(1, _compat.facet_entities(mesh, facets))]
+        measure = ufl.Measure("ds", domain=mesh, subdomain_data=data)(1)
+        area, *rest = _integrals(domain, values, measure)
+        count = domain.comm.allreduce(facets.size, op=MPI.SUM)
+        if not area > 0:  # facets on the axis of revolution
+            rows.append([name, f"{count} facets", "on the axis", "", ""])
+            continue
+        centroid, mean = np.reshape(rest, (2, d)) / area
+        length = float(np.linalg.norm(mean))
+        across = f"normal {_vector(mean)}"
+        if length < CLOSED:
+            across = "normals that cancel"
+        elif length < FLAT:
+            across = f"curved, mean normal {_vector(mean / length)}"
+        place = f"centroid {_vector(domain.resultant(centroid))}"
+        rows.append([name, f"{count} facets", f"{_extent(domain)} {area:.6g}", place, across])
+    return ["# parts of its boundary:", *_table(rows)]
+
+
+def regions(domain: Domain) -> list[str]:
+    """Return a line for each region: its cells and volume. Collective."""
+    rows = []
+    for name in sorted(domain.regions):
+        cells = domain.regions[name]
+        measure = ufl.Measure("dx", domain=domain.mesh, subdomain_data=[(1, cells)])(1)
+        (volume,) = _integrals(domain, [1.0], measure)
+        count = domain.comm.allreduce(cells.size, op=MPI.SUM)
+        word = "volume" if domain.dim == 3 or domain.revolved else "area"
+        rows.append([name, f"{count} cells", f"{word} {volume:.6g}"])
+    return ["# regions:", *_table(rows)]
+
+
+def _integrals(domain: Domain, values: Sequence[Any], measure: ufl.Measure) -> Array:
+    """Return the integrals of values, of the whole body. Collective.
+
+    The factors are constants, so that one form is compiled for all parts.
+    """
+    mesh = domain.mesh
+    factors = [fem.Constant(mesh, 0.0) for _ in values]
+    extent = domain.kinematics.extent(ufl.SpatialCoordinate(mesh))
+    integrand = sum(factor * value for factor, value in zip(factors, values, strict=True))
+    form = fem.form((integrand if extent is None else extent * integrand) * measure)
+    found = []
+    for factor in factors:
+        factor.value = 1.0
+        found.append(fem.assemble_scalar(form))
+        factor.value = 0.0
+    return np.asarray(domain.comm.allreduce(np.array(found), op=MPI.SUM))
+
+
+def _extent(domain: Domain) -> str:
+    return "area" if domain.dim == 3 or domain.revolved else "length"
+
+
+def _vector(values: Array) -> str:
+    """Return a vector, without the rounding of its zeros."""
+    values = np.where(np.abs(values) < 1e-12 * np.abs(values).max(initial=0.0), 0.0, values)
+    return f"({', '.join(f'{value:.6g}' for value in values)})"
+
+
+def _table(rows: Sequence[Sequence[str]]) -> Iterator[str]:
+    """Give the rows with aligned columns."""
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    for row in rows:
+        cells = (cell.ljust(width) for cell, width in zip(row, widths, strict=True))
+        yield "#   " + "  ".join(cells).rstrip()

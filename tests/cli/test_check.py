@@ -1,0 +1,135 @@
+"""`contact check` says of loads, gaps and the mesh what is so."""
+
+import numpy as np
+import pytest
+
+from contact.case.build import build_problem
+from contact.case.file import load_case, parse_case
+from contact.cli.check import describe, expectations
+from scripts.cases import CASES
+from tests.problems.bar import changed
+
+NOTHING = "nothing is loaded or moved"
+MESH = {"generator": "rectangle", "size": [2.0, 1.0], "cells": [4, 2]}
+PIEZO = {
+    "mesh": MESH,
+    "material": {"name": "PZT-4", "units": "GPa"},
+    "fixed": [
+        {"on": "left", "displacement": [0.0, 0.0], "potential": 0.0},
+        {"on": "right", "potential": 0.0},
+    ],
+    "contact": {"on": "bottom"},
+}
+
+
+def said(data):
+    return "\n".join(expectations(build_problem(parse_case(data))))
+
+
+def with_voltage(volts):
+    fixed = [PIEZO["fixed"][0], {"on": "right", "potential": volts}]
+    return {**PIEZO, "fixed": fixed}
+
+
+def bar(**changes):
+    return changed(load=None, **changes)
+
+
+ACTING = {
+    "an electrode at a potential": with_voltage(1e-3),
+    "a conductive foundation": {**PIEZO, "electric": {"law": "perfect", "k_e": 1.0, "phi_f": 1e-3}},
+    "a charge": {**PIEZO, "load": [{"on": "top", "charge": 1e-6}]},
+    "a support that moves": bar(fixed__0__displacement=[0.0, -1e-3]),
+    "a press fit": bar(
+        contact={
+            "on": "bottom",
+            "overlap": "press",
+            "foundation": {"shape": "plane", "point": [0.0, 1e-3], "normal": [0.0, 1.0]},
+        }
+    ),
+    "a layer that is thicker than the gap": bar(
+        contact={"on": "bottom", "law": "compliance", "gap": 0.01, "layer": 0.02}
+    ),
+    "a load": changed(),
+}
+
+
+@pytest.mark.parametrize("name", ACTING)
+def test_what_acts_is_seen(name):
+    assert NOTHING not in said(ACTING[name])
+
+
+@pytest.mark.parametrize("data", [PIEZO, bar(), bar(contact__gap=0.1)], ids=range(3))
+def test_where_nothing_acts_that_is_said(data):
+    assert NOTHING in said(data)
+
+
+def test_a_load_between_times_at_which_it_is_zero_is_seen():
+    data = changed(
+        load__0__amplitude="pulse",
+        evolution={
+            "times": [0.0, 2.0],
+            "steps": [4],
+            "amplitudes": {"pulse": {"time": [0.0, 1.0, 2.0], "value": [0.0, 1.0, 0.0]}},
+        },
+    )
+    case = parse_case(data)
+    text = describe(case, build_problem(case))
+    assert NOTHING not in text
+    assert "resultant (0, 0) at t = 2; displacements of up to 0;" in text
+
+
+def test_displacements_are_not_guessed():
+    """A cantilever bends by 1e-3 or more, and a block of its size is compressed by 3e-6."""
+    text = said(changed(mesh__size=[40.0, 1.0], mesh__parts=None, load__0__on="top"))
+    assert "expected" not in text and "some" not in text
+    assert "resultant (0, -0.2); displacements of up to 0; gap 0 to 0" in text
+
+
+def test_charges_of_electrodes_are_no_forces():
+    data = {**PIEZO, "electrode": [{"on": "right", "charge": 1e3}]}
+    data["fixed"] = [PIEZO["fixed"][0]]
+    assert "same units" not in said(data)
+
+
+def line(data, name):
+    case = parse_case(data)
+    text = describe(case, build_problem(case))
+    return next(row for row in text.splitlines() if row.split()[:2] == ["#", name])
+
+
+@pytest.mark.parallel
+def test_a_side_of_a_box():
+    data = {
+        **changed(),
+        "mesh": {"generator": "box", "size": [2.0, 3.0, 4.0], "cells": [2, 3, 4]},
+        "fixed": [{"on": "left", "displacement": [0.0, 0.0, 0.0]}],
+        "load": [{"on": "top", "pressure": 0.001}],
+    }
+    words = line(data, "right")
+    assert "24 facets" in words and "area 12 " in words
+    assert "centroid (2, 1.5, 2)" in words and words.endswith("normal (1, 0, 0)")
+    assert "144 cells" in line(data, "body") and "volume 24" in line(data, "body")
+
+
+@pytest.mark.parallel
+def test_parts_of_a_body_of_revolution_are_those_of_the_full_turn():
+    data = changed(
+        space__kinematics="axisymmetric",
+        fixed__0__displacement=["free", 0.0],
+        fixed__0__on="top",
+        load__0__on="right",
+        load__0__traction=[-0.001, 0.0],
+        mesh__size=[4.0, 1.0],
+    )
+    top, right, left = (line(data, name) for name in ("top", "right", "left"))
+    assert f"area {np.pi * 16:.6g} " in top and "centroid (0, 1)" in top
+    assert f"area {2 * np.pi * 4:.6g} " in right and "normal (1, 0)" in right
+    assert left.endswith("on the axis")
+    assert f"volume {np.pi * 16:.6g}" in line(data, "body")
+
+
+def test_a_curved_part_is_named_as_such():
+    case = load_case(CASES / "two-spheres.toml")
+    text = describe(case, build_problem(case))
+    assert "curved, mean normal (0.57" in text
