@@ -1,19 +1,29 @@
-"""Semismooth Newton method, a primal-dual active set strategy, and its fallbacks.
+"""Semismooth Newton method, a primal-dual active set strategy: the default solver; its fallbacks.
 
 1. Complementarity functions p - max(0, p + c (u_nu - rho)) and lambda - proj(lambda + c u_tau)
    state contact and friction at each node. Their values tell the active sets: which nodes are
    open, stick or slip. Each of them has a generalised derivative there.
 2. A step linearises material, contact, friction, layer and current together (`newton_step`). The
-   multipliers are condensed node by node, so that one linear system in the unknowns of the body is
-   left. Where the contact nodes are few, the body is condensed onto them first
-   (`condensed_step`): a step then linearises the material, and iterates contact there.
-3. The iteration ends with the residuals of the problem, computed from scratch, or with their
-   stagnation: the active sets cycle.
-4. A primal-dual interior point then finds the active sets on the same operator, with the friction
-   bound updated outside (`interior_point`), and Newton's method takes the last steps. Where the
-   body can be condensed onto its contact nodes, this happens there.
-5. Where a current flows through the contact nodes, the solutions are followed from a foundation
-   that hardly conducts instead (`continuation`).
+   multipliers are eliminated node by node with the augmentation parameter gamma, so that one
+   linear system in the unknowns of the body is left: with gamma far above the stiffness of the
+   body its solution meets u_nu = rho and u_tau = 0 (`contact.interface.complementarity`). No line
+   search: the active sets find themselves.
+3. Where the contact nodes are few, the body is condensed onto them first: a step then linearises
+   the material, and a Newton method of its own solves contact on the Schur complement
+   (`condensed_step`).
+4. The iteration ends with the residuals of the problem, computed from scratch, or with their
+   stagnation: the active sets cycle. It ends after one step where c overestimates the stiffness.
+
+Fallbacks, in this order, where a stage has ended without convergence:
+
+1. the condensed body for the whole one, or the whole for the condensed one;
+2. on a condensed body through whose contact nodes charge passes, solutions followed from a
+   foundation that hardly conducts (`continuation`);
+3. on a condensed body that the supports do not constrain, a rigid motion to a state in which
+   nothing presses (`rigid_body_modes`);
+4. a primal-dual interior point on the same operator, which finds the active sets, with the friction
+   bound updated outside, and Newton's last steps from there (`interior_point`). A converged
+   solution in which contact has pushed a body aside is compared with its solution too.
 
 The notes of the history say which.
 
@@ -61,7 +71,8 @@ from contact.typing import Array
 logger = logging.getLogger("contact.solver")
 
 #: Notes of the fallbacks in the history.
-FALLBACKS = CONTINUATION, INTERIOR_POINT
+RIGID_MOTION = "rigid motion"
+FALLBACKS = CONTINUATION, RIGID_MOTION, INTERIOR_POINT
 
 #: Stagnation limit where another way follows, or has gone before: the whole body where it can be
 #: condensed, and Newton's last steps.
@@ -313,7 +324,7 @@ class Newton:
         )
         equilibrium = left / first if first > 0 else 0.0
         residuals = replace(evaluate(problem, state), equilibrium=equilibrium)
-        self.history.record(residuals, "rigid motion", inner=2)
+        self.history.record(residuals, RIGID_MOTION, inner=2)
         outcome = Outcome(residuals, self.options.allowed)
         self.iteration.see(Iterate(state), residuals)
         return (Iterate(state), outcome) if outcome.converged else None

@@ -89,19 +89,18 @@ def _deviations(names: NDArray[np.int64], corners: Array, normal: Array, levels:
     pairs = pairs[:, near & known[pairs[1]]]
     edges = pairs_of(names.shape[1])
     found = np.zeros((len(names), len(edges)))
-    sure = np.zeros(found.shape, dtype=bool)
     for k, (i, j) in enumerate(edges):
-        ends = place[:, [i, j]]
-        edge = points[ends[:, 1]] - points[ends[:, 0]]
-        value = np.where(known[ends], _sagitta(edge[:, None], curvature[ends]), 0.0)
+        others = [c for c in range(names.shape[1]) if c not in (i, j)]
+        around = place[:, [i, j, *others]]
+        edge = points[around[:, 1]] - points[around[:, 0]]
+        value = np.where(known[around], _sagitta(edge[:, None], curvature[around]), 0.0)
         if levels == 0:
-            found[:, k] = _between(points, curvature, pairs, ends, known, edge, value)
+            found[:, k] = _between(points, curvature, pairs, around, known, edge, value)
         else:
             # All of the turn of the first edges is at their ends.
             larger = np.argmax(np.abs(value), axis=1)[:, None]
             found[:, k] = 2.0**levels * np.take_along_axis(value, larger, axis=1)[:, 0]
-        sure[:, k] = known[ends].any(axis=1)
-    return np.where(sure, found, _likewise(found, sure, corners, edges))
+    return found
 
 
 def _weights(corners: Array) -> Array:
@@ -164,34 +163,37 @@ def _between(
     points: Array,
     curvature: Array,
     pairs: Numbers,
-    ends: Numbers,
+    corners: Numbers,
     known: NDArray[np.bool_],
     edge: Array,
     value: Array,
 ) -> Array:
-    """Return c of edges between two vertices each, given that of each end, shape (e,).
+    """Return c of an edge of each facet, given that by each corner, its ends first, shape (f,).
 
-    Where the curvature jumps, as from a side to a rounded edge, the end counts beyond which it
+    Where the curvature jumps, as from a side to a rounded edge, the corner counts beyond which it
     stays as it is.
     """
     largest = np.abs(value).max(axis=1)
     largest[largest == 0] = 1.0
     begin = np.searchsorted(pairs[0], np.arange(len(points) + 1))
+    middle = points[corners[:, :2]].mean(axis=1)
     weights = np.zeros_like(value)
-    for k, sign in ((0, -1.0), (1, 1.0)):
-        # All neighbours of an end, edge by edge, of which those beyond it count.
-        end = ends[:, k]
-        counts = np.diff(begin)[end]
-        of = np.repeat(np.arange(len(ends)), counts)
+    for k, corner in enumerate(corners.T):
+        # All neighbours of a corner, facet by facet, of which those beyond it count.
+        counts = np.diff(begin)[corner]
+        of = np.repeat(np.arange(len(corners)), counts)
         last = np.cumsum(counts)
-        beyond = pairs[1][np.arange(of.size) + np.repeat(begin[end] - last + counts, counts)]
-        way = np.einsum("pd,pd->p", points[beyond] - points[end[of]], sign * edge[of])
+        beyond = pairs[1][np.arange(of.size) + np.repeat(begin[corner] - last + counts, counts)]
+        outward = points[corner] - middle
+        way = np.einsum("pd,pd->p", points[beyond] - points[corner[of]], outward[of])
         share = np.maximum(way, 0.0)
         change = share * np.abs(_sagitta(edge[of], curvature[beyond]) - value[of, k])
-        total, changed = (np.bincount(of, given, minlength=len(ends)) for given in (share, change))
-        other = np.abs(value[:, 1] - value[:, 0])
+        total, changed = (
+            np.bincount(of, given, minlength=len(corners)) for given in (share, change)
+        )
+        other = np.ptp(value, axis=1)
         jump = np.where(total > 0, changed / np.where(total > 0, total, 1.0), other) / largest
-        weights[:, k] = known[end] / (jump**2 + ALIKE**2) ** 2
+        weights[:, k] = known[corner] / (jump**2 + ALIKE**2) ** 2
     total = np.maximum(weights.sum(axis=1), np.finfo(float).tiny)
     return np.asarray(np.sum(weights * value, axis=1) / total)
 
@@ -199,13 +201,3 @@ def _between(
 def _sagitta(edge: Array, curvature: Array) -> Array:
     """Return c = -e.K e/2 of edges, shape (..., d), with curvature tensors, shape (..., d, d)."""
     return np.asarray(-0.5 * np.einsum("...i,...ij,...j->...", edge, curvature, edge))
-
-
-def _likewise(
-    found: Array, known: NDArray[np.bool_], corners: Array, edges: list[tuple[int, int]]
-) -> Array:
-    """Return c of edges of which nothing is known: the curvature of the facet's others."""
-    squares = [np.sum((corners[:, j] - corners[:, i]) ** 2, axis=1) for i, j in edges]
-    lengths = np.stack(squares, axis=1)
-    curvature = np.where(known, found / lengths, 0.0).sum(axis=1) / np.maximum(known.sum(axis=1), 1)
-    return np.asarray(curvature[:, None] * lengths)

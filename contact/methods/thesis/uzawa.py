@@ -3,8 +3,15 @@
 One step solves for u, projects the auxiliary variables phi and updates the multipliers
 lambda, (3.34)-(3.36). Everything that it hands on is lambda + r u: the next multiplier is its
 projection, and r phi the difference to it. The step is therefore a fixed-point map, which
-`acceleration` speeds up. Its variable is z = lambda + r (u - u_0), with the iterate's u_0: beside
+`acceleration` speeds up: the alternating direction method of multipliers. Its variable is z = lambda + r (u - u_0), with the iterate's u_0: beside
 slips of the whole load a lambda that is unloaded to 1e-12 of it would be lost in rounding.
+
+References
+----------
+Glowinski and Le Tallec, Augmented Lagrangian and Operator-Splitting Methods in Nonlinear Mechanics,
+SIAM (1989), their ALG2; also known as ADMM.
+Koko, Uzawa block relaxation domain decomposition method for a two-body frictionless contact
+problem, Appl. Math. Lett. 22 (2009) 1534.
 """
 
 from __future__ import annotations
