@@ -12,7 +12,7 @@ from contact.case.file import Case
 from contact.case.mesh import Mesh
 from contact.errors import InputError
 from contact.interface.complementarity import project_half_line
-from contact.interface.jump import Multipliers
+from contact.interface.multipliers import Multipliers
 from contact.linear import multigrid
 from contact.mesh import grid
 from contact.mesh.transfer import carry

@@ -25,12 +25,12 @@ from contact.case.digest import check_restart, digest
 from contact.case.file import Case, load_case
 from contact.case.text import to_toml
 from contact.errors import InputError
-from contact.methods.interrupt import SIGNALLED, stop_on_signal
+from contact.methods.load_stepping import Evolution, solve_step
 from contact.methods.method import METHODS, Method
 from contact.methods.newton import Newton
 from contact.methods.options import NewtonOptions, Options
 from contact.methods.report import IterationHistory, Monitor, Outcome, tell
-from contact.methods.steps import Evolution, solve_step
+from contact.methods.signals import SIGNALLED, stop_on_signal
 from contact.nesting import nested_start, pays
 from contact.output.checkpoint import Checkpoints, read_steps
 from contact.output.remarks import announce
@@ -38,8 +38,8 @@ from contact.output.solution import Solution, StepRecord
 from contact.output.steps import StepRecorder
 from contact.output.uniqueness import critical_factor
 from contact.problem.checks import check_potential, check_problem, check_supports
-from contact.problem.kkt import evaluate
 from contact.problem.problem import ContactProblem
+from contact.problem.residuals import evaluate
 from contact.problem.state import State
 from contact.ranks import on_root
 

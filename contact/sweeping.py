@@ -26,11 +26,11 @@ from contact.case.file import Case, load_case
 from contact.case.text import literal, to_toml
 from contact.errors import InputError
 from contact.mesh.domain import Domain
-from contact.methods.interrupt import Interrupted, stop_on_signal
+from contact.methods.load_stepping import Reached, predicted, since, solve_step
 from contact.methods.method import METHODS, Method
 from contact.methods.options import NewtonOptions, Options
 from contact.methods.report import Monitor, tell
-from contact.methods.steps import Reached, predicted, since, solve_step
+from contact.methods.signals import Interrupted, stop_on_signal
 from contact.output.formats import write_csv
 from contact.output.quantities import SWEEP, values_of
 from contact.output.solution import Solution
@@ -274,7 +274,7 @@ class _Runner:
                 )
                 self._reached = []
             else:
-                self._method.turn_to(problem)
+                self._method.set_load_step(problem)
             return self._static(problem, case.solver.method, self._method)
 
     def _settings(self, case: Case) -> Options:

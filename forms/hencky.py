@@ -18,7 +18,7 @@ import ufl
 from ufl.core.expr import Expr
 
 from forms.elasticity import Anisotropic
-from forms.history import AtPoints, HistoryLaw
+from forms.history import HistoryLaw, QuadratureLaw
 from forms.kinematics import CARTESIAN, Strained, deviator_squared, embed, strain
 from forms.ops import Value, is_symbolic, log, maximum, sqrt
 
@@ -238,7 +238,7 @@ class UserLaw(Isotropic):
 
 #: Laws of the stress of a material, and as forms take them.
 Law: TypeAlias = Hencky | Anisotropic | HistoryLaw
-FormLaw: TypeAlias = Hencky | Anisotropic | AtPoints
+FormLaw: TypeAlias = Hencky | Anisotropic | QuadratureLaw
 
 
 def is_linear(law: Law) -> bool:
@@ -254,7 +254,7 @@ def secant_stress(law: FormLaw, frozen: Expr, eps: Expr) -> Expr:
     """
     if isinstance(law, Anisotropic):
         return law.stress(eps)
-    if isinstance(law, AtPoints):
+    if isinstance(law, QuadratureLaw):
         return law.secant_stress(frozen, eps)
     g = law.secant_modulus(deviator_squared(frozen))
     return (law.bulk - 2 * g / 3) * ufl.tr(eps) * ufl.Identity(3) + 2 * g * embed(eps)

@@ -160,7 +160,7 @@ def with_stiffness(
 
 
 @dataclass(frozen=True)
-class AtPoints:
+class QuadratureLaw:
     """A law with internal variables as forms see it: its stress and stiffness at given points.
 
     Attributes

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from mpi4py import MPI
 
-from contact.problem.kkt import force_rounding, residual_forces
 from contact.problem.problem import ContactProblem
+from contact.problem.residuals import force_rounding, residual_forces
 from contact.problem.state import State
 from contact.typing import Array
 

@@ -190,7 +190,7 @@ def solved(case: Case, problem: ContactProblem | None = None) -> Solution:
 
 
 def run_of(solution: Solution) -> Run | None:
-    """Return what the figures of a solution are drawn from, without its title. Collective."""
+    """Return the run that figures of a solution are drawn from, without its title. Collective."""
     run = solution.written()
     return None if run is None else replace(run, title="")
 

@@ -46,7 +46,7 @@ class Fixed:
     potential
         Of a piezoelectric body, likewise; None leaves it free.
     amplitude
-        Function of time by which they are multiplied: see `amplitude.amplitude_of`.
+        Function of time by which they are multiplied: see `fields.amplitude_of`.
 
     Raises
     ------
@@ -98,7 +98,7 @@ class Load:
     charge
         Surface charge q_2 = D.nu on a part, body charge q_0 in the body.
     amplitude
-        Function of time that multiplies all of them: see `amplitude.amplitude_of`.
+        Function of time that multiplies all of them: see `fields.amplitude_of`.
     traction, body_force, body_charge
         The words of the case file for force and charge.
 

@@ -30,8 +30,8 @@ from forms.hencky import FormLaw, Law
 from forms.history import (
     DIFFERENCE,
     LEAST,
-    AtPoints,
     HistoryLaw,
+    QuadratureLaw,
     Response,
     components,
     to_vector,
@@ -161,11 +161,11 @@ class QuadratureLaws:
 
     def law(self, law: Law) -> FormLaw:
         """Return a law as forms see it, with the stress and stiffness that `set` evaluates."""
-        return AtPoints(self._stress, self._stiffness) if isinstance(law, HistoryLaw) else law
+        return QuadratureLaw(self._stress, self._stiffness) if isinstance(law, HistoryLaw) else law
 
     def fitted_law(self, law: Law) -> FormLaw:
         """Return a law with the stress that `fit` has evaluated last, for any points."""
-        return AtPoints(self.fits["stress"]) if isinstance(law, HistoryLaw) else law
+        return QuadratureLaw(self.fits["stress"]) if isinstance(law, HistoryLaw) else law
 
     def of(self, state: Evaluated) -> InternalVariables | None:
         """Return the variables that the step of a state began with; None without any."""

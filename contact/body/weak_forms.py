@@ -18,7 +18,7 @@ from contact.body.pointwise import Pointwise
 from contact.mesh.domain import Domain
 from contact.mesh.entities import Indices
 from forms.hencky import is_linear, secant_form
-from forms.history import AtPoints, HistoryLaw
+from forms.history import HistoryLaw, QuadratureLaw
 from forms.kinematics import CellMean, Isochoric
 from forms.piezo import symmetrised_form
 
@@ -122,7 +122,7 @@ class WeakForms:
                 * symmetrised_form(law, piezo, u_0, u, phi, v, xi, kinematics)
                 * dx
                 for sign, kinematics, law, piezo, dx in integrals
-                for u_0 in [frozen[isinstance(law, AtPoints)]]
+                for u_0 in [frozen[isinstance(law, QuadratureLaw)]]
             )
             for integrals in self._rules
             if integrals

@@ -30,7 +30,7 @@ from contact.mesh.domain import Domain
 from contact.mesh.grid import rotate
 from contact.mesh.reader import from_generator, from_msh
 from contact.mesh.transfer import refined
-from contact.methods.interrupt import deaf
+from contact.methods.signals import deaf
 from contact.settings import Accepted, Count, Number, Positive
 from meshes.grading import memory
 

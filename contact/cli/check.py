@@ -23,8 +23,8 @@ from contact.output import environment
 from contact.output.bodies import passing
 from contact.output.remarks import fitting
 from contact.problem.checks import expected_displacements
-from contact.problem.kkt import residual_forces
 from contact.problem.problem import ContactProblem
+from contact.problem.residuals import residual_forces
 from contact.ranks import on_root
 from contact.typing import Array
 

@@ -23,7 +23,7 @@ from mpi4py import MPI
 
 from contact.cli.arguments import parse
 from contact.errors import InputError
-from contact.methods.interrupt import (
+from contact.methods.signals import (
     SIGNALLED,
     Interrupted,
     Terminated,

@@ -11,7 +11,7 @@ from mpi4py import MPI
 
 from contact.cli.main import CONVERGED
 from contact.errors import InputError
-from contact.methods.interrupt import signals_held
+from contact.methods.signals import signals_held
 from contact.output.figures.figures import FORMATS, animate, plot
 from contact.output.figures.style import Look
 from contact.ranks import on_root

@@ -17,7 +17,7 @@ from contact.case.text import to_toml
 from contact.cli.main import CONVERGED, NOT_CONVERGED
 from contact.cli.progress import progress
 from contact.errors import InputError
-from contact.methods.interrupt import SIGNALLED, Terminated, signals_held
+from contact.methods.signals import SIGNALLED, Terminated, signals_held
 from contact.output.checkpoint import case_of, discard, kept_case
 from contact.output.discretisation import locks
 from contact.output.files import write_outputs

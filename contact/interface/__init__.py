@@ -13,7 +13,7 @@ all laws together
 friction
     `friction`, with the coefficients of `forms.laws`; `smoothing` has the non-local operator R.
 layer and current
-    `law.InterfaceLaw`; `layer` and `current` describe each.
+    `law.InterfaceLaw`; `layer` describes normal compliance.
 penalised laws
     `penalised`.
 jump, contact forces, slip history

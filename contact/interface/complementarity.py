@@ -27,7 +27,7 @@ from numpy.typing import NDArray
 
 from contact.interface.active_set import ActiveSet
 from contact.interface.interface import Interface
-from contact.interface.jump import Multipliers
+from contact.interface.multipliers import Multipliers
 from contact.tolerances import EPS
 from contact.typing import Array
 
@@ -251,7 +251,7 @@ def _bound_gradient(
 ) -> Array:
     """Return the derivative of the friction bound by the slip, shape (n, block size).
 
-    Taken only when the slip zone is that of the step before, and limited: where friction falls
+    StepResult only when the slip zone is that of the step before, and limited: where friction falls
     faster than the node's own stiffness, the linearised node would snap.
     """
     gradient = np.zeros((length.size, interface.jump.block_size))

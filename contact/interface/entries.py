@@ -22,12 +22,12 @@ from scipy import sparse
 from contact.arguments import naming, real
 from contact.errors import InputError
 from contact.interface.friction import Friction, NodalFriction
-from contact.interface.jump import SlipHistory
 from contact.interface.law import Conductor, InterfaceLaw
 from contact.interface.layer import Layer
 from contact.interface.mortar.coupling import Coupling
 from contact.interface.mortar.lumping import Mixing
 from contact.interface.mortar.operator import CouplingOperator, coupling_operator
+from contact.interface.multipliers import SlipHistory
 from contact.interface.nodes import ContactNodes
 from contact.interface.smoothing import Smoothing
 from contact.typing import Array

@@ -10,7 +10,7 @@ from mpi4py import MPI
 from contact.arguments import check_finite, expect, naming, real
 from contact.body.fields import Given, field, values_at
 from contact.errors import InputError
-from contact.interface.jump import SlipHistory
+from contact.interface.multipliers import SlipHistory
 from contact.interface.nodes import ContactNodes
 from contact.interface.smoothing import Smoother
 from contact.ranks import on_all_ranks

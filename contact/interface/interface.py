@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from contact.interface.active_set import ActiveSet, touching
 from contact.interface.friction import NodalFriction
-from contact.interface.jump import Multipliers, SlipHistory
 from contact.interface.law import InterfaceLaw
+from contact.interface.multipliers import Multipliers, SlipHistory
 from contact.interface.nodes import ContactNodes
 from contact.linear.constraint import Change
 from contact.mesh.entities import component_sums

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from contact.interface.interface import Interface
-from contact.interface.jump import Multipliers
+from contact.interface.multipliers import Multipliers
 from contact.typing import Array
 from forms.foundation import penalty_friction_modulus, penalty_pressure
 

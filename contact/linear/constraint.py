@@ -79,7 +79,7 @@ class Change:
             Which of them are replaced, shape (r,).
         jumps
             The jumps by the unknowns, shape (r, c). One is made of the node itself, of nodes that
-            are not replaced, and of replaced ones, but in no circle: see `in_circles`.
+            are not replaced, and of replaced ones, but in no circle: see `cyclic_dependencies`.
         free
             Which unknowns are not fixed, shape (c, block size).
         """
@@ -113,7 +113,7 @@ class Change:
         return made
 
 
-def in_circles(rows: NDArray[np.intp], jumps: sparse.csr_array) -> NDArray[np.intp]:
+def cyclic_dependencies(rows: NDArray[np.intp], jumps: sparse.csr_array) -> NDArray[np.intp]:
     """Return the replaced nodes that follow each other in circles; none, or there is no change.
 
     Parameters

@@ -20,16 +20,16 @@ from typing import TypeAlias
 
 import numpy as np
 
-from contact.interface.jump import Multipliers
+from contact.interface.multipliers import Multipliers
 from contact.methods.newton_step import Iterate
 from contact.problem.state import State
 from contact.typing import Array
 
 #: Steps that a new factorisation is worth: as many are taken with the old one at most.
-WORTH = 10.0
+MOST_STEPS = 10.0
 
 #: Residual above which no factorisation is frozen: the tangent is not good there.
-FAR = 0.05
+RADIUS = 0.05
 
 #: Number of earlier steps that the acceleration uses.
 DEPTH = 8
@@ -91,7 +91,7 @@ class Chord:
         else:
             rate = reached / last
             left = np.log(self._goal / reached) / np.log(rate) if rate < 1 else np.inf
-            keep = bool(left <= self._worth and reached <= FAR)
+            keep = bool(left <= self._worth and reached <= RADIUS)
         if not keep:
             self._changes.clear()
             self._last = None

@@ -13,16 +13,16 @@ from collections.abc import Callable
 from dataclasses import replace
 
 from contact.interface.complementarity import ComplementarityParameters
-from contact.interface.jump import Multipliers
+from contact.interface.multipliers import Multipliers
 from contact.linear.operator import Counters
-from contact.methods.chord import WORTH, Chord
-from contact.methods.gap_derivative import GapDerivative
-from contact.methods.newton_step import Iterate, Taken
+from contact.methods.chord import MOST_STEPS, Chord
+from contact.methods.conductivity_derivative import ConductivityDerivative
+from contact.methods.newton_step import Iterate, StepResult
 from contact.methods.options import NewtonOptions
 from contact.methods.report import IterationHistory, Outcome
 from contact.problem.condensed import Condensation, CondensedProblem
-from contact.problem.kkt import KKT
 from contact.problem.problem import ContactProblem
+from contact.problem.residuals import Residuals
 
 #: Tolerance of the condensed contact problem, over the residual before the step.
 CONTACT_PART = 1e-3
@@ -70,14 +70,16 @@ class CondensedStep:
         fallbacks: tuple[str, ...],
     ) -> None:
         self.condensation, self.options, self.parameters = condensation, options, parameters
-        self.counters, self.gap_derivative = counters, GapDerivative()
+        self.counters, self.conductivity_derivative = counters, ConductivityDerivative()
         self._solve, self._history, self._fallbacks = solve, history, fallbacks
         inner = condensation.full.equilibrium.products
-        self._chord = Chord(options.tolerance, inner, WORTH if options.keep != "never" else 0.0)
+        self._chord = Chord(
+            options.tolerance, inner, MOST_STEPS if options.keep != "never" else 0.0
+        )
 
-    def turn_to(self, problem: ContactProblem, history: IterationHistory) -> None:
+    def set_load_step(self, problem: ContactProblem, history: IterationHistory) -> None:
         """Go on with another step of the same problem."""
-        self.condensation.turn_to(problem)
+        self.condensation.set_load_step(problem)
         self._history = history
 
     def forget(self) -> None:
@@ -89,7 +91,7 @@ class CondensedStep:
         """Begin another loop with the same factorisation."""
         self._chord.begin()
 
-    def __call__(self, iterate: Iterate, tangent: bool, reached: KKT) -> Taken | None:
+    def __call__(self, iterate: Iterate, tangent: bool, reached: Residuals) -> StepResult | None:
         """Take a step; None where the body cannot be condensed or contact is not solved."""
         body = self.condensation.full.equilibrium
         iterate, keep = self._chord.choose(iterate, reached.significant)
@@ -124,4 +126,4 @@ class CondensedStep:
         notes = [record.note for record in history.records]
         taken = [word for word in self._fallbacks if any(word in note for note in notes)]
         note = ", ".join([*["chord step"] * keep, *taken])
-        return Taken(replace(end, state=new), note, tuple(history.records))
+        return StepResult(replace(end, state=new), note, tuple(history.records))

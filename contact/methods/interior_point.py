@@ -27,13 +27,13 @@ import numpy as np
 from mpi4py import MPI
 
 from contact.errors import InputError
-from contact.interface.jump import Multipliers
+from contact.interface.multipliers import Multipliers
 from contact.methods.cones import Array, Cones, Step
 from contact.methods.newton_step import Iterate, Iteration, NewtonStep
 from contact.methods.report import Outcome
-from contact.methods.rigid_body_modes import RigidBodyModes, all_loads
-from contact.problem.kkt import evaluate, residual_forces
+from contact.methods.unconstrained_modes import UnconstrainedModes, all_loads
 from contact.problem.protocols import Problem
+from contact.problem.residuals import evaluate, residual_forces
 from contact.problem.state import State
 from contact.tolerances import EPS
 
@@ -67,7 +67,7 @@ SHORTEST, LONGEST = 0.9, 0.999
 def interior_point(
     iteration: Iteration,
     whole: NewtonStep,
-    modes: RigidBodyModes,
+    modes: UnconstrainedModes,
     finish: Callable[[State], tuple[Iterate, Outcome]],
 ) -> tuple[Iterate, Outcome]:
     """Solve convex problems with one friction bound after the other. Collective.

@@ -40,7 +40,7 @@ class Method(Protocol):
     def state(self) -> State:
         """The state after the last outer iteration, for a solve that is ended by a signal."""
 
-    def turn_to(self, problem: ContactProblem) -> None:
+    def set_load_step(self, problem: ContactProblem) -> None:
         """Go on with another step of the same problem, with a history of its own.
 
         Factorisations are kept: the body is the same.

@@ -20,7 +20,7 @@ Fallbacks, in this order, where a stage has ended without convergence:
 2. on a condensed body through whose contact nodes charge passes, solutions followed from a
    foundation that hardly conducts (`continuation`);
 3. on a condensed body that the supports do not constrain, a rigid motion to a state in which
-   nothing presses (`rigid_body_modes`);
+   nothing presses (`unconstrained_modes`);
 4. a primal-dual interior point on the same operator, which finds the active sets, with the friction
    bound updated outside, and Newton's last steps from there (`interior_point`). A converged
    solution in which contact has pushed a body aside is compared with its solution too.
@@ -50,7 +50,7 @@ import numpy as np
 
 from contact.interface.active_set import touching
 from contact.interface.complementarity import ComplementarityParameters
-from contact.interface.jump import Multipliers
+from contact.interface.multipliers import Multipliers
 from contact.linear.operator import Counters
 from contact.methods.condensed_step import CondensedStep
 from contact.methods.continuation import CONTINUATION, continuation
@@ -60,11 +60,11 @@ from contact.methods.options import NewtonOptions
 from contact.methods.parameters import complementarity_parameters, overestimates_stiffness
 from contact.methods.progress import Best, Stagnation, undeformed_equilibrium
 from contact.methods.report import IterationHistory, Monitor, Outcome
-from contact.methods.rigid_body_modes import RigidBodyModes
+from contact.methods.unconstrained_modes import UnconstrainedModes
 from contact.problem.condensed import Condensation, CondensedProblem, condensable, pays
-from contact.problem.kkt import KKT, evaluate, residual_forces
 from contact.problem.problem import ContactProblem
 from contact.problem.protocols import Problem
+from contact.problem.residuals import Residuals, evaluate, residual_forces
 from contact.problem.state import State
 from contact.typing import Array
 
@@ -112,7 +112,7 @@ class Newton:
     monitor: Monitor | None = None
     counters: Counters = field(default_factory=Counters)
     parameters: ComplementarityParameters | None = None
-    modes: RigidBodyModes | None = None
+    modes: UnconstrainedModes | None = None
     history: IterationHistory = field(init=False)
 
     def __post_init__(self) -> None:
@@ -124,7 +124,7 @@ class Newton:
         self._begin()
         if self.modes is None:
             assert isinstance(problem, ContactProblem)
-            self.modes = RigidBodyModes(problem)
+            self.modes = UnconstrainedModes(problem)
         underconstrained = not self.modes.constrained_undeformed
         self.whole = NewtonStep(problem, options, self._parameters, self.counters, underconstrained)
         self._condensed: CondensedStep | None = None
@@ -155,7 +155,7 @@ class Newton:
             )
         return self._condensed
 
-    def turn_to(self, problem: Problem) -> None:
+    def set_load_step(self, problem: Problem) -> None:
         """Go on with another step of the same problem; factorisations remain."""
         self.problem = self.whole.problem = problem
         self.history = IterationHistory(self.monitor)
@@ -163,7 +163,7 @@ class Newton:
             assert self.modes is not None
             self.modes.problem = problem
             if self._condensed is not None:
-                self._condensed.turn_to(problem, self.history)
+                self._condensed.set_load_step(problem, self.history)
         self._begin()
 
     def _begin(self, iterate: Iterate | None = None) -> None:
@@ -224,19 +224,19 @@ class Newton:
             found = self._fall_back(iterate, outcome)
             iterate, outcome = found if found[1].converged else (iterate, outcome)
         if outcome.converged and isinstance(self.problem, ContactProblem):
-            iterate, outcome = self._least(iterate, outcome)
+            iterate, outcome = self._minimal_motion(iterate, outcome)
         if not outcome.converged and iteration.best.found is not None:
             iterate = iteration.best.found
             outcome = replace(outcome, kkt=evaluate(self.problem, iterate.state))
         iteration.at = iterate
         return iterate, outcome
 
-    def _least(self, iterate: Iterate, outcome: Outcome) -> tuple[Iterate, Outcome]:
+    def _minimal_motion(self, iterate: Iterate, outcome: Outcome) -> tuple[Iterate, Outcome]:
         """Take a rigid motion off a solution that costs nothing. Collective."""
         assert self.modes is not None
         if self.modes.constrained_by_supports:
             return iterate, outcome
-        found = self.modes.least(self.problem, iterate.state)
+        found = self.modes.minimal_motion(self.problem, iterate.state)
         if found is None:
             return iterate, outcome
         state = iterate.state
@@ -274,7 +274,7 @@ class Newton:
         """
         iteration = self.iteration
         if isinstance(self.problem, CondensedProblem):
-            found = self._conducting(self.problem) or self._apart(outcome)
+            found = self._conducting(self.problem) or self._separated(outcome)
             if found is not None:
                 return found
         elif self._condensable and not self._pays and iteration.left > 0:
@@ -305,7 +305,7 @@ class Newton:
 
         return continuation(solve, Iterate(problem.start()))
 
-    def _apart(self, outcome: Outcome) -> tuple[Iterate, Outcome] | None:
+    def _separated(self, outcome: Outcome) -> tuple[Iterate, Outcome] | None:
         """Return a state in which nothing presses, where pushed bodies come to it. Collective."""
         problem, modes = self.problem, self.modes
         if outcome.converged or not isinstance(problem, CondensedProblem):
@@ -313,7 +313,7 @@ class Newton:
         assert modes is not None
         if modes.constrained_by_supports:
             return None
-        state = modes.apart(problem, self.whole.operator, self._parameters.nodal_stiffness)
+        state = modes.separated(problem, self.whole.operator, self._parameters.nodal_stiffness)
         if state is None:
             return None
         # All forces are rounding then: they are measured by those without the motion.
@@ -344,7 +344,7 @@ def _solve_condensed(
     parameters: ComplementarityParameters,
     history: IterationHistory,
     iterate: Iterate,
-    modes: RigidBodyModes,
+    modes: UnconstrainedModes,
 ) -> tuple[Iterate, Outcome]:
     """Solve a condensed contact problem."""
     method = Newton(problem, options, parameters=parameters, modes=modes)
@@ -410,7 +410,7 @@ class NewtonLoop:
                 return kept, self._end(residuals, self.step.fault)
             iterate = taken.iterate
             residuals = evaluate(problem, iterate.state)
-            worse = self.step.gap_derivative.worsened(residuals.significant)
+            worse = self.step.conductivity_derivative.worsened(residuals.significant)
             iteration.see(iterate, residuals)
             words = (note, taken.note, "tangent" * tangent, "rejected" * worse)
             said = " ".join(word for word in words if word)
@@ -423,7 +423,7 @@ class NewtonLoop:
                 iteration.see(iterate, residuals)
             if residuals.significant <= options.tolerance:
                 return iterate, self._end(residuals)
-            if (found := self._let_go(iterate, note)) is not None:
+            if (found := self._loss_of_contact(iterate, note)) is not None:
                 return found
             if self.give_up is not None and kept.active_set is None and self.give_up(iterate.state):
                 return iterate, self._end(residuals, OVERESTIMATED)
@@ -440,7 +440,7 @@ class NewtonLoop:
         steps = len(iteration.history.records)
         return iterate, self._end(residuals, f"not converged in {steps} steps")
 
-    def _let_go(self, iterate: Iterate, note: str) -> tuple[Iterate, Outcome] | None:
+    def _loss_of_contact(self, iterate: Iterate, note: str) -> tuple[Iterate, Outcome] | None:
         """Return zero displacement where nothing touches any more and nothing acts. Collective.
 
         Displacements fall by their rounding in each step then, and so do the forces beside which
@@ -458,5 +458,5 @@ class NewtonLoop:
         self.iteration.history.record(found[1], f"{note} zero displacement".strip(), inner=0)
         return iterate, self._end(found[1])
 
-    def _end(self, residuals: KKT, ended: str = "") -> Outcome:
+    def _end(self, residuals: Residuals, ended: str = "") -> Outcome:
         return Outcome(residuals, self.iteration.options.allowed, ended)

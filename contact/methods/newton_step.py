@@ -19,14 +19,14 @@ from contact.interface.complementarity import (
     linearise,
 )
 from contact.interface.interface import Interface
-from contact.interface.jump import Multipliers
+from contact.interface.multipliers import Multipliers
 from contact.linear.operator import Counters, Operator
-from contact.methods.gap_derivative import GapDerivative
+from contact.methods.conductivity_derivative import ConductivityDerivative
 from contact.methods.options import NewtonOptions
 from contact.methods.progress import Best
 from contact.methods.report import IterationHistory, Record
-from contact.problem.kkt import KKT, residual_forces
 from contact.problem.protocols import Problem
+from contact.problem.residuals import Residuals, residual_forces
 from contact.problem.state import State
 from contact.typing import Array
 
@@ -72,7 +72,7 @@ class Iterate:
 
 
 @dataclass(frozen=True)
-class Taken:
+class StepResult:
     """A step that was taken.
 
     Attributes
@@ -117,7 +117,7 @@ class Iteration:
         """Number of steps that are left of the limit."""
         return self.options.max_outer - len(self.history.records)
 
-    def see(self, iterate: Iterate, residuals: KKT) -> None:
+    def see(self, iterate: Iterate, residuals: Residuals) -> None:
         """Take note of an iterate."""
         self.at = iterate
         self.best.see(iterate, residuals.significant)
@@ -126,14 +126,14 @@ class Iteration:
 class Step(Protocol):
     """A step of Newton's method."""
 
-    gap_derivative: GapDerivative
+    conductivity_derivative: ConductivityDerivative
     #: Why a step could not be taken, in words.
     fault: str
 
     def begin(self) -> None:
         """Forget the steps before: a new loop begins."""
 
-    def __call__(self, iterate: Iterate, tangent: bool, reached: KKT) -> Taken | None:
+    def __call__(self, iterate: Iterate, tangent: bool, reached: Residuals) -> StepResult | None:
         """Take a step; None if it cannot be taken. Collective.
 
         Parameters
@@ -182,7 +182,7 @@ class NewtonStep:
 
     def begin(self) -> None:
         """Forget the steps before."""
-        self.gap_derivative = GapDerivative()
+        self.conductivity_derivative = ConductivityDerivative()
         self._kind = ""
         self._nearest, self._stagnant, self._forcing = np.inf, 0, FORCING
 
@@ -214,7 +214,7 @@ class NewtonStep:
             )
         return self._operator
 
-    def __call__(self, iterate: Iterate, tangent: bool, reached: KKT) -> Taken | None:
+    def __call__(self, iterate: Iterate, tangent: bool, reached: Residuals) -> StepResult | None:
         """Take a step; see `Step`."""
         state, interface = iterate.state, self.problem.interface
         body, jump = self.problem.equilibrium, interface.jump
@@ -262,7 +262,7 @@ class NewtonStep:
         # Nodes of a rigid part that has moved far and comes back follow it but for rounding.
         x = body.prescribe(body.moved(state.x, increment), state.time)
         new = replace(state, x=x, forces=forces)
-        return Taken(Iterate(new, contact.active_set, known))
+        return StepResult(Iterate(new, contact.active_set, known))
 
     def _current(self, nodal: Array, contact: LinearisedContact, reached: float) -> Array | float:
         """Return the derivative of the current, with psi followed or frozen."""
@@ -272,7 +272,7 @@ class NewtonStep:
             return 0.0
         follow = contact.unchanged  # else the derivative is that of nodes that will not be there
         if law.follows_gap:
-            follow = self.gap_derivative(reached, follow)
+            follow = self.conductivity_derivative(reached, follow)
         return law.current_block(nodal, interface.pressure(nodal, contact.forces), follow)
 
 

@@ -13,7 +13,7 @@ from typing import Annotated, Any, Literal, TypeVar
 from annotated_types import Ge, Gt, Le, Lt
 
 from contact.errors import InputError
-from contact.problem.kkt import KKT
+from contact.problem.residuals import Residuals
 from contact.settings import Accepted, Count, Internal, Positive, ReadWith, Switch, Tolerance
 from contact.tolerances import LARGEST_VIOLATION, PRECISION
 
@@ -47,9 +47,9 @@ class Options:
             raise InputError(f"tolerance: given {self.tolerance!r}; accepted: between 0 and 1")
 
     @property
-    def allowed(self) -> KKT:
+    def allowed(self) -> Residuals:
         """How large each residual may be at the end."""
-        return KKT(self.tolerance, self.tolerance, self.tolerance)
+        return Residuals(self.tolerance, self.tolerance, self.tolerance)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -148,9 +148,9 @@ class PenaltyOptions(LoopOptions):
     eps_slip: Positive | None = None
 
     @property
-    def allowed(self) -> KKT:
+    def allowed(self) -> Residuals:
         """How large each residual may be at the end."""
-        return KKT(self.tolerance, LARGEST_VIOLATION, LARGEST_VIOLATION)
+        return Residuals(self.tolerance, LARGEST_VIOLATION, LARGEST_VIOLATION)
 
 
 @dataclass(frozen=True, kw_only=True)

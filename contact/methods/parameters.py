@@ -8,8 +8,8 @@ import numpy as np
 from mpi4py import MPI
 
 from contact.interface.complementarity import ComplementarityParameters
-from contact.problem.kkt import residual_forces
 from contact.problem.protocols import Problem, Scales
+from contact.problem.residuals import residual_forces
 from contact.problem.state import State
 
 #: Forces that c makes of the first penetration, over the loads, from which on c overestimates the

@@ -7,8 +7,8 @@ from typing import Generic, TypeVar
 
 import numpy as np
 
-from contact.problem.kkt import KKT, evaluate
 from contact.problem.protocols import Problem
+from contact.problem.residuals import Residuals, evaluate
 from contact.problem.state import State
 from contact.tolerances import ROUNDING
 
@@ -77,7 +77,7 @@ class Stagnation:
         return self._since >= (self.limit if limit is None else limit)
 
 
-def undeformed_equilibrium(problem: Problem) -> tuple[State, KKT] | None:
+def undeformed_equilibrium(problem: Problem) -> tuple[State, Residuals] | None:
     """Return zero displacement and its residuals, where it is in equilibrium. Collective.
 
     Beside forces that vanish no residual is small, and only those that are 0 have none: a method

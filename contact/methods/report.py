@@ -10,7 +10,7 @@ from typing import Protocol, TypeAlias, runtime_checkable
 
 import numpy as np
 
-from contact.problem.kkt import KKT
+from contact.problem.residuals import Residuals
 
 logger = logging.getLogger("contact.solver")
 
@@ -46,7 +46,7 @@ class Record:
 
     iteration: int
     inner: int
-    kkt: KKT
+    kkt: Residuals
     change: float
     seconds: float
     note: str = ""
@@ -96,7 +96,7 @@ class IterationHistory:
 
     def record(
         self,
-        kkt: KKT,
+        kkt: Residuals,
         note: str,
         inner: int = 1,
         sizes: tuple[int, int, int] | None = None,
@@ -146,8 +146,8 @@ class Outcome:
         Number of the signal that ended it; 0 for none.
     """
 
-    kkt: KKT
-    allowed: KKT
+    kkt: Residuals
+    allowed: Residuals
     ended: str = ""
     signal: int = 0
 

@@ -11,8 +11,8 @@ from scipy import linalg
 
 from contact.mesh.entities import cells_at, owned_among
 from contact.output.solution import Note, Remark, Solution
-from contact.problem.kkt import residual_forces
 from contact.problem.problem import ContactProblem
+from contact.problem.residuals import residual_forces
 from contact.problem.rigid_modes import (
     Group,
     constrained_by_supports,

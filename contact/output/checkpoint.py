@@ -28,7 +28,7 @@ from scipy.spatial import cKDTree
 from contact import _compat
 from contact.errors import InputError
 from contact.history import CONTACT_NODES, QUADRATURE_POINTS
-from contact.interface.jump import Multipliers
+from contact.interface.multipliers import Multipliers
 from contact.output.folder import kind, listed, read_json, settle, write_whole
 from contact.output.solution import Solution, StepRecord
 from contact.problem.problem import ContactProblem

@@ -12,8 +12,8 @@ from mpi4py import MPI
 
 from contact.body.rigid import Electrode
 from contact.output.resultants import reaction_masks
-from contact.problem.kkt import residual_forces
 from contact.problem.problem import ContactProblem
+from contact.problem.residuals import residual_forces
 from contact.problem.state import State
 from contact.typing import Array
 

@@ -36,7 +36,7 @@ from typing import Any
 from mpi4py import MPI
 
 from contact.errors import InputError
-from contact.methods.interrupt import signals_held
+from contact.methods.signals import signals_held
 from contact.ranks import on_root
 
 logger = logging.getLogger("contact.output")

@@ -13,8 +13,8 @@ from contact.output import bodies, discretisation
 from contact.output.error_estimate import estimated
 from contact.output.fields import DerivedFields, deformation, unloaded
 from contact.output.solution import Note, Remark, Solution
-from contact.problem.kkt import left_as_pressures, residual_forces
 from contact.problem.problem import ContactProblem
+from contact.problem.residuals import left_as_pressures, residual_forces
 from contact.tolerances import LARGEST_VIOLATION
 from forms.elasticity import Anisotropic
 from forms.hencky import Hencky

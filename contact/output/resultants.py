@@ -24,8 +24,8 @@ from contact.body.loads import expression
 from contact.body.rigid import Electrode
 from contact.errors import InputError
 from contact.mesh.together import members
-from contact.problem.kkt import residual_forces
 from contact.problem.problem import ContactProblem
+from contact.problem.residuals import residual_forces
 from contact.problem.state import State
 from contact.typing import Array
 

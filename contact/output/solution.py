@@ -66,7 +66,7 @@ class StepRecord:
     enthalpy
         Where the energy balance of the next step begins, see `problem.energy.Moment`.
     rounding
-        Largest `rounding` of the residuals of a step so far, see `problem.kkt.KKT`.
+        Largest `rounding` of the residuals of a step so far, see `problem.kkt.Residuals`.
     """
 
     state: State

@@ -14,8 +14,8 @@ from scipy.sparse import csgraph
 from scipy.spatial import KDTree
 
 from contact.errors import InputError
-from contact.interface.jump import Multipliers
 from contact.interface.mortar.surface import surface_of
+from contact.interface.multipliers import Multipliers
 from contact.problem.problem import ContactProblem
 from contact.problem.state import State
 from contact.typing import Array

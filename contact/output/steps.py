@@ -9,7 +9,7 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 
 from contact.body.fields import Moving, steady
-from contact.methods.steps import LoadStep
+from contact.methods.load_stepping import LoadStep
 from contact.output.quantities import STEPS, values_of
 from contact.output.resultants import nodes_of
 from contact.output.solution import Solution, StepRecord

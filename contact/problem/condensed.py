@@ -18,7 +18,7 @@ from scipy.linalg import lu_factor, lu_solve
 from contact.body.component_norms import ComponentNorms
 from contact.history import BodyState, Evaluated
 from contact.interface.interface import Interface
-from contact.interface.jump import Multipliers
+from contact.interface.multipliers import Multipliers
 from contact.interface.nodes import ContactNodes
 from contact.linear import multigrid
 from contact.linear.constraint import ConstrainedBulk, Constraint
@@ -212,7 +212,7 @@ class Condensation:
     def __init__(self, full: ContactProblem, counters: Counters) -> None:
         self.counters = counters
         self.nodes = full.interface.coupled
-        self.turn_to(full)
+        self.set_load_step(full)
         body = full.equilibrium
         none = Constraint(body.layout, None, body.global_unknowns.ties, body.global_unknowns.free)
         self._constraint = full.constraint or none
@@ -228,7 +228,7 @@ class Condensation:
         self._rows: Array = np.zeros((0, 0))
         self._stiffness: Array = np.zeros((0, 0))
 
-    def turn_to(self, full: ContactProblem) -> None:
+    def set_load_step(self, full: ContactProblem) -> None:
         """Go on with another step of the same problem; factorisations remain."""
         self.full = full
         self._interface = at_kept_nodes(full.interface)

@@ -18,8 +18,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from mpi4py import MPI
 
-from contact.problem.kkt import residual_forces
 from contact.problem.problem import ContactProblem
+from contact.problem.residuals import residual_forces
 from contact.problem.state import State
 from contact.typing import Array
 
@@ -68,9 +68,9 @@ class Balance:
     energy
         Stored at its end.
     dissipation
-        Taken by friction during the step.
+        StepResult by friction during the step.
     plastic
-        Taken by plastic flow; None for a body without.
+        StepResult by plastic flow; None for a body without.
     """
 
     work: float

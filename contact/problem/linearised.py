@@ -22,11 +22,11 @@ import numpy as np
 from contact.errors import InputError
 from contact.interface.active_set import ActiveSet
 from contact.interface.complementarity import ComplementarityParameters
-from contact.interface.jump import Multipliers
+from contact.interface.multipliers import Multipliers
 from contact.linear import multigrid
 from contact.linear.operator import Counters
-from contact.problem.kkt import residual_forces
 from contact.problem.problem import ContactProblem
+from contact.problem.residuals import residual_forces
 from contact.problem.state import State
 from contact.tolerances import EPS
 from contact.typing import Array

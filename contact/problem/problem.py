@@ -28,8 +28,8 @@ from contact.interface.entries import (
 )
 from contact.interface.friction import Friction
 from contact.interface.interface import Interface
-from contact.interface.jump import Multipliers, SlipHistory
 from contact.interface.law import Conductor
+from contact.interface.multipliers import Multipliers, SlipHistory
 from contact.interface.nodes import ContactNodes
 from contact.interface.pairing import find_pair
 from contact.interface.placing import candidates, find_nodes, held_nodes

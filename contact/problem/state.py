@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from contact.history import History
-from contact.interface.jump import Multipliers
+from contact.interface.multipliers import Multipliers
 from contact.typing import Array
 
 

@@ -13,7 +13,7 @@ import numpy as np
 
 from contact.body.internal_variables import VARIABLES
 from contact.history import History, InternalVariables, Part
-from contact.interface.jump import SlipHistory
+from contact.interface.multipliers import SlipHistory
 from contact.problem.linearised import Linearised
 from contact.problem.problem import SLIP, ContactProblem
 from contact.problem.state import State

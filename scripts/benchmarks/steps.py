@@ -17,8 +17,8 @@ from typing import Any
 import numpy as np
 
 from contact import Case, build_problem
+from contact.methods.load_stepping import Evolution
 from contact.methods.newton import Newton
-from contact.methods.steps import Evolution
 from contact.sweeping import Axis, sweep
 from scripts.benchmarks.bench_one import LINEAR, block, unknowns
 from scripts.cases import CASES, bar

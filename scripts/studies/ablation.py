@@ -24,8 +24,8 @@ from contact.linear import block, dense, multigrid
 from contact.methods import (
     chord,
     condensed_step,
+    conductivity_derivative,
     continuation,
-    gap_derivative,
     interior_point,
     newton,
     newton_step,
@@ -35,8 +35,8 @@ from contact.methods import (
 from contact.methods.newton import Newton
 from contact.methods.options import NewtonOptions
 from contact.methods.report import Outcome
-from contact.methods.rigid_body_modes import RigidBodyModes
-from contact.problem.kkt import evaluate
+from contact.methods.unconstrained_modes import UnconstrainedModes
+from contact.problem.residuals import evaluate
 from scripts.benchmarks import bench_one
 from scripts.cases import CASES
 from scripts.reporting import Report, append, parser
@@ -137,8 +137,8 @@ DEVICES = (
            ((newton, "interior_point", _no_fallback),)),
     Device("updates of the friction bound", (), "Haslinger 1983",
            ((interior_point, "UPDATES", 1),)),
-    Device("sticking start where friction alone restrains", (RigidBodyModes.stuck_bound,), "-",
-           ((RigidBodyModes, "stuck_bound", _nothing),)),
+    Device("sticking start where friction alone restrains", (UnconstrainedModes.stuck_bound,), "-",
+           ((UnconstrainedModes, "stuck_bound", _nothing),)),
     Device("continuation in the conductivity", (continuation,), "Allgower and Georg 2003",
            ((Newton, "_conducting", _nothing),)),
     Device("estimate of the stiffness from the first step",
@@ -151,8 +151,8 @@ DEVICES = (
     Device("layer linearised where its law is met", (newton_step.linearised_layer,), "-",
            ((newton_step, "linearised_layer", _linearised(newton_step.linearised_layer)),)),
     Device("limited softening", (), "-", (), (("softening", float("inf")),)),
-    Device("derivative of the conductivity by the gap", (gap_derivative,), "-",
-           ((gap_derivative.GapDerivative, "__call__", lambda *_: False),)),
+    Device("derivative of the conductivity by the gap", (conductivity_derivative,), "-",
+           ((conductivity_derivative.ConductivityDerivative, "__call__", lambda *_: False),)),
     Device("stagnation limit of the steps after a fallback", (), "-",
            ((newton, "SHORT", NewtonOptions().stagnation_limit),)),
     Device("stagnation limit of the continuation", (), "-",
@@ -163,7 +163,7 @@ DEVICES = (
            _block),
     Device("chord steps", (chord,), "Kelley 1995; Walker and Ni 2011", (), (("keep", "never"),)),
     Device("zero displacement where nothing acts", (progress.undeformed_equilibrium,), "-",
-           ((newton.NewtonLoop, "_let_go", _nothing),)),
+           ((newton.NewtonLoop, "_loss_of_contact", _nothing),)),
     Device("static condensation", (condensed_step,), "Guyan 1965", (), (("condense", False),)),
     Device("Cholesky factors of a condensed body", (), "Golub and Van Loan 2013",
            ((dense, "dpotrf", lambda *_, **__: (None, 1)),), (), _lifted),

@@ -8,15 +8,15 @@ import numpy as np
 from mpi4py import MPI
 
 from contact import Case, Solution
-from contact.interface.jump import Multipliers
+from contact.interface.multipliers import Multipliers
 from contact.methods.method import METHODS, Method
 from contact.methods.newton import Newton
 from contact.methods.options import NewtonOptions, Options
 from contact.methods.report import Outcome, Record
 from contact.nesting import has_coarser, nested_start
 from contact.output.remarks import review
-from contact.problem.kkt import KKT, evaluate
 from contact.problem.problem import ContactProblem
+from contact.problem.residuals import Residuals, evaluate
 from contact.problem.state import State
 from contact.typing import Array
 from scripts.studies.product_norm import ProductNorm
@@ -126,7 +126,7 @@ class Branches:
             outcome = Outcome(evaluate(self.problem, state), allowed, f"given up: {SOLVES} solves")
         return Solution(self.problem, state, outcome, method.history, method.counters, "", {})
 
-    def residuals(self, found: Solution) -> KKT:
+    def residuals(self, found: Solution) -> Residuals:
         """Return the residuals of a solution, computed once more from scratch. Collective."""
         return evaluate(self.problem, found.state)
 

@@ -28,8 +28,8 @@ from contact.case.file import parse_case
 from contact.history import BodyState
 from contact.linear.operator import Counters, SparseOperator
 from contact.methods.options import NewtonOptions
-from contact.problem.kkt import residual_forces
 from contact.problem.problem import ContactProblem
+from contact.problem.residuals import residual_forces
 from contact.typing import Array
 from scripts.reporting import Report, parser
 

@@ -14,8 +14,8 @@ from contact.linear.operator import SparseOperator
 from contact.methods.parameters import automatic_r
 from contact.methods.thesis.uzawa import augmentation
 from contact.output.resultants import charge_balance
-from contact.problem.kkt import residual_forces
 from contact.problem.problem import ContactProblem
+from contact.problem.residuals import residual_forces
 from scripts.cases import CASES
 from scripts.force_balance import force_balance
 from scripts.reporting import Report, options

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 from mpi4py import MPI
 
-from contact.methods.interrupt import Interrupted, ending_on_signal, stop_on_signal
+from contact.methods.signals import Interrupted, ending_on_signal, stop_on_signal
 from tests.problems.processes import BAR, RANKS, SMALL, command, environment
 
 BOX = """

@@ -10,7 +10,7 @@ import pytest
 
 from contact.cli.main import main
 from contact.errors import InputError
-from contact.methods.interrupt import Interrupted
+from contact.methods.signals import Interrupted
 from contact.sweeping import Axis
 from tests.cli.running import MESH
 from tests.problems.bar import BAR

@@ -9,7 +9,7 @@ from mpi4py import MPI
 from contact.interface.active_set import ActiveSet
 from contact.interface.complementarity import ComplementarityParameters, linearise
 from contact.interface.friction import Friction
-from contact.interface.jump import Multipliers
+from contact.interface.multipliers import Multipliers
 from forms.laws import ConstantCoefficient, Coulomb, SlipCoefficient
 from tests.problems import mechanics
 

@@ -17,7 +17,7 @@ from contact import (
     solve,
 )
 from contact.mesh.grid import rectangle
-from contact.problem.kkt import evaluate
+from contact.problem.residuals import evaluate
 from forms.laws import ConstantCoefficient, Coulomb
 
 

@@ -16,7 +16,7 @@ from contact.interface.mortar.segments import clipped
 from contact.interface.mortar.surface import (
     Surface,
     basis,
-    positive_change,
+    dual_basis_transformation,
     rule,
     size_of,
     surface_of,
@@ -284,7 +284,7 @@ def test_surfaces_of_meshes(dim, degree) -> None:
 
 @pytest.mark.parametrize(("dim", "degree"), KINDS, ids=NAMES)
 def test_the_changed_basis_has_positive_integrals(dim, degree) -> None:
-    change = positive_change(dim, degree)
+    change = dual_basis_transformation(dim, degree)
     places, weights = rule(dim, 4)
     changed = basis(places, degree) @ change.T
     np.testing.assert_allclose(changed.sum(axis=1), 1, atol=1e-14)

@@ -12,8 +12,8 @@ import pytest
 from mpi4py import MPI
 
 import meshes
-from contact.interface.jump import Multipliers
-from contact.problem.kkt import evaluate
+from contact.interface.multipliers import Multipliers
+from contact.problem.residuals import evaluate
 from contact.solving import solve
 from tests.problems.mechanics import bar, leaning_block
 from tests.problems.rings import between_plates, squeezed

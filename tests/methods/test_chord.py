@@ -46,7 +46,7 @@ def test_loads_that_follow_each_other_need_hardly_any():
     method, start, solves = Newton(problem, options), None, []
     for load in np.linspace(-0.03, -0.04, 6):
         problem = yielding(load)
-        method.turn_to(problem)
+        method.set_load_step(problem)
         begun = method.counters.linear_solves
         start, outcome = method.solve(start)
         assert outcome.converged

@@ -7,7 +7,7 @@ import pytest
 from mpi4py import MPI
 from scipy.optimize import minimize
 
-from contact.methods.rigid_body_modes import RigidBodyModes, _least_distance
+from contact.methods.unconstrained_modes import UnconstrainedModes, _least_distance
 from contact.problem.rigid_modes import groups
 from contact.solving import solve
 from tests.problems.rings import between_plates, squeezed
@@ -25,8 +25,8 @@ def test_the_least_of_all_places():
     (said,) = [text for text in solution.warnings if "nothing holds" in text]
     assert "nothing holds ring against a rigid motion" in said
 
-    modes, body = RigidBodyModes(problem), problem.equilibrium
-    motion, limited = modes.least(problem, state)
+    modes, body = UnconstrainedModes(problem), problem.equilibrium
+    motion, limited = modes.minimal_motion(problem, state)
     assert not limited
     assert np.abs(motion).max() < 1e-9
     # Whatever motion is added, the least of all takes it off.
@@ -35,7 +35,7 @@ def test_the_least_of_all_places():
     columns = group.moved[:, 3 * ring : 3 * ring + 3]
     for amounts in ([0.01, 0.0, 0.0], [0.0, 0.02, 0.01], [-0.3, -0.2, 0.1]):
         elsewhere = replace(state, x=body.moved(state.x, columns @ np.array(amounts)))
-        motion, limited = modes.least(problem, elsewhere)
+        motion, limited = modes.minimal_motion(problem, elsewhere)
         assert not limited
         back = body.moved(elsewhere.x, -motion)
         np.testing.assert_allclose(nodes.apply(back), nodes.apply(state.x), rtol=0, atol=1e-9)

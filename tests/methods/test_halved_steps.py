@@ -5,11 +5,11 @@ from dataclasses import replace
 import pytest
 
 from contact import evolve
+from contact.methods.load_stepping import Evolution
 from contact.methods.method import METHODS
 from contact.methods.options import NewtonOptions
 from contact.methods.report import Outcome
-from contact.methods.steps import Evolution
-from contact.problem.kkt import KKT
+from contact.problem.residuals import Residuals
 from contact.solving import NotConvergedError
 from tests.problems.shaken import TIGHT, shaken
 
@@ -22,7 +22,7 @@ def failing(problem, largest: float, options=TIGHT["newton"]):
             state, outcome = super().solve(*given)
             since = self.problem.since or 0.0
             if self.problem.time - since > largest * (1 + 1e-9):
-                kkt = KKT(1.0, 1.0, 1.0)
+                kkt = Residuals(1.0, 1.0, 1.0)
                 outcome = Outcome(kkt, outcome.allowed, "too long")
                 state = replace(state, x=state.x + 1.0)
             return state, outcome

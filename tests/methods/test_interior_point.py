@@ -16,7 +16,7 @@ from contact.methods.interior_point import interior_point
 from contact.methods.newton import Newton
 from contact.methods.options import NewtonOptions
 from contact.methods.report import Outcome
-from contact.problem.kkt import KKT, evaluate
+from contact.problem.residuals import Residuals, evaluate
 from contact.solving import solve
 from forms.laws import ConstantCoefficient
 from scripts.cases import bar
@@ -168,7 +168,7 @@ def test_a_method_cannot_call_itself_converged(monkeypatch):
     """What it says of its end is one thing, the residuals of the whole problem another."""
 
     def boast(method: Newton, *given):
-        outcome = Outcome(KKT(0.0, 0.0, 0.0), KKT(1.0, 1.0, 1.0), "all is well")
+        outcome = Outcome(Residuals(0.0, 0.0, 0.0), Residuals(1.0, 1.0, 1.0), "all is well")
         return method.problem.start(0.1), outcome
 
     monkeypatch.setattr(Newton, "solve", boast)

@@ -7,9 +7,9 @@ from contact import evolve
 from contact.body.description import Body, Load
 from contact.interface.friction import Friction
 from contact.mesh.grid import rectangle
+from contact.methods.load_stepping import Evolution
 from contact.methods.newton import Newton
 from contact.methods.options import NewtonOptions
-from contact.methods.steps import Evolution
 from contact.problem.contact import Contact
 from contact.problem.problem import ContactProblem
 from contact.problem.state import State

@@ -11,7 +11,7 @@ from contact.case.build import build_problem
 from contact.case.file import Case, parse_case
 from contact.errors import InputError
 from contact.interface.friction import Friction
-from contact.interface.jump import Multipliers
+from contact.interface.multipliers import Multipliers
 from contact.methods.newton import Newton
 from contact.methods.options import FixedPointOptions, NewtonOptions
 from contact.methods.thesis.fixed_point import FixedPoint

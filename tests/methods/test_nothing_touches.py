@@ -5,9 +5,9 @@ from mpi4py import MPI
 
 from contact import build_problem
 from contact.case.file import parse_case
+from contact.methods.load_stepping import Evolution
 from contact.methods.method import METHODS
 from contact.methods.options import NewtonOptions
-from contact.methods.steps import Evolution
 
 SELF = MPI.COMM_SELF
 

@@ -9,7 +9,7 @@ from contact.methods.options import FixedPointOptions, PenaltyOptions
 from contact.methods.progress import Best, Stagnation
 from contact.methods.thesis.fixed_point import FixedPoint
 from contact.methods.thesis.penalty import Penalty
-from contact.problem.kkt import evaluate
+from contact.problem.residuals import evaluate
 from forms.laws import ConstantCoefficient
 from tests.problems import mechanics
 

@@ -10,7 +10,7 @@ from contact.case.file import parse_case
 from contact.errors import InputError
 from contact.methods.options import NewtonOptions, PenaltyOptions
 from contact.problem.energy import Moment, balance, moment
-from contact.problem.kkt import evaluate
+from contact.problem.residuals import evaluate
 from contact.solving import solve
 from forms.hencky import Linear, Log
 from forms.laws import ConstantCoefficient, SlipCoefficient

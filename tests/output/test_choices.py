@@ -7,7 +7,7 @@ import pytest
 from mpi4py import MPI
 
 from contact import parse_case, solve
-from contact.interface.jump import Multipliers
+from contact.interface.multipliers import Multipliers
 from contact.output.bodies import choices
 from tests.problems.pairs import case
 

@@ -15,7 +15,7 @@ from contact.output.checkpoint import read_checkpoint
 from contact.output.fields import DerivedFields
 from contact.output.files import write_outputs
 from contact.output.options import OutputOptions
-from contact.problem.kkt import evaluate
+from contact.problem.residuals import evaluate
 from contact.solving import solve
 from tests.problems.written import block, electric, written
 

@@ -264,7 +264,7 @@ def test_a_signal_before_the_first_iteration_leaves_what_is_there(tmp_path, monk
     case.write_text(to_toml(steps_case()))
     assert on_the_line("solve", case, "--out", out) == 0
     before = {path.name: path.read_bytes() for path in out.iterdir()}
-    turn = Newton.turn_to
+    turn = Newton.set_load_step
 
     def signalled(self, problem):
         signal.raise_signal(signal.SIGINT)
@@ -276,7 +276,7 @@ def test_a_signal_before_the_first_iteration_leaves_what_is_there(tmp_path, monk
         self.poll()
         record(self, *arguments, **named)
 
-    monkeypatch.setattr(Newton, "turn_to", signalled)
+    monkeypatch.setattr(Newton, "set_load_step", signalled)
     monkeypatch.setattr(IterationHistory, "record", nothing)
     assert on_the_line("solve", case, "--out", out) == 130
     after = {path.name: path.read_bytes() for path in out.iterdir() if path.is_file()}

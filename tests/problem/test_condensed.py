@@ -12,8 +12,8 @@ from contact.linear.schur import SchurComplement
 from contact.methods.newton import Newton
 from contact.methods.options import NewtonOptions
 from contact.problem import condensed
-from contact.problem.kkt import evaluate
 from contact.problem.problem import ContactProblem
+from contact.problem.residuals import evaluate
 from contact.problem.state import State
 from contact.ranks import on_root
 from forms.hencky import Linear

@@ -5,7 +5,7 @@ import pytest
 from mpi4py import MPI
 
 from contact.case.file import parse_case
-from contact.problem.kkt import evaluate
+from contact.problem.residuals import evaluate
 from contact.problem.state import State
 from contact.solving import solve
 from scripts.studies.raw_balance import imbalance

@@ -12,8 +12,8 @@ from contact.interface.friction import Friction
 from contact.mesh.grid import rectangle
 from contact.problem import kkt
 from contact.problem.contact import Contact
-from contact.problem.kkt import KKT, evaluate, residual_forces
 from contact.problem.problem import ContactProblem
+from contact.problem.residuals import Residuals, evaluate, residual_forces
 from contact.problem.state import State
 from contact.solving import solve as solve_case
 from contact.tolerances import MOST_ROUNDING
@@ -245,6 +245,6 @@ def test_a_node_without_numbers_far_from_all_others_is_no_equilibrium(solved):
 
 
 def test_what_is_no_number_has_not_converged():
-    assert KKT(0.0, float("nan"), 0.0).largest == np.inf
-    assert KKT(float("inf"), 0.0, 0.0).largest == np.inf
-    assert KKT(1e-9, 3e-9, 2e-9).largest == 3e-9
+    assert Residuals(0.0, float("nan"), 0.0).largest == np.inf
+    assert Residuals(float("inf"), 0.0, 0.0).largest == np.inf
+    assert Residuals(1e-9, 3e-9, 2e-9).largest == 3e-9

@@ -9,11 +9,11 @@ from mpi4py import MPI
 from contact import write_outputs
 from contact.case.file import parse_case
 from contact.errors import InputError
-from contact.interface.jump import Multipliers
+from contact.interface.multipliers import Multipliers
 from contact.methods.newton import Newton
 from contact.methods.options import FixedPointOptions, NewtonOptions, PenaltyOptions
 from contact.output.figures.figures import plot
-from contact.problem.kkt import evaluate, residual_forces
+from contact.problem.residuals import evaluate, residual_forces
 from contact.problem.state import State
 from contact.solving import build_problem, solve
 from tests.problems.rigid import indented, solved

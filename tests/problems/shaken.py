@@ -7,9 +7,9 @@ from contact.body.description import Body, Fixed
 from contact.interface.friction import Friction
 from contact.interface.obstacle import GapFunction
 from contact.mesh.grid import rectangle
+from contact.methods.load_stepping import Evolution, LoadStep
 from contact.methods.method import METHODS
 from contact.methods.options import FixedPointOptions, NewtonOptions
-from contact.methods.steps import Evolution, LoadStep
 from contact.problem.contact import Contact
 from contact.problem.problem import ContactProblem
 from forms.hencky import Linear

@@ -13,7 +13,7 @@ from contact.methods.parameters import automatic_r
 from contact.methods.thesis.fixed_point import FixedPoint
 from contact.methods.thesis.uzawa import augmentation
 from contact.output.resultants import charge_balance
-from contact.problem.kkt import residual_forces
+from contact.problem.residuals import residual_forces
 from forms.laws import ConstantCoefficient, SlipCoefficient
 from tests.problems.piezo import SCALED, SI, Column, example, hencky, potential
 

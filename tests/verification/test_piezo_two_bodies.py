@@ -12,8 +12,8 @@ from contact.methods.options import FixedPointOptions, NewtonOptions
 from contact.methods.thesis.fixed_point import FixedPoint
 from contact.output.resultants import charge_balance, movements
 from contact.problem.contact import Contact
-from contact.problem.kkt import evaluate
 from contact.problem.problem import ContactProblem
+from contact.problem.residuals import evaluate
 from forms.hencky import Linear
 from forms.laws import PerfectConductivity, ShiftedConductivity, Truncation
 from forms.piezo import from_voigt

@@ -6,8 +6,8 @@ the slave node j is then
 
     j_j = (S u)_j - sum_l P_jl u_l,     P_jl = int Phi_j (N_l o Pi) / int N~_j,
 
-S being the identity, but for quadratic triangles, where N~ = A N (`positive_change`) and S
-is made of the inverse of A^T. Constants pass: rows of S and of P have the sum 1.
+S being the identity, but for quadratic triangles, where N~ = A N (`dual_basis_transformation`)
+and S is made of the inverse of A^T. Constants pass: rows of S and of P have the sum 1.
 
 `integrate` finds these integrals on the facets of one rank, `couple` sums them up. Where nodes
 carry no multiplier, their functions are handed over to others.
@@ -32,7 +32,7 @@ from scipy.spatial import cKDTree
 
 from contact.interface.mortar.lumping import Mixing, coefficients, integrals
 from contact.interface.mortar.segments import Points, common_points, facing_pairs
-from contact.interface.mortar.surface import Surface, basis, positive_change
+from contact.interface.mortar.surface import Surface, basis, dual_basis_transformation
 from contact.tolerances import NEGLIGIBLE, ROUNDING
 from contact.typing import Array
 
@@ -138,7 +138,7 @@ def integrate(slave: Surface, master: Surface, reach: float, carriers: Carriers)
         The nodes whose functions act on the slave facets.
     """
     direction, found = _facing(slave, master, reach)
-    change = positive_change(slave.corners.shape[1], slave.degree)
+    change = dual_basis_transformation(slave.corners.shape[1], slave.degree)
     dual, weight = _dual(slave, found, change)
     dual, own = carriers.functions @ dual, carriers.functions * weight[:, None, :]
     gap = np.zeros((*weight.shape, 2))
@@ -317,7 +317,7 @@ def _assembled(parts: Parts, d: int, degree: int, without: NDArray[np.int64]) ->
     rows, columns = np.broadcast_arrays(carrier[:, :, None], place[:, None, :])
     places = (rows.ravel(), columns.ravel())
     dual = sparse.csr_array((parts.own.ravel(), places), shape=(every.size, every.size))[kept]
-    own = divide @ dual @ coefficients(place, every.size, positive_change(d, degree))
+    own = divide @ dual @ coefficients(place, every.size, dual_basis_transformation(d, degree))
     own.eliminate_zeros()
     other = sparse.csr_array(divide @ other[kept])
     jumps = every[kept], every, sparse.csr_array(own), masters, other

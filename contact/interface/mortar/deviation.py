@@ -178,7 +178,8 @@ def _between(
     begin = np.searchsorted(pairs[0], np.arange(len(points) + 1))
     middle = points[corners[:, :2]].mean(axis=1)
     weights = np.zeros_like(value)
-    for k, corner in enumerate(corners.T):
+    for k in range(corners.shape[1]):
+        corner = corners[:, k]
         # All neighbours of a corner, facet by facet, of which those beyond it count.
         counts = np.diff(begin)[corner]
         of = np.repeat(np.arange(len(corners)), counts)
@@ -191,7 +192,7 @@ def _between(
         total, changed = (
             np.bincount(of, given, minlength=len(corners)) for given in (share, change)
         )
-        other = np.ptp(value, axis=1)
+        other = value.max(axis=1) - value.min(axis=1)
         jump = np.where(total > 0, changed / np.where(total > 0, total, 1.0), other) / largest
         weights[:, k] = known[corner] / (jump**2 + ALIKE**2) ** 2
     total = np.maximum(weights.sum(axis=1), np.finfo(float).tiny)

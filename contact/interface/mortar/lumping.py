@@ -1,7 +1,7 @@
 """Nodal areas of a surface: integrals of functions that all have some, and their coefficients.
 
 At the vertices of quadratic triangles the basis functions have no mean: a constraint there would
-weigh nothing. The functions N~ = A N of `positive_change` take their place, and with them
+weigh nothing. The functions N~ = A N of `dual_basis_transformation` take their place, and with them
 the coefficients S u, S = A^-T, that of the nodal values u: in front of a rigid foundation as in
 front of another body. For all other facets A is the identity.
 """
@@ -16,7 +16,13 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 from scipy import sparse
 
-from contact.interface.mortar.surface import Surface, basis, positive_change, rule, size_of
+from contact.interface.mortar.surface import (
+    Surface,
+    basis,
+    dual_basis_transformation,
+    rule,
+    size_of,
+)
 from contact.typing import Array
 
 
@@ -24,7 +30,7 @@ def integrals(surface: Surface) -> Array:
     """Return int N~ over whole facets, shape (f, k)."""
     corners = surface.corners.shape[1]
     places, weights = rule(corners, 4)
-    functions = basis(places, surface.degree) @ positive_change(corners, surface.degree).T
+    functions = basis(places, surface.degree) @ dual_basis_transformation(corners, surface.degree).T
     facets = np.repeat(np.arange(surface.count), weights.size)
     turns = surface.turn(facets, np.tile(places, (surface.count, 1))).reshape(-1, weights.size)
     return np.asarray(size_of(surface.corners)[:, None] * ((turns * weights) @ functions))
@@ -137,7 +143,7 @@ class Lumping:
         deviation = np.zeros_like(normal)
         np.add.at(deviation, place, surface.node_deviations)
         deviation /= np.bincount(place.ravel(), minlength=nodes.size)[:, None]
-        change = positive_change(surface.corners.shape[1], surface.degree)
+        change = dual_basis_transformation(surface.corners.shape[1], surface.degree)
         if np.array_equal(change, np.eye(len(change))):
             return Lumping(nodes, weight, normal, deviation, None)
         mixing = Mixing.alone(nodes, coefficients(place, nodes.size, change))

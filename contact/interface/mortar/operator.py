@@ -17,7 +17,7 @@ from scipy import sparse
 
 from contact.errors import InputError
 from contact.interface.mortar.lumping import Mixing
-from contact.linear.constraint import Change, in_circles
+from contact.linear.constraint import Change, cyclic_dependencies
 from contact.mesh.entities import owned_among
 from contact.typing import Array
 
@@ -115,7 +115,7 @@ def coupling_operator(
     every = np.unique(np.concatenate([masters, *(rows.slaves for rows in given)]))
     jumps = sparse.vstack([_over(rows, every) for rows in given], format="csr")
     replaced = np.searchsorted(every, slaves)
-    circle = in_circles(replaced, jumps)
+    circle = cyclic_dependencies(replaced, jumps)
     if circle.size:
         raise InputError(
             f"contact.against: {circle.size} contact nodes follow, by way of the nodes opposite, "

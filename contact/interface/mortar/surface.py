@@ -48,7 +48,7 @@ def basis(barycentric: Array, degree: int) -> Array:
     return np.column_stack([corners, *(4 * barycentric[:, pair].prod(axis=1) for pair in others)])
 
 
-def positive_change(corners: int, degree: int) -> Array:
+def dual_basis_transformation(corners: int, degree: int) -> Array:
     """Return A with the functions N~ = A N, all of whose integrals are positive.
 
     The vertex functions of a quadratic triangle have none. There each takes the share alpha of

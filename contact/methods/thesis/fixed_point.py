@@ -20,14 +20,14 @@ from typing import ClassVar
 import numpy as np
 
 from contact.linear.operator import Operator
-from contact.methods.gap_derivative import GapDerivative
+from contact.methods.conductivity_derivative import ConductivityDerivative
 from contact.methods.options import FixedPointOptions
 from contact.methods.parameters import automatic_r
 from contact.methods.report import Outcome
-from contact.methods.rigid_body_modes import RigidBodyModes
 from contact.methods.thesis.outer_loop import NEAR, OuterLoop
 from contact.methods.thesis.uzawa import augmentation, split, uzawa_block_relaxation
-from contact.problem.kkt import KKT
+from contact.methods.unconstrained_modes import UnconstrainedModes
+from contact.problem.residuals import Residuals
 from contact.problem.state import State
 from contact.typing import Array
 
@@ -76,14 +76,14 @@ class FixedPoint(OuterLoop):
             Initial guess, zero by default; and unknowns at which the first secant is taken.
         """
         self._stalled, self._residual = False, np.inf
-        self._gap_derivative = GapDerivative(NEAR)
+        self._gap_derivative = ConductivityDerivative(NEAR)
         if not self.operator.symmetric:  # a solve does not depend on an earlier one
             self.operator = self._new_operator(symmetric=True)
         problem, interface = self.problem, self.problem.interface
         frictional = interface.friction.acts
         if start is None:
             self.state, self._secant_at = problem.start(), problem.equilibrium.rest()
-            stuck = RigidBodyModes(problem).stuck_bound()
+            stuck = UnconstrainedModes(problem).stuck_bound()
             # Iteration 0 is the pure contact problem that the thesis starts from. A bound that is
             # updated in the Uzawa block relaxation needs none, and a body that friction alone holds
             # has no such problem.
@@ -155,7 +155,7 @@ class FixedPoint(OuterLoop):
             self.operator = self._new_operator(symmetric=False)
         return law.current_block(nodal, pressure, full=True)
 
-    def _measure(self, residuals: KKT) -> float:
+    def _measure(self, residuals: Residuals) -> float:
         self._residual = residuals.significant
         return self._residual
 

@@ -18,8 +18,8 @@ from contact.linear.operator import Counters
 from contact.methods.options import LoopOptions
 from contact.methods.progress import Best, Stagnation, undeformed_equilibrium
 from contact.methods.report import IterationHistory, Monitor, Outcome, Record
-from contact.problem.kkt import KKT, evaluate
 from contact.problem.problem import ContactProblem
+from contact.problem.residuals import Residuals, evaluate
 from contact.problem.state import State
 from contact.typing import Array
 
@@ -62,9 +62,9 @@ class OuterLoop(ABC):
         """Start from zero with an empty history."""
         thesis = self.options.stopping == "thesis"
         self._norm = self.problem.equilibrium.l2_norm() if thesis else None
-        self.turn_to(self.problem)
+        self.set_load_step(self.problem)
 
-    def turn_to(self, problem: ContactProblem) -> None:
+    def set_load_step(self, problem: ContactProblem) -> None:
         """Go on with another step of the same problem; factorisations remain."""
         self.problem, self.state = problem, problem.start()
         self.history = IterationHistory(self.monitor)
@@ -75,7 +75,7 @@ class OuterLoop(ABC):
         """Move the state by a frozen problem; return its inner iterations and a note."""
 
     @abstractmethod
-    def _measure(self, residuals: KKT) -> float:
+    def _measure(self, residuals: Residuals) -> float:
         """Return the residual that is to vanish."""
 
     @abstractmethod
@@ -94,7 +94,7 @@ class OuterLoop(ABC):
         """Iterate until convergence, stagnation or the limit, and leave the best iterate."""
         begin, problem, options = time.perf_counter(), self.problem, self.options
         stagnation = Stagnation(*self.stagnation)
-        best: Best[tuple[State, KKT]] = Best()
+        best: Best[tuple[State, Residuals]] = Best()
         by_thesis = options.stopping == "thesis"
         for iteration in range(first, options.max_outer + 1):
             previous = self.state
@@ -152,5 +152,5 @@ class OuterLoop(ABC):
         now, before = own(self.state.x), own(previous.x)
         return self._norm(now - before) < self.options.eps_fp * self._norm(now)
 
-    def _outcome(self, residuals: KKT, ended: str = "") -> Outcome:
+    def _outcome(self, residuals: Residuals, ended: str = "") -> Outcome:
         return Outcome(residuals, self.options.allowed, ended)

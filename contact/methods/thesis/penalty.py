@@ -35,13 +35,13 @@ from contact.interface.penalised import (
 from contact.linear.faults import petsc_options
 from contact.linear.krylov import Packing, shell
 from contact.linear.operator import Counters
-from contact.methods.interrupt import Interrupted
 from contact.methods.options import PenaltyOptions
 from contact.methods.report import Outcome
+from contact.methods.signals import Interrupted
 from contact.methods.thesis.outer_loop import LOST, NEAR, OuterLoop
 from contact.problem.checks import expected_displacements
-from contact.problem.kkt import KKT, residual_forces
 from contact.problem.problem import ContactProblem
+from contact.problem.residuals import Residuals, residual_forces
 from contact.problem.rigid_modes import constrained_by_friction
 from contact.problem.state import State
 from contact.tolerances import LARGEST_VIOLATION
@@ -108,7 +108,7 @@ class PenalisedProblem:
             if default:
                 given.delValue(name)
 
-    def turn_to(self, problem: ContactProblem, eps: Regularisation) -> None:
+    def set_load_step(self, problem: ContactProblem, eps: Regularisation) -> None:
         """Go on with another step of the same problem."""
         self._problem, self._interface, self._eps = problem, problem.interface, eps
 
@@ -290,12 +290,12 @@ class Penalty(OuterLoop):
         self._solvers: dict[bool, PenalisedProblem] = {}
         super().__post_init__()
 
-    def turn_to(self, problem: ContactProblem) -> None:
+    def set_load_step(self, problem: ContactProblem) -> None:
         """Go on with another step of the same problem; factorisations remain."""
-        super().turn_to(problem)
+        super().set_load_step(problem)
         self._eps = regularisation(problem, self.options)
         for solver in self._solvers.values():
-            solver.turn_to(problem, self._eps)
+            solver.set_load_step(problem, self._eps)
 
     def solve(
         self, start: State | None = None, about: Array | None = None
@@ -361,7 +361,7 @@ class Penalty(OuterLoop):
             law.stick()
         return law
 
-    def _measure(self, residuals: KKT) -> float:
+    def _measure(self, residuals: Residuals) -> float:
         return residuals.equilibrium
 
     def _adapt(self, residual: float, best: float) -> None:
@@ -372,7 +372,7 @@ class Penalty(OuterLoop):
     def _advice(self, residual: float | None = None) -> str:
         return HARDER
 
-    def _outcome(self, residuals: KKT, ended: str = "") -> Outcome:
+    def _outcome(self, residuals: Residuals, ended: str = "") -> Outcome:
         options, limit = self.options, max(residuals.contact, residuals.friction)
         ended = ended or f"the residual of the penalised problem is <= {options.tolerance:g}"
         if residuals.equilibrium <= options.tolerance:

@@ -1,10 +1,11 @@
 """Uzawa block relaxation for one linearised problem: Algorithms 2, 5, 7 and 9.
 
 One step solves for u, projects the auxiliary variables phi and updates the multipliers
-lambda, (3.34)-(3.36). Everything that it hands on is lambda + r u: the next multiplier is its
-projection, and r phi the difference to it. The step is therefore a fixed-point map, which
-`acceleration` speeds up: the alternating direction method of multipliers. Its variable is z = lambda + r (u - u_0), with the iterate's u_0: beside
-slips of the whole load a lambda that is unloaded to 1e-12 of it would be lost in rounding.
+lambda, (3.34)-(3.36): the alternating direction method of multipliers. Everything that it hands on
+is lambda + r u: the next multiplier is its projection, and r phi the difference to it. The step is
+therefore a fixed-point map, which `acceleration` speeds up. Its variable is
+z = lambda + r (u - u_0), with the iterate's u_0: beside slips of the whole load a lambda that is
+unloaded to 1e-12 of it would be lost in rounding.
 
 References
 ----------
@@ -25,16 +26,16 @@ from mpi4py import MPI
 
 from contact.interface.complementarity import disc_derivative, interface_residuals, project_disc
 from contact.interface.interface import Interface
-from contact.interface.jump import Multipliers
 from contact.interface.layer import NormalLaw
+from contact.interface.multipliers import Multipliers
 from contact.interface.nodes import ContactNodes
 from contact.linear.multigrid import TOLERANCE
 from contact.linear.operator import Operator
 from contact.methods.options import FixedPointOptions
 from contact.methods.progress import Stagnation
 from contact.methods.thesis.acceleration import ResidualMinimiser
-from contact.problem.kkt import residual_forces
 from contact.problem.protocols import Problem
+from contact.problem.residuals import residual_forces
 from contact.problem.state import State
 from contact.tolerances import ROUNDING
 from contact.typing import Array

@@ -26,9 +26,9 @@ from scipy.optimize import nnls
 from contact.linear.operator import Operator
 from contact.mesh.entities import component_sums
 from contact.problem.condensed import CondensedProblem
-from contact.problem.kkt import residual_forces
 from contact.problem.problem import ContactProblem
 from contact.problem.protocols import Problem
+from contact.problem.residuals import residual_forces
 from contact.problem.rigid_modes import (
     Group,
     constrained_by_friction,
@@ -46,7 +46,7 @@ STUCK = 10.0
 
 
 @dataclass(frozen=True)
-class _Least:
+class _RigidMotion:
     """Rigid motions that are free at a solution, and how much of each is taken off.
 
     Attributes
@@ -70,7 +70,7 @@ class _Least:
 
 
 @dataclass
-class RigidBodyModes:
+class UnconstrainedModes:
     """How the rigid-body modes are constrained; computed when first asked for. Collective.
 
     Parameters
@@ -114,7 +114,7 @@ class RigidBodyModes:
     def _unsupported(self) -> list[Group]:
         return [group for group in groups(self.problem) if null_space(group.supports).size > 0]
 
-    def least(self, problem: Problem, state: State) -> tuple[Array, bool] | None:
+    def minimal_motion(self, problem: Problem, state: State) -> tuple[Array, bool] | None:
         """Return the free rigid motion to take off a solution, and whether contact limits it.
 
         Collective.
@@ -131,10 +131,10 @@ class RigidBodyModes:
         The motion of owned and global unknowns of the whole problem, and whether the least
         displacements of all would pass through the foundation; None where nothing is free.
         """
-        found = self._least(problem, state)
+        found = self._rigid_motion(problem, state)
         return None if found is None else (found.motions @ found.amounts, found.limited)
 
-    def apart(
+    def separated(
         self, problem: CondensedProblem, operator: Operator, stiffness: float
     ) -> State | None:
         """Return a state in which nothing presses: bodies that others push move off. Collective.
@@ -160,7 +160,7 @@ class RigidBodyModes:
         for _ in range(2):  # each leaves the root of the rounding
             increment = operator.solve(-residual_forces(problem, state))
             state = replace(state, x=problem.equilibrium.moved(state.x, increment))
-        found = self._least(problem, state)
+        found = self._rigid_motion(problem, state)
         if found is None:
             return None
         further = found.columns @ (found.amounts - found.wanted)
@@ -171,7 +171,7 @@ class RigidBodyModes:
         moved[jump.nodes, : jump.dim] = found.columns @ found.amounts
         return replace(state, x=state.x - moved.ravel())
 
-    def _least(self, problem: Problem, state: State) -> _Least | None:
+    def _rigid_motion(self, problem: Problem, state: State) -> _RigidMotion | None:
         """Return the free rigid motion to take off; None where nothing is free. Collective."""
         interface = problem.interface
         jump, nodal = interface.jump, interface.jump.apply(state.x)
@@ -203,7 +203,7 @@ class RigidBodyModes:
             parts = jump.comm.allgather((rising[near], room[near]))
             cone, room = (np.concatenate(part) for part in zip(*parts, strict=True))
             amounts = _least_distance(products, wanted, cone, -room)
-        return _Least(np.hstack(motions), moved, wanted, amounts, depth, limited)
+        return _RigidMotion(np.hstack(motions), moved, wanted, amounts, depth, limited)
 
     def pushed_aside(self, problem: Problem, state: State) -> bool:
         """Tell whether contact has pushed a body to where nothing holds it. Collective.
@@ -212,7 +212,7 @@ class RigidBodyModes:
         """
         if not problem.interface.friction.acts or self.constrained_by_supports:
             return False
-        found = self.least(problem, state)
+        found = self.minimal_motion(problem, state)
         return found is not None and found[1]
 
 

@@ -16,11 +16,11 @@ from mpi4py import MPI
 
 from contact.errors import InputError
 from contact.linear.operator import Counters
-from contact.methods.interrupt import Interrupted
 from contact.methods.method import Method
 from contact.methods.report import IterationHistory, Outcome
-from contact.problem.kkt import KKT, evaluate
+from contact.methods.signals import Interrupted
 from contact.problem.problem import ContactProblem
+from contact.problem.residuals import Residuals, evaluate
 from contact.problem.rigid_modes import released, unilateral_supports
 from contact.problem.state import State
 from contact.tolerances import ROUNDING
@@ -32,7 +32,7 @@ logger = logging.getLogger("contact.solve")
 HALVINGS = 4
 
 #: Stands for residuals until they are measured.
-NOTHING = KKT(np.inf, np.inf, np.inf)
+NOTHING = Residuals(np.inf, np.inf, np.inf)
 
 
 @dataclass(frozen=True)
@@ -143,7 +143,7 @@ class Evolution:
     def _solve(self, time: float) -> LoadStep:
         last, method = self._last, self.method
         problem = self._at(time)
-        method.turn_to(problem)
+        method.set_load_step(problem)
         counted = replace(method.counters)
         start = about = None
         if last is not None:

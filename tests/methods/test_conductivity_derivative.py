@@ -4,7 +4,7 @@ import numpy as np
 from mpi4py import MPI
 
 from contact.interface.friction import Friction
-from contact.methods.gap_derivative import GapDerivative
+from contact.methods.conductivity_derivative import ConductivityDerivative
 from contact.methods.newton import Newton
 from contact.methods.options import FixedPointOptions, NewtonOptions
 from contact.methods.thesis.fixed_point import FixedPoint
@@ -13,13 +13,13 @@ from tests.problems.piezo import example, potential
 
 
 def test_followed_as_long_as_the_residual_falls():
-    follow = GapDerivative(1e-2)
+    follow = ConductivityDerivative(1e-2)
     assert [follow(r) for r in (1.0, 1e-1, 9e-3, 1e-4, 1e-9)] == [False, False, True, True, True]
 
 
 def test_a_step_that_made_it_worse_is_not_repeated_at_once():
     """A frozen step takes back what a followed one has spoilt, and not much more."""
-    follow = GapDerivative()
+    follow = ConductivityDerivative()
     assert follow(1.83e-3)
     assert not follow(9.55e-3)
     assert not follow(1.82e-3)
@@ -28,7 +28,7 @@ def test_a_step_that_made_it_worse_is_not_repeated_at_once():
 
 
 def test_steps_in_between_that_must_not_follow():
-    follow = GapDerivative()
+    follow = ConductivityDerivative()
     assert follow(1e-3)
     assert not follow(1e-2, allowed=False)
     assert not follow(9e-4)
@@ -75,7 +75,7 @@ def test_a_solve_does_not_depend_on_an_earlier_one():
 
 def test_a_step_that_is_taken_back():
     """The iterate before it is as good as it was: psi stays frozen until it is much better."""
-    follow = GapDerivative()
+    follow = ConductivityDerivative()
     assert follow(2e-2)
     assert follow.worsened(4e-1)
     assert not follow.worsened(4e-1)

@@ -15,7 +15,7 @@ import numpy as np
 
 
 @dataclass
-class GapDerivative:
+class ConductivityDerivative:
     """Decides by the residuals whether a step includes the derivative; alike on all ranks.
 
     Attributes

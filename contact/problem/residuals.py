@@ -27,7 +27,7 @@ MARGIN = 4.0
 
 
 @dataclass(frozen=True)
-class KKT:
+class Residuals:
     """Relative residuals of equilibrium, contact and friction.
 
     Attributes
@@ -82,7 +82,7 @@ class KKT:
     def _values(self) -> tuple[float, float, float]:
         return self.equilibrium, self.contact, self.friction
 
-    def excess(self, allowed: KKT) -> str:
+    def excess(self, allowed: Residuals) -> str:
         """Name the residual that is farthest above its limit, or its floor where that is larger.
 
         Nothing if none is.
@@ -170,7 +170,7 @@ def _over_pressed(interface: Interface, state: State, pressures: Array) -> float
 
 
 @np.errstate(over="ignore", invalid="ignore")
-def evaluate(problem: Problem, state: State) -> KKT:
+def evaluate(problem: Problem, state: State) -> Residuals:
     """Return the residuals of a state. Collective; nothing is changed by it.
 
     Those of a body that flies away are no numbers, which is all there is to say of them.
@@ -209,4 +209,4 @@ def evaluate(problem: Problem, state: State) -> KKT:
         (float(first), float(contact), float(friction))
         for (first,), (contact, friction) in zip(balance, laws, strict=True)
     )
-    return KKT(*residuals, floors, granted, _over_pressed(interface, state, pressures))
+    return Residuals(*residuals, floors, granted, _over_pressed(interface, state, pressures))
