@@ -1,4 +1,4 @@
-"""Checks of arguments in Python: kinds of objects, ranges, names, values of a user's functions."""
+"""Checks of arguments in Python: kinds, ranges, names, a user's functions and derivatives."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 from contact.errors import InputError
-from contact.tolerances import HUGE
+from contact.tolerances import EPS, HUGE
 from contact.typing import Array
 
 T = TypeVar("T")
@@ -20,6 +20,24 @@ CONSTANTS = ("young", "poisson", "bulk", "shear")
 
 #: Most letters of a given value that a message repeats.
 LONGEST = 80
+
+
+#: Step of differences over the argument; how far a derivative may be off them, and one-sided
+#: differences from each other where the function counts as smooth.
+STEP, OFF, SMOOTH = 1e-5, 0.02, 0.01
+
+#: Share of the places at which a derivative must be off to be refused, and their least number.
+SHARE, LEAST = 0.1, 3
+
+#: Change of a value over its rounding from which on differences say something.
+SEEN = 1e4
+
+#: A bound above zero.
+TINY = np.finfo(float).tiny
+
+#: Slips, and potential differences, at which laws are looked at; pressures beside them.
+SAMPLES = np.logspace(-9, 3, 49)
+PRESSURES = np.logspace(-6, 6, 13)
 
 
 def expect(name: str, given: Any, accepted: str, fits: object) -> None:
@@ -139,3 +157,56 @@ class OfTime:
             value = real(self.function(time), (), "a number")
             check_finite(value.reshape(1), lambda _: f"at t = {time:g}")
             return float(value)
+
+
+def check_slope(
+    name: str, function: Callable[[Array], Array], slope: Callable[[Array], Array], at: Array
+) -> None:
+    """Refuse a derivative that the differences of its function contradict.
+
+    At kinks, and where differences cannot tell, anything is accepted; a function that raises
+    something at these places is not judged, for it may never be asked there.
+
+    Parameters
+    ----------
+    name
+        Of the derivative, for messages.
+    function, slope
+        The function and its derivative, of arrays.
+    at
+        Arguments other than 0, shape (n,).
+
+    Raises
+    ------
+    InputError
+        If the derivative is off, or the object has none.
+    """
+    h = STEP * np.abs(at)
+    try:
+        with np.errstate(all="ignore"):
+            low, low2, middle, high2, high = (
+                real(function(at + step), at.shape, "") for step in (-h, -h / 2, 0, h / 2, h)
+            )
+            given = real(slope(at), at.shape, "")
+    except AttributeError as error:
+        with naming(name):
+            raise error
+    except Exception:
+        return  # the same law is asked for, and named, where it is used
+    with np.errstate(all="ignore"):
+        slopes = np.stack([middle - low, high - middle, 2 * (middle - low2), 2 * (high2 - middle)])
+        slopes /= h
+        size = np.abs(slopes).max(axis=0)
+        rounding = EPS * np.maximum(np.abs(middle), np.abs(high)) / h
+        judged = (np.ptp(slopes, axis=0) <= SMOOTH * size) & np.isfinite(given)
+        judged |= (size <= SEEN * rounding) & np.isfinite(size + given)
+        mean, allowed = slopes.mean(axis=0), OFF * size + SEEN * rounding
+        off = judged & (np.abs(given - mean) > allowed)
+    if np.count_nonzero(off) < max(LEAST, SHARE * np.count_nonzero(judged)):
+        return
+    places = np.flatnonzero(off)
+    worst = places[np.argmax(np.abs(given - mean)[places] / (allowed[places] + TINY))]
+    raise InputError(
+        f"{name}: {given[worst]:.4g} at {at[worst]:.3g}, where differences of the values are "
+        f"{mean[worst]:.4g}; accepted: the derivative of the law"
+    )

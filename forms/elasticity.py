@@ -9,7 +9,14 @@ import ufl
 from numpy.typing import ArrayLike, NDArray
 from ufl.core.expr import Expr
 
-from forms.crystal import VOIGT, stiffness_tensor, stiffness_voigt, turned
+from forms.crystal import (
+    VOIGT,
+    in_plane,
+    isotropic_about_x3,
+    stiffness_tensor,
+    stiffness_voigt,
+    turned,
+)
 from forms.kinematics import embed
 
 
@@ -24,9 +31,13 @@ class Anisotropic:
     stiffness
         C in Voigt's notation (11, 22, 33, 23, 13, 12), shape (6, 6), in the axes of the body, or a
         UFL expression of that shape (stress).
+    placed
+        Whether the axes of a crystal have been turned into those of the body: by `rotated`, or
+        `in_plane`.
     """
 
     stiffness: NDArray[np.float64] | Expr
+    placed: bool = False
 
     @property
     def bulk(self) -> float:
@@ -77,7 +88,11 @@ class Anisotropic:
             If the matrix is no rotation.
         """
         tensor = stiffness_tensor(np.asarray(self.stiffness))
-        return Anisotropic(stiffness_voigt(turned(tensor, rotation)))
+        return Anisotropic(stiffness_voigt(turned(tensor, rotation)), placed=True)
+
+    def in_plane(self, degrees: float = 90.0) -> Anisotropic:
+        """Return the material in a plane body, its X3 at an angle from x: along y by default."""
+        return self.rotated(in_plane(degrees))
 
     def check(self) -> None:
         """Check the matrix, however it was made.
@@ -104,9 +119,17 @@ class Anisotropic:
         Raises
         ------
         ValueError
-            If strains in the plane, or across it, shear the body out of it.
+            If strains in the plane, or across it, shear the body out of it, or the axis X3 of a
+            crystal points out of it without having been turned there.
         """
         c = np.asarray(self.stiffness, dtype=float)
+        tensor = stiffness_tensor(c)
+        if not self.placed and isotropic_about_x3(tensor):
+            if not np.allclose(self.in_plane().stiffness, c, rtol=0, atol=1e-8 * np.abs(c).max()):
+                raise ValueError(
+                    "the crystal's axis X3 points out of the plane; accepted: law.in_plane(), X3 "
+                    "along y, or law.rotated(np.eye(3)) where it is to point there"
+                )
         if np.abs(c[3:5][:, [0, 1, 2, 5]]).max() > 1e-10 * np.abs(c).max():
             raise ValueError(
                 "the crystal couples strains in the plane with shear out of it: plane strain "

@@ -93,9 +93,15 @@ class Piezo:
         Raises
         ------
         ValueError
-            If a field in the plane would shear the body out of it (e_ij3 with i, j < 3).
+            If a field in the plane would shear the body out of it (e_ij3 with i, j < 3), or none
+            acts on it at all.
         """
         e = np.asarray(self.e, dtype=float)
+        if np.abs(e[:2]).max() <= 1e-10 * np.abs(e).max() and np.abs(e).max() > 0:
+            raise ValueError(
+                "the crystal is poled out of the plane, and no field in it acts on it; accepted: "
+                "piezo.in_plane(), poled along y"
+            )
         if np.abs(e[:2, :2, 2]).max() > 1e-10 * np.abs(e).max():
             raise ValueError(
                 "the crystal couples fields in the plane with shear out of it: plane strain "

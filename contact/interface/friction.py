@@ -7,7 +7,15 @@ from dataclasses import dataclass
 import numpy as np
 from mpi4py import MPI
 
-from contact.arguments import check_finite, expect, naming, real
+from contact.arguments import (
+    PRESSURES,
+    SAMPLES,
+    check_finite,
+    check_slope,
+    expect,
+    naming,
+    real,
+)
 from contact.body.fields import Given, field, values_at
 from contact.errors import InputError
 from contact.interface.multipliers import SlipHistory
@@ -64,7 +72,8 @@ class Friction:
         expect("Friction: radius", self.radius, "a length >= 0", size)
         if sum(law is not None for law in self._laws) > 1:
             raise InputError("Friction: accepted: one of coefficient, tresca, mu and law")
-        if hasattr(self.mu, "lipschitz"):
+        # A coefficient that lacks something is no function of position.
+        if any(hasattr(self.mu, name) for name in COEFFICIENT if name != "__call__"):
             object.__setattr__(self, "coefficient", self.mu)
             object.__setattr__(self, "mu", None)
         for name, methods in (("coefficient", COEFFICIENT), ("law", LAW)):
@@ -91,7 +100,7 @@ class Friction:
         ------
         InputError
             If a bound or coefficient is negative or no number at a node, or a coefficient of the
-            slip where nothing slips.
+            slip where nothing slips, or a derivative is not that of its law.
         """
         if self.tresca is not None:
             bound = _at("tresca", self.tresca, nodes)
@@ -100,6 +109,8 @@ class Friction:
             mu = _at("mu", self.mu, nodes)
             return Coulomb(ConstantCoefficient(mu)) if nodes.maximum(mu) > 0 else None
         if self.coefficient is None:
+            with on_all_ranks(nodes.comm):
+                _check_law(self.law)
             return self.law
         # Ranks without nodes ask too: mistakes are found by all.
         rest, words = np.zeros(3), "one number for each slip"
@@ -108,9 +119,24 @@ class Friction:
         with on_all_ranks(nodes.comm), naming("Friction: mu: derivative"):
             slope = real(self.coefficient.derivative(rest), rest.shape, words)
             check_finite(slope, lambda _: "without slip")
+        with on_all_ranks(nodes.comm):
+            given = self.coefficient
+            check_slope("Friction: mu: derivative", given, given.derivative, SAMPLES)
         _check("coefficient without slip", resists, nodes)
         most = nodes.comm.allreduce(self.coefficient.maximum, op=MPI.MAX)
         return Coulomb(self.coefficient) if most > 0 else None
+
+
+def _check_law(law: FrictionLaw | None) -> None:
+    """Refuse a law whose derivatives are not its own."""
+    if law is None:
+        return
+    slip, pressure = np.tile(SAMPLES, PRESSURES.size), np.repeat(PRESSURES, SAMPLES.size)
+    for name, bound, slope, at in (
+        ("by_slip", lambda s: law(s, pressure), lambda s: law.by_slip(s, pressure), slip),
+        ("by_pressure", lambda p: law(slip, p), lambda p: law.by_pressure(slip, p), pressure),
+    ):
+        check_slope(f"Friction: law: {name}", bound, slope, at)
 
 
 def _at(name: str, given: Given, nodes: ContactNodes) -> Array:

@@ -18,6 +18,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from contact.arguments import SAMPLES, check_slope, expect
 from contact.interface.active_set import touching
 from contact.interface.layer import Layer, NormalLaw
 from contact.interface.nodes import ContactNodes
@@ -57,6 +58,32 @@ class Conductor:
     lagged: bool = False
     phi_f_at: Callable[[float], Value] | None = None
     share: float = 1.0
+
+    def check(self) -> None:
+        """Refuse laws that lack something, or whose derivatives are not their own.
+
+        Raises
+        ------
+        InputError
+            The message names the law.
+        """
+        for name, law, methods in (
+            ("psi", self.psi, ("k_e", "delta", "follows_gap", "at", "gap_slope")),
+            ("phi_l", self.phi_l, ("__call__", "derivative")),
+        ):
+            missing = [method for method in methods if not hasattr(law, method)]
+            accepted = f"an object with {', '.join(methods)}"
+            expect(f"Conductor: {name} without {', '.join(missing)}", law, accepted, not missing)
+        both = np.concatenate([-SAMPLES[::-1], SAMPLES])
+        never, psi = np.zeros(both.size, dtype=bool), self.psi
+        if psi.follows_gap:
+            check_slope(
+                "Conductor: psi: gap_slope",
+                lambda s: psi.at(s, never, never),
+                lambda s: psi.gap_slope(s, never),
+                both,
+            )
+        check_slope("Conductor: phi_l: derivative", self.phi_l, self.phi_l.derivative, both)
 
     def at(self, time: float) -> Conductor:
         """Return the foundation at a time."""

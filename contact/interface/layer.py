@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from contact.arguments import naming, real
+from contact.arguments import check_slope, naming, real
 from contact.errors import InputError
 from contact.tolerances import EPS
 from contact.typing import Array
@@ -53,8 +53,8 @@ class Layer:
         Raises
         ------
         InputError
-            If the thickness, p_nu or h_nu is negative or no number, a law has no derivative, or
-            p_nu does not vanish before the layer is touched.
+            If the thickness, p_nu or h_nu is negative or no number, a law has no derivative, or one
+            that is not its own, or p_nu does not vanish before the layer is touched.
         """
         if not self.thickness >= 0:
             raise InputError(f"layer: the thickness is {self.thickness:g}; accepted: >= 0, or inf")
@@ -82,6 +82,7 @@ class Layer:
                     "layer: p_nu presses before the layer is touched; accepted: 0 at negative "
                     "penetrations"
                 )
+            check_slope(f"layer: {name}: derivative", law, law.derivative, samples[samples != 0])
 
     def depths(self, size: float) -> Array:
         """Return penetrations from 0 to the rigid part, or to the size of the body if it is less.

@@ -39,6 +39,7 @@ from contact.mesh.entities import elongation
 from contact.problem.contact import Contact, check_laws
 from contact.problem.protocols import Scales
 from contact.problem.state import State
+from contact.ranks import on_all_ranks
 from contact.typing import Array
 
 
@@ -241,6 +242,9 @@ class ContactProblem:
     def _entry(self, key: str, contact: Contact) -> Entry:
         if contact.layer is not None:
             contact.layer.check(self.domain.size)
+        if contact.conductor is not None:
+            with on_all_ranks(self.comm):
+                contact.conductor.check()
         assert contact.friction is not None  # filled in above
         body = self.equilibrium
         if contact.against is not None:
