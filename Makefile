@@ -1,12 +1,12 @@
 # Every target works on a fresh machine: scripts/fx finds FEniCSx or makes a place for it, once.
 FX := scripts/fx
-SCRIPTS := $(shell grep -ls __main__ scripts/*/*.py) scripts/examples/explore_forms.py
+SCRIPTS := $(shell grep -ls __main__ scripts/*/*.py) scripts/examples/explore_forms.py scripts/gallery.py
 NAMES := $(notdir $(basename $(SCRIPTS)))
 # a test that hangs on some ranks is ended, and fails
 MPI_TESTS = timeout --foreground 1200 $(FX) mpirun -n $(1) \
 	python3 -m mpi4py -m pytest tests -m parallel -q --color=no -p no:cacheprovider
 
-.PHONY: help demo test test-serial lint format docs clean $(NAMES)
+.PHONY: help demo test test-serial lint format docs release clean $(NAMES)
 .DEFAULT_GOAL := help
 
 help:
@@ -16,6 +16,7 @@ help:
 	@echo "make format   let ruff format the sources"
 	@echo "make NAME     run a script: $(sort $(NAMES))"
 	@echo "make docs     the documentation, into build/docs (notebooks are executed)"
+	@echo "make release  wheel and source distribution, built, installed and tried elsewhere"
 	@echo "make clean    remove results and caches in this folder"
 	@echo "FENICSX_SUITE=sid make test   the same on dolfinx 0.11"
 
@@ -49,6 +50,9 @@ docs:
 	$(FX) python3 docs/render.py
 	$(FX) python3 -m sphinx -q -W --keep-going -b html docs build/docs
 	@echo "build/docs/index.html"
+
+release:
+	$(FX) python3 -m pytest tests/scripts/test_release.py -m "release or not release" -q
 
 clean:
 	rm -rf results build .pytest_cache .mypy_cache .ruff_cache .hypothesis

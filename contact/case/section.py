@@ -25,6 +25,7 @@ from pydantic import (
     SerializerFunctionWrapHandler,
     Tag,
     ValidationInfo,
+    WithJsonSchema,
     model_serializer,
     model_validator,
 )
@@ -237,6 +238,7 @@ Names: TypeAlias = Annotated[
     BeforeValidator(lambda given: (given,) if isinstance(given, str) else given),
     as_tuple,
     Accepted("a name, or a list of names"),
+    WithJsonSchema({"type": ["string", "array"], "minItems": 1, "items": {"type": "string"}}),
 ]
 #: A file, whose path a dump writes by the function ``path`` of its context.
 File: TypeAlias = Annotated[str, AfterValidator(_placed), PlainSerializer(_path)]

@@ -16,7 +16,8 @@ from contact.output.reference import files_help
 DESCRIPTION = """\
 Frictional contact of elasto-plastic and piezoelectric bodies. A problem is a case file;
 contact new MESH.msh writes one to begin with, contact check shows its contents, contact solve
-solves it, contact plot draws the results. Documentation: docs/ of the sources.
+solves it, contact plot draws the results; contact demo solves an example. Documentation: docs/ of
+the sources.
 """
 EXIT = """\
 exit status: 0 converged; 1 not converged, results are written all the same; 2 bad input, or no
@@ -91,9 +92,11 @@ def _parser() -> Parser:
         "--version", action="version", version=f"contact {__version__}", help="show the version"
     )
     commands = parser.add_subparsers(
-        dest="command", required=True, metavar="new|check|solve|sweep|plot|identify|materials"
+        dest="command",
+        required=True,
+        metavar="demo|new|check|solve|sweep|plot|identify|materials|schema",
     )
-    for usage, text, epilog, arguments in _commands():
+    for usage, text, epilog, arguments in offered():
         command = commands.add_parser(
             usage.partition(" ")[0],
             help=text,
@@ -125,7 +128,7 @@ def _flag(text: str) -> dict[str, Any]:
     return {"help": text, "action": "store_true"}
 
 
-def _commands() -> Iterator[tuple[str, str, str | None, dict[str, dict[str, Any]]]]:
+def offered() -> Iterator[tuple[str, str, str | None, dict[str, dict[str, Any]]]]:
     """Give the commands: usage, purpose, the text below the options, and the arguments."""
     case = _value("CASE.toml", "case file (TOML)")
     replaced = _values(
@@ -135,6 +138,16 @@ def _commands() -> Iterator[tuple[str, str, str | None, dict[str, dict[str, Any]
         "--quiet": _flag("show no progress"),
         "--log": _value("FILE", "write a log to the end of a file"),
     }
+    yield (
+        "demo [--out DIR] [options]",
+        "solve an example, a bar pressed on a foundation, with its figures",
+        None,
+        {
+            "--out": _value("DIR", "folder for results; contact-demo by default"),
+            "--set": replaced,
+            **shown,
+        },
+    )
     yield (
         "new MESH.msh [--case CASE.toml]",
         "write a commented case file for a mesh file, with its parts",
@@ -228,4 +241,11 @@ def _commands() -> Iterator[tuple[str, str, str | None, dict[str, dict[str, Any]
             "name": _value("NAME", "material to show", nargs="?"),
             "--file": _value("FILE", "a library of one's own (TOML)"),
         },
+    )
+    yield (
+        "schema",
+        "print the JSON schema of the case file, by which editors complete and check TOML",
+        "contact schema > contact.schema.json, and as the first line of a case file\n"
+        "#:schema ./contact.schema.json",
+        {},
     )

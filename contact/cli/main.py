@@ -45,6 +45,8 @@ COMMANDS = {
     "plot": "contact.cli.plot",
     "identify": "contact.cli.identify",
     "materials": "contact.cli.materials",
+    "demo": "contact.cli.solve",
+    "schema": "contact.cli.schema",
 }
 
 
@@ -99,7 +101,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
                 # PETSc would call it a crash that a reader, such as head, has seen enough.
                 signal.signal(signal.SIGPIPE, signal.SIG_IGN)
                 command = import_module(COMMANDS[options.command])
-                if options.command in ("check", "solve", "sweep", "identify"):
+                if options.command in ("check", "solve", "sweep", "identify", "demo"):
                     on_root(comm, _check_cache)
             status = int(command.run(options, comm))
             sys.stdout.flush()  # it has been read: else it is a broken pipe

@@ -1,4 +1,4 @@
-"""``contact solve`` and ``contact sweep``: a case, or a case for several values of its keys."""
+"""``contact solve``, ``demo`` and ``sweep``: a case, or a case for several values of its keys."""
 
 from __future__ import annotations
 
@@ -27,13 +27,23 @@ from contact.ranks import on_root
 from contact.solving import SolveInterrupted, solve
 from contact.sweeping import TABLE, Axis, sweep
 
+#: The case of `contact demo`.
+DEMO = Path(__file__).parents[1] / "cases" / "bar.toml"
+
 #: Seconds after a signal from which on a second one ends the writing of results too.
 GRACE = 2.0
 
 
 def run(options: argparse.Namespace, comm: MPI.Intracomm) -> int:
     """Solve the case, or sweep over it, and return the exit status. Collective."""
-    return {"solve": _solve, "sweep": _sweep}[options.command](options, comm)
+    return {"solve": _solve, "sweep": _sweep, "demo": _demo}[options.command](options, comm)
+
+
+def _demo(options: argparse.Namespace, comm: MPI.Intracomm) -> int:
+    """Solve the example that comes with the package."""
+    options.case, options.out = DEMO, options.out or "contact-demo"
+    options.plot, options.restart, options.overwrite = True, None, False
+    return _solve(options, comm)
 
 
 def _solve(options: argparse.Namespace, comm: MPI.Intracomm) -> int:
