@@ -2,9 +2,12 @@
 
 A block after the comment ``<!-- file: NAME -->`` is a file that the reader writes. Else blocks of
 ``python`` are executed, each with the names of those before; ``sh`` line by line; ``toml`` is read.
-Other languages (``bash``, ``text``) show what is not executed.
+A block of ``text`` right behind one of ``python`` is what that prints. Other languages (``bash``)
+show what is not executed.
 """
 
+import contextlib
+import io
 import re
 import runpy
 import shlex
@@ -50,6 +53,7 @@ def run(page: Path, small: dict[str, str] | None = None) -> dict[str, Any]:
     if not Path("scripts").exists():
         Path("scripts").symlink_to(ROOT / "scripts")
     names: dict[str, Any] = {"__name__": "__main__"}
+    printed = io.StringIO()
     for block in blocks(page):
         text = block.text
         for given, taken in (small or {}).items():
@@ -58,7 +62,12 @@ def run(page: Path, small: dict[str, str] | None = None) -> dict[str, Any]:
         if block.file:
             Path(block.file).write_text(text)
         elif block.language == "python":
-            exec(compile("\n" * block.line + text, place, "exec"), names)
+            printed = io.StringIO()
+            with contextlib.redirect_stdout(printed):
+                exec(compile("\n" * block.line + text, place, "exec"), names)
+        elif block.language == "text" and printed.getvalue():
+            assert text.split() == printed.getvalue().split(), place
+            printed = io.StringIO()
         elif block.language == "sh":
             for line in text.replace("\\\n", " ").splitlines():
                 _command(shlex.split(line, comments=True), place)
