@@ -1,5 +1,6 @@
 """Sphinx: `make docs`, or ``python3 -m sphinx -W docs build/docs`` from the top folder."""
 
+import os
 import re
 import shutil
 from pathlib import Path
@@ -9,22 +10,50 @@ import contact
 
 project = "contact-fenicsx"
 version = release = contact.__version__
-extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.napoleon", "sphinx.ext.mathjax"]
-myst_enable_extensions = ["dollarmath"]
+extensions = [
+    "myst_parser",
+    "sphinx.ext.autodoc",
+    "sphinx.ext.napoleon",
+    "sphinx.ext.mathjax",
+    "sphinx_copybutton",
+    "sphinx_design",
+    "sphinxcontrib.bibtex",
+]
+myst_enable_extensions = ["dollarmath", "colon_fence"]
 myst_heading_anchors = 3
-exclude_patterns = ["results/**"]
-html_theme = "alabaster"
+exclude_patterns = ["results/**", "benchmarks/**", "examples/**"]
+bibtex_bibfiles = ["references.bib"]
+bibtex_reference_style = "author_year"
+html_theme = "pydata_sphinx_theme"
+html_title = f"{project} {version}"
 html_theme_options = {
-    "description": "Frictional contact in FEniCSx",
-    "page_width": "min(1240px, 96%)",  # narrow windows cut nothing off
-    "sidebar_width": "250px",
-    "body_max_width": "none",  # lines of code have 100 characters
-    "code_font_size": "0.8em",
-    "fixed_sidebar": True,
+    "logo": {"text": project},
+    "navbar_align": "left",
+    "header_links_before_dropdown": 8,
+    "show_toc_level": 2,
+    "navigation_with_keys": False,
+    "footer_start": ["copyright"],
+    "footer_end": [],
+    "secondary_sidebar_items": ["page-toc", "edit-this-page"],
+    "use_edit_page_button": bool(os.environ.get("REPOSITORY")),
 }
-html_static_path = ["_static"]  # custom.css, which the theme looks for
+# "edit this page" leads to a public repository, OWNER/NAME on GitHub, where one is named.
+if repository := os.environ.get("REPOSITORY", ""):
+    owner, _, name = repository.partition("/")
+    html_context = {
+        "github_user": owner,
+        "github_repo": name,
+        "github_version": "main",
+        "doc_path": "docs",
+    }
+html_sidebars = {"index": []}
+html_last_updated_fmt = None
+html_static_path = ["_static"]
+html_css_files = ["custom.css"]
 html_show_copyright = False
-autodoc_typehints = "none"
+html_show_sphinx = False
+autodoc_typehints = "description"
+autodoc_typehints_description_target = "documented"
 autodoc_member_order = "bysource"
 napoleon_numpy_docstring = True
 napoleon_use_ivar = True
@@ -58,8 +87,8 @@ def _bars(_: Any, __: str, ___: str, ____: Any, _____: Any, lines: list[str]) ->
 
 
 def _present(app: Any, name: str, source: list[str]) -> None:
-    """Leave out of the index what is not there: notebooks that have not been run."""
-    if name == "index":
+    """Leave notebooks that have not been run out of the examples."""
+    if name == "examples":
         lines = source[0].splitlines()
         pages = re.compile(r"[a-z_/0-9-]+")
         kept = (x for x in lines if not pages.fullmatch(x) or x in app.env.found_docs)

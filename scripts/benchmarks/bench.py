@@ -5,8 +5,8 @@ on the same mesh; (c) one rank against two; (d) GetFEM on the same meshes; (e) p
 penalty; (f) where the time goes; (g) bodies that touch each other; (h) memory on several ranks;
 (i) load steps beside one static solve.
 
-All of it takes half an hour on two cores and 4 GB, and writes docs/benchmarks.md, the table of
-docs/scaling.md and that of the README after each part: after an interruption --parts goes on with
+All of it takes half an hour on two cores and 4 GB, and writes docs/benchmarks.md, its summary
+and the table of docs/scaling.md after each part: after an interruption --parts goes on with
 the others. --large adds meshes of two million unknowns, --coarse is a trial that writes nothing.
 Every measurement is a process of its own, warm (its forms are compiled) and with one BLAS thread a
 rank; ratios are taken within one process. Absolute times are those of the machine.
@@ -25,7 +25,7 @@ from pathlib import Path
 import numpy as np
 
 from meshes import write
-from scripts.benchmarks.pages import write_memory, write_page, write_readme
+from scripts.benchmarks.pages import write_memory, write_page
 from scripts.benchmarks.processes import Run, columns, command, measured, run, started
 from scripts.reporting import Report, parser, subplots
 
@@ -271,7 +271,6 @@ def main(arguments: Sequence[str] | None = None) -> None:
     made.add_argument("--large", action="store_true", help="two million unknowns too, 6 GB")
     made.add_argument("--parts", nargs="+", default=list(PARTS), choices=list(PARTS))
     made.add_argument("--page", type=Path, default=Path("docs/benchmarks.md"))
-    made.add_argument("--readme", type=Path, default=Path("README.md"))
     made.add_argument("--scaling", type=Path, default=Path("docs/scaling.md"))
     given = made.parse_args(arguments)
     np.set_printoptions(precision=3)
@@ -289,7 +288,6 @@ def main(arguments: Sequence[str] | None = None) -> None:
         # Measurements stay, whatever becomes of the rest.
         if not given.coarse or given.page != made.get_default("page"):
             write_page(given.out, names, given.page)
-            write_readme(given.out, given.readme)
             write_memory(given.out, given.scaling)
     if failed:
         sys.exit(f"not measured: {', '.join(failed)}")

@@ -11,9 +11,6 @@ from pathlib import Path
 
 from contact.output.environment import versions
 
-#: The table of the README: its header, and the lines below.
-README_TABLE = re.compile(r"^\| \| unknowns \|.*\n(?:\|.*\n)+", re.MULTILINE)
-
 #: The table of the ranks' memory, likewise.
 MEMORY_TABLE = re.compile(r"^\| \| unknowns \| ranks \|.*\n(?:\|.*\n)+", re.MULTILINE)
 
@@ -41,37 +38,61 @@ def write_page(folder: Path, names: Sequence[str], page: Path) -> None:
     made = ", ".join(f"{name} {version}" for name, version in versions().items())
     pieces.append(f"{made}, {os.cpu_count()} cores, {time.strftime('%Y-%m-%d')}\n")
     page.write_text("\n".join(pieces))
+    write_summary(place)
 
 
-def readme_table(rows: Sequence[Mapping[str, str]]) -> str:
-    """Return the table of the README, of the program's own choice of a start."""
-    lines = [
-        "| | unknowns | solves of the whole body | iterations on the condensed problem | "
-        "time / one linear solve |",
-        "|---|---|---|---|---|",
-    ]
-    for row in rows:
-        plane = row["dimension"] == "2"
-        place = f"plane, {row['cells a unit']} cells a unit" if plane else "space, "
-        place += "" if plane else row["cells a unit"]
-        set_ups, each = int(row["set-ups"]), float(row["iterations a solve"])
-        many = "s" if set_ups > 1 else ""
-        steps = f"{row['solves']}, with "
-        steps += f"{set_ups} factorisation{many}" if plane else f"{each:.1f} iterations each"
-        dense = row["contact solves"] if plane else "—"
-        ratio = float(row["ratio"])
-        lines.append(f"| {place} | {int(row['unknowns']):,} | {steps} | {dense} | {ratio:.1f} |")
+def summary(folder: Path) -> str:
+    """Return the one table of the page on performance, from the files of a folder.
+
+    Each row is a range over the problems of a file, in front of the place that has them all.
+    """
+    lines = ["| time of | over that of | problem | unknowns | ratio |", "|---|---|---|---|---|"]
+    ratios = [row for row in _rows(folder / "bench-ratio.csv") if row["start"] != "cold"]
+    for dimension, problem in (("2", "Example 7.2"), ("3", "block in 3-D")):
+        rows = [row for row in ratios if row["dimension"] == dimension]
+        problem = f"{problem}, friction, Hencky's law"
+        lines.append(
+            _range("nonlinear solve | one linear elasticity solve", problem, rows, "ratio")
+        )
+    for row in _rows(folder / "bench-steps.csv"):
+        place = "Example 7.2" if row[""] == "plane" else "block in 3-D"
+        times = f"{row['steps']} load steps | one static solve"
+        lines.append(_range(times, f"{place}, linear material", [row], "ratio"))
+    compared = _rows(folder / "bench-getfem.csv")
+    for name, problem in (("bar", "Example 7.2"), ("Hertz", "Hertz"), ("block", "block in 3-D")):
+        rows = [row for row in compared if row["problem"] == name and row["GetFEM"] == "True"]
+        lines.append(_range("GetFEM | this code", f"{problem}, linear material", rows, "ratio"))
+    plain = _rows(folder / "peer-plain.csv")
+    lines.append(_range("plain dolfinx with a penalty | this code", "Example 7.2", plain, "ratio"))
+    for row in _rows(folder / "bench-ranks.csv"):
+        place = "Example 7.2" if row["dimension"] == "2" else "block in 3-D"
+        lines.append(_range("one rank | two ranks", place, [row], "speed-up"))
     return "\n".join(lines) + "\n"
 
 
-def write_readme(folder: Path, readme: Path) -> None:
-    """Put the ratios on the largest meshes into the README, where they have been measured."""
-    rows = [row for row in _rows(folder / "bench-ratio.csv") if row["start"] != "cold"]
-    if not rows:
-        return
-    plane, space = ([row for row in rows if row["dimension"] == d] for d in "23")
-    table = readme_table([*plane[-3:], *space[-2:]])
-    readme.write_text(README_TABLE.sub(lambda _: table, readme.read_text()))
+def _range(times: str, problem: str, rows: Sequence[Mapping[str, str]], key: str) -> str:
+    """Return a row of the summary: the range of a column of some rows."""
+    values, sizes = (
+        [float(row[key]) for row in rows],
+        [int(row["unknowns"]) for row in rows if "unknowns" in row],
+    )
+    return f"| {times} | {problem} | {_from_to(sizes, ',')} | {_from_to(values, '.2g')} |"
+
+
+def _from_to(values: Sequence[float], form: str) -> str:
+    """Return the least and the greatest of some values; a dash for none."""
+    ends = (
+        dict.fromkeys(f"{value:{form}}" for value in (min(values), max(values)))
+        if values
+        else ["—"]
+    )
+    return " to ".join(ends)
+
+
+def write_summary(folder: Path) -> None:
+    """Write the table of the page on performance beside the files that it is made from."""
+    if (folder / "bench-ratio.csv").is_file():
+        (folder / "summary.md").write_text(summary(folder))
 
 
 def write_memory(folder: Path, page: Path) -> None:

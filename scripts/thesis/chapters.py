@@ -26,6 +26,8 @@ class Part:
         Whether it makes tables, and figures.
     package
         Where the script is.
+    page
+        Name of the page, one of `PAGES`.
     """
 
     script: str
@@ -33,6 +35,7 @@ class Part:
     tables: bool = True
     figures: bool = True
     package: str = "thesis"
+    page: str = "thesis-studies"
 
     @property
     def module(self) -> str:
@@ -40,27 +43,90 @@ class Part:
         return f"scripts.{self.package}.{self.script}"
 
 
+#: Name of a page of results -> its title.
+PAGES = {
+    "thesis-mechanics": "Chapters 3, 4 and 7: elasto-plastic bodies",
+    "thesis-piezo": "Chapters 5 and 8: electro-elasto-plastic bodies",
+    "thesis-compliance": "Chapters 6 and 8: compliant and conductive foundations",
+    "thesis-studies": "Studies beside the thesis",
+}
+
 PARTS = (
-    Part("setups", "Set-ups and constants: Figures 1.1, 1.2, 7.1, 7.3, 8.1, 8.8, Table 8.1"),
-    Part("hertz", "Example 7.1: Hertz's cylinder, and a sphere"),
-    Part("table_7_1", "Example 7.2: Table 7.1, Algorithms 1 and 2", figures=False),
-    Part("figures_mechanics", "Example 7.2: Figures 7.4, 7.5, 7.7 and 7.8", tables=False),
-    Part("table_7_2", "Example 7.2: Table 7.2, the penalty method, Theorem 4.2"),
-    Part("convergence_mechanics", "Figure 7.6 and Theorems 3.2, 4.3 and 4.5", package="studies"),
-    Part("corner", "The singular corner of Example 7.2", figures=False, package="studies"),
+    Part(
+        "setups",
+        "Set-ups and constants: Figures 1.1, 1.2, 7.1, 7.3, 8.1, 8.8, Table 8.1",
+        page="thesis-mechanics",
+    ),
+    Part("hertz", "Example 7.1: Hertz's cylinder, and a sphere", page="thesis-mechanics"),
+    Part(
+        "table_7_1",
+        "Example 7.2: Table 7.1, Algorithms 1 and 2",
+        figures=False,
+        page="thesis-mechanics",
+    ),
+    Part(
+        "figures_mechanics",
+        "Example 7.2: Figures 7.4, 7.5, 7.7 and 7.8",
+        tables=False,
+        page="thesis-mechanics",
+    ),
+    Part(
+        "table_7_2",
+        "Example 7.2: Table 7.2, the penalty method, Theorem 4.2",
+        page="thesis-mechanics",
+    ),
+    Part(
+        "convergence_mechanics",
+        "Figure 7.6 and Theorems 3.2, 4.3 and 4.5",
+        package="studies",
+        page="thesis-mechanics",
+    ),
+    Part(
+        "corner",
+        "The singular corner of Example 7.2",
+        figures=False,
+        package="studies",
+        page="thesis-mechanics",
+    ),
     Part("pressure_convergence", "Convergence of the contact pressure", package="studies"),
     Part("curved_foundations", "Curved foundations", figures=False, package="studies"),
     Part("pressure_on_axis", "Pressure on the axis", figures=False, package="studies"),
     Part("nonlocal_friction", "Non-local friction at work", package="studies"),
-    Part("tables_piezo", "Examples 8.1 and 8.2: Tables 8.2 and 8.3", figures=False),
-    Part("figures_piezo", "Examples 8.1 and 8.2: Figures 8.2 to 8.7", tables=False),
-    Part("tables_compliance", "Examples 8.3 and 8.4: Table 8.4", figures=False),
-    Part("stopping_8_3", "Example 8.3: the thesis's two iterations", figures=False),
-    Part("figures_compliance", "Examples 8.3 and 8.4: figures", tables=False),
+    Part(
+        "tables_piezo",
+        "Examples 8.1 and 8.2: Tables 8.2 and 8.3",
+        figures=False,
+        page="thesis-piezo",
+    ),
+    Part(
+        "figures_piezo",
+        "Examples 8.1 and 8.2: Figures 8.2 to 8.7",
+        tables=False,
+        page="thesis-piezo",
+    ),
+    Part(
+        "tables_compliance",
+        "Examples 8.3 and 8.4: Table 8.4",
+        figures=False,
+        page="thesis-compliance",
+    ),
+    Part(
+        "stopping_8_3",
+        "Example 8.3: the thesis's two iterations",
+        figures=False,
+        page="thesis-compliance",
+    ),
+    Part(
+        "figures_compliance",
+        "Examples 8.3 and 8.4: figures",
+        tables=False,
+        page="thesis-compliance",
+    ),
     Part(
         "limit_theorem",
         "Theorems 6.3 to 6.5: limits of the compliant foundation",
         package="studies",
+        page="thesis-compliance",
     ),
     Part("refinement_8", "Chapter 8 on finer meshes", figures=False, package="studies"),
     Part("sensitivity", "Parameters that the thesis does not print", package="studies"),

@@ -7,11 +7,16 @@ from pathlib import Path
 
 import pytest
 
+from scripts import command_page
+from scripts.thesis import results_page
+from scripts.thesis.chapters import PARTS
 from tests.docs.pages import ROOT, blocks, run
 
 DOCS = ROOT / "docs"
 PAGES = sorted(
-    path for path in DOCS.glob("*.md") if path.name not in ("architecture.md", "results.md")
+    path
+    for path in DOCS.glob("*.md")
+    if path.name not in ("architecture.md", "results.md") and not path.name.startswith("thesis-")
 )
 #: What makes the problems of a page small.
 SMALL = {'bar.toml")': 'bar.toml", ["mesh.cells=[16, 4]"])'}
@@ -50,16 +55,46 @@ def test_links_lead_somewhere(page: Path) -> None:
             assert (page.parent / target).read_bytes()[-8:-4] == b"IEND", target
 
 
-def test_the_index_has_all_pages() -> None:
-    index = (DOCS / "index.md").read_text()
-    listed = set(re.findall(r"^([a-z-]+)$", index, re.M))
-    assert {page.stem for page in DOCS.glob("*.md")} - {"index"} <= listed
+def listed(page: str) -> list[str]:
+    """Return the pages in the tables of contents of a page."""
+    tables = re.findall(r"^```{toctree}\n(.*?)^```", (DOCS / f"{page}.md").read_text(), re.M | re.S)
+    return re.findall(r"^([a-z][a-z-]*)$", "".join(tables), re.M)
+
+
+def test_every_page_is_in_one_table_of_contents() -> None:
+    reached, front = ["index"], ["index"]
+    while front:
+        front = [below for page in front for below in listed(page)]
+        reached += front
+    assert sorted(reached) == sorted(page.stem for page in DOCS.glob("*.md"))
+
+
+def test_the_summary_of_the_thesis_is_that_of_its_files() -> None:
+    text = (DOCS / "results.md").read_text()
+    made = text.partition("## Versions\n\n")[2].strip()
+    assert results_page.overview(DOCS / "results", made) == text
+    for part in PARTS:
+        assert f"\n## {part.heading}\n" in (DOCS / f"{part.page}.md").read_text()
+
+
+def test_the_command_line_is_that_of_the_program() -> None:
+    assert command_page.PAGE.read_text() == command_page.page(), "scripts.command_page"
+
+
+def test_every_citation_has_its_entry() -> None:
+    known = set(re.findall(r"^@\w+{(\w+),", (DOCS / "references.bib").read_text(), re.M))
+    pages = [*DOCS.glob("*.md"), *(ROOT / "scripts" / "thesis").glob("*.py")]
+    text = "".join(page.read_text() for page in pages)
+    cited = {key for keys in re.findall(r"{cite:[pt]}`([^`]+)`", text) for key in keys.split(",")}
+    cited |= set(re.findall(r"@([a-z]+\d{4})\b", (ROOT / "paper.md").read_text()))
+    assert len(cited) > 30 and not cited - known
 
 
 def test_pages_build_without_warnings(tmp_path: Path) -> None:
     """All but the notebooks, which `make docs` executes first."""
     pytest.importorskip("sphinx")
-    pytest.importorskip("myst_parser")
+    for module in ("myst_parser", "pydata_sphinx_theme", "sphinx_design", "sphinxcontrib.bibtex"):
+        pytest.importorskip(module)
     command = [sys.executable, "-m", "sphinx", "-q", "-W", "--keep-going", "-D"]
     command += ["exclude_patterns=results/**,notebooks/**", str(DOCS), str(tmp_path)]
     done = subprocess.run(command, capture_output=True, text=True, timeout=300)

@@ -6,18 +6,26 @@ import pytest
 
 import contact
 from scripts.benchmarks import bench
-from scripts.benchmarks.pages import write_memory, write_readme
+from scripts.benchmarks.pages import summary, write_memory
 from scripts.benchmarks.phases import PHASES
 from scripts.reporting import Report
 
-SCALING = Path(__file__).parents[2] / "docs" / "scaling.md"
+DOCS = Path(__file__).parents[2] / "docs"
+SCALING, MEASURED = DOCS / "scaling.md", DOCS / "benchmarks"
+
+
+def test_tables_of_pages_are_those_of_the_measured_files(tmp_path):
+    assert (MEASURED / "summary.md").read_text() == summary(MEASURED)
+    page = tmp_path / "scaling.md"
+    page.write_text(SCALING.read_text())
+    write_memory(MEASURED, page)
+    assert page.read_text() == SCALING.read_text()
 
 
 def test_the_table_of_ranks_is_replaced_where_memory_has_been_measured(tmp_path):
     page = tmp_path / "scaling.md"
     page.write_text(SCALING.read_text())
     write_memory(tmp_path, page)
-    write_readme(tmp_path, tmp_path / "none.md")
     assert page.read_text() == SCALING.read_text()
     row = {"dimension": 3, "unknowns": 1234567, "ranks": 2, "bytes an unknown": 99.6}
     row |= {"over one rank": 1.234, "linear solve": 50.2, "its over one rank": 1.119}
@@ -45,8 +53,8 @@ def test_the_other_parts_are_measured_where_one_fails(tmp_path, monkeypatch, cap
     parts = {"d": (fails, ("bench-getfem",)), "e": (works, ("peer-plain",))}
     monkeypatch.setattr(bench, "PARTS", parts)
     monkeypatch.setattr(bench, "ORDER", "de")
-    pages = [tmp_path / name for name in ("page.md", "readme.md", "scaling.md")]
-    where = zip(("--page", "--readme", "--scaling"), map(str, pages), strict=True)
+    pages = [tmp_path / name for name in ("page.md", "scaling.md")]
+    where = zip(("--page", "--scaling"), map(str, pages), strict=True)
     given = ["--out", str(tmp_path / "out"), *(word for pair in where for word in pair)]
     with pytest.raises(SystemExit, match="not measured: d"):
         bench.main([*given, "--parts", "d", "e"])

@@ -1,0 +1,36 @@
+"""The tables of the gallery are those of the program, and its references are met."""
+
+import re
+from pathlib import Path
+
+import pytest
+
+from scripts.gallery import EXAMPLES, FOLDER, solved
+from tests.docs.pages import ROOT
+
+SLOW = ("bimorph", "partial-slip", "indentation")
+
+
+@pytest.mark.parametrize(
+    "name", [pytest.param(n, marks=pytest.mark.slow) if n in SLOW else n for n in EXAMPLES]
+)
+def test_an_example_has_the_values_of_its_table(name: str, tmp_path: Path) -> None:
+    pytest.importorskip("gmsh")
+    example = EXAMPLES[name]
+    shown = (FOLDER / f"{name}.md").read_text()
+    rows = re.findall(r"^\| (.+) \| (\S+) \| (\S+) \| .+ \|$", shown, re.M)
+    found = list(example.compare(solved(example, tmp_path, figures=False)))
+    assert [row[0] for row in rows] == [quantity for quantity, _, _ in found]
+    for row, (_, computed, reference) in zip(rows, found, strict=True):
+        assert float(row[1]) == pytest.approx(computed, rel=1e-3)
+        assert float(row[2]) == pytest.approx(reference, rel=1e-3)
+        assert computed == pytest.approx(reference, rel=example.within)
+
+
+def test_every_example_has_its_page() -> None:
+    pages = {path.stem.removeprefix("example-") for path in (ROOT / "docs").glob("example-*.md")}
+    assert pages == set(EXAMPLES)
+    for name, example in EXAMPLES.items():
+        text = (ROOT / "docs" / f"example-{name}.md").read_text()
+        assert f"scripts/cases/{example.case}.toml" in text
+        assert all(change in text for change in example.changes)
