@@ -23,6 +23,7 @@ myst_enable_extensions = ["dollarmath", "colon_fence"]
 myst_heading_anchors = 3
 exclude_patterns = ["results/**", "benchmarks/**", "examples/**"]
 bibtex_bibfiles = ["references.bib"]
+add_module_names = False
 bibtex_reference_style = "author_year"
 html_theme = "pydata_sphinx_theme"
 html_title = f"{project} {version}"

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+import contact
 from scripts import command_page
 from scripts.thesis import results_page
 from scripts.thesis.chapters import PARTS
@@ -81,6 +82,14 @@ def test_the_command_line_is_that_of_the_program() -> None:
     assert command_page.PAGE.read_text() == command_page.page(), "scripts.command_page"
 
 
+def test_every_public_name_has_its_place_in_the_reference() -> None:
+    text = "".join(page.read_text() for page in DOCS.glob("api-*.md"))
+    listed = set(re.findall(r"^\.\. auto\w+:: (\S+)$", text, re.M))
+    members = set(re.findall(r"\w+", "".join(re.findall(r":members:(.*)$", text, re.M))))
+    for name, (module, there) in contact._PUBLIC.items():
+        assert f"{module}.{there}" in listed or there in members, name
+
+
 def test_every_citation_has_its_entry() -> None:
     known = set(re.findall(r"^@\w+{(\w+),", (DOCS / "references.bib").read_text(), re.M))
     pages = [*DOCS.glob("*.md"), *(ROOT / "scripts" / "thesis").glob("*.py")]
@@ -99,7 +108,7 @@ def test_pages_build_without_warnings(tmp_path: Path) -> None:
     command += ["exclude_patterns=results/**,notebooks/**", str(DOCS), str(tmp_path)]
     done = subprocess.run(command, capture_output=True, text=True, timeout=300)
     assert done.returncode == 0, done.stderr
-    assert "Domain.from_mesh" in (tmp_path / "api.html").read_text()
+    assert "Domain.from_mesh" in (tmp_path / "api-geometry.html").read_text()
     if Path("/usr/share/javascript/mathjax").is_dir():  # formulas are drawn without a network
         assert "_static/mathjax/MathJax.js" in (tmp_path / "theory.html").read_text()
         assert (tmp_path / "_static/mathjax/jax/output/SVG/jax.js").exists()
