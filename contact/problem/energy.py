@@ -68,9 +68,9 @@ class Balance:
     energy
         Stored at its end.
     dissipation
-        StepResult by friction during the step.
+        Taken by friction during the step.
     plastic
-        StepResult by plastic flow; None for a body without.
+        Taken by plastic flow; None for a body without.
     """
 
     work: float

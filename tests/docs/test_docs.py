@@ -8,6 +8,17 @@ from pathlib import Path
 import pytest
 
 import contact
+from contact.methods import (
+    chord,
+    condensed_step,
+    continuation,
+    interior_point,
+    load_stepping,
+    newton,
+    newton_step,
+    parameters,
+)
+from contact.methods.options import FixedPointOptions, NewtonOptions
 from scripts import command_page
 from scripts.thesis import results_page
 from scripts.thesis.chapters import PARTS
@@ -80,6 +91,52 @@ def test_the_summary_of_the_thesis_is_that_of_its_files() -> None:
 
 def test_the_command_line_is_that_of_the_program() -> None:
     assert command_page.PAGE.read_text() == command_page.page(), "scripts.command_page"
+
+
+def test_files_that_pages_name_are_there() -> None:
+    pages = [page for page in DOCS.glob("*.md") if page.name != "changes.md"]
+    named = {
+        name
+        for page in pages
+        for name in re.findall(
+            r"`((?:contact|forms|meshes|scripts|tests)/[\w/.-]+)`", page.read_text()
+        )
+    }
+    assert len(named) > 20
+    missing = [name for name in sorted(named) if not (ROOT / name).exists()]
+    assert not [name for name in missing if "NAME" not in name]
+
+
+def test_constants_of_the_algorithms_are_those_of_the_code() -> None:
+    text = (DOCS / "algorithms.md").read_text()
+    options = NewtonOptions()
+    said = {
+        f"after [{options.stagnation_limit}] steps in which": newton.PROGRESS == 0.5,
+        f"after [{options.max_iterations}] steps;": True,
+        "is [10³] times all loads": parameters.OVERESTIMATE == 1e3,
+        "limited to [1/4] κ": options.softening == 0.25,
+        "10^4 \\max(c, \\kappa)": options.gamma == 1e4,
+        "below [1/10] of the largest residual": newton_step.SMALL == 0.1,
+        "the forcing term [10⁻²]": newton_step.FORCING == 1e-2,
+        "each three steps": newton_step.STAGNANT == 3,
+        "[10^{-2}]\\,\\kappa$ is added": newton_step.REGULARISATION == 1e-2,
+        "to [10⁻³] of the residual before": condensed_step.CONTACT_PART == 1e-3,
+        "has not fallen to [1/20]": condensed_step.UNSOLVED == 0.05,
+        "below a residual of [0.05]": chord.RADIUS == 0.05,
+        f"within [{chord.MOST_STEPS:g}] steps": True,
+        f"the last [{chord.DEPTH}] steps": True,
+        f"with the stagnation limit [{newton.SHORT}]": True,
+        f"at most [{interior_point.LIMIT}] times": True,
+        f"at most [{interior_point.UPDATES}] times": True,
+        "below [10⁻¹⁰] of the work": interior_point.CLOSED == 1e-10,
+        f"[{interior_point.SHORTEST} to {interior_point.LONGEST}] of the way": True,
+        "the part [10⁻⁹]": continuation.FIRST_PART == 1e-9,
+        "by [10³]": continuation.FACTOR == 1e3,
+        f"down to [{continuation.LEAST_FACTOR}]": True,
+        f"over [{FixedPointOptions().depth}] solves": True,
+        f"up to [{load_stepping.HALVINGS}] times": True,
+    }
+    assert [words for words, holds in said.items() if words not in text or not holds] == []
 
 
 def test_every_public_name_has_its_place_in_the_reference() -> None:
