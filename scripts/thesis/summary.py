@@ -50,7 +50,7 @@ class Row:
             The address of the section.
         """
         numbers = ["—", "—"]
-        if self.file:
+        if self.file and (results / self.script / self.file).is_file():
             with (results / self.script / self.file).open() as stream:
                 rows = list(csv.DictReader(stream))
             numbers = [
