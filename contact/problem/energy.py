@@ -68,9 +68,9 @@ class Balance:
     energy
         Stored at its end.
     dissipation
-        Taken by friction during the step.
+        StepResult by friction during the step.
     plastic
-        Taken by plastic flow; None for a body without.
+        StepResult by plastic flow; None for a body without.
     """
 
     work: float
