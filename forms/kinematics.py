@@ -223,3 +223,18 @@ def von_mises(sigma: Expr) -> Expr:
     """Return the von Mises stress sqrt(3/2) |dev sigma| of a 3 x 3 stress tensor."""
     s = ufl.dev(sigma)
     return ufl.sqrt(1.5 * ufl.inner(s, s))
+
+
+def principal_values(sigma: Expr) -> Expr:
+    """Return the eigenvalues of a symmetric 3 x 3 tensor, the largest first.
+
+    By the angle of Lode, Smith, Comm. ACM 4 (1961) 168; equal ones are off by the root of rounding.
+    """
+    s = ufl.dev(sigma)
+    size = ufl.sqrt(ufl.inner(s, s) / 6)
+    # Its cube would vanish before it does.
+    unit = s / ufl.max_value(size, 1e-150)
+    cosine = ufl.max_value(ufl.min_value(ufl.det(unit) / 2, 1.0), -1.0)
+    angle, mean = ufl.acos(cosine) / 3, ufl.tr(sigma) / 3
+    turns = (0.0, -2 * ufl.pi / 3, 2 * ufl.pi / 3)
+    return ufl.as_vector([mean + 2 * size * ufl.cos(angle + turn) for turn in turns])

@@ -98,7 +98,8 @@ SECTIONS: Mapping[str, str] = {
     q.STEPS: "",
     q.SWEEP: "",
     q.BODY: "At the nodes. All but displacement and potential are averages of the cells around a "
-    "node, weighted by volume; as they are, they stand in the cells under NAME`_cell`.",
+    "node, weighted by volume, in each region for itself: a node between regions is a point of "
+    "each. As they are, they stand in the cells under NAME`_cell`.",
     q.SURFACE: "At the nodes; `nan` where a node is held and hence no contact node.",
     q.OPPOSITE: "",
 }

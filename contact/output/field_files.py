@@ -18,11 +18,12 @@ from pathlib import Path
 from typing import Any, TypeAlias
 
 import numpy as np
-from dolfinx import fem, has_adios2, io
+from dolfinx import fem, has_adios2, io, la
 from mpi4py import MPI
+from numpy.typing import NDArray
 
 from contact.errors import InputError
-from contact.output.fields import DerivedFields, linear, unknowns
+from contact.output.fields import DerivedFields, discontinuous, linear, unknowns
 from contact.output.folder import ROOM
 from contact.output.formats import Grid, Values, gathered, write_vtu
 from contact.output.solution import Solution
@@ -43,8 +44,9 @@ def write_fields(solution: Solution, folder: Path) -> None:
     ``fields.vtu`` holds all of them, the derived ones both averaged at the nodes and as they
     are in the cells. So do ``fields.bp``, at the nodes, and ``cells.bp``, in the cells: one VTX
     file has one kind of elements only. ``fields.xdmf`` has those at the nodes, of degree 1 at
-    most. Of an evolution each has all steps; ``fields.vtu`` has the last one, and ``fields.pvd``
-    names files with the main fields of all.
+    most; of several regions the means of the cells. Averages stay in their region. Of an evolution
+    each has all steps; ``fields.vtu`` has the last one, and ``fields.pvd`` names files with the
+    main fields of all.
 
     Raises
     ------
@@ -57,8 +59,10 @@ def write_fields(solution: Solution, folder: Path) -> None:
     match solution.output.fields:
         case "vtu":
             share = body_share(problem, solution.state)
+            in_cells = {**share.in_cells, "region": regions_of(problem)}
             if solution.error is not None:
-                share = replace(share, in_cells={**share.in_cells, "error": solution.error.cells})
+                in_cells["error"] = solution.error.cells
+            share = replace(share, in_cells=in_cells)
             write_share(problem.comm, share, folder / "fields.vtu")
             if solution.steps:
                 _write_series(problem, frames, folder)
@@ -66,6 +70,15 @@ def write_fields(solution: Solution, folder: Path) -> None:
             _write_vtx(problem, frames, folder)
         case "xdmf":
             _write_xdmf(problem, frames, folder)
+
+
+def regions_of(problem: ContactProblem) -> NDArray[np.int32]:
+    """Return the region of each owned cell: its place among the names, the first of several."""
+    domain = problem.domain
+    found = np.full(domain.mesh.topology.index_map(domain.dim).size_local, -1, dtype=np.int32)
+    for k, name in reversed([*enumerate(sorted(domain.regions))]):
+        found[domain.regions[name]] = k
+    return found
 
 
 def _frames(solution: Solution) -> list[Frame]:
@@ -101,18 +114,19 @@ def body_share(
     `derived` are the derived fields at the state, where they are at hand.
     """
     body, d = problem.equilibrium, problem.dim
-    space = body.space
+    space, derived = body.space, derived or DerivedFields(body, state)
     links, index_map = space.dofmap.list, space.dofmap.index_map
     owned = body.domain.mesh.topology.index_map(d).size_local
-    cells = index_map.local_to_global(links[:owned].reshape(-1)).reshape(owned, links.shape[1])
-    points = space.tabulate_dof_coordinates()[: index_map.size_local, :d]
+    numbers, nodes, groups = _points_of(derived)
+    cells = numbers[links[:owned], derived.groups[:, None]]
+    points = space.tabulate_dof_coordinates()[nodes, :d]
 
     def nodal(function: fem.Function) -> Values:
-        """Return a function's values at the owned nodes of the body's space."""
+        """Return a function's values at the points."""
         dofmap = function.function_space.dofmap
         values = np.empty((index_map.size_local + index_map.num_ghosts, dofmap.index_map_bs))
         values[links] = function.x.array.reshape(-1, dofmap.index_map_bs)[dofmap.list]
-        return _rows(values[: index_map.size_local])
+        return _rows(values[nodes])
 
     def mean(function: fem.Function) -> Values:
         """Return a discontinuous function's means over the owned cells."""
@@ -120,18 +134,46 @@ def body_share(
         values = function.x.array.reshape(-1, dofmap.index_map_bs)[dofmap.list[:owned]]
         return _rows(values.mean(axis=1))
 
-    derived = derived or DerivedFields(body, state)
-    at_points, in_cells = unknowns(body, state.x), {}
-    if names is None or set(names) - set(at_points):
-        at_points |= derived.nodes()
-        in_cells = derived.cells()
-    return Grid(
-        points,
-        cells,
-        d,
-        {k: nodal(f) for k, f in at_points.items() if names is None or k in names},
-        {f"{k}_cell": mean(f) for k, f in in_cells.items() if names is None or k in names},
-    )
+    of_nodes, in_cells = unknowns(body, state.x), {}
+    at_points = {k: nodal(f) for k, f in of_nodes.items() if names is None or k in names}
+    if names is None or set(names) - set(of_nodes):
+        means, in_cells = derived.means()[groups, nodes], derived.cells()
+        at_points |= {
+            k: _rows(means[:, columns])
+            for k, columns in derived.columns.items()
+            if names is None or k in names
+        }
+    of_cells = {f"{k}_cell": mean(f) for k, f in in_cells.items() if names is None or k in names}
+    return Grid(points, cells, d, at_points, of_cells)
+
+
+def _points_of(
+    derived: DerivedFields,
+) -> tuple[NDArray[np.int64], NDArray[np.intp], NDArray[np.intp]]:
+    """Return the points of a grid: a node between groups of cells has one for each. Collective.
+
+    Returns
+    -------
+    The number of the point of each local node and group over all ranks, shape (nodes, groups), -1
+    for none; the nodes and the groups of the points of this rank.
+    """
+    space, groups = derived.body.space, derived.groups
+    index_map, count = space.dofmap.index_map, derived.group_count
+    vector = la.vector(index_map, count, dtype=np.int64)
+    there = vector.array.reshape(-1, count)
+    there[space.dofmap.list[: groups.size], groups[:, None]] = 1
+    vector.scatter_reverse(la.InsertMode.add)
+    own = there[: index_map.size_local]
+    nodes, of_group = np.nonzero(own)
+    # A node's first point stands where the node does, further ones behind all nodes.
+    order = np.argsort(np.diff(nodes, prepend=-1) == 0, kind="stable")
+    nodes, of_group = nodes[order], of_group[order]
+    comm = derived.body.comm
+    begin = comm.exscan(nodes.size) or 0
+    own[:] = -1
+    own[nodes, of_group] = begin + np.arange(nodes.size)
+    vector.scatter_forward()
+    return there, nodes, of_group
 
 
 def _rows(values: Values) -> Values:
@@ -174,20 +216,51 @@ def _copy(given: Iterable[fem.Function], into: Iterable[fem.Function]) -> None:
 
 def _write_xdmf(problem: ContactProblem, frames: Sequence[Frame], folder: Path) -> None:
     derived = DerivedFields(problem.equilibrium, frames[0][1])
-    at_corners = [linear(f) for f in _at_nodes(problem, frames[0][1], derived)]
+    at_corners = _at_corners(problem, frames[0][1], derived)
     claim_room(problem.comm, folder, len(frames) * _bytes(at_corners))
     path = folder / "fields.xdmf"
     with library_errors(path), closing(lambda: io.XDMFFile(problem.comm, path, "w")) as file:
         file.write_mesh(problem.domain.mesh)
         for time, state in frames:
             derived.move_to(state)
-            for function in _at_nodes(problem, state, derived):
-                file.write_function(linear(function), time)
+            for function in _at_corners(problem, state, derived):
+                file.write_function(function, time)
 
 
 def _at_nodes(problem: ContactProblem, state: State, derived: DerivedFields) -> list[fem.Function]:
-    """Return all fields at the nodes."""
-    return list((unknowns(problem.equilibrium, state.x) | derived.nodes()).values())
+    """Return all fields at the nodes, all discontinuous where the derived ones are."""
+    found, nodal = unknowns(problem.equilibrium, state.x), derived.nodes()
+    if derived.group_count > 1:
+        found = {name: _apart(function) for name, function in found.items()}
+    return list((found | nodal).values())
+
+
+def _apart(function: fem.Function) -> fem.Function:
+    """Return a nodal function with values of each cell for itself."""
+    space = function.function_space
+    shape = space.ufl_element().reference_value_shape
+    made = discontinuous(space, function.name, shape)
+    values = function.x.array.reshape(-1, space.dofmap.index_map_bs)
+    array = made.x.array.reshape(-1, values.shape[1])
+    array[made.function_space.dofmap.list] = values[space.dofmap.list]
+    return made
+
+
+def _at_corners(
+    problem: ContactProblem, state: State, derived: DerivedFields
+) -> list[fem.Function]:
+    """Return the fields for XDMF: of several regions the derived ones are the cells' means."""
+    if derived.group_count == 1:
+        return [linear(f) for f in _at_nodes(problem, state, derived)]
+    found = [linear(f) for f in unknowns(problem.equilibrium, state.x).values()]
+    for name, function in derived.cells().items():
+        space = function.function_space
+        made = fem.Function(fem.functionspace(space.mesh, ("DG", 0, derived.shapes[name])))
+        made.name = name
+        values = function.x.array.reshape(-1, space.dofmap.index_map_bs)[space.dofmap.list]
+        made.x.array[:] = values.mean(axis=1).ravel()
+        found.append(made)
+    return found
 
 
 def _vtx(path: Path, functions: Sequence[fem.Function]) -> Callable[[], Any]:

@@ -11,7 +11,7 @@ from typing import NamedTuple
 import basix.ufl
 import numpy as np
 import ufl
-from dolfinx import fem
+from dolfinx import fem, la
 from dolfinx.la import InsertMode
 from mpi4py import MPI
 from numpy.typing import NDArray
@@ -23,6 +23,7 @@ from contact.body.equilibrium import BodyEquilibrium
 from contact.body.materials import law_with_constants, piezo_with_constants
 from contact.history import BodyState, Evaluated
 from contact.mesh.simplices import corners, inverse_jacobians, measures, rule
+from contact.mesh.together import pieces
 from contact.output.quantities import BODY, values_of
 from contact.problem.problem import ContactProblem
 from contact.problem.state import State
@@ -30,7 +31,7 @@ from contact.typing import Array
 from forms.elasticity import Anisotropic
 from forms.hencky import is_linear, stress
 from forms.history import HistoryLaw, components, to_tensor
-from forms.kinematics import deviator_squared, strain, von_mises
+from forms.kinematics import deviator_squared, principal_values, strain, von_mises
 from forms.ops import maximum, sqrt
 from forms.piezo import coupling_stress, electric_displacement
 
@@ -56,6 +57,12 @@ def nodal_function(
     function.x.array.reshape(-1, values.shape[1])[target] = values[source.dofmap.list]
     function.x.scatter_forward()
     return function
+
+
+def discontinuous(space: fem.FunctionSpace, name: str, shape: tuple[int, ...]) -> fem.Function:
+    """Return a function on the nodes of the cells of a Lagrange space, each for itself."""
+    degree = space.ufl_element().embedded_superdegree
+    return fem.Function(fem.functionspace(space.mesh, ("DG", degree, shape)), name=name)
 
 
 def linear(function: fem.Function) -> fem.Function:
@@ -114,6 +121,11 @@ class Point:
         self.stress = stress(law, self.strain)
         if self._piezo is not None:
             self.stress += coupling_stress(self._piezo, self._phi)
+
+    @property
+    def principal_stress(self) -> Expr:
+        """The principal stresses, the largest first."""
+        return principal_values(self.stress)
 
     @property
     def von_mises(self) -> Expr:
@@ -270,26 +282,73 @@ class DerivedFields:
             function.x.scatter_forward()
         return made
 
-    def nodes(self) -> dict[str, fem.Function]:
-        """Return the fields at the nodes: the cells' values, averaged by volume."""
-        space, volume = self.body.space, self._volumes()
+    @cached_property
+    def groups(self) -> NDArray[np.int32]:
+        """The group of each owned cell: one for all cells that are in the same regions. Collective.
+
+        The same groups, counted in the same order, on all ranks.
+        """
+        domain = self.body.domain
+        count = domain.mesh.topology.index_map(domain.dim).size_local
+        found = pieces(domain.comm, count, domain.regions.values())
+        groups = np.full(count, len(found), dtype=np.int32)
+        for k, (_, cells) in enumerate(found):
+            groups[cells] = k
+        return groups
+
+    @cached_property
+    def group_count(self) -> int:
+        """The number of groups. Collective."""
+        return 1 + int(self.body.comm.allreduce(int(self.groups.max(initial=0)), op=MPI.MAX))
+
+    def means(self) -> Array:
+        """Return the cells' values around nodes, averaged by volume in each group. Collective.
+
+        Returns
+        -------
+        Shape (groups, local nodes, components); NaN at nodes of no cell of a group.
+        """
+        space, volume, groups = self.body.space, self._volumes(), self.groups
+        index_map, links = space.dofmap.index_map, space.dofmap.list
+        nodes = index_map.size_local + index_map.num_ghosts
         count = sum(math.prod(shape) for shape in self.shapes.values())
-        total = fem.Function(
-            fem.functionspace(space.mesh, ("Lagrange", self.body.degree, (count + 1,)))
-        )
-        sums = total.x.array.reshape(-1, count + 1)
+        sums = np.zeros((self.group_count, nodes, count + 1))
         for chosen, values in self.chunks():
-            dofs = total.function_space.dofmap.list[chosen]
+            dofs = links[chosen]
             weight = np.broadcast_to(volume[chosen, None, None], (*dofs.shape, 1))
             at_nodes = np.broadcast_to(values, (*dofs.shape, count)) * weight
-            np.add.at(sums, dofs, np.concatenate([at_nodes, weight], axis=2))
-        total.x.scatter_reverse(InsertMode.add)
-        total.x.scatter_forward()
-        means = sums[:, :-1] / sums[:, -1:]
-        return {
-            name: nodal_function(name, total.function_space, means[:, columns], self.shapes[name])
-            for name, columns in self.columns.items()
-        }
+            every = np.concatenate([at_nodes, weight], axis=2)
+            np.add.at(sums, (groups[chosen, None], dofs), every)
+        vector = la.vector(index_map, count + 1)
+        for group in sums:
+            vector.array[:] = group.ravel()
+            vector.scatter_reverse(InsertMode.add)
+            vector.scatter_forward()
+            group[:] = vector.array.reshape(group.shape)
+        with np.errstate(invalid="ignore"):
+            return np.asarray(sums[..., :-1] / sums[..., -1:])
+
+    def nodes(self) -> dict[str, fem.Function]:
+        """Return the fields at the nodes: the cells' values, averaged by volume. Collective.
+
+        In a mesh of several regions averages stay within each: the functions are discontinuous
+        between them, of the same degree.
+        """
+        means, space, groups = self.means(), self.body.space, self.groups
+        if self.group_count == 1:
+            return {
+                name: nodal_function(name, space, means[0][:, columns], self.shapes[name])
+                for name, columns in self.columns.items()
+            }
+        made = {}
+        links = space.dofmap.list[: groups.size]
+        for name, columns in self.columns.items():
+            made[name] = discontinuous(space, name, self.shapes[name])
+            dofs = made[name].function_space.dofmap.list[: groups.size]
+            array = made[name].x.array.reshape(-1, columns.stop - columns.start)
+            array[dofs] = means[groups[:, None], links, columns]
+            made[name].x.scatter_forward()
+        return made
 
     def _volumes(self) -> Array:
         """Return the volumes of the owned cells, or of the rings that they are."""

@@ -140,6 +140,7 @@ _RUN = (
         "points in the reference configuration: in 2-D a list of one, about z and "
         "counter-clockwise, in 3-D a vector.",
     ),
+    Quantity("regions", "", "Names of the regions.", lambda r: sorted(r.problem.domain.regions)),
     Quantity(
         "reactions", "force", "Force of the support of each part on the body, a vector a part. A "
         "node of two parts counts for the one that stands first in the case. With the loads and "
@@ -149,6 +150,10 @@ _RUN = (
     Quantity(
         "reaction_moments", "force · length", "Moments of these, as `contact_moment`.",
         lambda r: {part: held.moment for part, held in r.supports.items()},
+    ),
+    Quantity(
+        "region", "", "Place of the cell's region among `regions` of the summary, from 0. In "
+        "`fields.vtu`, in the cells.", _elsewhere, (BODY,),
     ),
     Quantity(
         "error", "",
@@ -468,7 +473,9 @@ _BODY = (
     Quantity(
         "stress", "stress", "σ, nine components, row by row; tension is positive.", files=(BODY,),
     ),
+    Quantity("principal_stress", "stress", "σ1 ≥ σ2 ≥ σ3, its eigenvalues.", files=(BODY,)),
     Quantity("von_mises", "stress", "Von Mises stress.", files=(BODY,)),
+    Quantity("strain", "", "ε, nine components as of the stress.", files=(BODY,)),
     Quantity("dev_strain", "", "|dev ε|, the norm of the strain deviator.", files=(BODY,)),
     Quantity(
         "plastic_strain", "", "Of `j2`, nine components; `back_stress_1`, ... likewise.",

@@ -100,6 +100,7 @@ def test_fields(written: list[Path]) -> None:
             derived = set(found.point_data) - {"displacement", "potential"}
             assert name == SURFACE or set(found.cell_data) == {
                 "error",
+                "region",
                 *(f"{k}_cell" for k in derived),
             }
 
