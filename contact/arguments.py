@@ -36,8 +36,8 @@ SEEN = 1e4
 TINY = np.finfo(float).tiny
 
 #: Slips, and potential differences, at which laws are looked at; pressures beside them.
-SAMPLES: Array = np.logspace(-9, 3, 49)
-PRESSURES: Array = np.logspace(-6, 6, 13)
+SAMPLES = np.logspace(-9, 3, 49, dtype=np.float64)
+PRESSURES = np.logspace(-6, 6, 13, dtype=np.float64)
 
 
 def expect(name: str, given: Any, accepted: str, fits: object) -> None:

@@ -2,16 +2,27 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Sequence
 from dataclasses import InitVar, dataclass
 from dataclasses import field as default
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 from ufl.core.expr import Expr
 
 from contact.arguments import expect, is_law, several
-from contact.body.fields import Amplitude, Given, Moving, amplitude_of, field, own_amplitude, vector
+from contact.body.fields import (
+    Amplitude,
+    Given,
+    Moving,
+    Number,
+    amplitude_of,
+    field,
+    knows_time,
+    own_amplitude,
+    vector,
+)
 from contact.body.rigid import Electrode, Rigid
 from contact.errors import InputError
 from contact.mesh.together import part
@@ -19,6 +30,12 @@ from contact.typing import Array
 from forms.elasticity import Anisotropic
 from forms.hencky import Law, is_linear
 from forms.piezo import Piezo
+
+#: For scripts that are older than the meaning of the word.
+CHANGED = (
+    "Load(force=...) is the resultant, spread evenly over the part; until version 0.1 it was the "
+    "force per area, which is traction=..."
+)
 
 
 class Field(Protocol):
@@ -46,7 +63,9 @@ class Fixed:
     potential
         Of a piezoelectric body, likewise; None leaves it free.
     amplitude
-        Function of time by which they are multiplied: see `fields.amplitude_of`.
+        Function of time by which they are multiplied; "constant": they always act. By default
+        they grow from 0 at time 0 to all at time 1, and stay; values that are functions of time
+        are taken as they are.
 
     Raises
     ------
@@ -76,8 +95,9 @@ class Fixed:
     @property
     def factor(self) -> Amplitude:
         """The amplitude, also where none is given."""
-        fields = [*(self.displacement or ()), self.potential]
-        return amplitude_of(self.amplitude, fields)
+        return amplitude_of(
+            self.amplitude, knows_time([*(self.displacement or ()), self.potential])
+        )
 
 
 @dataclass(frozen=True)
@@ -91,16 +111,19 @@ class Load:
     ----------
     on
         Name of the part, or a list of names; None for the whole body.
-    force
+    density
         Traction (force/area) on a part, body force (force/volume) in the body.
     pressure
         Pressure against the outward normal of the part (force/area).
     charge
         Surface charge q_2 = D.nu on a part, body charge q_0 in the body.
     amplitude
-        Function of time that multiplies all of them: see `fields.amplitude_of`.
+        Function of time that multiplies all of them, as of `Fixed`.
     traction, body_force, body_charge
-        The words of the case file for force and charge.
+        The words of the case file for density and charge.
+    force
+        Resultant on a part, spread evenly over it: numbers; that of the full turn for a body of
+        revolution, of a unit of depth for a plane one.
 
     Raises
     ------
@@ -109,36 +132,51 @@ class Load:
     """
 
     on: Given = None
-    force: Given = None
+    density: Given = None
     pressure: Given = None
     charge: Given = None
     amplitude: Amplitude | None = None
     traction: InitVar[Given] = None
     body_force: InitVar[Given] = None
     body_charge: InitVar[Given] = None
+    force: Given = default(default=None, kw_only=True)
 
     def __post_init__(self, traction: Given, body_force: Given, body_charge: Given) -> None:
         """Make fields of the given values."""
         object.__setattr__(self, "on", None if self.on is None else part(self.on))
         inside = self.on is None
-        force = self._one(force=self.force, traction=traction, body_force=body_force)
+        density = self._one(density=self.density, traction=traction, body_force=body_force)
         charge = self._one(charge=self.charge, body_charge=body_charge)
         for name, given, fits in (
             ("traction", traction, not inside),
             ("pressure", self.pressure, not inside),
+            ("force", self.force, not inside),
             ("body_force", body_force, inside),
             ("body_charge", body_charge, inside),
         ):
             accepted = "it in the whole body, on=None" if not inside else "it on a part"
             expect(f"Load: {name}", given, accepted, given is None or fits)
-        object.__setattr__(self, "force", vector(force))
+        object.__setattr__(self, "density", vector(density))
+        object.__setattr__(self, "force", self._resultant())
         object.__setattr__(self, "pressure", field(self.pressure))
         object.__setattr__(self, "charge", field(charge))
         object.__setattr__(
             self, "amplitude", own_amplitude(f"Load on {self.on or 'the body'!r}", self.amplitude)
         )
         if not self.named:
-            raise InputError("Load: nothing is given; accepted: force, pressure or charge")
+            raise InputError(
+                "Load: nothing is given; accepted: force, traction, pressure or charge"
+            )
+
+    def _resultant(self) -> tuple[Any, ...] | None:
+        """Return the components of the resultant, which have no place."""
+        found = vector(self.force)
+        for component in found or ():
+            accepted = "numbers, the resultant of the part; traction=... is per area, and may vary"
+            expect("Load: force", self.force, accepted, isinstance(component, Number | Moving))
+        if found is not None:
+            warnings.warn(CHANGED, FutureWarning, stacklevel=4)
+        return found
 
     @staticmethod
     def _one(**given: Given) -> Given:
@@ -151,15 +189,16 @@ class Load:
     def named(self) -> dict[str, Field | Moving]:
         """All that is given, by the keys that the case file has for it."""
         inside = self.on is None
-        force, charge = ("body_force", "body_charge") if inside else ("traction", "charge")
-        given = {f"{force}.{i}": component for i, component in enumerate(self.force or ())}
+        density, charge = ("body_force", "body_charge") if inside else ("traction", "charge")
+        given = {f"{density}.{i}": component for i, component in enumerate(self.density or ())}
+        given |= {f"force.{i}": component for i, component in enumerate(self.force or ())}
         given |= {"pressure": self.pressure, charge: self.charge}
         return {name: field for name, field in given.items() if field is not None}
 
     @property
     def factor(self) -> Amplitude:
         """The amplitude, also where none is given."""
-        return amplitude_of(self.amplitude, [*self.named.values()])
+        return amplitude_of(self.amplitude, knows_time([*self.named.values()]))
 
 
 @dataclass(frozen=True)

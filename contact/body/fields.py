@@ -25,12 +25,24 @@ from contact.typing import Array
 Amplitude: TypeAlias = Callable[[float], float]
 
 
-def ramp(time: float) -> float:
-    """Return the time itself: given values grow with it, and are complete at time 1.
+@dataclass(frozen=True)
+class Ramp:
+    """The factor of given values without an amplitude: from 0 to 1 over the first stage, then 1.
 
     A static problem is one step from time 0 to time 1.
+
+    Attributes
+    ----------
+    begin, end
+        Beginning and end of the stage.
     """
-    return time
+
+    begin: float = 0.0
+    end: float = 1.0
+
+    def __call__(self, time: float) -> float:
+        """Return the factor at a time."""
+        return min(max((time - self.begin) / (self.end - self.begin), 0.0), 1.0)
 
 
 def steady(time: float) -> float:
@@ -51,21 +63,34 @@ def at_time(field: Any, time: Any) -> Any:
     return field.at(time) if isinstance(field, Moving) else field
 
 
+#: The amplitude of values that always act, by its name.
+CONSTANT = "constant"
+
+
 def own_amplitude(name: str, given: Any) -> Amplitude | None:
     """Return a given function of time so that it says whose amplitude it is where it fails."""
+    if isinstance(given, str) and given == CONSTANT:
+        return steady
     fits = given is None or callable(given)
-    expect(f"{name}: amplitude", given, "a function of time, such as lambda t: 2 * t", fits)
-    return given if given in (None, steady) else OfTime(given, f"{name}: amplitude")
+    accepted = f'a function of time, such as lambda t: 2 * t, or "{CONSTANT}"'
+    expect(f"{name}: amplitude", given, accepted, fits)
+    plain = given is None or given is steady or isinstance(given, Ramp)
+    return given if plain else OfTime(given, f"{name}: amplitude")
 
 
-def amplitude_of(given: Amplitude | None, fields: list[Any]) -> Amplitude:
-    """Return the amplitude that goes with fields, where none may be given.
+def amplitude_of(given: Amplitude | None, known: bool) -> Amplitude:
+    """Return the amplitude of values where none may be given: a `Ramp` by default.
 
-    It is `ramp` by default; of fields that know the time themselves `steady`.
+    Of values some of which are `known` functions of time themselves it is `steady`.
     """
-    if given is not None:
-        return given
-    return steady if any(isinstance(field, Moving) for field in fields) else ramp
+    if given is None or isinstance(given, Ramp):
+        return steady if known else (given or Ramp())
+    return given
+
+
+def knows_time(fields: Sequence[Any]) -> bool:
+    """Tell whether any of some fields is a function of time."""
+    return any(isinstance(field, Moving) for field in fields)
 
 
 def values_at(field: Any, points: Array, time: float, name: str, comm: MPI.Intracomm) -> Array:
@@ -154,6 +179,11 @@ class Number:
     """The same everywhere."""
 
     value: float
+
+    @property
+    def is_zero(self) -> bool:
+        """Whether it is nothing."""
+        return self.value == 0
 
     def ufl(self, x: Expr) -> float:
         """Return the number."""

@@ -110,13 +110,19 @@ def _works(
     x = ufl.SpatialCoordinate(domain.mesh)
     measure = domain.dx if load.on is None else domain.ds(load.on)
     place = repr(load.on) if load.on is not None else "'the body'"
-    if load.force is not None and len(load.force) != domain.dim:
-        raise InputError(
-            f"load on {place}: the force has {len(load.force)} components, the body has "
-            f"{domain.dim}"
-        )
+    for force in (load.density, load.force):
+        if force is not None and len(force) != domain.dim:
+            raise InputError(
+                f"load on {place}: the force has {len(force)} components, the body has {domain.dim}"
+            )
     if load.charge is not None and xi is None:
         raise InputError(f"load on {place}: a charge needs a piezoelectric material")
+    if domain.revolved and load.force is not None and not getattr(load.force[0], "is_zero", False):
+        raise InputError(
+            f"{key}.force.0: given one across the axis, where it cancels over the full turn; "
+            "accepted: 0, or a traction or pressure"
+        )
+    area = 1.0 if load.force is None else domain.volume(measure)
     works = []
     for name, field in load.named.items():
         given = expression(domain, field, x, time, f"{key}.{name}")
@@ -125,7 +131,7 @@ def _works(
         elif name.endswith("charge"):
             work = electric_load(xi, **{"body" if load.on is None else "surface": given})
         else:
-            work = given * v[int(name[-1])]
+            work = given * v[int(name[-1])] / (area if name.startswith("force") else 1.0)
         works.append((work * measure, isinstance(field, Moving)))
     return works
 

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from contact.arguments import OfTime, expect
-from contact.body.fields import Amplitude, own_amplitude, ramp, steady
+from contact.body.fields import Amplitude, amplitude_of, own_amplitude
 from contact.mesh.together import part
 from contact.typing import Array
 
@@ -26,7 +26,7 @@ def _timed(name: str, value: Timed | None) -> Timed | None:
 def _at(values: Sequence[Timed | None], given: Amplitude | None, time: float) -> Array:
     """Return values at a time, 0 for None: times an amplitude, as `amplitude_of` has it."""
     known = any(callable(value) for value in values)
-    factor = (given or (steady if known else ramp))(time)
+    factor = amplitude_of(given, known)(time)
     numbers = [value(time) if callable(value) else (value or 0.0) for value in values]
     return factor * np.array(numbers)
 
@@ -46,7 +46,8 @@ class Motion:
     centre
         Centre of rotation, about which moments are taken.
     amplitude
-        Function of time that multiplies all of them; by default numbers grow with time.
+        Function of time that multiplies all of them; by default
+        numbers grow from 0 at time 0 to all at time 1, and stay; "constant": they always act.
     """
 
     displacement: Sequence[Timed | None]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Sequence
 from itertools import pairwise
 from typing import Annotated, Any, Literal, Self, TypeAlias
@@ -100,17 +101,38 @@ class Fixed(Section):
         return description.Fixed(self.on, displacement, potential, amplitude)
 
 
+ZERO = Expression(0.0)
+
+Components: TypeAlias = Annotated[
+    Few[TimeComponent],
+    SPATIAL,
+    Accepted('a list of 2 components in 2-D, 3 in 3-D, each a number, a formula in t or "free"'),
+]
+Forces: TypeAlias = Annotated[
+    Few[TimeFormula],
+    SPATIAL,
+    Accepted("a list of 2 numbers or formulas in t in 2-D, 3 in 3-D"),
+]
+Rotation: TypeAlias = Annotated[
+    Either[TimeComponent, Components],
+    Accepted('in 2-D an angle, a formula in t or "free", in 3-D a list of 3 of these'),
+]
+Moment: TypeAlias = Annotated[
+    Either[TimeFormula, Forces],
+    Accepted("in 2-D a number or a formula in t, in 3-D a list of 3 of these"),
+]
+
+
 #: Keys of a load on a part, and of one in the whole body.
-SURFACE, VOLUME = ("traction", "pressure", "charge"), ("body_force", "body_charge")
+SURFACE, VOLUME = ("traction", "force", "pressure", "charge"), ("body_force", "body_charge")
 
 
 class Load(Section):
     """`[[load]]`: forces and charges on a part, or in the whole body."""
 
     hints = dict.fromkeys(
-        ("force", "resultant", "forces"),
-        "a load is given per area, traction = resultant / area of the part, or per volume, "
-        "body_force; a resultant goes to a part that is rigid, force of [[rigid]]",
+        ("resultant", "forces"),
+        "force is the resultant on the part, traction is per area, body_force per volume",
     )
 
     on: Part | None = None
@@ -119,6 +141,9 @@ class Load(Section):
     """`true`: in the whole body."""
     traction: FormulaVector | None = None
     """Force per area of the part."""
+    force: Forces | None = None
+    """Resultant force on the part, spread evenly over it; in 2-D of a unit of depth, of a body of
+    revolution that of the full turn. A part that is to move as a rigid body is `[[rigid]]`."""
     pressure: Formula | None = None
     """Normal pressure p on the part: traction -p along the outward normal."""
     charge: Formula | None = None
@@ -147,38 +172,23 @@ class Load(Section):
 
     def build(self, key: str, case: Case, comm: MPI.Intracomm) -> description.Load:
         """Return the load itself; ``key`` is the section's own."""
-        force, charge = VOLUME if self.everywhere else (SURFACE[0], SURFACE[2])
-        components = getattr(self, force)
-        return description.Load(
-            self.on,
-            components
-            and [as_field(f"{key}.{force}.{k}", f, comm) for k, f in enumerate(components)],
-            as_field(f"{key}.pressure", self.pressure, comm),
-            as_field(f"{key}.{charge}", getattr(self, charge), comm),
-            case.amplitude(self.amplitude),
-        )
-
-
-ZERO = Expression(0.0)
-
-Components: TypeAlias = Annotated[
-    Few[TimeComponent],
-    SPATIAL,
-    Accepted('a list of 2 components in 2-D, 3 in 3-D, each a number, a formula in t or "free"'),
-]
-Forces: TypeAlias = Annotated[
-    Few[TimeFormula],
-    SPATIAL,
-    Accepted("a list of 2 numbers or formulas in t in 2-D, 3 in 3-D"),
-]
-Rotation: TypeAlias = Annotated[
-    Either[TimeComponent, Components],
-    Accepted('in 2-D an angle, a formula in t or "free", in 3-D a list of 3 of these'),
-]
-Moment: TypeAlias = Annotated[
-    Either[TimeFormula, Forces],
-    Accepted("in 2-D a number or a formula in t, in 3-D a list of 3 of these"),
-]
+        density, charge = VOLUME if self.everywhere else ("traction", "charge")
+        components = getattr(self, density)
+        force = [
+            f.value if f.is_constant else as_field(f"{key}.force.{k}", f, comm)
+            for k, f in enumerate(self.force or ())
+        ]
+        with warnings.catch_warnings():  # the word has always had this meaning in a case
+            warnings.simplefilter("ignore", FutureWarning)
+            return description.Load(
+                self.on,
+                components
+                and [as_field(f"{key}.{density}.{k}", f, comm) for k, f in enumerate(components)],
+                as_field(f"{key}.pressure", self.pressure, comm),
+                as_field(f"{key}.{charge}", getattr(self, charge), comm),
+                case.amplitude(self.amplitude),
+                force=force or None,
+            )
 
 
 class Moving(Section):
@@ -340,8 +350,9 @@ class Evolution(Section):
     """Number of equal steps in each stage."""
     amplitudes: dict[Text, Amplitude] = Field(default={})
     """Factors by name, for the key `amplitude` of `[[fixed]]`, `[[load]]`, `[electric]`,
-    `[contact.rigid]`, `[[rigid]]`, `[[electrode]]`. Without one they act all
-    the time."""
+    `[contact.rigid]`, `[[rigid]]`, `[[electrode]]`. Without one given values grow from 0 to all
+    over the first stage, and stay; with `"constant"` they act all the time; where one is a formula
+    in t all are taken as they are."""
 
     @model_validator(mode="after")
     def _check(self) -> Self:

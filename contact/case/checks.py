@@ -6,6 +6,7 @@ import math
 from collections.abc import Iterable
 from typing import Any, TypeAlias
 
+from contact.body.fields import CONSTANT
 from contact.case.body import ZERO
 from contact.case.formula import Expression
 from contact.case.messages import Words, fault, listed, nearest
@@ -92,6 +93,24 @@ def _check_size(path: str, value: Any) -> None:
             raise fault(path, value, accepted)
 
 
+def growing(case: Case) -> list[str]:
+    """Return the keys of sections whose values grow over the first stage, having no amplitude."""
+    if case.evolution is None:
+        return []
+    sections = [
+        (f"{k}.{i}", s)
+        for k in ("fixed", "load", "electrode")
+        for i, s in enumerate(getattr(case, k))
+    ]
+    found = []
+    for path, section in (*sections, *case.moving):
+        values = [v for _, v, _ in walk(section) if isinstance(v, Expression)]
+        moves = any("t" in value.names for value in values)
+        if section.amplitude is None and not moves and any(value != ZERO for value in values):
+            found.append(path)
+    return found
+
+
 def _check_time(case: Case, path: str, formula: Expression) -> None:
     """Raise a fault if a formula uses t where it has no meaning."""
     if not (path.startswith(TIMED) or ".rigid." in path or path.endswith(".phi_f")):
@@ -104,9 +123,9 @@ def _check_amplitude(case: Case, path: str, name: str) -> None:
     """Raise a fault if there is no amplitude of a name."""
     if case.evolution is None:
         raise fault(path, name, "an amplitude with [evolution] only")
-    known = sorted(case.evolution.amplitudes)
+    known = sorted({*case.evolution.amplitudes, CONSTANT})
     if name not in known:
-        names = f"{listed(known) or 'none is given'}{nearest(name, known)}"
+        names = f"{listed(known)}{nearest(name, known)}"
         raise fault(path, name, f"a name below evolution.amplitudes: {names}")
 
 

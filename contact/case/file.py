@@ -24,7 +24,7 @@ from pydantic import (
 )
 from pydantic_core import PydanticCustomError
 
-from contact.body.fields import Amplitude, steady
+from contact.body.fields import CONSTANT, Amplitude, Ramp, steady
 from contact.case.body import Electrode, Evolution, Fixed, Load, Moving, RigidPart, Space
 from contact.case.checks import check_mesh, check_sections
 from contact.case.interface import Contact, Electric, Friction
@@ -191,10 +191,14 @@ class Case(Section):
         return "electric", self.electric
 
     def amplitude(self, name: str | None) -> Amplitude | None:
-        """Return a factor of time by its name; in an evolution, 1 for none."""
+        """Return a factor of time by its name; for none growth over the first stage."""
         if self.evolution is None:
             return None
-        return steady if name is None else self.evolution.amplitudes[name]
+        if name is None:
+            return Ramp(*self.evolution.times[:2])
+        if name == CONSTANT and name not in self.evolution.amplitudes:
+            return steady
+        return self.evolution.amplitudes[name]
 
     @model_validator(mode="before")
     @classmethod

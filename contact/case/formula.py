@@ -213,6 +213,11 @@ class NodalField:
     minimum: float = -np.inf
     time: Any = None
 
+    @property
+    def is_zero(self) -> bool:
+        """Whether it is nothing."""
+        return self.expression.is_constant and self.expression.value == 0
+
     def ufl(self, x: Expr) -> Expr:
         """Return the formula as a UFL expression of the coordinates."""
         return self.expression.ufl(x, self.time)

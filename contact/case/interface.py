@@ -166,7 +166,7 @@ class Electric(Section):
     phi_f: TimeFormula = Expression(0.0)
     """Potential phi_F of the foundation."""
     amplitude: AmplitudeName | None = None
-    """Factor of phi_f as a function of time, see `[evolution]`."""
+    """Factor of phi_f as a function of time, see `[evolution]`. Without one phi_f is constant."""
     delta: Annotated[Positive | None, ReadWith("law", ("shifted", "ramp"))] = None
     """Slope of psi (1/length): psi rises within 1/delta of the gap. Default: 10 / H, H the volume
     of the body over the area of its contact part, or its diameter where that is smaller. A
@@ -190,7 +190,9 @@ class Electric(Section):
         phi_f = as_number(self.phi_f)
         if isinstance(phi_f, float) and self.amplitude is None:
             return Conductor(psi, phi_f, truncation, self.lagged)
-        factor, number = case.amplitude(self.amplitude) or steady, self.phi_f.number
+        # A foundation has its potential from the beginning.
+        named = None if self.amplitude is None else case.amplitude(self.amplitude)
+        factor, number = named or steady, self.phi_f.number
 
         def phi_f_at(time: float) -> float:
             """Return the potential of the foundation at a time."""

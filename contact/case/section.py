@@ -250,7 +250,10 @@ Part: TypeAlias = Annotated[
     Accepted(together.ACCEPTED),
 ]
 AmplitudeName: TypeAlias = Annotated[
-    str, Field(min_length=1), AMPLITUDE, Accepted("a name below evolution.amplitudes")
+    str,
+    Field(min_length=1),
+    AMPLITUDE,
+    Accepted('a name below evolution.amplitudes, or "constant"'),
 ]
 Vector: TypeAlias = Annotated[settings.Vector, as_tuple]
 Direction: TypeAlias = Annotated[settings.Direction, as_tuple]

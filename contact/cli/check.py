@@ -13,6 +13,7 @@ from mpi4py import MPI
 
 from contact import _compat
 from contact.case.build import build_problem
+from contact.case.checks import growing
 from contact.case.file import Case, load_case
 from contact.case.text import to_toml
 from contact.cli.geometry import parts, regions
@@ -70,7 +71,7 @@ def describe(case: Case, problem: ContactProblem) -> str:
         f"{domain.size:g}",
         *parts(domain),
         *regions(domain),
-        *(f"# note: {note}" for note in domain.notes),
+        *(f"# note: {note}" for note in (*domain.notes, *grows(case))),
         f"# unknowns: {layout.unknowns} ({layout.block_size} a node), contact nodes: "
         f"{problem.nodes.size}",
         *expectations(problem, _times(case)),
@@ -80,6 +81,18 @@ def describe(case: Case, problem: ContactProblem) -> str:
     if library == environment.REFERENCE:
         lines.append(f"# {environment.ADVICE}")
     return "\n".join(lines)
+
+
+def grows(case: Case) -> list[str]:
+    """Say which loads and values have no amplitude in an evolution."""
+    found = growing(case)
+    if not found or case.evolution is None:
+        return []
+    begin, end = case.evolution.times[:2]
+    return [
+        f"{', '.join(found)} without an amplitude: from 0 at t = {begin:g} to all at t = {end:g}, "
+        'and then constant; amplitude = "constant": all the time, as until version 0.1'
+    ]
 
 
 def _times(case: Case) -> list[float]:

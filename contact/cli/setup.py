@@ -125,12 +125,15 @@ def _roles(case: Case, problem: ContactProblem) -> Iterable[Role | None]:
         said = []
         if given.traction is not None:
             said.append(f"traction ({_said(*given.traction)})")
+        if given.force is not None:
+            said.append(f"force ({_said(*given.force)})")
         if given.pressure is not None:
             said.append(f"pressure {_said(given.pressure)}")
         if given.charge is not None and _said(given.charge) != "0":
             said.append(f"charge {_said(given.charge)}")
         if given.on is not None and said:
-            yield _role(domain, given.on, LOADED, f"{', '.join(said)} on {given.on}", load.force)
+            arrows = load.density or load.force
+            yield _role(domain, given.on, LOADED, f"{', '.join(said)} on {given.on}", arrows)
 
 
 def _contact_words(case: Case, key: str, section: Any) -> str:

@@ -8,7 +8,7 @@ import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
 
-from contact.body.fields import Moving, steady
+from contact.body.fields import knows_time, steady
 from contact.methods.load_stepping import LoadStep
 from contact.output.quantities import STEPS, values_of
 from contact.output.resultants import nodes_of
@@ -63,8 +63,8 @@ def _driven_part(problem: ContactProblem) -> str | None:
     """
     for fixed in problem.body.fixed:
         given = [component for component in fixed.displacement or () if component is not None]
-        moving = any(isinstance(component, Moving) for component in given)
-        if given and (moving or fixed.factor is not steady):
+        moves = any(not getattr(component, "is_zero", False) for component in given)
+        if moves and (knows_time(given) or fixed.factor is not steady):
             return fixed.on
     loaded = [load.on for load in problem.body.loads if load.on is not None]
     return loaded[0] if loaded else None

@@ -132,7 +132,9 @@ def problem(seed: int) -> tuple[str, dict[str, Any]]:
     elif family == "evolution, electrode":
         data["material"] = {"young": 100.0, "poisson": 0.3, "piezo": PIEZO}
         data["electric"] = {"law": "perfect", "k_e": rng.uniform(0.5, 2), "phi_f": 0.05}
-        data["electrode"] = [{"on": "top", "charge": rng.uniform(-0.1, 0.1)}]
+        data["electrode"] = [
+            {"on": "top", "charge": rng.uniform(-0.1, 0.1), "amplitude": "constant"}
+        ]
         data = evolving(data)
     elif family == "revolution":
         data["space"] = {"kinematics": "axisymmetric", "degree": 2}

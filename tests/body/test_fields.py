@@ -86,7 +86,7 @@ def problem(mesh: dmesh.Mesh, tags: dmesh.MeshTags, given: Any) -> Problem:
     body = Body(
         Linear(10.0, 0.3),
         [Fixed("top", [given, "free"])],
-        [Load("top", pressure=given), Load(None, force=[given, 0.0])],
+        [Load("top", pressure=given), Load(body_force=[given, 0.0])],
     )
     return Problem(domain, body, Contact("bottom", given), Friction(mu=given))
 

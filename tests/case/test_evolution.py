@@ -30,7 +30,7 @@ def test_an_amplitude_is_linear_between_its_values():
     [
         (
             {"evolution": evolution(), "load__0__amplitude": "pres"},
-            r"load\.0\.amplitude: given \"pres\".* below evolution\.amplitudes: press \(did you",
+            r"load\.0\.amplitude: given \"pres\".*amplitudes: constant, press \(did you",
         ),
         ({"load__0__amplitude": "press"}, r"load\.0\.amplitude: .* with \[evolution\] only"),
         ({"load__0__traction": [0.0, "-t"]}, r"load\.0\.traction\.1: .* with \[evolution\] only"),

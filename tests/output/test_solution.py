@@ -68,7 +68,7 @@ def test_figures_for_a_notebook(dim: int) -> None:
 @pytest.mark.parallel
 def test_a_body_that_nothing_holds_is_refused() -> None:
     domain = rectangle(MPI.COMM_WORLD, (0.0, 0.0), (1.0, 1.0), (2, 2))
-    body = Body(Linear(1.0, 0.3), [], [Load("top", force=[0.1, 0.0])])
+    body = Body(Linear(1.0, 0.3), [], [Load("top", traction=[0.1, 0.0])])
     with pytest.raises(InputError, match="held"):
         solve(Problem(domain, body, Contact("bottom")))
 

@@ -84,8 +84,8 @@ def test_formulas_in_t_say_what_amplitudes_do():
 
 
 def test_prescribed_values_in_t():
-    """A formula in t and x on a support; what has neither t nor amplitude always acts."""
-    case = case_of(load__0__amplitude=None, fixed__0__displacement=["0.001*t*y", 0.0])
+    """A formula in t and x on a support; what has the constant amplitude always acts."""
+    case = case_of(load__0__amplitude="constant", fixed__0__displacement=["0.001*t*y", 0.0])
     solution = solve(case, comm=SELF)
     problem = solution.problem
     x = problem.equilibrium.space.tabulate_dof_coordinates()

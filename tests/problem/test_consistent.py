@@ -103,7 +103,12 @@ WRONG = {
     "a pressure in the body": (lambda: Load(pressure=1.0), "Load: pressure: .*it on a part"),
     "a traction in the body": (lambda: Load(traction=[0, 1]), "Load: traction: .*it on a part"),
     "a body force on a part": (lambda: Load("top", body_force=[0, 1]), "Load: body_force: "),
-    "two names for a force": (lambda: Load("top", [0, 1], traction=[0, 1]), "Load: .*one of force"),
+    "two names for a force": (lambda: Load("top", [0, 1], traction=[0, 1]), "Load: .*one of dens"),
+    "a resultant in the body": (lambda: Load(force=[0, 1]), "Load: force: .*it on a part"),
+    "a resultant by place": (
+        lambda: Load("top", force=[0, lambda x: x[0]]),
+        r"Load: force: .*accepted: numbers, the resultant",
+    ),
     "a support of nothing": (lambda: Fixed("top", ["free", None]), "nothing is prescribed"),
     "an amplitude": (
         lambda: Fixed("top", [0, 0], amplitude=2),

@@ -19,7 +19,7 @@ from tests.problems.put_together import block, problem
 
 def test_the_words_of_the_case_file() -> None:
     given = {"traction": [0.0, 0.001]}
-    assert Load("right", **given) == Load("right", force=[0.0, 0.001])
+    assert Load("right", **given) == Load("right", [0.0, 0.001])
     assert Load(body_force=[0.0, 0.001]) == Load(None, [0.0, 0.001])
     assert Load(None, body_charge=2.0) == Load(None, charge=2.0)
     x = problem(contact=Contact("bottom", gap=0.002)).nodes.gap
