@@ -22,7 +22,7 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
@@ -45,9 +45,14 @@ from contact.problem.linearised import (
     moved_state,
     weakly_active,
 )
+from contact.problem.linearised_steps import (
+    before_along,
+    before_transposed,
+    commit_along,
+    commit_transposed,
+)
 from contact.problem.problem import ContactProblem
 from contact.problem.state import State
-from contact.problem.transposed import before_transposed, commit_transposed
 from contact.typing import Array
 
 logger = logging.getLogger("contact.sensitivity")
@@ -291,44 +296,50 @@ class _Direction:
 
     x: Array
     forces: Array
-    history: dict[str, Array] = field(default_factory=dict)
+    history: History
 
 
-def _beside(family: Family, state: State, direction: _Direction) -> _Sides:
+def _beside(family: Family, state: State, direction: _Direction | None = None) -> _Sides:
     """Return problems and states at both sides of a parameter, moved along a direction.
 
     Collective.
     """
     found = []
     for way, problem in zip(family.ways, family.problems, strict=True):
-        history = _moved_history(state.history, direction.history, way)
-        here = problem.at(state.time, history)
-        there = moved_state(here, state, way * direction.x, way * direction.forces)
+        there = state
+        if direction is not None:
+            there = replace(
+                moved_state(problem, state, way * direction.x, way * direction.forces),
+                history=_sum(state.history, way, direction.history),
+            )
+        here = problem.at(state.time, there.history)
         x = here.equilibrium.prescribe(there.x, state.time)
-        found.append((here, replace(there, x=x, history=history)))
+        found.append((here, replace(there, x=x)))
     return found
 
 
-def _moved_history(history: History, change: Mapping[str, Array], way: float) -> History:
-    arrays = history.arrays()
-    return history.replaced(
-        {k: v + way * change[k] if k in change else v for k, v in arrays.items()}
-    )
+def _sum(history: History, factor: float, change: History) -> History:
+    """Return a history and so many times a change of it."""
+    more = change.arrays()
+    return history.replaced({k: v + factor * more[k] for k, v in history.arrays().items()})
 
 
-def _explicit(
-    family: Family, state: State, linearised: Linearised, history: dict[str, Array]
-) -> tuple[Equations, _Sides]:
-    """Return dR/dm + dR/dh dh/dm at the fixed state, and the problems beside it. Collective."""
-    zero = np.zeros_like(linearised.problem.equilibrium.owned_part(state.x))
-    still = _Direction(zero, np.zeros_like(linearised.problem.nodes.normal), history)
-    sides = _beside(family, state, still)
+def _explicit(family: Family, state: State, linearised: Linearised) -> tuple[Equations, _Sides]:
+    """Return dR/dm at the fixed state and history, and the problems beside it. Collective."""
+    sides = _beside(family, state)
     ahead, behind = (equations(*side, linearised.active) for side in sides)
     change = Equations(
         family.slope(ahead.forces, behind.forces),
         family.slope(ahead.conditions, behind.conditions),
     )
     return change, sides
+
+
+def _explicit_history(family: Family, sides: _Sides) -> History:
+    """Return dH/dm: how the history at the end of a step changes at the fixed state. Collective."""
+    ahead, behind = (here.commit(there) for here, there in sides)
+    less = behind.arrays()
+    return ahead.replaced({k: family.slope(v, less[k]) for k, v in ahead.arrays().items()})
 
 
 def _tangent(
@@ -341,34 +352,34 @@ def _tangent(
     rows: dict[str, dict[str, list[float]]] = {
         name: {key: [] for key in families} for name in quantities
     }
-    histories: dict[str, dict[str, Array]] = {key: {} for key in families}
+    first = path.steps[0][0].history
+    histories = dict.fromkeys(families, _sum(first, -1.0, first))
     for index, (problem, state) in enumerate(path.steps):
-        linearised = path.linearised(index)
+        linearised, body = path.linearised(index), problem.equilibrium
         gradients = {
             name: given.gradient(problem, state)
             for name, given in _with_gradients(quantities).items()
         }
         for key, family in families.items():
-            change, still = _explicit(family, state, linearised, histories[key])
-            x, forces = linearised.solve(change)
-            sides = _beside(family, state, _Direction(x, forces, histories[key]))
+            change, still = _explicit(family, state, linearised)
+            remembered = before_along(linearised, histories[key])
+            x, forces = linearised.solve(change + remembered)
             for name, quantity in quantities.items():
-                # Where the gradient is known, the difference has nothing but the explicit part.
-                ahead, behind = (
-                    quantity(*side) for side in (still if name in gradients else sides)
-                )
-                value = (ahead - behind) / family.over
-                if name in gradients:
-                    by_x, by_force = gradients[name]
-                    value += problem.equilibrium.product(by_x, x) + _total(
-                        problem, by_force, forces
-                    )
+                if name not in gradients:
+                    direction = _Direction(x, forces, histories[key])
+                    ahead, behind = (quantity(*it) for it in _beside(family, state, direction))
+                    rows[name][key].append((ahead - behind) / family.over)
+                    continue
+                by_x, by_force = gradients[name]
+                ahead, behind = (quantity(*it) for it in still)
+                value = (ahead - behind) / family.over + body.product(by_x, x)
+                value += _total(problem, by_force, forces)
+                if isinstance(quantity, Reaction):
+                    value += body.product(quantity.weights(problem), remembered.forces)
                 rows[name][key].append(value)
             if index + 1 < len(path.steps):
-                ends = [problem.commit(end).arrays() for problem, end in sides]
-                histories[key] = {
-                    part: family.slope(ends[0][part], ends[1][part]) for part in ends[0]
-                }
+                ends = commit_along(linearised, x, histories[key])
+                histories[key] = _sum(ends, 1.0, _explicit_history(family, still))
     for name, columns in rows.items():
         found.steps[name] = {key: np.array(values) for key, values in columns.items()}
         found[name] = {key: values[-1] for key, values in columns.items()}
@@ -434,7 +445,7 @@ def _adjoint(
     for linearised, adjoints in backwards(path, quantities):
         problem, state = linearised.problem, linearised.state
         for key, family in families.items():
-            change, sides = _explicit(family, state, linearised, {})
+            change, sides = _explicit(family, state, linearised)
             for name, one in adjoints.items():
                 found[name][key] -= problem.equilibrium.product(one.x, change.forces)
                 found[name][key] -= _total(problem, one.conditions, change.conditions)
@@ -442,10 +453,9 @@ def _adjoint(
                     ahead, behind = (quantities[name](*side) for side in sides)
                     found[name][key] += (ahead - behind) / family.over
                     continue
-                ends = [here.commit(there).arrays() for here, there in sides]
+                ends = _explicit_history(family, sides).arrays()
                 for part, weights in one.after.arrays().items():
-                    moved = family.slope(ends[0][part], ends[1][part])
-                    found[name][key] += _total(problem, weights, moved)
+                    found[name][key] += _total(problem, weights, ends[part])
 
 
 def _total(problem: ContactProblem, one: Array, other: Array) -> float:

@@ -25,6 +25,9 @@ PAIRS = {4: ((0, 0), (1, 1), (2, 2), (0, 1)), 6: VOIGT}
 #: Part of a strain, and the least strain, by which differences of the stress are taken.
 DIFFERENCE, LEAST = 1e-6, 1e-12
 
+#: Name of the strain, and of the stress, among the variables of a point.
+_STRAIN = ""
+
 
 def components(dim: int) -> int:
     """Return the number of components of a symmetric tensor in 2-D or 3-D."""
@@ -82,6 +85,7 @@ class HistoryLaw(Protocol):
     """A law of the stress with internal variables, which a step changes; see `hencky.Hencky`.
 
     `symmetric`, where it has that and it is False, says that its stiffness is not symmetric.
+    `differential`, where it has that, is its own `differential` (the function below).
 
     Examples
     --------
@@ -150,13 +154,59 @@ def with_stiffness(
         moduli = young / (3 - 6 * poisson), young / (2 + 2 * poisson)
         stiffness[:] = isotropic_stiffness(*moduli, size)
     else:
-        step = np.maximum(DIFFERENCE * np.linalg.norm(strain, axis=1), LEAST)
-        for k in range(size):
-            moved = np.zeros_like(strain)
-            moved[:, k] = step
-            up, down = (law.respond(strain + s * moved, variables).stress for s in (1, -1))
-            stiffness[:, :, k] = (up - down) / (2 * step[:, None])
+        still = {name: np.zeros_like(value) for name, value in variables.items()}
+        for k, unit in enumerate(np.eye(size)):
+            moved = np.tile(unit, (n, 1))
+            stiffness[:, :, k] = differential(law, strain, variables, moved, still).stress
     return replace(found, stiffness=stiffness)
+
+
+def differential(
+    law: HistoryLaw,
+    strain: NDArray[np.float64],
+    variables: Mapping[str, NDArray[np.float64]],
+    moved: NDArray[np.float64],
+    changed: Mapping[str, NDArray[np.float64]],
+) -> Response:
+    """Return how stress and variables at the end of a step change: the linearised response.
+
+    Central differences, one component after the other, where the law has none of its own: the sum
+    is linear in the changes, so that its transpose is made of the same numbers.
+
+    Parameters
+    ----------
+    law, strain, variables
+        As of `HistoryLaw.respond`.
+    moved, changed
+        Changes of the strain, and of the variables at the beginning, of the same shapes.
+    """
+    own = getattr(law, "differential", None)
+    if own is not None:
+        return own(strain, variables, moved, changed)  # type: ignore[no-any-return]
+    n = len(strain)
+    point, ways = {**variables, _STRAIN: strain}, {**changed, _STRAIN: moved}
+    total = {name: np.zeros((n, value[:1].size)) for name, value in point.items()}
+    for name, value in point.items():
+        flat, way = value.reshape(n, -1), ways[name].reshape(n, -1)
+        sizes = np.linalg.norm(flat, axis=1) if name == _STRAIN else np.abs(flat).max(initial=0.0)
+        step = np.broadcast_to(np.maximum(DIFFERENCE * sizes, LEAST), n)[:, None]
+        for k in np.flatnonzero(way.any(axis=0)):
+            unit = step * np.eye(flat.shape[1])[k]
+            up, down = (
+                _end(law, point | {name: (flat + s * unit).reshape(value.shape)}) for s in (1, -1)
+            )
+            for part, sums in total.items():
+                sums += way[:, k, None] * (up[part] - down[part]).reshape(n, -1) / (2 * step)
+    ends = {name: sums.reshape(point[name].shape) for name, sums in total.items()}
+    return Response(ends.pop(_STRAIN), ends)
+
+
+def _end(
+    law: HistoryLaw, point: Mapping[str, NDArray[np.float64]]
+) -> dict[str, NDArray[np.float64]]:
+    """Return variables and stress, under the name of the strain, at the end of a step."""
+    found = law.respond(point[_STRAIN], {k: v for k, v in point.items() if k != _STRAIN})
+    return {**found.variables, _STRAIN: found.stress}
 
 
 @dataclass(frozen=True)

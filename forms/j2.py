@@ -192,14 +192,7 @@ class J2(Isotropic):
     def respond(self, strain: Array, variables: Mapping[str, Array], kind: str = "") -> Response:
         """Return the response at n points; see `forms.history.HistoryLaw`."""
         n, size = strain.shape
-        a = variables["equivalent_plastic_strain"]
-        # Products with a matrix take a third of the time of sums over a few columns.
-        trial = strain @ isotropic_stiffness(0.0, self.shear, size)
-        trial -= 2 * self.shear * variables["plastic_strain"]
-        back = [variables[name] for name in self._back]
-        relative = _norm(trial - sum(back) if back else trial)
-        plastic = np.flatnonzero(relative > ROOT * self.strength(a))
-        flow = _Flow(self, trial[plastic], a[plastic], [b[plastic] for b in back])
+        trial, plastic, flow = self._flow(strain, variables)
         new = {name: value.copy() for name, value in variables.items()}
         new["plastic_strain"][plastic] += flow.plastic_strain
         new["equivalent_plastic_strain"][plastic] += ROOT * flow.dg
@@ -222,6 +215,45 @@ class J2(Isotropic):
             if kind == "tangent":
                 stiffness[plastic] += flow.softening()
         return Response(stress, new, stiffness, dissipation)
+
+    def differential(
+        self,
+        strain: Array,
+        variables: Mapping[str, Array],
+        moved: Array,
+        changed: Mapping[str, Array],
+    ) -> Response:
+        """Return how stress and variables change at n points; see `forms.history.differential`."""
+        size, g2 = strain.shape[1], 2 * self.shear
+        _, plastic, flow = self._flow(strain, variables)
+        trial = moved @ isotropic_stiffness(0.0, self.shear, size) - g2 * changed["plastic_strain"]
+        back = [changed[name][plastic] for name in self._back]
+        a = changed["equivalent_plastic_strain"]
+        dg, strained = flow.differential(trial[plastic], a[plastic], back)
+        new = {name: np.array(value) for name, value in changed.items()}
+        new["plastic_strain"][plastic] += strained
+        new["equivalent_plastic_strain"][plastic] += ROOT * dg
+        trial[plastic] -= g2 * strained
+        for name, (c, recovery), theta, old, change in zip(
+            self._back, self._terms, flow.theta, flow.back, back, strict=True
+        ):
+            less = (recovery * ROOT * theta**2 * dg)[:, None]
+            new[name][plastic] = theta[:, None] * (change + 2 / 3 * c * strained)
+            new[name][plastic] -= less * (old + 2 / 3 * c * flow.plastic_strain)
+        return Response(trial + moved @ isotropic_stiffness(self.bulk, 0.0, size), new)
+
+    def _flow(
+        self, strain: Array, variables: Mapping[str, Array]
+    ) -> tuple[Array, NDArray[np.intp], _Flow]:
+        """Return the trial stress, the points that yield, and the flow there."""
+        a = variables["equivalent_plastic_strain"]
+        # Products with a matrix take a third of the time of sums over a few columns.
+        trial = strain @ isotropic_stiffness(0.0, self.shear, strain.shape[1])
+        trial -= 2 * self.shear * variables["plastic_strain"]
+        back = [variables[name] for name in self._back]
+        relative = _norm(trial - sum(back) if back else trial)
+        plastic = np.flatnonzero(relative > ROOT * self.strength(a))
+        return trial, plastic, _Flow(self, trial[plastic], a[plastic], [b[plastic] for b in back])
 
 
 def _norm(tensors: Array) -> Array:
@@ -247,10 +279,10 @@ class _Flow:
     def __init__(self, law: J2, trial: Array, a: Array, back: Sequence[Array]) -> None:
         self._law, self._trial, self._a, self.back = law, trial, a, back
         self.dg = self._solve()
-        self.theta, along, size, self._slope = self._at(self.dg)
-        self._normal = along / size[:, None]
+        self.theta, along, self._size, self._slope = self._at(self.dg)
+        self._normal = along / self._size[:, None]
         self.plastic_strain = self.dg[:, None] * self._normal
-        self.turn = 2 * law.shear * self.dg / size
+        self.turn = 2 * law.shear * self.dg / self._size
 
     def _at(self, dg: Array) -> tuple[list[Array], Array, Array, Array]:
         """Return theta, z, its norm and minus the derivative of the local equation."""
@@ -294,14 +326,38 @@ class _Flow:
             dg = np.where(open_, np.where(inside, step, (low + high) / 2), dg)
         return dg
 
+    def differential(self, trial: Array, a: Array, back: Sequence[Array]) -> tuple[Array, Array]:
+        """Return how dg and de_p change with the trial stress, a and the back stresses.
+
+        Parameters
+        ----------
+        trial, a, back
+            Their changes.
+        """
+        hardening = self._law.hardening.slope(self._a + ROOT * self.dg)  # type: ignore[union-attr]
+        along = trial - sum(
+            (part[:, None] * b for part, b in zip(self.theta, back, strict=True)),
+            np.zeros_like(trial),
+        )
+        towards = np.einsum("ni,ni->n", along, self._normal)
+        dg = (towards - ROOT * hardening * a) / self._slope
+        along -= dg[:, None] * self._recovered()
+        along -= np.einsum("ni,ni->n", along, self._normal)[:, None] * self._normal
+        turned = (self.dg / self._size)[:, None] * along
+        return dg, dg[:, None] * self._normal + turned
+
+    def _recovered(self) -> Array:
+        """Return minus the derivative of z by dg: back stresses that recover."""
+        found = np.zeros_like(self._normal)
+        for (_, recovery), part, b in zip(self._law._terms, self.theta, self.back, strict=True):
+            found -= (recovery * ROOT * part**2)[:, None] * b
+        return found
+
     def softening(self) -> Array:
         """Return the tangent less the secant."""
-        law, normal = self._law, self._normal
-        g2 = 2 * law.shear
+        normal, g2 = self._normal, 2 * self._law.shear
         left = (g2 * self.turn - g2**2 / self._slope)[:, None] * normal
-        turned = np.zeros_like(normal)
-        for (_, recovery), part, b in zip(law._terms, self.theta, self.back, strict=True):
-            turned -= (recovery * ROOT * part**2)[:, None] * b
+        turned = self._recovered()
         turned -= np.einsum("ni,ni->n", turned, normal)[:, None] * normal
         left += (self.turn * g2 / self._slope)[:, None] * turned
         return np.asarray(left[:, :, None] * normal[:, None, :])

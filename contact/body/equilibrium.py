@@ -196,6 +196,34 @@ class BodyEquilibrium:
         """Return the internal variables at the end of the step of a state. Collective."""
         return self.laws.commit(state, self.nodal(state.x).ravel())
 
+    def commit_along(
+        self, state: Evaluated, along: Array, change: InternalVariables
+    ) -> InternalVariables:
+        """Return how the internal variables at the end of a step change. Collective.
+
+        Parameters
+        ----------
+        state
+            The end of the step.
+        along, change
+            Changes of the owned unknowns there, and of the variables at the beginning.
+        """
+        x, along = (self.nodal(values).ravel() for values in (state.x, self.local(along)))
+        return self.laws.commit_along(state, x, along, change)
+
+    def before_along(self, state: Evaluated, change: InternalVariables) -> Array:
+        """Return how the internal forces on the owned unknowns change. Collective.
+
+        Parameters
+        ----------
+        state
+            The end of a step.
+        change
+            Changes of the internal variables at its beginning.
+        """
+        self.laws.before_along(state, self.nodal(state.x).ravel(), change)
+        return self._forces_of_laws()
+
     def commit_transposed(self, state: Evaluated, after: InternalVariables) -> Array:
         """Return the derivatives of a quantity by the owned unknowns at the end of a step.
 
@@ -208,10 +236,13 @@ class BodyEquilibrium:
         after
             Its derivatives by the internal variables there.
         """
-        forms = self.forms
         self.laws.commit_transposed(state, self.nodal(state.x).ravel(), after)
-        forms.at.x.array[:] = 0.0  # no other material has stresses
-        forces = sum(assembled(form, self.owned) for form in forms.law_forces)
+        return self._forces_of_laws()
+
+    def _forces_of_laws(self) -> Array:
+        """Return the forces of the stresses that the laws with history have been given."""
+        self.forms.at.x.array[:] = 0.0  # no other material has stresses
+        forces = sum(assembled(form, self.owned) for form in self.forms.law_forces)
         return np.concatenate([forces, np.zeros(self.global_unknowns.size)])
 
     def before_transposed(

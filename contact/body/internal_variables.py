@@ -28,12 +28,11 @@ from contact.mesh.simplices import barycentric, corners, inverse_jacobians, meas
 from contact.typing import Array
 from forms.hencky import FormLaw, Law
 from forms.history import (
-    DIFFERENCE,
-    LEAST,
     HistoryLaw,
     QuadratureLaw,
     Response,
     components,
+    differential,
     to_vector,
     with_stiffness,
 )
@@ -254,6 +253,49 @@ class QuadratureLaws:
                 by_cell[cells] = values.reshape(by_cell[cells].shape)
         return before.replaced(arrays)
 
+    def _differentials(
+        self, state: Evaluated, x: Array, along: Array, change: InternalVariables
+    ) -> Iterator[tuple[Indices, Response]]:
+        """Yield some cells after others, and how the response at their points changes."""
+        moved = self._points(state, along)
+        for (law, cells, strains, variables), (_, _, way, _) in zip(
+            self._points(state, x), moved, strict=True
+        ):
+            changed = self._at(change.arrays, law, cells)
+            yield cells, differential(law, strains, variables, way, changed)
+
+    def commit_along(
+        self, state: Evaluated, x: Array, along: Array, change: InternalVariables
+    ) -> InternalVariables:
+        """Return how the variables at the end of a step change.
+
+        Parameters
+        ----------
+        state, x
+            The state that the step has led to, and its local unknowns of the nodes.
+        along, change
+            Changes of these unknowns, and of the variables at the beginning.
+        """
+        arrays = {name: np.zeros_like(array) for name, array in change.arrays.items()}
+        for cells, found in self._differentials(state, x, along, change):
+            for name, values in found.variables.items():
+                by_cell = self.by_cell(arrays[name])
+                by_cell[cells] = values.reshape(by_cell[cells].shape)
+        return change.replaced(arrays)
+
+    def before_along(self, state: Evaluated, x: Array, change: InternalVariables) -> None:
+        """Let the forms look at how the stresses change with the variables before a step.
+
+        Parameters
+        ----------
+        state, x, change
+            As of `commit_along`.
+        """
+        self._seen = None
+        self._stress.x.array[:] = 0.0
+        for cells, found in self._differentials(state, x, np.zeros_like(x), change):
+            _fill(self._stress, cells, found.stress)
+
     def commit_transposed(self, state: Evaluated, x: Array, after: InternalVariables) -> None:
         """Let the forms look at the stresses whose forces are those of the variables' derivatives.
 
@@ -389,7 +431,7 @@ def _gradient(
     given: Mapping[str, Array],
     name: str,
 ) -> Array:
-    """Return a derivative of the response at each point, by central differences.
+    """Return a derivative of the response at each point, component by component.
 
     Parameters
     ----------
@@ -401,23 +443,16 @@ def _gradient(
     name
         By which variable at the beginning; `OF_STRAIN` by the strain.
     """
-    point = {**variables, OF_STRAIN: strain}
-
-    def value(there: Array) -> Array:
-        moved = point | {name: there}
-        found = law.respond(moved.pop(OF_STRAIN), moved)
-        response = {**found.variables, OF_STRAIN: found.stress}
-        return np.sum([_dot(weight, response[part]) for part, weight in given.items()], axis=0)
-
-    flat = point[name].reshape(len(strain), -1)
-    step = max(DIFFERENCE * float(np.abs(flat).max(initial=0.0)), LEAST)
-    slopes = np.empty_like(flat)
-    for k in range(flat.shape[1]):
-        moved = np.zeros_like(flat)
-        moved[:, k] = step
-        way = moved.reshape(point[name].shape)
-        slopes[:, k] = (value(point[name] + way) - value(point[name] - way)) / (2 * step)
-    return slopes.reshape(point[name].shape)
+    still = {key: np.zeros_like(value) for key, value in (*variables.items(), (OF_STRAIN, strain))}
+    slopes = np.zeros((len(strain), still[name][:1].size))
+    for k in range(slopes.shape[1]):
+        unit = np.zeros_like(slopes)
+        unit[:, k] = 1.0
+        way = still | {name: unit.reshape(still[name].shape)}
+        found = differential(law, strain, variables, way.pop(OF_STRAIN), way)
+        ends = {**found.variables, OF_STRAIN: found.stress}
+        slopes[:, k] = np.sum([_dot(weight, ends[part]) for part, weight in given.items()], axis=0)
+    return slopes.reshape(still[name].shape)
 
 
 def _dot(one: Array, other: Array) -> Array:

@@ -51,6 +51,10 @@ class Equations:
     forces: Array
     conditions: Array
 
+    def __add__(self, other: Equations) -> Equations:
+        """Return the sum of two changes."""
+        return Equations(self.forces + other.forces, self.conditions + other.conditions)
+
 
 def active_set(problem: ContactProblem, state: State) -> ActiveSet:
     """Return the active set of a solution. Collective."""

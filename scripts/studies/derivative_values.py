@@ -1,8 +1,8 @@
 """Derivatives beside closed forms and published values, and their cost.
 
 `python3 -m scripts.studies.derivative_values [--out DIR] [--coarse]`: exponents of indentation,
-Cattaneo's and Mindlin's balls, the current through a column, the bar of Example 7.2; remainders of
-Taylor's series, transposed solves, and the cost beside that of a solution.
+the current through a column, the bar of Example 7.2; remainders of Taylor's series, transposed
+solves, and the cost beside that of a solution.
 """
 
 from __future__ import annotations
@@ -10,8 +10,6 @@ from __future__ import annotations
 import time
 import tomllib
 from collections.abc import Sequence
-from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
@@ -30,7 +28,6 @@ from scripts.reporting import Report, append, options, solved
 from scripts.studies.derivatives import block, evolving
 from scripts.studies.half_space import HalfSpace
 from scripts.studies.indentation import Setting
-from scripts.studies.mindlin import MU, RADIUS, YOUNG, write_mesh
 
 #: Constants of PZT-4 (GPa, C/m2, nF/m).
 STIFFNESS = {"c11": 139.0, "c12": 77.8, "c13": 74.3, "c33": 113.0, "c44": 25.6}
@@ -38,9 +35,6 @@ PIEZO = {"e31": -6.98, "e33": 13.84, "e15": 13.44, "beta11": 6.0, "beta33": 5.47
 
 #: Those by which the exponents of the force are tabulated.
 BY = ("c11", "c33", "c44", "c13", "e31", "e33", "e15", "beta11", "beta33")
-
-#: Steps in which two balls are moved along, and as many before.
-STEPS = 8
 
 #: Extents of the boxes that stand for a half space, in contact radii.
 BOXES = (15.0, 30.0)
@@ -50,7 +44,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     """Make the tables."""
     given = options(__doc__, "derivatives", arguments)
     report, coarse = Report(given.out), given.coarse
-    known(report, coarse)
+    known(report)
     exponents(report, 4.0 if coarse else 12.0)
     remainders(report)
     cost(report, coarse)
@@ -131,7 +125,7 @@ def exponents(report: Report, fineness: float) -> None:
     )
 
 
-def known(report: Report, coarse: bool) -> None:
+def known(report: Report) -> None:
     """Tabulate derivatives that are known."""
     columns: dict[str, list[Any]] = {
         name: [] for name in ("problem", "derivative", "found", "known")
@@ -149,17 +143,12 @@ def known(report: Report, coarse: bool) -> None:
     sign = np.sign(slope["electric.k_e"])
     exact = top / (k * height / b + 1) ** 2
     append(columns, "column", "d current/d k", sign * slope["electric.k_e"], exact)
-    for name, one, other in balls(2.0 if coarse else 4.0, 4 if coarse else 6):
-        append(columns, "two balls", name, one, other)
     shown = {name: [f"{x:.9g}" if isinstance(x, float) else x for x in column]
              for name, column in columns.items()}  # fmt: skip
     report.table(
         "known",
         "Derivatives beside known ones",
         shown,
-        "Two balls, pressed on each other by P and moved along by Q: the closed form "
-        "of Cattaneo and Mindlin is that of half spaces, the balls have four linear elements on "
-        "a and six sectors.",
     )
 
 
@@ -177,60 +166,6 @@ def charged_column(height: float, k: float, top: float) -> dict[str, Any]:
         "electric": {"law": "perfect", "k_e": k, "phi_f": 0.0},
         "solver": {"tolerance": 1e-12},
     }
-
-
-def balls(elements: float, sectors: int) -> list[tuple[str, float, float]]:
-    """Return derivatives of two balls beside those of the closed form of Cattaneo and Mindlin.
-
-    A force Q moves them by d = 3 mu P k/(16 a) [1 - (1 - Q/(mu P))^(2/3)], k the compliance
-    sum (2 - nu)/G, and by more of their own, in proportion to Q. At a given Q that has no part in
-    dd/dmu = -(dQ/dmu)/(dQ/dway).
-    """
-    press, way = 0.125, 0.027
-    with TemporaryDirectory() as folder:
-        path = Path(folder) / "balls.msh"
-        write_mesh(path, np.sqrt(RADIUS / 2 * press), elements, sectors)
-        times = [0.0, 1.0, 2.0]
-        case = {
-            "mesh": {"file": str(path)},
-            "material": {"young": YOUNG, "poisson": 0.0},
-            "fixed": [
-                {"on": "symmetry", "displacement": ["free", 0.0, "free"]},
-                {"on": "lower_cut", "displacement": [0.0, 0.0, 0.0]},
-                {"on": "upper_cut", "displacement": [way, 0.0, "free"], "amplitude": "shear"},
-                {
-                    "on": "upper_cut",
-                    "displacement": ["free", "free", -press],
-                    "amplitude": "press",
-                },
-            ],
-            "contact": {"on": "upper_round", "against": "lower_round"},
-            "friction": {"law": "coulomb", "mu": MU},
-            "solver": {"tolerance": 1e-10},
-            "evolution": {
-                "times": times,
-                "steps": [1, 2 * STEPS],
-                "amplitudes": {
-                    "press": {"time": times, "value": [0.0, 1.0, 1.0]},
-                    "shear": {"time": times, "value": [0.0, 0.0, 1.0]},
-                },
-            },
-        }
-        solution = solved(parse_case(case))
-        keys = ["friction.mu", "fixed.2.displacement.0"]
-        found = sensitivity(solution, ["contact_force_x"], keys, "tangent").steps["contact_force_x"]
-    ratios = []
-    for step, record in list(enumerate(solution.steps))[-STEPS:]:
-        # Both halves of the balls.
-        tangential, normal = (2 * abs(record.row[f"contact_force_{axis}"]) for axis in "xz")
-        width = (3 * normal * RADIUS / 2 / (4 * YOUNG / 2)) ** (1 / 3)
-        unit, x = normal * (4 / (YOUNG / 2)) / width, tangential / (MU * normal)
-        exact = 3 / 16 * (1 - (1 - x) ** (2 / 3) - 2 / 3 * x * (1 - x) ** (-1 / 3))
-        by_way = found[keys[1]][step] / (record.row["t"] - 1)
-        ratios.append(-found[keys[0]][step] / by_way / unit / exact)
-    title = f"d delta_x/d mu over the closed form, mean of {STEPS} steps"
-    spread = f"the same, standard deviation of the {STEPS}"
-    return [(title, float(np.mean(ratios)), 1.0), (spread, float(np.std(ratios)), 0.0)]
 
 
 def remainders(report: Report) -> None:

@@ -15,18 +15,20 @@ import numpy as np
 from mpi4py import MPI
 
 from contact import solve
-from contact.case.build import build_problem
 from contact.case.file import Case, parse_case
 from contact.case.text import number_at, to_toml, with_number
-from contact.derivatives import Parameter, sensitivity
+from contact.derivatives import sensitivity
+from contact.interface.active_set import ActiveSet
 from contact.output.differentiable import named_quantities
 from contact.output.solution import Solution
-from contact.problem.problem import ContactProblem
+from contact.problem.linearised import active_set
 from contact.typing import Array
 from scripts.reporting import Report, append, parser
 
-#: Relative change of a parameter in the central differences, and sections with parameters.
-STEP = 1e-4
+#: Relative changes of a parameter in the central differences: the first without a kink between.
+STEPS = (1e-4, 1e-5, 1e-6)
+
+#: Sections with parameters.
 SECTIONS = ("material", "fixed", "load", "contact", "friction", "electric", "electrode")
 
 #: Numbers that are no parameters: they choose, or leave the problem as it is.
@@ -193,8 +195,29 @@ def moved(case: Case, way: Mapping[str, float], by: float) -> Case:
     return case
 
 
-def differences(solution: Solution, names: list[str], way: Mapping[str, float]) -> Array:
+def active_sets(solution: Solution) -> list[ActiveSet]:
+    """Return the active set of each step. Collective."""
+    base = solution.problem
+    states = [step.state for step in solution.steps] or [solution.state]
+    return [active_set(base.at(state.time, state.history), state) for state in states]
+
+
+def same_sets(one: Solution, other: Solution) -> bool:
+    """Tell whether nodes are open, stick and slip alike in all steps of two runs. Collective."""
+    pairs = zip(active_sets(one), active_sets(other), strict=True)
+    same = all(
+        np.array_equal(a.closed, b.closed) and np.array_equal(a.slips, b.slips) for a, b in pairs
+    )
+    return bool(one.problem.comm.allreduce(same, op=MPI.LAND))
+
+
+def differences(
+    solution: Solution, names: list[str], way: Mapping[str, float]
+) -> tuple[Array, float]:
     """Return the derivatives along a way of parameters by central differences of solutions.
+
+    Where the active sets of the two ends differ in a step, the difference goes across a kink of
+    the results: it is taken over a tenth of the way then, and over a hundredth.
 
     Parameters
     ----------
@@ -202,10 +225,18 @@ def differences(solution: Solution, names: list[str], way: Mapping[str, float]) 
         The solution, and results of it.
     way
         Key -> change of the parameter, relative to its value.
+
+    Returns
+    -------
+    The derivatives, and over which relative change they were taken.
     """
     comm, case = solution.problem.comm, solution.source
-    ends = [values(solve(moved(case, way, by), comm=comm), names) for by in (STEP, -STEP)]
-    return (ends[0] - ends[1]) / (2 * STEP)
+    for step in STEPS:
+        ends = [solve(moved(case, way, by), comm=comm) for by in (step, -step)]
+        if same_sets(*ends):
+            break
+    ahead, behind = (values(end, names) for end in ends)
+    return (ahead - behind) / (2 * step), step
 
 
 @dataclass(frozen=True)
@@ -216,16 +247,18 @@ class Compared:
     ----------
     apart, adjoint
         To central differences of solutions, and to the adjoint.
-    weak
-        Number of weakly active nodes.
+    weak, kinks
+        Numbers of weakly active nodes, and of differences that were shortened: at their ends
+        another node touches, sticks or slips.
     parameters, results
-        How many there are; of all parameters along one way one.
+        How many there are.
     """
 
     family: str
     apart: float
     adjoint: float
     weak: int
+    kinks: int
     parameters: int
     results: int
 
@@ -238,8 +271,8 @@ def compared(seed: int, comm: MPI.Intracomm, each: bool = True) -> Compared:
     seed, comm
         Number of the problem, and the ranks.
     each
-        Derivatives by each parameter; else along one random way of all at once, beside which two
-        solutions are enough.
+        Solutions beside each parameter; else along one random way of all at once, beside which two
+        are enough. Tangent and adjoint are those of each in both cases.
     """
     family, data = problem(seed)
     solution = solve(parse_case(data), comm=comm)
@@ -253,32 +286,27 @@ def compared(seed: int, comm: MPI.Intracomm, each: bool = True) -> Compared:
     if family == "evolution, electrode":
         names += ["charge_foundation", "potential_top", "reactions.top.x"]
     size = np.array([number_at(solution.source, key) for key in given])
-    ways, parameters = np.eye(len(given)), given
-    if not each:
-        size, ways = np.ones(1), np.random.default_rng(seed).uniform(-1, 1, (len(given), 1))
-        way = dict(zip(given, ways[:, 0], strict=True))
-
-        def along(by: float) -> ContactProblem:
-            return build_problem(moved(solution.source, way, by), comm)
-
-        parameters = {"way": Parameter(0.0, along)}
-    found = sensitivity(solution, names, parameters, "tangent")
-    other = sensitivity(solution, names, parameters, "adjoint")
+    found = sensitivity(solution, names, given, "tangent")
+    other = sensitivity(solution, names, given, "adjoint")
     # By relative changes of the parameters: in the units of the results.
     tangent, adjoint = (
-        np.array([[of[name][key] for key in parameters] for name in names]) * size
+        np.array([[of[name][key] for key in given] for name in names]) * size
         for of in (found, other)
     )
-    apart = np.column_stack(
-        [differences(solution, names, dict(zip(given, way, strict=True))) for way in ways.T]
-    )
     natural = np.maximum(np.abs(values(solution, names)), 1e-300)[:, None]
+    both = float((np.abs(tangent - adjoint) / np.maximum(np.abs(tangent), natural)).max())
+    ways = np.eye(len(given))
+    if not each:
+        ways = np.random.default_rng(seed).uniform(-1, 1, (len(given), 1))
+    ends = [differences(solution, names, dict(zip(given, way, strict=True))) for way in ways.T]
+    apart, along = np.column_stack([end for end, _ in ends]), tangent @ ways
     return Compared(
         family,
-        float((np.abs(tangent - apart) / np.maximum(np.abs(apart), LEAST * natural)).max()),
-        float((np.abs(tangent - adjoint) / np.maximum(np.abs(tangent), natural)).max()),
+        float((np.abs(along - apart) / np.maximum(np.abs(apart), LEAST * natural)).max()),
+        both,
         len(found.weakly_active),
-        len(parameters),
+        sum(step < STEPS[0] for _, step in ends),
+        len(given),
         len(names),
     )
 
@@ -287,7 +315,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     """Compare the problems, and tabulate those of all numbers of ranks in the folder."""
     made = parser(__doc__, "derivatives")
     made.add_argument("--count", type=int, default=60, help="number of problems")
-    made.add_argument("--together", action="store_true", help="all parameters along one way")
+    made.add_argument("--together", action="store_true", help="solutions along one way alone")
     given, comm = made.parse_args(arguments), MPI.COMM_WORLD
     report = Report(given.out)
     rows: dict[str, list[Any]] = {name: [] for name in ("ranks", *Compared.__annotations__)}
@@ -304,7 +332,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
 def tabulate(report: Report) -> None:
     """Tabulate the problems of all runs in the folder by family."""
     columns: dict[str, list[Any]] = {
-        name: [] for name in ("family", "ranks", "problems", "derivatives", "apart", "adjoint")
+        name: []
+        for name in ("family", "ranks", "problems", "derivatives", "apart", "kinks", "adjoint")
     }
     for path in sorted(report.out.glob("problems-*.csv")):
         with path.open(newline="") as stream:
@@ -312,16 +341,18 @@ def tabulate(report: Report) -> None:
         for family in FAMILIES:
             own = [row for row in every if row["family"] == family]
             number = sum(int(row["parameters"]) * int(row["results"]) for row in own)
-            worst = [max(float(row[name]) for row in own) for name in ("apart", "adjoint")]
-            append(columns, family, every[0]["ranks"], len(own), number, *worst)
+            apart, adjoint = (max(float(row[name]) for row in own) for name in ("apart", "adjoint"))
+            kinks, ranks = sum(int(row["kinks"]) for row in own), every[0]["ranks"]
+            append(columns, family, ranks, len(own), number, apart, kinks, adjoint)
     report.table(
         "problems",
         "Derivatives of random problems by all their parameters",
         columns,
         "Largest relative difference of the tangent to central differences of solutions (apart), "
         "and to the adjoint. Derivatives are compared relative to themselves, but to not less than "
-        "a hundredth of the result (apart) or the result (adjoint) over the parameter. On several "
-        "ranks along one random way of all parameters.",
+        "a hundredth of the result (apart) or the result (adjoint) over the parameter. Kinks: "
+        "differences between whose ends a node begins to touch, stick or slip, and which were "
+        "taken over a tenth or hundredth of the way.",
     )
 
 

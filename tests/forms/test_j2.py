@@ -1,11 +1,12 @@
 """The stress update of flow theory at single points."""
 
 from itertools import pairwise
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
-from forms.history import HistoryLaw, Response, isotropic_stiffness
+from forms.history import HistoryLaw, Response, differential, isotropic_stiffness
 from forms.j2 import J2, Tabulated, Voce
 
 ROOT = np.sqrt(2 / 3)
@@ -84,6 +85,47 @@ def test_the_tangent_is_the_derivative_of_the_step(name, size):
             assert np.sort(error.max(axis=1))[-3] < 1e-8
     asymmetric = np.abs(response.stiffness - response.stiffness.transpose(0, 2, 1)).max()
     assert (asymmetric < 1e-14) == law.symmetric == (name != "chaboche")
+
+
+@pytest.mark.parametrize("size", [4, 6])
+@pytest.mark.parametrize("name", list(LAWS))
+def test_the_differential_is_the_derivative_of_the_step(name, size):
+    law, random, h = LAWS[name], np.random.default_rng(1), 1e-7
+    for strain, before, response in steps(law, size):
+        moved = random.standard_normal(strain.shape)
+        changed = {k: random.standard_normal(v.shape) for k, v in before.items()}
+        found = law.differential(strain, before, moved, changed)
+        ends = [
+            law.respond(strain + s * moved, {k: v + s * changed[k] for k, v in before.items()})
+            for s in (h, -h)
+        ]
+        parts = {k: (v, *(end.variables[k] for end in ends)) for k, v in found.variables.items()}
+        parts["stress"] = found.stress, ends[0].stress, ends[1].stress
+        for one, up, down in parts.values():
+            error = np.abs(one - (up - down) / (2 * h)).reshape(len(strain), -1).max(axis=1)
+            # But for a few points that have just begun to yield, or meet a corner of the table.
+            assert np.sort(error)[-4] < 2e-7
+        # By the strain alone it is the tangent.
+        still = {k: np.zeros_like(v) for k, v in before.items()}
+        along = law.differential(strain, before, moved, still).stress
+        tangent = np.einsum("nij,nj->ni", response.stiffness, moved)
+        assert along == pytest.approx(tangent, abs=1e-13)
+
+
+@pytest.mark.parametrize("name", ["H", "chaboche"])
+def test_the_differential_of_a_law_that_has_none_is_that_of_differences(name):
+    law = LAWS[name]
+    plain = SimpleNamespace(respond=law.respond)
+    random = np.random.default_rng(2)
+    for strain, before, _ in steps(law, 4):
+        moved = random.standard_normal(strain.shape)
+        changed = {k: random.standard_normal(v.shape) for k, v in before.items()}
+        exact, found = (differential(one, strain, before, moved, changed) for one in (law, plain))
+        errors = [np.abs(found.stress - exact.stress).max(axis=1)]
+        assert np.sort(errors[0])[-4] < 1e-5
+        for key, value in exact.variables.items():
+            error = np.abs(found.variables[key] - value).reshape(len(strain), -1).max(axis=1)
+            assert np.sort(error)[-4] < 1e-5
 
 
 def test_the_secant_is_hencky_s_about_a_moved_origin():

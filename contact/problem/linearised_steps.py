@@ -1,10 +1,11 @@
-"""The history of a step transposed: the way back of the adjoint through the steps of an evolution.
+"""A step of an evolution linearised, and transposed: derivatives carried through the history.
 
 A step ends with the unknowns x and the history h' = H(x, h), and its equations R(x, f, h) = 0 know
-the history h of its beginning. Given the derivatives of a quantity by h', those by x are
-(dH/dx)^T times these, and those by h are (dH/dh)^T times these less (dR/dh)^T w, with the adjoint
-w of the step. Each part of the history has its own H: slip adds up at the contact nodes, internal
-variables of the material flow at the quadrature points.
+the history h of its beginning. The tangent goes forwards with dh' = dH/dx dx + dH/dh dh; dR/dh dh
+is part of the equations of dx. The adjoint goes back: given the derivatives of a quantity by h',
+those by x are (dH/dx)^T times these, and those by h are (dH/dh)^T times these less (dR/dh)^T w,
+with the adjoint w of the step. Each part of the history has its own H: slip adds up at the contact
+nodes, internal variables of the material flow at the quadrature points.
 """
 
 from __future__ import annotations
@@ -14,10 +15,50 @@ import numpy as np
 from contact.body.internal_variables import VARIABLES
 from contact.history import History, InternalVariables, Part
 from contact.interface.multipliers import SlipHistory
-from contact.problem.linearised import Linearised
+from contact.problem.linearised import Equations, Linearised
 from contact.problem.problem import SLIP, ContactProblem
 from contact.problem.state import State
 from contact.typing import Array
+
+
+def commit_along(linearised: Linearised, x: Array, change: History) -> History:
+    """Return how the history at the end of a step changes. Collective.
+
+    Parameters
+    ----------
+    linearised
+        The equations of the step.
+    x, change
+        Changes of the owned unknowns, and of the history at its beginning.
+    """
+    problem, state = linearised.problem, linearised.state
+    slip, variables = _parts(change)
+    moved = problem.nodes.apply(problem.equilibrium.local(x))[:, : problem.dim]
+    jump = problem.nodes.tangential_component(moved)
+    longer = np.einsum("ni,ni->n", _direction(problem, problem.nodal(state)), jump - slip.jump)
+    parts: dict[str, Part] = {SLIP: SlipHistory(jump, slip.accumulated + longer)}
+    if variables is not None:
+        parts[VARIABLES] = problem.equilibrium.commit_along(state, x, variables)
+    return History(parts)
+
+
+def before_along(linearised: Linearised, change: History) -> Equations:
+    """Return how the equations of a step change with the history at its beginning. Collective.
+
+    Parameters
+    ----------
+    linearised
+        The equations of the step.
+    change
+        Of the history.
+    """
+    problem, state = linearised.problem, linearised.state
+    slip, variables = _parts(change)
+    conditions = linearised.by_length * slip.accumulated[:, None]
+    conditions -= np.einsum("nij,nj->ni", linearised.by_slip, slip.jump)
+    if variables is None:
+        return Equations(np.zeros_like(problem.equilibrium.owned_part(state.x)), conditions)
+    return Equations(problem.equilibrium.before_along(state, variables), conditions)
 
 
 def commit_transposed(problem: ContactProblem, state: State, after: History) -> Array:
