@@ -5,12 +5,16 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
+from scipy.optimize import minimize_scalar
 
 from contact import Case, NewtonOptions, Solution, load_case, parse_case, solve
+from contact.case.build import build_problem
 from contact.typing import Array
 from forms.hencky import UserLaw
 from forms.ops import Value, maximum
@@ -22,19 +26,19 @@ STEEL = {"law": "j2", "young": YOUNG, "poisson": POISSON, "yield_stress": YIELD}
 EFFECTIVE = YOUNG / (1 - POISSON**2)
 ELEMENTS = {"P1": (1, "standard"), "P2": (2, "standard"), "P2, mean": (2, "mean_dilatation")}
 
-#: Radius of the ball and of the cylinder in the study of first yield (mm).
+#: Radius of the ball and of the cylinder (mm).
 RADIUS = 10.0
-#: Largest pressure at first yield over Y, and its depth over the contact radius, at nu = 0.3.
-FIRST_YIELD = {"ball": (1.61280, 0.4809), "cylinder": (1.79367, 0.7043)}
 
-#: Depth over that of first yield; force over that of first yield by an independent code, and by the
-#: fit of Kogut and Etsion, J. Appl. Mech. 69 (2002) 657.
+#: Largest pressure over Y at first yield of a ball, in the fit of Jackson and Green.
+JACKSON_GREEN = 1.295 * np.exp(0.736 * POISSON)
+
+#: Bodies and Poisson's ratios in the study of first yield.
+YIELDING = [("ball", 0.25), ("ball", 0.3), ("ball", 0.35), ("ball", 0.4), ("cylinder", 0.3)]
+
+#: Depth over that of first yield -> force over that of first yield by an independent code.
 BALL = {
-    1.9: (2.574, 2.571),
-    3.0: (4.933, 4.929),
-    5.0: (9.977, 10.21),
-    7.5: (17.27, 17.84),
-    10.0: (25.29, 25.66),
+    **{1.9: 2.574, 3.0: 4.933, 5.0: 9.977, 7.5: 17.27, 10.0: 25.29},
+    **{30.0: 103.3, 40.0: 148.1, 50.0: 193.5},
 }
 
 
@@ -109,7 +113,58 @@ def prandtl(report: Report, coarse: bool) -> None:
     )
 
 
-def first_yield(shape: str, fineness: float) -> tuple[float, float]:
+def hertz_first_yield(shape: str, poisson: float = POISSON) -> tuple[float, float]:
+    """Return the largest Hertzian pressure at first yield over Y, and the depth over the radius.
+
+    It yields where von Mises' stress on the axis is largest: of a ball |s_z - s_r|, of a cylinder
+    that of plane strain (Johnson, Contact Mechanics, 1985, sections 3.4 and 4.2).
+
+    Parameters
+    ----------
+    shape
+        "ball" or "cylinder".
+    poisson
+        Of the half space.
+    """
+
+    def mises(z: float) -> float:
+        """Return the stress over the largest pressure in a depth over the contact radius."""
+        if shape == "ball":
+            outside = 1 - z * np.arctan2(1.0, z)
+            return float(abs(1.5 / (1 + z**2) - (1 + poisson) * outside))
+        root = np.sqrt(1 + z**2)
+        along, down = -((1 + 2 * z**2) / root - 2 * z), -1 / root
+        out = poisson * (along + down)
+        of = np.array([along - down, down - out, out - along])
+        return float(np.sqrt(of @ of / 2))
+
+    found = minimize_scalar(
+        lambda z: -mises(z), bounds=(0.2, 1.2), method="bounded", options={"xatol": 1e-9}
+    )
+    return -1 / float(found.fun), float(found.x)
+
+
+def kogut_etsion(w: float) -> float:
+    """Return the force over that of first yield at a depth over that of first yield, from 1 on.
+
+    A fit for a deformable ball on a rigid plane; J. Appl. Mech. 69 (2002) 657.
+    """
+    return float(1.03 * w**1.425 if w <= 6 else 1.40 * w**1.263)
+
+
+def jackson_green(w: float) -> float:
+    """Return the force over that of first yield at a depth over that of first yield, from 1.9 on.
+
+    A fit for a deformable ball on a rigid plane; J. Tribol. 127 (2005) 343.
+    """
+    strain, yielding = YIELD / EFFECTIVE, JACKSON_GREEN
+    width = np.pi * yielding * strain / 2 * np.sqrt(w) * (w / 1.9) ** (0.07 * np.exp(23 * strain))
+    hardness = 2.84 * (1 - np.exp(-0.82 * width**-0.7))
+    elastic = np.exp(-(w ** (5 / 12)) / 4) * w**1.5
+    return float(elastic + 4 * hardness / yielding * (1 - np.exp(-(w ** (5 / 9)) / 25)) * w)
+
+
+def first_yield(shape: str, fineness: float, poisson: float = POISSON) -> tuple[float, float]:
     """Return the largest pressure at first yield over Y, and the depth over the contact radius.
 
     The force grows in steps of 0.01 Y of the largest Hertzian pressure, whose middle counts.
@@ -120,24 +175,27 @@ def first_yield(shape: str, fineness: float) -> tuple[float, float]:
         "ball" or "cylinder".
     fineness
         Elements on the contact radius.
+    poisson
+        Of the body.
     """
-    known, _ = FIRST_YIELD[shape]
+    known, _ = hertz_first_yield(shape, poisson)
     pressures = known - 0.105 + 0.01 * np.arange(22)
-    ball = shape == "ball"
+    ball, modulus = shape == "ball", YOUNG / (1 - poisson**2)
 
     def force(pressure: Array) -> Array:
         """Return the force of a largest pressure over Y, of the meshed half of the cylinder."""
         if ball:
-            return np.pi**3 * RADIUS**2 * (pressure * YIELD) ** 3 / (6 * EFFECTIVE**2)
-        return np.pi * RADIUS * (pressure * YIELD) ** 2 / (2 * EFFECTIVE)
+            return np.pi**3 * RADIUS**2 * (pressure * YIELD) ** 3 / (6 * modulus**2)
+        return np.pi * RADIUS * (pressure * YIELD) ** 2 / (2 * modulus)
 
     # Of a ball a = pi p R/(2 E*), of a cylinder 2 p R/E*.
-    a = (np.pi / 2 if ball else 2) * known * YIELD * RADIUS / EFFECTIVE
+    a = (np.pi / 2 if ball else 2) * known * YIELD * RADIUS / modulus
     forces = force(pressures)
     times = [float(k) for k in range(forces.size + 1)]
     case = indentation(
         {"shape": "paraboloid", "apex": [0.0, 0.0], "axis": [0.0, 1.0], "radius": RADIUS},
         {"displacement": [0.0, "free"], "force": [0.0, -1.0]},
+        material={**STEEL, "poisson": poisson},
         mesh={
             **{"generator": "half_space", "radius": 1.5 * a, "extent": 60 * a, "size": 15 * a},
             **{"contact_size": a / fineness, "edge_size": a / fineness, "growth": 0.2},
@@ -165,47 +223,118 @@ def first_yield(shape: str, fineness: float) -> tuple[float, float]:
 
 def ball_and_cylinder(report: Report, coarse: bool) -> None:
     """Make the table of first yield under Hertzian contact."""
-    columns: dict[str, list[Any]] = {
-        name: [] for name in ("body", "elements", "p_0/Y", "closed form", "depth/a", "closed form ")
-    }
-    for shape, known in FIRST_YIELD.items():
-        for fineness in (6,) if coarse else (6, 12, 24):
-            pressure, depth = first_yield(shape, fineness)
-            append(columns, shape, fineness, pressure, known[0], depth, known[1])
+    names = ("body", "nu", "elements", "p_0/Y", "closed form", "depth/a", "closed form ")
+    columns: dict[str, list[Any]] = {name: [] for name in names}
+    for shape, poisson in YIELDING:
+        known = hertz_first_yield(shape, poisson)
+        sizes = (6,) if coarse else (6, 12, 24) if poisson == POISSON else (24,)
+        for fineness in sizes:
+            pressure, depth = first_yield(shape, fineness, poisson)
+            append(columns, shape, poisson, fineness, pressure, known[0], depth, known[1])
     report.table(
         "first-yield",
-        "First yield under a rigid ball and a rigid cylinder, nu = 0.3",
+        "First yield under a rigid ball and a rigid cylinder",
         columns,
         "The largest Hertzian pressure of the force at which the first point yields, and its "
         "depth; P2, elements on the contact radius. The force grows in steps of 0.01 Y.",
     )
 
 
+def depth_of_first_yield() -> float:
+    """Return how deep a ball is when the steel yields, w_c, as the fits have it."""
+    return float((np.pi * JACKSON_GREEN * YIELD / (2 * EFFECTIVE)) ** 2 * RADIUS)
+
+
+def ball_cases(coarse: bool) -> list[Case]:
+    """Return the ball at 1.9 to 10 times the depth of first yield, and at 30 to 50 times that."""
+    name, size = CASES / "ball-in-steel.toml", 2 if coarse else 1
+    depth = 50 * depth_of_first_yield()
+    return [
+        load_case(name, [f"mesh.{of}_size={0.004 * size}" for of in ("contact", "edge")]),
+        load_case(
+            name,
+            [
+                *(f"mesh.{of}_size={0.01 * size}" for of in ("contact", "edge")),
+                *("mesh.radius=0.45", "mesh.extent=30.0", "mesh.size=8.0"),
+                f"contact.rigid.displacement=[0.0,{-depth}]",
+                *("evolution.times=[0.0,0.2,0.6,0.8,1.0,2.0]", "evolution.steps=[8,8,4,4,20]"),
+            ],
+        ),
+    ]
+
+
 def pressed_ball(report: Report, coarse: bool) -> None:
-    """Make the table of forces on a ball that is pressed into steel that yields. Collective."""
-    # The case's mesh, or one of twice the size.
-    changes = ["mesh.contact_size=0.008", "mesh.edge_size=0.008"] if coarse else []
-    solution = solved(load_case(CASES / "ball-in-steel.toml", changes))
-    depth = (np.pi * FIRST_YIELD["ball"][0] * YIELD / (2 * EFFECTIVE)) ** 2 * RADIUS
+    """Make the tables of a ball that is pressed into steel that yields, and lifted. Collective."""
+    depth = depth_of_first_yield()
     first = 4 / 3 * EFFECTIVE * np.sqrt(RADIUS) * depth**1.5
-    moved = np.array([-float(step.row["rigid_y"]) for step in solution.steps]) / depth
-    forces = np.array([abs(float(step.row["contact_force_y"])) for step in solution.steps]) / first
-    columns: dict[str, list[Any]] = {
-        name: []
-        for name in ("w/w_c", "P/P_c", "another code", "over it", "Kogut and Etsion", "over that")
-    }
-    for w, (other, fit) in BALL.items():
-        # The loading steps come first; the case's steps end within .1 % of these depths.
-        k = int(np.argmin(np.abs(moved - w)))
-        force = forces[k] * (w / moved[k]) ** 1.3
-        append(columns, w, force, other, force / other - 1, fit, force / fit - 1)
+    titles = ("w/w_c", "P/P_c", "another code", "over it")
+    fits = ("Kogut and Etsion", "over that", "Jackson and Green", "over these")
+    columns: dict[str, list[Any]] = {name: [] for name in (*titles, *fits)}
+    names = ("w/w_c", "mark over w", "Etsion et al.", "exponent", "rise 4 E* a/(3 P)")
+    lifted: dict[str, list[Any]] = {name: [] for name in names}
+    deepest = 0.0
+    for case in ball_cases(coarse):
+        solution = solved(case)
+        rows = [step.row for step in solution.steps]
+        moved = np.array([-float(row["rigid_y"]) for row in rows]) / depth
+        forces = np.array([abs(float(row["contact_force_y"])) for row in rows]) / first
+        turn = int(np.argmax(moved))
+        for w, other in BALL.items():
+            if not 1.01 * deepest < w < 1.01 * moved[turn]:
+                continue
+            # The steps of the loading end within .1 % of these depths.
+            k = int(np.argmin(np.abs(moved[: turn + 1] - w)))
+            force = forces[k] * (w / moved[k]) ** 1.3
+            against = [x for fit in (kogut_etsion(w), jackson_green(w)) for x in (fit, force / fit)]
+            against[1::2] = [ratio - 1 for ratio in against[1::2]]
+            append(columns, w, force, other, force / other - 1, *against)
+        deepest = float(moved[turn])
+        mark, *elastic = unloading(solution, turn)
+        append(lifted, deepest, mark, (1 - deepest**-0.28) * (1 - deepest**-0.69), *elastic)
     report.table(
         "ball",
         "Force on a rigid ball over that of first yield",
         columns,
-        "`ball-in-steel.toml`, seven elements on the contact radius of first yield, no hardening. "
-        "The fit of Kogut and Etsion is one for a deformable ball, +-5 %.",
+        "`ball-in-steel.toml`, seven elements on the contact radius of first yield, no hardening; "
+        "from 30 on in a body of five times the size, 29 elements on the last contact radius. The "
+        "fits are ones for a deformable ball, +-5 %.",
     )
+    report.table(
+        "ball-unloading",
+        "A ball that is lifted off the steel, beside Hertz's law for the radius of its mark",
+        lifted,
+        "Depth of the mark on the axis over that of the ball, beside the fit of Etsion, Kligerman "
+        "and Kadin, Int. J. Solids Struct. 42 (2005) 3716, for a deformable ball. Of Hertz the "
+        "exponent of the force in the rise above the mark is 1.5, and the rise 3 P/(4 E* a) with "
+        "the contact radius a at its deepest.",
+    )
+
+
+def unloading(solution: Solution, turn: int) -> tuple[float, float, float]:
+    """Return how a ball is lifted off; Hertz has 1.5 and 1 for the last two. Serial.
+
+    Parameters
+    ----------
+    solution, turn
+        The steps, and the last one of the loading.
+
+    Returns
+    -------
+    Depth of the mark over that of the ball at its deepest, exponent of the force in the rise of the
+    ball above the mark, and the whole rise over 3 P/(4 E* a).
+    """
+    nodes, body = solution.problem.nodes, solution.problem.equilibrium
+    places = nodes.points[:, 0]
+    mark = -float(body.nodal(solution.state.x)[nodes.nodes[np.argmin(places)], 1])
+    rows = [step.row for step in solution.steps[turn:]]
+    depth = np.array([-float(row["rigid_y"]) for row in rows])
+    force = np.array([abs(float(row["contact_force_y"])) for row in rows])
+    above, pressed = depth - mark, force > 0
+    exponent = np.polyfit(np.log(above[pressed]), np.log(force[pressed]), 1)[0]
+    touching = places[solution.steps[turn].state.forces.pressure > 0].max()
+    width = (touching + places[places > touching].min()) / 2
+    rise = above[0] * 4 * EFFECTIVE * width / (3 * force[0])
+    return mark / float(depth[0]), float(exponent), float(rise)
 
 
 def block(law: str, **more: Any) -> Case:
@@ -258,6 +387,37 @@ def newton(report: Report) -> None:
     )
 
 
+def cost(report: Report, coarse: bool) -> None:
+    """Tabulate the processor time of an iteration with J2 and with Hencky's law. Collective."""
+    times, repeated = np.linspace(0.0, 3.0, 19)[1:].tolist(), 1 if coarse else 3
+    names = ("degree", "cells", "factorisations", "iterations, J2", "s", "iterations, Hencky", "s ")
+    columns: dict[str, list[Any]] = {name: [] for name in (*names, "ratio")}
+    for degree, cells in ((2, 8),) if coarse else ((2, 24), (1, 64)):
+        mesh = {"generator": "rectangle", "size": [2.0, 1.0], "cells": [2 * cells, cells]}
+        for words, keep in (("few (chord steps)", "auto"), ("each iteration", "never")):
+            row: list[Any] = []
+            for given, law in (("j2", None), ("linear", hencky(4e3))):
+                case = block(given, mesh=mesh, space={"degree": degree})
+                settings = replace(NewtonOptions(), keep=keep)
+                seconds = []
+                for _ in range(repeated):
+                    problem = build_problem(case, law=law)
+                    begin = time.process_time()
+                    solution = solve(problem, settings, times=times)
+                    seconds.append(time.process_time() - begin)
+                    assert solution.converged, solution.outcome.reason
+                iterations = len(solution.history.records)
+                row += [iterations, min(seconds) / iterations]
+            append(columns, degree, f"{2 * cells} x {cells}", words, *row, row[1] / row[3])
+    report.table(
+        "cost",
+        "Processor time of an iteration with flow theory and with Hencky's law",
+        columns,
+        "The block that is pressed, sheared and unloaded in 18 steps, on one thread; the least of "
+        "three runs without set-up and output, over the number of iterations.",
+    )
+
+
 def apart(report: Report) -> None:
     """Draw J2 and Hencky's law on the way to a load and back. Collective."""
     flow = solved(block("j2"))
@@ -300,6 +460,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     chosen = options(__doc__ or "", "plasticity", arguments)
     report = Report(chosen.out)
     newton(report)
+    cost(report, chosen.coarse)
     apart(report)
     prandtl(report, chosen.coarse)
     ball_and_cylinder(report, chosen.coarse)

@@ -1,12 +1,9 @@
 """Bodies in homogeneous states of plasticity, and these states by an integration of their own."""
 
 import numpy as np
-from dolfinx.mesh import DiagonalType, create_rectangle, locate_entities_boundary
-from mpi4py import MPI
 from scipy.optimize import root
 
-from contact import J2, Body, Contact, Fixed, Load, Problem, parse_case, solve
-from contact.mesh.domain import from_mesh, revolved
+from contact import parse_case
 from contact.output.fields import DerivedFields
 
 FAR = 100.0
@@ -151,48 +148,4 @@ def integrated(young, poisson, yield_stress, hardening, kinematic, free, driven)
     for value in driven:
         now = step(value, *now)
         rows.append([*stress(now[0], now[1]), now[2]])
-    return np.array(rows)
-
-
-def sphere_problem(cells, young, yield_stress, pressure, degree=2, element="standard"):
-    """Return a hollow sphere, radii 1 and 2, under a pressure that comes and goes."""
-    ends = [[1.0, 0.0], [2.0, np.pi / 2]]
-    grid = create_rectangle(MPI.COMM_SELF, ends, [cells] * 2, diagonal=DiagonalType.crossed)
-    where = {"inner": (0, 1.0), "outer": (0, 2.0), "base": (1, 0.0)}
-    parts = {
-        name: locate_entities_boundary(grid, 1, lambda x, i=i, at=at: np.isclose(x[i], at))
-        for name, (i, at) in where.items()
-    }
-    radius, angle = grid.geometry.x[:, :2].T.copy()
-    grid.geometry.x[:, :2] = (radius * [np.cos(angle), np.sin(angle)]).T
-    body = Body(
-        J2(young, 0.3, yield_stress=yield_stress),
-        [Fixed("base", [None, 0.0])],
-        [Load("inner", pressure=pressure, amplitude=lambda t: min(t, 2.0 - t))],
-    )
-    domain = revolved(from_mesh(grid, parts))
-    return Problem(domain, body, Contact("outer", FAR), degree=degree, element=element)
-
-
-def hollow_sphere(cells, degree, young, yield_stress, pressure, steps=10):
-    """Return a hollow sphere, radii 1 and 2, after an inner pressure and after its removal.
-
-    Rows are the two states, columns u_r(1), u_r(2) and the hoop stresses there, on the equator.
-    """
-    problem = sphere_problem(cells, young, yield_stress, pressure, degree)
-    solution = solve(problem, times=[*np.linspace(0, 1, steps + 1)[1:], 2.0])
-    assert solution.converged and len(solution.steps) == steps + 1
-    rows, equilibrium = [], problem.equilibrium
-    for step in (solution.steps[-2], solution.steps[-1]):
-        stress = DerivedFields(equilibrium, step.state).nodes()["stress"]
-        row = []
-        for values, space, column in (
-            (equilibrium.nodal(step.state.x), equilibrium.space, 0),
-            (stress.x.array.reshape(-1, 9), stress.function_space, 8),
-        ):
-            places = space.tabulate_dof_coordinates()
-            equator = np.flatnonzero(np.abs(places[:, 1]) < 1e-9)
-            order = equator[np.argsort(places[equator, 0])]
-            row += [values[order[0], column], values[order[-1], column]]
-        rows.append(row)
     return np.array(rows)

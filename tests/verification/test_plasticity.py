@@ -8,15 +8,23 @@ from dolfinx import fem
 from contact import NewtonOptions, solve
 from contact.output.fields import DerivedFields
 from forms.j2 import Tabulated, Voce
-from scripts.studies.plasticity import STEEL, hencky
-from tests.problems.plasticity import (
-    hollow_sphere,
-    homogeneous,
-    homogeneous_values,
-    integrated,
-    path,
-    sphere_problem,
+from scripts.studies.hollow_sphere import (
+    Hill,
+    at_the_equator,
+    cycled,
+    limit_pressure,
+    most_strained,
+    pressed,
+    sphere,
 )
+from scripts.studies.plasticity import (
+    STEEL,
+    hencky,
+    hertz_first_yield,
+    jackson_green,
+    kogut_etsion,
+)
+from tests.problems.plasticity import homogeneous, homogeneous_values, integrated, path
 
 YOUNG, YIELD = 1.0, 0.004
 #: Hardening -> the keys of the case; then the function and the terms for the integration.
@@ -37,7 +45,8 @@ LAWS = {
         [(0.5, 200.0), (0.05, 0.0)],
     ),
 }
-#: At -.02: stress along, out of plane, a; at -.014 both stresses; at +.004 both, a.
+#: At -.02: stress along, out of plane, a; at -.014 both stresses; at +.004 both, a. The strain
+#: across at -.02; and the first two with 400 steps to it.
 EXPECTED = {
     "none": (-0.00461878, -0.00229633, 0.018080521, 0.00197463, -0.00031831,
              0.00461869, 0.00228163, 0.035869274),
@@ -48,6 +57,8 @@ EXPECTED = {
     "voce": (-0.00736973, -0.00346046, 0.015129630, -0.00077633, -0.00148244,
              0.00824324, 0.00346328, 0.026193295),
 }  # fmt: skip
+ACROSS = {"none": 0.017233958, "H": 0.016669968, "K": 0.016683946, "voce": 0.015667921}
+FINE = {"none": (-0.00461879, -0.00229875), "H": (-0.00560102, -0.00272757)}
 ENDS = (-0.02, -0.014, 0.004)
 
 
@@ -79,12 +90,20 @@ def test_plane_strain_between_plates(law):
         assert stress[2, 2] == pytest.approx(expected[1], abs=1e-8)
         assert a == pytest.approx(expected[-1], abs=2e-9) or len(expected) == 2
         assert abs(stress[0, 0]) < 1e-9
+    body, state = solution.problem.equilibrium, solution.steps[49].state
+    assert body.nodal(state.x)[:, 0].max() == pytest.approx(ACROSS[law], abs=1e-9)
     # Work is stored, or lost to plastic flow; the trapezoidal rule meets the corners of a curve.
     rows = [step.row for step in solution.steps]
     work, lost = (sum(row[name] for row in rows) for name in ("work", "plastic_dissipation"))
     assert all(row["plastic_dissipation"] >= 0 and row["dissipation"] == 0 for row in rows)
     assert work - rows[-1]["energy"] == pytest.approx(lost, rel=2e-3)
     assert lost == pytest.approx(YIELD * known[2][-1], rel=1e-6)
+
+
+@pytest.mark.parametrize("law", list(FINE))
+def test_plane_strain_in_eight_times_as_many_steps(law):
+    stress, _ = found(run("plane", material(law), path(-0.02, steps=400), cells=1))
+    assert (stress[1, 1], stress[2, 2]) == pytest.approx(FINE[law], abs=1e-8)
 
 
 @pytest.mark.parametrize(
@@ -141,32 +160,72 @@ def test_uniaxial_cycle(kind, keys, known):
         assert found(solution, step)[0][up, up] == pytest.approx(expected, abs=1e-6)
 
 
-#: Hill's solution: after the pressure, and unloaded; none where the table has none.
-SPHERES = {
-    "c 1.415": (
-        (1.0, 0.004, 0.0045),
-        [
-            [0.0061359479, 0.0019839870, np.nan, np.nan],
-            [0.0025359479, 0.0006339870, -0.0037142857, 0.00045284784],
-        ],
-    ),
-    "c 1.25": (
-        (200e3, 250.0, 237.548338),
-        [
-            [1.2338877e-3, 4.2724609e-4, np.nan, np.nan],
-            [2.8369435e-4, np.nan, -157.225723, np.nan],
-        ],
-    ),
-}
+def test_hill_s_closed_form_of_the_hollow_sphere():
+    """Numbers that were computed by themselves: under pressure and unloaded."""
+    found = Hill(1.0, 0.004)
+    assert found.front(0.0045) == pytest.approx(1.4151862, rel=1e-7)
+    assert found.row(0.0045, False)[:2] == pytest.approx([0.0061359479, 0.0019839870], rel=1e-7)
+    unloaded = [0.0025359479, 0.0006339870, -0.0037142857, 0.00045284784]
+    assert found.row(0.0045, True) == pytest.approx(unloaded, rel=1e-7)
+    steel = Hill(200e3, 250.0)
+    assert 2 * steel.first == pytest.approx(291.667, rel=1e-5)
+    pressure = steel.pressure(1.25)
+    assert pressure == pytest.approx(237.548338, rel=1e-8)
+    assert steel.row(pressure, False)[:2] == pytest.approx([1.2338877e-3, 4.2724609e-4], rel=1e-7)
+    inside, _, hoop, _ = steel.row(pressure, True)
+    assert (inside, hoop) == pytest.approx((2.8369435e-4, -157.225723), rel=1e-7)
 
 
-@pytest.mark.parametrize("name", list(SPHERES))
-def test_hollow_sphere_under_pressure_and_unloaded(name):
+@pytest.mark.parametrize(
+    ("young", "limit", "front"), [(1.0, 0.004, 1.4151862), (200e3, 250.0, 1.25)]
+)
+def test_hollow_sphere_under_pressure_and_unloaded(young, limit, front):
     """Within .2 %, of second order: straight edges follow the sphere no better."""
-    given, known = SPHERES[name]
-    errors = [np.abs(hollow_sphere(cells, 2, *given) / np.array(known) - 1) for cells in (16, 32)]
-    assert np.nanmax(errors[1]) < 2e-3
-    assert np.nanmin((errors[0] / errors[1])[:, 0]) > 3.3
+    exact = Hill(young, limit)
+    pressure, errors = exact.pressure(front), []
+    for cells in (16, 32):
+        run = pressed(cells, young, limit, pressure)
+        assert float(run.steps[-1].row["plastic_dissipation"]) == 0
+        pairs = [(at_the_equator(run, step), exact.row(pressure, step == -1)) for step in (-2, -1)]
+        moved = [np.abs(np.array(found[:2]) / known[:2] - 1) for found, known in pairs]
+        stressed = [np.abs(np.subtract(found, known))[2:] / limit for found, known in pairs]
+        assert cells == 16 or np.max(stressed) < 2e-3
+        errors.append(np.max(moved, axis=1))
+    assert errors[1].max() < 2e-3
+    assert (errors[0] / errors[1]).min() > 3.3
+
+
+@pytest.mark.parametrize("front", [1.5, 1.75])
+def test_hollow_sphere_that_yields_in_reverse(front):
+    """Unloading is the problem of twice the yield stress, in closed form too."""
+    exact = Hill(200e3, 250.0)
+    pressure = exact.pressure(front)
+    assert pressure > 2 * exact.first > exact.pressure(1.4151862)
+    run = pressed(16, 200e3, 250.0, pressure, steps=6)
+    assert float(run.steps[-1].row["plastic_dissipation"]) > 0
+    for step in (-2, -1):
+        found, known = at_the_equator(run, step), exact.row(pressure, unloaded=step == -1)
+        assert found[:2] == pytest.approx(known[:2], rel=4e-3)
+        at, strain = most_strained(run, step)
+        assert strain == pytest.approx(exact.plastic(at, pressure, step == -1), rel=0.04)
+
+
+def test_hollow_sphere_shakes_down_below_twice_its_first_yield():
+    exact = Hill(200e3, 250.0)
+    for share in (0.98, 1.1):
+        pressure = share * 2 * exact.first
+        first, *later = cycled(16, pressure, 3)
+        assert first == pytest.approx(exact.dissipated(pressure), rel=0.02)
+        # In each half cycle after the first: strains of twice the yield stress, which flow at Y.
+        half = exact.reversed.dissipated(pressure) / 2
+        assert later == pytest.approx([half] * 5, rel=0.05, abs=1e-9)
+        assert (half > 0) == (share > 1)
+
+
+def test_hollow_sphere_at_its_limit():
+    assert Hill(200e3, 250.0).most == pytest.approx(2 * 250 * np.log(2), rel=1e-12)
+    errors = [limit_pressure(cells) / Hill(200e3, 250.0).most - 1 for cells in (8, 16)]
+    assert abs(errors[1]) < 2e-3 and abs(errors[0]) > 3.5 * abs(errors[1])
 
 
 @pytest.mark.parametrize("kind", ["uniaxial", "revolved"])
@@ -192,6 +251,19 @@ def test_j2_is_hencky_s_law_in_proportional_loading(kind):
     assert theory[3] - theory[4] < 0.1 * drop
 
 
+def test_first_yield_under_hertz_and_the_fits_of_a_ball():
+    """The numbers that the tables of the study stand beside."""
+    known = {0.25: (1.55435, 0.4643), 0.3: (1.61280, 0.4809), 0.35: (1.67411, 0.4975)}
+    for poisson, values in (known | {0.4: (1.73848, 0.5142)}).items():
+        assert hertz_first_yield("ball", poisson) == pytest.approx(values, rel=1e-4)
+    assert hertz_first_yield("cylinder") == pytest.approx((1.79367, 0.7043), rel=1e-4)
+    depths = (1.9, 3.0, 5.0, 7.5, 10.0)
+    fits = {kogut_etsion: (2.571, 4.929, 10.21, 17.84, 25.66)}
+    fits[jackson_green] = (2.631, 4.998, 10.13, 17.60, 25.88)
+    for fit, values in fits.items():
+        assert [fit(w) for w in depths] == pytest.approx(values, rel=6e-4)
+
+
 def test_the_mean_dilatation_is_p2_p0_with_the_return_map_at_the_points():
     """The body's solution balances the mixed form, with a pressure of each cell of its own.
 
@@ -199,7 +271,7 @@ def test_the_mean_dilatation_is_p2_p0_with_the_return_map_at_the_points():
     so is the mixed method.
     """
     young, limit, pressure, nu = YOUNG, YIELD, 0.0045, 0.3
-    problem = sphere_problem(4, young, limit, pressure, element="mean_dilatation")
+    problem = sphere(4, young, limit, pressure=lambda t: pressure * t, element="mean_dilatation")
     solution = solve(problem, NewtonOptions(tolerance=1e-11), times=[1.0])
     assert solution.converged and len(solution.steps) == 1
     body = problem.equilibrium
