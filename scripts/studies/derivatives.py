@@ -250,8 +250,8 @@ class Compared:
     weak, kinks
         Numbers of weakly active nodes, and of differences that were shortened: at their ends
         another node touches, sticks or slips.
-    parameters, results
-        How many there are.
+    parameters, results, ways
+        How many there are; ways of parameters along which solutions were compared.
     """
 
     family: str
@@ -261,6 +261,7 @@ class Compared:
     kinks: int
     parameters: int
     results: int
+    ways: int
 
 
 def compared(seed: int, comm: MPI.Intracomm, each: bool = True) -> Compared:
@@ -308,6 +309,7 @@ def compared(seed: int, comm: MPI.Intracomm, each: bool = True) -> Compared:
         sum(step < STEPS[0] for _, step in ends),
         len(given),
         len(names),
+        ways.shape[1],
     )
 
 
@@ -331,28 +333,39 @@ def main(arguments: Sequence[str] | None = None) -> None:
 
 def tabulate(report: Report) -> None:
     """Tabulate the problems of all runs in the folder by family."""
-    columns: dict[str, list[Any]] = {
-        name: []
-        for name in ("family", "ranks", "problems", "derivatives", "apart", "kinks", "adjoint")
-    }
+    names = (
+        "family",
+        "ranks",
+        "problems",
+        "derivatives",
+        "adjoint",
+        "differences",
+        "apart",
+        "kinks",
+    )
+    columns: dict[str, list[Any]] = {name: [] for name in names}
     for path in sorted(report.out.glob("problems-*.csv")):
         with path.open(newline="") as stream:
             every = list(csv.DictReader(stream))
         for family in FAMILIES:
             own = [row for row in every if row["family"] == family]
-            number = sum(int(row["parameters"]) * int(row["results"]) for row in own)
             apart, adjoint = (max(float(row[name]) for row in own) for name in ("apart", "adjoint"))
+            by, along = (
+                sum(int(row[name]) * int(row["results"]) for row in own)
+                for name in ("parameters", "ways")
+            )
             kinks, ranks = sum(int(row["kinks"]) for row in own), every[0]["ranks"]
-            append(columns, family, ranks, len(own), number, apart, kinks, adjoint)
+            append(columns, family, ranks, len(own), by, adjoint, along, apart, kinks)
     report.table(
         "problems",
         "Derivatives of random problems by all their parameters",
         columns,
-        "Largest relative difference of the tangent to central differences of solutions (apart), "
-        "and to the adjoint. Derivatives are compared relative to themselves, but to not less than "
-        "a hundredth of the result (apart) or the result (adjoint) over the parameter. Kinks: "
-        "differences between whose ends a node begins to touch, stick or slip, and which were "
-        "taken over a tenth or hundredth of the way.",
+        "Largest relative difference of the tangent to the adjoint, and to central differences of "
+        "solutions (apart). Differences are by each parameter, or, where they are fewer than the "
+        "derivatives, along one random way of all. Derivatives are compared relative to "
+        "themselves, but to not less than a hundredth of the result (apart) or the result "
+        "(adjoint) over the parameter. Kinks: differences between whose ends a node begins to "
+        "touch, stick or slip, and which were taken over a tenth or hundredth of the way.",
     )
 
 
