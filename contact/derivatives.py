@@ -362,8 +362,8 @@ def _tangent(
         }
         for key, family in families.items():
             change, still = _explicit(family, state, linearised)
-            remembered = before_along(linearised, histories[key])
-            x, forces = linearised.solve(change + remembered)
+            by_history = before_along(linearised, histories[key])
+            x, forces = linearised.solve(change + by_history)
             for name, quantity in quantities.items():
                 if name not in gradients:
                     direction = _Direction(x, forces, histories[key])
@@ -375,7 +375,7 @@ def _tangent(
                 value = (ahead - behind) / family.over + body.product(by_x, x)
                 value += _total(problem, by_force, forces)
                 if isinstance(quantity, Reaction):
-                    value += body.product(quantity.weights(problem), remembered.forces)
+                    value += body.product(quantity.weights(problem), by_history.forces)
                 rows[name][key].append(value)
             if index + 1 < len(path.steps):
                 ends = commit_along(linearised, x, histories[key])

@@ -42,7 +42,7 @@ MU_KEY, WAY_KEY = "friction.mu", "fixed.0.displacement.0"
 
 @dataclass(frozen=True)
 class Found:
-    """What a run gives at Q = SHARE mu P, in units of the closed form.
+    """Results of a run at Q = SHARE mu P, in units of the closed form.
 
     Attributes
     ----------
@@ -143,7 +143,7 @@ def stick(problem: ContactProblem, state: State) -> float:
 
 
 def run(case: dict[str, Any], way: float, unit: Callable[[float], float]) -> Found:
-    """Move two bodies along until Q is SHARE mu P, and return what the closed form has. Serial.
+    """Move two bodies along until Q is SHARE mu P; return values of the closed form. Serial.
 
     Bodies yield elsewhere too, in proportion to Q: the displacement is that beyond the straight
     line on which all would stick.

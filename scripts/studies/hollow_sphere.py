@@ -34,7 +34,7 @@ YOUNG, YIELD = 200e3, 250.0
 FRONTS = (1.25, 1.4151862, 1.5, 1.75)
 CYCLED = (0.98, 0.99, 1.01, 1.02, 1.05)
 
-#: What the sphere touches: nothing.
+#: Gap of a foundation that the sphere never touches.
 FAR = 100.0
 
 
@@ -118,7 +118,7 @@ class Hill:
         return strain + (self.reversed.plastic(r, pressure, unloaded=False) if unloaded else 0.0)
 
     def dissipated(self, pressure: float) -> float:
-        """Return what plastic flow in half a sphere takes until a pressure."""
+        """Return the plastic dissipation of half a sphere until a pressure."""
         c, y = max(self.front(pressure), INNER), self.limit
         volume = c**3 * np.log(c / INNER) - (c**3 - INNER**3) / 3
         return float(4 * np.pi * (1 - POISSON) * y**2 / self.young * volume)
@@ -218,7 +218,7 @@ def converged(problem: Problem, times: Sequence[float]) -> Solution:
 
 
 def cycled(cells: int, pressure: float, cycles: int) -> Array:
-    """Return what plastic flow takes in each half of so many cycles of a pressure and none."""
+    """Return the plastic dissipation in each half of so many cycles of a pressure and none."""
     amplitude, times = course([pressure, 0.0] * cycles, 1)
     solution = converged(sphere(cells, YOUNG, YIELD, pressure=amplitude), times)
     return np.array([float(step.row["plastic_dissipation"]) for step in solution.steps])
@@ -266,7 +266,7 @@ def unloading(report: Report, cells: int) -> None:
 
 
 def shakedown(report: Report, cells: int) -> None:
-    """Tabulate what plastic flow takes in cycles beside the limit of shakedown."""
+    """Tabulate the plastic dissipation in cycles beside the limit of shakedown."""
     exact = Hill(YOUNG, YIELD)
     halves = ("off", "on, 2", "off, 2", "on, 3", "off, 3")
     columns: dict[str, list[Any]] = {

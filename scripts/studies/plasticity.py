@@ -190,7 +190,7 @@ def first_yield(shape: str, fineness: float, poisson: float = POISSON) -> tuple[
 
     # Of a ball a = pi p R/(2 E*), of a cylinder 2 p R/E*.
     a = (np.pi / 2 if ball else 2) * known * YIELD * RADIUS / modulus
-    # Stresses decay with the square of the distance below a ball, and with itself in the plane.
+    # Stresses decay with the square of the distance below a ball, with the distance in the plane.
     forces, box = force(pressures), 60 if ball else 480
     times = [float(k) for k in range(forces.size + 1)]
     case = indentation(
@@ -198,13 +198,9 @@ def first_yield(shape: str, fineness: float, poisson: float = POISSON) -> tuple[
         {"displacement": [0.0, "free"], "force": [0.0, -1.0]},
         material={**STEEL, "poisson": poisson},
         mesh={
-            **{
-                "generator": "half_space",
-                "radius": 1.5 * a,
-                "extent": box * a,
-                "size": box * a / 4,
-            },
-            **{"contact_size": a / fineness, "edge_size": a / fineness, "growth": 0.2},
+            **{"generator": "half_space", "radius": 1.5 * a, "growth": 0.2},
+            **{"extent": box * a, "size": box * a / 4},
+            **{"contact_size": a / fineness, "edge_size": a / fineness},
         },
         space={"degree": 2, **({"kinematics": "axisymmetric"} if ball else {})},
         evolution={
