@@ -236,9 +236,32 @@ class UserLaw(Isotropic):
         return total
 
 
-#: Laws of the stress of a material, and as forms take them.
+#: Laws of the stress of a material.
 Law: TypeAlias = Hencky | Anisotropic | HistoryLaw
-FormLaw: TypeAlias = Hencky | Anisotropic | QuadratureLaw
+
+
+@dataclass(frozen=True, eq=False)
+class Graded:
+    """A law as forms see it where its stresses are multiplied by a function of position.
+
+    Attributes
+    ----------
+    law
+        The law.
+    factor
+        The function, in UFL.
+    """
+
+    law: Hencky | Anisotropic
+    factor: Expr
+
+    def secant_stress(self, frozen: Expr, eps: Expr) -> Expr:
+        """Return the stress with secants at a frozen strain."""
+        return self.factor * secant_stress(self.law, frozen, eps)
+
+
+#: Laws as forms take them.
+FormLaw: TypeAlias = Hencky | Anisotropic | QuadratureLaw | Graded
 
 
 def is_linear(law: Law) -> bool:
@@ -254,7 +277,7 @@ def secant_stress(law: FormLaw, frozen: Expr, eps: Expr) -> Expr:
     """
     if isinstance(law, Anisotropic):
         return law.stress(eps)
-    if isinstance(law, QuadratureLaw):
+    if isinstance(law, QuadratureLaw | Graded):
         return law.secant_stress(frozen, eps)
     g = law.secant_modulus(deviator_squared(frozen))
     return (law.bulk - 2 * g / 3) * ufl.tr(eps) * ufl.Identity(3) + 2 * g * embed(eps)

@@ -9,6 +9,7 @@ from dataclasses import field as default
 from typing import Any, Protocol
 
 import numpy as np
+from dolfinx.fem import Function
 from ufl.core.expr import Expr
 
 from contact.arguments import expect, is_law, several
@@ -29,6 +30,7 @@ from contact.mesh.together import part
 from contact.typing import Array
 from forms.elasticity import Anisotropic
 from forms.hencky import Law, is_linear
+from forms.history import HistoryLaw
 from forms.piezo import Piezo
 
 #: For scripts that are older than the meaning of the word.
@@ -213,19 +215,29 @@ class Material:
         Piezoelectric tensors in the body's axes, or None.
     on
         Name of the region that consists of it, or several; none for the whole mesh.
+    factor
+        A function of position > 0 that its stresses are multiplied by, as `fields.field` takes it
+        (no unit): Young's modulus as a field, of which the law has a mean. A Function is copied.
+        None for 1.
     """
 
     law: Law
     piezo: Piezo | None = None
     on: Given = ()
+    factor: Given = None
 
     def __post_init__(self) -> None:
         """Refuse anything but materials."""
+        factor = self.factor.copy() if isinstance(self.factor, Function) else self.factor
+        object.__setattr__(self, "factor", field(factor))
         names = several("on", self.on, str, "the name of a region, or a list of names")
         object.__setattr__(self, "on", names)
         expect("law", self.law, "Linear(young, poisson), Log, UserLaw, ...", is_law(self.law))
         fits = isinstance(self.piezo, Piezo | None)
         expect("piezo", self.piezo, "Piezo(...), or None", fits)
+        fits = self.factor is None or not (self.piezo or isinstance(self.law, HistoryLaw))
+        accepted = "a material without coupling and internal variables"
+        expect("factor", self.factor, accepted, fits and not isinstance(self.factor, Moving))
 
 
 def _leading(materials: Sequence[Material]) -> tuple[Law, Piezo | None]:

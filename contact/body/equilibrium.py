@@ -29,7 +29,7 @@ from contact.body.description import Body
 from contact.body.elements import STANDARD, check_element
 from contact.body.global_unknowns import make_global_unknowns
 from contact.body.loads import Loads, assembled
-from contact.body.materials import cells_of
+from contact.body.materials import cells_of, factor_of
 from contact.body.pointwise import Pointwise
 from contact.body.supports import free_components, supports_of, without_field
 from contact.body.weak_forms import WeakForms
@@ -74,6 +74,8 @@ class BodyEquilibrium:
         self.space = fem.functionspace(domain.mesh, ("Lagrange", degree, (self.block_size,)))
         #: The owned cells of each material.
         self.cells = cells_of(domain, body.materials)
+        for material, own in zip(body.materials, self.cells, strict=True):
+            factor_of(domain, material, own)
         self.pointwise = Pointwise(self.space)
         self.supports = supports_of(domain, self.space, body)
         coupled = [material.piezo is not None for material in body.materials]

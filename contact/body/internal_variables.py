@@ -26,7 +26,7 @@ from contact.history import QUADRATURE_POINTS, Evaluated, InternalVariables
 from contact.mesh.domain import Domain, Indices
 from contact.mesh.simplices import barycentric, corners, inverse_jacobians, measures
 from contact.typing import Array
-from forms.hencky import FormLaw, Law
+from forms.hencky import FormLaw, Graded, Law
 from forms.history import (
     HistoryLaw,
     QuadratureLaw,
@@ -158,11 +158,11 @@ class QuadratureLaws:
         size = inverse_jacobians(of)[1]
         return measures(self._domain, of, barycentric(points), weights, size).ravel()
 
-    def law(self, law: Law) -> FormLaw:
+    def law(self, law: Law | Graded) -> FormLaw:
         """Return a law as forms see it, with the stress and stiffness that `set` evaluates."""
         return QuadratureLaw(self._stress, self._stiffness) if isinstance(law, HistoryLaw) else law
 
-    def fitted_law(self, law: Law) -> FormLaw:
+    def fitted_law(self, law: Law | Graded) -> FormLaw:
         """Return a law with the stress that `fit` has evaluated last, for any points."""
         return QuadratureLaw(self.fits["stress"]) if isinstance(law, HistoryLaw) else law
 

@@ -7,22 +7,26 @@ from dataclasses import fields, is_dataclass, replace
 from typing import TypeAlias
 
 import numpy as np
+import ufl
 from dolfinx import fem
 from dolfinx.mesh import Mesh
 from mpi4py import MPI
 
+from contact.arguments import expect
 from contact.body.description import Material
-from contact.body.fields import constant
+from contact.body.fields import constant, values_at
 from contact.errors import InputError
 from contact.mesh.domain import Domain, Indices, Measure
 from contact.mesh.entities import cells_at
+from contact.mesh.simplices import corners
+from contact.typing import Array
 from forms.elasticity import Anisotropic
-from forms.hencky import Law
+from forms.hencky import Graded, Law
 from forms.history import HistoryLaw
 from forms.piezo import Piezo
 
 #: A material with form constants for its numbers, and the measure of its cells.
-MaterialMeasure: TypeAlias = tuple[Law, Piezo | None, Measure]
+MaterialMeasure: TypeAlias = tuple[Law | Graded, Piezo | None, Measure]
 
 
 def cells_of(domain: Domain, materials: Sequence[Material]) -> list[Indices]:
@@ -115,13 +119,37 @@ def material_measures(
     whole = len(cells) == 1
     measures = [domain.dx] if whole else domain.divided(cells)
     for material, dx in zip(materials, measures, strict=True):
-        law = law_with_constants(material.law, domain.mesh)
-        piezo = material.piezo
+        law, piezo = form_law(material, domain.mesh), material.piezo
         constants = None if piezo is None else piezo_with_constants(piezo, domain.mesh)
         yield law, constants, dx(metadata=metadata)
 
 
-def law_with_constants(law: Law, mesh: Mesh) -> Law:
+def form_law(material: Material, mesh: Mesh) -> Law | Graded:
+    """Return the law of a material with form constants, and with its factor. Collective."""
+    law = _with_constants(material.law, mesh)
+    if material.factor is None or isinstance(law, HistoryLaw):
+        return law
+    return Graded(law, ufl.as_ufl(material.factor.ufl(ufl.SpatialCoordinate(mesh))))
+
+
+def factor_of(domain: Domain, material: Material, cells: Indices) -> Array:
+    """Return the factor of a material in the middle of some cells, shape (cells,). Collective.
+
+    Raises
+    ------
+    InputError
+        If it is not positive.
+    """
+    if material.factor is None:
+        return np.ones(cells.size)
+    middles = corners(domain)[cells].mean(axis=1)
+    values = values_at(material.factor, middles, 1.0, "material: factor", domain.comm)
+    least = domain.comm.allreduce(float(values.min(initial=np.inf)), op=MPI.MIN)
+    expect("material: factor", least, "a function that is positive everywhere", least > 0)
+    return values
+
+
+def _with_constants(law: Law, mesh: Mesh) -> Law:
     """Return a law with form constants for its numbers."""
     if isinstance(law, Anisotropic):
         return Anisotropic(fem.Constant(mesh, np.asarray(law.stiffness, dtype=float)))

@@ -20,6 +20,7 @@ from mpi4py import MPI
 
 from contact.body.description import Material
 from contact.body.elements import MEAN_DILATATION
+from contact.body.materials import factor_of
 from contact.mesh.entities import cells_at
 from contact.mesh.simplices import corners, inverse_jacobians, lagrange, measures, rule
 from contact.mesh.together import members, part
@@ -104,14 +105,16 @@ def estimated(
             shear = secant[cells]
         else:
             shear = np.asarray(law.secant_modulus(strain[cells] ** 2)).mean(axis=1)
-        energy = _density(material, shear)
+        factor = factor_of(body.domain, material, cells)
+        energy = _density(material, shear, factor)
         if local is not None:
-            squares[cells] = local.squares(cells, _moduli(material, shear))
+            squares[cells] = local.squares(cells, _moduli(material, shear, factor))
             if body.element == MEAN_DILATATION and not isinstance(law, Anisotropic):
                 # The pressure is constant in a cell.
+                bulk = factor * _bulk(law)
                 rough = own[..., :3].sum(axis=2).mean(axis=1)[:, None] / 3
                 between = at @ (nodal_means(body.domain, cells, rough) - rough[:, None])
-                squares[cells] += np.sum(volumes[cells] * between[..., 0] ** 2, 1) / _bulk(law)
+                squares[cells] += np.sum(volumes[cells] * between[..., 0] ** 2, 1) / bulk
         else:
             smooth = nodal_means(body.domain, cells, own[:, 0])
             squares[cells] = np.sum(volumes[cells] * energy(at @ (smooth - own)), axis=1)
@@ -152,7 +155,7 @@ def _bulk(law: Hencky | HistoryLaw) -> float:
     return float(law.young) / (3 - 6 * float(law.poisson))
 
 
-def _density(material: Material, shear: Array) -> Callable[[Array], Array]:
+def _density(material: Material, shear: Array, factor: Array) -> Callable[[Array], Array]:
     """Return the energy density of fluxes of shape (cells, q, components) in a material."""
     if material.piezo is None and not isinstance(material.law, Anisotropic):
         bulk = _bulk(material.law)
@@ -160,16 +163,17 @@ def _density(material: Material, shear: Array) -> Callable[[Array], Array]:
         def isotropic(flux: Array) -> Array:
             trace = flux[..., :3].sum(axis=-1)
             size = np.einsum("cqi,cqi->cq", flux, flux)
-            return trace**2 / (9 * bulk) + (size - trace**2 / 3) / (2 * shear[:, None])
+            density = trace**2 / (9 * bulk) + (size - trace**2 / 3) / (2 * shear[:, None])
+            return density / factor[:, None]
 
         return isotropic
-    compliance = np.linalg.inv(_moduli(material, shear))
+    compliance = np.linalg.inv(_moduli(material, shear, factor))
     # Without coupling a neighbour's D is zero here.
     size = compliance.shape[1]
     return lambda flux: np.sum((flux[..., :size] @ compliance) * flux[..., :size], axis=-1)
 
 
-def _moduli(material: Material, shear: Array) -> Array:
+def _moduli(material: Material, shear: Array, factor: Array) -> Array:
     """Return the moduli of each cell, shape (cells, 6, 6), with coupling (cells, 9, 9); or of all.
 
     They map strains to stresses in the basis of Mandel, and (eps, E) to (sigma, D).
@@ -182,6 +186,8 @@ def _moduli(material: Material, shear: Array) -> Array:
         volumetric[:3, :3] = 1 / 3
         own = shear[:1] if is_linear(law) else shear
         moduli = 3 * _bulk(law) * volumetric + 2 * own[:, None, None] * (np.eye(6) - volumetric)
+    if material.factor is not None:
+        moduli = factor[:, None, None] * moduli
     return moduli if material.piezo is None else _coupled(moduli, material.piezo)
 
 

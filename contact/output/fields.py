@@ -20,7 +20,7 @@ from ufl.core.expr import Expr
 from contact.body.description import Material
 from contact.body.elements import kinematics_of
 from contact.body.equilibrium import BodyEquilibrium
-from contact.body.materials import law_with_constants, piezo_with_constants
+from contact.body.materials import form_law, piezo_with_constants
 from contact.history import BodyState, Evaluated
 from contact.mesh.simplices import corners, inverse_jacobians, measures, rule
 from contact.mesh.together import pieces
@@ -117,7 +117,7 @@ class Point:
         kinematics = kinematics_of(body.domain, body.element, on_axis=True)
         self._dim, self.strain = body.dim, strain(u, kinematics)
         self._piezo = material.piezo and piezo_with_constants(material.piezo, mesh)
-        law = body.laws.fitted_law(law_with_constants(material.law, mesh))
+        law = body.laws.fitted_law(form_law(material, mesh))
         self.stress = stress(law, self.strain)
         if self._piezo is not None:
             self.stress += coupling_stress(self._piezo, self._phi)
