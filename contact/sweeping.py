@@ -8,6 +8,7 @@ computed from the same input.
 from __future__ import annotations
 
 import csv
+import difflib
 import itertools
 import logging
 import os
@@ -18,6 +19,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from mpi4py import MPI
 
 from contact.case.build import build_problem, named
@@ -32,7 +34,8 @@ from contact.methods.options import NewtonOptions, Options
 from contact.methods.report import Monitor, tell
 from contact.methods.signals import Interrupted, stop_on_signal
 from contact.output.formats import write_csv
-from contact.output.quantities import SWEEP, values_of
+from contact.output.quantities import SUMMARY, SWEEP, quantities, values_of
+from contact.output.remarks import measure
 from contact.output.solution import Solution
 from contact.problem.checks import check_potential
 from contact.problem.problem import ContactProblem
@@ -46,6 +49,9 @@ TABLE, CASE = "sweep.csv", "sweep.toml"
 
 #: Column with the digests of the files that the case of a row reads.
 INPUT = "input"
+
+#: Most values of a range, and names of the components of a vector.
+MOST, AXES = 10_000, "xyz"
 
 #: Columns that every table has.
 COLUMNS = ("converged", "kkt", "seconds", INPUT)
@@ -63,7 +69,7 @@ class Axis:
 
     @staticmethod
     def of(text: str) -> Axis:
-        """Read ``key=v1,v2,...``: TOML values, or bare words.
+        """Read ``key=v1,v2,...``: TOML values, bare words, or ``a:b:n``, n numbers from a to b.
 
         Raises
         ------
@@ -71,6 +77,8 @@ class Axis:
             If it is not that.
         """
         key, _, given = text.partition("=")
+        if ":" in given and not {*given} & {*"[]{}\"'"}:
+            given = ",".join(_spread(part, text) for part in given.split(","))
         try:
             values = tomllib.loads(f"values = [{given}]")["values"]
             # Each in one way: a row is found again by its texts.
@@ -84,6 +92,73 @@ class Axis:
         return Axis(key.strip(), tuple(texts))
 
 
+def _spread(text: str, whole: str) -> str:
+    """Return the numbers of a range ``a:b:n``; anything else as it is."""
+    first, *more = text.split(":")
+    if not more:
+        return text
+    try:
+        (last, count) = more
+        if not 2 <= int(count) <= MOST:
+            raise ValueError
+        ends = float(first), float(last)
+        if not np.isfinite(ends).all():
+            raise ValueError
+        numbers = np.linspace(*ends, int(count))
+    except ValueError:
+        accepted = f"a:b:n, n numbers from a to b, 2 to {MOST} of them"
+        raise InputError(f"--over {whole}: given {text.strip()}; accepted: {accepted}") from None
+    # To twelve digits: 0.3, and not 0.30000000000000004.
+    return ",".join(repr(float(f"{number:.12g}")) for number in numbers)
+
+
+def summary_columns(solution: Solution, names: Sequence[str]) -> dict[str, float]:
+    """Return keys of the summary as columns, a vector one a component. Collective.
+
+    Parameters
+    ----------
+    names
+        Of the keys; ``error.energy`` is one of a table in it.
+
+    Raises
+    ------
+    InputError
+        If there is no such key, or no number in it.
+    """
+    found: dict[str, float] = {}
+    for name in names:
+        top, *inner = name.split(".")
+        value = values_of(SUMMARY, solution, top).get(top)
+        for key in inner:
+            value = value.get(key) if isinstance(value, Mapping) else None
+        every: dict[str, Any] = {name: value}
+        if isinstance(value, Mapping):
+            every = {f"{name}.{key}": inside for key, inside in value.items()}
+        for key, entry in every.items():
+            numbers = np.atleast_1d(np.asarray(entry))
+            if numbers.dtype.kind not in "biuf" or numbers.ndim != 1:
+                kinds = "a number, a vector, or a table of these, in summary.json"
+                raise InputError(f"--columns {name}: given {entry!r:.40}; accepted: {kinds}")
+            ends = [""] if np.ndim(entry) == 0 else [f"_{axis}" for axis in AXES[: numbers.size]]
+            if len(ends) < numbers.size:
+                ends = [f"_{k}" for k in range(numbers.size)]
+            found |= {f"{key}{end}": float(x) for end, x in zip(ends, numbers, strict=True)}
+    return found
+
+
+def _check_columns(names: Sequence[str]) -> None:
+    """Refuse names that no key of a summary has."""
+    known = [quantity.name for quantity in quantities(SUMMARY)]
+    for name in names:
+        top = name.partition(".")[0]
+        if top not in known:
+            near = difflib.get_close_matches(top, known, n=1)
+            hint = f" (did you mean {near[0]}?)" if near else ""
+            raise InputError(
+                f"--columns {name}: no key of summary.json{hint}; accepted: {', '.join(known)}"
+            )
+
+
 def sweep(
     path: str | Path,
     axes: Sequence[Axis],
@@ -92,6 +167,7 @@ def sweep(
     monitor: Monitor | None = None,
     comm: MPI.Intracomm = MPI.COMM_WORLD,
     warm: bool = True,
+    columns: Sequence[str] = (),
 ) -> list[dict[str, Any]]:
     """Solve a case for all combinations of values; write a row of ``sweep.csv`` after each.
 
@@ -109,6 +185,8 @@ def sweep(
         Communicator of the mesh.
     warm
         Whether each solve has the solution before it as warm start.
+    columns
+        Further columns, as `summary_columns` takes them.
 
     Returns
     -------
@@ -122,6 +200,7 @@ def sweep(
         If a value is not accepted, or the folder has a sweep of other input, or files that no
         sweep has left.
     """
+    _check_columns(columns)
     names = [axis.key for axis in axes]
     points = [
         dict(zip(names, values, strict=True))
@@ -148,7 +227,9 @@ def sweep(
                 if solution.outcome.signal:
                     raise Interrupted(solution.outcome.signal)
                 seconds = comm.bcast(time.perf_counter() - begin)
-                row = {**point, **values_of(SWEEP, solution), "seconds": seconds}
+                measure(solution, whole=len(columns) > 0)
+                more = summary_columns(solution, columns)
+                row = {**point, **values_of(SWEEP, solution), **more, "seconds": seconds}
                 row[INPUT] = given
                 said = f"{', '.join(_set(point))}: {solution.outcome.reason}"
                 tell(logger, (len(rows) + 1) / len(cases), said)
@@ -239,8 +320,8 @@ def _read(table: Path) -> list[dict[str, str]]:
 def _write(folder: Path, rows: Sequence[Mapping[str, Any]]) -> None:
     if any([*row] != [*rows[0]] for row in rows):
         raise InputError(
-            f"{folder / TABLE}: its rows have other columns than those of this version; accepted: "
-            "another folder"
+            f"{folder / TABLE}: its rows have other columns than those of this version, or other "
+            "--columns; accepted: another folder"
         )
     draft = folder / f".contact-{TABLE}"
     write_csv(draft, rows[0], (row.values() for row in rows))

@@ -192,7 +192,13 @@ def offered() -> Iterator[tuple[str, str, str | None, dict[str, dict[str, Any]]]
         {
             "case": case,
             "--set": replaced,
-            "--over": _values("KEY=V1,V2,...", "the values of a key, for all combinations"),
+            "--over": _values(
+                "KEY=V1,V2,...", "the values of a key, for all combinations; a:b:n is n numbers"
+            ),
+            "--columns": _values(
+                "KEY,...",
+                "further columns: keys of summary.json, max_dev_strain, reactions.left, ...",
+            ),
             "--out": _value("DIR", "folder for the table; rows in it are kept"),
             "--cold": _flag("start each solve from the zero initial guess, without a warm start"),
             **shown,
@@ -200,14 +206,15 @@ def offered() -> Iterator[tuple[str, str, str | None, dict[str, dict[str, Any]]]
     )
     yield (
         "plot DIR [options]",
-        "draw the figures of a run again, from its files",
+        "draw the figures of a run again, from its files, or that of a sweep",
         None,
         {
-            "folder": _value("DIR", "folder with the results of a run"),
+            "folder": _value("DIR", "folder with the results of a run, or of a sweep"),
             "--field": _values(
                 "NAME",
                 "colour the body by this field of fields.vtu, von_mises, displacement, "
-                "displacement_y, stress_xy, potential, ..., and draw this figure alone",
+                "displacement_y, stress_xy, potential, ..., and draw this figure alone; of a "
+                "sweep, draw this column",
             ),
             "--format": _value("pdf,png", "formats of the files: png, pdf, svg", default="png"),
             "--width": _value("85mm", "width of the figures, in mm, cm or in"),

@@ -14,7 +14,9 @@ from contact.errors import InputError
 from contact.methods.signals import signals_held
 from contact.output.figures.figures import FORMATS, animate, plot
 from contact.output.figures.style import Look
+from contact.output.figures.sweep import plot_sweep
 from contact.ranks import on_root
+from contact.sweeping import TABLE
 
 _LENGTH = re.compile(r"(\d+(?:\.\d*)?)\s*(mm|cm|in)")
 _INCHES = {"mm": 1 / 25.4, "cm": 1 / 2.54, "in": 1.0}
@@ -34,6 +36,8 @@ def run(options: argparse.Namespace, comm: MPI.Intracomm) -> int:
     look, folder = Look(width, options.mirror, *limits), Path(options.folder)
 
     def draw() -> list[Path]:
+        if (folder / TABLE).is_file() and not (folder / "summary.json").exists():
+            return plot_sweep(folder, options.field, formats, look)
         if options.animate:
             return animate(folder, options.field, look)
         return plot(folder, options.field, formats, look)

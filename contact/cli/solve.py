@@ -150,7 +150,14 @@ def _sweep(options: argparse.Namespace, comm: MPI.Intracomm) -> int:
     shown = progress(comm, options.quiet, options.log)
     with result_folder(options.out, comm, overwrite=True) as folder, shown as monitor:
         rows = sweep(
-            options.case, axes, folder.path, options.set, monitor, comm, warm=not options.cold
+            options.case,
+            axes,
+            folder.path,
+            options.set,
+            monitor,
+            comm,
+            not options.cold,
+            [name.strip() for text in options.columns for name in text.split(",")],
         )
     bad = sum(row["converged"] not in (True, "True") for row in rows)
     if comm.rank == 0 and not (options.quiet and bad == 0):

@@ -126,6 +126,12 @@ def fitting(labels: Mapping[str, str], quantities: Collection[str]) -> list[str]
     return [k for k in SYSTEMS if contradiction(named(k, labels), labels, quantities) is None]
 
 
+def force_of(stress: str, length: str) -> str | None:
+    """Return the name of the unit of force that goes with two units; None where it has none."""
+    pressure, side = size(stress, "stress"), size(length, "length")
+    return None if pressure is None or side is None else _named(pressure * side**2, "N")
+
+
 def _named(value: float, base: str) -> str:
     """Return the name of a unit of SI's."""
     prefix = next((p for p, factor in PREFIXES.items() if isclose(factor, value)), None)

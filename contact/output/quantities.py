@@ -7,68 +7,26 @@ PETSc's options are read.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
-from operator import attrgetter, itemgetter
 from typing import Any
 
 import numpy as np
 
 from contact.output.environment import versions
-
-SUMMARY, STEPS, SWEEP = "summary.json", "steps.csv", "sweep.csv"
-ADAPT = "adapt.csv"
-NODES, HISTORY, AGAINST = "contact.csv", "history.csv", "contact-against.csv"
-BODY, SURFACE, OPPOSITE = "fields.vtu", "contact.vtu", "contact-against.vtu"
-#: Tables with a row a solution; the others have columns of arrays.
-ROWS = (STEPS, SWEEP, ADAPT)
-#: Status of a node -> its number in ``contact.vtu``.
-STATUS = {"none": -1, "open": 0, "stick": 1, "slip": 2}
-
-
-@dataclass(frozen=True)
-class Quantity:
-    """A key of ``summary.json``, a column of a table or a field.
-
-    Attributes
-    ----------
-    name
-        PART, KEY and AXIS in it stand for names of the case, and x, y, z.
-    text
-        The description, with the sign; `unit` is "length", "stress", ..., empty for none.
-    value
-        A function of `solution.Solution`; in ``history.csv`` of `methods.report.Record`, in
-        ``contact.csv`` and ``contact.vtu`` of `surface.ContactResult`, in ``fields.vtu`` of
-        `fields.Point`, on master sides of a mapping. By default the attribute, or entry, of the
-        quantity's name. A mapping has several columns, a vector one a component; None stands for a
-        quantity that a problem does not have, which has no key, column or field then.
-    files
-        Where it stands; the first has the description.
-    component
-        Of a vector: name of the column of a component.
-    """
-
-    name: str
-    unit: str
-    text: str
-    value: Callable[[Any], Any] | None = None
-    files: tuple[str, ...] = (SUMMARY,)
-    component: str = ""
-
-    def in_file(self, file: str, given: Any) -> dict[str, Any]:
-        """Return the keys, columns or field in a file; none where the quantity is absent."""
-        get = itemgetter if isinstance(given, Mapping) else attrgetter
-        value = (self.value or get(self.name))(given)
-        if value is None:
-            return {}
-        table = file.endswith(".csv")
-        if table and isinstance(value, Mapping):
-            return dict(value)
-        if table and self.component and np.ndim(value) > (file not in ROWS):
-            names = (self.component.format(name=self.name, axis=axis) for axis in "xyz")
-            parts = np.asarray(value).T
-            return dict(zip(names, parts.tolist() if file in ROWS else parts, strict=False))
-        return {self.name: value}
+from contact.output.quantity import (
+    ADAPT,
+    AGAINST,
+    BODY,
+    HISTORY,
+    NODES,
+    OPPOSITE,
+    ROWS,
+    STATUS,
+    STEPS,
+    SUMMARY,
+    SURFACE,
+    SWEEP,
+    Quantity,
+)
 
 
 def quantities(file: str) -> list[Quantity]:
@@ -76,11 +34,12 @@ def quantities(file: str) -> list[Quantity]:
     return [quantity for quantity in QUANTITIES if file in quantity.files]
 
 
-def values_of(file: str, given: Any) -> dict[str, Any]:
-    """Return the keys, columns or fields of a file for some object."""
+def values_of(file: str, given: Any, only: str = "") -> dict[str, Any]:
+    """Return the keys, columns or fields of a file for some object, or those of one name alone."""
     found: dict[str, Any] = {}
     for quantity in quantities(file):
-        found |= quantity.in_file(file, given)
+        if only in ("", quantity.name):
+            found |= quantity.in_file(file, given)
     return found
 
 
@@ -148,6 +107,10 @@ _RUN = (
         lambda r: {part: held.force for part, held in r.supports.items()},
     ),
     Quantity(
+        "reaction_AXIS_PART", "force", "The same of each support: `reaction_x_left`, ...",
+        lambda r: r.reaction_columns, (STEPS,),
+    ),
+    Quantity(
         "reaction_moments", "force · length", "Moments of these, as `contact_moment`.",
         lambda r: {part: held.moment for part, held in r.supports.items()},
     ),
@@ -200,6 +163,7 @@ _RUN = (
     Quantity(
         "max_von_mises", "stress",
         "Largest von Mises stress over the same. At sharp corners it grows with each refinement.",
+        files=(SUMMARY, SWEEP),
     ),
     Quantity(
         "plastic_share", "", "Share of the volume in the plastic range, |dev ε| above the "
@@ -226,6 +190,7 @@ _RUN = (
         "dissipation", "work", "By friction in the step; over a cycle the area of the loop.",
         lambda r: r.energies.dissipation, (STEPS,),
     ),
+    Quantity("dissipation", "work", "By friction in all steps.", files=(SWEEP,)),
     Quantity(
         "plastic_dissipation", "work", "By plastic flow in the step; in the summary in all steps.",
         files=(SUMMARY, STEPS),
@@ -282,11 +247,13 @@ _RUN = (
     ),
     Quantity(
         "rigid_AXIS", "length",
-        "Displacement of a foundation that moves, `rigid_x`...; `rigid_rotation` in degrees.",
+        "Displacement of a foundation that moves, `rigid_x`...; `rigid_rotation` in degrees. Of a "
+        "part that does, where there is no such foundation or with the part: `rigid_x_top`.",
         lambda r: r.rigid["moved"], ROWS,
     ),
     Quantity(
-        "rigid_force_AXIS", "force", "Force on it; `rigid_moment`... Several end with their part.",
+        "rigid_force_AXIS", "force",
+        "Force on it; `rigid_moment`... Several end with their part, too.",
         lambda r: r.rigid["acting"], ROWS,
     ),
     Quantity(

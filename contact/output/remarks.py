@@ -55,9 +55,17 @@ def announce(solution: Solution) -> None:
             logger.warning(warning)
 
 
-def review(solution: Solution) -> None:
-    """Add all remarks to the notes and warnings of a solution. Collective."""
-    body, x = solution.problem.equilibrium, solution.state.x
+def measure(solution: Solution, whole: bool = True) -> list[float]:
+    """Give a solution its extremes of stress and strain, and return |dev eps| by material.
+
+    Collective.
+
+    Parameters
+    ----------
+    whole
+        Whether it is given deformation and error estimate too.
+    """
+    body = solution.problem.equilibrium
     fields = DerivedFields(body, solution.state)
     extremes = fields.extremes()
     strains = [largest.strain for largest in extremes]
@@ -72,8 +80,15 @@ def review(solution: Solution) -> None:
         solution.plastic_volume = sum(
             e.yielded for e in extremes if e.plastic is not None and e.yielded is not None
         )
-    solution.deformation = deformation(body, x)
-    solution.error = solution.error or estimated(solution.problem, solution.state, fields)
+    if whole:
+        solution.deformation = deformation(body, solution.state.x)
+        solution.error = solution.error or estimated(solution.problem, solution.state, fields)
+    return strains
+
+
+def review(solution: Solution) -> None:
+    """Add all remarks to the notes and warnings of a solution. Collective."""
+    strains = measure(solution)
     for remarks in (
         unloading(solution),
         monotonicity(solution, strains),

@@ -312,17 +312,21 @@ def _one_or_more(values: Array) -> Any:
 
 
 def rigid_columns(moving: Mapping[str, Any]) -> dict[str, dict[str, float]]:
-    """Return the columns of the foundations that move, and of electrodes, from their `movements`.
+    """Return the columns of rigid bodies and of electrodes, from their `movements`.
 
     They are `moved` (displacements and rotations), `acting` (forces and moments) and
-    `potentials`. Of several foundations the names have that of the part behind them.
+    `potentials`. Of several foundations the names have that of the part behind them, and so have
+    those of rigid parts, but where there is one and no foundation moves.
     """
     foundations, electrodes = moving.get("rigid", {}), moving.get("electrodes", {})
+    parts = moving.get("rigid_parts", {})
     found: dict[str, dict[str, float]] = {"moved": {}, "acting": {}}
     found["potentials"] = {f"potential_{part}": e["potential"] for part, e in electrodes.items()}
     if isinstance(foundations.get("displacement"), list):  # a single one
         foundations = {"": foundations}
-    for part, body in foundations.items():
+    if not foundations and len(parts) == 1:
+        parts = {"": next(iter(parts.values()))}
+    for part, body in (*foundations.items(), *parts.items()):
         end = f"_{part}" if part else ""
         for kind, key, name in (
             ("moved", "displacement", "rigid"),

@@ -316,8 +316,26 @@ class Solution(Solved):
 
     @property
     def rigid(self) -> Mapping[str, Mapping[str, float]]:
-        """The columns of foundations that move, and of electrodes: see `rigid_columns`."""
+        """The columns of rigid bodies, and of electrodes: see `rigid_columns`."""
         return rigid_columns(self.movements)
+
+    @property
+    def reaction_columns(self) -> dict[str, float]:
+        """The reactions of supports as columns, ``reaction_x_left``. Collective."""
+        axes = "xyz"[: self.problem.dim]
+        return {
+            f"reaction_{axis}_{part}": float(value)
+            for part, held in self.supports.items()
+            for axis, value in zip(axes, held.force, strict=True)
+        }
+
+    @property
+    def dissipation(self) -> float:
+        """The energy that friction has dissipated, in all steps of an evolution. Collective."""
+        if self.steps:
+            return sum(float(step.row["dissipation"]) for step in self.steps)
+        slip = self.problem.interface.slip(self.nodal)
+        return self.problem.nodes.sum(np.einsum("ni,ni->n", self.friction, slip))
 
     @property
     def conduction_ramp(self) -> float | None:

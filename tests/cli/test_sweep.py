@@ -234,3 +234,53 @@ def test_other_files_under_our_names_are_left_alone(tmp_path, capfd, name, kind)
     assert main(["sweep", str(tmp_path / "bar.toml"), *arguments]) == 2
     assert f"{path} is no file of ours" in capfd.readouterr().err
     assert [*out.iterdir()] == [path]
+
+
+def test_ranges():
+    assert Axis.of("friction.mu=0.1:0.3:3").values == ("0.1", "0.2", "0.3")
+    assert Axis.of("friction.mu=0,0.1:0.2:2").values == ("0", "0.1", "0.2")
+    for wrong in ("0.1:0.2", "a:b:3", "0:1:1", "0:1:2.5", "0:inf:3", "0:1:100000"):
+        with pytest.raises(InputError, match=r"--over friction\.mu=.*: given .*; accepted: a:b:n"):
+            Axis.of(f"friction.mu={wrong}")
+
+
+def test_columns_of_the_summary(sweep):
+    """A number, a vector, a table of vectors, an entry of one."""
+    names = "contact_moment,reactions,reaction_moments.left,volume_ratio,error.energy"
+    status, rows = sweep("--over", "friction.mu=0.2,0.4", "--columns", names)
+    assert status == 0
+    for row in rows:
+        assert float(row["max_von_mises"]) > 0 and float(row["dissipation"]) > 0
+        balance = float(row["reactions.left_y"]) - float(row["contact_force_y"])
+        assert balance == pytest.approx(0.01, rel=1e-6)  # with the load
+        found = {"contact_moment_x", "reaction_moments.left_x", "volume_ratio_y", "error.energy"}
+        assert found <= {*row}
+    _, again = sweep("--over", "friction.mu=0.2,0.4", "--columns", names)
+    assert again == rows
+
+
+@pytest.mark.parametrize(
+    ("name", "words"),
+    [
+        ("max_presure", "did you mean max_pressure"),
+        ("reason", "a number, a vector"),
+        ("error.nothing", "a number, a vector"),
+    ],
+)
+def test_other_columns_are_refused(sweep, capsys, name, words):
+    assert sweep("--over", "friction.mu=0.2", "--columns", name)[0] == 2
+    assert words in capsys.readouterr().err
+
+
+def test_the_figure_of_a_sweep(sweep, tmp_path, capsys):
+    sweep("--over", "load.0.traction.1=-0.002:-0.006:3", "--over", "friction.mu=0.1,0.3")
+    out = str(tmp_path / "out")
+    assert main(["plot", out, "--format", "png,pdf"]) == 0
+    assert (tmp_path / "out" / "figure-sweep.png").stat().st_size > 10_000
+    assert (tmp_path / "out" / "figure-sweep.pdf").exists()
+    assert main(["plot", out, "--field", "contact_area"]) == 0
+    assert main(["plot", out, "--field", "area"]) == 2
+    assert "no such column of sweep.csv; accepted: converged" in capsys.readouterr().err
+    (tmp_path / "out" / "sweep.csv").write_text("nothing")
+    assert main(["plot", out]) == 2
+    assert "damaged" in capsys.readouterr().err

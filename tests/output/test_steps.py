@@ -10,9 +10,13 @@ from mpi4py import MPI
 from contact import parse_case, solve, write_outputs
 from contact.case.build import build_problem
 from contact.output.figures.figures import plot
+from contact.output.figures.run import read_run
+from contact.output.figures.steps import draw_loop
+from contact.output.resultants import rigid_columns
 from contact.solving import evolve
 from tests.problems.bar import changed
 from tests.problems.piezo import COUPLING, PERMITTIVITY
+from tests.problems.rigid import plate
 
 SELF = MPI.COMM_SELF
 PRESS = {"time": [0.0, 1.0, 2.0], "value": [0.0, 1.0, 0.2]}
@@ -189,3 +193,44 @@ def test_the_summary_has_the_most_that_rounding_was_granted(tmp_path):
     summary = json.loads((tmp_path / "summary.json").read_text())
     assert solution.outcome.kkt.rounding == 0
     assert summary["rounding"]["equilibrium"] == solution.steps[0].rounding > 1e-13
+
+
+def test_rigid_parts_and_reactions_have_columns():
+    """A plate under a force: its way and force, as of a foundation; reactions balance with it."""
+    steps = {"times": [0.0, 1.0], "steps": [2]}
+    rows = [record.row for record in solve(plate(evolution=steps), comm=SELF).steps]
+    for row, share in zip(rows, (0.5, 1.0), strict=True):
+        assert row["rigid_force_y"] == pytest.approx(-0.02 * share)
+        assert row["rigid_moment"] == pytest.approx(0.002 * share)
+        assert row["rigid_y"] < 0 and row["rigid_rotation"] != 0
+        balance = row["rigid_force_x"] + row["reaction_x_left"] - row["contact_force_x"]
+        assert abs(balance) < 1e-10
+
+
+def test_several_rigid_parts_are_told_apart_by_their_names():
+    moving = {"displacement": [0.0, -0.1], "rotation": 0.0, "force": [1.0, 2.0], "moment": 0.5}
+    columns = rigid_columns({"rigid_parts": {"top": moving, "left": moving}})
+    assert columns["moved"]["rigid_y_top"] == columns["moved"]["rigid_y_left"] == -0.1
+    assert columns["acting"]["rigid_force_x_top"] == 1.0
+    both = rigid_columns({"rigid": moving, "rigid_parts": {"top": moving}})
+    assert {"rigid_x", "rigid_x_top"} <= {*both["moved"]}
+    assert {*rigid_columns({"rigid_parts": {"top": moving}})["acting"]} == {
+        *("rigid_force_x", "rigid_force_y", "rigid_moment"),
+    }
+
+
+def test_the_loop_is_drawn_along_the_way_of_a_rigid_part_with_units_of_force(tmp_path):
+    """It slides there and back, and sinks in by far less, up and down a little."""
+    rigid = {"on": "top", "displacement": ["0.01*sin(pi*t)", "free"], "force": [0.0, -0.02]}
+    steps = {"times": [0.0, 1.0], "steps": [4]}
+    case = plate(
+        rigid=[rigid],
+        fixed=[],
+        friction={"law": "coulomb", "mu": 0.3},
+        evolution=steps,
+        case={"units": {"length": "mm", "stress": "MPa"}},
+    )
+    write_outputs(solve(case, comm=SELF), tmp_path / "out")
+    axes = draw_loop(read_run(tmp_path / "out"), "rigid").axes[0]
+    assert axes.get_xlabel() == "displacement $u_x$ (mm)"
+    assert axes.get_ylabel() == "force on the rigid body along $x$ (N/mm)"

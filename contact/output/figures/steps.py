@@ -6,6 +6,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
+from contact.library.units import force_of
 from contact.output.figures.contact import position, window, zones
 from contact.output.figures.run import Run
 from contact.output.figures.style import (
@@ -24,7 +25,10 @@ from contact.output.figures.style import (
 from contact.typing import Array
 
 #: Parts that move, as the columns of ``steps.csv`` begin; labels of their displacement, and names.
-DRIVEN = {"driven": ("mean displacement", "part"), "rigid": ("displacement", "foundation")}
+DRIVEN = {"driven": ("mean displacement", "part"), "rigid": ("displacement", "rigid body")}
+
+#: Share of the largest motion from which on a part moves along an axis.
+MOVES = 0.1
 
 
 def steps_figures(run: Run, look: Look) -> dict[str, Figure]:
@@ -58,6 +62,9 @@ def _unit(run: Run, power: int) -> str:
     stress, length = run.units.stress, run.units.length
     if not stress or not length:
         return ""
+    force = force_of(stress, length)
+    if power == 1 and force is not None:
+        return f" ({force}{f'/{length}' if run.axes == 'xy' else ''})"
     power += run.axes != "xy"
     return f" ({stress} {length}{f'$^{power}$' if power > 1 else ''})"
 
@@ -66,6 +73,8 @@ def draw_loop(run: Run, moves: str) -> Figure:
     """Draw the force on the part that moves over its displacement, from the origin on."""
     names = "xyz"[: len(run.axes)]
     ways = [_course(run, f"{moves}_{axis}") for axis in names]
+    far = max(float(np.ptp(way)) for way in ways)
+    ways = [way if np.ptp(way) > MOVES * far else 0 * way for way in ways]
     directions = [np.sign(np.diff(way)) for way in ways]
     turns = [np.count_nonzero(there[1:] * there[:-1] < 0) for there in directions]
     # Where the part turns back most often; else where it goes farthest.

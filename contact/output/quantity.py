@@ -1,0 +1,64 @@
+"""A quantity of the output files, and the names of these."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from operator import attrgetter, itemgetter
+from typing import Any
+
+import numpy as np
+
+SUMMARY, STEPS, SWEEP = "summary.json", "steps.csv", "sweep.csv"
+ADAPT = "adapt.csv"
+NODES, HISTORY, AGAINST = "contact.csv", "history.csv", "contact-against.csv"
+BODY, SURFACE, OPPOSITE = "fields.vtu", "contact.vtu", "contact-against.vtu"
+#: Tables with a row a solution; the others have columns of arrays.
+ROWS = (STEPS, SWEEP, ADAPT)
+#: Status of a node -> its number in ``contact.vtu``.
+STATUS = {"none": -1, "open": 0, "stick": 1, "slip": 2}
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """A key of ``summary.json``, a column of a table or a field.
+
+    Attributes
+    ----------
+    name
+        PART, KEY and AXIS in it stand for names of the case, and x, y, z.
+    text
+        The description, with the sign; `unit` is "length", "stress", ..., empty for none.
+    value
+        A function of `solution.Solution`; in ``history.csv`` of `methods.report.Record`, in
+        ``contact.csv`` and ``contact.vtu`` of `surface.ContactResult`, in ``fields.vtu`` of
+        `fields.Point`, on master sides of a mapping. By default the attribute, or entry, of the
+        quantity's name. A mapping has several columns, a vector one a component; None stands for a
+        quantity that a problem does not have, which has no key, column or field then.
+    files
+        Where it stands; the first has the description.
+    component
+        Of a vector: name of the column of a component.
+    """
+
+    name: str
+    unit: str
+    text: str
+    value: Callable[[Any], Any] | None = None
+    files: tuple[str, ...] = (SUMMARY,)
+    component: str = ""
+
+    def in_file(self, file: str, given: Any) -> dict[str, Any]:
+        """Return the keys, columns or field in a file; none where the quantity is absent."""
+        get = itemgetter if isinstance(given, Mapping) else attrgetter
+        value = (self.value or get(self.name))(given)
+        if value is None:
+            return {}
+        table = file.endswith(".csv")
+        if table and isinstance(value, Mapping):
+            return dict(value)
+        if table and self.component and np.ndim(value) > (file not in ROWS):
+            names = (self.component.format(name=self.name, axis=axis) for axis in "xyz")
+            parts = np.asarray(value).T
+            return dict(zip(names, parts.tolist() if file in ROWS else parts, strict=False))
+        return {self.name: value}
