@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import re
 import warnings
 from collections.abc import Sequence
+from functools import cached_property
 from itertools import pairwise
+from pathlib import Path
 from typing import Annotated, Any, Literal, Self, TypeAlias
 
 import numpy as np
+from dolfinx.mesh import entities_to_geometry
 from mpi4py import MPI
 from pydantic import Field, model_validator
 
@@ -20,6 +24,7 @@ from contact.case.section import (
     Component,
     Either,
     Few,
+    File,
     Formula,
     FormulaVector,
     Part,
@@ -31,6 +36,8 @@ from contact.case.section import (
     as_given,
     as_tuple,
 )
+from contact.errors import InputError
+from contact.mesh.domain import Domain
 from contact.settings import SPATIAL, Accepted, Count, Number, Switch
 
 #: `contact.case.file.Case`, of which these are sections.
@@ -71,6 +78,9 @@ class Fixed(Section):
         | None
     ) = None
     """Displacement of the part; "free" for a component that is not fixed."""
+    symmetry: Literal["x", "y", "z"] | None = None
+    """Instead of a displacement: the part lies in a plane of symmetry across this axis; its
+    displacement along the axis is 0."""
     potential: Formula | None = None
     """Electric potential of the part."""
     amplitude: AmplitudeName | None = None
@@ -83,14 +93,23 @@ class Fixed(Section):
 
     @model_validator(mode="after")
     def _check(self) -> Self:
+        if self.symmetry is not None:
+            if self.displacement is not None:
+                raise fault("symmetry", self.symmetry, "one of symmetry and displacement")
+            return self
         if self.potential is None and all(c == "free" for c in self.displacement or ()):
             given = self.displacement or Words("missing")
             raise fault("displacement", given, "a component that is fixed, or a potential")
         return self
 
-    def build(self, key: str, case: Case, comm: MPI.Intracomm) -> description.Fixed:
-        """Return the support itself; ``key`` is the section's own."""
-        displacement = None
+    def build(self, key: str, case: Case, domain: Domain) -> description.Fixed:
+        """Return the support itself; ``key`` is the section's own. Collective."""
+        displacement: list[Any] | None = None
+        comm = domain.comm
+        if self.symmetry is not None:
+            axis = "xyz".index(self.symmetry)
+            _check_across(f"{key}.symmetry", domain, self.on, axis)
+            displacement = [0.0 if k == axis else None for k in range(domain.dim)]
         if self.displacement is not None:
             displacement = [
                 as_field(f"{key}.displacement.{k}", component, comm)
@@ -121,6 +140,25 @@ Moment: TypeAlias = Annotated[
     Either[TimeFormula, Forces],
     Accepted("in 2-D a number or a formula in t, in 3-D a list of 3 of these"),
 ]
+
+
+def _check_across(key: str, domain: Domain, on: str, axis: int) -> None:
+    """Refuse a part that lies in no plane across an axis. Collective."""
+    name = "xyz"[axis]
+    if axis >= domain.dim or (domain.revolved and axis == 0):
+        known = "y" if domain.revolved else " or ".join("xyz"[: domain.dim])
+        raise InputError(f'{key}: given "{name}"; accepted: {known}')
+    facets, there = domain.facets(on), np.zeros(0)
+    if facets.size:  # which `entities_to_geometry` divides by
+        nodes = entities_to_geometry(domain.mesh, domain.dim - 1, facets)
+        there = domain.mesh.geometry.x[nodes.ravel(), axis]
+    low = domain.comm.allreduce(float(there.min(initial=np.inf)), op=MPI.MIN)
+    high = domain.comm.allreduce(float(there.max(initial=-np.inf)), op=MPI.MAX)
+    if high - low > 1e-6 * domain.size:
+        raise InputError(
+            f"{key}: {on} reaches from {name} = {low:.6g} to {high:.6g}; accepted: a part in a "
+            f"plane across {name}"
+        )
 
 
 #: Keys of a load on a part, and of one in the whole body.
@@ -317,21 +355,85 @@ def _check_increasing(key: str, times: tuple[float, ...]) -> None:
 class Amplitude(Section):
     """`[evolution.amplitudes.NAME]`: a factor as a function of time, linear between the values."""
 
-    time: Increasing
-    """Times; the first and the last step lie within them."""
-    value: Annotated[tuple[Number, ...], as_tuple, Accepted("a list of numbers, one for each time")]
-    """Values at these times."""
+    time: Increasing | None = None
+    """Times; the first and the last step lie within them. Required without `file`."""
+    value: (
+        Annotated[tuple[Number, ...], as_tuple, Accepted("a list of numbers, one for each time")]
+        | None
+    ) = None
+    """Values at these times. Likewise."""
+    file: Annotated[File, Accepted("a CSV file of times and values")] | None = None
+    """CSV file instead, relative to the case file: times in the first column, values in the second
+    one, a measured curve for instance. Its first row may have names."""
+
+    @cached_property
+    def points(self) -> tuple[tuple[float, ...], tuple[float, ...]]:
+        """The times, and the values there."""
+        if self.file is not None:
+            return read_curve(self.file)
+        assert self.time is not None and self.value is not None  # checked
+        return self.time, self.value
 
     @model_validator(mode="after")
     def _check(self) -> Self:
-        _check_increasing("time", self.time)
-        if len(self.value) != len(self.time):
-            raise fault("value", self.value, f"{len(self.time)} values, as many as times")
+        if self.file is not None:
+            for key in ("time", "value"):
+                if getattr(self, key) is not None:
+                    raise fault(key, Words("given with file"), f"{key}, or file")
+            try:
+                _check_increasing("file", self.points[0])
+            except InputError as error:
+                words, _, accepted = str(error).partition("; accepted: ")
+                raise fault("file", Words(words), accepted) from None
+            return self
+        for key in ("time", "value"):
+            if getattr(self, key) is None:
+                raise fault(key, Words("missing"), f"{key}, or file with times and values")
+        times, values = self.points
+        _check_increasing("time", times)
+        if len(values) != len(times):
+            raise fault("value", values, f"{len(times)} values, as many as times")
         return self
 
     def __call__(self, time: float) -> float:
         """Return the factor at a time."""
-        return float(np.interp(time, self.time, self.value))
+        return float(np.interp(time, *self.points))
+
+
+def read_curve(path: str | Path) -> tuple[tuple[float, ...], tuple[float, ...]]:
+    """Return the first two columns of a CSV file, at least two rows of numbers.
+
+    Raises
+    ------
+    InputError
+        If it cannot be read, or has no such rows.
+    """
+    accepted = "a CSV file, rows of a time and a value, two at least"
+    try:
+        text = Path(path).read_text(encoding="utf-8-sig")
+    except OSError as error:
+        raise InputError(f"{path}: {error.strerror}; accepted: {accepted}") from None
+    except UnicodeDecodeError:
+        raise InputError(f"{path}: not a text in UTF-8; accepted: {accepted}") from None
+    lines = [line for line in text.splitlines() if line.strip() and line.lstrip()[0] != "#"]
+    rows: list[tuple[float, float]] = []
+    for number, line in enumerate(lines):
+        cells = re.split(r"\s*[,;]\s*|\s+", line.strip())
+        try:
+            first, second = map(float, cells[:2])
+            if not np.isfinite([first, second]).all():
+                raise ValueError
+        except ValueError:
+            if number > 0:
+                raise InputError(
+                    f"{path}: no numbers in {line!r:.40}; accepted: {accepted}"
+                ) from None
+            continue  # names
+        rows.append((first, second))
+    if len(rows) < 2:
+        raise InputError(f"{path}: {len(rows)} rows of numbers; accepted: {accepted}")
+    times, values = zip(*rows, strict=True)
+    return times, values
 
 
 class Evolution(Section):
@@ -361,10 +463,11 @@ class Evolution(Section):
         if len(self.steps) != stages:
             raise fault("steps", self.steps, f"{stages} numbers, one for each stage between times")
         for name, amplitude in self.amplitudes.items():
-            first, last = amplitude.time[0], amplitude.time[-1]
-            if first > self.times[0] or last < self.times[-1]:
+            times = amplitude.points[0]
+            if times[0] > self.times[0] or times[-1] < self.times[-1]:
                 accepted = f"times that reach from {self.times[0]:g} to {self.times[-1]:g}"
-                raise fault(f"amplitudes.{name}.time", amplitude.time, accepted)
+                key = "time" if amplitude.file is None else "file"
+                raise fault(f"amplitudes.{name}.{key}", times, accepted)
         return self
 
     @property

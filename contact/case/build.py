@@ -66,7 +66,7 @@ def build_problem(
         case.check_mesh(domain.dim, domain.names)
         body = Body(
             _materials(case, domain, law),
-            [fixed.build(f"fixed.{i}", case, domain.comm) for i, fixed in enumerate(case.fixed)],
+            [fixed.build(f"fixed.{i}", case, domain) for i, fixed in enumerate(case.fixed)],
             [load.build(f"load.{i}", case, domain.comm) for i, load in enumerate(case.load)],
             rigid=_rigid(case, domain.dim),
             electrodes=tuple(electrode.build(case) for electrode in case.electrode),

@@ -115,6 +115,9 @@ def _roles(case: Case, problem: ContactProblem) -> Iterable[Role | None]:
         if section.against is not None:
             yield _role(domain, section.against, FOUNDATION, f"opposite: {section.against}")
     for fixed in case.fixed:
+        if fixed.symmetry is not None:
+            words = f"symmetry across ${fixed.symmetry}$ on {fixed.on}"
+            yield _role(domain, fixed.on, HELD, words)
         if fixed.displacement is not None:
             words = f"$u$ = ({_said(*fixed.displacement)}) on {fixed.on}"
             yield _role(domain, fixed.on, HELD, words)
