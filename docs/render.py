@@ -6,6 +6,8 @@ The pages go to ``docs/notebooks``, for Sphinx; they are not kept in the reposit
 import base64
 import os
 import sys
+from collections.abc import Sequence
+from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 
 import jupytext
@@ -56,11 +58,18 @@ def _output(output: dict, stem: str) -> list[str]:
     return ["```text", data.get("text/plain", ""), "```", ""]
 
 
+def main(names: Sequence[str]) -> None:
+    """Render the notebooks named, or all, as many at a time as there are cores."""
+    os.environ.pop("MPLBACKEND", None)  # the kernels show figures in the notebook
+    os.environ.setdefault("OMP_NUM_THREADS", "1")
+    chosen = [path for path in NOTEBOOKS if not names or path.stem in names]
+    for path in chosen:
+        for old in PAGES.glob(f"{path.stem}*"):
+            old.unlink()
+    with ProcessPoolExecutor(max_workers=os.cpu_count()) as pool:
+        for path, _ in zip(chosen, pool.map(render, chosen), strict=True):
+            print(f"docs/notebooks/{path.stem}.md", flush=True)
+
+
 if __name__ == "__main__":
-    os.environ.pop("MPLBACKEND", None)  # the kernel shows figures in the notebook
-    for old in PAGES.glob("*"):
-        old.unlink()
-    for chosen in NOTEBOOKS:
-        if len(sys.argv) == 1 or chosen.stem in sys.argv[1:]:
-            render(chosen)
-            print(f"docs/notebooks/{chosen.stem}.md")
+    main(sys.argv[1:])

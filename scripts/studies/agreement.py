@@ -230,7 +230,7 @@ def solutions(report: Report, compared: Sequence[Compared]) -> None:
             columns,
             "Number of contact nodes that stick, slide and are open, and of those that do "
             "something else than in solution A; the largest relative difference to A; the "
-            "largest residual, computed from scratch; then how far Newton's method and block "
+            "largest residual, computed from scratch; then how far Newton's method and Uzawa block "
             "relaxation go away from the solution if they are started there, and which "
             f"solution they end at if each node is off by up to {DISTURBANCE:g} of its values. "
             "nested: Newton's method by way of coarser meshes; eps: next to the penalised "

@@ -1,5 +1,7 @@
 """Every code block of the documentation runs, links lead somewhere, the index has all pages."""
 
+import csv
+import itertools
 import re
 import subprocess
 import sys
@@ -20,6 +22,7 @@ from contact.methods import (
 )
 from contact.methods.options import FixedPointOptions, NewtonOptions
 from scripts import command_page
+from scripts.reporting import text
 from scripts.thesis import results_page
 from scripts.thesis.chapters import PARTS
 from tests.docs.pages import ROOT, blocks, run
@@ -82,15 +85,59 @@ def test_every_page_is_in_one_table_of_contents() -> None:
 
 
 def test_the_summary_of_the_thesis_is_that_of_its_files() -> None:
-    text = (DOCS / "results.md").read_text()
-    made = text.partition("## Versions\n\n")[2].strip()
-    assert results_page.overview(DOCS / "results", made) == text
+    said = (DOCS / "results.md").read_text()
+    made = said.partition("## Versions\n\n")[2].strip()
+    assert results_page.overview(DOCS / "results", made) == said
     for part in PARTS:
         assert f"\n## {part.heading}\n" in (DOCS / f"{part.page}.md").read_text()
 
 
 def test_the_command_line_is_that_of_the_program() -> None:
     assert command_page.PAGE.read_text() == command_page.page(), "scripts.command_page"
+
+
+def same(cell: str, number: str) -> bool:
+    """Tell whether a cell of a page shows that of a file of numbers."""
+    if number in ("True", "False"):
+        number = text(number == "True")
+    number = number.replace("|", r"\|")
+    try:
+        return cell in (number, text(float(number))) or float(cell) == float(text(float(number)))
+    except ValueError:
+        return cell in (number, "—") and number in (cell, "", "nan")
+
+
+def measured_tables() -> dict[tuple[str, ...], list[list[list[str]]]]:
+    """Return header -> rows of the files of numbers with that header."""
+    found: dict[tuple[str, ...], list[list[list[str]]]] = {}
+    for path in sorted([*DOCS.glob("results/*/*.csv"), *DOCS.glob("benchmarks/*.csv")]):
+        with path.open() as stream:
+            head, *rows = csv.reader(stream)
+        name = tuple(cell.strip().replace("|", r"\|") for cell in head)
+        found.setdefault(name, []).append(rows)
+    return found
+
+
+def matches(rows: list[list[str]], numbers: list[list[str]]) -> bool:
+    """Tell whether the rows of a page show those of a file of numbers."""
+    if [len(row) for row in rows] != [len(row) for row in numbers]:
+        return False
+    return all(map(same, itertools.chain(*rows), itertools.chain(*numbers)))
+
+
+def test_tables_of_pages_are_those_of_the_files_of_numbers() -> None:
+    files, compared, wrong = measured_tables(), 0, []
+    for page in sorted(DOCS.glob("*.md")):
+        for table in re.findall(r"(?:^\|.*\n){3,}", page.read_text(), re.M):
+            head, _, *rows = [
+                [cell.strip() for cell in re.split(r"(?<!\\)\|", line.strip()[1:-1])]
+                for line in table.splitlines()
+            ]
+            if tuple(head) in files:
+                compared += 1
+                if not any(matches(rows, numbers) for numbers in files[tuple(head)]):
+                    wrong.append(f"{page.name}: {head}")
+    assert compared > 40 and not wrong, "\n".join(wrong)
 
 
 def test_files_that_pages_name_are_there() -> None:
@@ -108,7 +155,7 @@ def test_files_that_pages_name_are_there() -> None:
 
 
 def test_constants_of_the_algorithms_are_those_of_the_code() -> None:
-    text = (DOCS / "algorithms.md").read_text()
+    page = (DOCS / "algorithms.md").read_text()
     options = NewtonOptions()
     said = {
         f"after [{options.stagnation_limit}] steps in which": newton.PROGRESS == 0.5,
@@ -136,13 +183,13 @@ def test_constants_of_the_algorithms_are_those_of_the_code() -> None:
         f"over [{FixedPointOptions().depth}] solves": True,
         f"up to [{load_stepping.HALVINGS}] times": True,
     }
-    assert [words for words, holds in said.items() if words not in text or not holds] == []
+    assert [words for words, holds in said.items() if words not in page or not holds] == []
 
 
 def test_every_public_name_has_its_place_in_the_reference() -> None:
-    text = "".join(page.read_text() for page in DOCS.glob("api-*.md"))
-    listed = set(re.findall(r"^\.\. auto\w+:: (\S+)$", text, re.M))
-    members = set(re.findall(r"\w+", "".join(re.findall(r":members:(.*)$", text, re.M))))
+    pages = "".join(page.read_text() for page in DOCS.glob("api-*.md"))
+    listed = set(re.findall(r"^\.\. auto\w+:: (\S+)$", pages, re.M))
+    members = set(re.findall(r"\w+", "".join(re.findall(r":members:(.*)$", pages, re.M))))
     for name, (module, there) in contact._PUBLIC.items():
         assert f"{module}.{there}" in listed or there in members, name
 
@@ -150,8 +197,8 @@ def test_every_public_name_has_its_place_in_the_reference() -> None:
 def test_every_citation_has_its_entry() -> None:
     known = set(re.findall(r"^@\w+{(\w+),", (DOCS / "references.bib").read_text(), re.M))
     pages = [*DOCS.glob("*.md"), *(ROOT / "scripts" / "thesis").glob("*.py")]
-    text = "".join(page.read_text() for page in pages)
-    cited = {key for keys in re.findall(r"{cite:[pt]}`([^`]+)`", text) for key in keys.split(",")}
+    said = "".join(page.read_text() for page in pages)
+    cited = {key for keys in re.findall(r"{cite:[pt]}`([^`]+)`", said) for key in keys.split(",")}
     cited |= set(re.findall(r"@([a-z]+\d{4})\b", (ROOT / "paper.md").read_text()))
     assert len(cited) > 30 and not cited - known
 
