@@ -389,7 +389,7 @@ _HISTORY = (
     Quantity("contact", "", "The same.", lambda r: r.kkt.contact, (HISTORY,)),
     Quantity("friction", "", "The same.", lambda r: r.kkt.friction, (HISTORY,)),
     Quantity(
-        "change", "", "Relative change of the friction bound, (3.46); `nan` where there is none.",
+        "change", "", "Relative change of the friction bound; `nan` where there is none.",
         files=(HISTORY,),
     ),
     Quantity("seconds", "s", "Since the solve began.", files=(HISTORY,)),
