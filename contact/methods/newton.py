@@ -125,8 +125,7 @@ class Newton:
         if self.modes is None:
             assert isinstance(problem, ContactProblem)
             self.modes = UnconstrainedModes(problem)
-        underconstrained = not self.modes.constrained_undeformed
-        self.whole = NewtonStep(problem, options, self._parameters, self.counters, underconstrained)
+        self.whole = NewtonStep(problem, options, self._parameters, self.counters)
         self._condensed: CondensedStep | None = None
         self._condensable, self._pays = False, False
         if options.condense and isinstance(problem, ContactProblem):

@@ -33,7 +33,6 @@ from contact.problem.rigid_modes import (
     Group,
     constrained_by_friction,
     constrained_by_supports,
-    constrained_undeformed,
     groups,
     null_space,
 )
@@ -85,11 +84,6 @@ class UnconstrainedModes:
     def constrained_by_supports(self) -> bool:
         """Whether the supports constrain all modes without contact."""
         return constrained_by_supports(self.problem)
-
-    @cached_property
-    def constrained_undeformed(self) -> bool:
-        """Whether supports, and contact where it touches in the reference configuration, do."""
-        return constrained_undeformed(self.problem)
 
     @cached_property
     def friction_alone(self) -> bool:
