@@ -100,7 +100,7 @@ def test_a_column_whose_modulus_grows_with_the_height():
     body = Body(
         Material(Linear(1.0, 0.0), factor=lambda x: 1 + x[1]),
         [Fixed("left", [0.0, None]), Fixed("bottom", [None, 0.0])],
-        [Load("top", force=[0.0, -0.01])],
+        [Load("top", traction=[0.0, -0.01])],
     )
     errors = []
     for degree, cells in ((1, 8), (1, 16), (2, 8)):
