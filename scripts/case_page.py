@@ -39,7 +39,8 @@ a value of the file: its path is dotted, entries of lists are numbered from 0
 (`--set load.0.traction='[0, -0.05]'`), its value is TOML, and a bare word is a text.
 
 Lengths, forces and charges are in any consistent system of units; no key has a unit built in.
-An unknown key is an error.
+An unknown key is an error. `contact schema` prints a JSON schema of the file, by which
+[editors](install.md#an-editor-that-completes-case-files) complete and check it.
 
 **Formulas.** Where a number *or a formula* is accepted, a formula is a text of
 {formulas.ACCEPTED}.
