@@ -109,6 +109,10 @@ def identify(
     comm
         Communicator of the meshes.
 
+    Returns
+    -------
+    The parameters with their intervals, and the fitted columns.
+
     Raises
     ------
     InputError
@@ -254,6 +258,10 @@ class _Model:
 
 def read_data(path: str | Path) -> dict[str, Array]:
     """Read measurements from a CSV file with a row of names.
+
+    Returns
+    -------
+    Column -> values, shape (n,).
 
     Raises
     ------

@@ -139,6 +139,11 @@ def solve(
     replacements
         Objects that take the place of parts of the case; see `build.build_problem`.
 
+    Returns
+    -------
+    The solution, whether it has converged or not; of several steps that of the last one, with all
+    in its `steps`.
+
     Raises
     ------
     InputError
@@ -254,6 +259,10 @@ def evolve(
     before
         The state before that: with it the initial guess of the first step is that without the
         interruption, and so are the results, to rounding. Without it, within the tolerance.
+
+    Yields
+    ------
+    The state at the end of each step, one by one.
 
     Raises
     ------

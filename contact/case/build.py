@@ -50,6 +50,10 @@ def build_problem(
         Objects that replace the case's mesh, material law, Coulomb's mu(|u_tau|) or the whole
         friction law, foundation and compliant layer (own p_nu and h_nu).
 
+    Returns
+    -------
+    The problem, with the loads of time 1.
+
     Raises
     ------
     InputError

@@ -244,6 +244,10 @@ def load_case(
     without, folder
         As `parse_case` takes them; by default the folder of the file.
 
+    Returns
+    -------
+    The case, checked but for that which only its mesh can tell.
+
     Raises
     ------
     InputError
@@ -287,6 +291,10 @@ def parse_case(
     without
         Keys that may be missing, for objects will take their places: "mesh", "material",
         "friction.mu".
+
+    Returns
+    -------
+    The case; see `load_case`.
 
     Raises
     ------

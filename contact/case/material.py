@@ -440,6 +440,10 @@ def make_material(dim: int, **keys: Any) -> description.Material:
         Keys of the section: ``name="PZT-4"`` with ``poling``, or ``young``, ``poisson`` and
         ``piezo={"e31": ..., ...}``; ``on``, a region or a list of regions.
 
+    Returns
+    -------
+    The material, for `Body`.
+
     Raises
     ------
     InputError

@@ -52,6 +52,10 @@ def from_msh(comm: MPI.Intracomm, path: str | Path) -> Domain:
     asked for. `Domain.notes` and the log say so. Plane meshes may be stored in any plane
     z = const.
 
+    Returns
+    -------
+    The mesh with its parts and regions.
+
     Raises
     ------
     InputError

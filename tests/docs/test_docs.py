@@ -1,6 +1,7 @@
 """Every code block of the documentation runs, links lead somewhere, the index has all pages."""
 
 import csv
+import inspect
 import itertools
 import re
 import subprocess
@@ -191,6 +192,9 @@ def test_every_public_name_has_its_place_in_the_reference() -> None:
     members = set(re.findall(r"\w+", "".join(re.findall(r":members:(.*)$", pages, re.M))))
     for name, (module, there) in contact._PUBLIC.items():
         assert f"{module}.{there}" in listed or there in members, name
+        made = getattr(contact, name)
+        if inspect.isfunction(made) and made.__annotations__["return"] != "None":
+            assert re.search(r"^ *(Returns|Yields)\n *-{6,7}$", made.__doc__ or "", re.M), name
 
 
 def test_every_citation_has_its_entry() -> None:
