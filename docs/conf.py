@@ -28,7 +28,7 @@ bibtex_reference_style = "author_year"
 html_theme = "pydata_sphinx_theme"
 html_title = f"{project} {version}"
 html_theme_options = {
-    "logo": {"text": project},
+    "logo": {"text": f"{project} {version}"},
     "navbar_align": "left",
     "header_links_before_dropdown": 8,
     "show_toc_level": 2,

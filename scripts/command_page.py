@@ -46,9 +46,10 @@ def page() -> str:
 
 
 def _row(name: str, options: dict[str, Any]) -> str:
-    shown = options.get("metavar", "") if name.startswith("-") else ""
+    shown = options.get("metavar", "")
+    usage = f"{name} {shown}".strip() if name.startswith("-") else shown
     text = options["help"].replace("|", r"\|")
-    return f"| `{f'{name} {shown}'.strip()}` | {text[0].upper()}{text[1:]}. |"
+    return f"| `{usage}` | {text[0].upper()}{text[1:]}. |"
 
 
 if __name__ == "__main__":
