@@ -377,7 +377,7 @@ def _steps(
         return here, state, Outcome(evaluate(here, state), method.options.allowed), history
     outcome = step.outcome
     if not outcome.converged:
-        words = outcome.ended or f"the one to {step.problem.time:g} fails"
+        words = outcome.ended or outcome.criterion or f"the one to {step.problem.time:g} fails"
         ended = f"the steps end at t = {reached:g} of {end:g}: {words}"
         outcome = replace(outcome, ended=ended)
     return here, state, outcome, history

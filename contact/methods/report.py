@@ -144,12 +144,15 @@ class Outcome:
         Why the method ended, in words; nothing where it has converged.
     signal
         Number of the signal that ended it; 0 for none.
+    criterion
+        The method's own criterion, in words, where it ends by another one than the residuals.
     """
 
     kkt: Residuals
     allowed: Residuals
     ended: str = ""
     signal: int = 0
+    criterion: str = ""
 
     @property
     def converged(self) -> bool:
@@ -161,10 +164,13 @@ class Outcome:
         """Why the method ended, and its residuals, in words."""
         if self.signal:
             return self.ended
-        excess = self.kkt.excess(self.allowed)
-        if excess and self.ended:
+        excess, said = self.kkt.excess(self.allowed), self.ended or self.criterion
+        if excess and said:
             # A failure is explained by the residual, any other end is contradicted.
-            return f"{self.ended}{': ' if 'not converged' in self.ended else ', but '}{excess}"
+            return f"{said}{': ' if 'not converged' in said else ', but '}{excess}"
         if excess:
             return excess
-        return self.ended or f"all residuals <= {self.allowed.largest:g}"
+        # A converged end is no failure, even where the method had given up.
+        words = self.criterion or f"all residuals <= {self.allowed.largest:g}"
+        granted = self.kkt.granted(self.allowed)
+        return f"{words}, to rounding: {granted}" if granted else words

@@ -66,7 +66,8 @@ _RUN = (
     Quantity("units", "", "Names of the units, those of `[case] units`.", lambda r: r.units.given),
     Quantity("t", "time", "End of the step.", lambda r: r.state.time, (STEPS,)),
     Quantity(
-        "converged", "", "Whether all residuals are within the tolerance.", files=(SUMMARY, SWEEP),
+        "converged", "", "Whether all residuals are within the tolerance or their rounding floors.",
+        files=(SUMMARY, SWEEP),
     ),
     Quantity("reason", "", "Why the run ended, in words.", lambda r: r.outcome.reason),
     Quantity("method", "", "The method, as in `[solver]`."),

@@ -98,6 +98,22 @@ class Residuals:
         value, limit = getattr(self, worst), getattr(allowed, worst)
         return f"the {worst} residual is {value:.2e}, above {limit:g}"
 
+    def granted(self, allowed: Residuals) -> str:
+        """Name the residual farthest above its limit that is below its rounding floor.
+
+        Nothing if none is.
+        """
+        values = {
+            name: (getattr(self, name), floor)
+            for name, floor in zip(("equilibrium", "contact", "friction"), self.floors, strict=True)
+            if getattr(allowed, name) < getattr(self, name) <= floor
+        }
+        if not values:
+            return ""
+        worst = max(values, key=lambda name: values[name][0] / getattr(allowed, name))
+        value, floor = values[worst]
+        return f"the {worst} residual is {value:.2e}, its floor {floor:.2e}"
+
 
 def residual_forces(problem: Problem, state: State, secant_at: Array | None = None) -> Array:
     """Return F(x) - loads + contact and foundation forces on the owned unknowns. Collective.

@@ -126,6 +126,18 @@ def test_rounding_does_not_keep_a_long_beam_from_its_solution():
     assert any("rounding decides how well the forces balance" in w for w in solution.warnings)
 
 
+def test_an_end_that_rounding_alone_grants_is_said_to_be_to_rounding():
+    """It was called converged at 1e-12, with all residuals 0."""
+    load = {"on": "top", "traction": [0.0, -1e-13]}
+    case = beam(1000.0, [100, 1], load, 0.1, 0.8, space={"degree": 2})
+    solution = solve(parse_case({**case, "solver": {"tolerance": 1e-12}}), comm=SELF)
+    kkt = solution.outcome.kkt
+    assert solution.converged
+    assert 1e-12 < kkt.equilibrium <= kkt.floors[0] < 1e-6
+    words = f"to rounding: the equilibrium residual is {kkt.equilibrium:.2e}, its floor "
+    assert words + f"{kkt.floors[0]:.2e}" in solution.outcome.reason
+
+
 @pytest.mark.parametrize("mu", [0.0, 0.3])
 @pytest.mark.parametrize("degree", [1, 2])
 def test_a_beam_whose_tip_is_lifted_off(degree, mu):

@@ -105,7 +105,7 @@ class OuterLoop(ABC):
             change, seconds = self._update_bound(iteration), time.perf_counter() - begin
             self.history.add(Record(iteration, inner, residuals, change, seconds, note))
             if by_thesis and iteration > first and self._thesis_criterion(change, previous):
-                return self._outcome(residuals, "the thesis's criterion is met")
+                return self._outcome(residuals, criterion="the thesis's criterion is met")
             if not by_thesis and residual <= options.tolerance:
                 return self._outcome(residuals)
             if note == LOST:
@@ -152,5 +152,5 @@ class OuterLoop(ABC):
         now, before = own(self.state.x), own(previous.x)
         return self._norm(now - before) < self.options.eps_fp * self._norm(now)
 
-    def _outcome(self, residuals: Residuals, ended: str = "") -> Outcome:
-        return Outcome(residuals, self.options.allowed, ended)
+    def _outcome(self, residuals: Residuals, ended: str = "", criterion: str = "") -> Outcome:
+        return Outcome(residuals, self.options.allowed, ended, criterion=criterion)

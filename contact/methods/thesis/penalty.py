@@ -372,11 +372,13 @@ class Penalty(OuterLoop):
     def _advice(self, residual: float | None = None) -> str:
         return HARDER
 
-    def _outcome(self, residuals: Residuals, ended: str = "") -> Outcome:
-        options, limit = self.options, max(residuals.contact, residuals.friction)
-        ended = ended or f"the residual of the penalised problem is <= {options.tolerance:g}"
+    def _outcome(self, residuals: Residuals, ended: str = "", criterion: str = "") -> Outcome:
+        options, limit, laws = self.options, max(residuals.contact, residuals.friction), ""
+        criterion = criterion or (
+            f"the residual of the penalised problem is <= {options.tolerance:g}"
+        )
         if residuals.equilibrium <= options.tolerance:
-            ended += f"; the complementarity conditions are met to {limit:.1e}"
+            laws += f"; the complementarity conditions are met to {limit:.1e}"
         if limit > LARGEST_VIOLATION:
-            ended += "; a smaller eps_contact or eps_slip brings them nearer"
-        return super()._outcome(residuals, ended)
+            laws += "; a smaller eps_contact or eps_slip brings them nearer"
+        return super()._outcome(residuals, ended and ended + laws, criterion + laws)
