@@ -14,7 +14,7 @@ and a problem that is put together in Python by
 >>> solution = solve(problem)  # doctest: +SKIP
 
 - Geometry: `from_msh` reads a Gmsh file, `Domain.from_mesh` takes dolfinx's mesh and tags.
-- Body: `Body`, `Fixed`, `Load`; `Linear`, `Log`, `UserLaw`, `Piezo`; `J2` with `Voce` or
+- Body: `Body`, `Fixed`, `Elastic`, `Load`; `Linear`, `Log`, `UserLaw`, `Piezo`; `J2` with `Voce` or
   `Tabulated` hardening, and a stress update of your own, which returns a `Response`; several by
   `Material`, and crystals by `make_material`; `Rigid` with its `Motion`, and `Electrode`.
 - Contact: `Contact` with a gap, or a `Plane`, `Sphere`, `Cylinder`, `Cone`, `Paraboloid`, `Punch`,

@@ -1,6 +1,7 @@
 """The public names: for type checkers, and for `contact/__init__.py`, which imports them lazily."""
 
 from contact.body.description import Body as Body
+from contact.body.description import Elastic as Elastic
 from contact.body.description import Fixed as Fixed
 from contact.body.description import Load as Load
 from contact.body.description import Material as Material

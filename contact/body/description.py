@@ -204,6 +204,40 @@ class Load:
 
 
 @dataclass(frozen=True)
+class Elastic:
+    """An elastic support: a traction -k u on a part, k by component, along the normal, or both.
+
+    Parameters
+    ----------
+    on
+        Name of the part, or a list of names.
+    stiffness
+        A value a component (force/area/length), each as `fields.field` takes it; 0 for none.
+    normal
+        Stiffness along the normal of the part, likewise: u has no resistance in its plane.
+
+    Raises
+    ------
+    InputError
+        If nothing is given, or something else.
+    """
+
+    on: Given
+    stiffness: Given = None
+    normal: Given = None
+
+    def __post_init__(self) -> None:
+        """Make fields of the given values."""
+        object.__setattr__(self, "on", part(self.on))
+        object.__setattr__(self, "stiffness", vector(self.stiffness))
+        object.__setattr__(self, "normal", field(self.normal))
+        if self.stiffness is None and self.normal is None:
+            raise InputError(
+                f"Elastic on {self.on!r}: nothing is given; accepted: stiffness or normal"
+            )
+
+
+@dataclass(frozen=True)
 class Material:
     """A material and where it is.
 
@@ -265,6 +299,8 @@ class Body:
         The materials, where `law` was given as such; else none.
     rigid, electrodes
         Rigid parts, foundations included, and parts of one unknown potential.
+    elastic
+        Elastic supports.
     """
 
     law: Given
@@ -274,6 +310,7 @@ class Body:
     regions: tuple[Material, ...] = ()
     rigid: tuple[Rigid, ...] = ()
     electrodes: tuple[Electrode, ...] = ()
+    elastic: Sequence[Elastic] = default(default_factory=tuple)
 
     def __post_init__(self) -> None:
         """Refuse other arguments; accept one support or one load without a list."""
@@ -291,6 +328,7 @@ class Body:
             ("regions", Material),
             ("rigid", Rigid),
             ("electrodes", Electrode),
+            ("elastic", Elastic),
         ):
             words = f"{kind.__name__}(...), or a list of them"
             object.__setattr__(self, name, several(name, getattr(self, name), kind, words))

@@ -309,6 +309,12 @@ class BodyEquilibrium:
             forces = sum(assembled(form, self.owned) for form in forms.secant_forces)
         return np.concatenate([forces, np.zeros(self.global_unknowns.size)])
 
+    def elastic_forces(self, x: Array) -> list[Array]:
+        """Return the owned nodal forces of each elastic support at local unknowns. Collective."""
+        forms = self.forms
+        forms.at.x.array[:] = self.nodal(x).ravel()
+        return [assembled(form, self.owned) for form in forms.elastic_forces]
+
     @cached_property
     def loads_by_cell(self) -> tuple[fem.FunctionSpace, Loads]:
         """Discontinuous cubics, and the loads on those of the owned cells. Collective."""

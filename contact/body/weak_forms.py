@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from functools import cached_property
 from typing import Any
 
@@ -12,15 +12,34 @@ from ufl.core.expr import Expr
 
 from contact.body.description import Body
 from contact.body.elements import MEAN_DILATATION, kinematics_of
+from contact.body.fields import Number
 from contact.body.internal_variables import QuadratureLaws
+from contact.body.loads import expression
 from contact.body.materials import material_measures
 from contact.body.pointwise import Pointwise
-from contact.mesh.domain import Domain
+from contact.errors import InputError
+from contact.mesh.domain import Domain, Measure
 from contact.mesh.entities import Indices
 from forms.hencky import is_linear, secant_form
 from forms.history import HistoryLaw, QuadratureLaw
 from forms.kinematics import CellMean, Isochoric
 from forms.piezo import symmetrised_form
+
+
+def _elastic(domain: Domain, body: Body) -> Iterator[tuple[list[Expr], Expr, Measure]]:
+    """Yield the elastic supports in UFL. Collective."""
+    x = ufl.SpatialCoordinate(domain.mesh)
+    for number, support in enumerate(body.elastic):
+        given = support.stiffness or ()
+        if given and len(given) != domain.dim:
+            raise InputError(
+                f"elastic on {support.on!r}: the stiffness has {len(given)} components, the body "
+                f"has {domain.dim}"
+            )
+        key = f"elastic.{number}"
+        parts = [expression(domain, k, x, 0.0, f"{key}.stiffness.{i}") for i, k in enumerate(given)]
+        normal = Number(0.0) if support.normal is None else support.normal
+        yield parts, expression(domain, normal, x, 0.0, f"{key}.normal"), domain.ds(support.on)
 
 
 class WeakForms:
@@ -73,6 +92,9 @@ class WeakForms:
             # P2-P0: all that changes of volume do is taken at the centroid, the rest in full.
             mean = CellMean(base)
             rules = [(exact, ((1, Isochoric(base)),)), (1, ((1, mean), (-1, Isochoric(mean))))]
+        #: Elastic supports: the stiffness of each component, that along the normal, the measure.
+        self._elastic = [*_elastic(domain, body)]
+        self._normal = ufl.FacetNormal(domain.mesh)
         #: Integrals by quadrature rule: sign, kinematics, law, piezoelectric tensors, measure.
         self._rules = [
             [
@@ -113,6 +135,7 @@ class WeakForms:
         of a rule of one point for those of the others.
         """
         (u, phi), (v, xi) = self.split(self.at), test or self._test
+        supports = [functions * form for form in self._supported(u, v)]
         frozen = {False: self.split(secant_at)[0], True: self.split(history_at)[0]}
         return [
             sum(
@@ -126,7 +149,21 @@ class WeakForms:
             )
             for integrals in self._rules
             if integrals
+        ] + ([sum(supports)] if supports else [])
+
+    def _supported(self, u: Expr, v: Expr) -> list[Any]:
+        """Return the work of each elastic support, against the displacement u, along v."""
+        return [
+            sum((k * u[i] * v[i] for i, k in enumerate(parts)), normal * along) * ds
+            for parts, normal, ds in self._elastic
+            for along in [ufl.dot(u, self._normal) * ufl.dot(v, self._normal)]
         ]
+
+    @cached_property
+    def elastic_forces(self) -> list[fem.Form]:
+        """Forces of each elastic support against the displacement `at`."""
+        (u, _), (v, _) = self.split(self.at), self._test
+        return fem.form(self._supported(u, v)) if self._elastic else []
 
     # For each function of a form dolfinx packs the values in all cells: with the law itself those
     # of one.

@@ -1,13 +1,9 @@
-"""Sections of the case file about the body: elements, supports, loads, rigid parts, load steps."""
+"""Sections of the case file about the body: elements, supports, loads, rigid parts."""
 
 from __future__ import annotations
 
-import re
 import warnings
 from collections.abc import Sequence
-from functools import cached_property
-from itertools import pairwise
-from pathlib import Path
 from typing import Annotated, Any, Literal, Self, TypeAlias
 
 import numpy as np
@@ -24,21 +20,19 @@ from contact.case.section import (
     Component,
     Either,
     Few,
-    File,
     Formula,
     FormulaVector,
+    NonNegativeFormula,
     Part,
     Section,
-    Text,
     TimeComponent,
     TimeFormula,
     Vector,
     as_given,
-    as_tuple,
 )
 from contact.errors import InputError
 from contact.mesh.domain import Domain
-from contact.settings import SPATIAL, Accepted, Count, Number, Switch
+from contact.settings import SPATIAL, Accepted, Switch
 
 #: `contact.case.file.Case`, of which these are sections.
 Case: TypeAlias = Any
@@ -118,6 +112,42 @@ class Fixed(Section):
         potential = as_field(f"{key}.potential", self.potential, comm)
         amplitude = case.amplitude(self.amplitude)
         return description.Fixed(self.on, displacement, potential, amplitude)
+
+
+class Elastic(Section):
+    """`[[elastic]]`: an elastic support, a traction against the displacement of a part."""
+
+    on: Part
+    """Part of the boundary, or a list of parts, beside the contact part."""
+    stiffness: (
+        Annotated[
+            Few[NonNegativeFormula],
+            SPATIAL,
+            Accepted("a list of 2 numbers >= 0 or formulas in 2-D, 3 in 3-D"),
+        ]
+        | None
+    ) = None
+    """Force per area and displacement along each axis: traction -k u."""
+    normal: NonNegativeFormula | None = None
+    """The same along the normal of the part: it resists no motion in its plane."""
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        if self.stiffness is None and self.normal is None:
+            raise fault("stiffness", Words("missing"), "stiffness, normal, or both")
+        return self
+
+    def build(self, key: str, comm: MPI.Intracomm) -> description.Elastic:
+        """Return the support itself; ``key`` is the section's own."""
+        return description.Elastic(
+            self.on,
+            self.stiffness
+            and [
+                as_field(f"{key}.stiffness.{k}", value, comm, 0.0)
+                for k, value in enumerate(self.stiffness)
+            ],
+            as_field(f"{key}.normal", self.normal, comm, 0.0),
+        )
 
 
 ZERO = Expression(0.0)
@@ -337,144 +367,3 @@ def _components(values: Sequence[Expression | str], size: int, unit: float = 1.0
     """Return components, None for those that are free, and 0 where none are given."""
     known = [None if isinstance(value, str) else as_number(value, unit) for value in values]
     return [*known, *[0.0] * (size - len(known))][:size]
-
-
-Increasing: TypeAlias = Annotated[
-    tuple[Number, ...],
-    Field(min_length=2),
-    as_tuple,
-    Accepted("a list of 2 numbers or more that increase"),
-]
-
-
-def _check_increasing(key: str, times: tuple[float, ...]) -> None:
-    if any(after <= before for before, after in pairwise(times)):
-        raise fault(key, times, "numbers that increase")
-
-
-class Amplitude(Section):
-    """`[evolution.amplitudes.NAME]`: a factor as a function of time, linear between the values."""
-
-    time: Increasing | None = None
-    """Times; the first and the last step lie within them. Required without `file`."""
-    value: (
-        Annotated[tuple[Number, ...], as_tuple, Accepted("a list of numbers, one for each time")]
-        | None
-    ) = None
-    """Values at these times. Likewise."""
-    file: Annotated[File, Accepted("a CSV file of times and values")] | None = None
-    """CSV file instead, relative to the case file: times in the first column, values in the second
-    one, a measured curve for instance. Its first row may have names."""
-
-    @cached_property
-    def points(self) -> tuple[tuple[float, ...], tuple[float, ...]]:
-        """The times, and the values there."""
-        if self.file is not None:
-            return read_curve(self.file)
-        assert self.time is not None and self.value is not None  # checked
-        return self.time, self.value
-
-    @model_validator(mode="after")
-    def _check(self) -> Self:
-        if self.file is not None:
-            for key in ("time", "value"):
-                if getattr(self, key) is not None:
-                    raise fault(key, Words("given with file"), f"{key}, or file")
-            try:
-                _check_increasing("file", self.points[0])
-            except InputError as error:
-                words, _, accepted = str(error).partition("; accepted: ")
-                raise fault("file", Words(words), accepted) from None
-            return self
-        for key in ("time", "value"):
-            if getattr(self, key) is None:
-                raise fault(key, Words("missing"), f"{key}, or file with times and values")
-        times, values = self.points
-        _check_increasing("time", times)
-        if len(values) != len(times):
-            raise fault("value", values, f"{len(times)} values, as many as times")
-        return self
-
-    def __call__(self, time: float) -> float:
-        """Return the factor at a time."""
-        return float(np.interp(time, *self.points))
-
-
-def read_curve(path: str | Path) -> tuple[tuple[float, ...], tuple[float, ...]]:
-    """Return the first two columns of a CSV file, at least two rows of numbers.
-
-    Raises
-    ------
-    InputError
-        If it cannot be read, or has no such rows.
-    """
-    accepted = "a CSV file, rows of a time and a value, two at least"
-    try:
-        text = Path(path).read_text(encoding="utf-8-sig")
-    except OSError as error:
-        raise InputError(f"{path}: {error.strerror}; accepted: {accepted}") from None
-    except UnicodeDecodeError:
-        raise InputError(f"{path}: not a text in UTF-8; accepted: {accepted}") from None
-    lines = [line for line in text.splitlines() if line.strip() and line.lstrip()[0] != "#"]
-    rows: list[tuple[float, float]] = []
-    for number, line in enumerate(lines):
-        cells = re.split(r"\s*[,;]\s*|\s+", line.strip())
-        try:
-            first, second = map(float, cells[:2])
-            if not np.isfinite([first, second]).all():
-                raise ValueError
-        except ValueError:
-            if number > 0:
-                raise InputError(
-                    f"{path}: no numbers in {line!r:.40}; accepted: {accepted}"
-                ) from None
-            continue  # names
-        rows.append((first, second))
-    if len(rows) < 2:
-        raise InputError(f"{path}: {len(rows)} rows of numbers; accepted: {accepted}")
-    times, values = zip(*rows, strict=True)
-    return times, values
-
-
-class Evolution(Section):
-    """`[evolution]`: quasi-static load steps with incremental friction. Absent: one static step.
-
-    Friction acts on the slip of each step. A step that fails is halved, up to four times.
-    """
-
-    times: Increasing
-    """Ends of the stages; the body is in its reference configuration at the first."""
-    steps: Annotated[
-        tuple[Count, ...],
-        as_tuple,
-        Accepted("a list of whole numbers from 1 to 10000000, one for each stage"),
-    ]
-    """Number of equal steps in each stage."""
-    amplitudes: dict[Text, Amplitude] = Field(default={})
-    """Factors by name, for the key `amplitude` of `[[fixed]]`, `[[load]]`, `[electric]`,
-    `[contact.rigid]`, `[[rigid]]`, `[[electrode]]`. Without one given values grow from 0 to all
-    over the first stage, and stay; with `"constant"` they act all the time; where one is a formula
-    in t all are taken as they are."""
-
-    @model_validator(mode="after")
-    def _check(self) -> Self:
-        _check_increasing("times", self.times)
-        stages = len(self.times) - 1
-        if len(self.steps) != stages:
-            raise fault("steps", self.steps, f"{stages} numbers, one for each stage between times")
-        for name, amplitude in self.amplitudes.items():
-            times = amplitude.points[0]
-            if times[0] > self.times[0] or times[-1] < self.times[-1]:
-                accepted = f"times that reach from {self.times[0]:g} to {self.times[-1]:g}"
-                key = "time" if amplitude.file is None else "file"
-                raise fault(f"amplitudes.{name}.{key}", times, accepted)
-        return self
-
-    @property
-    def ends(self) -> list[float]:
-        """Ends of all steps."""
-        return [
-            end if k == count - 1 else begin + (end - begin) * (k + 1) / count
-            for (begin, end), count in zip(pairwise(self.times), self.steps, strict=True)
-            for k in range(count)
-        ]

@@ -72,6 +72,7 @@ def build_problem(
             _materials(case, domain, law),
             [fixed.build(f"fixed.{i}", case, domain) for i, fixed in enumerate(case.fixed)],
             [load.build(f"load.{i}", case, domain.comm) for i, load in enumerate(case.load)],
+            elastic=[e.build(f"elastic.{i}", domain.comm) for i, e in enumerate(case.elastic)],
             rigid=_rigid(case, domain.dim),
             electrodes=tuple(electrode.build(case) for electrode in case.electrode),
         )

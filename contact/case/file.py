@@ -25,8 +25,9 @@ from pydantic import (
 from pydantic_core import PydanticCustomError
 
 from contact.body.fields import CONSTANT, Amplitude, Ramp, steady
-from contact.case.body import Electrode, Evolution, Fixed, Load, Moving, RigidPart, Space
+from contact.case.body import Elastic, Electrode, Fixed, Load, Moving, RigidPart, Space
 from contact.case.checks import check_mesh, check_sections
+from contact.case.evolution import Evolution
 from contact.case.interface import Contact, Electric, Friction
 from contact.case.material import Material
 from contact.case.mesh import Mesh
@@ -127,6 +128,8 @@ class Case(Section):
     fixed: Annotated[tuple[Fixed, ...], as_tuple, Accepted("tables [[fixed]]")] = ()
     """Supports and electrodes: `[[fixed]]`. None where contact, with friction that is enough, or
     `[[rigid]]` holds the body."""
+    elastic: Annotated[tuple[Elastic, ...], as_tuple, Accepted("tables [[elastic]]")] = ()
+    """Elastic supports: any number of `[[elastic]]`."""
     load: Annotated[tuple[Load, ...], as_tuple, Accepted("tables [[load]]")] = ()
     """Forces and charges: any number of `[[load]]`."""
     rigid: Annotated[tuple[RigidPart, ...], as_tuple, Accepted("tables [[rigid]]")] = ()

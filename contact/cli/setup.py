@@ -124,6 +124,8 @@ def _roles(case: Case, problem: ContactProblem) -> Iterable[Role | None]:
         if fixed.potential is not None:
             words = rf"$\varphi$ = {_said(fixed.potential)} on {fixed.on}"
             yield _role(domain, fixed.on, ELECTRODE, words)
+    for support in case.elastic:
+        yield _role(domain, support.on, HELD, f"elastic support: {support.on}")
     for given, load in zip(case.load, problem.body.loads, strict=True):
         said = []
         if given.traction is not None:

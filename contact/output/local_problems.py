@@ -140,6 +140,9 @@ class LocalProblems:
         forces = np.zeros(body.owned + body.global_unknowns.size)
         problem.interface.add_forces(forces, state.x, state.forces)
         touch = np.any(body.nodal(body.local(forces)) != 0, axis=1)[nodes].any(axis=2)
+        # The traction of an elastic support is none of the loads either.
+        for support in body.body.elastic:
+            touch |= np.isin(facets, body.domain.facets(support.on))
         own = np.zeros(body.owned + body.global_unknowns.size)
         own[: body.owned] = body.free.ravel()
         free = body.nodal(body.local(own))[nodes].any(axis=2)

@@ -77,10 +77,18 @@ def supports(problem: ContactProblem, state: State) -> Mapping[str, Resultant]:
     residual = body.nodal(residual_forces(problem, state))[:, :d]
     points = body.space.tabulate_dof_coordinates()[:, :d]
     held = [fixed.displacement or (None,) * d for fixed in problem.body.fixed]
-    return {
+    found = {
         part: resultant(problem, points[nodes], forces)
         for part, (nodes, forces) in _reactions(problem, residual, held, slice(d)).items()
     }
+    owned = body.owned // body.block_size
+    forces_of = body.elastic_forces(state.x)
+    for support, forces in zip(problem.body.elastic, forces_of, strict=True):
+        on_body = -forces.reshape(-1, body.block_size)[:, :d]
+        own = resultant(problem, points[:owned], on_body)
+        other = found.get(support.on, Resultant(0 * own.force, 0 * own.moment))
+        found[support.on] = Resultant(own.force + other.force, own.moment + other.moment)
+    return found
 
 
 def _reactions(

@@ -92,6 +92,13 @@ def _check_loads(problem: ContactProblem) -> None:
                 f"load.{i}.on: {load.on} shares facets with the contact part {contact.on}; "
                 "accepted: parts beside it, or body forces"
             )
+    for contact, (i, support) in product(problem.contacts, enumerate(problem.body.elastic)):
+        sides = [contact.on] if contact.against is None else [contact.on, contact.against]
+        if any([_shared(problem, support.on, side)[1] for side in sides]):
+            raise InputError(
+                f"elastic.{i}.on: {support.on} shares facets with the contact part {contact.on}; "
+                "accepted: parts beside it"
+            )
     _check_sizes(problem)
 
 

@@ -210,9 +210,28 @@ def _group(
         moved,
         names,
         np.array(centres),
-        _gram(problem, apart[fixed.ravel()][:, None, :]),
+        _gram(problem, apart[fixed.ravel()][:, None, :]) + _elastic_gram(problem, moved),
         bool(moving),
     )
+
+
+def _elastic_gram(problem: ContactProblem, moved: Array) -> Array:
+    """Return the work of elastic supports on motions, over the largest one. Collective."""
+    body, size = problem.equilibrium, moved.shape[1]
+    if not problem.body.elastic:
+        return np.zeros((size, size))
+    tied = body.global_unknowns.tied.ravel()
+    follows = body.global_unknowns.ties @ moved[body.owned :]
+    motions = np.where(tied[:, None], follows, moved[: body.owned])
+    forces = np.stack(
+        [
+            np.sum(body.elastic_forces(body.local(np.append(motion, q))), axis=0)
+            for motion, q in zip(motions.T, moved[body.owned :].T, strict=True)
+        ],
+        axis=1,
+    )
+    gram = problem.comm.allreduce(motions.T @ forces, op=MPI.SUM)
+    return np.asarray(gram / max(float(np.diag(gram).max()), np.finfo(float).tiny))
 
 
 def described(motions: Array, names: list[str]) -> str:
