@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -42,13 +43,16 @@ def run(options: argparse.Namespace, comm: MPI.Intracomm) -> int:
 
 
 def case_text(domain: Domain, mesh: Path, path: Path) -> str:
-    """Return a case that presses the highest part down onto the lowest one. Collective."""
-    heights = _heights(domain)
-    order = sorted(heights, key=lambda name: (heights[name], name))
+    """Return a case that presses the highest part down onto the lowest one. Collective.
+
+    Of several bodies that face each other onto each other, the lowest part held.
+    """
+    heights, pairs = _heights(domain), facing_parts(domain)
+    sides = {side for pair in pairs for side in pair}
+    order = sorted({*heights} - sides or {*heights}, key=lambda name: (heights[name], name))
     lowest, highest = order[0], order[-1]
     d = domain.dim
     pressed = _along(d, -float(f"{1e-3 * domain.size:.0e}"))
-    ground = _along(d, _lowest(domain))
     try:
         name = str(mesh.resolve().relative_to(path.resolve().parent))
     except ValueError:
@@ -61,32 +65,23 @@ def case_text(domain: Domain, mesh: Path, path: Path) -> str:
 title = {literal(mesh.stem)}
 
 [case]
-# units = {{ length = "mm", stress = "MPa" }}    # for labels of figures
+# units = "N-mm-MPa"          # labels of figures, and constants of materials by name
 
 [mesh]
 file = {literal(name)}
 # Parts of its boundary, to be named below:
 {parts}# Regions: {regions}.
 
-[material]
-young = 210e3                 # Young's modulus (stress)
-poisson = 0.3
-# law = "log"                 # beyond this strain the material gives way:
-# yield_strain = 0.002
-
+{_materials(domain)}
 [[fixed]]                     # the part that lies highest; "free" for a component that is not held
 {f"on = {literal(highest)}":<30}# or a list of parts
 displacement = {pressed}
-
-# [[load]]                    # force per area, on any part but those of [contact]
+{_held(domain, lowest) if pairs else ""}
+# [[load]]                    # force on any part but those of contacts, spread evenly
 # on = {literal(highest)}
-# traction = {_along(d, -1.0)}
+# force = {_along(d, -1.0)}
 
-[contact]                     # the part that lies lowest
-on = {literal(lowest)}
-foundation = {{ shape = "plane", point = {ground}, normal = {_along(d, 1.0)} }}
-# gap = 0.0                   # instead: to a foundation along the part's normal; a formula, too
-{_pairs(domain)}
+{_pairs(pairs) if pairs else _foundation(domain, lowest)}
 [friction]
 law = "coulomb"
 mu = 0.2
@@ -97,22 +92,59 @@ tolerance = 1e-8
 """
 
 
-def _pairs(domain: Domain) -> str:
-    """Return contacts between bodies to choose from, as comments. Collective."""
-    pairs = facing_parts(domain)
-    if not pairs:
-        return ""
+def _materials(domain: Domain) -> str:
+    """Return a material for each region, where each cell has one; else one for all. Collective."""
+    counts = [domain.comm.allreduce(cells.size, op=MPI.SUM) for cells in domain.regions.values()]
+    apart = sum(counts) == domain.mesh.topology.index_map(domain.dim).size_global
+    names = sorted(domain.regions) if apart and len(counts) > 1 else [""]
+    more = """\
+# law = "log"                 # beyond this strain the material gives way:
+# yield_strain = 0.002
+"""
+    return "\n".join(
+        f"""\
+{f"[[material]]{chr(10)}on = {literal(name)}" if name else "[material]"}
+young = 210e3                 # Young's modulus (stress); or by name: name = "steel"
+poisson = 0.3
+{more if name == names[0] else ""}"""
+        for name in names
+    )
+
+
+def _held(domain: Domain, lowest: str) -> str:
+    """Return the support of the lowest body."""
+    return f"""
+[[fixed]]                     # the part that lies lowest
+on = {literal(lowest)}
+displacement = {_along(domain.dim, 0.0)}
+"""
+
+
+def _foundation(domain: Domain, lowest: str) -> str:
+    """Return the contact of one body with a plane. Collective."""
+    ground, d = _along(domain.dim, _lowest(domain)), domain.dim
+    return f"""\
+[contact]                     # the part that lies lowest
+on = {literal(lowest)}
+foundation = {{ shape = "plane", point = {ground}, normal = {_along(d, 1.0)} }}
+# gap = 0.0                   # instead: to a foundation along the part's normal; a formula, too
+"""
+
+
+def _pairs(pairs: Sequence[tuple[str, str]]) -> str:
+    """Return the contacts between bodies."""
     text = "".join(
-        f"""#
-# [[contact]]
-# on = {literal(on)}
-# against = {literal(against)}
+        f"""
+[[contact]]
+on = {literal(on)}
+against = {literal(against)}
 """
         for on, against in pairs
     )
-    return f"""
-# Bodies of this mesh that can touch each other: these instead, and hold the lowest part, too.
-# Friction and current can be given for each; `on` is the finer side here, or take the softer body.
+    return f"""\
+# Bodies of this mesh that can touch each other. Friction and current can be given for each; `on`
+# is the finer side here, or take the softer body. A rigid foundation instead of a body:
+# on = ..., foundation = {{ shape = "plane", point = [...], normal = [...] }}
 {text}"""
 
 

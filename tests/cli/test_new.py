@@ -1,5 +1,6 @@
 """A case for a mesh of one's own, and what ``check`` says of a case before it is solved."""
 
+import json
 from pathlib import Path
 
 import numpy as np
@@ -56,18 +57,28 @@ def test_a_case_to_begin_with(dim: int, tmp_path: Path, capsys: pytest.CaptureFi
     assert path.read_text() == text
 
 
-def test_contacts_between_bodies_are_offered(tmp_path: Path) -> None:
-    """Without the signs of a comment they make a case that can be checked."""
+def test_two_bodies(tmp_path: Path) -> None:
+    """The case presses them onto each other; it passes check as it is, and solves."""
+    mesh = tmp_path / "blocks.msh"
+    write("two_blocks", mesh, lower_size=0.4, upper_size=0.3)
+    assert main(["new", str(mesh)]) == CONVERGED
+    path = mesh.with_suffix(".toml")
+    case = load_case(path)
+    assert [m.on for _, m in case.materials] == [("lower",), ("upper",)]
+    assert [fixed.on for fixed in case.fixed] == ["upper_top", "lower_bottom"]
+    (contact,) = case.contact
+    assert {contact.on, contact.against} == {"upper_bottom", "lower_top"}
+    assert main(["check", str(path)]) == CONVERGED
+    assert main(["solve", str(path), "--out", str(tmp_path / "out"), "--quiet"]) == CONVERGED
+    summary = json.loads((tmp_path / "out" / "summary.json").read_text())
+    assert summary["contact_nodes"] > 0
+
+
+def test_several_bodies(tmp_path: Path) -> None:
+    """A ball between plates: both contacts."""
     mesh = tmp_path / "ball.msh"
     write("ball_between_plates", mesh, size=0.4, contact_size=0.1)
     assert main(["new", str(mesh)]) == CONVERGED
-    lines = mesh.with_suffix(".toml").read_text().splitlines()
-    own = lines.index("# [[contact]]")
-    offered = [line.removeprefix("#").strip() for line in lines[own : lines.index("[friction]")]]
-    begin = lines.index("[contact]                     # the part that lies lowest")
-    lines[begin : lines.index("[friction]")] = offered
-    lines += ["[[fixed]]", 'on = "lower_bottom"', "displacement = [0.0, 0.0]"]
-    mesh.with_suffix(".toml").write_text("\n".join(lines))
     contacts = load_case(mesh.with_suffix(".toml")).contact
     sides = {frozenset((contact.on, contact.against)) for contact in contacts}
     expected = [("ball_bottom", "lower_top"), ("ball_top", "upper_bottom")]
