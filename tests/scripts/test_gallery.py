@@ -8,12 +8,8 @@ import pytest
 from scripts.gallery import EXAMPLES, FOLDER, solved
 from tests.docs.pages import ROOT
 
-SLOW = ("bimorph", "partial-slip", "indentation")
 
-
-@pytest.mark.parametrize(
-    "name", [pytest.param(n, marks=pytest.mark.slow) if n in SLOW else n for n in EXAMPLES]
-)
+@pytest.mark.parametrize("name", EXAMPLES)
 def test_an_example_has_the_values_of_its_table(name: str, tmp_path: Path) -> None:
     pytest.importorskip("gmsh")
     example = EXAMPLES[name]
