@@ -134,6 +134,7 @@ def offered() -> Iterator[tuple[str, str, str | None, dict[str, dict[str, Any]]]
     replaced = _values(
         "KEY=VALUE", "replace a value of the case file, for instance load.0.traction='[0, -1]'"
     )
+    replaces = _flag("replace results or checkpoints of another case, if DIR has any")
     shown = {
         "--quiet": _flag("show no progress"),
         "--log": _value("FILE", "write a log to the end of a file"),
@@ -146,6 +147,7 @@ def offered() -> Iterator[tuple[str, str, str | None, dict[str, dict[str, Any]]]
             "--out": _value("DIR", "folder for results; contact-demo by default"),
             "--set": replaced,
             **shown,
+            "--overwrite": replaces,
         },
     )
     yield (
@@ -182,7 +184,7 @@ def offered() -> Iterator[tuple[str, str, str | None, dict[str, dict[str, Any]]]
                 "known, and the results go there too unless told otherwise",
             ),
             **shown,
-            "--overwrite": _flag("replace results or checkpoints of another case, if DIR has any"),
+            "--overwrite": replaces,
         },
     )
     yield (

@@ -43,7 +43,7 @@ def run(options: argparse.Namespace, comm: MPI.Intracomm) -> int:
 def _demo(options: argparse.Namespace, comm: MPI.Intracomm) -> int:
     """Solve the example that comes with the package."""
     options.case, options.out = DEMO, options.out or "contact-demo"
-    options.plot, options.restart, options.overwrite = True, None, False
+    options.plot, options.restart = True, None
     return _solve(options, comm)
 
 
