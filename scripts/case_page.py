@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 import inspect
+from argparse import ArgumentParser
 from collections.abc import Collection, Iterator, Sequence
 from dataclasses import is_dataclass
 from pathlib import Path
@@ -152,5 +153,11 @@ def _generators() -> Iterator[str]:
         yield f"| `{name}` | {summary} | {defaults} |"
 
 
-if __name__ == "__main__":
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Write the page."""
+    ArgumentParser("python3 -m scripts.case_page", description=__doc__).parse_args(arguments)
     PAGE.write_text(page())
+
+
+if __name__ == "__main__":
+    main()

@@ -5,7 +5,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from argparse import ArgumentParser
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
 from contact.output import quantities as q
@@ -123,5 +124,11 @@ def _rows(file: str) -> Iterator[str]:
         yield f"| `{name}` | {quantity.unit or '—'} | {text} |"
 
 
-if __name__ == "__main__":
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Write the page."""
+    ArgumentParser("python3 -m scripts.output_page", description=__doc__).parse_args(arguments)
     PAGE.write_text(page(), encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()

@@ -147,7 +147,7 @@ def known_solutions(report: Report, coarse: bool) -> dict[str, Array]:
         "Errors against known solutions, with observed orders",
         columns,
         "Hencky: a smooth displacement whose strain straddles the yield strain, with the body "
-        "force that belongs to it. Signorini: closed form 4, whose pressure is sqrt(x - x0); "
+        "force that belongs to it. Signorini: a half plane whose exact pressure is sqrt(x - x0); "
         "its singularity limits the order in H1 to 1.5, and where x0 lies in its cell makes the "
         "orders of P2 vary. The largest error is that of the nodes.",
     )

@@ -99,7 +99,7 @@ def exact(dim: int) -> Callable[[Any], ufl.core.expr.Expr]:
 
 @dataclass(frozen=True)
 class Singular:
-    """Closed form 4: frictionless contact of a half plane y > 0 for x > x0.
+    """Frictionless contact of a half plane y > 0 for x > x0.
 
     Attributes
     ----------

@@ -26,7 +26,7 @@ from scripts.studies.exact_solutions import Singular
 from scripts.studies.hertz_exact import Line, Point
 
 NOTE = (
-    "Root-like: p = |A| sqrt(x - x_0), closed form 4, in 2-D and in a slice in 3-D. Hertz: "
+    "Root-like: p = |A| sqrt(x - x_0), in 2-D and in a slice in 3-D. Hertz: "
     "p = p_0 sqrt(1 - r^2/a^2) of a cylinder and a ball, the body being cut out of the half space "
     "with Hertz's displacements inside it prescribed where it is cut, so that no assumption of "
     "Hertz's adds an error. These are of H^s for s < 1 on Gamma_3: approximation alone gives order "

@@ -268,7 +268,7 @@ def spheres(report: Report, levels: Sequence[tuple[float, int]]) -> dict[str, li
             ratios[key].append(value)
     report.table(
         "hertz-sphere",
-        "Sphere on a plane (closed form 5) over Hertz's solution",
+        "Sphere on a plane over Hertz's solution",
         columns,
         "Radius from the second moment of the pressure; peak pressure from p^2 as a linear "
         "function of r^2 near the axis, and as the largest nodal value. The body is a half ball, "

@@ -44,7 +44,7 @@ class Cylinder:
 
 @dataclass(frozen=True)
 class Sphere:
-    """Hertz's point contact of an elastic sphere with a rigid plane, closed form 5."""
+    """Hertz's point contact of an elastic sphere with a rigid plane."""
 
     force: float = 100.0
     young: float = 1000.0
