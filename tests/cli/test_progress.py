@@ -44,6 +44,7 @@ def test_a_static_solve_has_a_line_an_iteration(
     counts = [int(count) for count in rows[-1].split()[5:8]]
     assert counts[1:] == [summary["stick_nodes"], summary["slip_nodes"]]
     assert sum(counts) == 8
+    assert float(rows[-1].split()[2]) > 0  # raw, not less its rounding
     force, _, pressure = (line.split() for line in shown.out.splitlines()[1:4])
     assert float(force[-1].strip("()")) == pytest.approx(summary["contact_force"][1], rel=1e-5)
     assert float(pressure[2]) == pytest.approx(summary["max_pressure"], rel=1e-5)

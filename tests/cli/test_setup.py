@@ -53,6 +53,8 @@ def test_arrows_are_spread_over_the_pieces_of_a_part():
     below = arrows.XY[arrows.XY[:, 1] <= 0, 0]
     assert np.count_nonzero(below < 2) == np.count_nonzero(below > 10) >= 2
     assert len(arrows.XY) - len(below) >= 6
+    above = arrows.XY[arrows.XY[:, 1] > 0, 0]  # they stopped before the end of the top
+    assert above.min() == pytest.approx(12.0 - above.max()) and above.max() > 11
 
 
 def test_contacts_of_two_bodies_name_both_sides():

@@ -1,9 +1,10 @@
 """Problems whose solution touches nothing are found with the first solve."""
 
 import numpy as np
+import pytest
 from mpi4py import MPI
 
-from contact import build_problem
+from contact import build_problem, solve
 from contact.case.file import parse_case
 from contact.methods.load_stepping import Evolution
 from contact.methods.method import METHODS
@@ -38,3 +39,40 @@ def test_an_approach_of_two_blocks_takes_a_solve_a_step():
     assert steps[-1].outcome.reason == "all residuals <= 1e-08"
     top = problem.equilibrium.nodal(steps[-1].state.x)[:, 1].min()
     assert np.isclose(top, -0.001)
+
+
+@pytest.mark.parametrize("aside", ["0.003*t", "free"])
+def test_an_approach_to_a_rigid_shape_takes_a_solve(aside):
+    """Five steps took 346 dense solves, and ended with a reason of a failure."""
+    ball = {"shape": "sphere", "centre": [1.0, -2.05], "radius": 2.0}
+    case = {
+        "mesh": {"generator": "rectangle", "size": [2.0, 1.0], "cells": [12, 6]},
+        "material": {"young": 1.0, "poisson": 0.3},
+        "fixed": [{"on": "top", "displacement": [aside, "-0.01*t"]}],
+        "contact": {"on": "bottom", "foundation": ball},
+        "friction": {"law": "coulomb", "mu": 0.3},
+        "evolution": {"times": [0.0, 1.0], "steps": [5]},
+    }
+    solution = solve(parse_case(case), comm=SELF)
+    assert solution.converged and solution.pressure.max() == 0
+    assert solution.outcome.reason == "all residuals <= 1e-08"
+    assert solution.counters.factorizations == 1
+    assert solution.counters.linear_solves <= 2 and solution.counters.contact_solves <= 4
+
+
+def test_an_evolution_that_lifts_off_takes_a_solve_a_step():
+    """Two blocks are pressed, pushed aside and pulled apart: 300 solves a step."""
+    moved = {"on": "upper_top", "displacement": ["0.0003*t", "-0.001*sin(pi*t)"]}
+    case = {
+        **CASE,
+        "fixed": [CASE["fixed"][0], moved],
+        "contact": {"on": "upper_bottom", "against": "lower_top"},
+    }
+    problem = build_problem(parse_case(case), SELF)
+    method = METHODS["newton"](problem, NewtonOptions(), None)
+    steps = list(Evolution(problem, method).run([0.3, 0.6, 0.9, 1.2, 1.5, 1.8]))
+    assert all(step.outcome.converged for step in steps)
+    presses = [bool(step.state.forces.pressure.max() > 0) for step in steps]
+    assert presses == 3 * [True] + 3 * [False]
+    assert max(step.counters.contact_solves for step in steps) <= 10
+    assert method.counters.factorizations == 1 and method.counters.linear_solves <= 12

@@ -216,3 +216,5 @@ def test_damaged_checkpoints_are_gone_on_from_before(
             assert status == 2, message
             assert message.count("\n") == 1
             assert message.startswith("contact: ")
+            if name == "nodes.npz":  # a missing one was called a place to write to
+                assert "nodes.npz: no checkpoint, or a damaged one" in message

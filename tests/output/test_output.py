@@ -69,6 +69,16 @@ def test_electric_outputs(dim: int, shared_tmp_path: Path) -> None:
     assert abs(summary["total_charge"]) <= 1e-8 * abs(through)
 
 
+@pytest.mark.parametrize("method", ["newton", "uzawa"])
+def test_raw_residuals_are_written_beside_their_floors(method: str, tmp_path: Path) -> None:
+    """The rounding floor was subtracted: equilibrium was 0.0."""
+    solution = solve(block(2, solver={"method": method}))
+    summary, _ = written(solution, tmp_path)
+    kkt, floors = summary["kkt"], summary["rounding"]
+    assert 0 < kkt["equilibrium"] <= max(1e-8, floors["equilibrium"])
+    assert kkt.keys() == floors.keys() and 0 < floors["equilibrium"] < 1e-8
+
+
 def test_iterations_of_the_linear_solver_are_written(tmp_path: Path) -> None:
     """Those of MINRES where it is asked for, none to speak of with a factorisation."""
     counts = []
