@@ -34,7 +34,7 @@ INTRODUCTION = """\
 | `fields.vtu` | all fields of the body, for ParaView, pyvista and meshio |
 | `contact.vtu` | the contact part alone, a surface (in the plane a line) |
 | `contact-against.csv`, `.vtu` | between bodies: the other side, with the stresses there |
-| `fields.pvd` | of an evolution: its steps, for ParaView and pyvista |
+| `fields.pvd`, `contact.pvd` | of an evolution: steps of body and contact part, for ParaView |
 | `fields.bp`, `cells.bp` | instead of `fields.vtu`, with `output.fields = "vtx"`: needs ADIOS2 |
 | `fields.xdmf`, `fields.h5` | likewise with `output.fields = "xdmf"`: degree 1 at most |
 | `checkpoint.npz` | with `output.checkpoint = true` |

@@ -14,6 +14,7 @@ import os
 from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any, TypeAlias
 
@@ -27,6 +28,7 @@ from contact.output.fields import DerivedFields, discontinuous, linear, unknowns
 from contact.output.folder import ROOM
 from contact.output.formats import Grid, Values, gathered, write_vtu
 from contact.output.solution import Solution
+from contact.output.surface import contact_surface
 from contact.problem.problem import ContactProblem
 from contact.problem.state import State
 from contact.ranks import on_root
@@ -65,7 +67,7 @@ def write_fields(solution: Solution, folder: Path) -> None:
             share = replace(share, in_cells=in_cells)
             write_share(problem.comm, share, folder / "fields.vtu")
             if solution.steps:
-                _write_series(problem, frames, folder)
+                _write_series(solution, frames, folder)
         case "vtx":
             _write_vtx(problem, frames, folder)
         case "xdmf":
@@ -89,18 +91,32 @@ def _frames(solution: Solution) -> list[Frame]:
     return every[:: -solution.output.every][::-1]
 
 
-def _write_series(problem: ContactProblem, frames: Sequence[Frame], folder: Path) -> None:
-    """Write a file of the main fields for each step, and ``fields.pvd``, which names them."""
+def _write_series(solution: Solution, frames: Sequence[Frame], folder: Path) -> None:
+    """Write files of the main fields and of the contact part for each step, and of their names.
+
+    These are ``fields.pvd`` and ``contact.pvd``.
+    """
+    problem = solution.problem
     derived = DerivedFields(problem.equilibrium, frames[0][1])
-    names, lines = (*SERIES, *problem.equilibrium.laws.names), []
+    names = (*SERIES, *problem.equilibrium.laws.names)
+    lines: dict[str, list[str]] = {"fields": [], "contact": []}
     for k, (time, state) in enumerate(frames):
-        name = f"fields-{k:04d}.vtu"
+        for kind in lines:
+            file = f"{kind}-{k:04d}.vtu"
+            lines[kind].append(f'<DataSet timestep="{time!r}" file="{file}"/>')
         derived.move_to(state)
-        write_share(problem.comm, body_share(problem, state, names, derived), folder / name)
-        lines.append(f'<DataSet timestep="{time!r}" file="{name}"/>')
-    collection = "\n".join(['<VTKFile type="Collection">', "<Collection>", *lines, "</Collection>"])
-    if problem.comm.rank == 0:
-        (folder / "fields.pvd").write_text(collection + "\n</VTKFile>\n", encoding="utf-8")
+        share = body_share(problem, state, names, derived)
+        write_share(problem.comm, share, folder / f"fields-{k:04d}.vtu")
+        surface = contact_surface(solution.at_step(state))
+        on_root(problem.comm, partial(write_vtu, folder / f"contact-{k:04d}.vtu", surface))
+
+    def write_names() -> None:
+        for kind, sets in lines.items():
+            text = ['<VTKFile type="Collection">', "<Collection>", *sets, "</Collection>"]
+            path = folder / f"{kind}.pvd"
+            path.write_text("\n".join([*text, "</VTKFile>"]) + "\n", encoding="utf-8")
+
+    on_root(problem.comm, write_names)
 
 
 def body_share(

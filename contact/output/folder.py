@@ -49,8 +49,8 @@ MANIFEST = "files"
 
 #: Names that each run may write, and those that a summary may name: it may be of anybody.
 _RESULT = re.compile(
-    r"summary\.json|(history|steps|adapt|contact(-steps|-against)?)\.csv|contact(-against)?\.vtu|"
-    r"fields(-\d{4,})?\.vtu|fields\.(pvd|bp|xdmf|h5)|cells\.bp|checkpoint\.npz|"
+    r"summary\.json|(history|steps|adapt|contact(-steps|-against)?)\.csv|contact(-against|-\d{4,})?\.vtu|"
+    r"fields(-\d{4,})?\.vtu|contact\.pvd|fields\.(pvd|bp|xdmf|h5)|cells\.bp|checkpoint\.npz|"
     r"figure-(contact|loop|zones|energy|deformed|potential)\.png"
 )
 _MEMBER = re.compile(r"[A-Za-z0-9][\w-]*\.(json|csv|bp|npz|xdmf|h5|vtkhdf|pvd|vtu|png|pdf|svg|gif)")

@@ -319,6 +319,21 @@ class Solution(Solved):
         """The columns of rigid bodies, and of electrodes: see `rigid_columns`."""
         return rigid_columns(self.movements)
 
+    def at_step(self, state: State) -> Solution:
+        """Return the solution at the end of a step, without the records of the whole.
+
+        Parameters
+        ----------
+        state
+            The state at its end.
+
+        Returns
+        -------
+        Problem and state of the step.
+        """
+        problem = self.problem.at(state.time, state.history)
+        return Solution(problem, state, self.outcome, self.history, self.counters, self.method, {})
+
     @property
     def reaction_columns(self) -> dict[str, float]:
         """The reactions of supports as columns, ``reaction_x_left``. Collective."""

@@ -10,7 +10,7 @@ from mpi4py import MPI
 from contact import parse_case, solve, write_outputs
 from contact.case.build import build_problem
 from contact.output.figures.figures import plot
-from contact.output.figures.run import read_run
+from contact.output.figures.run import read_grid, read_run
 from contact.output.figures.steps import draw_loop
 from contact.output.resultants import rigid_columns
 from contact.solving import evolve
@@ -59,7 +59,13 @@ def test_tables(tmp_path):
     assert summary["contact_force"][1] == float(steps[-1]["contact_force_y"])
     files = set(summary["files"])
     assert {"steps.csv", "contact-steps.csv", "fields.pvd", "fields-0004.vtu"} <= files
-    assert (tmp_path / "fields.pvd").read_text().count("DataSet") == 5
+    assert {"contact.pvd", "contact-0000.vtu", "contact-0004.vtu"} <= files
+    for name in ("fields.pvd", "contact.pvd"):
+        assert (tmp_path / name).read_text().count("DataSet") == 5
+    for k, row in enumerate(steps):
+        surface = read_grid(tmp_path / f"contact-{k:04d}.vtu")
+        force = np.nansum(surface["traction"] * surface["weight"][:, None], axis=0)
+        assert force[1] == pytest.approx(float(row["contact_force_y"]), rel=1e-10)
 
 
 @pytest.mark.parametrize("fields", ["vtx", "xdmf", "vtu"])
