@@ -13,7 +13,8 @@ and a problem that is put together in Python by
 >>> problem = Problem(domain, body, Contact("bottom"), Friction(mu=0.3))  # doctest: +SKIP
 >>> solution = solve(problem)  # doctest: +SKIP
 
-- Geometry: `from_msh` reads a Gmsh file, `Domain.from_mesh` takes dolfinx's mesh and tags.
+- Geometry: `from_file` reads a mesh file, `from_msh` one of Gmsh, `Domain.from_mesh` takes
+  dolfinx's mesh and tags.
 - Body: `Body`, `Fixed`, `Elastic`, `Load`; `Linear`, `Log`, `UserLaw`, `Piezo`; `J2` with `Voce` or
   `Tabulated` hardening, and a stress update of your own, which returns a `Response`; several by
   `Material`, and crystals by `make_material`; `Rigid` with its `Motion`, and `Electrode`.

@@ -36,6 +36,7 @@ from contact.interface.obstacle import Shape as Shape
 from contact.interface.obstacle import Sphere as Sphere
 from contact.interface.obstacle import Triangles as Triangles
 from contact.mesh.domain import Domain as Domain
+from contact.mesh.reader import from_file as from_file
 from contact.mesh.reader import from_msh as from_msh
 from contact.methods.options import FixedPointOptions as FixedPointOptions
 from contact.methods.options import NewtonOptions as NewtonOptions

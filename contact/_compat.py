@@ -1,10 +1,11 @@
 """Differences between dolfinx 0.9, 0.10 and 0.11, between their PETSc, and faults around them."""
 
 import inspect
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-from dolfinx import fem
+from dolfinx import fem, graph
 from dolfinx.mesh import Mesh
 from mpi4py import MPI
 from petsc4py import PETSc
@@ -47,6 +48,13 @@ def facet_entities(mesh: Mesh, facets: npt.NDArray[np.int32]) -> npt.NDArray[np.
     # The dimension of the entities is an argument up to 0.9 only.
     dim = (mesh.topology.dim - 1,) if "dim" in inspect.signature(compute).parameters else ()
     return np.asarray(compute(fem.IntegralType.exterior_facet, mesh.topology, facets, *dim))
+
+
+def destinations(ranks: npt.NDArray[np.int32]) -> Any:
+    """Return the result of a partitioner: the rank that each cell goes to."""
+    made = graph.adjacencylist(ranks, np.arange(len(ranks) + 1, dtype=np.int32))
+    # An object of Python since 0.10.
+    return getattr(made, "_cpp_object", made)
 
 
 def collapse(

@@ -7,6 +7,7 @@ a piece of the mesh stands for, is stated by a `Kinematics`.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -160,6 +161,59 @@ class MeanDilatation:
         """Return the displacement gradient with the mean of its trace."""
         gradient, mean = self.base.gradient(u), self.base.mean_gradient(u, self.centroid)
         return gradient + ufl.tr(mean - gradient) / 3 * ufl.Identity(3)
+
+
+@dataclass(frozen=True)
+class MultilinearMean:
+    """The same on quadrilaterals of degree 1: Q1-P0 with the pressure condensed.
+
+    All but `base` are functions: of UFL's own Jacobian no form can be differentiated.
+
+    Parameters
+    ----------
+    base
+        The kinematics without the mean.
+    ways
+        From a point to the corners of the cell, in the coordinates of the reference cell, a row
+        each.
+    jacobian
+        The derivatives of x by these coordinates.
+    weights
+        The mean of tr grad u as a sum over the displacements of the corners, a row each.
+    """
+
+    base: Kinematics
+    ways: Expr
+    jacobian: Expr
+    weights: Expr
+
+    def gradient(self, u: Expr) -> Expr:
+        """Return the displacement gradient with the mean of its trace."""
+        gradient, values = self.base.gradient(u), [u]
+        for _ in range(len(u)):
+            values.append(ufl.dot(ufl.grad(values[-1]), self.jacobian))
+        corners, dim = self.ways.ufl_shape
+        mean = sum(
+            ufl.dot(_row(self.weights, a, dim), _taylor(values, _row(self.ways, a, dim)))
+            for a in range(corners)
+        )
+        return gradient + (mean - ufl.tr(gradient)) / 3 * ufl.Identity(3)
+
+
+def _row(matrix: Expr, row: int, length: int) -> Expr:
+    return ufl.as_vector([matrix[row, i] for i in range(length)])
+
+
+def _taylor(derivatives: Sequence[Expr], way: Expr) -> Expr:
+    """Return the value at the end of a way, given all derivatives at its beginning."""
+    found, factorial = derivatives[0], 1.0
+    for k, term in enumerate(derivatives[1:], 1):
+        factorial *= k
+        along = term
+        for _ in range(k):
+            along = ufl.dot(along, way)
+        found = found + along / factorial
+    return found
 
 
 def _way(u: Expr, centroid: Expr) -> Expr:

@@ -8,21 +8,25 @@ import numpy as np
 from dolfinx import fem
 
 from contact.errors import InputError
+from contact.mesh.cells import HEXAHEDRON, QUADRILATERAL, Shape, rule, shape_of
 from contact.mesh.domain import Domain
-from forms.kinematics import Axisymmetric, MeanDilatation, Strained
+from contact.mesh.geometry import geometry_nodes, inverse, jacobians, measures
+from contact.typing import Array
+from forms.kinematics import Axisymmetric, Kinematics, MeanDilatation, MultilinearMean, Strained
 
 #: Elements by the names that the case file has for them.
 STANDARD, MEAN_DILATATION = ELEMENTS = ("standard", "mean_dilatation")
 
-#: The degree that the mean dilatation asks for, and why.
-NEEDS = (
-    "degree = 2, or 'standard': the strain of triangles and tetrahedra of degree 1 is constant in "
-    "the cell, is its own mean, and locks with it or without"
+#: Why the mean dilatation asks for a degree.
+CONSTANT = (
+    "the strain of triangles and tetrahedra of degree 1 is constant in the cell, is its own mean, "
+    "and locks with it or without"
 )
+ENOUGH = "quadrilaterals and hexahedra of degree 2 hardly lock"
 
 
-def check_element(element: str, degree: int) -> None:
-    """Refuse elements that are none.
+def check_element(element: str, degree: int, shape: Shape) -> None:
+    """Refuse elements that are none on cells of a shape.
 
     Raises
     ------
@@ -33,8 +37,31 @@ def check_element(element: str, degree: int) -> None:
         raise InputError(f"degree: given {degree!r}; accepted: 1 or 2")
     if element not in ELEMENTS:
         raise InputError(f"element: given {element!r}; accepted: {', '.join(map(repr, ELEMENTS))}")
-    if element == MEAN_DILATATION and degree != 2:
-        raise InputError(f"element: given {element!r} of degree {degree}; accepted: {NEEDS}")
+    accepted = needed(element, degree, shape)
+    if accepted is not None:
+        raise InputError(f"element: given {element!r} of degree {degree}; accepted: {accepted}")
+
+
+def needed(element: str, degree: int, shape: Shape) -> str | None:
+    """Return the degree and cells that an element asks for; None where it has them."""
+    if element != MEAN_DILATATION:
+        return None
+    if shape.simplex:
+        return None if degree == 2 else f"degree = 2, or 'standard': {CONSTANT}"
+    if shape == HEXAHEDRON:
+        return f"'standard' on hexahedra: {ENOUGH}"
+    return None if degree == 1 else f"degree = 1 on quadrilaterals, or 'standard': {ENOUGH}"
+
+
+def unlocked(element: str, degree: int, shape: Shape) -> str | None:
+    """Return the remedy for elements that lock where volumes hardly change; None if none do."""
+    if degree > 1 or element == MEAN_DILATATION:
+        return None
+    if shape == QUADRILATERAL:
+        return 'element = "mean_dilatation", or space.degree = 2, does not lock'
+    if shape == HEXAHEDRON:
+        return "space.degree = 2 does not lock"
+    return 'space.degree = 2 does not lock, least of all with element = "mean_dilatation"'
 
 
 def kinematics_of(domain: Domain, element: str, on_axis: bool = False) -> Strained:
@@ -54,6 +81,41 @@ def kinematics_of(domain: Domain, element: str, on_axis: bool = False) -> Strain
         kinematics = replace(kinematics, on_axis=on_axis)
     if element == STANDARD:
         return kinematics
+    if not shape_of(domain.mesh).simplex:
+        return _multilinear_mean(domain, kinematics)
     centroid = fem.Function(fem.functionspace(domain.mesh, ("DG", 0, (domain.dim,))))
     centroid.interpolate(lambda x: np.asarray(x[: domain.dim]))
     return MeanDilatation(kinematics, centroid)
+
+
+def _multilinear_mean(domain: Domain, kinematics: Kinematics) -> MultilinearMean:
+    """Return the mean dilatation on quadrilaterals. Collective."""
+    shape, of = shape_of(domain.mesh), geometry_nodes(domain)
+    corners = shape.nodes(1)
+    # Volumes and derivatives of the corners' functions are quadratic along each axis at most.
+    at, weights = rule(shape, 3)
+    extent = measures(domain, shape, of, at, weights)
+    slopes = shape.gradients(1, at) @ inverse(jacobians(shape, of, at))
+    mean = np.einsum("cq,cqkd->ckd", extent, slopes)
+    if domain.revolved:
+        functions = shape.lagrange(1, at)
+        mean[..., 0] += (extent / (of[..., 0] @ functions.T)) @ functions
+    mean /= extent.sum(axis=1)[:, None, None]
+    ways = np.broadcast_to(
+        corners - corners[:, None], (len(of), *corners.shape[:1], *corners.shape)
+    )
+    return MultilinearMean(
+        kinematics,
+        _in_cells(domain, 1, ways),
+        _in_cells(domain, 1, jacobians(shape, of, corners)),
+        _in_cells(domain, 0, mean[:, None]),
+    )
+
+
+def _in_cells(domain: Domain, degree: int, values: Array) -> fem.Function:
+    """Return a discontinuous function with values at its nodes, (cells, nodes, ...). Collective."""
+    space = fem.functionspace(domain.mesh, ("DG", degree, values.shape[2:]))
+    made, dofs = fem.Function(space), space.dofmap.list[: len(values)]
+    made.x.array.reshape(-1, space.dofmap.index_map_bs)[dofs] = values.reshape(*dofs.shape, -1)
+    made.x.scatter_forward()
+    return made

@@ -37,6 +37,7 @@ from contact.history import BodyState, Evaluated, InternalVariables
 from contact.linear.constraint import ConstrainedBulk, ConstrainedOperator, Constraint
 from contact.linear.layout import Layout
 from contact.linear.operator import Counters, SparseOperator
+from contact.mesh.cells import shape_of
 from contact.mesh.domain import Domain
 from contact.mesh.entities import components
 from contact.tolerances import MOST_ROUNDING
@@ -67,7 +68,7 @@ class BodyEquilibrium:
         self, domain: Domain, body: Body, degree: int = 1, element: str = STANDARD
     ) -> None:
         body.check(domain.dim)
-        check_element(element, degree)
+        check_element(element, degree, shape_of(domain.mesh))
         self.domain, self.body, self.degree, self.element = domain, body, degree, element
         self.dim, self.phi_scale = domain.dim, body.phi_scale
         self.block_size = self.dim + (body.piezo is not None)

@@ -23,8 +23,9 @@ from contact.body.description import Material
 from contact.body.pointwise import Pointwise
 from contact.errors import InputError
 from contact.history import QUADRATURE_POINTS, Evaluated, InternalVariables
+from contact.mesh.cells import shape_of
 from contact.mesh.domain import Domain, Indices
-from contact.mesh.simplices import barycentric, corners, inverse_jacobians, measures
+from contact.mesh.geometry import geometry_nodes, measures
 from contact.typing import Array
 from forms.hencky import FormLaw, Graded, Law
 from forms.history import (
@@ -154,9 +155,8 @@ class QuadratureLaws:
     @cached_property
     def volumes(self) -> Array:
         """The volume of the body that each place stands for, shape (places,)."""
-        (points, weights), of = self._rule, corners(self._domain)
-        size = inverse_jacobians(of)[1]
-        return measures(self._domain, of, barycentric(points), weights, size).ravel()
+        shape, of = shape_of(self._domain.mesh), geometry_nodes(self._domain)
+        return measures(self._domain, shape, of, *self._rule).ravel()
 
     def law(self, law: Law | Graded) -> FormLaw:
         """Return a law as forms see it, with the stress and stiffness that `set` evaluates."""

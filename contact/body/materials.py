@@ -18,7 +18,7 @@ from contact.body.fields import constant, values_at
 from contact.errors import InputError
 from contact.mesh.domain import Domain, Indices, Measure
 from contact.mesh.entities import cells_at
-from contact.mesh.simplices import corners
+from contact.mesh.geometry import geometry_nodes
 from contact.typing import Array
 from forms.elasticity import Anisotropic
 from forms.hencky import Graded, Law
@@ -142,7 +142,7 @@ def factor_of(domain: Domain, material: Material, cells: Indices) -> Array:
     """
     if material.factor is None:
         return np.ones(cells.size)
-    middles = corners(domain)[cells].mean(axis=1)
+    middles = geometry_nodes(domain)[cells].mean(axis=1)
     values = values_at(material.factor, middles, 1.0, "material: factor", domain.comm)
     least = domain.comm.allreduce(float(values.min(initial=np.inf)), op=MPI.MIN)
     expect("material: factor", least, "a function that is positive everywhere", least > 0)

@@ -18,6 +18,7 @@ from contact.body.loads import expression
 from contact.body.materials import material_measures
 from contact.body.pointwise import Pointwise
 from contact.errors import InputError
+from contact.mesh.cells import shape_of
 from contact.mesh.domain import Domain, Measure
 from contact.mesh.entities import Indices
 from forms.hencky import is_linear, secant_form
@@ -80,7 +81,10 @@ class WeakForms:
         self._test = self.split(test)
         # Stresses at points are no function that more of them would integrate more exactly.
         smooth = all(is_linear(m.law) or isinstance(m.law, HistoryLaw) for m in body.materials)
-        exact = 1 if degree == 1 else (2 if smooth else 4)
+        simplex = shape_of(domain.mesh).simplex
+        # Strains of simplices are of one degree less than displacements, of others of the same.
+        exact = max(2 * degree - 2, 1) if simplex else 2 * degree
+        exact += 2 * (degree == 2 and not smooth)
         exact += domain.kinematics.added_degree
         base, seen = domain.kinematics, kinematics_of(domain, element)
         #: The laws with internal variables.
@@ -88,7 +92,9 @@ class WeakForms:
             domain, body.materials, cells, exact, seen, pointwise, degree - 1
         )
         rules: list[Any] = [(exact, ((1, base),))]
-        if element == MEAN_DILATATION:
+        if element == MEAN_DILATATION and not simplex:
+            rules = [(exact, ((1, seen),))]
+        elif element == MEAN_DILATATION:
             # P2-P0: all that changes of volume do is taken at the centroid, the rest in full.
             mean = CellMean(base)
             rules = [(exact, ((1, Isochoric(base)),)), (1, ((1, mean), (-1, Isochoric(mean))))]

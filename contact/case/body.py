@@ -12,7 +12,6 @@ from mpi4py import MPI
 from pydantic import Field, model_validator
 
 from contact.body import description, rigid
-from contact.body.elements import MEAN_DILATATION, NEEDS
 from contact.case.formula import Expression, as_field, as_number
 from contact.case.messages import Words, fault
 from contact.case.section import (
@@ -50,12 +49,6 @@ class Space(Section):
     """The body of a mesh in 2-D: in plane strain, or a body of revolution whose half plane the
     mesh is, x the radius and y the axis. There displacements are 0 across the axis without being
     asked for, and loads, forces and charges are those of the full turn."""
-
-    @model_validator(mode="after")
-    def _check(self) -> Self:
-        if self.element == MEAN_DILATATION and self.degree != 2:
-            raise fault("element", self.element, NEEDS)
-        return self
 
 
 class Fixed(Section):

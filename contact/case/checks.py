@@ -6,6 +6,7 @@ import math
 from collections.abc import Iterable
 from typing import Any, TypeAlias
 
+from contact.body.elements import needed
 from contact.body.fields import CONSTANT
 from contact.case.body import ZERO
 from contact.case.formula import Expression
@@ -47,6 +48,10 @@ def check_sections(case: Case) -> None:
     _check_rigid(case)
     if case.evolution is not None and getattr(case.solver, "nested", False):
         raise fault("solver.nested", True, "nested = false with [evolution]")
+    if case.mesh.shape is not None:
+        accepted = needed(case.space.element, case.space.degree, case.mesh.shape)
+        if accepted is not None:
+            raise fault("space.element", case.space.element, accepted)
     if case.mesh.dimension is not None:
         check_mesh(case, case.mesh.dimension, [*case.mesh.sides, *case.mesh.parts])
 

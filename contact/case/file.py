@@ -311,7 +311,9 @@ def parse_case(
         raise InputError(describe(error, Case, source)) from None
     file = case.mesh.file
     if file is not None and not Path(file).is_file():
-        raise InputError(f"{source}: mesh.file: no file {file}; accepted: a Gmsh file (.msh)")
+        raise InputError(
+            f"{source}: mesh.file: no file {file}; accepted: a mesh file (.msh, .inp, ...)"
+        )
     case._source, case._filled = source, tuple(filled)
     return case
 

@@ -26,9 +26,10 @@ from contact.case.section import (
 )
 from contact.errors import InputError
 from contact.mesh import grid
+from contact.mesh.cells import Shape
 from contact.mesh.domain import Domain
 from contact.mesh.grid import rotate
-from contact.mesh.reader import from_generator, from_msh
+from contact.mesh.reader import from_file, from_generator
 from contact.mesh.transfer import refined
 from contact.methods.signals import deaf
 from contact.settings import Accepted, Count, Number, Positive
@@ -93,15 +94,17 @@ class Adapt(Section):
 
 
 class Mesh(Section):
-    """`[mesh]`: a generator with its parameters, or a Gmsh file."""
+    """`[mesh]`: a generator with its parameters, or a file."""
 
     generator: (
         Annotated[str, Accepted('"rectangle", "box" or the name of a parametric mesh generator')]
         | None
     ) = None
     """Generator of the mesh. This or `file`."""
-    file: Annotated[File, Accepted("a Gmsh file (.msh)")] | None = None
-    """Gmsh file (.msh); its named physical groups are the parts. Relative to the case file."""
+    file: Annotated[File, Accepted("a mesh file (.msh, .inp, .vtu, .xdmf, .med, .e)")] | None = None
+    """Mesh file: of Gmsh (.msh), whose named physical groups are the parts, of Abaqus or CalculiX
+    (.inp), VTK (.vtu), XDMF (.xdmf), MED (.med) or Exodus (.e, .exo, .ex2), with their sets.
+    Relative to the case file."""
     origin: Vector | None = None
     """Lower left corner of a rectangle or box. Default: zeros."""
     size: (
@@ -119,6 +122,9 @@ class Mesh(Section):
     """Squares or cubes along the edges; required for a rectangle or box."""
     diagonal: Literal["right", "left", "crossed", "left_right", "right_left"] | None = None
     """How a rectangle's squares are cut into triangles; there "right" by default."""
+    cell: Literal["triangle", "quadrilateral", "tetrahedron", "hexahedron"] | None = None
+    """Shape of the cells of a rectangle, "triangle" or "quadrilateral", or of a box, "tetrahedron"
+    or "hexahedron". Default: the first of them."""
     rotation: Number = 0.0
     """Angle (degrees) by which the mesh is turned about the origin of coordinates,
     counter-clockwise; in 3-D about `axis`."""
@@ -146,6 +152,12 @@ class Mesh(Section):
     def sides(self) -> tuple[str, ...]:
         """Sides of a rectangle or box; none for other meshes."""
         return tuple(grid.SIDES.get(self.generator or "", ()))
+
+    @property
+    def shape(self) -> Shape | None:
+        """Shape of the cells; None if only the mesh itself can tell."""
+        known = grid.CELLS.get(self.generator or "")
+        return None if known is None else Shape(self.cell or known[0])
 
     @property
     def dimension(self) -> int | None:
@@ -189,6 +201,10 @@ class Mesh(Section):
             raise fault("generator", Words(given), "one of generator and file")
         if self.diagonal is not None and self.generator != "rectangle":
             raise fault("diagonal", self.diagonal, "diagonal for a rectangle only")
+        known = grid.CELLS.get(self.generator or "", ())
+        if self.cell is not None and self.cell not in known:
+            accepted = " or ".join(f'"{name}"' for name in known)
+            raise fault("cell", self.cell, accepted or "cell for a rectangle or box only")
         if self.generator is not None and self.sides:
             self._check_keys()
             return self
@@ -225,18 +241,22 @@ class Mesh(Section):
         Raises
         ------
         InputError
-            As `rectangle`, `box`, `from_msh` and `from_generator`, and if the mesh does not
+            As `rectangle`, `box`, `from_file` and `from_generator`, and if the mesh does not
             fit into the memory.
         """
+        shape = self.shape
         if self.file is not None:
-            domain = from_msh(comm, self.file)
-        elif self.generator == "rectangle":
-            each = 4 if self.diagonal == "crossed" else 2  # triangles of a square
+            domain = from_file(comm, self.file)
+        elif shape is not None and shape.dim == 2:
+            triangles = 4 if self.diagonal == "crossed" else 2
+            each = triangles if shape.simplex else 1  # of a square
             self._check_memory(comm, each * math.prod(self.cells or ()), 2)
-            domain = grid.rectangle(comm, *self._grid, diagonal=self.diagonal or "right")
-        elif self.generator == "box":
-            self._check_memory(comm, 6 * math.prod(self.cells or ()), 3)
-            domain = grid.box(comm, *self._grid)
+            diagonal = self.diagonal or "right"
+            domain = grid.rectangle(comm, *self._grid, diagonal=diagonal, cell=shape.name)
+        elif shape is not None:
+            each = 6 if shape.simplex else 1  # of a cube
+            self._check_memory(comm, each * math.prod(self.cells or ()), 3)
+            domain = grid.box(comm, *self._grid, cell=shape.name)
         else:
             assert self.generator is not None
             with deaf():

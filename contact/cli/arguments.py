@@ -15,7 +15,7 @@ from contact.output.reference import files_help
 
 DESCRIPTION = """\
 Frictional contact of elasto-plastic and piezoelectric bodies. A problem is a case file;
-contact new MESH.msh writes one to begin with, contact check shows its contents, contact solve
+contact new MESH writes one to begin with, contact check shows its contents, contact solve
 solves it, contact plot draws the results; contact demo solves an example. Documentation: docs/ of
 the sources.
 """
@@ -151,11 +151,13 @@ def offered() -> Iterator[tuple[str, str, str | None, dict[str, dict[str, Any]]]
         },
     )
     yield (
-        "new MESH.msh [--case CASE.toml]",
+        "new MESH [--case CASE.toml]",
         "write a commented case file for a mesh file, with its parts",
         None,
         {
-            "mesh": _value("MESH.msh", "Gmsh file with named physical groups"),
+            "mesh": _value(
+                "MESH", "mesh file: .msh with named physical groups, .inp, .vtu, .med, ..."
+            ),
             "--case": _value("FILE", "file to write; MESH.toml by default"),
         },
     )

@@ -11,13 +11,15 @@ from typing import NamedTuple
 import numpy as np
 from mpi4py import MPI
 
-from contact import _compat
+from contact.body.elements import unlocked
 from contact.case.build import build_problem
 from contact.case.checks import growing
 from contact.case.file import Case, load_case
 from contact.case.text import to_toml
 from contact.cli.geometry import parts, regions
 from contact.cli.main import CONVERGED
+from contact.mesh.cells import Shape, shape_of
+from contact.mesh.geometry import determinant, geometry_nodes, jacobians
 from contact.methods.options import NewtonOptions
 from contact.nesting import coarser_cases
 from contact.output import environment
@@ -109,20 +111,21 @@ def expectations(problem: ContactProblem, times: Sequence[float] = (1.0,)) -> li
 
 def _locking(problem: ContactProblem) -> list[str]:
     """Say which materials change their volume so little that elements of degree 1 lock."""
-    if problem.equilibrium.degree > 1:
+    body = problem.equilibrium
+    remedy = unlocked(body.element, body.degree, shape_of(body.domain.mesh))
+    if remedy is None:
         return []
     ratios = [float(m.law.poisson) for m in problem.body.materials]
     return [
         f"# warning: Poisson's ratio {ratio:g}, and from {INCOMPRESSIBLE:g} on elements of degree "
-        "1 are much too stiff, they lock: space.degree = 2 does not, least of all with "
-        'element = "mean_dilatation"'
+        f"1 are much too stiff, they lock: {remedy}"
         for ratio in dict.fromkeys(ratios)
         if ratio >= INCOMPRESSIBLE
     ]
 
 
 def mean_ratio(corners: Array) -> Array:
-    """Return the shape of simplices, corners (n, d + 1, d): 1 for regular ones, 0 for flat ones."""
+    """Return the quality of simplices, corners (n, d + 1, d): 1 for regular, 0 for flat ones."""
     d = corners.shape[2]
     edges = corners[:, 1:] - corners[:, :1]
     volume = np.abs(np.linalg.det(edges)) / (2 if d == 2 else 6)
@@ -133,10 +136,22 @@ def mean_ratio(corners: Array) -> Array:
     return np.asarray(12 * (3 * volume) ** (2 / 3) / squares)
 
 
+def quality(shape: Shape, corners: Array) -> Array:
+    """Return the mean ratio of cells, of other cells than simplices the least at their corners.
+
+    There it is that of the edges, 1 where these are of one length and at right angles (Knupp, SIAM
+    J. Sci. Comput. 23, 2001).
+    """
+    if shape.simplex:
+        return mean_ratio(corners)
+    d, jacobian = shape.dim, jacobians(shape, corners, shape.nodes(1))
+    size = np.maximum(determinant(jacobian), 0.0) ** (2 / d)
+    return np.asarray((d * size / np.sum(jacobian**2, axis=(2, 3))).min(axis=1))
+
+
 def _quality(problem: ContactProblem) -> list[str]:
-    mesh, comm, d = problem.domain.mesh, problem.comm, problem.dim
-    cells = _compat.geometry_dofmap(mesh)[: mesh.topology.index_map(d).size_local, : d + 1]
-    ratio = mean_ratio(mesh.geometry.x[cells][:, :, :d])
+    comm = problem.comm
+    ratio = quality(shape_of(problem.domain.mesh), geometry_nodes(problem.domain))
     least = comm.allreduce(float(ratio.min(initial=1.0)), op=MPI.MIN)
     thin = comm.allreduce(int(np.count_nonzero(ratio < THIN)), op=MPI.SUM)
     lines = [f"# mesh quality: the worst cell has the mean ratio {least:.2g} (1: regular)"]

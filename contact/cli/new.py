@@ -1,4 +1,4 @@
-"""``contact new MESH.msh``: a case file to begin with, for a mesh of one's own."""
+"""``contact new MESH``: a case file to begin with, for a mesh of one's own."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from contact.cli.main import CONVERGED
 from contact.errors import InputError
 from contact.interface.pairing import facing_parts
 from contact.mesh.domain import Domain
-from contact.mesh.reader import from_msh
+from contact.mesh.reader import from_file
 from contact.ranks import on_root
 
 
@@ -24,8 +24,8 @@ def run(options: argparse.Namespace, comm: MPI.Intracomm) -> int:
     mesh = Path(options.mesh)
     path = Path(options.case) if options.case else mesh.with_suffix(".toml")
     if not on_root(comm, mesh.is_file):
-        raise InputError(f"{mesh}: no such file; accepted: a Gmsh file (.msh)")
-    text = case_text(from_msh(comm, mesh), mesh, path)
+        raise InputError(f"{mesh}: no such file; accepted: a mesh file (.msh, .inp, .vtu, ...)")
+    text = case_text(from_file(comm, mesh), mesh, path)
 
     def write() -> None:
         try:

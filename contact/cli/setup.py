@@ -10,11 +10,12 @@ from typing import Any
 import matplotlib
 import numpy as np
 from dolfinx import mesh as dmesh
-from matplotlib.collections import LineCollection
+from matplotlib.collections import LineCollection, PolyCollection
 from matplotlib.figure import Figure
 
 from contact import _compat
 from contact.case.file import Case
+from contact.mesh.cells import facet_of, shape_of
 from contact.mesh.domain import Domain, Indices
 from contact.mesh.entities import exterior_facets
 from contact.output.figures.body import rendered
@@ -83,7 +84,7 @@ def draw_setup(case: Case, problem: ContactProblem) -> Figure | None:
     roles = list(_roles(case, problem))
     boundary = _gathered(domain, _corners(domain, exterior_facets(domain.mesh)))
     owned = slice(domain.mesh.topology.index_map(domain.dim).size_local)
-    places = _compat.geometry_dofmap(domain.mesh)[owned, : domain.dim + 1]
+    places = _compat.geometry_dofmap(domain.mesh)[owned]
     cells = _gathered(domain, domain.mesh.geometry.x[places][..., : domain.dim])
     surface = _foundation(problem)
     if boundary is None or cells is None:
@@ -176,11 +177,12 @@ def _role(
 
 
 def _corners(domain: Domain, facets: Indices) -> Array:
-    """Return the corners of facets of this rank, shape (n, d, d)."""
+    """Return the corners of facets of this rank, around a quadrilateral, shape (n, c, d)."""
+    shape = shape_of(domain.mesh).facet
     if not facets.size:  # which `entities_to_geometry` divides by
-        return np.empty((0, domain.dim, domain.dim))
+        return np.empty((0, shape.corners, domain.dim))
     places = dmesh.entities_to_geometry(domain.mesh, domain.dim - 1, facets)
-    return np.asarray(domain.mesh.geometry.x[places][..., : domain.dim])
+    return np.asarray(domain.mesh.geometry.x[places[:, shape.around]][..., : domain.dim])
 
 
 def _gathered(domain: Domain, values: Array) -> Array | None:
@@ -191,15 +193,15 @@ def _gathered(domain: Domain, values: Array) -> Array | None:
 def _draw_plane(
     boundary: Array, cells: Array, roles: Sequence[Role], surface: Array, units: Units, axes: str
 ) -> Figure:
-    """Draw a plane body by its boundary edges, shape (m, 2, 2), and cells, shape (n, 3, 2)."""
+    """Draw a plane body by its boundary edges, shape (m, 2, 2), and cells, shape (n, c, 2)."""
     extent = np.ptp(boundary, axis=(0, 1))
     figure = Figure(figsize=(6.9, float(np.clip(6.0 * extent[1] / extent[0], 1.6, 6.0)) + 1.6))
     ax = figure.subplots()
     ax.add_collection(LineCollection(list(boundary), colors="0.4", lw=0.6))
     if len(cells) <= MOST_CELLS:
-        corners = np.arange(3 * len(cells)).reshape(-1, 3)
-        thin = {"color": "0.75", "lw": 0.3, "rasterized": len(cells) > 2000}
-        ax.triplot(*cells.reshape(-1, 2).T, corners, **thin)
+        around = facet_of(cells.shape[1]).around
+        thin = {"edgecolor": "0.75", "lw": 0.3, "rasterized": len(cells) > 2000}
+        ax.add_collection(PolyCollection(list(cells[:, around]), facecolor="none", **thin))
     middle = cells.reshape(-1, 2).mean(axis=0)
     for role in roles:
         wide = 1.5 if role.colour == LOADED else 3.0
@@ -229,7 +231,7 @@ def _draw_plane(
 def _draw_space(
     boundary: Array, cells: Array, roles: Sequence[Role], surface: Array, units: Units, axes: str
 ) -> Figure:
-    """Draw a body in 3-D by the facets of its boundary, shape (m, 3, 3); see `_draw_plane`."""
+    """Draw a body in 3-D by the facets of its boundary, shape (m, c, 3); see `_draw_plane`."""
     points = boundary.reshape(-1, 3)
     extent = np.ptp(points, axis=0)
     arrows = [role.arrows(points.mean(axis=0), 0.2 * float(extent.max())) for role in roles]
@@ -238,7 +240,7 @@ def _draw_space(
         import pyvista
 
         def facets(given: Array) -> Any:
-            corners = np.arange(3 * len(given)).reshape(-1, 3)
+            corners = np.arange(given[..., 0].size).reshape(len(given), -1)
             return pyvista.PolyData.from_regular_faces(given.reshape(-1, 3), corners)
 
         edges = {"show_edges": len(boundary) <= MOST_CELLS, "edge_opacity": 0.4, "line_width": 0.5}

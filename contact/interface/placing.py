@@ -19,6 +19,7 @@ from contact.interface.mortar.surface import surface_of
 from contact.interface.nodes import ContactNodes, projectors
 from contact.interface.obstacle import Obstacle, Shape
 from contact.interface.obstacle.protocol import measured
+from contact.mesh.cells import shape_of
 from contact.mesh.domain import Domain
 from contact.mesh.entities import owned_among
 from contact.ranks import on_all_ranks
@@ -103,7 +104,7 @@ def candidates(domain: Domain, space: fem.FunctionSpace, part: str) -> Candidate
 def _corners(space: fem.FunctionSpace) -> NDArray[np.int32]:
     """Return the local nodes at vertices of the mesh."""
     layout, cells = space.dofmap.dof_layout, space.dofmap.list
-    corners = [layout.entity_dofs(0, i) for i in range(space.mesh.topology.dim + 1)]
+    corners = [layout.entity_dofs(0, i) for i in range(shape_of(space.mesh).corners)]
     return np.unique(cells[:, np.concatenate(corners)])
 
 

@@ -1,8 +1,9 @@
 """Meshes with names: parts of their boundary and regions of their cells.
 
 `domain`: `Domain`, `from_mesh` for a dolfinx mesh, and `revolved`; `grid`: `rectangle`, `box`,
-their `Piece`; `reader`: `from_msh` for Gmsh files and `from_generator` for the package `meshes`;
-`transfer`: `refined` and `carry`; `entities`: facets, connected components.
+their `Piece`; `reader`: `from_file` for files, `from_msh` for those of Gmsh, and `from_generator`
+for the package `meshes`; `cells`, `geometry`: the shapes of cells, and their sizes; `transfer`:
+`refined` and `carry`; `entities`: facets, connected components.
 
 Imports: `contact.errors`, `contact.typing`, `contact._compat`.
 """

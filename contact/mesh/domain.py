@@ -23,7 +23,9 @@ from ufl.core.expr import Expr
 
 from contact import _compat
 from contact.errors import InputError
+from contact.mesh.cells import SHAPES, shape_of
 from contact.mesh.entities import Indices, extent, exterior_facets
+from contact.mesh.extraction import BODY
 from contact.mesh.together import known, members, pieces
 from contact.typing import Array
 from forms.kinematics import CARTESIAN, Axisymmetric, Kinematics
@@ -62,9 +64,6 @@ Measure: TypeAlias = ufl.Measure | ExtendedMeasure
 #: Indices of facets or cells that this rank owns, ascending.
 Marker: TypeAlias = Callable[[npt.NDArray[np.float64]], npt.NDArray[np.bool_]]
 
-#: The region of a mesh whose cells nothing tells apart.
-BODY = "body"
-
 
 @dataclass(frozen=True, eq=False)
 class Domain:
@@ -73,7 +72,7 @@ class Domain:
     Attributes
     ----------
     mesh
-        Mesh of triangles or tetrahedra with straight edges.
+        Mesh of cells with straight edges, of one of `contact.mesh.cells.SHAPES`.
     parts
         Name of a part of the boundary -> its facets that this rank owns. The same names in the
         same order on all ranks.
@@ -121,7 +120,7 @@ class Domain:
         Parameters
         ----------
         mesh
-            Triangles or tetrahedra with straight edges.
+            Cells with straight edges: triangles, quadrilaterals, tetrahedra or hexahedra.
         facet_tags
             Tags of facets, for instance those that dolfinx reads from Gmsh.
         names
@@ -257,7 +256,7 @@ def from_mesh(
     Parameters
     ----------
     mesh
-        Triangles or tetrahedra with straight edges.
+        Cells with straight edges: triangles, quadrilaterals, tetrahedra or hexahedra.
     parts
         Name -> function of x, shape (3, n), that is true at all vertices of the part's facets;
         or the local indices of the facets. The same names on all ranks.
@@ -271,13 +270,12 @@ def from_mesh(
     InputError
         For other meshes, an empty part or region, or an interior facet in a part.
     """
-    kinds = (dmesh.CellType.triangle, dmesh.CellType.tetrahedron)
     tdim = mesh.topology.dim
     flat = tdim == mesh.geometry.dim and _compat.geometry_degree(mesh) == 1
-    if mesh.topology.cell_type not in kinds or not flat:
+    if shape_of(mesh) not in SHAPES or not flat:
         raise InputError(
-            "the mesh must consist of triangles in the plane or of tetrahedra, "
-            "with straight edges (geometry of degree 1)"
+            "the mesh must consist of triangles or quadrilaterals in the plane, or of tetrahedra "
+            "or hexahedra, with straight edges (geometry of degree 1)"
         )
     boundary = exterior_facets(mesh)
     chosen = {name: _owned(mesh, tdim - 1, given) for name, given in parts.items()}

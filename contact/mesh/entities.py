@@ -15,6 +15,7 @@ from scipy import sparse
 from scipy.sparse.csgraph import connected_components
 
 from contact._compat import lasting
+from contact.mesh.cells import shape_of
 
 Indices: TypeAlias = npt.NDArray[np.int32]
 
@@ -49,14 +50,21 @@ def owned_among(
     return here, (numbers[here] - begin).astype(np.int32)
 
 
+def cell_facets(mesh: dmesh.Mesh) -> Indices:
+    """Return the facets of each local cell, shape (cells, facets); their connectivity is there."""
+    dim = mesh.topology.dim
+    array = mesh.topology.connectivity(dim, dim - 1).array
+    return np.asarray(array.reshape(-1, len(shape_of(mesh).facet_corners)))
+
+
 def cells_at(mesh: dmesh.Mesh, facets: Indices) -> tuple[Indices, npt.NDArray[np.intp]]:
     """Return the cell behind each facet of the boundary, and which of its facets that is."""
     topology, dim = mesh.topology, mesh.topology.dim
     topology.create_connectivity(dim - 1, dim)
     topology.create_connectivity(dim, dim - 1)
-    to_cell, to_facet = topology.connectivity(dim - 1, dim), topology.connectivity(dim, dim - 1)
+    to_cell = topology.connectivity(dim - 1, dim)
     cells = to_cell.array[to_cell.offsets[facets]]
-    place = np.argmax(to_facet.array.reshape(-1, dim + 1)[cells] == facets[:, None], axis=1)
+    place = np.argmax(cell_facets(mesh)[cells] == facets[:, None], axis=1)
     return cells, place
 
 

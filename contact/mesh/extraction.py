@@ -1,15 +1,17 @@
-"""The contents of a Gmsh model as plain arrays; checked elsewhere.
+"""The contents of a Gmsh model, or of a file of another format, as plain arrays; checked elsewhere.
 
 Gmsh crashes on some damaged files, or takes the memory of the machine for a wrong count: a
 checker of the headers would have to know the reader of each format and version, so files are
-read by a process of their own, ``python3 -m contact.mesh.extraction FILE SWITCH OUT``.
+read by a process of their own, ``python3 -m contact.mesh.extraction FILE OUT SWITCH`` or
+``python3 -m contact.mesh.formats FILE OUT``.
 """
 
 import json
 import os
 import resource
 import sys
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -18,37 +20,69 @@ import numpy.typing as npt
 
 Ints = npt.NDArray[np.int64]
 
-#: Gmsh's element types of first order, by dimension.
-SIMPLEX = {0: 15, 1: 1, 2: 2, 3: 4}
+#: Cells by the first word of Gmsh's names: their corners, and those of their facets.
+CORNERS = {
+    "Triangle": (3, 2),
+    "Quadrilateral": (4, 2),
+    "Tetrahedron": (4, 3),
+    "Hexahedron": (8, 4),
+}
 
+#: The first words of Gmsh's names of facets, by their corners.
+FACETS = {2: "Line", 3: "Triangle", 4: "Quadrilateral"}
+
+#: Endings of the names of files that are not Gmsh's, and their formats.
+OTHERS = {
+    ".inp": "Abaqus",
+    ".vtu": "VTK",
+    ".xdmf": "XDMF",
+    ".med": "MED",
+    ".rmed": "MED",
+    ".e": "Exodus",
+    ".ex2": "Exodus",
+    ".exo": "Exodus",
+}
+
+#: The region of a mesh whose cells nothing tells apart.
+BODY = "body"
 
 #: Memory that reading a file may take: at least, and bytes for each byte of the file. A node or
 #: an element takes some 20 bytes of a file and at most 10 times that in Gmsh and here.
 LEAST_MEMORY, MEMORY_A_BYTE = 4 << 30, 100
 
 
+#: Arrays of a `Model` besides its groups.
+ARRAYS = ("tags", "points", "places", "cells")
+
+
 @dataclass(frozen=True)
 class Model:
-    """The contents of a Gmsh model.
+    """The contents of a Gmsh model, or of another file.
 
     Attributes
     ----------
     kinds
-        Name, dimension and order of each type of elements.
+        Name, dimension and order of each type of elements, as Gmsh has them.
     tags, points
         Nodes: their tags, shape (n,), and coordinates, shape (n, 3).
+    places
+        The nodes of a cell in the reference cell, corners first, shape (k, d).
     cells
-        Simplices of the largest dimension d by their nodes' tags, shape (m, d + 1).
+        Cells of the first type of the largest dimension d by their nodes' tags, shape (m, k).
     regions, parts
-        Physical groups of dimension d and d - 1: name -> their simplices likewise.
+        Groups of cells, likewise, and of facets by the tags of their corners, by name.
+    notes
+        Other contents of the file, one sentence each.
     """
 
     kinds: list[tuple[str, int, int]]
     tags: Ints
     points: npt.NDArray[np.float64]
+    places: npt.NDArray[np.float64]
     cells: Ints
     regions: dict[str, Ints]
     parts: dict[str, Ints]
+    notes: tuple[str, ...] = ()
 
     @property
     def dim(self) -> int:
@@ -57,10 +91,15 @@ class Model:
 
     def save(self, path: Path) -> None:
         """Write the arrays to a file."""
-        names = {"kinds": self.kinds, "regions": [*self.regions], "parts": [*self.parts]}
+        names = {
+            "kinds": self.kinds,
+            "regions": [*self.regions],
+            "parts": [*self.parts],
+            "notes": self.notes,
+        }
         groups = [*self.regions.values(), *self.parts.values()]
         arrays: dict[str, Any] = {f"group {i}": group for i, group in enumerate(groups)}
-        arrays |= {"tags": self.tags, "points": self.points, "cells": self.cells}
+        arrays |= {name: getattr(self, name) for name in ARRAYS}
         np.savez(path, names=np.array(json.dumps(names)), **arrays)
 
     @classmethod
@@ -68,10 +107,40 @@ class Model:
         """Read the file of `save`."""
         with np.load(path, allow_pickle=False) as arrays:
             names = json.loads(str(arrays["names"]))
-            groups = iter([arrays[f"group {i}"] for i in range(len(arrays) - 4)])
-            nodes = arrays["tags"], arrays["points"], arrays["cells"]
+            groups = iter([arrays[f"group {i}"] for i in range(len(arrays) - len(ARRAYS) - 1)])
+            nodes = [arrays[name] for name in ARRAYS]
         regions, parts = ({name: next(groups) for name in names[k]} for k in ("regions", "parts"))
-        return cls([tuple(kind) for kind in names["kinds"]], *nodes, regions, parts)
+        kinds = [tuple(kind) for kind in names["kinds"]]
+        tags, points, places, cells = nodes
+        return cls(kinds, tags, points, places, cells, regions, parts, tuple(names["notes"]))
+
+
+@dataclass
+class Contents:
+    """The contents of a file that has no groups but sets, elements and nodes in VTK's order.
+
+    Attributes
+    ----------
+    points
+        Coordinates of the nodes, shape (n, 3).
+    blocks
+        Name of a shape, as meshio has it, and elements by their nodes, in VTK's order.
+    groups
+        Name -> number of a block -> its elements in the group.
+    nodes
+        Name -> the nodes of a set.
+    surfaces
+        Name -> facets by their corners, around them.
+    notes
+        Its other contents, one sentence each.
+    """
+
+    points: Any
+    blocks: Sequence[tuple[str, Ints]]
+    groups: dict[str, dict[int, Ints]] = field(default_factory=dict)
+    nodes: dict[str, Ints] = field(default_factory=dict)
+    surfaces: dict[str, Ints] = field(default_factory=dict)
+    notes: list[str] = field(default_factory=list)
 
 
 def extract(model: Any, entities_are_groups: bool) -> Model:
@@ -86,19 +155,36 @@ def extract(model: Any, entities_are_groups: bool) -> Model:
     tags, xyz, _ = model.mesh.getNodes()
     nodes = tags.astype(np.int64), xyz.reshape(-1, 3)
     dim = max((kind[1] for kind in kinds), default=-1)
-    if dim < 1:
-        return Model(kinds, *nodes, np.empty((0, 1), dtype=np.int64), {}, {})
+    dim = max(dim, 1)
+    types = {t: model.mesh.getElementProperties(t) for t in model.mesh.getElementTypes(dim)}
+    first = next(iter(types.values()), None)
+    if dim < 2 or first is None or first[0].split()[0] not in CORNERS:
+        return Model(kinds, *nodes, np.empty((0, dim)), np.empty((0, 1), dtype=np.int64), {}, {})
+    local = np.array(first[4], dtype=np.float64).reshape(-1, dim)
+    # Gmsh's quadrilaterals and hexahedra go from -1 to 1.
+    low = local.min(axis=0)
+    places = (local - low) / (local.max(axis=0) - low)
+    corners = CORNERS[first[0].split()[0]][1]
+    facets = {
+        t: corners
+        for t in model.mesh.getElementTypes(dim - 1)
+        if model.mesh.getElementProperties(t)[0].split()[0] == FACETS[corners]
+    }
+    cells = {next(iter(types)): len(places)}
     return Model(
         kinds,
         *nodes,
-        _simplices(model, dim, [-1]),
-        _groups(model, dim, entities_are_groups),
-        _groups(model, dim - 1, entities_are_groups),
+        places,
+        _elements(model, cells, [-1]),
+        _groups(model, dim, cells, entities_are_groups),
+        _groups(model, dim - 1, facets, entities_are_groups),
     )
 
 
-def _groups(model: Any, dim: int, entities_are_groups: bool) -> dict[str, Ints]:
-    """Simplices of each physical group of a dimension; one without a name goes by its number."""
+def _groups(
+    model: Any, dim: int, types: Mapping[int, int], entities_are_groups: bool
+) -> dict[str, Ints]:
+    """Elements of each physical group of a dimension; one without a name goes by its number."""
     if entities_are_groups:
         found = [(tag, [tag]) for _, tag in model.getEntities(dim) if tag != 0]
     else:
@@ -109,21 +195,24 @@ def _groups(model: Any, dim: int, entities_are_groups: bool) -> dict[str, Ints]:
     entities: dict[str, list[int]] = {}
     for tag, members in found:
         entities.setdefault(model.getPhysicalName(dim, tag) or str(tag), []).extend(members)
-    return {name: _simplices(model, dim, members) for name, members in entities.items()}
+    return {name: _elements(model, types, members) for name, members in entities.items()}
 
 
-def _simplices(model: Any, dim: int, entities: list[int]) -> Ints:
-    """Node tags of the simplices of some entities (-1: of all), shape (m, dim + 1)."""
-    nodes = [model.mesh.getElementsByType(SIMPLEX[dim], entity)[1] for entity in entities]
-    return np.concatenate(nodes).astype(np.int64).reshape(-1, dim + 1)
+def _elements(model: Any, types: Mapping[int, int], entities: list[int]) -> Ints:
+    """Tags of the first nodes of elements of some types, as many as each has, in some entities.
+
+    Of the entity -1 they are all.
+    """
+    found = [np.empty((0, *{*types.values()}), dtype=np.int64)] if types else []
+    for kind, count in types.items():
+        every = model.mesh.getElementProperties(kind)[3]
+        nodes = [model.mesh.getElementsByType(kind, entity)[1] for entity in entities]
+        found.append(np.concatenate(nodes).astype(np.int64).reshape(-1, every)[:, :count])
+    return np.concatenate(found) if found else np.empty((0, 1), dtype=np.int64)
 
 
 def _read(file: Path, switch: bool) -> Model:
     """Read a mesh file with Gmsh."""
-    size = LEAST_MEMORY + MEMORY_A_BYTE * file.stat().st_size
-    hard = resource.getrlimit(resource.RLIMIT_AS)[1]
-    if hard == resource.RLIM_INFINITY or size < hard:
-        resource.setrlimit(resource.RLIMIT_AS, (size, hard))
     import gmsh
 
     gmsh.initialize(readConfigFiles=False, interruptible=False)
@@ -136,16 +225,20 @@ def _read(file: Path, switch: bool) -> Model:
     return extract(gmsh.model, switch)
 
 
-def main(file: str, switch: str, out: str) -> None:
-    """Read a mesh file and write its arrays, or print Gmsh's message."""
+def run(read: Callable[[Path], Model], file: str, out: str) -> None:
+    """Read a mesh file and write its arrays, or print its fault; end the process."""
     try:
-        _read(Path(file), switch == "switch").save(Path(out))
+        size = LEAST_MEMORY + MEMORY_A_BYTE * Path(file).stat().st_size
+        hard = resource.getrlimit(resource.RLIMIT_AS)[1]
+        if hard == resource.RLIM_INFINITY or size < hard:
+            resource.setrlimit(resource.RLIMIT_AS, (size, hard))
+        read(Path(file)).save(Path(out))
     except Exception as error:
-        print(error)
+        print(str(error) or type(error).__name__)
     sys.stdout.flush()
     # Whatever a damaged file has done to Gmsh's memory, nothing of it is freed.
     os._exit(0)
 
 
 if __name__ == "__main__":
-    main(*sys.argv[1:])
+    run(lambda file: _read(file, sys.argv[3] == "switch"), *sys.argv[1:3])

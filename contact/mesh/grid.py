@@ -42,6 +42,9 @@ SHORTEST = float(np.finfo(np.float64).eps)
 #: Most that a cell may be stretched: far beyond use, and rounding leaves the rest some digits.
 STRETCHED = 1e6
 
+#: Generator -> its shapes of cells, the usual one first.
+CELLS = {"rectangle": ("triangle", "quadrilateral"), "box": ("tetrahedron", "hexahedron")}
+
 #: Generator -> its sides.
 SIDES = {"rectangle": RECTANGLE_SIDES, "box": BOX_SIDES}
 
@@ -93,8 +96,9 @@ def rectangle(
     parts: Mapping[str, Piece | Sequence[Piece]] | None = None,
     diagonal: str = "right",
     rotation: float = 0.0,
+    cell: str = "triangle",
 ) -> Domain:
-    """Make a rectangle of triangles with the parts ``left``, ``right``, ``bottom``, ``top``.
+    """Make a rectangle with the parts ``left``, ``right``, ``bottom``, ``top``.
 
     Parameters
     ----------
@@ -108,6 +112,8 @@ def rectangle(
         How a square is cut: ``right``, ``left``, ``crossed``, ``left_right`` or ``right_left``.
     rotation
         Degrees, counter-clockwise about the point (0, 0).
+    cell
+        ``triangle``, or ``quadrilateral``: squares as they are.
 
     Raises
     ------
@@ -122,6 +128,7 @@ def rectangle(
         comm,
         grid[:2],
         list(cells),
+        cell_type=_cell_type("rectangle", cell),
         diagonal=kinds[diagonal],
         ghost_mode=dmesh.GhostMode.none,
     )
@@ -138,8 +145,9 @@ def box(
     parts: Mapping[str, Piece | Sequence[Piece]] | None = None,
     rotation: float = 0.0,
     axis: Sequence[float] = (0.0, 1.0, 0.0),
+    cell: str = "tetrahedron",
 ) -> Domain:
-    """Make a box of tetrahedra; its parts are ``left`` ... ``top``.
+    """Make a box of tetrahedra or of hexahedra (``cell``); its parts are ``left`` ... ``top``.
 
     ``left`` and ``right`` bound x, ``front`` and ``back`` y, ``bottom`` and ``top`` z.
     The arguments are those of `rectangle`; ``rotation`` (degrees, right-handed) is about
@@ -153,10 +161,19 @@ def box(
     grid, chosen = plan("box", origin, size, cells, parts or {})
     if np.shape(axis) != (3,) or not np.linalg.norm(axis) > 0.0:
         raise InputError(f"mesh axis must be 3 numbers, not all zero; given: {axis}")
-    mesh = dmesh.create_box(comm, grid[:2], list(cells), ghost_mode=dmesh.GhostMode.none)
+    kind = _cell_type("box", cell)
+    mesh = dmesh.create_box(
+        comm, grid[:2], list(cells), cell_type=kind, ghost_mode=dmesh.GhostMode.none
+    )
     domain = _name_grid(mesh, grid, chosen)
     rotate(mesh, rotation, axis)
     return domain
+
+
+def _cell_type(kind: str, cell: str) -> dmesh.CellType:
+    if cell not in CELLS[kind]:
+        raise GridError("cell", repr(cell), " or ".join(map(repr, CELLS[kind])))
+    return dmesh.CellType[cell]
 
 
 # A grid is (low corner, high corner, cell size), each of shape (d,).

@@ -27,7 +27,7 @@ from mpi4py import MPI
 
 from contact.errors import InputError
 from contact.mesh.domain import Domain, Indices, exterior_facets, with_names
-from contact.mesh.extraction import Model, extract
+from contact.mesh.extraction import OTHERS, Model, extract
 from contact.mesh.validity import Cells, Groups, check_model
 
 logger = logging.getLogger("contact.mesh")
@@ -38,8 +38,6 @@ LEAST_TIME, TIME_A_BYTE = 60.0, 5e-6
 
 #: Byte order mark, with which some editors begin a file.
 BOM = codecs.BOM_UTF8
-
-CELL_NAME = {2: "triangle", 3: "tetrahedron"}
 
 
 def from_msh(comm: MPI.Intracomm, path: str | Path) -> Domain:
@@ -59,42 +57,100 @@ def from_msh(comm: MPI.Intracomm, path: str | Path) -> Domain:
     Raises
     ------
     InputError
-        If the file is missing, damaged or no mesh, has no boundary groups, cells that are not
-        straight-sided triangles or tetrahedra, or degenerate or overlapping cells. The message
-        names the file.
+        If the file is missing, damaged or no mesh, has no boundary groups, cells of several kinds
+        or of curved geometry, or degenerate or overlapping cells. The message names the file.
     """
     return _from_rank_0(comm, lambda: _read(Path(path)), f"mesh file {path}")
 
 
+def from_file(comm: MPI.Intracomm, path: str | Path) -> Domain:
+    """Read a mesh file of one of several formats, by the ending of its name. Collective.
+
+    Input files of Abaqus and CalculiX (.inp), and, by meshio, VTK (.vtu), XDMF (.xdmf), MED (.med)
+    and Exodus (.e, .exo, .ex2); any other is one for `from_msh`. Sets of cells are regions; sets of
+    facets, surfaces, and sets of nodes (the facets of the boundary all of whose nodes they hold)
+    are parts. Whole numbers of cells or nodes in VTK's files and XDMF mark sets, 0 none.
+
+    Parameters
+    ----------
+    comm
+        Communicator of the ranks of the mesh.
+    path
+        The file.
+
+    Returns
+    -------
+    The mesh with its parts and regions.
+
+    Raises
+    ------
+    InputError
+        As `from_msh`, and if a set has no meaning.
+    """
+    file = Path(path)
+    if file.suffix.lower() not in OTHERS:
+        return from_msh(comm, path)
+    return _from_rank_0(comm, lambda: _read_other(file), f"mesh file {path}")
+
+
 def _read(file: Path) -> Model:
-    """Read a mesh file in a process of its own, see `contact.mesh.extraction`."""
-    command = [sys.executable, "-P", "-m", "contact.mesh.extraction"]
-    switch = "switch" if _format(file) < 4 else "as they are"
+    """Read a file of Gmsh."""
+    how = ["switch"] if _format(file) < 4 else ["as they are"]
+    with _plain_name(file) as plain:
+        return _apart("contact.mesh.extraction", how, plain, file, "Gmsh")
+
+
+def _read_other(file: Path) -> Model:
+    """Read a file of another format."""
+    if not file.is_file():
+        raise InputError("no such file")
+    reader = f"the {OTHERS[file.suffix.lower()]} reader"
+    return _apart("contact.mesh.formats", [], file.resolve(), file, reader)
+
+
+def _apart(module: str, options: list[str], plain: Path, file: Path, reader: str) -> Model:
+    """Read a file in a process of its own, see `contact.mesh.extraction`.
+
+    Parameters
+    ----------
+    module, options
+        The module to run, and its options behind the names of the file and of that for arrays.
+    plain
+        The name to read the file by.
+    file, reader
+        Its name, and who reads it, in messages.
+    """
+    with tempfile.TemporaryDirectory() as folder:
+        out = Path(folder) / "model.npz"
+        command = [sys.executable, "-P", "-m", module, str(plain), str(out), *options]
+        return _result(command, plain, out, file, reader)
+
+
+def _result(command: list[str], plain: Path, out: Path, file: Path, reader: str) -> Model:
+    """Run a process, and return the model that it writes."""
     limit = LEAST_TIME + TIME_A_BYTE * file.stat().st_size
     # All modules of this process can be imported by the other.
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join(map(os.path.abspath, sys.path))}
-    with _plain_name(file) as plain:
-        out = plain.with_name("model.npz")
-        try:
-            done = subprocess.run(
-                [*command, str(plain), switch, str(out)],
-                env=environment,
-                stdin=subprocess.DEVNULL,
-                stdout=subprocess.PIPE,
-                stderr=subprocess.DEVNULL,
-                timeout=limit,
-            )
-        except subprocess.TimeoutExpired:
-            raise InputError(f"Gmsh does not come to an end with it in {limit:.0f} s") from None
-        if done.returncode != 0:
-            raise InputError(
-                f"Gmsh breaks off reading it (status {done.returncode}): it is damaged"
-            )
-        if not out.exists():
-            said = " ".join(done.stdout.decode(errors="replace").split())
-            said = said.replace(str(plain), file.name)
-            raise InputError(f"Gmsh says: {said or 'nothing, and reads nothing of it'}")
-        return Model.load(out)
+    try:
+        done = subprocess.run(
+            command,
+            env=environment,
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.DEVNULL,
+            timeout=limit,
+        )
+    except subprocess.TimeoutExpired:
+        raise InputError(f"{reader} does not come to an end with it in {limit:.0f} s") from None
+    if done.returncode != 0:
+        raise InputError(
+            f"{reader} breaks off reading it (status {done.returncode}): it is damaged"
+        )
+    if not out.exists():
+        said = " ".join(done.stdout.decode(errors="replace").split())
+        said = said.replace(str(plain), file.name)
+        raise InputError(f"{reader} says of it: {said or 'nothing, and reads nothing of it'}")
+    return Model.load(out)
 
 
 def _format(file: Path) -> int:
@@ -169,13 +225,13 @@ def _from_rank_0(comm: MPI.Intracomm, load: Callable[[], Model], source: str) ->
     problem = comm.bcast(problem)
     if problem is not None:
         raise InputError(f"{source}: {problem}")
-    names = comm.bcast(None if raw is None else raw.without_simplices())
+    names = comm.bcast(None if raw is None else raw.without_rows())
     return _distribute(comm, names if raw is None else raw, source)
 
 
 def _distribute(comm: MPI.Intracomm, raw: Cells, source: str) -> Domain:
     dim = raw.points.shape[1]
-    element = basix.ufl.element("Lagrange", CELL_NAME[dim], 1, shape=(dim,), dtype=np.float64)
+    element = basix.ufl.element("Lagrange", raw.shape.name, 1, shape=(dim,), dtype=np.float64)
     mesh = dmesh.create_mesh(comm, cells=raw.regions.rows, x=raw.points, e=ufl.Mesh(element))
     exterior_facets(mesh)
     domain = with_names(mesh, _sets(mesh, dim - 1, raw.parts), _sets(mesh, dim, raw.regions))
@@ -187,7 +243,7 @@ def _distribute(comm: MPI.Intracomm, raw: Cells, source: str) -> Domain:
 
 
 def _sets(mesh: dmesh.Mesh, dim: int, groups: Groups) -> dict[str, Indices]:
-    """Return the owned simplices of each group. Collective."""
+    """Return the owned cells or facets of each group. Collective."""
     vertices, labels = io.utils.distribute_entity_data(mesh, dim, groups.rows, groups.labels)
     mesh.topology.create_connectivity(dim, 0)
     tags = dmesh.meshtags_from_entities(

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import basix.ufl
 import numpy as np
+import ufl
 from dolfinx import fem
 from dolfinx import mesh as dmesh
 from mpi4py import MPI
@@ -12,8 +14,10 @@ from numpy.typing import NDArray
 
 from contact import _compat
 from contact._compat import lasting
+from contact.errors import InputError
+from contact.mesh.cells import shape_of
 from contact.mesh.domain import Domain, exterior_facets, with_names
-from contact.mesh.entities import Indices
+from contact.mesh.entities import Indices, cell_facets
 
 
 def refined(domain: Domain, marked: Indices | None = None) -> Domain:
@@ -44,23 +48,15 @@ def with_parents(domain: Domain, marked: Indices | None = None) -> tuple[Domain,
     """
     coarse = domain.mesh
     tdim = coarse.topology.dim
-    coarse.topology.create_entities(1)
-    edges = None
-    if marked is not None:
-        edges = dmesh.compute_incident_entities(coarse.topology, marked, tdim, 1)
-    # Without a partitioner the refined cells stay on the rank of their parent.
-    fine, parent_cells, parent_facets = dmesh.refine(
-        coarse, edges, partitioner=None, option=dmesh.RefinementOption.parent_cell_and_facet
-    )
+    fine, parent_cells, parent_facets = _cut(coarse, marked)
     facets = exterior_facets(fine)
-    coarse_facets = coarse.topology.connectivity(tdim, tdim - 1).array.reshape(-1, tdim + 1)
-    fine_facets = fine.topology.connectivity(tdim, tdim - 1).array.reshape(-1, tdim + 1)
+    coarse_facets, fine_facets = cell_facets(coarse), cell_facets(fine)
 
     # dolfinx.mesh.transfer_meshtag does the same, but refuses ghosted parents.
     # The parents are listed in the order in which the refined cells were made.
     made = _compat.original_cells(fine) - fine.topology.index_map(tdim).local_range[0]
     parent = parent_cells[made]
-    local = parent_facets.reshape(-1, tdim + 1)[made]
+    local = parent_facets.reshape(-1, fine_facets.shape[1])[made]
     cells, places = np.nonzero(local >= 0)
     owner = np.full(fine_facets.max(initial=-1) + 1, -1, dtype=np.int32)
     owner[fine_facets[cells, places]] = coarse_facets[parent[cells], local[cells, places]]
@@ -80,6 +76,55 @@ def with_parents(domain: Domain, marked: Indices | None = None) -> tuple[Domain,
         revolved=domain.revolved,
     )
     return made_of, owned
+
+
+def _cut(coarse: dmesh.Mesh, marked: Indices | None) -> tuple[dmesh.Mesh, Indices, Indices]:
+    """Cut cells; return the mesh, and parents: of cells, and of their facets within these.
+
+    Collective. The refined cells stay on the rank of their parent.
+    """
+    if not shape_of(coarse).simplex:
+        return _halved(coarse, marked)
+    coarse.topology.create_entities(1)
+    edges = None
+    if marked is not None:
+        edges = dmesh.compute_incident_entities(coarse.topology, marked, coarse.topology.dim, 1)
+    parents = dmesh.RefinementOption.parent_cell_and_facet
+    made: tuple[dmesh.Mesh, Indices, Indices] = dmesh.refine(
+        coarse, edges, partitioner=None, option=parents
+    )
+    return made
+
+
+def _halved(coarse: dmesh.Mesh, marked: Indices | None) -> tuple[dmesh.Mesh, Indices, Indices]:
+    """Cut each quadrilateral in 4, each hexahedron in 8. Collective.
+
+    Raises
+    ------
+    InputError
+        If some cells are marked: dolfinx has no hanging nodes.
+    """
+    shape, d = shape_of(coarse), coarse.topology.dim
+    if marked is not None:
+        raise InputError(
+            f"mesh.adapt: the cells are {shape.plural}, of which some cannot be refined alone; "
+            "accepted: triangles or tetrahedra, or mesh.refine"
+        )
+    space = fem.functionspace(coarse, ("Lagrange", 2))
+    owned = coarse.topology.index_map(d).size_local
+    nodes, children = space.dofmap.list[:owned], shape.children
+    numbers = space.dofmap.index_map.local_to_global(nodes.ravel()).reshape(nodes.shape)
+    cells = numbers[:, children].reshape(-1, shape.corners)
+    points = space.tabulate_dof_coordinates()[: space.dofmap.index_map.size_local, :d]
+    element = basix.ufl.element("Lagrange", shape.name, 1, shape=(d,), dtype=np.float64)
+    rank = lasting(coarse.comm).rank
+    stay = _compat.destinations(np.full(len(cells), rank, dtype=np.int32))
+    kept = {"partitioner": lambda *_: stay}
+    fine = dmesh.create_mesh(coarse.comm, cells=cells, x=points, e=ufl.Mesh(element), **kept)
+    # A facet of a child that bounds the mesh lies in the parent's of the same place.
+    facets = np.tile(np.arange(len(shape.facet_corners), dtype=np.int32), len(cells))
+    parents = np.repeat(np.arange(owned, dtype=np.int32), len(children))
+    return fine, parents, facets
 
 
 #: How far outside of a mesh a node may lie, over the extent of the mesh, and over its largest cell.

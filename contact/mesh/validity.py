@@ -9,28 +9,32 @@ import numpy as np
 import numpy.typing as npt
 
 from contact.errors import InputError
-from contact.mesh.domain import BODY
+from contact.mesh.cells import SHAPES, Shape
 from contact.mesh.entities import combinations
-from contact.mesh.extraction import Ints, Model
+from contact.mesh.extraction import BODY, Ints, Model
+from contact.mesh.geometry import determinant, jacobians
 from contact.typing import Array
 
 #: A cell is degenerate if its volume is below this times (longest edge)^d. Gmsh's qualities, which
 #: need its model, would not do: the signs of the volumes say whether cells overlap.
 FLAT = 1e-10
 
+#: Nodes of degree 2 this near to where straight edges have them, over these, are there (rounding).
+STRAIGHT = 1e-5
+
 
 @dataclass(frozen=True)
 class Groups:
-    """Named groups of simplices that may overlap.
+    """Named groups of cells or facets that may overlap.
 
     Attributes
     ----------
     names
         Names of the groups.
     rows
-        Vertices of the simplices, no two the same, shape (k, n).
+        Their corners, no two the same, shape (k, n).
     labels
-        Which of the ``sets`` holds the groups that a simplex belongs to, shape (k,).
+        Which of the ``sets`` holds the groups that a row belongs to, shape (k,).
     sets
         Positions in ``names``.
     """
@@ -40,7 +44,7 @@ class Groups:
     labels: npt.NDArray[np.int32]
     sets: tuple[tuple[int, ...], ...]
 
-    def without_simplices(self) -> Groups:
+    def without_rows(self) -> Groups:
         """Return the names alone, for ranks that read nothing."""
         return replace(self, rows=self.rows[:0], labels=self.labels[:0])
 
@@ -51,25 +55,28 @@ class Cells:
 
     Attributes
     ----------
+    shape
+        Of the cells.
     points
         Coordinates, shape (n, d).
     regions
-        Groups of cells; their rows, shape (m, d + 1), are all cells of the mesh.
+        Groups of cells; their rows, shape (m, corners), are all cells of the mesh.
     parts
         Groups of facets on its boundary.
     unusable, notes
         As in `Domain`.
     """
 
+    shape: Shape
     points: Array
     regions: Groups
     parts: Groups
     unusable: dict[str, str]
     notes: tuple[str, ...]
 
-    def without_simplices(self) -> Cells:
+    def without_rows(self) -> Cells:
         """Return the names alone, for ranks that read nothing."""
-        regions, parts = self.regions.without_simplices(), self.parts.without_simplices()
+        regions, parts = self.regions.without_rows(), self.parts.without_rows()
         return replace(self, points=self.points[:0], regions=regions, parts=parts)
 
 
@@ -83,21 +90,29 @@ def check_model(model: Model) -> Cells:
     Raises
     ------
     InputError
-        For other meshes than of straight-sided triangles in a plane z = const or of tetrahedra,
-        for cells without volume or that overlap, and if no part is left.
+        For other meshes than of straight-sided triangles or quadrilaterals in a plane z = const, or
+        of tetrahedra or hexahedra, for cells without volume or that overlap, and if no part is
+        left.
     """
     dim = model.dim
-    _check_kinds(model.kinds, dim)
+    shape = _check_kinds(model.kinds, dim)
     order = np.argsort(model.tags)
     tags, points = model.tags[order], model.points[order]
     if np.any(tags[1:] == tags[:-1]):
         raise InputError("it has several nodes of one number")
+    first = _corners_first(shape, model.places)
+    every = _places(tags, model.cells)
+    _check_straight(points, every, model.places, shape, first)
     regions = _join(
-        {name: _places(tags, nodes) for name, nodes in model.regions.items() if len(nodes)}
-        or {BODY: _places(tags, model.cells)}
+        {
+            name: _places(tags, nodes)[:, first]
+            for name, nodes in model.regions.items()
+            if len(nodes)
+        }
+        or {BODY: every[:, first]}
     )
-    notes = []
-    if left := len(_first_of_each(model.cells)) - len(regions.rows):
+    notes = [*model.notes]
+    if left := len(_first_of_each(every[:, first])) - len(regions.rows):
         notes.append(f"{left} cell(s) in no physical group are no part of the body")
     # The nodes of the body alone; others may be centres of circles.
     used = np.unique(regions.rows)
@@ -106,30 +121,70 @@ def check_model(model: Model) -> Cells:
     points = _flatten(points[used], dim)
     cells = new[regions.rows]
 
-    parts = {name: new[_places(tags, nodes)] for name, nodes in model.parts.items()}
-    reasons = _check_cells(points, cells, parts)
+    around = shape.facet.around
+    parts = {name: new[_places(tags, nodes)][:, around] for name, nodes in model.parts.items()}
+    reasons = _check_cells(shape, points, cells, parts)
     usable = {name: rows for name, rows in parts.items() if name not in reasons}
     if not usable:
         entities = "curves" if dim == 2 else "surfaces"
-        first = next(iter(reasons.values()), None)
-        raise InputError(first or f"it has no physical groups of {entities}: no part has a name")
+        reason = next(iter(reasons.values()), None)
+        raise InputError(reason or f"it has no physical groups of {entities}: no part has a name")
     notes += [f"ignored: {reason}" for reason in reasons.values()]
-    return Cells(points, replace(regions, rows=cells), _join(usable), reasons, tuple(notes))
+    return Cells(shape, points, replace(regions, rows=cells), _join(usable), reasons, tuple(notes))
 
 
-def _check_kinds(kinds: Sequence[tuple[str, int, int]], dim: int) -> None:
+def _check_kinds(kinds: Sequence[tuple[str, int, int]], dim: int) -> Shape:
+    """Return the shape of the cells, which must have one, and nodes up to degree 2."""
     if dim < 2:
         raise InputError(
-            "it has no triangles or tetrahedra (Gmsh saves the elements of physical groups "
-            "alone, if there are any: the body needs a physical group, too)"
+            "it has no triangles, quadrilaterals, tetrahedra or hexahedra (Gmsh saves the elements "
+            "of physical groups alone, if there are any: the body needs a physical group, too)"
         )
-    for label, kind_dim, order in kinds:
-        if kind_dim == dim and label not in ("Triangle 3", "Tetrahedron 4"):
-            why = "curved geometry" if order > 1 else "another shape"
+    labels = [(label, order) for label, kind_dim, order in kinds if kind_dim == dim]
+    for label, order in labels:
+        if label.split()[0].lower() not in {shape.name for shape in SHAPES} or order > 2:
+            why = "another shape" if order < 3 else f"order {order}"
             raise InputError(
-                f"its cells include {label!r}, of {why}; accepted are straight-sided "
-                "triangles or tetrahedra (Mesh.ElementOrder = 1, no recombination)"
+                f"its cells include {label!r}, of {why}; accepted are triangles or quadrilaterals "
+                "in 2-D, tetrahedra or hexahedra in 3-D, of order 1 or 2 with straight edges"
             )
+    if len(labels) > 1:
+        found = " beside ".join(repr(label) for label, _ in labels)
+        raise InputError(
+            f"its cells include {found}; accepted are cells of one kind (in Gmsh quadrilaterals "
+            "alone by Mesh.RecombineAll and Mesh.SubdivisionAlgorithm = 1, hexahedra by 2)"
+        )
+    return Shape(labels[0][0].split()[0].lower())
+
+
+def _corners_first(shape: Shape, places: Array) -> Ints:
+    """Return which nodes of a cell of a file are the corners of the shape, in its order."""
+    return np.asarray(np.linalg.norm(shape.nodes(1)[:, None] - places, axis=2).argmin(axis=1))
+
+
+def _check_straight(points: Array, cells: Ints, places: Array, shape: Shape, first: Ints) -> None:
+    """Refuse cells of degree 2 whose nodes are not where straight edges have them.
+
+    Parameters
+    ----------
+    points, cells
+        Coordinates, shape (n, 3), and nodes, shape (m, k).
+    places, shape, first
+        The nodes of a cell in the reference cell, its shape, and which of them are its corners.
+    """
+    if len(places) == shape.corners:
+        return
+    corners = points[cells[:, first]]
+    aside = np.linalg.norm(points[cells] - shape.lagrange(1, places) @ corners, axis=2)
+    unit = np.ptp(corners, axis=1).max(axis=1)
+    curved = ~(aside.max(axis=1) <= STRAIGHT * unit)
+    if np.any(curved):
+        middle = ", ".join(f"{v:g}" for v in corners[curved][0].mean(axis=0))
+        raise InputError(
+            f"it has {curved.sum()} cell(s) of curved geometry, the first near ({middle}); "
+            "accepted are straight edges, with nodes in their middles or without "
+            "(Mesh.ElementOrder = 1, or Mesh.SecondOrderLinear = 1)"
+        )
 
 
 def _places(tags: Ints, nodes: Ints) -> Ints:
@@ -154,12 +209,12 @@ def _flatten(points: Array, dim: int) -> Array:
 
 
 def _first_of_each(rows: Ints) -> Ints:
-    """Return the index of the first simplex of each distinct one, shape (k,)."""
+    """Return the index of the first of equal rows, shape (k,)."""
     return np.unique(_number(rows), return_index=True)[1]
 
 
 def _number(rows: Ints) -> Ints:
-    """Return the number of each simplex, shape (n,), equal for equal ones: 0, 1, 2, ..."""
+    """Return the number of each row, shape (n,), equal for equal ones: 0, 1, 2, ..."""
     rows = np.sort(rows, axis=1)
     order = np.lexsort(rows.T)
     new = np.any(rows[order][1:] != rows[order][:-1], axis=1)
@@ -169,7 +224,7 @@ def _number(rows: Ints) -> Ints:
 
 
 def _join(groups: Mapping[str, Ints]) -> Groups:
-    """Make one list of simplices of groups that may share some, or name some twice."""
+    """Make one list of the rows of groups that may share some, or name some twice."""
     rows = np.vstack(list(groups.values()))
     number = _number(rows)
     first = np.unique(number, return_index=True)[1]
@@ -178,15 +233,17 @@ def _join(groups: Mapping[str, Ints]) -> Groups:
     return Groups(tuple(groups), rows[first], labels, sets)
 
 
-def _check_cells(points: Array, cells: Ints, parts: Mapping[str, Ints]) -> dict[str, str]:
+def _check_cells(
+    shape: Shape, points: Array, cells: Ints, parts: Mapping[str, Ints]
+) -> dict[str, str]:
     """Check cells, and which groups of facets cannot be parts of the boundary.
 
     Parameters
     ----------
-    points, cells
-        Coordinates, shape (n, d), and vertices, shape (m, d + 1).
+    shape, points, cells
+        Of the cells, coordinates, shape (n, d), and corners, shape (m, corners).
     parts
-        Name -> vertices of facets, shape (k, d), -1 for a node of no cell.
+        Name -> corners of facets, -1 for a node of no cell.
 
     Returns
     -------
@@ -197,28 +254,36 @@ def _check_cells(points: Array, cells: Ints, parts: Mapping[str, Ints]) -> dict[
     InputError
         For cells without volume or that overlap.
     """
-    n = cells.shape[1]
     # Without a unit of length, so that no volume overflows or vanishes.
     unit = np.ptp(points, axis=0).max() or 1.0
-    # Facet i of a cell lies opposite its vertex i.
-    others = np.array([[j for j in range(n) if j != i] for i in range(n)])
-    cell_facets = np.sort(cells[:, others], axis=2)
-    corners = points[cell_facets] / unit
-    apex = points[cells] / unit
-    edges = np.concatenate([corners[:, :, 1:], apex[:, :, None]], axis=2) - corners[:, :, :1]
-    volume = np.linalg.det(edges)
-    longest = np.linalg.norm(edges, axis=-1).max(axis=(1, 2))
+    x = points[cells] / unit
+    volume = determinant(jacobians(shape, x, shape.nodes(1)))
+    longest = np.linalg.norm(x[:, :, None] - x[:, None], axis=-1).max(axis=(1, 2))
     flat = ~(np.abs(volume).min(axis=1) > FLAT * longest ** points.shape[1])
     if np.any(flat):
         middle = ", ".join(f"{v:g}" for v in points[cells[flat][0]].mean(axis=0))
         raise InputError(f"it has {flat.sum()} cell(s) of zero volume, the first near ({middle})")
+    folded = np.abs(np.sign(volume).sum(axis=1)) < volume.shape[1]
+    if np.any(folded):
+        middle = ", ".join(f"{v:g}" for v in points[cells[folded][0]].mean(axis=0))
+        raise InputError(
+            f"it has {folded.sum()} cell(s) with a corner of 180 degrees or more, the first near "
+            f"({middle})"
+        )
 
-    number = _number(np.vstack([cell_facets.reshape(-1, n - 1), *parts.values()]))
-    inner, outer = number[: cells.size], number[cells.size :]
+    cell_facets = np.sort(cells[:, shape.facet_corners], axis=2)
+    # Three corners of a facet, two in 2-D, the same for both of its cells, and one inside.
+    corners = points[cell_facets[:, :, : points.shape[1]]] / unit
+    inside = np.broadcast_to(x.mean(axis=1)[:, None, None], corners[:, :, :1].shape)
+    edges = np.concatenate([corners[:, :, 1:], inside], axis=2) - corners[:, :, :1]
+    sides = np.sign(np.linalg.det(edges))
+
+    number = _number(np.vstack([cell_facets.reshape(-1, cell_facets.shape[2]), *parts.values()]))
+    inner, outer = number[: sides.size], number[sides.size :]
     total = int(number.max()) + 1
     count = np.bincount(inner, minlength=total)
     # Two cells that share a facet must lie on either side of it.
-    side = np.bincount(inner, weights=np.sign(volume).ravel(), minlength=total)
+    side = np.bincount(inner, weights=sides.ravel(), minlength=total)
     wrong = (count > 2) | ((count == 2) & (side != 0.0))
     if np.any(wrong):
         raise InputError(f"its cells overlap (inverted cells) at {wrong.sum()} facet(s)")

@@ -25,10 +25,10 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from contact import _compat
 from contact.errors import InputError
 from contact.history import CONTACT_NODES, QUADRATURE_POINTS
 from contact.interface.multipliers import Multipliers
+from contact.mesh.geometry import geometry_nodes
 from contact.output.folder import kind, listed, read_json, settle, write_whole
 from contact.output.solution import Solution, StepRecord
 from contact.problem.problem import ContactProblem
@@ -465,7 +465,7 @@ def _places(problem: ContactProblem) -> Array:
     body, d = problem.equilibrium, problem.dim
     mesh, space = body.domain.mesh, body.space
     cells = mesh.topology.index_map(d).size_local
-    corners = mesh.geometry.x[_compat.geometry_dofmap(mesh)][:cells, : d + 1, :d]
+    corners = geometry_nodes(body.domain)
     sums = fem.Function(fem.functionspace(mesh, ("Lagrange", body.degree, (d + 1,))))
     own = np.concatenate([corners.mean(axis=1), np.ones((cells, 1))], axis=1)
     links = sums.function_space.dofmap.list

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+from contact.body.elements import unlocked
+from contact.mesh.cells import shape_of
 from contact.output.solution import Remark, Solution
 
 #: Ratio of bulk to shear modulus, of nu = 0.475, from which on elements of degree 1 lock.
@@ -16,7 +18,12 @@ COARSE = 0.15
 def locks(solution: Solution) -> bool:
     """Whether elements of degree 1 are much too stiff, for volumes hardly change."""
     ratio = None if solution.error is None else solution.error.stiffness_ratio
-    return solution.problem.equilibrium.degree == 1 and ratio is not None and ratio >= LOCKED
+    return _remedy(solution) is not None and ratio is not None and ratio >= LOCKED
+
+
+def _remedy(solution: Solution) -> str | None:
+    body = solution.problem.equilibrium
+    return unlocked(body.element, body.degree, shape_of(body.domain.mesh))
 
 
 def remarks(solution: Solution) -> Iterator[Remark]:
@@ -28,7 +35,7 @@ def remarks(solution: Solution) -> Iterator[Remark]:
             f"the mesh locks: the bulk modulus is {error.stiffness_ratio:.3g} times the shear "
             f"modulus where the energy is, and from {LOCKED:g} on elements of degree 1 are too "
             "stiff: displacements are too small, and the estimated error is a lower bound; "
-            'space.degree = 2 does not lock, least of all with element = "mean_dilatation"'
+            f"{_remedy(solution)}"
         )
     elif error.relative > COARSE:
         yield (

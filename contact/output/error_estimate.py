@@ -21,8 +21,9 @@ from mpi4py import MPI
 from contact.body.description import Material
 from contact.body.elements import MEAN_DILATATION
 from contact.body.materials import factor_of
+from contact.mesh.cells import rule, shape_of
 from contact.mesh.entities import cells_at
-from contact.mesh.simplices import corners, inverse_jacobians, lagrange, measures, rule
+from contact.mesh.geometry import geometry_nodes, measures
 from contact.mesh.together import members, part
 from contact.output.fields import DerivedFields
 from contact.output.local_problems import LocalProblems
@@ -89,15 +90,17 @@ def estimated(
     fields
         The fields of the state, where they are known already.
     """
-    body = problem.equilibrium
+    body, shape = problem.equilibrium, shape_of(problem.domain.mesh)
+    if body.degree == 1 and not shape.simplex:
+        # Stresses vary in the cell, and are most exact in its middle.
+        fields = DerivedFields(body, state, shape.nodes(1))
     fields = fields or DerivedFields(body, state)
     flux, strain = _sampled(fields)
     secant = body.laws.secant_shear(state, body.nodal(state.x).ravel())
     local = LocalProblems(problem, state, flux) if body.degree == 2 else None
-    at, weights = rule(body.dim, 2 * body.degree)
-    places = corners(body.domain)
-    volumes = measures(body.domain, places, at, weights, inverse_jacobians(places)[1])
-    shapes = lagrange(2 if body.degree == 2 else 0, at)
+    at, weights = rule(shape, 2 * body.degree)
+    volumes = measures(body.domain, shape, geometry_nodes(body.domain), at, weights)
+    linear, shapes = shape.lagrange(1, at), shape.lagrange(shape.degree_of(flux.shape[1]), at)
     squares, sums = np.zeros(len(flux)), np.zeros(3)
     for material, cells in zip(body.body.materials, body.cells, strict=True):
         law, own = material.law, flux[cells]
@@ -113,11 +116,11 @@ def estimated(
                 # The pressure is constant in a cell.
                 bulk = factor * _bulk(law)
                 rough = own[..., :3].sum(axis=2).mean(axis=1)[:, None] / 3
-                between = at @ (nodal_means(body.domain, cells, rough) - rough[:, None])
+                between = linear @ (nodal_means(body.domain, cells, rough) - rough[:, None])
                 squares[cells] += np.sum(volumes[cells] * between[..., 0] ** 2, 1) / bulk
         else:
-            smooth = nodal_means(body.domain, cells, own[:, 0])
-            squares[cells] = np.sum(volumes[cells] * energy(at @ (smooth - own)), axis=1)
+            smooth = nodal_means(body.domain, cells, own.mean(axis=1))
+            squares[cells] = np.sum(volumes[cells] * energy(linear @ smooth - shapes @ own), axis=1)
         known = np.sum(volumes[cells] * energy(shapes @ own), axis=1)
         sums[0] += known.sum()
         if not isinstance(law, Anisotropic):
@@ -211,9 +214,9 @@ def _at_contact(problem: ContactProblem, state: State) -> Array:
     sides = tuple(dict.fromkeys(name for c in problem.contacts for name in members(c.on)))
     squares = np.zeros(domain.mesh.topology.index_map(d).size_local)
     cells, place = cells_at(domain.mesh, domain.facets(part(sides)))
-    layout = body.space.dofmap.dof_layout
-    closures = np.array([layout.entity_closure_dofs(d - 1, i) for i in range(d + 1)])
-    nodes = np.take_along_axis(body.space.dofmap.list[cells], closures[place], axis=1)
+    shape = shape_of(domain.mesh)
+    closures = shape.facet_nodes(body.degree)[place]
+    nodes = np.take_along_axis(body.space.dofmap.list[cells], closures, axis=1)
     index_map = body.space.dofmap.index_map
     vector = la.vector(index_map, 3 + 2 * d)
     values = vector.array.reshape(-1, 3 + 2 * d)
@@ -228,20 +231,16 @@ def _at_contact(problem: ContactProblem, state: State) -> Array:
         ]
     )
     vector.scatter_forward()
-    at, weights = rule(d - 1, 4)
-    found = lagrange(body.degree, at) @ values[nodes]
+    at, weights = rule(shape.facet, 4)
+    found = shape.facet.lagrange(body.degree, at) @ values[nodes]
     pressure, opening, bound = (found[..., i] for i in range(3))
     slip, friction = found[..., 3 : 3 + d], found[..., 3 + d :]
     # Next to a single node the quadratic function of its pressure is negative.
     density = np.maximum(pressure, 0.0) * np.abs(opening) + np.abs(
         bound * np.linalg.norm(slip, axis=-1) - np.sum(slip * friction, axis=-1)
     )
-    behind = corners(domain)[cells]
-    others = np.array([np.delete(np.arange(d + 1), i) for i in range(d + 1)])[place]
-    of_facet = np.take_along_axis(behind, others[..., None], axis=1)
-    # The size of a facet over that of the reference one is that of its cell over the height.
-    inverse, det = inverse_jacobians(behind)
-    inverse = np.concatenate([-inverse.sum(axis=1, keepdims=True), inverse], axis=1)
-    size = det * np.linalg.norm(inverse[np.arange(len(cells)), place], axis=1)
-    np.add.at(squares, cells, np.sum(measures(domain, of_facet, at, weights, size) * density, 1))
+    behind = geometry_nodes(domain)[cells]
+    of_facet = np.take_along_axis(behind, shape.facet_corners[place][..., None], axis=1)
+    areas = measures(domain, shape.facet, of_facet, at, weights)
+    np.add.at(squares, cells, np.sum(areas * density, axis=1))
     return squares

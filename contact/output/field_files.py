@@ -24,6 +24,7 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 
 from contact.errors import InputError
+from contact.mesh.cells import shape_of
 from contact.output.fields import DerivedFields, discontinuous, linear, unknowns
 from contact.output.folder import ROOM
 from contact.output.formats import Grid, Values, gathered, write_vtu
@@ -160,7 +161,7 @@ def body_share(
             if names is None or k in names
         }
     of_cells = {f"{k}_cell": mean(f) for k, f in in_cells.items() if names is None or k in names}
-    return Grid(points, cells, d, at_points, of_cells)
+    return Grid(points, cells, shape_of(body.domain.mesh), at_points, of_cells)
 
 
 def _points_of(
@@ -293,9 +294,9 @@ def _bytes(functions: Sequence[fem.Function]) -> int:
         nodes = index_map.size_local + index_map.num_ghosts
         # Vectors and tensors are filled up to 3 and 9 components.
         total += 8 * nodes * next(filled for filled in (1, 3, 9) if components <= filled)
-    topology, links = space.mesh.topology, space.dofmap.list
+    links = space.dofmap.list
     # Coordinates, numbers, marks of ghosts; and the corners of the cells.
-    corners = max(links.shape[1], topology.dim + 1)
+    corners = max(links.shape[1], shape_of(space.mesh).corners)
     points = max(nodes, corners * len(links) if links.shape[1] == 1 else nodes)
     return total + points * (24 + 8 + 1) + len(links) * (corners + 1) * 8
 

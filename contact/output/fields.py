@@ -8,7 +8,6 @@ from functools import cached_property, partial
 from itertools import accumulate, chain
 from typing import NamedTuple
 
-import basix.ufl
 import numpy as np
 import ufl
 from dolfinx import fem, la
@@ -22,7 +21,8 @@ from contact.body.elements import kinematics_of
 from contact.body.equilibrium import BodyEquilibrium
 from contact.body.materials import form_law, piezo_with_constants
 from contact.history import BodyState, Evaluated
-from contact.mesh.simplices import corners, inverse_jacobians, measures, rule
+from contact.mesh.cells import shape_of
+from contact.mesh.geometry import volumes
 from contact.mesh.together import pieces
 from contact.output.quantities import BODY, values_of
 from contact.problem.problem import ContactProblem
@@ -158,8 +158,20 @@ class Point:
         return None if self._phi is None else ufl.as_vector([0.0] * self._dim)
 
 
+def _usual_points(body: BodyEquilibrium) -> Array:
+    """Return the nodes of a cell, of degree 1 its middle.
+
+    There strains of simplices are constant, and those of other cells most exact (Barlow, IJNME 10,
+    1976).
+    """
+    shape = shape_of(body.domain.mesh)
+    return shape.middle if body.degree == 1 else shape.nodes(body.degree)
+
+
 class DerivedFields:
     """Fields derived from the unknowns of a body at a state. The methods are collective.
+
+    The points are those of `_usual_points`, or others, at which `chunks` alone has a meaning.
 
     Attributes
     ----------
@@ -168,8 +180,12 @@ class DerivedFields:
         theta in a body of revolution; then the internal variables of the materials.
     """
 
-    def __init__(self, body: BodyEquilibrium, state: Evaluated) -> None:
+    def __init__(
+        self, body: BodyEquilibrium, state: Evaluated, points: Array | None = None
+    ) -> None:
         self.body = body
+        #: Reference points of a cell at which the fields are evaluated.
+        self.points = _usual_points(body) if points is None else points
         self.move_to(state)
         at = Point(body, body.body.materials[0], fem.Function(body.space))
         self.shapes: dict[str, tuple[int, ...]] = {
@@ -186,15 +202,6 @@ class DerivedFields:
             name: slice(end - size, end)
             for name, size, end in zip(self.shapes, sizes, ends, strict=True)
         }
-
-    @cached_property
-    def points(self) -> Array:
-        """Reference points of a cell: its nodes, or its middle, for P1 strains are constant."""
-        mesh, d = self.body.domain.mesh, self.body.dim
-        if self.body.degree == 1:
-            return np.full((1, d), 1 / (d + 1))
-        element = basix.ufl.element("Lagrange", mesh.topology.cell_name(), self.body.degree)
-        return np.asarray(element.basix_element.points)
 
     def _expression(self, material: Material, at: fem.Function) -> Expr:
         """Return all components of a material's fields, one after the other."""
@@ -217,7 +224,7 @@ class DerivedFields:
         """Yield owned cells of a material and the values, shape (cells, points, components)."""
         body, cells = self.body, self.body.cells[material]
         expression = partial(self._expression, body.body.materials[material])
-        name = "fields", material
+        name = "fields", material, self.points.tobytes()
         body.laws.fit(self._state, self._x)
         yield from body.pointwise.values(name, expression, self.points, self._x, cells)
 
@@ -239,7 +246,7 @@ class DerivedFields:
 
     def extremes(self) -> list[Extremes]:
         """Return the largest values over the cells (their nodes, for degree 2), a material."""
-        volume, found = self._volumes(), []
+        volume, found = volumes(self.body.domain), []
         strain, mises = self.columns["dev_strain"], self.columns["von_mises"]
         laws, comm = self.body.laws, self.body.comm
         after = laws.commit(self._state, self._x)
@@ -272,7 +279,7 @@ class DerivedFields:
             name: fem.Function(fem.functionspace(mesh, ("DG", degree, shape)), name=name)
             for name, shape in self.shapes.items()
         }
-        corners = 1 if degree == 0 else self.body.dim + 1
+        corners = 1 if degree == 0 else shape_of(mesh).corners
         for chosen, values in self.chunks():
             for name, columns in self.columns.items():
                 dofs = made[name].function_space.dofmap.list[chosen]
@@ -308,7 +315,7 @@ class DerivedFields:
         -------
         Shape (groups, local nodes, components); NaN at nodes of no cell of a group.
         """
-        space, volume, groups = self.body.space, self._volumes(), self.groups
+        space, volume, groups = self.body.space, volumes(self.body.domain), self.groups
         index_map, links = space.dofmap.index_map, space.dofmap.list
         nodes = index_map.size_local + index_map.num_ghosts
         count = sum(math.prod(shape) for shape in self.shapes.values())
@@ -350,12 +357,6 @@ class DerivedFields:
             made[name].x.scatter_forward()
         return made
 
-    def _volumes(self) -> Array:
-        """Return the volumes of the owned cells, or of the rings that they are."""
-        domain, of = self.body.domain, corners(self.body.domain)
-        middle, weights = rule(domain.dim, 1)
-        return measures(domain, of, middle, weights, inverse_jacobians(of)[1]).sum(axis=1)
-
 
 class Deformation(NamedTuple):
     """Extremes over the middles of the cells.
@@ -376,7 +377,7 @@ class Deformation(NamedTuple):
 def deformation(body: BodyEquilibrium, x: Array) -> Deformation:
     """Return how large the deformation is at local unknowns of a body. Collective."""
     mesh, kinematics = body.domain.mesh, body.domain.kinematics
-    nodal, middle = body.nodal(x).ravel(), np.full((1, body.dim), 1 / (body.dim + 1))
+    nodal, middle = body.nodal(x).ravel(), shape_of(mesh).middle
 
     def measures(at: fem.Function) -> Expr:
         u, _ = body.split(at)
@@ -410,14 +411,14 @@ def unloaded(problem: ContactProblem, states: Sequence[State]) -> float:
     if not states or all(is_linear(law) or isinstance(law, HistoryLaw) for law in laws):
         return 0.0
     fields = DerivedFields(body, BodyState(body.rest()))
-    of_cells = fields._volumes()
-    volumes = [of_cells[cells] for cells in body.cells]
+    of_cells = volumes(body.domain)
+    sizes = [of_cells[cells] for cells in body.cells]
     sums, after = np.zeros(len(states) + 1), fields.strains()
-    sums[-1] = sum(float(own.sum()) for own in volumes)
+    sums[-1] = sum(float(own.sum()) for own in sizes)
     for k, state in enumerate(states):
         fields.move_to(state)
         before, after = after, fields.strains()
-        for law, own, old, new in zip(laws, volumes, before, after, strict=True):
+        for law, own, old, new in zip(laws, sizes, before, after, strict=True):
             if not isinstance(law, Anisotropic | HistoryLaw):
                 modulus = np.asarray(law.secant_modulus(old**2), dtype=float)
                 yielded = modulus < (1 - SOFTENED) * float(law.shear)

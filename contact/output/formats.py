@@ -15,25 +15,17 @@ import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
 
+from contact.mesh.cells import Shape
 from contact.typing import Array
 
 Values = NDArray[Any]
 #: Columns of equal length by name.
 Table = Mapping[str, Values]
 
-#: VTK's number of a kind of cells, by their dimension and their number of nodes.
-KINDS = {(1, 2): 3, (1, 3): 21, (2, 3): 5, (2, 6): 22, (3, 4): 10, (3, 10): 24}
-#: Where VTK has the nodes of cells of degree 2, in dolfinx's numbering.
-ORDER = {
-    (1, 3): [0, 1, 2],
-    (2, 6): [0, 1, 2, 5, 3, 4],
-    (3, 10): [0, 1, 2, 3, 9, 6, 8, 7, 5, 4],
-}
-
 
 @dataclass(frozen=True)
 class Grid:
-    """Simplices with fields, or this rank's share of them.
+    """Cells with fields, or this rank's share of them.
 
     Attributes
     ----------
@@ -41,7 +33,7 @@ class Grid:
         Coordinates of the nodes, shape (n, d), those of the ranks one rank after the other.
     cells
         Nodes of each cell in dolfinx's order, numbered over all ranks, shape (m, nodes a cell).
-    dimension
+    shape
         Of the cells.
     at_points, in_cells
         Fields by name, one row a node or cell.
@@ -49,7 +41,7 @@ class Grid:
 
     points: Array
     cells: NDArray[np.int64]
-    dimension: int
+    shape: Shape
     at_points: Mapping[str, Values]
     in_cells: Mapping[str, Values] = field(default_factory=dict)
 
@@ -64,7 +56,7 @@ def gathered(comm: MPI.Intracomm, share: Grid) -> Grid | None:
     whole = Grid(
         together(share.points),
         together(share.cells),
-        share.dimension,
+        share.shape,
         {name: together(values) for name, values in share.at_points.items()},
         {name: together(values) for name, values in share.in_cells.items()},
     )
@@ -84,16 +76,17 @@ def write_vtu(path: Path, grid: Grid) -> None:
     from vtkmodules.vtkCommonDataModel import vtkCellArray, vtkUnstructuredGrid
     from vtkmodules.vtkIOXML import vtkXMLUnstructuredGridWriter
 
-    kind = (grid.dimension, grid.cells.shape[1])
+    count = grid.cells.shape[1]
+    kind, order = grid.shape.vtk(grid.shape.degree_of(count))
     points = np.zeros((len(grid.points), 3))
     points[:, : grid.points.shape[1]] = grid.points
     places, cells, made = vtkPoints(), vtkCellArray(), vtkUnstructuredGrid()
     places.SetData(numpy_to_vtk(points))
-    nodes = np.ascontiguousarray(grid.cells[:, ORDER.get(kind, range(kind[1]))], dtype=np.int64)
-    ends = np.arange(0, nodes.size + 1, kind[1], dtype=np.int64)
+    nodes = np.ascontiguousarray(grid.cells[:, order], dtype=np.int64)
+    ends = np.arange(0, nodes.size + 1, count, dtype=np.int64)
     cells.SetData(numpy_to_vtkIdTypeArray(ends), numpy_to_vtkIdTypeArray(nodes.ravel()))
     made.SetPoints(places)
-    made.SetCells(KINDS[kind], cells)
+    made.SetCells(kind, cells)
     for data, fields in (
         (made.GetPointData(), grid.at_points),
         (made.GetCellData(), grid.in_cells),

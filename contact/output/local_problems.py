@@ -9,25 +9,23 @@ singularities, and sees half of the error there.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from functools import cache
 from itertools import combinations
+from math import comb
 
 import numpy as np
 from dolfinx import la
 from numpy.typing import NDArray
 
 from contact.body.equilibrium import BodyEquilibrium
+from contact.mesh.cells import INTERVAL, Shape, barycentric, rule, shape_of
 from contact.mesh.domain import Indices
-from contact.mesh.simplices import (
-    barycentric,
-    corners,
-    inverse_jacobians,
-    lagrange,
-    measures,
-    rule,
-)
+from contact.mesh.entities import cell_facets
+from contact.mesh.geometry import geometry_nodes, inverse, jacobians, measures
 from contact.problem.problem import ContactProblem
 from contact.problem.state import State
+from contact.tolerances import ROUNDING
 from contact.typing import Array
 from forms.crystal import VOIGT
 
@@ -36,27 +34,37 @@ CHUNK = 10_000
 
 
 @cache
-def surplus(degree: int, dim: int) -> tuple[Array, Array]:
+def surplus(shape: Shape, degree: int) -> tuple[Array, Array]:
     """Return the cubics without values at nodes at the points of a rule, and their derivatives.
 
-    One an edge, L_i L_j (L_i - L_j), and one a triangle, L_i L_j L_k; shapes (q, n), (q, n, dim).
+    Shapes (q, n), (q, n, dim).
     """
-    at, _ = rule(dim, degree)
-    return cubics(at), _derivatives(at)
+    at, _ = rule(shape, degree)
+    return cubics(shape, at), _derivatives(shape, at)
 
 
-def cubics(at: Array) -> Array:
-    """Return the cubics without values at nodes, shape (q, n), at barycentric coordinates."""
+def cubics(shape: Shape, at: Array) -> Array:
+    """Return the cubics without values at nodes, shape (q, n), at points of the reference cell.
+
+    Of simplices, one an edge, L_i L_j (L_i - L_j), and one a triangle, L_i L_j L_k, in barycentric
+    coordinates. Of others that of an interval along each axis, times quadratics along the others.
+    """
+    if not shape.simplex:
+        return np.concatenate([one for one, _ in _products(shape, at)], axis=1)
+    at = barycentric(at)
     size = range(at.shape[1])
     edges = [at[:, i] * at[:, j] * (at[:, i] - at[:, j]) for i, j in combinations(size, 2)]
     faces = [at[:, i] * at[:, j] * at[:, k] for i, j, k in combinations(size, 3)]
     return np.stack(edges + faces, axis=1)
 
 
-def _derivatives(at: Array) -> Array:
+def _derivatives(shape: Shape, at: Array) -> Array:
     """Return the derivatives of `cubics` by the coordinates of the reference cell."""
+    if not shape.simplex:
+        return np.concatenate([by for _, by in _products(shape, at)], axis=1)
+    at = barycentric(at)
     size = at.shape[1]
-    by = np.zeros((len(at), cubics(at).shape[1], size))
+    by = np.zeros((len(at), size * (size - 1) // 2 + comb(size, 3), size))
     for n, (i, j) in enumerate(combinations(range(size), 2)):
         by[:, n, i] = at[:, j] * (2 * at[:, i] - at[:, j])
         by[:, n, j] = at[:, i] * (at[:, i] - 2 * at[:, j])
@@ -65,6 +73,32 @@ def _derivatives(at: Array) -> Array:
         for i in face:
             by[:, n, i] = np.prod(at[:, [k for k in face if k != i]], axis=1)
     return by[..., 1:] - by[..., :1]
+
+
+def _products(shape: Shape, at: Array) -> Iterator[tuple[Array, Array]]:
+    """Yield the functions along each axis, (q, n), and their derivatives, (q, n, dim)."""
+    x, dim = at[:, :, None], shape.dim
+    cubic = (x * (1 - x) * (1 - 2 * x), 1 - 6 * x + 6 * x**2)
+    quadratic = (INTERVAL.lagrange(2, at.reshape(-1, 1)), INTERVAL.gradients(2, at.reshape(-1, 1)))
+    smooth = [np.asarray(values).reshape(len(at), dim, 3) for values in quadratic]
+    for axis in range(dim):
+        order = [list(part) for part in (cubic, smooth)]
+        yield (
+            _product(order, axis),
+            np.stack([_product(order, axis, along) for along in range(dim)], axis=-1),
+        )
+
+
+def _product(factors: list[list[Array]], axis: int, along: int = -1) -> Array:
+    """Return products of a cubic along one axis and quadratics along others, shape (q, n).
+
+    Of the factor that belongs to the axis `along` the derivative is taken.
+    """
+    found = np.ones((len(factors[0][0]), 1))
+    for k in range(factors[0][0].shape[1]):
+        one = factors[k != axis][k == along][:, k]
+        found = (found[:, :, None] * one[:, None, :]).reshape(len(found), -1)
+    return found
 
 
 class LocalProblems:
@@ -81,26 +115,24 @@ class LocalProblems:
 
     def __init__(self, problem: ContactProblem, state: State, flux: Array) -> None:
         body = self._body = problem.equilibrium
-        self._flux, self._corners = flux, corners(body.domain)
-        self._inverse, self._det = inverse_jacobians(self._corners)
-        first = -self._inverse.sum(axis=1, keepdims=True)
-        #: Gradients of the barycentric coordinates: of the facets opposite, inner normals.
-        self._gradients = np.concatenate([first, self._inverse], axis=1)
-        d = body.dim
-        layout = body.space.dofmap.dof_layout
+        self._flux, self._nodes = flux, geometry_nodes(body.domain)
+        shape = self._shape = shape_of(body.domain.mesh)
         #: The nodes of each facet, as nodes of its cell.
-        self._closures = np.array([layout.entity_closure_dofs(d - 1, i) for i in range(d + 1)])
+        self._closures = shape.facet_nodes(2)
         self._loads = _loads(body, state.time)
         self._through, self._held = self._facets(problem, state)
 
     def _normal_flux(self) -> Array:
-        """Return the flux out of each cell at the nodes of its facets, (cells, d + 1, m, b).
+        """Return the flux out of each cell at the nodes of its facets, (cells, facets, m, b).
 
         That of the charge is -D . n, as it works on the potential.
         """
-        d, flux = self._body.dim, self._flux[:, self._closures]
-        lengths = np.linalg.norm(self._gradients, axis=2, keepdims=True)
-        normal = (-self._gradients / lengths)[:, :, None]
+        d, shape, flux = self._body.dim, self._shape, self._flux[:, self._closures]
+        jacobian = jacobians(shape, self._nodes, shape.nodes(2))
+        every = np.broadcast_to(jacobian, (*self._flux.shape[:2], d, d))[:, self._closures]
+        # Along the gradient of the coordinate that grows out of the facet.
+        normal = np.einsum("fr,cfmrd->cfmd", shape.facet_normals, inverse(every))
+        normal /= np.linalg.norm(normal, axis=-1, keepdims=True)
         found = np.zeros((*flux.shape[:3], self._body.block_size))
         for m, (i, j) in enumerate(VOIGT):
             if i < d and j < d:
@@ -126,7 +158,7 @@ class LocalProblems:
         out = self._normal_flux()
         topology = mesh.topology
         topology.create_connectivity(d, d - 1)
-        facets = topology.connectivity(d, d - 1).array.reshape(-1, d + 1)[: len(self._flux)]
+        facets = cell_facets(mesh)[: len(self._flux)]
         ordered = np.take_along_axis(out, order[..., None], axis=2)
         ordered = ordered.reshape(*facets.shape, int(np.prod(out.shape[2:])))
         total = la.vector(topology.index_map(d - 1), ordered.shape[2] + 1)
@@ -167,21 +199,23 @@ class LocalProblems:
         whole = np.zeros((len(cells), *2 * (9 if self._body.piezoelectric else 6,)))
         whole[:, : moduli.shape[1], : moduli.shape[2]] = moduli
         found = np.zeros(len(cells))
-        for first in range(0, len(cells), CHUNK):  # a rank may have none
-            piece = slice(first, first + CHUNK)
+        chunk = CHUNK if self._shape.simplex else CHUNK // 10
+        for first in range(0, len(cells), chunk):  # a rank may have none
+            piece = slice(first, first + chunk)
             found[piece] = self._solved(cells[piece], whole[piece])
         return found
 
     def _solved(self, cells: Indices, moduli: Array) -> Array:
-        body, d = self._body, self._body.dim
+        body, d, shape, of = self._body, self._body.dim, self._shape, self._nodes[cells]
         # Strains of the test functions have these components alone.
         kept = [0, 1, 2, 5] if d == 2 else list(range(6))
         kept += [6, 7, 8][:d] * body.piezoelectric
         moduli = moduli[:, kept][:, :, kept]
-        degree = 4 + body.domain.revolved
-        (at, weights), (values, derivatives) = rule(d, degree), surplus(degree, d)
-        volumes = measures(body.domain, self._corners[cells], at, weights, self._det[cells])
-        gradients = np.einsum("qak,ckj->cqaj", derivatives, self._inverse[cells], optimize=True)
+        degree = (4 if shape.simplex else 6) + body.domain.revolved
+        (at, weights), (values, derivatives) = rule(shape, degree), surplus(shape, degree)
+        volumes = measures(body.domain, shape, of, at, weights)
+        back = np.broadcast_to(inverse(jacobians(shape, of, at)), (len(of), len(at), d, d))
+        gradients = derivatives @ back
         strains = np.zeros((*gradients.shape[:3], body.block_size, len(kept)))
         for m, component in enumerate(kept):
             if component >= 6:
@@ -194,26 +228,24 @@ class LocalProblems:
                 strains[..., i, m] = gradients[..., j] / np.sqrt(2)
                 strains[..., j, m] = gradients[..., i] / np.sqrt(2)
             elif body.domain.revolved and i == j:
-                strains[..., 0, m] = values / (self._corners[cells][..., 0] @ at.T)[..., None]
+                strains[..., 0, m] = values / (of[..., 0] @ shape.lagrange(1, at).T)[..., None]
         count = len(cells)
         strains = strains.reshape(count, len(weights), -1, len(kept)).swapaxes(2, 3)
         weighted = (volumes[:, :, None, None] * strains).reshape(count, -1, strains.shape[3])
         fluxes = moduli[:, None] @ strains
         matrix = weighted.swapaxes(1, 2) @ fluxes.reshape(weighted.shape)
-        known = (lagrange(2, at) @ self._flux[cells])[..., kept].reshape(count, -1, 1)
+        known = (shape.lagrange(2, at) @ self._flux[cells])[..., kept].reshape(count, -1, 1)
         right = self._loads[cells] - (weighted.swapaxes(1, 2) @ known)[..., 0].reshape(
             count, -1, body.block_size
         )
         held = np.zeros(right.shape, dtype=bool)
-        at, weights = rule(d - 1, 5)
-        for facet in range(d + 1):
-            there = np.insert(at, facet, 0.0, axis=1)
-            values = cubics(there)
-            size = np.linalg.norm(self._gradients[cells, facet], axis=1) * self._det[cells]
-            areas = measures(body.domain, self._corners[cells], there, weights, size)
-            flux = lagrange(2, at) @ self._through[cells, facet]
+        at, weights = rule(shape.facet, 5)
+        for facet, ends in enumerate(shape.facet_corners):
+            values = cubics(shape, shape.on_facet(facet, at))
+            areas = measures(body.domain, shape.facet, of[:, ends], at, weights)
+            flux = shape.facet.lagrange(2, at) @ self._through[cells, facet]
             right += values.T @ (areas[..., None] * flux)
-            acts = np.abs(values).max(axis=0) > 0
+            acts = np.abs(values).max(axis=0) > ROUNDING
             held |= acts[None, :, None] & self._held[cells, facet][:, None]
         if body.piezoelectric:
             held[..., d] |= (moduli[:, -1, -1] == 0)[:, None]
@@ -232,7 +264,7 @@ def _loads(body: BodyEquilibrium, time: float) -> Array:
     values = loads.at(time).reshape(-1, body.block_size)
     points = space.sub(0).element.basix_element.points
     nodes = space.dofmap.list[: body.domain.mesh.topology.index_map(body.dim).size_local]
-    found = cubics(barycentric(points)).T @ values[nodes]
+    found = cubics(shape_of(space.mesh), points).T @ values[nodes]
     if body.piezoelectric:
         # The potential is scaled there, and its test function negated.
         found[..., body.dim] /= -body.phi_scale

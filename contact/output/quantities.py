@@ -77,7 +77,7 @@ _RUN = (
     ),
     Quantity("dofs", "", "Number of unknowns.", lambda r: r.problem.equilibrium.layout.unknowns),
     Quantity(
-        "cells", "", "Number of triangles or tetrahedra.",
+        "cells", "", "Number of cells of the mesh.",
         lambda r: r.problem.domain.mesh.topology.index_map(r.problem.dim).size_global,
     ),
     Quantity(

@@ -11,6 +11,7 @@ from contact.interface.entries import Entry
 from contact.interface.mortar.coupling import Coupling
 from contact.interface.mortar.lumping import Lumping
 from contact.interface.mortar.surface import surface_of
+from contact.mesh.cells import shape_of
 from contact.mesh.entities import owned_among
 from contact.output.formats import Grid, Table
 from contact.output.quantities import AGAINST, NODES, SURFACE, values_of
@@ -55,7 +56,7 @@ def contact_surface(solution: Solution) -> Grid:
         none = np.nan if values.dtype.kind == "f" else -1
         fields[name] = np.full((len(known), *values.shape[1:]), none, dtype=values.dtype)
         fields[name][rows] = values
-    return Grid(points, cells.reshape(facets.shape), d - 1, fields)
+    return Grid(points, cells.reshape(facets.shape), shape_of(problem.domain.mesh).facet, fields)
 
 
 def _at_nodes(solution: Solution, nodes: NDArray[np.int64]) -> tuple[Array, Array]:
@@ -108,7 +109,9 @@ def opposite_surface(solution: Solution) -> Grid | None:
     if not sides:
         return None
     fields = {name: np.concatenate([side[name] for side in sides]) for name in sides[0]}
-    return Grid(fields.pop("points"), np.concatenate(cells), d - 1, fields)
+    return Grid(
+        fields.pop("points"), np.concatenate(cells), shape_of(problem.domain.mesh).facet, fields
+    )
 
 
 def _acting(

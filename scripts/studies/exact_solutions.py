@@ -56,7 +56,9 @@ def smooth(dim: int) -> list[Callable[[Any], Any]]:
     return parts
 
 
-def manufactured(dim: int, degree: int, n: int, law: Hencky = HENCKY) -> ContactProblem:
+def manufactured(
+    dim: int, degree: int, n: int, law: Hencky = HENCKY, cell: str | None = None
+) -> ContactProblem:
     """Return a Hencky body with the displacement `smooth`, loaded at the bottom. Collective.
 
     Parameters
@@ -67,9 +69,11 @@ def manufactured(dim: int, degree: int, n: int, law: Hencky = HENCKY) -> Contact
         Cells along each edge of the unit square or cube.
     law
         The material.
+    cell
+        Shape of the cells; by default triangles or tetrahedra.
     """
-    make = rectangle if dim == 2 else box
-    domain = make(MPI.COMM_WORLD, [0.0] * dim, [1.0] * dim, [n] * dim)
+    make, usual = (rectangle, "triangle") if dim == 2 else (box, "tetrahedron")
+    domain = make(MPI.COMM_WORLD, [0.0] * dim, [1.0] * dim, [n] * dim, cell=cell or usual)
     sigma = stress(law, strain(exact(dim)(ufl.SpatialCoordinate(domain.mesh))))
     element = basix.ufl.element("Lagrange", domain.mesh.topology.cell_name(), degree + 2)
     space = fem.functionspace(domain.mesh, element)

@@ -82,7 +82,7 @@ def test_a_mesh_file_belongs_to_the_folder_of_the_case(bar):
     lines = [line for line in text.splitlines() if not line.startswith(("origin", "size", "cells"))]
     start, stop = lines.index("[mesh.parts.loaded]"), lines.index("[space]")
     bar.write_text("\n".join(lines[:start] + lines[stop:]))
-    with pytest.raises(InputError, match=r"mesh\.file: no file .*body\.msh; accepted: a Gmsh file"):
+    with pytest.raises(InputError, match=r"mesh\.file: no file .*body\.msh; accepted: a mesh file"):
         load_case(bar)
     (bar.parent / "body.msh").touch()
     assert load_case(bar).mesh.file == str(bar.parent / "body.msh")

@@ -7,8 +7,9 @@ import numpy as np
 import pytest
 
 from contact.case.file import load_case
-from contact.cli.check import mean_ratio
+from contact.cli.check import mean_ratio, quality
 from contact.cli.main import BAD_INPUT, CONVERGED, main
+from contact.mesh.cells import HEXAHEDRON, QUADRILATERAL
 from meshes import write
 from scripts.cases import CASES
 
@@ -101,6 +102,22 @@ def test_shapes_of_cells() -> None:
     right = np.array([[[0, 0], [1, 0], [0, 1.0]]])
     for corners, ratio in ((triangle, 1.0), (tetrahedron, 1.0), (right, np.sqrt(3) / 2)):
         assert mean_ratio(corners) == pytest.approx([ratio], rel=1e-12)
+
+
+def test_shapes_of_quadrilaterals_and_hexahedra() -> None:
+    """1 for squares and cubes in any size; by hand for a slab, a rhombus, a kite's worst corner."""
+    square, cube = (shape.nodes(1) for shape in (QUADRILATERAL, HEXAHEDRON))
+    rhombus = square @ np.array([[1.0, 0.0], [0.5, np.sqrt(0.75)]])
+    kite = square.copy()
+    kite[3] = 0.75, 0.75  # its edges are 0.75 and 0.25 there, at a blunt angle
+    for shape, corners, ratio in (
+        (QUADRILATERAL, 3 * square, 1.0),
+        (HEXAHEDRON, 0.1 * cube, 1.0),
+        (HEXAHEDRON, cube * [1, 1, 8], 3 * 8 ** (2 / 3) / 66),
+        (QUADRILATERAL, rhombus, np.sqrt(0.75)),
+        (QUADRILATERAL, kite, 2 * (0.75**2 - 0.25**2) / (2 * (0.75**2 + 0.25**2))),
+    ):
+        assert quality(shape, corners[None]) == pytest.approx([ratio], rel=1e-12)
 
 
 @pytest.mark.parametrize(

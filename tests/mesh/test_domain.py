@@ -201,9 +201,11 @@ def test_wrong_parts_of_a_dolfinx_mesh_are_refused():
     inside = np.arange(mesh.topology.index_map(1).size_local, dtype=np.int32)
     with pytest.raises(InputError, match="'all' contains interior facets"):
         from_mesh(mesh, {"all": inside})
-    squares = dmesh.create_unit_square(COMM, 4, 4, cell_type=dmesh.CellType.quadrilateral)
-    with pytest.raises(InputError, match="triangles in the plane or of tetrahedra"):
-        from_mesh(squares, {})
+    prisms = dmesh.create_box(
+        COMM, [(0.0,) * 3, (1.0,) * 3], (2, 2, 2), cell_type=dmesh.CellType.prism
+    )
+    with pytest.raises(InputError, match="quadrilaterals in the plane, or of tetrahedra or hexah"):
+        from_mesh(prisms, {})
 
 
 @pytest.mark.parallel

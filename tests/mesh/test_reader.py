@@ -36,18 +36,21 @@ GOOD = {
     "triangle.msh": (2, {"bottom": 1.0, "top": 1.0}),  # one cell, stored at z = 2
     "overlap.msh": (2, {"bottom": 1.0, "top": 1.0, "all": 3.0}),
     "regions.msh": (2, {"bottom": 1.0, "top": 1.0}),  # cells in two groups, and twice in one
+    "quadrangle.msh": (2, {"bottom": 1.0, "top": 1.0}),
+    "second-order.msh": (2, {"bottom": 1.0, "top": 2**0.5}),  # nodes in the middles of edges
     "mixed.msh": (2, {"bottom": 1.0, "top": 1.0}),  # two groups in one elementary entity
 }
 BAD = {
-    "line.msh": "no triangles or tetrahedra",
-    "no-cells.msh": "no triangles or tetrahedra",
-    "empty.msh": "no triangles or tetrahedra",
+    "line.msh": "no triangles, quadrilaterals, tetrahedra or hexahedra",
+    "no-cells.msh": "no triangles, quadrilaterals, tetrahedra or hexahedra",
+    "empty.msh": "no triangles, quadrilaterals, tetrahedra or hexahedra",
     "no-groups.msh": "no physical groups of curves",
     "no-boundary.msh": "no physical groups of curves",
     "degenerate.msh": r"1 cell\(s\) of zero volume, the first near \(0.5, 0\)",
     "folded.msh": "cells overlap",
-    "quadrangle.msh": "'Quadrilateral 4', of another shape",
-    "second-order.msh": "'Triangle 6', of curved geometry",
+    "two-kinds.msh": "'Triangle 3' beside 'Quadrilateral 4'; accepted are cells of one kind",
+    "arrow.msh": r"1 cell\(s\) with a corner of 180 degrees or more",
+    "second-order.msh": r"1 cell\(s\) of curved geometry.*accepted are straight edges",
     "surface.msh": "surface in 3-D",
     "text.msh": "no Gmsh .msh file",
     "cut.msh": "it is cut off",

@@ -33,6 +33,8 @@ from tests.problems.revolution import Tube
 KNOWN = {
     "hencky": (lambda n, p: manufactured(2, p, n), exact(2), (16, 8)),
     "solid": (lambda n, p: manufactured(3, p, n), exact(3), (6, 3)),
+    "quadrilaterals": (lambda n, p: manufactured(2, p, n, cell="quadrilateral"), exact(2), (16, 8)),
+    "hexahedra": (lambda n, p: manufactured(3, p, n, cell="hexahedron"), exact(3), (6, 3)),
     "tube": (lambda n, p: Tube().problem(n, p), Tube().displacement, (16, 8)),
 }
 

@@ -10,6 +10,7 @@ import ufl
 from dolfinx import mesh as dmesh
 from mpi4py import MPI
 
+from contact.mesh.cells import Shape
 from contact.mesh.domain import Domain, from_mesh
 
 
@@ -31,6 +32,8 @@ class Blocks:
         Angle by which both are turned (degrees).
     gap
         Between them.
+    cell
+        Shape of the cells; by default triangles or tetrahedra.
     """
 
     dim: int = 2
@@ -40,13 +43,19 @@ class Blocks:
     grading: float = 1.0
     turn: float = 0.0
     gap: float = 0.0
+    cell: str = ""
+
+    @property
+    def shape(self) -> Shape:
+        """The shape of the cells."""
+        return Shape(self.cell or {2: "triangle", 3: "tetrahedron"}[self.dim])
 
     def domain(self, comm: MPI.Intracomm) -> Domain:
         """Return the mesh with the parts `top`, `under`, `over`, `bottom` and sides."""
         points, cells = self._cells()
-        name = "triangle" if self.dim == 2 else "tetrahedron"
+        name = self.shape.name
         element = basix.ufl.element("Lagrange", name, 1, shape=(self.dim,), dtype=np.float64)
-        first = cells if comm.rank == 0 else np.zeros((0, self.dim + 1), dtype=np.int64)
+        first = cells if comm.rank == 0 else np.zeros((0, self.shape.corners), dtype=np.int64)
         x = points if comm.rank == 0 else np.zeros((0, self.dim))
         mesh = dmesh.create_mesh(comm, cells=first, x=x, e=ufl.Mesh(element))
         d = self.dim
@@ -89,7 +98,7 @@ class Blocks:
         _, first, number = np.unique(
             np.round(points, 9), axis=0, return_index=True, return_inverse=True
         )
-        name = "triangle" if self.dim == 2 else "tetrahedron"
+        name = self.shape.name
         element = basix.ufl.element("Lagrange", name, 1, shape=(self.dim,), dtype=np.float64)
         cells = number.reshape(-1)[cells]
         mesh = dmesh.create_mesh(comm, cells=cells, x=points[first], e=ufl.Mesh(element))
@@ -129,6 +138,8 @@ class Blocks:
         i = np.arange((n + 1) ** d).reshape((n + 1,) * d)
         if d == 2:
             a, b, c, e = (p.ravel() for p in (i[:-1, :-1], i[1:, :-1], i[:-1, 1:], i[1:, 1:]))
+            if not self.shape.simplex:
+                return x, np.stack([a, b, c, e], 1)
             return x, np.concatenate([np.stack([a, b, e], 1), np.stack([a, e, c], 1)])
         corner = {
             (p, q, r): i[p : n + p, q : n + q, r : n + r].ravel()
@@ -136,6 +147,9 @@ class Blocks:
             for q in (0, 1)
             for r in (0, 1)
         }
+        if not self.shape.simplex:
+            order = [(k & 1, k >> 1 & 1, k >> 2) for k in range(8)]
+            return x, np.stack([corner[place] for place in order], 1)
         paths = [(0, 1, 2), (0, 2, 1), (1, 0, 2), (1, 2, 0), (2, 0, 1), (2, 1, 0)]
         cells = []
         for path in paths:

@@ -26,8 +26,15 @@ from tests.problems.blocks import Blocks, squares
 from tests.problems.mechanics import constant
 
 COMM = MPI.COMM_WORLD
-KINDS = [(2, 1), (2, 2), (3, 1), (3, 2)]
-NAMES = [f"{d}d-P{p}" for d, p in KINDS]
+KINDS = [
+    (2, 1, "triangle"),
+    (2, 2, "triangle"),
+    (2, 1, "quadrilateral"),
+    (2, 2, "quadrilateral"),
+    (3, 1, "tetrahedron"),
+    (3, 2, "tetrahedron"),
+]
+NAMES = [f"{cell}-{degree}" for _, degree, cell in KINDS]
 SIDES = {2: ("left", "right"), 3: ("left", "right", "front", "back")}
 NOTHING = GapFunction(lambda points: np.zeros(len(points)))
 
@@ -72,10 +79,12 @@ PAIRS = [("under", "over"), ("over", "under")]
 @pytest.mark.parallel
 @pytest.mark.parametrize("condense", [True, False], ids=["dense", "sparse"])
 @pytest.mark.parametrize("pair", PAIRS, ids=["upper", "lower"])
-@pytest.mark.parametrize(("dim", "degree"), KINDS, ids=NAMES)
-def test_constant_pressure(dim: int, degree: int, pair: Sequence[str], condense: bool) -> None:
+@pytest.mark.parametrize(("dim", "degree", "cell"), KINDS, ids=NAMES)
+def test_constant_pressure(
+    dim: int, degree: int, cell: str, pair: Sequence[str], condense: bool
+) -> None:
     """A hundred times stiffer below, either side the slave: the pressure is that on top."""
-    domain = blocks(dim, grading=1.4).domain(COMM)
+    domain = blocks(dim, grading=1.4, cell=cell).domain(COMM)
     zero = constant(0.0, dim)
     fixed = [
         Fixed(part, [zero if i == axis else None for i in range(dim)])
@@ -117,12 +126,12 @@ def test_constant_pressure_on_discs(degree: int, pair: Sequence[str]) -> None:
 @pytest.mark.parallel
 @pytest.mark.parametrize("turn", [0.0, 30.0], ids=["straight", "turned"])
 @pytest.mark.parametrize("pair", PAIRS, ids=["upper", "lower"])
-@pytest.mark.parametrize(("dim", "degree"), KINDS, ids=NAMES)
+@pytest.mark.parametrize(("dim", "degree", "cell"), KINDS, ids=NAMES)
 def test_constant_stress_with_shear(
-    dim: int, degree: int, pair: Sequence[str], turn: float
+    dim: int, degree: int, cell: str, pair: Sequence[str], turn: float
 ) -> None:
     """Under full stick two bodies carry any constant stress, as one body does."""
-    given = blocks(dim, turn=turn)
+    given = blocks(dim, turn=turn, cell=cell)
     law, axes = Linear(1.0, 0.3), given.axes
     strain = np.diag([0.002, 0.001, -0.01][-dim:]) + 0.002 * (1 - np.eye(dim))
     strain = axes @ strain @ axes.T
@@ -144,12 +153,12 @@ def test_constant_stress_with_shear(
 
 @pytest.mark.parallel
 @pytest.mark.parametrize("pair", PAIRS, ids=["upper", "lower"])
-@pytest.mark.parametrize(("dim", "degree"), KINDS, ids=NAMES)
+@pytest.mark.parametrize(("dim", "degree", "cell"), KINDS, ids=NAMES)
 def test_a_rim_that_is_held_carries_no_multiplier(
-    dim: int, degree: int, pair: Sequence[str]
+    dim: int, degree: int, cell: str, pair: Sequence[str]
 ) -> None:
     """All of the outer boundary follows a linear field: the functions of the rim go inwards."""
-    given = blocks(dim)
+    given = blocks(dim, cell=cell)
     law = Linear(1.0, 0.3)
     strain = np.diag([0.002, 0.001, -0.01][-dim:]) + 0.002 * (1 - np.eye(dim))
     linear = [Linearly(row) for row in strain]
@@ -163,10 +172,10 @@ def test_a_rim_that_is_held_carries_no_multiplier(
 
 
 @pytest.mark.parallel
-@pytest.mark.parametrize(("dim", "degree"), KINDS, ids=NAMES)
-def test_a_rim_that_is_held_along_the_surface(dim: int, degree: int) -> None:
+@pytest.mark.parametrize(("dim", "degree", "cell"), KINDS, ids=NAMES)
+def test_a_rim_that_is_held_along_the_surface(dim: int, degree: int, cell: str) -> None:
     """Friction acts there on the other body, which is not held: a constant shear passes."""
-    given = blocks(dim)
+    given = blocks(dim, cell=cell)
     law = Linear(1.0, 0.3)
     strain = np.diag([0.002, 0.001, -0.01][-dim:]) + 0.002 * (1 - np.eye(dim))
     stress = (law.bulk - 2 * law.shear / 3) * np.trace(strain) * np.eye(dim)
@@ -186,11 +195,11 @@ def test_a_rim_that_is_held_along_the_surface(dim: int, degree: int) -> None:
     np.testing.assert_allclose(vectors, -problem.nodes.normal @ stress, rtol=0, atol=1e-11)
 
 
-@pytest.mark.parametrize(("dim", "degree"), KINDS, ids=NAMES)
-def test_matching_meshes_are_one_body(dim: int, degree: int) -> None:
+@pytest.mark.parametrize(("dim", "degree", "cell"), KINDS, ids=NAMES)
+def test_matching_meshes_are_one_body(dim: int, degree: int, cell: str) -> None:
     """Tied by friction along matching meshes, two blocks bend as one does."""
     n = 5 if dim == 2 else 2
-    given = Blocks(dim, n, n, jitter=0.0)
+    given = Blocks(dim, n, n, jitter=0.0, cell=cell)
     zero = constant(0.0, dim)
     load = Load("top", constants(np.array([3e-4, *[0.0] * (dim - 2), -0.01])))
     body = Body(Linear(1.0, 0.3), [Fixed("bottom", [zero] * dim)], [load])

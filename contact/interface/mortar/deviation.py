@@ -21,6 +21,7 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 from scipy import sparse
 
+from contact.mesh.cells import facet_of
 from contact.typing import Array
 
 #: Least cosine between the normals of a surface and of its facets; corners of bodies have less.
@@ -38,7 +39,7 @@ Numbers = NDArray[np.intp]
 
 def pairs_of(corners: int) -> list[tuple[int, int]]:
     """Return the edges of a facet, as pairs of its corners."""
-    return list(combinations(range(corners), 2))
+    return facet_of(corners).edges if corners == 4 else list(combinations(range(corners), 2))
 
 
 def deviations(
@@ -53,9 +54,9 @@ def deviations(
     Parameters
     ----------
     names
-        Global numbers of the corners, shape (f, d).
+        Global numbers of the corners, shape (f, c).
     corners, normal
-        Their coordinates, shape (f, d, d), and the facets' normals, shape (f, d).
+        Their coordinates, shape (f, c, d), and the facets' normals, shape (f, d).
     comm
         Communicator; the facets are those of this rank.
     levels
@@ -104,20 +105,26 @@ def _deviations(names: NDArray[np.int64], corners: Array, normal: Array, levels:
 
 
 def _weights(corners: Array) -> Array:
-    """Return the weights of facets at their corners, shape (f, d)."""
-    d = corners.shape[1]
-    around = [[k for k in range(d) if k != c] for c in range(d)]
+    """Return the weights of facets at their corners, shape (f, c)."""
+    count, edges = corners.shape[1], pairs_of(corners.shape[1])
+    around = [[a + b - c for a, b in edges if c in (a, b)] for c in range(count)]
     sides = [corners[:, others] - corners[:, [c]] for c, others in enumerate(around)]
     lengths = np.stack([np.linalg.norm(side, axis=2).prod(axis=1) for side in sides], axis=1)
-    if d == 2:
+    if count == 2:
         return np.asarray(1 / lengths)
-    area = np.linalg.norm(np.cross(sides[0][:, 0], sides[0][:, 1]), axis=1)
-    return np.asarray(area[:, None] / lengths**2)
+    if count == 3:
+        area = np.linalg.norm(np.cross(sides[0][:, 0], sides[0][:, 1]), axis=1)[:, None]
+    else:
+        crossed = [np.linalg.norm(np.cross(s[:, 0], s[:, 1]), axis=1) for s in sides]
+        area = np.stack(crossed, axis=1)
+    return np.asarray(area / lengths**2)
 
 
 def _around(place: Numbers, count: int) -> tuple[Numbers, NDArray[np.bool_]]:
     """Return vertices with those up to two edges away, shape (2, p), and which are neighbours."""
-    ends = np.concatenate([place[:, pair] for pair in pairs_of(place.shape[1])])
+    # All corners of a facet are neighbours, be they opposite to each other.
+    pairs = combinations(range(place.shape[1]), 2)
+    ends = np.concatenate([place[:, pair] for pair in pairs])
     rows, columns = np.concatenate([ends, ends[:, ::-1]]).T
     beside = sparse.csr_array((np.ones(rows.size), (rows, columns)), shape=(count, count))
     both = sparse.coo_array(beside @ beside + 1e6 * beside)

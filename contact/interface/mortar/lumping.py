@@ -19,9 +19,9 @@ from scipy import sparse
 from contact.interface.mortar.surface import (
     Surface,
     basis,
+    densities,
     dual_basis_transformation,
     rule,
-    size_of,
 )
 from contact.typing import Array
 
@@ -33,7 +33,9 @@ def integrals(surface: Surface) -> Array:
     functions = basis(places, surface.degree) @ dual_basis_transformation(corners, surface.degree).T
     facets = np.repeat(np.arange(surface.count), weights.size)
     turns = surface.turn(facets, np.tile(places, (surface.count, 1))).reshape(-1, weights.size)
-    return np.asarray(size_of(surface.corners)[:, None] * ((turns * weights) @ functions))
+    size = densities(surface.corners, places)
+    uneven = size / size[:, :1]
+    return np.asarray(size[:, :1] * ((uneven * turns * weights) @ functions))
 
 
 def coefficients(place: NDArray[np.intp], count: int, change: Array) -> sparse.csr_array:

@@ -1,8 +1,10 @@
 """The facets of a part of the boundary as plain arrays, on this rank or on all, and their basis.
 
-Points on facets are given by barycentric coordinates, shape (p, c): c = 2 corners of an edge, 3 of
-a triangle. Nodes are the corners, then for degree 2 the middle of the edge, or of the triangle's
-edges, the first of them opposite to the first corner.
+Points on facets are given by the functions of degree 1 of their c corners, shape (p, c): by
+barycentric coordinates on edges and triangles, bilinear functions on quadrilaterals. Nodes are
+those of `contact.mesh.cells`: the corners, then for degree 2 the middle of the edge, or of the
+facet's edges (of a triangle the first of them opposite to the first corner), and the middle of a
+quadrilateral.
 """
 
 from __future__ import annotations
@@ -11,7 +13,6 @@ import math
 from dataclasses import dataclass, fields, replace
 from typing import Any
 
-import basix
 import numpy as np
 from dolfinx import fem
 from mpi4py import MPI
@@ -19,8 +20,11 @@ from numpy.typing import NDArray
 
 from contact import _compat
 from contact.interface.mortar.deviation import deviations, pairs_of
+from contact.mesh.cells import QUADRILATERAL, facet_of, shape_of
+from contact.mesh.cells import rule as cell_rule
 from contact.mesh.domain import Domain
 from contact.mesh.entities import cells_at
+from contact.mesh.geometry import jacobians, sizes
 from contact.typing import Array
 
 #: Share of each mid-edge function that goes to the two vertices of a quadratic triangle.
@@ -41,11 +45,18 @@ def basis(barycentric: Array, degree: int) -> Array:
     """Return the basis functions at points, shape (p, nodes)."""
     if degree == 1:
         return barycentric
+    if barycentric.shape[1] == 4:
+        return QUADRILATERAL.lagrange(degree, _reference(barycentric))
     corners = barycentric * (2 * barycentric - 1)
     if barycentric.shape[1] == 2:
         return np.column_stack([corners, 4 * barycentric.prod(axis=1)])
     others = [[1, 2], [2, 0], [0, 1]]
     return np.column_stack([corners, *(4 * barycentric[:, pair].prod(axis=1) for pair in others)])
+
+
+def _reference(functions: Array) -> Array:
+    """Return points of a quadrilateral, (p, 2), given by the functions of its corners."""
+    return np.column_stack([functions[:, [1, 3]].sum(axis=1), functions[:, [2, 3]].sum(axis=1)])
 
 
 def dual_basis_transformation(corners: int, degree: int) -> Array:
@@ -56,7 +67,7 @@ def dual_basis_transformation(corners: int, degree: int) -> Array:
     B421); else A is the identity.
     """
     if (corners, degree) != (3, 2):
-        return np.eye(degree + 1 if corners == 2 else 3)
+        return np.eye(len(facet_of(corners).nodes(degree)))
     change = np.diag([1.0] * 3 + [1 - 2 * ALPHA] * 3)
     change[:3, 3:] = ALPHA * (1 - np.eye(3))
     return change
@@ -68,10 +79,13 @@ def rule(corners: int, degree: int) -> tuple[Array, Array]:
     Parameters
     ----------
     corners
-        2 for an edge, 3 for a triangle.
+        2 for an edge, 3 for a triangle, 4 for a quadrilateral.
     degree
         2 or 4.
     """
+    if corners == 4:
+        at, weights = cell_rule(QUADRILATERAL, degree)
+        return QUADRILATERAL.lagrange(1, at), weights
     if corners == 2:
         points, weights = np.polynomial.legendre.leggauss(degree // 2 + 1)
         return np.column_stack([1 - points, 1 + points]) / 2, weights / 2
@@ -80,8 +94,23 @@ def rule(corners: int, degree: int) -> tuple[Array, Array]:
     return np.concatenate(places), np.repeat([weight for _, weight in ORBITS[degree]], 3)
 
 
+def densities(corners: Array, places: Array) -> Array:
+    """Return the size of facets for that of the whole reference facet at points, (f, q) or (f, 1).
+
+    Parameters
+    ----------
+    corners
+        Coordinates of the corners, shape (f, c, d).
+    places
+        Points, shape (q, c).
+    """
+    if corners.shape[1] < 4:
+        return size_of(corners)[:, None]
+    return sizes(QUADRILATERAL, corners, _reference(places))
+
+
 def size_of(corners: Array) -> Array:
-    """Return the lengths or areas of facets given by their corners, shape (f, d, d) -> (f,)."""
+    """Return the lengths or areas of edges or triangles by their corners, (f, d, d) -> (f,)."""
     edges = corners[:, 1:] - corners[:, :1]
     gram = np.einsum("fid,fjd->fij", edges, edges)
     return np.asarray(np.sqrt(np.linalg.det(gram)) / math.factorial(edges.shape[1]))
@@ -96,9 +125,9 @@ class Surface:
     nodes
         Global numbers of the nodes, shape (f, k).
     corners
-        Coordinates of the corners, shape (f, d, d) (length).
+        Coordinates of the corners, shape (f, c, d) (length).
     normal
-        Unit normals out of the body, shape (f, d).
+        Unit normals out of the body, shape (f, d); in the middle, where a facet is not plane.
     deviation
         Of the curved surface from them (`contact.interface.mortar.deviation`), shape (f, edges).
     degree
@@ -168,18 +197,20 @@ class Surface:
         """
         if not self.follows:
             return np.zeros(barycentric.shape[:2])
-        edges = pairs_of(self.corners.shape[1])
-        products = np.stack([barycentric[..., i] * barycentric[..., j] for i, j in edges], axis=2)
+        corners = self.corners.shape[1]
+        pairs = [(barycentric[..., i], barycentric[..., j]) for i, j in pairs_of(corners)]
+        products = np.stack([one * other for one, other in pairs], axis=2)
+        if corners == 4:
+            # Between opposite edges the curves of both, in proportion.
+            along = np.stack([one + other for one, other in pairs], axis=2)
+            products /= np.where(along > 0, along, 1.0)
         return np.asarray(np.einsum("pqe,pe->pq", products, self.deviation[facets]))
 
     @property
     def node_deviations(self) -> Array:
         """From the nodes of each facet to the curved surface, shape (f, k, d) (length)."""
-        corners = self.corners.shape[1]
-        places = np.eye(corners)
-        if self.degree == 2:
-            middles = [[0.5, 0.5]] if corners == 2 else (1 - places) / 2
-            places = np.concatenate([places, middles])
+        shape = facet_of(self.corners.shape[1])
+        places = shape.lagrange(1, shape.nodes(self.degree))
         heights = self.height(
             np.arange(self.count), np.broadcast_to(places, (self.count, *places.shape))
         )
@@ -210,18 +241,17 @@ def surface_of(domain: Domain, space: fem.FunctionSpace, part: str) -> Surface:
     mesh, d = domain.mesh, domain.dim
     facets = domain.facets(part)
     cells, place = cells_at(mesh, facets)
-    degree = space.ufl_element().embedded_superdegree
-    local = _local_nodes(space, degree)[place]
+    degree, shape = space.ufl_element().embedded_superdegree, shape_of(mesh)
+    local = shape.facet_nodes(degree)[place]
     nodes = np.take_along_axis(space.dofmap.list[cells], local, axis=1)
-    # Vertex i of a simplex is opposite to facet i.
-    vertices = np.array([[j for j in range(d + 1) if j != i] for i in range(d + 1)])[place]
-    x = mesh.geometry.x[_compat.geometry_dofmap(mesh)[cells]][:, : d + 1, :d]
-    corners = np.take_along_axis(x, vertices[:, :, None], axis=1)
-    inside = np.take_along_axis(x, place[:, None, None], axis=1)[:, 0]
+    x = mesh.geometry.x[_compat.geometry_dofmap(mesh)[cells]][:, :, :d]
+    corners = np.take_along_axis(x, shape.facet_corners[place][:, :, None], axis=1)
     numbers = space.dofmap.index_map.local_to_global(nodes.ravel().astype(np.int32))
     names = np.asarray(numbers, dtype=np.int64).reshape(nodes.shape)
-    normal = _outward(corners, inside)
-    deviation = deviations(names[:, :d], corners, normal, domain.comm, domain.levels)
+    normal = _outward(corners, x.mean(axis=1))
+    deviation = deviations(
+        names[:, : corners.shape[1]], corners, normal, domain.comm, domain.levels
+    )
     return Surface(
         names,
         corners,
@@ -233,27 +263,12 @@ def surface_of(domain: Domain, space: fem.FunctionSpace, part: str) -> Surface:
     )
 
 
-def _local_nodes(space: fem.FunctionSpace, degree: int) -> NDArray[np.intp]:
-    """Return the nodes of each facet of a cell in the order of the basis, (d + 1, k)."""
-    cell = space.mesh.basix_cell()
-    layout, topology = space.dofmap.dof_layout, basix.topology(cell)
-    d = len(topology) - 1
-    rows = []
-    for facet in topology[d - 1]:
-        nodes = [layout.entity_dofs(0, vertex)[0] for vertex in facet]
-        if degree == 2:
-            ends = [facet] if d == 2 else [[facet[1], facet[2]], [facet[0], facet[2]], facet[:2]]
-            edges = [sorted(edge) for edge in topology[1]]
-            nodes += [layout.entity_dofs(1, edges.index(sorted(pair)))[0] for pair in ends]
-        rows.append(nodes)
-    return np.array(rows, dtype=np.intp)
-
-
 def _outward(corners: Array, inside: Array) -> Array:
     """Return unit normals that point away from a point of the body, shape (f, d)."""
-    edges = corners[:, 1:] - corners[:, :1]
+    shape = facet_of(corners.shape[1])
+    edges = np.moveaxis(jacobians(shape, corners, shape.middle)[:, 0], 2, 0)
     flat = corners.shape[2] == 2
-    turned = edges[:, 0, ::-1] * [-1.0, 1.0] if flat else np.cross(edges[:, 0], edges[:, 1])
+    turned = edges[0][:, ::-1] * [-1.0, 1.0] if flat else np.cross(*edges)
     across: Array = np.asarray(turned, dtype=float)
     normal = across / np.linalg.norm(across, axis=1)[:, None]
     away = np.einsum("fd,fd->f", normal, corners[:, 0] - inside)

@@ -19,6 +19,7 @@ from matplotlib.figure import Figure
 from matplotlib.tri import Triangulation
 
 from contact.errors import InputError
+from contact.mesh.cells import LINEAR
 from contact.output.figures.contact import ends
 from contact.output.figures.run import Run
 from contact.output.figures.style import (
@@ -80,7 +81,7 @@ def scalar(run: Run, field: str) -> tuple[Array, bool]:
     if field in in_cells:
         return np.asarray(in_cells[field]), True
     name, _, component = field.rpartition("_")
-    linear = run.body.get_cell(0).n_points == len(run.axes) + 1
+    linear = run.body.celltypes[0] in LINEAR
     for whole, part in ((field, ""), (name, component)):
         of_cells = linear and f"{whole}_cell" in in_cells
         fields, key = (in_cells, f"{whole}_cell") if of_cells else (at_points, whole)
@@ -215,7 +216,7 @@ def _bar(figure: Figure, picture: Picture) -> None:
 
 def _colour(ax: Axes, picture: Picture, side: int) -> None:
     """Draw the coloured body, or its mirror image where the side is -1."""
-    skin = picture.skin
+    skin = picture.skin.triangulate()
     mesh = Triangulation(*(skin.points[:, :2] * [side, 1]).T, skin.regular_faces)
     shown: dict[str, Any] = {"norm": picture.norm, "cmap": "viridis", "rasterized": True}
     if "values" in skin.cell_data:

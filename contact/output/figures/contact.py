@@ -229,7 +229,8 @@ def draw_surface(run: Run, look: Look) -> Figure:
     highest = float(np.nanmax(surface["pressure"], initial=0.0)) or 1.0
     x, y = (run.units.label(f"${'xyz'[k]}$", "length") for k in view)
     for ax, (side, name) in zip((*lefts, right), panels, strict=True):
-        skin = side.extract_surface(nonlinear_subdivision=1)  # of degree 2: four triangles each
+        # Of degree 2 four pieces each.
+        skin = side.extract_surface(nonlinear_subdivision=1).triangulate()
         flat, facets = np.asarray(skin.points)[:, view], np.asarray(skin.regular_faces)
         ax.add_collection(PolyCollection(list(flat[facets]), facecolor="#F2F2F2", lw=0))
         if ax is right:

@@ -1,0 +1,309 @@
+"""Input files of Abaqus and CalculiX: nodes, elements, sets and surfaces.
+
+meshio's reader knows no surfaces, and neither the keywords nor the elements that these files have
+in practice. A set of elements is a region, or a part if they lie on the boundary; a set of nodes
+is a part, the facets all of whose nodes it holds; a surface is a part.
+
+References
+----------
+CalculiX CrunchiX USER'S MANUAL, *NODE, *ELEMENT, *NSET, *ELSET, *SURFACE (numbers of faces), and
+chapter 6.2 (elements).
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+
+from contact.mesh.extraction import Contents, Ints
+
+#: meshio's names of elements by their dimension and number of nodes.
+KINDS = {
+    (1, 2): "line",
+    (1, 3): "line3",
+    (2, 3): "triangle",
+    (2, 6): "triangle6",
+    (2, 4): "quad",
+    (2, 8): "quad8",
+    (2, 9): "quad9",
+    (3, 4): "tetra",
+    (3, 10): "tetra10",
+    (3, 8): "hexahedron",
+    (3, 20): "hexahedron20",
+    (3, 27): "hexahedron27",
+    (3, 6): "wedge",
+    (3, 15): "wedge15",
+}
+
+#: Types of elements: beginnings of their names, and their dimension.
+TYPES = (
+    (re.compile(r"(?:AC|D|F)?C3D(\d+)"), 3),
+    (re.compile(r"(?:AC|D)?(?:CPS|CPE|CPEG|CAX|CGAX|C2D|MAX|M3D|S|DS|SC|R3D|SFM3D|STRI)(\d+)"), 2),
+    (re.compile(r"(?:T2D|T3D|B2|B3|R2D|RAX|SAX|F2D)(\d)"), 1),
+)
+
+#: Corners of the faces S1, S2, ... of elements, by meshio's name without a number.
+FACES = {
+    "triangle": ((0, 1), (1, 2), (2, 0)),
+    "quad": ((0, 1), (1, 2), (2, 3), (3, 0)),
+    "tetra": ((0, 1, 2), (0, 3, 1), (1, 3, 2), (2, 3, 0)),
+    "hexahedron": (
+        (0, 1, 2, 3),
+        (4, 7, 6, 5),
+        (0, 4, 5, 1),
+        (1, 5, 6, 2),
+        (2, 6, 7, 3),
+        (3, 7, 4, 0),
+    ),
+}
+
+#: Keywords without a meaning for a mesh that are not worth a word.
+SILENT = {"HEADING", "PREPRINT", "END PART", "PART", "ASSEMBLY", "END ASSEMBLY", "END INSTANCE"}
+
+
+@dataclass
+class _Read:
+    """The data of a file by number and by name, names as they stood first."""
+
+    points: dict[int, list[float]] = field(default_factory=dict)
+    elements: dict[str, list[int]] = field(default_factory=dict)
+    nodes: dict[str, list[int | str]] = field(default_factory=dict)
+    sets: dict[str, list[int | str]] = field(default_factory=dict)
+    surfaces: dict[str, tuple[str, list[list[str]]]] = field(default_factory=dict)
+    names: dict[str, str] = field(default_factory=dict)
+    other: list[str] = field(default_factory=list)
+
+    def name(self, given: str) -> str:
+        """Return the key of a name: capitals do not matter."""
+        key = given.strip().strip('"').upper()
+        self.names.setdefault(key, given.strip().strip('"'))
+        return key
+
+
+def read(file: Path) -> Contents:
+    """Read an input file, and those that it includes.
+
+    Raises
+    ------
+    ValueError
+        If something is missing, or no number where one belongs; the message names it.
+    """
+    found = _Read()
+    for keyword, options, lines in _blocks(file, 0):
+        _take(found, keyword, options, lines)
+    return _deck(found)
+
+
+def _blocks(file: Path, depth: int) -> Iterator[tuple[str, dict[str, str], list[list[str]]]]:
+    """Yield keywords with their options and the values of their data lines."""
+    if depth > 10:
+        raise ValueError(f"*INCLUDE: {file.name} includes itself")
+    keyword, pending = "", ""
+    options: dict[str, str] = {}
+    lines: list[list[str]] = []
+    for raw in file.read_text(encoding="utf-8", errors="replace").splitlines():
+        line = pending + raw.strip()
+        pending = ""
+        if not line or line.startswith("**"):
+            continue
+        if not line.startswith("*"):
+            lines.append([value.strip() for value in line.rstrip(",").split(",")])
+            continue
+        if line.endswith(","):
+            pending = line
+            continue
+        if keyword:
+            yield keyword, options, lines
+        first, *others = line[1:].split(",")
+        keyword, lines = " ".join(first.upper().split()), []
+        pairs = (other.partition("=") for other in others)
+        options = {key.strip().upper().replace(" ", ""): value.strip() for key, _, value in pairs}
+        if keyword == "INCLUDE":
+            given = options.get("INPUT", "").strip('"')
+            inner = file.parent / given
+            if not given or not inner.is_file():
+                raise ValueError(f"*INCLUDE: there is no file {given!r} beside {file.name}")
+            yield from _blocks(inner, depth + 1)
+            keyword = ""
+    if keyword:
+        yield keyword, options, lines
+
+
+def _take(
+    found: _Read, keyword: str, options: dict[str, str], lines: Sequence[Sequence[str]]
+) -> None:
+    """Take a keyword with its data."""
+    if keyword == "NODE":
+        numbers = [int(line[0]) for line in lines]
+        for number, line in zip(numbers, lines, strict=True):
+            found.points[number] = [float(value or 0) for value in [*line[1:4], "", ""][:3]]
+        if "NSET" in options:
+            found.nodes.setdefault(found.name(options["NSET"]), []).extend(numbers)
+    elif keyword == "ELEMENT":
+        kind = options.get("TYPE", "").upper()
+        numbers = found.elements.setdefault(kind, [])
+        count = _nodes(kind) + 1
+        values = [int(value) for line in lines for value in line if value]
+        if len(values) % count:
+            raise ValueError(f"*ELEMENT, TYPE={kind}: {len(values)} numbers, {count} an element")
+        numbers.extend(values)
+        if "ELSET" in options:
+            found.sets.setdefault(found.name(options["ELSET"]), []).extend(values[::count])
+    elif keyword in ("NSET", "ELSET"):
+        if keyword not in options:
+            raise ValueError(f"*{keyword} without a name")
+        into = found.nodes if keyword == "NSET" else found.sets
+        members = into.setdefault(found.name(options[keyword]), [])
+        if "GENERATE" in options:
+            for line in lines:
+                first, last, step = (*(int(value) for value in line[:3]), 1)[:3]
+                members.extend(range(first, last + 1, step))
+        else:
+            every = (value for line in lines for value in line if value)
+            members.extend(int(v) if v.lstrip("+-").isdigit() else found.name(v) for v in every)
+    elif keyword == "SURFACE":
+        rows = [list(line) for line in lines]
+        kind = options.get("TYPE", "ELEMENT").upper()
+        if "NAME" not in options:
+            raise ValueError("*SURFACE without a name")
+        found.surfaces[found.name(options["NAME"])] = (kind, rows)
+    elif keyword not in SILENT and keyword not in found.other:
+        found.other.append(keyword)
+
+
+def _nodes(kind: str) -> int:
+    """Return the number of nodes of a type of elements."""
+    return _known(kind)[1]
+
+
+def _known(kind: str) -> tuple[int, int]:
+    """Return the dimension and the number of nodes of a type of elements."""
+    for pattern, dim in TYPES:
+        if match := pattern.match(kind):
+            count = int(match[1])
+            if dim == 1:  # T3D2, B31: nodes, or the order
+                count = count if "D" in kind else count + 1
+            if kind.startswith("STRI65"):
+                count = 6
+            if (dim, count) in KINDS:
+                return dim, count
+    raise ValueError(f"*ELEMENT, TYPE={kind}: elements that are not known")
+
+
+def _deck(found: _Read) -> Contents:
+    tags = np.array(sorted(found.points), dtype=np.int64)
+    points = np.array([found.points[tag] for tag in tags], dtype=float).reshape(-1, 3)
+    blocks: list[tuple[str, Ints]] = []
+    homes = [np.zeros((0, 3), dtype=np.int64)]
+    for block, (kind, values) in enumerate(found.elements.items()):
+        dim, count = _known(kind)
+        rows = np.array(values, dtype=np.int64).reshape(-1, count + 1)
+        nodes = _indices(tags, rows[:, 1:], "elements")
+        if (dim, count) == (1, 3):
+            nodes = _middle_last(points, nodes)
+        blocks.append((KINDS[dim, count], nodes))
+        places = np.arange(len(rows))
+        homes.append(np.column_stack([rows[:, 0], np.full_like(places, block), places]))
+    elements = np.concatenate(homes)
+    elements = elements[np.argsort(elements[:, 0], kind="stable")]
+    deck = Contents(points, blocks)
+    for key in found.sets:
+        members = _members(found.sets, key, ())
+        deck.groups[found.names[key]] = _by_block(members, elements)
+    for key in found.nodes:
+        numbers = _members(found.nodes, key, ())
+        deck.nodes[found.names[key]] = np.flatnonzero(np.isin(tags, numbers))
+    for key, (sort, lines) in found.surfaces.items():
+        if sort == "NODE":
+            numbers = _named(found, found.nodes, [line[0] for line in lines])
+            deck.nodes[found.names[key]] = np.flatnonzero(np.isin(tags, numbers))
+        elif sort == "ELEMENT":
+            deck.surfaces[found.names[key]] = _faces(found, lines, elements, blocks)
+    if found.other:
+        deck.notes.append(f"left out: {', '.join(f'*{word}' for word in found.other)}")
+    return deck
+
+
+def _middle_last(points: npt.NDArray[np.float64], lines: Ints) -> Ints:
+    """Return lines of three nodes with the middle one last, wherever the program has it."""
+    spread = np.linalg.norm(points[lines] - points[lines].mean(axis=1, keepdims=True), axis=2)
+    return np.take_along_axis(lines, np.argsort(-spread, axis=1, kind="stable"), axis=1)
+
+
+def _indices(tags: Ints, rows: Ints, words: str) -> Ints:
+    places = np.minimum(np.searchsorted(tags, rows), max(tags.size - 1, 0))
+    if tags.size == 0 or np.any(tags[places] != rows):
+        raise ValueError(f"it has {words} whose nodes it does not have")
+    return np.asarray(places)
+
+
+def _members(sets: dict[str, list[int | str]], key: str, above: tuple[str, ...]) -> list[int]:
+    """Return the numbers of a set, those of sets in it too."""
+    if key in above:
+        raise ValueError(f"the set {key} holds itself")
+    if key not in sets:
+        raise ValueError(f"there is no set {key}")
+    numbers: list[int] = []
+    for member in sets[key]:
+        if isinstance(member, int):
+            numbers.append(member)
+        else:
+            numbers += _members(sets, member, (*above, key))
+    return numbers
+
+
+def _named(found: _Read, sets: dict[str, list[int | str]], given: Sequence[str]) -> list[int]:
+    """Return the numbers that words stand for, each a number or a set."""
+    numbers: list[int] = []
+    for word in given:
+        numbers += [int(word)] if word.isdigit() else _members(sets, found.name(word), ())
+    return numbers
+
+
+def _by_block(numbers: Sequence[int], elements: Ints) -> dict[int, Ints]:
+    """Return elements by block, those that are there; rows are number, block, place in it."""
+    here = elements[np.isin(elements[:, 0], numbers)]
+    return {int(b): np.unique(here[here[:, 1] == b, 2]) for b in np.unique(here[:, 1])}
+
+
+def _faces(
+    found: _Read,
+    rows: Sequence[Sequence[str]],
+    elements: Ints,
+    blocks: Sequence[tuple[str, Ints]],
+) -> Ints:
+    """Return the faces of a surface by their corners; all with one number of them."""
+    faces: list[Ints] = []
+    every: list[Ints] = []
+    for given, label in ((row[0], row[1].upper() if len(row) > 1 else "") for row in rows):
+        for block, members in _by_block(_named(found, found.sets, [given]), elements).items():
+            name, nodes = blocks[block]
+            corners = FACES.get(name.rstrip("0123456789"), ())
+            if re.fullmatch(r"[SE]\d", label) and 0 < int(label[1]) <= len(corners):
+                faces.append(nodes[members][:, list(corners[int(label[1]) - 1])])
+            elif label in ("", "SPOS", "SNEG"):
+                # Shells and membranes; of solids the faces of one of them alone.
+                if name.startswith(("triangle", "quad")):
+                    faces.append(nodes[members][:, : len(corners)])
+                else:
+                    every += [nodes[members][:, list(face)] for face in corners]
+            else:
+                raise ValueError(f"*SURFACE: elements {given} have no face {label!r}")
+    if every:
+        faces.append(once(np.concatenate(every)))
+    least = min((face.shape[1] for face in faces), default=1)
+    kept = [face for face in faces if face.shape[1] == least]
+    return np.concatenate(kept) if kept else np.zeros((0, 1), dtype=np.int64)
+
+
+def once(faces: Ints) -> Ints:
+    """Return the faces that are there once."""
+    _, first, count = np.unique(
+        np.sort(faces, axis=1), axis=0, return_index=True, return_counts=True
+    )
+    return np.asarray(faces[np.sort(first[count == 1])])

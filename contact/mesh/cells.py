@@ -1,0 +1,199 @@
+"""The shapes of cells: nothing else knows how corners and facets lie, or how cells are integrated.
+
+Points are those of the reference cell of basix, shape (q, dim); nodes are numbered as dolfinx does,
+corners first. dolfinx is not imported: it starts MPI, and files are read by processes of their own.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cache, cached_property
+from typing import Any
+
+import basix
+import numpy as np
+from numpy.typing import NDArray
+
+from contact.typing import Array
+
+#: Nodes of cells and facets.
+Nodes = NDArray[np.intp]
+
+
+@dataclass(frozen=True)
+class Shape:
+    """A shape of cells, or of facets.
+
+    Attributes
+    ----------
+    name
+        ``interval``, ``triangle``, ``quadrilateral``, ``tetrahedron`` or ``hexahedron``.
+    """
+
+    name: str
+
+    @property
+    def kind(self) -> basix.CellType:
+        """The shape in basix."""
+        return basix.CellType[self.name]
+
+    @property
+    def plural(self) -> str:
+        """Several of them in words."""
+        return {"tetrahedron": "tetrahedra", "hexahedron": "hexahedra"}.get(
+            self.name, f"{self.name}s"
+        )
+
+    @cached_property
+    def topology(self) -> list[list[list[int]]]:
+        """Corners of the corners, edges, ... and the cell."""
+        return basix.topology(self.kind)
+
+    @property
+    def dim(self) -> int:
+        """Its dimension."""
+        return len(self.topology) - 1
+
+    @property
+    def corners(self) -> int:
+        """Number of corners."""
+        return len(self.topology[0])
+
+    @property
+    def simplex(self) -> bool:
+        """Whether it is a simplex: straight cells are affine images of the reference one."""
+        return self.corners == self.dim + 1
+
+    @property
+    def facet(self) -> Shape:
+        """The shape of its facets."""
+        return facet_of(self.facet_corners.shape[1])
+
+    @cached_property
+    def facet_corners(self) -> Nodes:
+        """Corners of each facet in the order of the facet's shape, (facets, corners)."""
+        return np.array(self.topology[self.dim - 1], dtype=np.intp)
+
+    @cached_property
+    def edges(self) -> list[tuple[int, int]]:
+        """The edges as pairs of corners."""
+        return [(a, b) for a, b in self.topology[1]]
+
+    @property
+    def around(self) -> list[int]:
+        """The corners in an order around a cell in 2-D."""
+        return [0, 1, 3, 2] if self.corners == 4 else list(range(self.corners))
+
+    @property
+    def middle(self) -> Array:
+        """The centroid, shape (1, dim)."""
+        return np.asarray(basix.geometry(self.kind).mean(axis=0, keepdims=True))
+
+    def nodes(self, degree: int) -> Array:
+        """Return the nodes of the Lagrange element of a degree, shape (nodes, dim)."""
+        return np.asarray(_element(self, degree).points)
+
+    def facet_nodes(self, degree: int) -> Nodes:
+        """Return the nodes of each facet in the order of the facet's element, (facets, nodes)."""
+        closures = _element(self, degree).entity_closure_dofs[self.dim - 1]
+        corners = basix.geometry(self.kind)[self.facet_corners]
+        functions = self.facet.lagrange(1, self.facet.nodes(degree))
+        places = np.einsum("nc,fcd->fnd", functions, corners)
+        every = self.nodes(degree)[np.array(closures)]
+        distance = np.linalg.norm(places[:, :, None] - every[:, None], axis=3)
+        return np.take_along_axis(np.array(closures), distance.argmin(axis=2), axis=1)
+
+    @cached_property
+    def facet_normals(self) -> Array:
+        """Unit normals out of the facets of the reference cell, shape (facets, dim)."""
+        return np.asarray(basix.cell.facet_outward_normals(self.kind))
+
+    def on_facet(self, facet: int, at: Array) -> Array:
+        """Return points of a facet as points of the cell, shape (q, dim)."""
+        corners = basix.geometry(self.kind)[self.facet_corners[facet]]
+        return np.asarray(self.facet.lagrange(1, at) @ corners)
+
+    @property
+    def children(self) -> Nodes:
+        """Corners of the halves along each axis as nodes of degree 2, (children, corners)."""
+        corners = basix.geometry(self.kind)
+        places = (corners[:, None] + corners[None]) / 2
+        distance = np.linalg.norm(places[:, :, None] - self.nodes(2), axis=3)
+        return np.asarray(distance.argmin(axis=2))
+
+    def lagrange(self, degree: int, at: Array) -> Array:
+        """Return the Lagrange polynomials of a degree at points, shape (q, nodes)."""
+        if degree == 0:
+            return np.ones((len(at), 1))
+        return np.asarray(_element(self, degree).tabulate(0, at)[0, :, :, 0])
+
+    def gradients(self, degree: int, at: Array) -> Array:
+        """Return their derivatives by the coordinates of the reference cell, (q, nodes, dim)."""
+        return np.moveaxis(_element(self, degree).tabulate(1, at)[1:, :, :, 0], 0, -1)
+
+    def vtk(self, degree: int) -> tuple[int, tuple[int, ...]]:
+        """Return VTK's number of cells of a degree, and where it has dolfinx's nodes."""
+        *numbers, order = VTK[self.name]
+        return numbers[degree - 1], order[: len(self.nodes(degree))]
+
+    def degree_of(self, nodes: int) -> int:
+        """Return the degree of the Lagrange element with a number of nodes: 0, 1 or 2."""
+        known = {1: 0} | {len(self.nodes(degree)): degree for degree in (1, 2)}
+        return known[nodes]
+
+
+@cache
+def _element(shape: Shape, degree: int) -> basix.finite_element.FiniteElement:
+    variant = basix.LagrangeVariant.gll_warped
+    return basix.create_element(basix.ElementFamily.P, shape.kind, degree, variant)
+
+
+@cache
+def rule(shape: Shape, degree: int) -> tuple[Array, Array]:
+    """Return the points of a quadrature rule, (q, dim), and its weights, (q,)."""
+    points, weights = basix.make_quadrature(shape.kind, degree)
+    return np.asarray(points), np.asarray(weights)
+
+
+#: VTK's number of a shape, of degree 1 and 2, and where it has the nodes of degree 2.
+VTK: dict[str, tuple[int, int, tuple[int, ...]]] = {
+    "interval": (3, 21, (0, 1, 2)),
+    "triangle": (5, 22, (0, 1, 2, 5, 3, 4)),
+    "tetrahedron": (10, 24, (0, 1, 2, 3, 9, 6, 8, 7, 5, 4)),
+    "quadrilateral": (9, 28, (0, 1, 3, 2, 4, 6, 7, 5, 8)),
+    "hexahedron": (
+        12,
+        29,
+        (
+            *(0, 1, 3, 2, 4, 5, 7, 6),
+            *(8, 11, 13, 9, 16, 18, 19, 17, 10, 12, 15, 14),
+            *(22, 23, 21, 24, 20, 25, 26),
+        ),
+    ),
+}
+
+#: VTK's numbers of cells of degree 1.
+LINEAR = frozenset(number for number, *_ in VTK.values())
+
+#: Facets of cells in 2-D.
+INTERVAL = Shape("interval")
+
+#: The shapes of the cells of a mesh.
+TRIANGLE, QUADRILATERAL = Shape("triangle"), Shape("quadrilateral")
+TETRAHEDRON, HEXAHEDRON = Shape("tetrahedron"), Shape("hexahedron")
+SHAPES = (TRIANGLE, QUADRILATERAL, TETRAHEDRON, HEXAHEDRON)
+
+
+def facet_of(corners: int) -> Shape:
+    """Return the shape of facets with a number of corners."""
+    return {2: INTERVAL, 3: TRIANGLE, 4: QUADRILATERAL}[corners]
+
+
+def shape_of(mesh: Any) -> Shape:
+    """Return the shape of the cells of a mesh of dolfinx."""
+    return Shape(mesh.topology.cell_name())
+
+
+def barycentric(points: Array) -> Array:
+    """Return the barycentric coordinates of points of a simplex, shape (n, dim + 1)."""
+    return np.column_stack([1 - points.sum(axis=1), points])

@@ -1,0 +1,177 @@
+"""Mesh files of other programs: by meshio, those of Abaqus and CalculiX by `contact.mesh.abaqus`.
+
+Files are read by a process of their own, as by `contact.mesh.extraction`. Groups of elements, tags
+of cells and sets of nodes become regions and parts.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from contact.mesh import abaqus, exodus
+from contact.mesh.cells import INTERVAL, SHAPES, Shape
+from contact.mesh.extraction import BODY, OTHERS, Contents, Ints, Model, run
+
+#: Arrays that hold tags of groups, and those of a program's own.
+TAGS = {"gmsh:physical", "cell_tags", "point_tags", "medit:ref"}
+INNER = {"gmsh:geometrical", "gmsh:bounding_entities", "GlobalElementId", "GlobalNodeId"}
+
+#: Names of shapes of cells in other programs.
+NAMES = {"line": "interval", "quad": "quadrilateral", "tetra": "tetrahedron"}
+
+
+def read(file: Path) -> Model:
+    """Read a mesh file.
+
+    Raises
+    ------
+    Exception
+        Of any kind, if it is damaged.
+    """
+    if OTHERS[file.suffix.lower()] == "Abaqus":
+        return model_of(abaqus.read(file))
+    import meshio
+
+    contents = _contents(meshio.read(file))
+    if OTHERS[file.suffix.lower()] == "Exodus":
+        exodus.add(file, contents)
+    return model_of(contents)
+
+
+def _contents(mesh: Any) -> Contents:
+    """Return the contents of a mesh of meshio."""
+    points = np.zeros((len(mesh.points), 3))
+    points[:, : mesh.points.shape[1]] = mesh.points
+    blocks = [(block.type, np.asarray(block.data, dtype=np.int64)) for block in mesh.cells]
+    made = Contents(points, blocks)
+    for name, parts in mesh.cell_sets.items():
+        given = (np.asarray([] if part is None else part, dtype=np.int64) for part in parts)
+        made.groups[str(name)] = dict(enumerate(given))
+    names = getattr(mesh, "cell_tags", None) or {}
+    for key, arrays in mesh.cell_data.items():
+        for name, members in _by_number(key, arrays, names):
+            group = made.groups.setdefault(name, {})
+            for block, rows in members.items():
+                group[block] = np.union1d(group.get(block, rows), rows)
+    made.nodes |= {str(k): np.asarray(v, dtype=np.int64) for k, v in mesh.point_sets.items()}
+    families = getattr(mesh, "point_tags", None) or {}
+    for key, values in mesh.point_data.items():
+        if np.asarray(values).dtype.kind in "iub" and np.ndim(values) == 1:
+            for name, members in _by_number(key, [values], families):
+                found = made.nodes.get(name, np.zeros(0, dtype=np.int64))
+                made.nodes[name] = np.union1d(found, members[0])
+    return made
+
+
+def _by_number(
+    key: str, arrays: Sequence[Any], names: Mapping[int, Sequence[str]]
+) -> Iterator[tuple[str, dict[int, Ints]]]:
+    """Yield groups that arrays of whole numbers mark, block by block; 0 marks none.
+
+    Parameters
+    ----------
+    key, arrays
+        Name of the arrays, and one a block.
+    names
+        Names of the groups of a number. Without, it is the name of the group, behind that of the
+        array unless that is one for tags.
+    """
+    whole = [np.asarray(array) for array in arrays]
+    if key in INNER or any(v.dtype.kind not in "iub" or v.ndim != 1 for v in whole):
+        return
+    several = key.split("-")
+    if len(several) > 1 and max(v.max(initial=0) for v in whole) == len(several) - 1:
+        # Sets that meshio has written as one array: their names, and -1 for none.
+        names, whole = {k: [name] for k, name in enumerate(several, 1)}, [v + 1 for v in whole]
+    before = "" if key in TAGS else f"{key} "
+    for block, values in enumerate(whole):
+        for number in np.unique(values[values != 0]):
+            # Families of MED have negative numbers; without a name these mark none.
+            unnamed = [f"{before}{number}"] if number > 0 else []
+            for name in names.get(int(number), unnamed):
+                yield str(name), {block: np.flatnonzero(values == number)}
+
+
+def model_of(contents: Contents) -> Model:
+    """Return the contents of a file as they are checked."""
+    known = [_kind(name, nodes.shape[1]) for name, nodes in contents.blocks]
+    kinds = list(dict.fromkeys(kind for kind, _ in known if kind[1] > 0))
+    tags = np.arange(1, len(contents.points) + 1)
+    dim = max((kind[1] for kind in kinds), default=-1)
+    whole = [b for b, (kind, _) in enumerate(known) if kind[1] == dim]
+    shape = known[whole[0]][1] if whole else None
+    if shape is None or dim < 2 or len({known[b][0] for b in whole}) > 1:
+        none = np.zeros((0, 1), dtype=np.int64)
+        return Model(kinds, tags, contents.points, np.zeros((0, max(dim, 1))), none, {}, {})
+    cells = np.concatenate([contents.blocks[b][1] for b in whole])
+    places = _places(shape, cells.shape[1])
+    regions, parts = {}, dict(contents.surfaces)
+    for name, members in contents.groups.items():
+        inside = [contents.blocks[b][1][members[b]] for b in whole if b in members]
+        if sum(map(len, inside)):
+            regions[name] = np.concatenate(inside)
+        sides = [
+            contents.blocks[b][1][rows][:, : shape.facet.corners]
+            for b, rows in members.items()
+            if known[b][1] == shape.facet and len(rows)
+        ]
+        if sides and name not in parts:
+            parts[name] = np.concatenate(sides)
+    notes = list(contents.notes)
+    if regions and len(np.unique(np.concatenate([*regions.values()]), axis=0)) < len(cells):
+        regions[BODY] = cells
+    outside, without = _exterior(shape, cells[:, _corners(shape)]), []
+    for name, nodes in contents.nodes.items():
+        found = outside[np.isin(outside, nodes).all(axis=1)]
+        if len(found) and name not in parts:
+            parts[name] = found
+        elif not len(found):
+            without.append(name)
+    if without:
+        notes.append(f"sets of nodes that hold no facet of the boundary: {', '.join(without)}")
+    return Model(
+        kinds,
+        tags,
+        contents.points,
+        places,
+        cells + 1,
+        {name: rows + 1 for name, rows in regions.items()},
+        {name: rows + 1 for name, rows in parts.items()},
+        tuple(notes),
+    )
+
+
+def _kind(name: str, nodes: int) -> tuple[tuple[str, int, int], Shape | None]:
+    """Return name, dimension and order as Gmsh has them, and the shape if it is one of ours."""
+    stem = name.rstrip("0123456789")
+    shape = next((s for s in (INTERVAL, *SHAPES) if s.name == NAMES.get(stem, stem)), None)
+    if shape is None:
+        return (name, 0 if stem == "vertex" else 3, 1), None
+    word = "Line" if shape == INTERVAL else shape.name.capitalize()
+    return (f"{word} {nodes}", shape.dim, 1 if nodes == shape.corners else 2), shape
+
+
+def _places(shape: Shape, count: int) -> Any:
+    """Return the nodes of a cell with so many of them, in VTK's order."""
+    degree = 1 if count == shape.corners else 2
+    return shape.nodes(degree)[list(shape.vtk(degree)[1])][:count]
+
+
+def _corners(shape: Shape) -> list[int]:
+    """Return the corners in the order of the shape, as nodes in VTK's order."""
+    return [shape.vtk(1)[1].index(corner) for corner in range(shape.corners)]
+
+
+def _exterior(shape: Shape, corners: Ints) -> Ints:
+    """Return the facets of one cell alone, by their corners, around them."""
+    facets = corners[:, shape.facet_corners[:, shape.facet.around]]
+    return abaqus.once(facets.reshape(-1, facets.shape[2]))
+
+
+if __name__ == "__main__":
+    run(read, *sys.argv[1:3])

@@ -1,0 +1,97 @@
+"""The sizes of cells and facets: maps from the reference cell, volumes, integrals over the body."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from contact import _compat
+from contact.mesh.cells import Shape, rule, shape_of
+from contact.mesh.domain import Domain
+from contact.typing import Array
+
+
+def geometry_nodes(domain: Domain) -> Array:
+    """Return the nodes of the owned cells, of straight ones the corners, (cells, nodes, d)."""
+    mesh, d = domain.mesh, domain.dim
+    owned = mesh.topology.index_map(d).size_local
+    return np.asarray(mesh.geometry.x[_compat.geometry_dofmap(mesh)[:owned], :d])
+
+
+def jacobians(shape: Shape, of: Array, at: Array) -> Array:
+    """Return dx/dxi at points, shape (n, q, d, dim); of simplices q = 1, for all points.
+
+    Parameters
+    ----------
+    shape
+        Of the cells, or of facets.
+    of
+        Nodes of each, shape (n, nodes, d).
+    at
+        Points, shape (q, dim).
+    """
+    degree = shape.degree_of(of.shape[1])
+    if shape.simplex and degree == 1:
+        return np.swapaxes(of[:, 1:] - of[:, :1], 1, 2)[:, None]
+    return np.einsum("qkr,nkd->nqdr", shape.gradients(degree, at), of)
+
+
+def sizes(shape: Shape, of: Array, at: Array) -> Array:
+    """Return the size of each over that of the reference one at points, (n, q) or (n, 1).
+
+    As `jacobians`; of facets it is sqrt(det J^T J).
+    """
+    jacobian = jacobians(shape, of, at)
+    d, dim = jacobian.shape[2:]
+    if d == dim:
+        return np.abs(determinant(jacobian))
+    if dim == 1:
+        return np.asarray(np.linalg.norm(jacobian[..., 0], axis=-1))
+    return np.asarray(np.linalg.norm(np.cross(jacobian[..., 0], jacobian[..., 1]), axis=-1))
+
+
+def determinant(matrix: Array) -> Array:
+    """Return the determinants of matrices, shape (..., d, d), in closed form."""
+    columns = np.moveaxis(matrix, -1, 0)
+    if len(columns) == 2:
+        (a, c), (b, d) = (np.moveaxis(column, -1, 0) for column in columns)
+        return np.asarray(a * d - b * c)
+    return np.asarray(np.sum(columns[0] * np.cross(columns[1], columns[2]), axis=-1))
+
+
+def inverse(matrix: Array) -> Array:
+    """Return the inverses of matrices, shape (..., d, d), in closed form."""
+    det = determinant(matrix)[..., None, None]
+    columns = np.moveaxis(matrix, -1, 0)
+    if len(columns) == 2:
+        (a, c), (b, d) = (np.moveaxis(column, -1, 0) for column in columns)
+        return np.asarray(np.moveaxis(np.array([[d, -b], [-c, a]]), (0, 1), (-2, -1)) / det)
+    one, two, three = columns
+    rows = [np.cross(two, three), np.cross(three, one), np.cross(one, two)]
+    return np.asarray(np.stack(rows, axis=-2) / det)
+
+
+def measures(domain: Domain, shape: Shape, of: Array, at: Array, weights: Array) -> Array:
+    """Return the weights of points in integrals over the body, (n, q): of a revolved one, of rings.
+
+    Parameters
+    ----------
+    domain
+        The mesh.
+    shape
+        Of its cells or facets.
+    of
+        Nodes of some of them, shape (n, nodes, d).
+    at, weights
+        Points, shape (q, dim), and weights, (q,), of a rule.
+    """
+    found = sizes(shape, of, at) * weights
+    if not domain.revolved:
+        return found
+    return found * 2 * np.pi * (of[..., 0] @ shape.lagrange(shape.degree_of(of.shape[1]), at).T)
+
+
+def volumes(domain: Domain) -> Array:
+    """Return the volumes of the owned cells, or of the rings that they are, shape (cells,)."""
+    shape = shape_of(domain.mesh)
+    points, weights = rule(shape, 1 if shape.simplex else 3)
+    return measures(domain, shape, geometry_nodes(domain), points, weights).sum(axis=1)

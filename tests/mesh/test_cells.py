@@ -1,0 +1,125 @@
+"""Shapes of cells: facets, rules, sizes and VTK's order, against what is known without them."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from dolfinx import fem
+from mpi4py import MPI
+from vtkmodules import vtkCommonDataModel
+
+from contact.errors import InputError
+from contact.mesh.cells import SHAPES, Shape, rule, shape_of
+from contact.mesh.domain import revolved
+from contact.mesh.geometry import geometry_nodes, inverse, jacobians, measures, sizes, volumes
+from contact.mesh.grid import box, rectangle
+from contact.mesh.transfer import refined
+from tests.problems.quadrilaterals import unit_block
+from tests.problems.sizes import integral
+from tests.problems.sizes import measures as part_sizes
+
+COMM = MPI.COMM_WORLD
+NAMES = [shape.name for shape in SHAPES]
+
+
+@pytest.mark.parametrize("shape", SHAPES, ids=NAMES)
+@pytest.mark.parametrize("degree", [1, 2])
+def test_facets_have_the_nodes_of_dolfinx(shape, degree):
+    mesh = unit_block(MPI.COMM_SELF, shape.name, 1).mesh
+    layout = fem.functionspace(mesh, ("Lagrange", degree)).dofmap.dof_layout
+    assert shape_of(mesh) == shape
+    for facet, nodes in enumerate(shape.facet_nodes(degree)):
+        assert sorted(nodes) == sorted(layout.entity_closure_dofs(shape.dim - 1, facet))
+        # On a facet its own functions are those of the cell.
+        at, _ = rule(shape.facet, 4)
+        whole = shape.lagrange(degree, shape.on_facet(facet, at))
+        np.testing.assert_allclose(whole[:, nodes], shape.facet.lagrange(degree, at), atol=1e-14)
+        np.testing.assert_allclose(np.delete(whole, nodes, axis=1), 0, atol=1e-14)
+
+
+@pytest.mark.parametrize(
+    ("name", "degree", "known"),
+    [
+        ("interval", 1, "vtkLine"),
+        ("interval", 2, "vtkQuadraticEdge"),
+        ("triangle", 1, "vtkTriangle"),
+        ("triangle", 2, "vtkQuadraticTriangle"),
+        ("quadrilateral", 1, "vtkQuad"),
+        ("quadrilateral", 2, "vtkBiQuadraticQuad"),
+        ("tetrahedron", 1, "vtkTetra"),
+        ("tetrahedron", 2, "vtkQuadraticTetra"),
+        ("hexahedron", 1, "vtkHexahedron"),
+        ("hexahedron", 2, "vtkTriQuadraticHexahedron"),
+    ],
+)
+def test_numbers_and_order_are_those_of_vtk(name, degree, known):
+    shape = Shape(name)
+    number, order = shape.vtk(degree)
+    cell = getattr(vtkCommonDataModel, known)()
+    assert number == cell.GetCellType()
+    places = np.array(cell.GetParametricCoords()).reshape(-1, 3)
+    np.testing.assert_allclose(shape.nodes(degree)[list(order)], places[:, : shape.dim], atol=1e-9)
+
+
+@pytest.mark.parallel
+@pytest.mark.parametrize("name", NAMES)
+def test_volumes_are_those_of_dolfinx(name):
+    domain = unit_block(COMM, name)
+    piece = fem.form(1.0 * domain.dx)
+    assert COMM.allreduce(volumes(domain).sum()) == pytest.approx(1.0, rel=1e-13)
+    assert COMM.allreduce(fem.assemble_scalar(piece)) == pytest.approx(1.0, rel=1e-13)
+    if domain.dim == 2:
+        ring = revolved(domain)
+        assert COMM.allreduce(volumes(ring).sum()) == pytest.approx(np.pi, rel=1e-13)
+        found = measures(
+            ring, shape_of(ring.mesh), geometry_nodes(ring), *rule(shape_of(ring.mesh), 4)
+        )
+        assert COMM.allreduce(found.sum()) == pytest.approx(np.pi, rel=1e-13)
+
+
+@pytest.mark.parametrize("shape", SHAPES, ids=NAMES)
+def test_sizes_of_facets_and_their_normals_close_the_cell(shape):
+    """The integral of n over the boundary is 0, and that of x.n is dim times the volume."""
+    domain = unit_block(MPI.COMM_SELF, shape.name, 2)
+    of, at = geometry_nodes(domain), rule(shape, 4)
+    total, through = np.zeros((len(of), shape.dim)), np.zeros(len(of))
+    points, weights = rule(shape.facet, 4)
+    for facet, corners in enumerate(shape.facet_corners):
+        on_cell = shape.on_facet(facet, points)
+        normal = shape.facet_normals[facet] @ inverse(jacobians(shape, of, on_cell))
+        normal = normal / np.linalg.norm(normal, axis=-1, keepdims=True)
+        area = (sizes(shape.facet, of[:, corners], points) * weights)[..., None]
+        x = shape.lagrange(1, on_cell) @ of
+        total += (area * normal).sum(axis=1)
+        through += (area * normal * x).sum(axis=(1, 2))
+    np.testing.assert_allclose(total, 0, atol=1e-14)
+    size = measures(domain, shape, of, *at).sum(axis=1)
+    np.testing.assert_allclose(through, shape.dim * size, rtol=1e-12)
+
+
+@pytest.mark.parallel
+@pytest.mark.parametrize("name", NAMES)
+def test_refined_meshes_keep_parts_regions_and_space(name):
+    make = rectangle if name in NAMES[:2] else box
+    dim = 2 if make is rectangle else 3
+    domain = make(COMM, (0.0,) * dim, (1.0,) * dim, (3,) * dim, cell=name)
+    whole = domain.mesh.topology.index_map(dim).size_global
+    fine = refined(refined(domain))
+    assert shape_of(fine.mesh).name == name
+    assert fine.mesh.topology.index_map(dim).size_global == whole * 4**dim
+    assert part_sizes(fine) == pytest.approx(part_sizes(domain))
+    assert integral(fine, fine.dx_in("body")) == pytest.approx(1.0)
+    assert fine.levels == 2
+
+
+def test_some_quadrilaterals_alone_are_not_refined():
+    domain = rectangle(MPI.COMM_SELF, (0, 0), (1, 1), (2, 2), cell="quadrilateral")
+    with pytest.raises(InputError, match="quadrilaterals, of which some cannot be refined alone"):
+        refined(domain, np.array([0], dtype=np.int32))
+
+
+def test_cells_of_the_other_dimension_are_refused():
+    with pytest.raises(InputError, match=r"mesh.cell: given 'hexahedron'; accepted: 'triangle' or"):
+        rectangle(MPI.COMM_SELF, (0, 0), (1, 1), (2, 2), cell="hexahedron")
+    with pytest.raises(InputError, match=r"mesh.cell: .*accepted: 'tetrahedron' or 'hexahedron'"):
+        box(MPI.COMM_SELF, (0, 0, 0), (1, 1, 1), (2, 2, 2), cell="quadrilateral")
