@@ -113,10 +113,6 @@ FILES = {
         ('on = "bottom"', 'on = "bottom"\nfoundation = {centre = [0, 0]}'),
         'contact.foundation.shape: missing; accepted: "plane", "sphere", "cylinder"',
     ),
-    "a force": (
-        ("traction", "force"),
-        "load.0.force: unknown key: a load is given per area, traction = resultant / area of the",
-    ),
     "a coefficient of the contact": (
         ('on = "bottom"', 'on = "bottom"\nmu = 0.3'),
         "contact.mu: unknown key here: it belongs to [friction]; accepted: on,",
