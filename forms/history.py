@@ -72,12 +72,16 @@ class Response:
         the "secant" is asked for. None: differences of the stress, and the elastic stiffness.
     dissipation
         Energy that was dissipated during the step, by volume, shape (n,); None for nothing.
+    energy
+        Energy that is stored at its end, by volume, shape (n,), from which a balance can tell
+        whether the dissipation is right. None: the work of the stresses less the dissipation.
     """
 
     stress: NDArray[np.float64]
     variables: Mapping[str, NDArray[np.float64]]
     stiffness: NDArray[np.float64] | None = None
     dissipation: NDArray[np.float64] | None = None
+    energy: NDArray[np.float64] | None = None
 
 
 @runtime_checkable

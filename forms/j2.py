@@ -49,6 +49,9 @@ class Hardening(Protocol):
     def slope(self, a: Array) -> Array:
         """Return its derivative."""
 
+    def energy(self, a: Array) -> Array:
+        """Return its integral from 0 on: the energy that it stores, by volume."""
+
 
 @dataclass(frozen=True)
 class Voce:
@@ -79,6 +82,11 @@ class Voce:
     def slope(self, a: Array) -> Array:
         """Return R'(a)."""
         return self.modulus + self.saturation * self.rate * np.exp(-self.rate * a)
+
+    def energy(self, a: Array) -> Array:
+        """Return the integral of R - Y from 0 to a."""
+        saturating = a + np.expm1(-self.rate * a) / self.rate if self.rate > 0 else 0.0
+        return np.asarray(0.5 * self.modulus * a**2 + self.saturation * saturating)
 
 
 @dataclass(frozen=True)
@@ -115,6 +123,13 @@ class Tabulated:
         """Return R'(a), to the right at the points."""
         slopes = np.append(np.diff(self.stress) / np.diff(self.strain), 0.0)
         return np.asarray(slopes[np.searchsorted(self.strain, a, side="right") - 1])
+
+    def energy(self, a: Array) -> Array:
+        """Return the integral of R - Y from 0 to a."""
+        strain, stress = np.array(self.strain), np.array(self.stress) - self.stress[0]
+        below = np.append(0.0, np.cumsum(0.5 * (stress[1:] + stress[:-1]) * np.diff(strain)))
+        k = np.searchsorted(strain, a, side="right") - 1
+        return np.asarray(below[k] + 0.5 * (stress[k] + self(a)) * (a - strain[k]))
 
 
 @dataclass(frozen=True)
@@ -214,7 +229,15 @@ class J2(Isotropic):
             stiffness = isotropic_stiffness(self.bulk, shear, size)
             if kind == "tangent":
                 stiffness[plastic] += flow.softening()
-        return Response(stress, new, stiffness, dissipation)
+        return Response(stress, new, stiffness, dissipation, self._energy(strain, stress, new))
+
+    def _energy(self, strain: Array, stress: Array, variables: Mapping[str, Array]) -> Array:
+        """Return the stored energy by volume, shape (n,): elastic, and of the hardening."""
+        total = 0.5 * np.einsum("ni,ni->n", stress, strain - variables["plastic_strain"])
+        total += self.hardening.energy(variables["equivalent_plastic_strain"])  # type: ignore[union-attr]
+        for name, (c, _) in zip(self._back, self._terms, strict=True):
+            total += 0.75 / c * np.einsum("ni,ni->n", variables[name], variables[name])
+        return total
 
     def differential(
         self,

@@ -284,9 +284,22 @@ class BodyEquilibrium:
         matrix.destroy()
         return found
 
-    def dissipation(self, state: Evaluated) -> float:
-        """Return the energy that the material dissipated in the step of a state. Collective."""
-        return self.laws.dissipation(state, self.nodal(state.x).ravel())
+    def energies(self, state: Evaluated) -> tuple[float, float | None]:
+        """Return the energies of the materials with internal variables. Collective.
+
+        Returns
+        -------
+        The energy dissipated in the step of a state, and that stored there: None without any, and
+        where one of them does not state it.
+        """
+        return self.laws.energies(state, self.nodal(state.x).ravel())
+
+    def forces_without_history(self, state: Evaluated) -> Array:
+        """Return the owned nodal forces of all materials without internal variables. Collective."""
+        self.laws.silence()
+        self.forms.at.x.array[:] = self.nodal(state.x).ravel()
+        forces = sum(assembled(form, self.owned) for form in self.forms.law_forces)
+        return np.concatenate([forces, np.zeros(self.global_unknowns.size)])
 
     def internal_forces(self, state: Evaluated, secant_at: Array | None = None) -> Array:
         """Return the owned nodal forces of the stresses at a state. Collective.

@@ -370,13 +370,22 @@ class QuadratureLaws:
         dx = self._domain.dx(metadata={"quadrature_degree": self._degree})
         return fem.form(functions * self._weighed * dx)
 
-    def dissipation(self, state: Evaluated, x: Array) -> float:
-        """Return the energy that was dissipated in the step that led to a state. Collective."""
-        total, volumes = 0.0, self.by_cell(self.volumes)
+    def energies(self, state: Evaluated, x: Array) -> tuple[float, float | None]:
+        """Return the energy lost in a step, and that stored at its end, if stated. Collective."""
+        sums, stated, volumes = np.zeros(2), self.initial is not None, self.by_cell(self.volumes)
         for cells, response in self._responses(state, x):
-            if response.dissipation is not None:
-                total += float(volumes[cells].ravel() @ response.dissipation)
-        return float(self._domain.comm.allreduce(total, op=MPI.SUM))
+            stated = stated and response.energy is not None
+            for k, values in enumerate((response.dissipation, response.energy)):
+                if values is not None:
+                    sums[k] += volumes[cells].ravel() @ values
+        lost, stored = map(float, self._domain.comm.allreduce(sums, op=MPI.SUM))
+        return lost, stored if self._domain.comm.allreduce(stated, op=MPI.LAND) else None
+
+    def silence(self) -> None:
+        """Let the forms see no stress of the laws."""
+        self._seen = None
+        if self.initial is not None:
+            self._stress.x.array[:] = 0.0
 
     def variables(self, law: Law) -> Mapping[str, ArrayLike]:
         """Return the internal variables of a law in the reference configuration."""
@@ -473,6 +482,8 @@ def _check(
         shapes["stiffness"] = np.shape(found.stiffness), (n, size, size)
     if found.dissipation is not None:
         shapes["dissipation"] = np.shape(found.dissipation), (n,)
+    if found.energy is not None:
+        shapes["energy"] = np.shape(found.energy), (n,)
     for name, (given, accepted) in shapes.items():
         if given != accepted:
             raise InputError(

@@ -251,7 +251,7 @@ def _bound_gradient(
 ) -> Array:
     """Return the derivative of the friction bound by the slip, shape (n, block size).
 
-    StepResult only when the slip zone is that of the step before, and limited: where friction falls
+    Taken only when the slip zone is that of the step before, and limited: where friction falls
     faster than the node's own stiffness, the linearised node would snap.
     """
     gradient = np.zeros((length.size, interface.jump.block_size))

@@ -7,12 +7,13 @@ in the body. Per step
     work - change of energy = dissipation + plastic dissipation + O(step^2),
 
 and the dissipation, sum w lambda_f . Delta j_tau with the friction at the end of the step, is
-never negative; neither is that of plastic flow, which the material states. Before the reference
-configuration nothing has acted before.
+never negative; neither is that of plastic flow, which the material states, as it states the energy
+that it stores. Before the reference configuration nothing has acted.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -68,9 +69,9 @@ class Balance:
     energy
         Stored at its end.
     dissipation
-        StepResult by friction during the step.
+        Taken by friction during the step.
     plastic
-        StepResult by plastic flow; None for a body without.
+        Taken by plastic flow; None for a body without.
     """
 
     work: float
@@ -91,16 +92,20 @@ def moment(problem: ContactProblem, state: State, before: Moment) -> Moment:
     interface.jump.transpose(-vectors, foundation)
     given = external - foundation + body.reactions(residual)
     moved = body.owned_part(state.x) - body.owned_part(before.x)
+    plastic, stored = body.energies(state)
+    forces_at: Callable[[State], Array] = body.internal_forces
+    if stored is None:
+        gained = -plastic
+    else:
+        _, at_first = body.energies(replace(state, x=before.x))
+        assert at_first is not None
+        forces_at, gained = body.forces_without_history, stored - at_first
     if body.linear:
         power = 0.5 * (internal + before.internal)
     else:
-        forces = [
-            body.internal_forces(replace(state, x=0.5 * ((1 - s) * before.x + (1 + s) * state.x)))
-            for s in _POINTS
-        ]
-        power = 0.5 * _WEIGHTS @ np.array(forces)
-    plastic = body.dissipation(state)
-    enthalpy = before.enthalpy + body.product(power, moved) - plastic
+        way = [0.5 * ((1 - s) * before.x + (1 + s) * state.x) for s in _POINTS]
+        power = 0.5 * _WEIGHTS @ np.array([forces_at(replace(state, x=x)) for x in way])
+    enthalpy = before.enthalpy + body.product(power, moved) + gained
     return Moment(state.x, given, internal, enthalpy, plastic)
 
 

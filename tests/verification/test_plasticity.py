@@ -1,13 +1,17 @@
 """Flow theory in homogeneous states: every number of the specification, with the same steps."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import ufl
 from dolfinx import fem
+from scipy.integrate import quad
+from scipy.optimize import brentq
 
 from contact import NewtonOptions, solve
 from contact.output.fields import DerivedFields
-from forms.j2 import Tabulated, Voce
+from forms.j2 import J2, Tabulated, Voce
 from scripts.studies.hollow_sphere import (
     Hill,
     at_the_equator,
@@ -98,6 +102,59 @@ def test_plane_strain_between_plates(law):
     assert all(row["plastic_dissipation"] >= 0 and row["dissipation"] == 0 for row in rows)
     assert work - rows[-1]["energy"] == pytest.approx(lost, rel=2e-3)
     assert lost == pytest.approx(YIELD * known[2][-1], rel=1e-6)
+
+
+def uniaxial_energy(steps, end, hardening, terms):
+    """Return the stored energy of a uniaxial pull by backward Euler steps, and the lost one."""
+    a, back, lost = 0.0, np.zeros(len(terms)), 0.0
+    moduli, recoveries = (np.array([term[k] for term in terms]) for k in (0, 1))
+
+    def at(da):
+        after = (back + moduli * da) / (1 + recoveries * da)
+        return after, YIELD + hardening(a + da) + after.sum()
+
+    for strain in np.linspace(0.0, end, steps + 1)[1:]:
+
+        def misfit(da, flown=a, strain=strain):
+            return at(da)[1] / YOUNG + flown + da - strain
+
+        da = brentq(misfit, 0.0, end, xtol=1e-16) if misfit(0.0) < 0 else 0.0
+        back, _ = at(da)
+        a += da
+        lost += da * (YIELD + (recoveries / moduli * back**2).sum())
+    stress = YIELD + hardening(a) + back.sum()
+    isotropic = quad(hardening, 0.0, a, epsabs=1e-15)[0]
+    return stress**2 / (2 * YOUNG) + isotropic + (back**2 / (2 * moduli)).sum(), lost
+
+
+@pytest.mark.parametrize("law", ["table", "voce", "K", "chaboche"])
+@pytest.mark.parametrize("steps", [1, 4])
+def test_stored_energy_is_that_of_the_state(law, steps):
+    """However long the steps are: elastic, of isotropic hardening, and of the back stresses."""
+    _, hardening, terms = LAWS[law]
+    solution = run("uniaxial", material(law), path(0.02, steps=steps), cells=1)
+    rows = [step.row for step in solution.steps]
+    stored, lost = uniaxial_energy(steps, 0.02, hardening, terms)
+    assert rows[-1]["energy"] == pytest.approx(stored, rel=1e-8)
+    assert sum(row["plastic_dissipation"] for row in rows) == pytest.approx(lost, rel=1e-8)
+
+
+def test_the_balance_sees_a_wrong_dissipation(monkeypatch):
+    def left():
+        solution = run("uniaxial", material("chaboche"), path(0.02, steps=40), cells=1)
+        rows = [step.row for step in solution.steps]
+        work, lost = (sum(row[name] for row in rows) for name in ("work", "plastic_dissipation"))
+        return abs(work - rows[-1]["energy"] - lost) / work
+
+    assert left() < 0.02
+    respond = J2.respond
+
+    def wrong(law, *given):
+        found = respond(law, *given)
+        return replace(found, dissipation=2 * found.dissipation)
+
+    monkeypatch.setattr(J2, "respond", wrong)
+    assert left() > 0.1
 
 
 @pytest.mark.parametrize("law", list(FINE))
