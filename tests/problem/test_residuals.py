@@ -10,7 +10,7 @@ from contact.body.description import Body, Fixed, Load
 from contact.case.file import parse_case
 from contact.interface.friction import Friction
 from contact.mesh.grid import rectangle
-from contact.problem import kkt
+from contact.problem import residuals
 from contact.problem.contact import Contact
 from contact.problem.problem import ContactProblem
 from contact.problem.residuals import Residuals, evaluate, residual_forces
@@ -107,7 +107,7 @@ def test_rounding_is_a_small_part_of_the_loads(solved, monkeypatch):
     shake = np.random.default_rng(0).standard_normal(body.owned) * body.free.ravel()
     shake.reshape(-1, body.block_size)[problem.nodes.nodes] = 0.0
     strict = evaluate(problem, State(solved.state.x + 1e-4 * shake, solved.forces))
-    monkeypatch.setattr(kkt, "MARGIN", 1e30)
+    monkeypatch.setattr(residuals, "MARGIN", 1e30)
     for size in (1e-4, 1e-4 * 2 * MOST_ROUNDING / strict.equilibrium):
         found = evaluate(problem, State(solved.state.x + size * shake, solved.forces))
         assert found.equilibrium > 0.99 * MOST_ROUNDING
@@ -132,7 +132,7 @@ def test_rounding_is_what_no_solve_gets_rid_of(degree):
     assert found.rounding > 1e-11  # beside loads and reactions
     assert 0 < found.equilibrium <= found.floors[0]
     assert found.significant == 0
-    known = kkt.force_rounding(problem, state, body.internal_forces(state))
+    known = residuals.force_rounding(problem, state, body.internal_forces(state))
     assert 0.1 < stalled / known[0, 0] < 0.5
     spoilt = state.x.copy()
     spoilt[: body.owned] += 1e-9 * body.free.ravel() * np.abs(spoilt).max()
