@@ -125,7 +125,8 @@ class Newton:
         if self.modes is None:
             assert isinstance(problem, ContactProblem)
             self.modes = UnconstrainedModes(problem)
-        self.whole = NewtonStep(problem, options, self._parameters, self.counters)
+        underconstrained = not self.modes.constrained_undeformed
+        self.whole = NewtonStep(problem, options, self._parameters, self.counters, underconstrained)
         self._condensed: CondensedStep | None = None
         self._condensable, self._pays = False, False
         if options.condense and isinstance(problem, ContactProblem):

@@ -39,6 +39,10 @@ FORCING = 1e-2
 #: two digits the active set may cycle. Its least value is the tolerance.
 STAGNANT = 3
 
+#: Levenberg-Marquardt regularisation of underconstrained bodies, over a node's stiffness and the
+#: residual.
+REGULARISATION = 1e-2
+
 #: Equilibrium residual over the largest one below which the material is left as it was linearised
 #: last: the error is in contact and friction.
 SMALL = 0.1
@@ -152,6 +156,12 @@ class NewtonStep:
         The problem, the options and the complementarity parameters.
     counters
         Where factorisations and solves are counted.
+    underconstrained
+        Whether a rigid-body mode is constrained by contact alone, and not by the nodes that touch
+        in the reference configuration. A body that touches at a single node, say, rolls or slides
+        off by any length until it touches at more. A Levenberg-Marquardt regularisation at all
+        contact nodes prevents that while the active set changes; its forces are left to the next
+        step, and it decreases with the residual.
     """
 
     fault = "no contact constrains the body at that displacement"
@@ -162,7 +172,9 @@ class NewtonStep:
         options: NewtonOptions,
         parameters: ComplementarityParameters,
         counters: Counters,
+        underconstrained: bool = False,
     ) -> None:
+        self._underconstrained = underconstrained
         self.problem, self.options, self.parameters = problem, options, parameters
         self.counters = counters
         self._operator: Operator | None = None
@@ -221,6 +233,12 @@ class NewtonStep:
         blocks = contact.blocks + layer + self._current(nodal, contact, reached.significant)
         kind, last = "tangent" if tangent else "secant", self._kind
         remains = kind == last and reached.equilibrium < SMALL * reached.significant
+        if self._underconstrained and not contact.unchanged:
+            stiffness = (
+                REGULARISATION * min(reached.significant, 1.0) * self.parameters.nodal_stiffness
+            )
+            along = jump.normal[:, :, None] * jump.normal[:, None, :]
+            blocks[:, : body.dim, : body.dim] += stiffness * (along + jump.tangent)
         blocks = interface.weighted(blocks, state.x)
         about = state if iterate.about is None else replace(state, x=iterate.about)
         self.operator.update(kind, about, blocks, constant=body.linear or remains)

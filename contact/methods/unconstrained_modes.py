@@ -33,6 +33,7 @@ from contact.problem.rigid_modes import (
     Group,
     constrained_by_friction,
     constrained_by_supports,
+    constrained_undeformed,
     groups,
     null_space,
 )
@@ -84,6 +85,11 @@ class UnconstrainedModes:
     def constrained_by_supports(self) -> bool:
         """Whether the supports constrain all modes without contact."""
         return constrained_by_supports(self.problem)
+
+    @cached_property
+    def constrained_undeformed(self) -> bool:
+        """Whether supports, and contact where it touches in the reference configuration, do."""
+        return constrained_undeformed(self.problem)
 
     @cached_property
     def friction_alone(self) -> bool:

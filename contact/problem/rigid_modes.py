@@ -124,6 +124,17 @@ def constrained_by_supports(problem: ContactProblem) -> bool:
     return all([null_space(group.supports).size == 0 for group in groups(problem)])
 
 
+def constrained_undeformed(problem: ContactProblem) -> bool:
+    """Tell whether supports and contact hold all bodies where they touch undeformed. Collective."""
+    touching = _touching(problem)
+    return all(
+        [
+            null_space(group.held(problem.frictional, touching)).size == 0
+            for group in groups(problem)
+        ]
+    )
+
+
 def _touching(problem: ContactProblem) -> NDArray[np.bool_]:
     """Tell which contact nodes touch before anything but prescribed values moves. Collective."""
     interface, rest = problem.interface, problem.start()

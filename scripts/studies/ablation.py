@@ -144,6 +144,8 @@ DEVICES = (
     Device("estimate of the stiffness from the first step",
            (parameters.overestimates_stiffness,), "-",
            ((newton, "overestimates_stiffness", lambda *_: False),)),
+    Device("Levenberg-Marquardt regularisation", (), "Marquardt 1963",
+           ((newton_step, "REGULARISATION", 0.0),)),
     Device("forcing term that tightens", (newton_step.NewtonStep._forcing_term,),
            "Dembo, Eisenstat and Steihaug 1982", ((newton_step, "STAGNANT", 10**9),)),
     Device("layer linearised where its law is met", (newton_step.linearised_layer,), "-",

@@ -167,6 +167,7 @@ def test_constants_of_the_algorithms_are_those_of_the_code() -> None:
         "below [1/10] of the largest residual": newton_step.SMALL == 0.1,
         "the forcing term [10⁻²]": newton_step.FORCING == 1e-2,
         "each three steps": newton_step.STAGNANT == 3,
+        "[10^{-2}]\\,\\kappa$ is added": newton_step.REGULARISATION == 1e-2,
         "to [10⁻³] of the residual before": condensed_step.CONTACT_PART == 1e-3,
         "has not fallen to [1/20]": condensed_step.UNSOLVED == 0.05,
         "below a residual of [0.05]": chord.RADIUS == 0.05,
