@@ -15,6 +15,7 @@ from pathlib import Path
 import numpy as np
 
 from contact import Case, build_problem, load_case
+from contact.case.evolution import Evolution
 from contact.output.resultants import Reading, sensor
 from scripts.cases import CASES
 from scripts.reporting import Report, parser, solved, subplots
@@ -36,10 +37,14 @@ def opened(case: Case, electrode: str) -> Case:
 
 def readings(case: Case, electrode: str, factors: Sequence[float]) -> list[Reading]:
     """Return the electrode's potentials at multiples of the load. Collective."""
-    base = build_problem(case)
-    found = []
+    most = max(factors)
+    growing = {"time": [0.0, most], "value": [0.0, most]}
+    stages = {"times": [0.0, most], "steps": [1], "amplitudes": {"load": growing}}
+    loads = tuple(load.model_copy(update={"amplitude": "load"}) for load in case.load)
+    update = {"load": loads, "evolution": Evolution.model_validate(stages)}
+    base, found = build_problem(case.model_copy(update=update)), []
     for factor in factors:
-        solution = solved(case, base.at(factor))  # loads without an amplitude grow with time
+        solution = solved(case, base.at(factor))
         found.append(sensor(solution.problem, solution.state, electrode))
     return found
 

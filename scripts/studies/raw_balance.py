@@ -162,7 +162,9 @@ def _tractions(solution: Solution) -> Array:
             edges = corners[1:] - corners[0]
             area = np.sqrt(np.linalg.det(edges @ edges.T))
             at = corners[0] + points @ edges
-            traction = np.column_stack([np.broadcast_to(f.numpy(at), len(at)) for f in load.force])
+            traction = np.column_stack(
+                [np.broadcast_to(f.numpy(at), len(at)) for f in load.density]
+            )
             forces[nodes] += area * np.einsum("q,qn,qi->ni", weights, shapes, traction)
     return forces
 
