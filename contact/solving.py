@@ -336,6 +336,7 @@ def run_schedule(
         start=BEFORE if records else ZERO if start is None else schedule.guess,
         seconds={"setup": setup, "solve": time.perf_counter() - clock - setup, "output": 0.0},
         steps=records,
+        extra_steps=sum(record.state.time not in schedule.times for record in records),
         critical_factor=critical,
     )
     if reviewed:

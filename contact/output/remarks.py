@@ -90,6 +90,7 @@ def review(solution: Solution) -> None:
     """Add all remarks to the notes and warnings of a solution. Collective."""
     strains = measure(solution)
     for remarks in (
+        halved(solution),
         unloading(solution),
         monotonicity(solution, strains),
         small_strain(solution),
@@ -113,6 +114,15 @@ def review(solution: Solution) -> None:
     ):
         for text in remarks:
             (solution.notes if isinstance(text, Note) else solution.warnings).append(text)
+
+
+def halved(solution: Solution) -> Iterator[Remark]:
+    """Say that steps have failed and were halved."""
+    if solution.extra_steps > 0:
+        yield Note(
+            f"{len(solution.steps)} steps, {solution.extra_steps} more than asked for: some that "
+            "did not converge were halved"
+        )
 
 
 def unloading(solution: Solution) -> Iterator[Remark]:
