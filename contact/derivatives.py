@@ -64,6 +64,9 @@ STEP = 2e-6
 #: Problems and states a little above and below a parameter.
 _Sides = list[tuple[ContactProblem, State]]
 
+#: Sections of a case by whose numbers there are no derivatives.
+WITHOUT = "case", "solver", "output", "evolution"
+
 #: Methods of `sensitivity`.
 AUTO, TANGENT, ADJOINT = "auto", "tangent", "adjoint"
 
@@ -201,6 +204,12 @@ def parameters_of(
             "{name: Parameter(value, problem)}"
         )
     domain, comm = solution.problem.domain, solution.problem.comm
+    for key in given:
+        sections, value = key.split("."), number_at(case, key)
+        accepted = "a number of the mesh, materials, supports, loads, contact or rigid parts"
+        expect("parameters", key, accepted, sections[0] not in WITHOUT)
+        accepted = "a number above 0: friction begins at 0, and derivatives are one-sided there"
+        expect(f"parameters: {key}", value, accepted, "friction" not in sections or value != 0)
 
     def build(key: str, value: float) -> ContactProblem:
         kept = None if key.split(".")[0] == "mesh" else domain

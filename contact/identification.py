@@ -135,6 +135,9 @@ def identify(
     count = sum(model.count for model in models)
     enough = f"more than {len(parameters)}, the number of parameters"
     expect("data", f"{count} values", enough, count > len(parameters))
+    for key, value, (low, high) in zip(parameters, first, limits, strict=True):
+        accepted = f"some around {value:g}, its number in the case"
+        expect(f"bounds: {key}", f"{low:g} to {high:g}", accepted, low <= value <= high)
 
     def residuals(values: Array) -> Array:
         runs = [model.run(dict(zip(parameters, values, strict=True))) for model in models]
@@ -199,6 +202,7 @@ class _Model:
                 f"data: columns {', '.join(arrays)}; accepted: t and columns of steps.csv"
             )
         self._time = arrays.pop(TIME)
+        expect("data", "no rows", "one row or more", self._time.size > 0)
         self._measured = arrays
         for name, values in arrays.items():
             fits = values.shape == self._time.shape and bool(np.all(np.isfinite(values)))
@@ -272,6 +276,8 @@ def read_data(path: str | Path) -> dict[str, Array]:
     try:
         with path.open(newline="", encoding="utf-8-sig") as file:
             names, *rows = [row for row in csv.reader(file) if row]
+        if len(set(names)) < len(names):
+            raise ValueError("a name stands twice")
         values = np.array([[float(value) for value in row] for row in rows]).reshape(-1, len(names))
     except OSError as error:
         raise InputError(f"{path}: {error.strerror}; accepted: a CSV file") from None

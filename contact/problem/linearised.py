@@ -45,7 +45,8 @@ class Equations:
     forces
         On the owned unknowns, global ones behind them.
     conditions
-        At the contact nodes, shape (n, d).
+        At the contact nodes, shape (n, d): stresses, and gaps and slips times `stiffness` of the
+        interface, for a normal that is along no axis mixes them.
     """
 
     forces: Array
@@ -74,10 +75,10 @@ def equations(problem: ContactProblem, state: State, active: ActiveSet) -> Equat
     bound = interface.friction.bound(pressure, length)
     along = slip / np.maximum(length, np.finfo(float).tiny)[:, None]
     friction = jump.tangential_component(vectors)
-    tangential = np.where(
-        active.sticks[:, None], slip, friction - np.where(active.slips, bound, 0.0)[:, None] * along
-    )
-    normal = np.where(active.closed, -interface.opening(nodal), jump.normal_component(vectors))
+    slides = friction - np.where(active.slips, bound, 0.0)[:, None] * along
+    tangential = np.where(active.sticks[:, None], interface.stiffness * slip, slides)
+    closing = -interface.stiffness * interface.opening(nodal)
+    normal = np.where(active.closed, closing, jump.normal_component(vectors))
     conditions = normal[:, None] * jump.normal + tangential
     return Equations(residual_forces(problem, state), conditions)
 
@@ -135,8 +136,9 @@ class Linearised:
         self._conditions(nodal)
         regular = self._by_force.copy()
         normal = jump.normal[:, :, None] * jump.normal[:, None, :]
-        regular -= np.where(self.active.closed, 1 / parameters.gamma, 0.0)[:, None, None] * normal
-        sticks = np.where(self.active.sticks, 1 / parameters.gamma, 0.0)
+        small = interface.stiffness / parameters.gamma
+        regular -= np.where(self.active.closed, small, 0.0)[:, None, None] * normal
+        sticks = np.where(self.active.sticks, small, 0.0)
         regular -= sticks[:, None, None] * jump.tangent
         # Components that supports hold have no condition of their own.
         fixed = np.eye(jump.dim) - normal - jump.tangent
@@ -175,15 +177,16 @@ class Linearised:
         self._layer = interface.law.layer_gradient(nodal)
         local = self._rate * friction.local
         self._by_jump = np.zeros((length.size, d, jump.block_size))
-        self._by_jump[:, :, :d] = np.where(closed, normal, 0.0)
-        self._by_jump[:, :, :d] += np.where(sticks, jump.tangent, 0.0) - np.where(slips, falls, 0.0)
+        self._by_jump[:, :, :d] = np.where(closed, interface.stiffness * normal, 0.0)
+        #: Derivative of the conditions by the slip alone, and by its length.
+        self.by_slip = np.where(sticks, interface.stiffness * jump.tangent, 0.0)
+        self.by_slip -= np.where(slips, falls, 0.0)
+        self.by_length = -by_slip[:, None] * self._along
+        self._by_jump[:, :, :d] += self.by_slip
         self._by_jump -= (local[:, None] * self._along)[:, :, None] * self._layer[:, None, :]
         pressed = (local[:, None] * self._along)[:, :, None] * jump.normal[:, None, :]
         self._by_force = np.where(closed, 0.0, normal) + np.where(sticks, 0.0, jump.tangent)
         self._by_force -= pressed
-        #: Derivative of the conditions by the slip alone, and by its length.
-        self.by_slip = np.where(sticks, jump.tangent, 0.0) - np.where(slips, falls, 0.0)
-        self.by_length = -by_slip[:, None] * self._along
 
     @property
     def local(self) -> bool:
