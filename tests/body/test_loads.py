@@ -28,10 +28,10 @@ def external(problem, time=1.0):
     return body.comm.allreduce(nodal.sum(axis=0), op=MPI.SUM)
 
 
-def block(load, dim=2, law=None):
+def block(load, dim=2, law=None, domain=None):
     size, count = (2.0, 1.0, 1.5)[:dim], (4, 2, 3)[:dim]
     make = rectangle if dim == 2 else box
-    domain = make(MPI.COMM_WORLD, (0.0,) * dim, size, count)
+    domain = make(MPI.COMM_WORLD, (0.0,) * dim, size, count) if domain is None else domain
     body = Body(Linear(10.0, 0.3), Fixed("left", [0.0] * dim), load)
     return Problem(domain, body, Contact("bottom"))
 
@@ -47,8 +47,9 @@ def test_a_force_is_the_resultant_and_a_traction_is_per_area(dim):
     found, known = block(resultant(*force), dim), block(Load("top", traction=force), dim)
     assert external(found) == pytest.approx(force, rel=1e-12)
     assert external(known) == pytest.approx(area * np.array(force), rel=1e-12)
-    # Evenly: the traction of that resultant.
-    even = block(Load("top", traction=[f / area for f in force]), dim)
+    # Evenly: the traction of that resultant, on the same mesh, which ranks may share otherwise.
+    evenly = Load("top", traction=[f / area for f in force])
+    even = block(evenly, dim, domain=found.domain)
     loads = (p.equilibrium.external(1.0) for p in (found, even))
     assert np.allclose(*loads, rtol=0, atol=1e-15)
 
