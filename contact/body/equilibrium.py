@@ -244,7 +244,11 @@ class BodyEquilibrium:
 
     def _forces_of_laws(self) -> Array:
         """Return the forces of the stresses that the laws with history have been given."""
-        self.forms.at.x.array[:] = 0.0  # no other material has stresses
+        return self._assembled_at(0.0)  # no other material has stresses
+
+    def _assembled_at(self, x: Array | float) -> Array:
+        """Return the forces at local unknowns of the nodes, by laws with history as they stand."""
+        self.forms.at.x.array[:] = x
         forces = sum(assembled(form, self.owned) for form in self.forms.law_forces)
         return np.concatenate([forces, np.zeros(self.global_unknowns.size)])
 
@@ -297,9 +301,7 @@ class BodyEquilibrium:
     def forces_without_history(self, state: Evaluated) -> Array:
         """Return the owned nodal forces of all materials without internal variables. Collective."""
         self.laws.silence()
-        self.forms.at.x.array[:] = self.nodal(state.x).ravel()
-        forces = sum(assembled(form, self.owned) for form in self.forms.law_forces)
-        return np.concatenate([forces, np.zeros(self.global_unknowns.size)])
+        return self._assembled_at(self.nodal(state.x).ravel())
 
     def internal_forces(self, state: Evaluated, secant_at: Array | None = None) -> Array:
         """Return the owned nodal forces of the stresses at a state. Collective.
