@@ -66,6 +66,7 @@ from contact.problem.problem import ContactProblem
 from contact.problem.protocols import Problem
 from contact.problem.residuals import Residuals, evaluate, residual_forces
 from contact.problem.state import State
+from contact.tolerances import ROUNDING
 from contact.typing import Array
 
 logger = logging.getLogger("contact.solver")
@@ -394,6 +395,7 @@ class NewtonLoop:
         iteration, problem, options = self.iteration, self.iteration.problem, self.iteration.options
         linear = problem.equilibrium.linear
         residuals = evaluate(problem, iterate.state)
+        pressed = self._largest_pressure(iterate)
         limit = self.stagnation_limit or options.stagnation_limit
         stagnation = Stagnation(limit, PROGRESS, together=True)
         if iterate.active_set is not None and residuals.significant <= options.tolerance:
@@ -423,8 +425,9 @@ class NewtonLoop:
                 iteration.see(iterate, residuals)
             if residuals.significant <= options.tolerance:
                 return iterate, self._end(residuals)
-            if (found := self._loss_of_contact(iterate, note)) is not None:
+            if (found := self._loss_of_contact(iterate, pressed, note)) is not None:
                 return found
+            pressed = max(pressed, self._largest_pressure(iterate))
             if self.give_up is not None and kept.active_set is None and self.give_up(iterate.state):
                 return iterate, self._end(residuals, OVERESTIMATED)
             if not np.isfinite(residuals.significant):
@@ -440,15 +443,22 @@ class NewtonLoop:
         steps = len(iteration.history.records)
         return iterate, self._end(residuals, f"not converged in {steps} steps")
 
-    def _loss_of_contact(self, iterate: Iterate, note: str) -> tuple[Iterate, Outcome] | None:
+    def _largest_pressure(self, iterate: Iterate) -> float:
+        return self.iteration.problem.interface.jump.maximum(iterate.state.forces.pressure)
+
+    def _loss_of_contact(
+        self, iterate: Iterate, pressed: float, note: str
+    ) -> tuple[Iterate, Outcome] | None:
         """Return zero displacement where nothing touches any more and nothing acts. Collective.
 
         Displacements fall by their rounding in each step then, and so do the forces beside which
-        residuals are measured.
+        residuals are measured: nodes that touch press by rounding of the largest pressure before.
         """
         problem = self.iteration.problem
         sizes = _sizes(iterate, problem)
-        if sizes is None or sizes[1] + sizes[2] > 0:
+        if sizes is None:
+            return None
+        if sizes[1] + sizes[2] > 0 and self._largest_pressure(iterate) > ROUNDING * pressed:
             return None
         found = undeformed_equilibrium(problem)
         if found is None:
