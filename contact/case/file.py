@@ -30,7 +30,7 @@ from contact.case.checks import check_mesh, check_sections
 from contact.case.evolution import Evolution
 from contact.case.interface import Contact, Electric, Friction
 from contact.case.material import Material
-from contact.case.mesh import Mesh
+from contact.case.mesh import Mesh, cut_about_axis
 from contact.case.messages import clipped, describe, describe_fault, fault, keys_of, path_of, shown
 from contact.case.section import (
     FromTable,
@@ -205,8 +205,8 @@ class Case(Section):
 
     @model_validator(mode="before")
     @classmethod
-    def _share_units(cls, given: Any) -> Any:
-        return share(given)
+    def _fill_in(cls, given: Any) -> Any:
+        return cut_about_axis(share(given))
 
     @model_validator(mode="after")
     def _check(self) -> Self:

@@ -93,6 +93,24 @@ class Adapt(Section):
     uniform, and from the third one on the summary has `intervals`."""
 
 
+def cut_about_axis(given: Any) -> Any:
+    """Cut the squares of a body of revolution of degree 1 at its axis by both diagonals.
+
+    With diagonals of one way pressures next to the axis are off: `scripts.studies.pressure_on_axis`.
+    """
+    if not isinstance(given, Mapping):
+        return given
+    mesh, space = given.get("mesh"), given.get("space")
+    if not isinstance(mesh, Mapping) or not isinstance(space, Mapping):
+        return given
+    origin = mesh.get("origin", [0.0])
+    on_axis = not (isinstance(origin, list | tuple) and origin and origin[0])
+    revolved = space.get("kinematics") == "axisymmetric" and space.get("degree", 1) == 1
+    if mesh.get("generator") != "rectangle" or not (revolved and on_axis):
+        return given
+    return {**given, "mesh": {"diagonal": "crossed", **mesh}}
+
+
 class Mesh(Section):
     """`[mesh]`: a generator with its parameters, or a file."""
 
@@ -121,7 +139,8 @@ class Mesh(Section):
     ) = None
     """Squares or cubes along the edges; required for a rectangle or box."""
     diagonal: Literal["right", "left", "crossed", "left_right", "right_left"] | None = None
-    """How a rectangle's squares are cut into triangles; there "right" by default."""
+    """How a rectangle's squares are cut into triangles; there "right" by default, and "crossed" in
+    a body of revolution of degree 1 that reaches its axis."""
     cell: Literal["triangle", "quadrilateral", "tetrahedron", "hexahedron"] | None = None
     """Shape of the cells of a rectangle, "triangle" or "quadrilateral", or of a box, "tetrahedron"
     or "hexahedron". Default: the first of them."""

@@ -109,7 +109,8 @@ def rectangle(
     parts
         Further parts: a piece of a side, or several.
     diagonal
-        How a square is cut: ``right``, ``left``, ``crossed``, ``left_right`` or ``right_left``.
+        How a square is cut: ``right``, ``left``, ``crossed``, ``left_right`` or ``right_left``. Of
+        a body of revolution at degree 1 take ``crossed``: pressures next to the axis are better.
     rotation
         Degrees, counter-clockwise about the point (0, 0).
     cell

@@ -91,7 +91,8 @@ def test_two_blocks_unloaded_to_zero_end_at_zero(loads, condense):
     case = {
         **CASE,
         "fixed": [CASE["fixed"][0], push],
-        "load": [{"on": "upper_top", "traction": [0.0, "-0.001*t*(1 - t)"]}] * (loads != "supports"),
+        "load": [{"on": "upper_top", "traction": [0.0, "-0.001*t*(1 - t)"]}]
+        * (loads != "supports"),
         "contact": {"on": "upper_bottom", "against": "lower_top"},
     }
     problem = build_problem(parse_case(case), SELF)
