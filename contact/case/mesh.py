@@ -96,7 +96,7 @@ class Adapt(Section):
 def cut_about_axis(given: Any) -> Any:
     """Cut the squares of a body of revolution of degree 1 at its axis by both diagonals.
 
-    With diagonals of one way pressures next to the axis are off: `scripts.studies.pressure_on_axis`.
+    With those of one way pressures next to the axis are off (`scripts.studies.pressure_on_axis`).
     """
     if not isinstance(given, Mapping):
         return given
