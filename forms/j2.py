@@ -220,7 +220,7 @@ class J2(Isotropic):
         ):
             at_end = theta[:, None] * (old + 2 / 3 * c * flow.plastic_strain)
             new[name][plastic] = at_end
-            square = np.einsum("ni,ni->n", at_end, at_end)
+            square = _dot(at_end, at_end)
             dissipation[plastic] += 1.5 * recovery / c * square * ROOT * flow.dg
         stiffness = None
         if kind:
@@ -233,10 +233,10 @@ class J2(Isotropic):
 
     def _energy(self, strain: Array, stress: Array, variables: Mapping[str, Array]) -> Array:
         """Return the stored energy by volume, shape (n,): elastic, and of the hardening."""
-        total = 0.5 * np.einsum("ni,ni->n", stress, strain - variables["plastic_strain"])
+        total = 0.5 * _dot(stress, strain - variables["plastic_strain"])
         total += self.hardening.energy(variables["equivalent_plastic_strain"])  # type: ignore[union-attr]
         for name, (c, _) in zip(self._back, self._terms, strict=True):
-            total += 0.75 / c * np.einsum("ni,ni->n", variables[name], variables[name])
+            total += 0.75 / c * _dot(variables[name], variables[name])
         return total
 
     def differential(
@@ -279,9 +279,14 @@ class J2(Isotropic):
         return trial, plastic, _Flow(self, trial[plastic], a[plastic], [b[plastic] for b in back])
 
 
+def _dot(one: Array, other: Array) -> Array:
+    """Return the inner products of the rows."""
+    return np.asarray(np.einsum("ni,ni->n", one, other))
+
+
 def _norm(tensors: Array) -> Array:
     """Return the norms of the rows; NumPy's own take five times as long where these are short."""
-    return np.asarray(np.sqrt(np.einsum("ni,ni->n", tensors, tensors)))
+    return np.sqrt(_dot(tensors, tensors))
 
 
 class _Flow:
@@ -300,45 +305,67 @@ class _Flow:
     """
 
     def __init__(self, law: J2, trial: Array, a: Array, back: Sequence[Array]) -> None:
-        self._law, self._trial, self._a, self.back = law, trial, a, back
-        self.dg = self._solve()
-        self.theta, along, self._size, self._slope = self._at(self.dg)
+        self._law, self._a, self.back = law, a, back
+        self._relative = trial - sum(back) if back else trial
+        #: Back stresses that recover, with modulus and recovery: the others do not turn z.
+        recovering = [(c, g, b) for (c, g), b in zip(law._terms, back, strict=True) if g > 0]
+        parts = [b for _, _, b in recovering]
+        self._square = _dot(self._relative, self._relative)
+        self._towards = [_dot(self._relative, b) for b in parts]
+        self._between = [[_dot(one, other) for other in parts] for one in parts]
+        self._recovering = [(c, g) for c, g, _ in recovering]
+        self._fixed = 2 * law.shear + sum(2 / 3 * c for c, g in law._terms if g == 0)
+        self.dg = self._solve(_norm(trial) + sum(_norm(b) for b in back))
+        self.theta = [1 / (1 + recovery * ROOT * self.dg) for _, recovery in law._terms]
+        along = self._relative + sum(
+            ((1 - part)[:, None] * b for part, b in zip(self.theta, back, strict=True)),
+            np.zeros_like(trial),
+        )
+        self._size, self._slope = _norm(along), self._at(self.dg)[1]
         self._normal = along / self._size[:, None]
         self.plastic_strain = self.dg[:, None] * self._normal
         self.turn = 2 * law.shear * self.dg / self._size
 
-    def _at(self, dg: Array) -> tuple[list[Array], Array, Array, Array]:
-        """Return theta, z, its norm and minus the derivative of the local equation."""
-        law, along = self._law, self._trial.copy()
-        terms = law._terms
-        theta = [1 / (1 + recovery * ROOT * dg) for _, recovery in terms]
-        for part, b in zip(theta, self.back, strict=True):
-            along -= part[:, None] * b
-        size = _norm(along)
-        slope = 2 * law.shear + 2 / 3 * law.hardening.slope(self._a + ROOT * dg)  # type: ignore[union-attr]
-        for (c, recovery), part, b in zip(terms, theta, self.back, strict=True):
+    def _at(self, dg: Array) -> tuple[Array, Array]:
+        """Return the local equation's value, and minus its derivative.
+
+        They are of the inner products of the trial stress and the back stresses alone, which no
+        step of the iteration changes.
+        """
+        law, a = self._law, self._a + ROOT * dg
+        theta = [1 / (1 + recovery * ROOT * dg) for _, recovery in self._recovering]
+        gone = [1 - part for part in theta]
+        on = [
+            towards + sum(part * b for part, b in zip(gone, between, strict=True))
+            for towards, between in zip(self._towards, self._between, strict=True)
+        ]
+        square, moduli = self._square.copy(), np.full_like(dg, self._fixed)
+        for part, towards, along in zip(gone, self._towards, on, strict=True):
+            square += part * (towards + along)
+        size = np.sqrt(square)
+        slope = self._fixed + 2 / 3 * law.hardening.slope(a)  # type: ignore[union-attr]
+        for (c, recovery), part, along in zip(self._recovering, theta, on, strict=True):
             # d(theta)/d(dg) = -gamma sqrt(2/3) theta^2
             change = recovery * ROOT * part**2
-            slope += 2 / 3 * c * (part - change * dg)
-            slope -= change * np.einsum("ni,ni->n", along, b) / size
-        return theta, along, size, slope
+            moduli += 2 / 3 * c * part
+            slope += 2 / 3 * c * (part - change * dg) - change * along / size
+        return size - moduli * dg - ROOT * law.strength(a), slope
 
-    def _solve(self) -> Array:
+    def _solve(self, scale: Array) -> Array:
         """Solve |z| - (2G + sum (2/3) C_k theta_k) dg = sqrt(2/3) R by Newton's method.
 
         Bisection where a step leaves the interval in which the sign changes.
+
+        Parameters
+        ----------
+        scale
+            Size of the stresses, shape (n,).
         """
-        law = self._law
-        scale = _norm(self._trial) + sum(_norm(b) for b in self.back)
         low: Array = np.zeros(scale.size)
-        high: Array = np.asarray(scale / (2 * law.shear), dtype=float)
+        high: Array = np.asarray(scale / (2 * self._law.shear), dtype=float)
         dg: Array = low.copy()
         for _ in range(MOST):
-            theta, _, size, slope = self._at(dg)
-            moduli = 2 * law.shear + sum(
-                (2 / 3 * c * part for (c, _), part in zip(law._terms, theta, strict=True)), 0.0
-            )
-            left = size - moduli * dg - ROOT * law.strength(self._a + ROOT * dg)
+            left, slope = self._at(dg)
             open_ = np.abs(left) > LOCAL * scale
             if not open_.any():
                 break
@@ -362,10 +389,10 @@ class _Flow:
             (part[:, None] * b for part, b in zip(self.theta, back, strict=True)),
             np.zeros_like(trial),
         )
-        towards = np.einsum("ni,ni->n", along, self._normal)
+        towards = _dot(along, self._normal)
         dg = (towards - ROOT * hardening * a) / self._slope
         along -= dg[:, None] * self._recovered()
-        along -= np.einsum("ni,ni->n", along, self._normal)[:, None] * self._normal
+        along -= _dot(along, self._normal)[:, None] * self._normal
         turned = (self.dg / self._size)[:, None] * along
         return dg, dg[:, None] * self._normal + turned
 
@@ -381,6 +408,6 @@ class _Flow:
         normal, g2 = self._normal, 2 * self._law.shear
         left = (g2 * self.turn - g2**2 / self._slope)[:, None] * normal
         turned = self._recovered()
-        turned -= np.einsum("ni,ni->n", turned, normal)[:, None] * normal
+        turned -= _dot(turned, normal)[:, None] * normal
         left += (self.turn * g2 / self._slope)[:, None] * turned
         return np.asarray(left[:, :, None] * normal[:, None, :])

@@ -363,12 +363,12 @@ class BodyEquilibrium:
         return create_matrix(self.forms.secant[0])
 
     def assemble(self, matrix: PETSc.Mat, kind: str, state: Evaluated, held: bool = True) -> None:
-        """Assemble Kacanov's "secant" or Newton's "tangent" at a state. Collective.
+        """Assemble Kacanov's "secant", Newton's "tangent" or its "symmetric" part. Collective.
 
         Parameters
         ----------
         matrix, kind, state
-            The matrix, which of them, and where.
+            The matrix, which of them, and the state.
         held
             Whether rows and columns of unknowns that supports hold are those of the identity.
         """
@@ -376,7 +376,7 @@ class BodyEquilibrium:
         forms.at.x.array[:] = forms.secant_at.x.array[:] = self.nodal(state.x).ravel()
         self.laws.set(state, forms.at.x.array, kind)
         matrix.zeroEntries()
-        for form in forms.tangent if kind == "tangent" else forms.secant:
+        for form in forms.secant if kind == "secant" else forms.tangent:
             assemble_matrix(matrix, form, bcs=conditions)
             matrix.assemble()
 

@@ -8,6 +8,7 @@ Nothing else in the program knows of them.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from functools import cached_property
 
 import basix
@@ -186,12 +187,18 @@ class QuadratureLaws:
         state, x
             The state, and its local unknowns of the nodes.
         kind
-            "tangent" or "secant"; empty without stiffness.
+            "tangent", its "symmetric" part, or "secant"; empty without stiffness.
         """
         for law, cells, strains, variables in self._points(state, x):
-            response = law.respond(strains, variables, kind)
+            asked = "tangent" if kind == "symmetric" else kind
+            response = law.respond(strains, variables, asked)
             _check(law, strains, variables, response)
-            yield cells, with_stiffness(law, strains, variables, kind, response)
+            found = with_stiffness(law, strains, variables, asked, response)
+            if kind == "symmetric":
+                assert found.stiffness is not None
+                transposed = found.stiffness.transpose(0, 2, 1)
+                found = replace(found, stiffness=0.5 * (found.stiffness + transposed))
+            yield cells, found
 
     def _points(
         self, state: Evaluated, x: Array

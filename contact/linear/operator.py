@@ -40,7 +40,7 @@ class Bulk(Protocol):
         """Return an empty matrix with the pattern of the body. Collective."""
 
     def assemble(self, matrix: PETSc.Mat, kind: str, state: Evaluated) -> None:
-        """Assemble the body's "secant" or "tangent" at a state. Collective."""
+        """Assemble the body's "secant", "tangent" or its "symmetric" part. Collective."""
 
 
 @dataclass

@@ -310,7 +310,9 @@ class Condensation:
         """Find the dense stiffness of the body at a state. Collective."""
         body, schur = self.full.equilibrium, self._schur
         self._rows = self._stiffness = np.zeros((0, 0))  # room for new ones
-        self._bulk.assemble(self._matrix, kind, state)
+        # The symmetric part of a tangent converges as a chord step does, and condenses alike.
+        part = "symmetric" if kind == "tangent" and not body.symmetric else kind
+        self._bulk.assemble(self._matrix, part, state)
         balance(self._matrix, body.layout)
         with petsc_options(PREFIX):
             stiffness = schur.factorise(self._matrix)
@@ -394,7 +396,7 @@ def condensable(problem: ContactProblem, kind: str) -> bool:
     """Tell whether a problem can be condensed onto its contact nodes.
 
     That is where the contact nodes are few and a direct solver has the memory, unless the user
-    or his options of PETSc ask for another, and where the matrix is symmetric.
+    or his options of PETSc ask for another.
     """
     options = PETSc.Options(PREFIX)
     names = ("ksp_type", "pc_type", "pc_factor_mat_solver_type")
@@ -402,4 +404,4 @@ def condensable(problem: ContactProblem, kind: str) -> bool:
     layout = problem.equilibrium.layout
     large = kind == "auto" and layout.dim == 3 and layout.unknowns > multigrid.DIRECT
     many = problem.nodes.size * layout.block_size > LARGEST
-    return problem.equilibrium.symmetric and not (chosen or kind == "iterative" or large or many)
+    return not (chosen or kind == "iterative" or large or many)

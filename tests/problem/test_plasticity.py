@@ -120,3 +120,17 @@ def test_the_files_of_all_steps_have_the_plastic_strain(tmp_path):
         for name in ("plastic_strain", "equivalent_plastic_strain", "back_stress_1"):
             assert f'Name="{name}"' in text
             assert f'Name="{name}_cell"' in text
+
+
+def test_recovery_is_condensed_by_the_symmetric_part():
+    """Its tangent is not symmetric: chord steps lead to the solution of the whole body."""
+    found = {}
+    for condense in (True, False):
+        settings = NewtonOptions(tolerance=1e-11, condense=condense)
+        solution = solve(block("chaboche", degree=2), settings)
+        assert solution.converged, solution.outcome.reason
+        found[condense] = totals(solution)
+        chord = any("chord step" in record.note for record in solution.history.records)
+        assert chord == condense
+    scale = np.abs(found[False]).max(axis=0)
+    assert np.abs((found[True] - found[False]) / scale).max() < 1e-9
