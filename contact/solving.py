@@ -109,8 +109,8 @@ def solve(
     settings: Options | None = None,
     monitor: Monitor | None = None,
     comm: MPI.Intracomm = MPI.COMM_WORLD,
-    folder: Path | None = None,
-    restart: Path | None = None,
+    folder: str | Path | None = None,
+    restart: str | Path | None = None,
     start: State | Solution | None = None,
     times: Sequence[float] | None = None,
     **replacements: Any,
@@ -159,6 +159,7 @@ def solve(
     expect("start", start, "an earlier solution of the same problem, or its state", fits)
     fits = isinstance(case, Case | ContactProblem | str | Path)
     expect("solve", case, "a case, the name of a case file, or a Problem", fits)
+    folder, restart = (None if given is None else Path(given) for given in (folder, restart))
     for name in replacements.keys() - set(REPLACEMENTS):
         raise InputError(f"{name}: unknown; accepted: {', '.join(REPLACEMENTS)}")
     nested = settings.nested if isinstance(settings, NewtonOptions) else None

@@ -268,11 +268,15 @@ def _state(
         points = problem.points(QUADRATURE_POINTS)
         nearest = cKDTree(arrays[QUADRATURE_POINTS]).query(points)[1] if len(points) else []
         here[QUADRATURE_POINTS] = np.asarray(nearest, dtype=np.intp)
-    history = {
-        name: arrays[HISTORY + name][here[place]]
-        for place in problem.initial.places
-        for name in problem.initial.arrays(place)
-    }
+    initial = problem.initial
+    asked = {name: place for place in initial.places for name in initial.arrays(place)}
+    kept = {name.removeprefix(HISTORY) for name in arrays if name.startswith(HISTORY)}
+    if kept != asked.keys():
+        raise InputError(
+            f"checkpoints: given the history {sorted(kept)}; accepted: {sorted(asked)}, that of "
+            "the materials of the problem"
+        )
+    history = {name: arrays[HISTORY + name][here[place]] for name, place in asked.items()}
     return State(
         problem.equilibrium.local(np.concatenate([arrays["x"][where].ravel(), arrays["motion"]])),
         Multipliers.of(

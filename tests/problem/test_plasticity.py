@@ -6,6 +6,7 @@ from mpi4py import MPI
 
 from contact import FixedPointOptions, NewtonOptions, evolve, parse_case, solve
 from contact.case.build import build_problem
+from contact.errors import InputError
 from contact.output.checkpoint import read_steps
 from contact.output.field_files import write_fields
 from tests.problems.plasticity import homogeneous, homogeneous_values
@@ -134,3 +135,12 @@ def test_recovery_is_condensed_by_the_symmetric_part():
         assert chord == condense
     scale = np.abs(found[False]).max(axis=0)
     assert np.abs((found[True] - found[False]) / scale).max() < 1e-9
+
+
+def test_checkpoints_of_other_materials_are_refused(tmp_path):
+    """They have a back stress less."""
+    folder = MPI.COMM_WORLD.bcast(tmp_path)
+    assert solve(block(), folder=str(folder)).converged
+    assert len(read_steps(folder, build_problem(block()))) == 6
+    with pytest.raises(InputError, match=r"back_stress_2.*that of the materials of the problem"):
+        read_steps(folder, build_problem(block("chaboche")))
