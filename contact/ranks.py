@@ -6,9 +6,11 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any, TypeVar
 
+import numpy as np
 from mpi4py import MPI
 
 from contact.errors import InputError
+from contact.typing import Array
 
 T = TypeVar("T")
 
@@ -44,6 +46,33 @@ def on_root(comm: MPI.Intracomm, action: Callable[[], T]) -> T:
         except OSError as error:
             raise refused(error) from None
     return comm.bcast(result)  # type: ignore[no-any-return]
+
+
+def neighbours(comm: MPI.Comm, points: Array, values: Array, reach: float) -> Array:
+    """Return the values at points near those of this rank, from the ranks that have them.
+
+    Each rank tells the others where its points are, and gets no more than it asks for. Collective.
+
+    Parameters
+    ----------
+    comm
+        Communicator.
+    points, values
+        Those of this rank, shapes (n, d) and (n, k).
+    reach
+        How far around the box of its points a rank asks (length).
+
+    Returns
+    -------
+    In the order of the ranks, shape (near, k).
+    """
+    none = np.full(points.shape[1], np.inf)
+    low, high = (points.min(axis=0), points.max(axis=0)) if len(points) else (none, -none)
+    sent = [
+        values[np.all((points >= lower - reach) & (points <= upper + reach), axis=1)]
+        for lower, upper in comm.allgather((low, high))
+    ]
+    return np.concatenate(comm.alltoall(sent))
 
 
 def refused(error: OSError) -> InputError:

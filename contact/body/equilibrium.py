@@ -35,7 +35,7 @@ from contact.body.supports import free_components, supports_of, without_field
 from contact.body.weak_forms import WeakForms
 from contact.history import BodyState, Evaluated, InternalVariables
 from contact.linear.constraint import ConstrainedBulk, ConstrainedOperator, Constraint
-from contact.linear.layout import Layout
+from contact.linear.layout import Layout, times
 from contact.linear.operator import Counters, SparseOperator
 from contact.mesh.cells import shape_of
 from contact.mesh.domain import Domain
@@ -281,10 +281,8 @@ class BodyEquilibrium:
         """
         matrix = self.create_matrix()
         self.assemble(matrix, "tangent", state, held=False)
-        vector, image = matrix.createVecs()
-        vector.array[:] = weights[: self.owned]
-        matrix.multTranspose(vector, image)
-        found = np.concatenate([image.array, np.zeros(self.global_unknowns.size)])
+        own = times(matrix, weights[: self.owned], transposed=True)
+        found = np.concatenate([own, np.zeros(self.global_unknowns.size)])
         matrix.destroy()
         return found
 

@@ -5,11 +5,13 @@ from __future__ import annotations
 from typing import Protocol
 
 import numpy as np
-from mpi4py import MPI
+from petsc4py import PETSc
 from scipy import sparse
 from scipy.spatial import cKDTree
 
 from contact.interface.nodes import ContactNodes
+from contact.linear.layout import times
+from contact.ranks import neighbours
 from contact.typing import Array
 
 #: Angles at which omega is taken on a ring; it is smooth.
@@ -46,43 +48,45 @@ class Smoothing:
     """
 
     def __init__(self, nodes: ContactNodes, radius: float) -> None:
-        self._nodes, self.radius = nodes, radius
-        self._matrix: sparse.csr_array | None = None
-        if radius > 0:
-            self._matrix = _mollifier(nodes, radius)
+        self.radius = radius
+        self._matrix = _mollifier(nodes, radius) if radius > 0 else None
 
     def __call__(self, values: Array) -> Array:
         """Return R applied to nodal values, shape (n,). Collective."""
-        if self._matrix is None:
-            return values
-        return self._matrix @ self._nodes.gather(values)
+        return times(self._matrix, values)
 
     def transposed(self, values: Array) -> Array:
         """Return R^T applied to nodal values, shape (n,). Collective."""
-        if self._matrix is None:
-            return values
-        comm, own = self._nodes.comm, values.size
-        every = comm.allreduce(self._matrix.T @ values, op=MPI.SUM)
-        begin = comm.exscan(own) or 0  # none is before the first rank
-        return np.asarray(every[begin : begin + own])
+        return times(self._matrix, values, transposed=True)
 
 
-def _mollifier(nodes: ContactNodes, radius: float) -> sparse.csr_array:
-    """Return the rows of R that belong to the owned nodes."""
-    points, weight = nodes.gather(nodes.points), nodes.gather(nodes.weight)
-    shape = (nodes.nodes.size, weight.size)
-    if nodes.nodes.size == 0:
-        return sparse.csr_array(shape)
-    pairs = cKDTree(nodes.points).sparse_distance_matrix(
-        cKDTree(points), radius * (1 - 1e-9), output_type="coo_matrix"
-    )
+def _mollifier(nodes: ContactNodes, radius: float) -> PETSc.Mat:
+    """Return R, its rows and columns divided among the ranks as the nodes are. Collective."""
+    own, reach = nodes.nodes.size, radius * (1 - 1e-9)
+    first = nodes.comm.scan(own) - own
+    numbers = np.arange(first, first + own, dtype=float)
+    values = np.column_stack([nodes.points, nodes.weight, numbers])
+    near = neighbours(nodes.comm, nodes.points, values, radius)
+    points, weight, column = near[:, : nodes.dim], near[:, -2], near[:, -1].astype(PETSc.IntType)
+    if own == 0:
+        pairs = sparse.coo_array((own, len(near)))
+    else:
+        pairs = cKDTree(nodes.points).sparse_distance_matrix(
+            cKDTree(points), reach, output_type="coo_matrix"
+        )
+    row, col = pairs.row, pairs.col
     if nodes.revolved:
-        omega = _ring_mean(nodes.points[pairs.row], points[pairs.col], radius)
+        omega = _ring_mean(nodes.points[row], points[col], radius)
     else:
         omega = _omega(pairs.data**2, radius)
-    values = omega * weight[pairs.col]
-    matrix = sparse.csr_array((values, (pairs.row, pairs.col)), shape=shape)
-    return sparse.csr_array(sparse.diags_array(1 / matrix.sum(axis=1)) @ matrix)
+    every = nodes.comm.allreduce(own)
+    part = sparse.csr_array((omega * weight[col], (row, column[col])), (own, every))
+    part = sparse.csr_array(sparse.diags_array(1 / part.sum(axis=1)) @ part)
+    part.sort_indices()
+    csr = (part.indptr.astype(PETSc.IntType), part.indices.astype(PETSc.IntType), part.data)
+    made = PETSc.Mat().createAIJ(((own, every), (own, every)), csr=csr, comm=nodes.comm)
+    made.assemble()
+    return made
 
 
 def _omega(square: Array, radius: float) -> Array:

@@ -33,7 +33,7 @@ from scipy import sparse
 from scipy.sparse import csgraph
 
 from contact.history import Evaluated
-from contact.linear.layout import Layout
+from contact.linear.layout import Layout, times
 from contact.linear.operator import Bulk, Counters, SparseOperator
 from contact.mesh.entities import owned_among
 from contact.tolerances import ROUNDING
@@ -201,33 +201,23 @@ class Constraint:
     def expand(self, y: Array) -> Array:
         """Return x = C y, q behind. Collective."""
         q = y[self.owned :]
-        return np.concatenate([_times(self.matrix, y[: self.owned] + self.motions @ q), q])
+        return np.concatenate([times(self.matrix, y[: self.owned] + self.motions @ q), q])
 
     def relative(self, x: Array) -> Array:
         """Return the y of x. Collective."""
         q = x[self.owned :]
-        return np.concatenate([_times(self._inverse, x[: self.owned]) - self.motions @ q, q])
+        return np.concatenate([times(self._inverse, x[: self.owned]) - self.motions @ q, q])
 
     def restrict(self, forces: Array) -> Array:
         """Return C^T f of forces on x. Collective."""
-        own = _times(self.matrix, forces[: self.owned], transposed=True)
+        own = times(self.matrix, forces[: self.owned], transposed=True)
         return np.concatenate([own, forces[self.owned :] + self.gathered(own)])
 
     def forces(self, restricted: Array) -> Array:
         """Return the forces on x of those on y, where q is given none. Collective."""
         own = restricted[: self.owned]
         q = np.where(self.free, restricted[self.owned :] - self.gathered(own), 0.0)
-        return np.concatenate([_times(self._inverse, own, transposed=True), q])
-
-
-def _times(matrix: PETSc.Mat | None, values: Array, transposed: bool = False) -> Array:
-    """Return a matrix times owned values; None is the identity. Collective."""
-    if matrix is None:
-        return values
-    vector, image = matrix.createVecs()
-    vector.array[:] = values
-    (matrix.multTranspose if transposed else matrix.mult)(vector, image)
-    return np.asarray(image.array)
+        return np.concatenate([times(self._inverse, own, transposed=True), q])
 
 
 class ConstrainedBulk:
@@ -283,7 +273,7 @@ class ConstrainedBulk:
         if self.constraint.free.size == 0:
             return
         for k, column in enumerate(self.constraint.motions.T.toarray()):
-            self.columns[:, k] = _times(matrix, column)
+            self.columns[:, k] = times(matrix, column)
         self.corner = self.constraint.gathered(self.columns)
         self.columns *= self.layout.free.ravel()[:, None]
         self._without_followers(matrix)

@@ -69,6 +69,16 @@ class Layout:
         return np.where(self.free.ravel(), values, 0.0)
 
 
+def times(matrix: PETSc.Mat | None, values: Array, transposed: bool = False) -> Array:
+    """Return a matrix times owned values; None is the identity. Collective."""
+    if matrix is None:
+        return values
+    vector, image = matrix.createVecs()
+    vector.array[:] = values
+    (matrix.multTranspose if transposed else matrix.mult)(vector, image)
+    return np.asarray(image.array)
+
+
 def balance(matrix: PETSc.Mat, layout: Layout) -> None:
     """Put the size of the matrix's own diagonal at fixed unknowns, in place of ones. Collective.
 

@@ -24,7 +24,7 @@ from contact.linear.faults import (
     set_up_with_workspace,
 )
 from contact.linear.krylov import Components, refine
-from contact.linear.layout import Layout, balance, insert_blocks, nodal_blocks
+from contact.linear.layout import Layout, balance, insert_blocks, nodal_blocks, times
 from contact.linear.multigrid import TOUCH, Hierarchy, held_motions
 from contact.typing import Array
 
@@ -136,10 +136,7 @@ class SparseOperator:
 
     def multiply(self, values: Array) -> Array:
         """Return the matrix times owned values. Collective."""
-        vector, image = self.matrix.createVecs()
-        vector.array[:] = values
-        self.matrix.mult(vector, image)
-        return np.asarray(image.array)
+        return times(self.matrix, values)
 
     def update(self, kind: str, state: Evaluated, blocks: Array, *, constant: bool = False) -> bool:
         """Assemble the operator at a state. Collective.

@@ -14,6 +14,7 @@ from petsc4py import PETSc
 
 from contact._compat import lasting
 from contact.linear.faults import mat_solve, no_solution, out_of_memory, set_up_with_workspace
+from contact.linear.layout import times
 from contact.typing import Array
 
 #: MUMPS's ICNTL(26): 0 solves with the eliminated unknowns, the kept ones being 0.
@@ -158,10 +159,7 @@ class SchurComplement:
     def multiply(self, values: Array) -> Array:
         """Return the matrix times owned values. Collective."""
         assert self._matrix is not None
-        vector, image = self._matrix.createVecs()
-        vector.array[:] = values
-        self._matrix.mult(vector, image)
-        return np.asarray(image.array)
+        return times(self._matrix, values)
 
     def condense(self, rhs: Array, interior: Array) -> Array:
         """Return a right-hand side at the kept unknowns, of all ranks, given `interior` of it."""
