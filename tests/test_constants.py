@@ -16,8 +16,6 @@ FORMATS = {
     "HEADER",
     "EACH",
     "SIGNALLED",
-    "ORBITS",
-    "CORNERS",
 }
 
 

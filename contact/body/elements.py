@@ -94,7 +94,7 @@ def _multilinear_mean(domain: Domain, kinematics: Kinematics) -> MultilinearMean
     corners = shape.nodes(1)
     # Volumes and derivatives of the corners' functions are quadratic along each axis at most.
     at, weights = rule(shape, 3)
-    extent = measures(domain, shape, of, at, weights)
+    extent = measures(domain.revolved, shape, of, at, weights)
     slopes = shape.gradients(1, at) @ inverse(jacobians(shape, of, at))
     mean = np.einsum("cq,cqkd->ckd", extent, slopes)
     if domain.revolved:

@@ -157,7 +157,7 @@ class QuadratureLaws:
     def volumes(self) -> Array:
         """The volume of the body that each place stands for, shape (places,)."""
         shape, of = shape_of(self._domain.mesh), geometry_nodes(self._domain)
-        return measures(self._domain, shape, of, *self._rule).ravel()
+        return measures(self._domain.revolved, shape, of, *self._rule).ravel()
 
     def law(self, law: Law | Graded) -> FormLaw:
         """Return a law as forms see it, with the stress and stiffness that `set` evaluates."""

@@ -17,7 +17,6 @@ from contact.interface.nodes import ContactNodes, projectors
 from contact.interface.obstacle import Obstacle
 from contact.interface.obstacle.protocol import measured
 from contact.interface.placing import check_gap
-from contact.mesh.cells import shape_of
 from contact.mesh.domain import Domain
 from contact.mesh.entities import components, owned_among
 from contact.typing import Array
@@ -62,12 +61,9 @@ def find_pair(
     ------
     InputError
         If the parts share nodes or overlap, follow a rigid part, do not face each other, no
-        node can move, supports along the part would take friction off the other side, or the cells
-        are hexahedra.
+        node can move, or supports along the part would take friction off the other side.
     """
     label = f"{key}.against: {part!r} and {against!r}"
-    if not shape_of(body.domain.mesh).facet.simplex:
-        raise InputError(f"{label} are sides of hexahedra; accepted: sides of other cells")
     slave = surface_of(body.domain, body.space, part)
     master = surface_of(body.domain, body.space, against).gathered(body.comm)
     coupling = _coupled(body, slave, master, label, part if friction else None)
@@ -241,7 +237,7 @@ def facing_parts(domain: Domain) -> list[tuple[str, str]]:
     """
     space = fem.functionspace(domain.mesh, ("Lagrange", 1))
     piece, count = components(space)
-    if count == 1 or not shape_of(domain.mesh).facet.simplex:
+    if count == 1:
         return []
     comm = domain.comm
     sides: list[tuple[float, str, Surface, Surface, int]] = []

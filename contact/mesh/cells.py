@@ -121,15 +121,31 @@ class Shape:
         distance = np.linalg.norm(places[:, :, None] - self.nodes(2), axis=3)
         return np.asarray(distance.argmin(axis=2))
 
+    def pieces(self, degree: int) -> Nodes:
+        """Return the corners of straight pieces of a facet whose geometry has a degree.
+
+        Those of degree 2 are the halves along each axis, by its nodes, (pieces, corners).
+        """
+        if degree == 1:
+            return np.arange(self.corners)[None]
+        # Of a triangle the one in the middle, too.
+        return np.concatenate([self.children, [[3, 4, 5]]]) if self == TRIANGLE else self.children
+
     def lagrange(self, degree: int, at: Array) -> Array:
         """Return the Lagrange polynomials of a degree at points, shape (q, nodes)."""
         if degree == 0:
             return np.ones((len(at), 1))
-        return np.asarray(_element(self, degree).tabulate(0, at)[0, :, :, 0])
+        return self._tabulated(degree, at, 0)[0]
 
     def gradients(self, degree: int, at: Array) -> Array:
         """Return their derivatives by the coordinates of the reference cell, (q, nodes, dim)."""
-        return np.moveaxis(_element(self, degree).tabulate(1, at)[1:, :, :, 0], 0, -1)
+        return np.moveaxis(self._tabulated(degree, at, 1)[1:], 0, -1)
+
+    def _tabulated(self, degree: int, at: Array, derivatives: int) -> Array:
+        """Return the polynomials, then their first derivatives, at points, shape (k, q, nodes)."""
+        if not len(at):  # by whose number basix divides
+            return np.zeros((1 + derivatives * self.dim, 0, len(self.nodes(degree))))
+        return np.asarray(_element(self, degree).tabulate(derivatives, at)[..., 0])
 
     def vtk(self, degree: int) -> tuple[int, tuple[int, ...]]:
         """Return VTK's number of cells of a degree, and where it has dolfinx's nodes."""
@@ -154,6 +170,9 @@ def rule(shape: Shape, degree: int) -> tuple[Array, Array]:
     points, weights = basix.make_quadrature(shape.kind, degree)
     return np.asarray(points), np.asarray(weights)
 
+
+#: Largest degree of a rule where integrands are no polynomials.
+LARGEST = 40
 
 #: VTK's number of a shape, of degree 1 and 2, and where it has the nodes of degree 2.
 VTK: dict[str, tuple[int, int, tuple[int, ...]]] = {
@@ -187,6 +206,12 @@ SHAPES = (TRIANGLE, QUADRILATERAL, TETRAHEDRON, HEXAHEDRON)
 def facet_of(corners: int) -> Shape:
     """Return the shape of facets with a number of corners."""
     return {2: INTERVAL, 3: TRIANGLE, 4: QUADRILATERAL}[corners]
+
+
+def facet_with(dim: int, nodes: int) -> Shape:
+    """Return the shape of facets of a dimension whose geometry has a number of nodes."""
+    known = (s for s in (INTERVAL, TRIANGLE, QUADRILATERAL) if s.dim == dim)
+    return next(s for s in known if nodes in (s.corners, len(s.nodes(2))))
 
 
 def shape_of(mesh: Any) -> Shape:

@@ -41,17 +41,30 @@ def sizes(shape: Shape, of: Array, at: Array) -> Array:
     As `jacobians`; of facets it is sqrt(det J^T J).
     """
     jacobian = jacobians(shape, of, at)
-    d, dim = jacobian.shape[2:]
-    if d == dim:
+    if jacobian.shape[2] == jacobian.shape[3]:
         return np.abs(determinant(jacobian))
-    if dim == 1:
-        return np.asarray(np.linalg.norm(jacobian[..., 0], axis=-1))
-    return np.asarray(np.linalg.norm(np.cross(jacobian[..., 0], jacobian[..., 1]), axis=-1))
+    return np.asarray(np.linalg.norm(across(jacobian), axis=-1))
+
+
+def across(jacobian: Array) -> Array:
+    """Return vectors normal to facets, as long as these are large, shape (..., d).
+
+    Parameters
+    ----------
+    jacobian
+        dx/dxi of facets, shape (..., d, d - 1).
+    """
+    columns = np.moveaxis(jacobian, -1, 0)
+    if len(columns) == 2:
+        return np.asarray(np.cross(*columns))
+    return np.asarray(columns[0][..., ::-1] * [-1.0, 1.0])
 
 
 def determinant(matrix: Array) -> Array:
     """Return the determinants of matrices, shape (..., d, d), in closed form."""
     columns = np.moveaxis(matrix, -1, 0)
+    if len(columns) == 1:
+        return np.asarray(matrix[..., 0, 0])
     if len(columns) == 2:
         (a, c), (b, d) = (np.moveaxis(column, -1, 0) for column in columns)
         return np.asarray(a * d - b * c)
@@ -62,6 +75,8 @@ def inverse(matrix: Array) -> Array:
     """Return the inverses of matrices, shape (..., d, d), in closed form."""
     det = determinant(matrix)[..., None, None]
     columns = np.moveaxis(matrix, -1, 0)
+    if len(columns) == 1:
+        return np.asarray(1 / matrix)
     if len(columns) == 2:
         (a, c), (b, d) = (np.moveaxis(column, -1, 0) for column in columns)
         return np.asarray(np.moveaxis(np.array([[d, -b], [-c, a]]), (0, 1), (-2, -1)) / det)
@@ -70,13 +85,13 @@ def inverse(matrix: Array) -> Array:
     return np.asarray(np.stack(rows, axis=-2) / det)
 
 
-def measures(domain: Domain, shape: Shape, of: Array, at: Array, weights: Array) -> Array:
+def measures(revolved: bool, shape: Shape, of: Array, at: Array, weights: Array) -> Array:
     """Return the weights of points in integrals over the body, (n, q): of a revolved one, of rings.
 
     Parameters
     ----------
-    domain
-        The mesh.
+    revolved
+        Whether the cells or facets stand for the rings through them.
     shape
         Of its cells or facets.
     of
@@ -85,7 +100,7 @@ def measures(domain: Domain, shape: Shape, of: Array, at: Array, weights: Array)
         Points, shape (q, dim), and weights, (q,), of a rule.
     """
     found = sizes(shape, of, at) * weights
-    if not domain.revolved:
+    if not revolved:
         return found
     return found * 2 * np.pi * (of[..., 0] @ shape.lagrange(shape.degree_of(of.shape[1]), at).T)
 
@@ -94,4 +109,4 @@ def volumes(domain: Domain) -> Array:
     """Return the volumes of the owned cells, or of the rings that they are, shape (cells,)."""
     shape = shape_of(domain.mesh)
     points, weights = rule(shape, 1 if shape.simplex else 3)
-    return measures(domain, shape, geometry_nodes(domain), points, weights).sum(axis=1)
+    return measures(domain.revolved, shape, geometry_nodes(domain), points, weights).sum(axis=1)

@@ -99,7 +99,7 @@ def estimated(
     secant = body.laws.secant_shear(state, body.nodal(state.x).ravel())
     local = LocalProblems(problem, state, flux) if body.degree == 2 else None
     at, weights = rule(shape, 2 * body.degree)
-    volumes = measures(body.domain, shape, geometry_nodes(body.domain), at, weights)
+    volumes = measures(body.domain.revolved, shape, geometry_nodes(body.domain), at, weights)
     linear, shapes = shape.lagrange(1, at), shape.lagrange(shape.degree_of(flux.shape[1]), at)
     squares, sums = np.zeros(len(flux)), np.zeros(3)
     for material, cells in zip(body.body.materials, body.cells, strict=True):
@@ -241,6 +241,6 @@ def _at_contact(problem: ContactProblem, state: State) -> Array:
     )
     behind = geometry_nodes(domain)[cells]
     of_facet = np.take_along_axis(behind, shape.facet_corners[place][..., None], axis=1)
-    areas = measures(domain, shape.facet, of_facet, at, weights)
+    areas = measures(domain.revolved, shape.facet, of_facet, at, weights)
     np.add.at(squares, cells, np.sum(areas * density, axis=1))
     return squares

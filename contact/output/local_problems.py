@@ -213,7 +213,7 @@ class LocalProblems:
         moduli = moduli[:, kept][:, :, kept]
         degree = (4 if shape.simplex else 6) + body.domain.revolved
         (at, weights), (values, derivatives) = rule(shape, degree), surplus(shape, degree)
-        volumes = measures(body.domain, shape, of, at, weights)
+        volumes = measures(body.domain.revolved, shape, of, at, weights)
         back = np.broadcast_to(inverse(jacobians(shape, of, at)), (len(of), len(at), d, d))
         gradients = derivatives @ back
         strains = np.zeros((*gradients.shape[:3], body.block_size, len(kept)))
@@ -242,7 +242,7 @@ class LocalProblems:
         at, weights = rule(shape.facet, 5)
         for facet, ends in enumerate(shape.facet_corners):
             values = cubics(shape, shape.on_facet(facet, at))
-            areas = measures(body.domain, shape.facet, of[:, ends], at, weights)
+            areas = measures(body.domain.revolved, shape.facet, of[:, ends], at, weights)
             flux = shape.facet.lagrange(2, at) @ self._through[cells, facet]
             right += values.T @ (areas[..., None] * flux)
             acts = np.abs(values).max(axis=0) > ROUNDING

@@ -33,6 +33,8 @@ KINDS = [
     (2, 2, "quadrilateral"),
     (3, 1, "tetrahedron"),
     (3, 2, "tetrahedron"),
+    (3, 1, "hexahedron"),
+    (3, 2, "hexahedron"),
 ]
 NAMES = [f"{cell}-{degree}" for _, degree, cell in KINDS]
 SIDES = {2: ("left", "right"), 3: ("left", "right", "front", "back")}

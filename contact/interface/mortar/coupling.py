@@ -32,7 +32,8 @@ from scipy.spatial import cKDTree
 
 from contact.interface.mortar.lumping import Mixing, coefficients, integrals
 from contact.interface.mortar.segments import Points, common_points, facing_pairs
-from contact.interface.mortar.surface import Surface, basis, dual_basis_transformation
+from contact.interface.mortar.surface import Surface, dual_basis_transformation
+from contact.mesh.cells import Shape
 from contact.tolerances import NEGLIGIBLE, ROUNDING
 from contact.typing import Array
 
@@ -138,23 +139,25 @@ def integrate(slave: Surface, master: Surface, reach: float, carriers: Carriers)
         The nodes whose functions act on the slave facets.
     """
     direction, found = _facing(slave, master, reach)
-    change = dual_basis_transformation(slave.corners.shape[1], slave.degree)
+    change = dual_basis_transformation(slave.shape, slave.degree)
     dual, weight = _dual(slave, found, change)
     dual, own = carriers.functions @ dual, carriers.functions * weight[:, None, :]
-    gap = np.zeros((*weight.shape, 2))
+    gap, normal = np.zeros((*weight.shape, 2)), np.zeros((*weight.shape, direction.shape[1]))
     entries: list[Entries] = [(NOTHING, NOTHING, np.zeros(0))]
     for points in found:
         phi = np.einsum("pij,pj->pi", dual[points.slave], _functions(points, slave, change))
         phi *= points.weight[:, None]
         across = np.column_stack([points.gap, np.maximum(points.gap, 0.0)])
         _add(gap, points.slave, phi[:, :, None] * across[:, None, :])
+        normals = _normals(points, slave, master, direction)
+        _add(normal, points.slave, phi[:, :, None] * normals[:, None, :])
         entries.append(_master_entries(points, phi, carriers.nodes, master))
     return Parts(
         slave.nodes,
         carriers.nodes,
         own,
         np.einsum("fij,fj->fi", carriers.functions, integrals(slave)),
-        own.sum(axis=2)[:, :, None] * direction[:, None, :],
+        normal,
         gap[:, :, :, None] * direction[:, None, None, :],
         *(np.concatenate(part) for part in zip(*entries, strict=True)),
     )
@@ -162,20 +165,32 @@ def integrate(slave: Surface, master: Surface, reach: float, carriers: Carriers)
 
 def _facing(slave: Surface, master: Surface, reach: float) -> tuple[Array, list[Points]]:
     """Return the directions along which facets look, (f, d), and the points where they meet."""
-    degree = 2 if slave.degree == master.degree == 1 and not slave.revolved else 4
     pairs = list(facing_pairs(slave, master, reach))
     direction = slave.normal
-    found = [common_points(slave, master, pair, direction, degree) for pair in pairs]
+    found = [common_points(slave, master, pair, direction) for pair in pairs]
     middle = _middle(slave, master, found)
     if np.abs(middle - direction).max(initial=0.0) > ROUNDING:
         direction = middle
-        found = [common_points(slave, master, pair, direction, degree) for pair in pairs]
+        found = [common_points(slave, master, pair, direction) for pair in pairs]
     return direction, found
 
 
 def _functions(points: Points, slave: Surface, change: Array) -> Array:
     """Return the functions N~ of the slave facets at points, shape (p, k)."""
-    return basis(points.on_slave, slave.degree) @ change.T
+    return slave.shape.lagrange(slave.degree, points.on_slave) @ change.T
+
+
+def _normals(points: Points, slave: Surface, master: Surface, direction: Array) -> Array:
+    """Return unit vectors at points between the normals of both sides, shape (p, d).
+
+    On straight facets they are the directions of these, for their own jump at edges.
+    """
+    if slave.order == 1:
+        return direction[points.slave]
+    i, j = points.slave, points.master
+    both = slave.normals(i, slave.slopes(i, points.on_slave))
+    both -= master.normals(j, master.slopes(j, points.on_master))
+    return np.asarray(both / np.linalg.norm(both, axis=1)[:, None])
 
 
 def _dual(slave: Surface, found: Sequence[Points], change: Array) -> tuple[Array, Array]:
@@ -220,7 +235,7 @@ def _master_entries(
     points: Points, phi: Array, carriers: NDArray[np.int64], master: Surface
 ) -> Entries:
     """Return int Phi_j N_l as global row, global column, value."""
-    n = basis(points.on_master, master.degree)
+    n = master.shape.lagrange(master.degree, points.on_master)
     new = np.ones(points.slave.size, dtype=bool)
     new[1:] = (np.diff(points.slave) != 0) | (np.diff(points.master) != 0)
     first = np.flatnonzero(new)
@@ -288,10 +303,10 @@ def couple(
         still contain the constants.
     """
     parts = integrate(slave, master, reach, Carriers.of(slave, without, comm)).gathered(comm)
-    return _assembled(parts, slave.corners.shape[1], slave.degree, without)
+    return _assembled(parts, slave.shape, slave.degree, without)
 
 
-def _assembled(parts: Parts, d: int, degree: int, without: NDArray[np.int64]) -> Coupling:
+def _assembled(parts: Parts, shape: Shape, degree: int, without: NDArray[np.int64]) -> Coupling:
     every, place = np.unique(parts.nodes, return_inverse=True)
     place = place.reshape(parts.nodes.shape)
     carrier = np.searchsorted(every, parts.carriers)
@@ -317,7 +332,7 @@ def _assembled(parts: Parts, d: int, degree: int, without: NDArray[np.int64]) ->
     rows, columns = np.broadcast_arrays(carrier[:, :, None], place[:, None, :])
     places = (rows.ravel(), columns.ravel())
     dual = sparse.csr_array((parts.own.ravel(), places), shape=(every.size, every.size))[kept]
-    own = divide @ dual @ coefficients(place, every.size, dual_basis_transformation(d, degree))
+    own = divide @ dual @ coefficients(place, every.size, dual_basis_transformation(shape, degree))
     own.eliminate_zeros()
     other = sparse.csr_array(divide @ other[kept])
     jumps = every[kept], every, sparse.csr_array(own), masters, other

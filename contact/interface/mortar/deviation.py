@@ -21,7 +21,8 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 from scipy import sparse
 
-from contact.mesh.cells import facet_of
+from contact.mesh.cells import facet_with
+from contact.mesh.geometry import across
 from contact.typing import Array
 
 #: Least cosine between the normals of a surface and of its facets; corners of bodies have less.
@@ -35,11 +36,6 @@ ALIKE = 0.1
 
 #: Numbers of vertices.
 Numbers = NDArray[np.intp]
-
-
-def pairs_of(corners: int) -> list[tuple[int, int]]:
-    """Return the edges of a facet, as pairs of its corners."""
-    return facet_of(corners).edges if corners == 4 else list(combinations(range(corners), 2))
 
 
 def deviations(
@@ -88,7 +84,7 @@ def _deviations(names: NDArray[np.int64], corners: Array, normal: Array, levels:
     pairs, near = pairs[:, alike & known[pairs[0]]], near[alike & known[pairs[0]]]
     curvature = _curvatures(points, own, pairs, np.where(near, 1.0, FAR))
     pairs = pairs[:, near & known[pairs[1]]]
-    edges = pairs_of(names.shape[1])
+    edges = facet_with(points.shape[1] - 1, names.shape[1]).edges
     found = np.zeros((len(names), len(edges)))
     for k, (i, j) in enumerate(edges):
         others = [c for c in range(names.shape[1]) if c not in (i, j)]
@@ -106,18 +102,13 @@ def _deviations(names: NDArray[np.int64], corners: Array, normal: Array, levels:
 
 def _weights(corners: Array) -> Array:
     """Return the weights of facets at their corners, shape (f, c)."""
-    count, edges = corners.shape[1], pairs_of(corners.shape[1])
-    around = [[a + b - c for a, b in edges if c in (a, b)] for c in range(count)]
-    sides = [corners[:, others] - corners[:, [c]] for c, others in enumerate(around)]
-    lengths = np.stack([np.linalg.norm(side, axis=2).prod(axis=1) for side in sides], axis=1)
-    if count == 2:
-        return np.asarray(1 / lengths)
-    if count == 3:
-        area = np.linalg.norm(np.cross(sides[0][:, 0], sides[0][:, 1]), axis=1)[:, None]
-    else:
-        crossed = [np.linalg.norm(np.cross(s[:, 0], s[:, 1]), axis=1) for s in sides]
-        area = np.stack(crossed, axis=1)
-    return np.asarray(area / lengths**2)
+    edges = facet_with(corners.shape[2] - 1, corners.shape[1]).edges
+    around = [[a + b - c for a, b in edges if c in (a, b)] for c in range(corners.shape[1])]
+    # (f, c, d, d - 1): the edges from each corner.
+    sides = [np.swapaxes(corners[:, ends] - corners[:, [c]], 1, 2) for c, ends in enumerate(around)]
+    every = np.stack(sides, axis=1)
+    lengths = np.linalg.norm(every, axis=2).prod(axis=2)
+    return np.asarray(np.linalg.norm(across(every), axis=2) / lengths**2)
 
 
 def _around(place: Numbers, count: int) -> tuple[Numbers, NDArray[np.bool_]]:
@@ -145,7 +136,8 @@ def _curvatures(points: Array, normal: Array, pairs: Numbers, weight: Array) -> 
     along = np.einsum("pid,pd->pi", tangent[at], offset) / scale[:, None]
     z = np.einsum("pd,pd->p", normal[at], offset) / scale
     # A part of z^2 beside the squares makes spheres exact.
-    products = [along[:, i] * along[:, j] for i, j in pairs_of(d - 1)]
+    mixed = list(combinations(range(d - 1), 2))
+    products = [along[:, i] * along[:, j] for i, j in mixed]
     squares = [0.5 * (along[:, i] ** 2 + z**2 / (d - 1)) for i in range(d - 1)]
     columns = np.column_stack([along, *squares, *products])
     k = columns.shape[1]
@@ -159,7 +151,7 @@ def _curvatures(points: Array, normal: Array, pairs: Numbers, weight: Array) -> 
     form = np.zeros((count, d - 1, d - 1))
     diagonal = np.arange(d - 1)
     form[:, diagonal, diagonal] = fit[:, d - 1 : 2 * (d - 1)]
-    for number, (i, j) in enumerate(pairs_of(d - 1), 2 * (d - 1)):
+    for number, (i, j) in enumerate(mixed, 2 * (d - 1)):
         form[:, i, j] = form[:, j, i] = fit[:, number]
     mean = np.trace(form, axis1=1, axis2=2) / (d - 1)
     tensor = np.einsum("via,vij,vjb->vab", tangent, form, tangent)

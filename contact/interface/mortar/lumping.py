@@ -16,26 +16,24 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 from scipy import sparse
 
-from contact.interface.mortar.surface import (
-    Surface,
-    basis,
-    densities,
-    dual_basis_transformation,
-    rule,
-)
+from contact.interface.mortar.surface import Surface, dual_basis_transformation
+from contact.mesh.cells import rule
+from contact.mesh.geometry import jacobians
 from contact.typing import Array
 
 
 def integrals(surface: Surface) -> Array:
     """Return int N~ over whole facets, shape (f, k)."""
-    corners = surface.corners.shape[1]
-    places, weights = rule(corners, 4)
-    functions = basis(places, surface.degree) @ dual_basis_transformation(corners, surface.degree).T
-    facets = np.repeat(np.arange(surface.count), weights.size)
-    turns = surface.turn(facets, np.tile(places, (surface.count, 1))).reshape(-1, weights.size)
-    size = densities(surface.corners, places)
-    uneven = size / size[:, :1]
-    return np.asarray(size[:, :1] * ((uneven * turns * weights) @ functions))
+    _, measure, functions = _integrated(surface)
+    return np.asarray(measure @ functions)
+
+
+def _integrated(surface: Surface) -> tuple[Array, Array, Array]:
+    """Return points, their weights in integrals over facets, (f, q), and N~ there, (q, k)."""
+    places, weights = rule(surface.shape, 4 * surface.order)
+    change = dual_basis_transformation(surface.shape, surface.degree)
+    functions = surface.shape.lagrange(surface.degree, places) @ change.T
+    return places, surface.measures(places, weights), functions
 
 
 def coefficients(place: NDArray[np.intp], count: int, change: Array) -> sparse.csr_array:
@@ -138,14 +136,17 @@ class Lumping:
         """Return the areas, given the facets of all ranks."""
         nodes, place = np.unique(surface.nodes, return_inverse=True)
         place = place.reshape(surface.nodes.shape)
-        area = integrals(surface)
+        places, measure, functions = _integrated(surface)
+        slopes = jacobians(surface.shape, surface.points, places)
+        facets = np.arange(surface.count)[:, None]
+        normals = measure[:, :, None] * surface.normals(facets, slopes)
         weight, normal = np.zeros(nodes.size), np.zeros((nodes.size, surface.normal.shape[1]))
-        np.add.at(weight, place, area)
-        np.add.at(normal, place, area[:, :, None] * surface.normal[:, None, :])
+        np.add.at(weight, place, measure @ functions)
+        np.add.at(normal, place, np.einsum("fqd,qk->fkd", normals, functions))
         deviation = np.zeros_like(normal)
         np.add.at(deviation, place, surface.node_deviations)
         deviation /= np.bincount(place.ravel(), minlength=nodes.size)[:, None]
-        change = dual_basis_transformation(surface.corners.shape[1], surface.degree)
+        change = dual_basis_transformation(surface.shape, surface.degree)
         if np.array_equal(change, np.eye(len(change))):
             return Lumping(nodes, weight, normal, deviation, None)
         mixing = Mixing.alone(nodes, coefficients(place, nodes.size, change))

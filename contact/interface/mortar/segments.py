@@ -1,13 +1,20 @@
 """Segments of the mortar integration: pairs of facets, their intersections, and quadrature there.
 
-A master facet is projected onto the line or plane of a slave facet, along a direction that each
-slave facet has. Both have in common a segment or a convex polygon, on which all integrands are
-polynomials: the rules are exact there.
+Both facets are projected onto the average plane of the slave facet, along a direction that each
+slave facet has; their segments or convex polygons have a segment or a convex polygon in common.
+Its points are carried back onto both by the inverse of their maps: on straight simplices and
+parallelograms integrands are polynomials there, and the rules are exact. Curved facets are cut
+along straight lines between the nodes of their geometry.
+
+References
+----------
+Puso and Laursen, Comput. Methods Appl. Mech. Engrg. 193 (2004) 601 (average plane); Puso, Laursen
+and Solberg, ibid. 197 (2008) 555 (pieces of facets of degree 2).
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,7 +22,9 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from contact.body.pointwise import CHUNK
-from contact.interface.mortar.surface import Surface, rule, size_of
+from contact.interface.mortar.surface import Surface
+from contact.mesh.cells import INTERVAL, LARGEST, TRIANGLE, rule
+from contact.mesh.geometry import across, determinant, inverse, jacobians
 from contact.tolerances import ROUNDING
 from contact.typing import Array
 
@@ -47,7 +56,8 @@ def facing_pairs(
     near = np.flatnonzero(distance <= reach + widest + own)
     radius = (own + widest + DETOUR * distance)[near]
     counts = tree.query_ball_point(centres[near], radius, return_length=True)
-    ends = np.cumsum(counts) // CHUNK
+    # Masses of the functions of a facet are found at its points.
+    ends = np.cumsum(counts) // max(CHUNK // slave.nodes.shape[1] ** 2, 1)
     for chosen in np.split(np.arange(near.size), np.flatnonzero(np.diff(ends)) + 1):
         found = tree.query_ball_point(centres[near[chosen]], radius[chosen], return_sorted=True)
         i = np.repeat(near[chosen], [len(f) for f in found])
@@ -60,52 +70,52 @@ def facing_pairs(
         yield i[keep], j[keep]
 
 
-#: Corners of the intersection of two triangles, at most.
-CORNERS = 6
-
-
-def clipped(triangles: Array) -> tuple[Array, NDArray[np.intp]]:
-    """Clip triangles by the reference triangle, on which all barycentric coordinates are >= 0.
+def clipped(polygons: Array, by: Array) -> tuple[Array, NDArray[np.intp]]:
+    """Clip convex polygons by others (Sutherland and Hodgman, Comm. ACM 17, 1974).
 
     Parameters
     ----------
-    triangles
-        Barycentric coordinates of the corners of each, shape (n, 3, 3).
+    polygons, by
+        Corners of each in their order, either way round, shapes (n, k, 2) and (n, m, 2).
 
     Returns
     -------
     polygons
-        Corners in their order, shape (n, 6, 3); those beyond the number of corners are 0.
+        Corners in their order, shape (n, k + m, 2); those beyond the number of corners are 0.
     count
         Number of corners, 0 where nothing is common, shape (n,).
     """
-    n = triangles.shape[0]
-    polygon: Array = np.zeros((n, CORNERS, 3))
-    polygon[:, :3] = triangles
-    count: NDArray[np.intp] = np.full(n, 3, dtype=np.intp)
-    for side in range(3):
-        polygon, count = _cut(polygon, count, side)
+    n, k, _ = polygons.shape
+    polygon = np.concatenate([polygons, np.zeros_like(by)], axis=1)
+    count: NDArray[np.intp] = np.full(n, k, dtype=np.intp)
+    edges = np.roll(by, -1, axis=1) - by
+    turn = np.sign(_cross(by[:, 1] - by[:, 0], by[:, 2] - by[:, 0]))
+    for side in range(by.shape[1]):
+        height = turn[:, None] * _cross(edges[:, side, None], polygon - by[:, side, None])
+        polygon, count = _cut(polygon, count, height)
     return polygon, count
 
 
-def _cut(polygon: Array, count: NDArray[np.intp], side: int) -> tuple[Array, NDArray[np.intp]]:
-    """Keep the part of each polygon where a coordinate is >= 0."""
+def _cross(a: Array, b: Array) -> Array:
+    return np.asarray(a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0])
+
+
+def _cut(polygon: Array, count: NDArray[np.intp], height: Array) -> tuple[Array, NDArray[np.intp]]:
+    """Keep the part of each polygon where a linear function, by its corners, is >= 0."""
     n, most, _ = polygon.shape
     present = np.arange(most)[None, :] < count[:, None]
     following = np.where(
         np.arange(1, most + 1)[None, :] < count[:, None], np.arange(1, most + 1), 0
     )
     after = np.take_along_axis(polygon, following[:, :, None], axis=1)
-    here, there = polygon[:, :, side], after[:, :, side]
-    inside = (here >= 0) & present
-    crosses = ((here >= 0) != (there >= 0)) & present
-    slope = np.where(crosses, here - there, 1.0)
-    crossing = polygon + (here / slope)[:, :, None] * (after - polygon)
-    # On the side itself, whatever rounding says.
-    crossing[:, :, side] = 0.0
+    there = np.take_along_axis(height, following, axis=1)
+    inside = (height >= 0) & present
+    crosses = ((height >= 0) != (there >= 0)) & present
+    slope = np.where(crosses, height - there, 1.0)
+    crossing = polygon + (height / slope)[:, :, None] * (after - polygon)
     # Of each edge its beginning where that is inside, then the crossing.
     emitted = np.stack([inside, crosses], axis=2).reshape(n, 2 * most)
-    corners = np.stack([polygon, crossing], axis=2).reshape(n, 2 * most, 3)
+    corners = np.stack([polygon, crossing], axis=2).reshape(n, 2 * most, 2)
     order = np.argsort(~emitted, axis=1, kind="stable")[:, :most]
     kept = np.take_along_axis(corners, order[:, :, None], axis=1)
     left = emitted.sum(axis=1)
@@ -122,7 +132,7 @@ class Points:
     slave, master
         The facets that each point belongs to, shape (p,).
     on_slave, on_master
-        Barycentric coordinates there, shape (p, d).
+        Points of their reference facets, shape (p, dim).
     weight
         Quadrature weights, lengths or areas on the slave facet, or of its rings, shape (p,).
     gap
@@ -142,7 +152,6 @@ def common_points(
     master: Surface,
     pairs: tuple[NDArray[np.intp], NDArray[np.intp]],
     direction: Array,
-    degree: int,
 ) -> Points:
     """Return quadrature points on the intersections of pairs of facets.
 
@@ -154,82 +163,165 @@ def common_points(
         The facets of each pair, shapes (n,).
     direction
         Along which a slave facet looks, unit vectors, shape (f, d).
-    degree
-        Of the polynomials that are integrated exactly, 2 or 4.
     """
     i, j = pairs
-    corners = slave.corners[i]
-    # Barycentric coordinates of the master's corners, projected, on the slave: (n, d, d).
-    projected, height = _on_plane(corners, slave.normal[i], direction[i], master.corners[j])
-    d = corners.shape[1]
-    parts, share = (_segments if d == 2 else _triangles)(projected)
-    # Parts of the slave facet by barycentric coordinates of their corners: (n, parts, d, d).
-    pair, part = np.nonzero(share > ROUNDING)
-    places, weights = rule(d, degree)
-    on_slave = np.einsum("qc,pcb->pqb", places, parts[pair, part])
-    # The projection is affine: x = sum_c lambda_c x_c on both.
-    inverse = np.linalg.inv(projected[pair])
-    on_master = np.einsum("pqb,pbc->pqc", on_slave, inverse)
-    gap = np.einsum("pqc,pc->pq", on_master, height[pair])
-    for side, facets, places_on in ((slave, i[pair], on_slave), (master, j[pair], on_master)):
-        cosine = np.abs(np.einsum("pd,pd->p", side.normal[facets], direction[i[pair]]))
-        gap -= side.height(facets, places_on) / cosine[:, None]
-    size = (size_of(corners)[pair] * share[pair, part])[:, None] * weights
-    points = np.repeat(pair, weights.size)
-    places = on_slave.reshape(-1, d)
-    return Points(
-        i[points],
-        j[points],
-        places,
-        on_master.reshape(-1, d),
-        size.ravel() * slave.turn(i[points], places),
-        gap.ravel(),
+    own, other = _on_planes(slave, i, direction[i], (slave.points[i], master.points[j]))
+    exact = _degrees(slave, master, i, j)
+    none = np.zeros(0, dtype=np.intp), np.zeros((0, slave.shape.dim)), np.zeros(0)
+    found: list[tuple[NDArray[np.intp], Array, Array]] = [none]
+    for degree in np.unique(exact):
+        chosen = np.flatnonzero(exact == degree)
+        sides = (_pieces(slave, own[chosen]), _pieces(master, other[chosen]))
+        pair, y, weight = _common(*sides, int(degree))
+        found.append((chosen[pair], y, weight))
+    pair, y, weight = (np.concatenate(arrays) for arrays in zip(*found, strict=True))
+    order = np.argsort(pair, kind="stable")
+    pair, y, weight = pair[order], y[order], weight[order]
+    on_slave, on_master = (
+        _carried_back(side, nodes[pair], y) for side, nodes in ((slave, own), (master, other))
     )
+    gap = np.zeros(pair.size)
+    for sign, side, facets, at, nodes in (
+        (1.0, master, j, on_master, other),
+        (-1.0, slave, i, on_slave, own),
+    ):
+        functions = side.shape.lagrange(side.order, at)
+        gap += sign * np.einsum("pk,pk->p", functions, nodes[pair, :, -1])
+        cosine = np.abs(np.einsum("pd,pd->p", side.normal[facets], direction[i]))
+        gap -= side.height(facets[pair], at[:, None])[:, 0] / cosine[pair]
+    slopes = slave.slopes(i[pair], on_slave)
+    size = np.linalg.norm(across(slopes), axis=1) / np.abs(_turned(slave, own[pair], on_slave))
+    if slave.revolved:
+        functions = slave.shape.lagrange(slave.order, on_slave)
+        size *= 2 * np.pi * np.einsum("pk,pk->p", functions, slave.points[i[pair], :, 0])
+    return Points(i[pair], j[pair], on_slave, on_master, weight * size, gap)
 
 
-def _on_plane(corners: Array, normal: Array, direction: Array, x: Array) -> tuple[Array, Array]:
-    """Return barycentric coordinates of projected points on facets, and their distances.
+def _on_planes(
+    slave: Surface, facets: NDArray[np.intp], direction: Array, sides: Sequence[Array]
+) -> list[Array]:
+    """Return points, projected onto average planes of slave facets, and their heights above.
+
+    Coordinates on a plane are those of the reference facet, by the slope of its map in the middle:
+    of an affine facet they are its own.
 
     Parameters
     ----------
-    corners, normal
-        Of the facets, shapes (n, d, d) and (n, d).
+    slave, facets
+        The slave side, and its facet for each plane, shape (n,).
     direction
-        Of the projection, and of the distances, shape (n, d).
-    x
-        Points, shape (n, m, d).
+        Of the projection, and of the heights, shape (n, d).
+    sides
+        Points, shapes (n, m, d).
 
     Returns
     -------
-    Shapes (n, m, d) and (n, m).
+    Coordinates and heights of each side, shapes (n, m, d).
     """
-    offset = x - corners[:, :1]
-    cosine = np.einsum("nd,nd->n", normal, direction)
-    height = np.einsum("nmd,nd->nm", offset, normal) / cosine[:, None]
-    edges = corners[:, 1:] - corners[:, :1]
-    gram = np.einsum("nid,njd->nij", edges, edges)
-    products = np.einsum("nid,nmd->nim", edges, offset)
-    aside = np.einsum("nid,nd->ni", edges, direction)
-    products -= aside[:, :, None] * height[:, None, :]
-    others = np.linalg.solve(gram, products).transpose(0, 2, 1)
-    first = 1 - others.sum(axis=2, keepdims=True)
-    return np.concatenate([first, others], axis=2), height
+    shape, points = slave.shape, slave.points[facets]
+    origin = shape.lagrange(slave.order, shape.middle) @ points
+    slope = jacobians(shape, points, shape.middle)[:, 0]
+    to_plane = inverse(np.concatenate([slope, direction[:, :, None]], axis=2))
+    middle = np.append(shape.middle[0], 0.0)
+    return [np.einsum("nij,nmj->nmi", to_plane, x - origin) + middle for x in sides]
 
 
-def _segments(projected: Array) -> tuple[Array, Array]:
-    """Return the common segment of each pair, shape (n, 1, 2, 2), and its share, (n, 1)."""
-    s = projected[:, :, 1]
-    low, high = np.maximum(s.min(axis=1), 0.0), np.minimum(s.max(axis=1), 1.0)
-    ends = np.stack([low, high], axis=1)
-    return np.stack([1 - ends, ends], axis=2)[:, None], (high - low)[:, None]
+def _degrees(
+    slave: Surface, master: Surface, i: NDArray[np.intp], j: NDArray[np.intp]
+) -> NDArray[np.intp]:
+    """Return the degree of the polynomials that are to be integrated over each pair, shape (n,).
+
+    The inverse of a bilinear map is analytic up to where its determinant, 1 + w (eta, xi), is 0:
+    beside a rule on [-1, 1] that is at 1/(2 b), the bend b being |w|/4, and errors fall with each
+    degree by the sum of the half axes of the ellipse through it.
+    """
+    total = sum(
+        side.degree * (1 if side.shape.simplex or side.order > 1 else 2) for side in (slave, master)
+    )
+    bend = np.maximum(slave.bend[i], master.bend[j])
+    if slave.order > 1:
+        # Pieces of a facet, with the slope of its map beside the functions.
+        more = np.where(bend > 0, 2, 0)
+    else:
+        pole = 1 / np.clip(2 * bend, ROUNDING, 0.9)
+        fall = np.log(pole + np.sqrt(pole**2 - 1))
+        more = np.where(bend > 0, np.ceil(np.log(1 / ROUNDING) / fall), 0)
+    return np.minimum(total + slave.revolved + more, LARGEST).astype(np.intp)
 
 
-def _triangles(projected: Array) -> tuple[Array, Array]:
-    """Return the triangles of each pair's common polygon, (n, 4, 3, 3), and their shares."""
-    polygon, count = clipped(projected)
-    # A fan about the first corner; coordinates are barycentric on the slave.
-    fan = [polygon[:, [0, k, k + 1]] for k in range(1, polygon.shape[1] - 1)]
-    parts = np.stack(fan, axis=1)
-    share = np.abs(np.linalg.det(parts))
-    share[np.arange(2, polygon.shape[1])[None, :] >= count[:, None]] = 0.0
-    return parts, share
+def _pieces(side: Surface, nodes: Array) -> Array:
+    """Return the straight pieces of projected facets, corners around each, (n, pieces, c, dim)."""
+    shape = side.shape
+    return nodes[:, shape.pieces(side.order)[:, shape.around], : shape.dim]
+
+
+def _common(own: Array, other: Array, degree: int) -> tuple[NDArray[np.intp], Array, Array]:
+    """Return the points of a rule on the common parts of pieces of facets, and their weights.
+
+    Parameters
+    ----------
+    own, other
+        Convex pieces of both facets of each pair, shapes (n, pieces, corners, dim).
+    degree
+        Of the polynomials that are integrated exactly.
+
+    Returns
+    -------
+    The pair of each point, ascending, shape (p,), the points, (p, dim), and their weights, (p,).
+    """
+    first, second = own[:, :, None], other[:, None]
+    low = np.maximum(first.min(axis=3), second.min(axis=3))
+    high = np.minimum(first.max(axis=3), second.max(axis=3))
+    pair, a, b = np.nonzero(np.all(high > low, axis=3))
+    if own.shape[3] == 1:
+        shape, part = INTERVAL, np.stack([low, high], axis=3)[pair, a, b]
+    else:
+        shape = TRIANGLE
+        polygon, count = clipped(own[pair, a], other[pair, b])
+        # A fan about the first corner.
+        fan = np.arange(1, polygon.shape[1] - 1)
+        row, k = np.nonzero(fan + 1 < count[:, None])
+        pair, part = pair[row], polygon[row[:, None], np.stack([0 * k, k + 1, k + 2], axis=1)]
+    size = np.abs(determinant(jacobians(shape, part, shape.middle)[:, 0]))
+    large = size > ROUNDING
+    at, weights = rule(shape, degree)
+    y = shape.lagrange(1, at) @ part[large]
+    weight = size[large][:, None] * weights
+    return np.repeat(pair[large], weights.size), y.reshape(-1, shape.dim), weight.ravel()
+
+
+def _turned(side: Surface, nodes: Array, at: Array) -> Array:
+    """Return the determinants of the maps of facets to the plane at points, shape (p,)."""
+    shape = side.shape
+    return determinant(_slopes(shape.gradients(side.order, at), nodes[..., : shape.dim]))
+
+
+def _slopes(gradients: Array, nodes: Array) -> Array:
+    return np.asarray(np.einsum("pkr,pkd->pdr", gradients, nodes))
+
+
+def _carried_back(side: Surface, nodes: Array, y: Array) -> Array:
+    """Return points of the reference facet that are projected to points, shape (p, dim).
+
+    Newton's method; of an affine facet it needs one step.
+
+    Parameters
+    ----------
+    side, nodes
+        Whose facets, and their projected nodes for each point, shape (p, nodes, d).
+    y
+        The points on the planes, shape (p, dim).
+    """
+    shape = side.shape
+    at = np.repeat(shape.middle, len(y), axis=0)
+    for _ in range(20):
+        slope = inverse(_slopes(shape.gradients(side.order, at), nodes[..., : shape.dim]))
+        left = y - np.einsum(
+            "pk,pkd->pd", shape.lagrange(side.order, at), nodes[..., : shape.dim]
+        )
+        step = np.einsum("pij,pj->pi", slope, left)
+        # Nothing common lies farther from a facet.
+        at = np.clip(at + step, -1.0, 2.0)
+        if np.abs(step).max(initial=0.0) <= ROUNDING:
+            break
+    return at
