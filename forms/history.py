@@ -83,6 +83,11 @@ class Response:
     dissipation: NDArray[np.float64] | None = None
     energy: NDArray[np.float64] | None = None
 
+    def symmetrised(self) -> Response:
+        """Return the same with the symmetric part of the stiffness."""
+        assert self.stiffness is not None
+        return replace(self, stiffness=(self.stiffness + self.stiffness.transpose(0, 2, 1)) / 2)
+
 
 @runtime_checkable
 class HistoryLaw(Protocol):

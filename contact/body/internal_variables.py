@@ -8,7 +8,6 @@ Nothing else in the program knows of them.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import replace
 from functools import cached_property
 
 import basix
@@ -194,11 +193,7 @@ class QuadratureLaws:
             response = law.respond(strains, variables, asked)
             _check(law, strains, variables, response)
             found = with_stiffness(law, strains, variables, asked, response)
-            if kind == "symmetric":
-                assert found.stiffness is not None
-                transposed = found.stiffness.transpose(0, 2, 1)
-                found = replace(found, stiffness=0.5 * (found.stiffness + transposed))
-            yield cells, found
+            yield cells, found.symmetrised() if kind == "symmetric" else found
 
     def _points(
         self, state: Evaluated, x: Array
@@ -487,10 +482,9 @@ def _check(
     shapes["stress"] = np.shape(found.stress), (n, size)
     if found.stiffness is not None:
         shapes["stiffness"] = np.shape(found.stiffness), (n, size, size)
-    if found.dissipation is not None:
-        shapes["dissipation"] = np.shape(found.dissipation), (n,)
-    if found.energy is not None:
-        shapes["energy"] = np.shape(found.energy), (n,)
+    for name in ("dissipation", "energy"):
+        if (energies := getattr(found, name)) is not None:
+            shapes[name] = np.shape(energies), (n,)
     for name, (given, accepted) in shapes.items():
         if given != accepted:
             raise InputError(

@@ -94,7 +94,7 @@ def _parser() -> Parser:
     commands = parser.add_subparsers(
         dest="command",
         required=True,
-        metavar="demo|new|check|solve|sweep|plot|identify|materials|schema",
+        metavar="demo|new|mesh|check|solve|sweep|plot|identify|materials|schema",
     )
     for usage, text, epilog, arguments in offered():
         command = commands.add_parser(
@@ -159,6 +159,15 @@ def offered() -> Iterator[tuple[str, str, str | None, dict[str, dict[str, Any]]]
                 "MESH", "mesh file: .msh with named physical groups, .inp, .vtu, .med, ..."
             ),
             "--case": _value("FILE", "file to write; MESH.toml by default"),
+        },
+    )
+    yield (
+        "mesh FILE PART.xdmf",
+        "write a mesh file as XDMF of which each rank reads its share, for many ranks",
+        None,
+        {
+            "file": _value("FILE", "mesh file: .msh, .inp, .vtu, .med, ..."),
+            "to": _value("PART.xdmf", "the new file; PART.h5 is written beside it"),
         },
     )
     yield (

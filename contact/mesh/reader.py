@@ -26,15 +26,20 @@ from dolfinx import mesh as dmesh
 from mpi4py import MPI
 
 from contact.errors import InputError
+from contact.mesh import shared
 from contact.mesh.domain import Domain, Indices, exterior_facets, with_names
 from contact.mesh.extraction import OTHERS, Model, extract
 from contact.mesh.validity import Cells, Groups, check_model
+from contact.ranks import on_all_ranks, on_root
 
 logger = logging.getLogger("contact.mesh")
 
 #: Seconds that reading a file may take, whatever its length, and for each byte of it: ten times
 #: the time on a machine that others use, too.
 LEAST_TIME, TIME_A_BYTE = 60.0, 5e-6
+
+#: Cells from which a mesh that one rank reads for all is worth a word: it takes some 1.4 GB.
+MANY = 5_000_000
 
 #: Byte order mark, with which some editors begin a file.
 BOM = codecs.BOM_UTF8
@@ -60,7 +65,7 @@ def from_msh(comm: MPI.Intracomm, path: str | Path) -> Domain:
         If the file is missing, damaged or no mesh, has no boundary groups, cells of several kinds
         or of curved geometry, or degenerate or overlapping cells. The message names the file.
     """
-    return _from_rank_0(comm, lambda: _read(Path(path)), f"mesh file {path}")
+    return _from_rank_0(comm, lambda: _read_msh(Path(path)), f"mesh file {path}")
 
 
 def from_file(comm: MPI.Intracomm, path: str | Path) -> Domain:
@@ -69,7 +74,8 @@ def from_file(comm: MPI.Intracomm, path: str | Path) -> Domain:
     Input files of Abaqus and CalculiX (.inp), and, by meshio, VTK (.vtu), XDMF (.xdmf), MED (.med)
     and Exodus (.e, .exo, .ex2); any other is one for `from_msh`. Sets of cells are regions; sets of
     facets, surfaces, and sets of nodes (the facets of the boundary all of whose nodes they hold)
-    are parts. Whole numbers of cells or nodes in VTK's files and XDMF mark sets, 0 none.
+    are parts. Whole numbers of cells or nodes in VTK's files and XDMF mark sets, 0 none. Of XDMF
+    that `convert` has written each rank reads its share; other files are read on rank 0.
 
     Parameters
     ----------
@@ -87,13 +93,43 @@ def from_file(comm: MPI.Intracomm, path: str | Path) -> Domain:
     InputError
         As `from_msh`, and if a set has no meaning.
     """
-    file = Path(path)
-    if file.suffix.lower() not in OTHERS:
-        return from_msh(comm, path)
-    return _from_rank_0(comm, lambda: _read_other(file), f"mesh file {path}")
+    file, source = Path(path), f"mesh file {path}"
+    heavy = on_root(comm, lambda: shared.heavy_file(file))
+    if heavy is None:
+        return _from_rank_0(comm, lambda: _read(file), source)
+    return _distribute(comm, shared.read(comm, *heavy), source)
+
+
+def convert(file: Path, to: Path) -> Cells:
+    """Write a mesh file as XDMF of which each rank reads its share. On one rank.
+
+    Parameters
+    ----------
+    file
+        A file as of `from_file`.
+    to
+        The new file, ``*.xdmf``; another with the ending .h5 is written beside it.
+
+    Returns
+    -------
+    The mesh that has been written.
+
+    Raises
+    ------
+    InputError
+        As `from_file`, and if one of the new files is there already.
+    """
+    cells = _checked(lambda: _read(file), f"mesh file {file}")
+    shared.write(cells, to)
+    return cells
 
 
 def _read(file: Path) -> Model:
+    """Read a file by the ending of its name."""
+    return (_read_other if file.suffix.lower() in OTHERS else _read_msh)(file)
+
+
+def _read_msh(file: Path) -> Model:
     """Read a file of Gmsh."""
     how = ["switch"] if _format(file) < 4 else ["as they are"]
     with _plain_name(file) as plain:
@@ -216,17 +252,25 @@ def from_generator(comm: MPI.Intracomm, name: str, **parameters: Any) -> Domain:
 
 def _from_rank_0(comm: MPI.Intracomm, load: Callable[[], Model], source: str) -> Domain:
     """Check on rank 0 the model that ``load`` makes there, and distribute it."""
-    raw, problem = None, None
-    if comm.rank == 0:
-        try:
-            raw = check_model(load())
-        except InputError as error:
-            problem = str(error)
-    problem = comm.bcast(problem)
-    if problem is not None:
-        raise InputError(f"{source}: {problem}")
+    with on_all_ranks(comm):
+        raw = _checked(load, source) if comm.rank == 0 else None
+    if raw is not None and comm.size > 1 and len(raw.regions.rows) >= MANY:
+        logger.info(
+            "%s: one rank has read all %d cells; of a file that contact mesh writes each reads its "
+            "share",
+            source,
+            len(raw.regions.rows),
+        )
     names = comm.bcast(None if raw is None else raw.without_rows())
     return _distribute(comm, names if raw is None else raw, source)
+
+
+def _checked(load: Callable[[], Model], source: str) -> Cells:
+    """Return a model that has been checked, or name its source."""
+    try:
+        return check_model(load())
+    except InputError as error:
+        raise InputError(f"{source}: {error}") from None
 
 
 def _distribute(comm: MPI.Intracomm, raw: Cells, source: str) -> Domain:

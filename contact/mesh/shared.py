@@ -1,0 +1,172 @@
+"""Meshes in XDMF and HDF5 of which each rank reads its own share.
+
+A file of another format is read and checked on rank 0, which has to hold all of it. `write` keeps
+the checked mesh: XDMF for other programs, and behind it HDF5 with the names of regions and parts.
+`read` takes slices of that, and no rank ever has more.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import re
+import tempfile
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from mpi4py import MPI
+from numpy.typing import NDArray
+
+from contact.errors import InputError
+from contact.mesh.cells import Shape
+from contact.mesh.validity import Cells, Groups
+from contact.ranks import on_root
+
+#: XDMF's names of cells and facets.
+NAMES = {
+    "interval": "Polyline",
+    "triangle": "Triangle",
+    "quadrilateral": "Quadrilateral",
+    "tetrahedron": "Tetrahedron",
+    "hexahedron": "Hexahedron",
+}
+
+#: Where the file of names and shares is told, with its SHA-256.
+MARK = re.compile(r'<Information Name="contact" Value="(\S+) ([0-9a-f]{64})"/>')
+
+#: The groups of a mesh in the HDF5 file.
+GROUPS = ("regions", "parts")
+
+
+def write(cells: Cells, path: Path) -> None:
+    """Write a checked mesh to ``path``, an .xdmf file, and an .h5 file beside it. On one rank.
+
+    Raises
+    ------
+    InputError
+        If the name ends otherwise, or one of the files is there already.
+    """
+    import h5py
+
+    heavy = path.with_suffix(".h5")
+    if path.suffix.lower() != ".xdmf":
+        raise InputError(f"{path}: given another ending; accepted: a name that ends with .xdmf")
+    for file in (path, heavy):
+        if file.exists():
+            raise InputError(f"{file}: it is there already; accepted: another name")
+    groups = {name: getattr(cells, name) for name in GROUPS}
+    said: dict[str, Any] = {
+        name: {"names": group.names, "sets": group.sets} for name, group in groups.items()
+    }
+    said |= {"shape": cells.shape.name, "unusable": cells.unusable, "notes": cells.notes}
+    shapes = {"regions": cells.shape, "parts": cells.shape.facet}
+    with tempfile.TemporaryDirectory(dir=path.parent) as folder:
+        made = Path(folder) / heavy.name
+        with h5py.File(made, "w") as store:
+            store.attrs["contact"] = json.dumps(said)
+            store["points"] = cells.points
+            for name, group in groups.items():
+                order = _vtk_order(shapes[name], group.rows.shape[1])
+                store[name], store[f"{name}-label"] = group.rows[:, order], group.labels
+        mark = f"{heavy.name} {_sha256(made)}"
+        light = Path(folder) / path.name
+        grids = "".join(
+            _grid(name, NAMES[shapes[name].name], group.rows.shape, cells.points.shape, heavy.name)
+            for name, group in groups.items()
+        )
+        light.write_text(
+            '<?xml version="1.0"?>\n<Xdmf Version="3.0"><Domain>\n'
+            f'<Information Name="contact" Value="{mark}"/>\n{grids}</Domain></Xdmf>\n'
+        )
+        made.rename(heavy)
+        light.rename(path)
+
+
+def _grid(name: str, kind: str, rows: tuple[int, ...], points: tuple[int, ...], heavy: str) -> str:
+    """Return the XDMF of the cells, or of the facets of parts, with the labels of their groups."""
+    n, corners = rows
+    where = f'Format="HDF">{heavy}:'
+    of_polyline = f' NodesPerElement="{corners}"' if kind == "Polyline" else ""
+    return (
+        f'<Grid Name="{name}" GridType="Uniform">\n'
+        f'<Topology TopologyType="{kind}" NumberOfElements="{n}"{of_polyline}>'
+        f'<DataItem Dimensions="{n} {corners}" NumberType="Int" Precision="8" {where}/{name}'
+        "</DataItem></Topology>\n"
+        f'<Geometry GeometryType="{"XY" if points[1] == 2 else "XYZ"}">'
+        f'<DataItem Dimensions="{points[0]} {points[1]}" Precision="8" {where}/points'
+        "</DataItem></Geometry>\n"
+        f'<Attribute Name="{name}" AttributeType="Scalar" Center="Cell">'
+        f'<DataItem Dimensions="{n}" NumberType="Int" Precision="4" {where}/{name}-label'
+        "</DataItem></Attribute>\n</Grid>\n"
+    )
+
+
+def _vtk_order(shape: Shape, nodes: int) -> list[int]:
+    """Return where VTK, and thus XDMF, has the nodes of a cell or facet."""
+    return list(shape.vtk(shape.degree_of(nodes))[1])
+
+
+def _sha256(path: Path) -> str:
+    with open(path, "rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()
+
+
+def heavy_file(path: Path) -> tuple[Path, str] | None:
+    """Return the HDF5 file of a mesh that `write` has written, and its SHA-256; else None.
+
+    On one rank.
+    """
+    if path.suffix.lower() != ".xdmf" or not path.is_file():
+        return None
+    with open(path, errors="replace") as file:
+        found = MARK.search(file.read(1000))
+    return None if found is None else (path.with_name(found[1]), found[2])
+
+
+def read(comm: MPI.Intracomm, heavy: Path, digest: str) -> Cells:
+    """Return this rank's share of a mesh that `write` has written. Collective.
+
+    Parameters
+    ----------
+    comm
+        Communicator of the ranks of the mesh.
+    heavy, digest
+        The file of the mesh, and its SHA-256.
+
+    Raises
+    ------
+    InputError
+        If the file is missing, or is not as it was written.
+    """
+    import h5py
+
+    def check() -> None:
+        if not heavy.is_file():
+            raise InputError(f"{heavy}: it is missing beside its .xdmf file; accepted: both")
+        if _sha256(heavy) != digest:
+            raise InputError(
+                f"{heavy}: it is not as it was written; accepted: as contact mesh has left it"
+            )
+
+    on_root(comm, check)
+    with h5py.File(heavy, "r", locking=False) as store:
+        said = json.loads(store.attrs["contact"])
+
+        def share(name: str) -> NDArray[Any]:
+            """Return this rank's rows of an array."""
+            rows = store[name]
+            first, last = (len(rows) * (comm.rank + k) // comm.size for k in (0, 1))
+            return rows[first:last]
+
+        shape = Shape(said["shape"])
+        found = []
+        for name, of in zip(GROUPS, (shape, shape.facet), strict=True):
+            rows = share(name)
+            inverse = np.argsort(_vtk_order(of, rows.shape[1]))
+            sets = tuple(tuple(inside) for inside in said[name]["sets"])
+            labels = share(f"{name}-label")
+            found.append(Groups(tuple(said[name]["names"]), rows[:, inverse], labels, sets))
+        regions, parts = found
+        notes = tuple(said["notes"])
+        return Cells(shape, share("points"), regions, parts, said["unusable"], notes)

@@ -1,0 +1,176 @@
+"""Meshes of which each rank reads its share: as their sources, or refused."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+
+from contact import solve
+from contact.cli.main import BAD_INPUT, CONVERGED, main
+from contact.errors import InputError
+from contact.mesh import shared
+from contact.mesh.reader import from_file
+from tests.mesh.test_formats import PLATE, bricks, regions
+from tests.problems.sizes import integral, measures
+
+pytest.importorskip("h5py")
+
+COMM = MPI.COMM_WORLD
+
+#: Two triangles that share a region, with parts that overlap and one that lies inside.
+SQUARE = """\
+$MeshFormat
+2.2 0 8
+$EndMeshFormat
+$PhysicalNames
+6
+1 1 "low"
+1 2 "outside"
+1 5 "diagonal"
+2 3 "left half"
+2 4 "all"
+2 6 "right half"
+$EndPhysicalNames
+$Nodes
+4
+1 0 0 0
+2 1 0 0
+3 1 1 0
+4 0 1 0
+$EndNodes
+$Elements
+8
+1 1 2 1 1 1 2
+2 1 2 2 1 1 2
+3 1 2 2 2 2 3
+4 1 2 5 3 1 3
+5 2 2 3 4 1 3 4
+6 2 2 4 4 1 3 4
+7 2 2 4 5 1 2 3
+8 2 2 6 5 1 2 3
+$EndElements
+"""
+
+SOURCES = {"plate.inp": PLATE, "bricks.inp": bricks(), "square.msh": SQUARE}
+
+
+def written(folder, name):
+    """Write a source, convert it on one rank, and return both names. Collective."""
+    source, made = folder / name, folder / "part.xdmf"
+    if COMM.rank == 0:
+        source.write_text(SOURCES[name])
+    COMM.barrier()
+    assert main(["mesh", str(source), str(made)]) == CONVERGED
+    COMM.barrier()
+    return source, made
+
+
+@pytest.mark.parallel
+@pytest.mark.parametrize("name", SOURCES)
+def test_a_shared_mesh_is_its_source(name, shared_tmp_path, capsys):
+    source, made = written(shared_tmp_path, name)
+    one, other = from_file(COMM, source), from_file(COMM, made)
+    assert measures(other) == pytest.approx(measures(one), rel=1e-13)
+    assert regions(other) == pytest.approx(regions(one), rel=1e-13)
+    assert [*other.parts] == [*one.parts]
+    assert [*other.regions] == [*one.regions]
+    assert (other.size, other.notes) == (one.size, one.notes)
+    said = [{key: text.split(": ", 1)[1] for key, text in d.unusable.items()} for d in (one, other)]
+    assert said[0] == said[1]
+    assert ("diagonal" in said[0]) == (name == "square.msh")
+    assert moments(other) == pytest.approx(moments(one), rel=1e-12, abs=1e-12)
+
+
+def moments(domain):
+    """Return the first moments of parts and regions: no other facet or cell is taken for one."""
+    import ufl
+
+    x = ufl.SpatialCoordinate(domain.mesh)
+    measures = [domain.ds(name) for name in domain.parts]
+    measures += [domain.dx_in(name) for name in domain.regions]
+    return [integral(domain, dx, x[i]) for dx in measures for i in range(domain.dim)]
+
+
+@pytest.mark.parallel
+def test_dolfinx_reads_it_too(shared_tmp_path, capsys):
+    from dolfinx.io import XDMFFile
+
+    _, made = written(shared_tmp_path, "plate.inp")
+    with XDMFFile(COMM, str(made), "r") as file:
+        mesh = file.read_mesh(name="regions")
+    assert mesh.topology.index_map(2).size_global == 2
+    assert mesh.topology.cell_name() == "quadrilateral"
+    assert mesh.geometry.x[:, 0].max(initial=0.0) <= 2.0
+
+
+def test_a_case_is_solved_on_it_as_on_its_source(tmp_path, capsys):
+    source, made = written(tmp_path, "plate.inp")
+    found = []
+    for mesh in (source, made):
+        text = f"""
+        [mesh]
+        file = "{mesh.name}"
+        [material]
+        young = 1.0
+        poisson = 0.3
+        [[fixed]]
+        on = "top"
+        displacement = [0.0, -0.01]
+        [contact]
+        on = "ground"
+        """
+        path = tmp_path / "case.toml"
+        path.write_text(text)
+        found.append(solve(path).contact_force)
+    assert found[0] == pytest.approx(found[1], rel=1e-12)
+    assert abs(found[0][1]) > 1e-3
+
+
+def test_other_names_and_files_that_are_there_are_refused(tmp_path, capsys):
+    source, made = written(tmp_path, "plate.inp")
+    before = made.read_bytes()
+    for to, words in ((made, "it is there already"), (tmp_path / "part.msh", "given another end")):
+        assert main(["mesh", str(source), str(to)]) == BAD_INPUT
+        assert words in capsys.readouterr().err
+    assert main(["mesh", str(tmp_path / "none.msh"), str(tmp_path / "b.xdmf")]) == BAD_INPUT
+    assert "no such file" in capsys.readouterr().err
+    assert made.read_bytes() == before
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["part.h5", "part.xdmf", "plate.inp"]
+
+
+@pytest.mark.parallel
+@pytest.mark.parametrize("harm", ["missing", "cut", "bit"])
+def test_damaged_shares_are_refused(harm, shared_tmp_path, capsys):
+    _, made = written(shared_tmp_path, "square.msh")
+    heavy = made.with_suffix(".h5")
+    if COMM.rank == 0:
+        data = bytearray(heavy.read_bytes())
+        heavy.unlink()
+        data[len(data) // 2] ^= 1
+        if harm != "missing":
+            heavy.write_bytes(bytes(data) if harm == "bit" else bytes(data[:-100]))
+    COMM.barrier()
+    with pytest.raises(InputError, match=r"part\.h5: it is (missing|not as it was)"):
+        from_file(COMM, made)
+
+
+def test_no_rank_takes_more_than_its_share(tmp_path, monkeypatch, capsys):
+    """Of three ranks each gets a third of points, cells and facets."""
+    _, made = written(tmp_path, "bricks.inp")
+    heavy = shared.heavy_file(made)
+
+    class Rank:
+        size = 3
+
+        def __init__(self, rank):
+            self.rank = rank
+
+    monkeypatch.setattr(shared, "on_root", lambda comm, action: action())
+    shares = [shared.read(Rank(rank), *heavy) for rank in range(3)]
+    for rows in ([s.points for s in shares], [s.parts.rows for s in shares]):
+        sizes = [len(own) for own in rows]
+        assert max(sizes) - min(sizes) <= 1
+    every = np.concatenate([s.points for s in shares])
+    assert len(every) == 12
+    assert np.unique(every, axis=0).shape == every.shape
