@@ -215,10 +215,15 @@ class UserLaw(Isotropic):
             ) from error
         kinds = int | float | np.number
         scalar = isinstance(found, kinds) or getattr(found, "ufl_shape", None) == ()
-        given = is_symbolic(start) or np.asarray(start).dtype.kind in "iuf"
+        if is_symbolic(start):
+            raise ValueError(
+                f"UserLaw: modulus: the function returns {start!r} for a number; {accepted}; a "
+                "modulus that varies in the body is Material(law, factor=...)"
+            )
+        given = np.asarray(start).dtype.kind in "iuf"
         if not (scalar and given and np.shape(start) in ((), (1,))):
             raise ValueError(f"UserLaw: modulus: the function returns {found!r}; {accepted}")
-        if not (is_symbolic(start) or np.isfinite(start).all()):
+        if not np.isfinite(start).all():
             start = float(np.mean(start))
             raise ValueError(f"UserLaw: modulus: {start} without strain; accepted: finite values")
 

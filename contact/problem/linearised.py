@@ -43,7 +43,7 @@ class Equations:
     Attributes
     ----------
     forces
-        On the owned unknowns, global ones behind them.
+        On the owned unknowns that are free, global ones behind them.
     conditions
         At the contact nodes, shape (n, d): stresses, and gaps and slips times `stiffness` of the
         interface, for a normal that is along no axis mixes them.
@@ -80,7 +80,9 @@ def equations(problem: ContactProblem, state: State, active: ActiveSet) -> Equat
     closing = -interface.stiffness * interface.opening(nodal)
     normal = np.where(active.closed, closing, jump.normal_component(vectors))
     conditions = normal[:, None] * jump.normal + tangential
-    return Equations(residual_forces(problem, state), conditions)
+    # Forces on nodes of a rigid part are those on it: its moment arms may be the parameter.
+    forces = problem.equilibrium.unbalanced(residual_forces(problem, state))
+    return Equations(forces, conditions)
 
 
 def weakly_active(problem: ContactProblem, state: State) -> Array:
@@ -140,9 +142,7 @@ class Linearised:
         regular -= np.where(self.active.closed, small, 0.0)[:, None, None] * normal
         sticks = np.where(self.active.sticks, small, 0.0)
         regular -= sticks[:, None, None] * jump.tangent
-        # Components that supports hold have no condition of their own.
-        fixed = np.eye(jump.dim) - normal - jump.tangent
-        self._regular = np.linalg.inv(regular + fixed)
+        self._regular = np.linalg.inv(regular)
         d = jump.dim
         law[:, :d] -= self._regular @ self._by_jump
         body = problem.equilibrium
@@ -186,6 +186,8 @@ class Linearised:
         self._by_jump -= (local[:, None] * self._along)[:, :, None] * self._layer[:, None, :]
         pressed = (local[:, None] * self._along)[:, :, None] * jump.normal[:, None, :]
         self._by_force = np.where(closed, 0.0, normal) + np.where(sticks, 0.0, jump.tangent)
+        # There is no contact force along components that supports hold.
+        self._by_force += np.eye(d) - normal - jump.tangent
         self._by_force -= pressed
 
     @property
