@@ -13,9 +13,9 @@ from contact.case.file import Case as Case
 from contact.case.file import load_case as load_case
 from contact.case.file import parse_case as parse_case
 from contact.case.material import make_material as make_material
-from contact.derivatives import Parameter as Parameter
 from contact.derivatives import Sensitivities as Sensitivities
 from contact.derivatives import sensitivity as sensitivity
+from contact.differences import Parameter as Parameter
 from contact.errors import InputError as InputError
 from contact.gradients import field_gradient as field_gradient
 from contact.gradients import gap_gradient as gap_gradient

@@ -9,7 +9,9 @@ the history at the beginning of a step, and R(z, h; m) = 0 the equations of its 
 one back-substitution a parameter and step, or one a quantity and step. The tangent is carried
 forwards through the steps of an evolution with the history, the adjoint backwards. dR/dm is a
 central difference of residuals at the fixed solution (semi-analytical sensitivities: nothing is
-solved again), so that any number of a case may be the parameter, sizes of the mesh too.
+solved again), so that any number of a case may be the parameter, sizes of the mesh too. The state
+of another parameter has the same free unknowns; those that follow a rigid part or an electrode, and
+the moments about its centre, are as its problem has them.
 
 References
 ----------
@@ -21,7 +23,7 @@ transient non-linear coupled problems, Int. J. Numer. Methods Engrg. 37 (1994).
 from __future__ import annotations
 
 import logging
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -31,6 +33,7 @@ from mpi4py import MPI
 from contact.arguments import expect
 from contact.case.build import build_problem
 from contact.case.text import number_at, with_number
+from contact.differences import Family, Parameter, at, family_of
 from contact.errors import InputError
 from contact.history import History
 from contact.linear.operator import Counters
@@ -57,34 +60,17 @@ from contact.typing import Array
 
 logger = logging.getLogger("contact.sensitivity")
 
-#: Relative change of parameters in central differences: their error, largest with plastic flow, and
-#: that of rounding are some 1e-10 then.
-STEP = 2e-6
-
 #: Problems and states a little above and below a parameter.
 _Sides = list[tuple[ContactProblem, State]]
 
 #: Sections of a case by whose numbers there are no derivatives.
 WITHOUT = "case", "solver", "output", "evolution"
 
+#: Numbers of [friction] without which there is none.
+BEGIN = "mu", "bound", "radius"
+
 #: Methods of `sensitivity`.
 AUTO, TANGENT, ADJOINT = "auto", "tangent", "adjoint"
-
-
-@dataclass(frozen=True)
-class Parameter:
-    """A number that a problem depends on.
-
-    Attributes
-    ----------
-    value
-        The number.
-    problem
-        Returns the problem of another number, with the same mesh, spaces and contact nodes.
-    """
-
-    value: float
-    problem: Callable[[float], ContactProblem]
 
 
 class Sensitivities(dict[str, dict[str, float]]):
@@ -208,31 +194,18 @@ def parameters_of(
         sections, value = key.split("."), number_at(case, key)
         accepted = "a number of the mesh, materials, supports, loads, contact or rigid parts"
         expect("parameters", key, accepted, sections[0] not in WITHOUT)
+        accepted = "a number of the mesh where that is not adapted"
+        adapts = sections[0] == "mesh" and case.mesh.adapt is not None
+        expect("parameters", key, accepted, not adapts)
         accepted = "a number above 0: friction begins at 0, and derivatives are one-sided there"
-        expect(f"parameters: {key}", value, accepted, "friction" not in sections or value != 0)
+        begins = "friction" in sections[:-1] and sections[-1] in BEGIN
+        expect(f"parameters: {key}", value, accepted, value != 0 or not begins)
 
     def build(key: str, value: float) -> ContactProblem:
         kept = None if key.split(".")[0] == "mesh" else domain
         return build_problem(with_number(case, key, value), comm, domain=kept)
 
     return [(key, Parameter(number_at(case, key), partial(build, key))) for key in given]
-
-
-@dataclass(frozen=True)
-class Family:
-    """The problems at two values of a parameter, that far away from its own."""
-
-    problems: tuple[ContactProblem, ContactProblem]
-    ways: tuple[float, float]
-
-    def slope(self, ahead: Array, behind: Array) -> Array:
-        """Return the difference quotient of values at both."""
-        return np.asarray((ahead - behind) / self.over, dtype=np.float64)
-
-    @property
-    def over(self) -> float:
-        """The distance between them."""
-        return self.ways[0] - self.ways[1]
 
 
 class LoadPath:
@@ -273,25 +246,7 @@ class LoadPath:
 
     def family(self, name: str, parameter: Parameter) -> Family:
         """Return the problems beside that of a parameter. Collective."""
-        step = STEP * (abs(parameter.value) or 1.0)
-        problems, ways = [], []
-        for way in (step, -step):
-            try:
-                problems.append(parameter.problem(parameter.value + way))
-            except InputError:  # 0 may be the least that is accepted
-                problems.append(parameter.problem(parameter.value))
-                way = 0.0
-            ways.append(way)
-        ours = self.base.nodes.nodes, self.base.equilibrium.rest().size
-        for problem in problems:
-            theirs = problem.nodes.nodes, problem.equilibrium.rest().size
-            same = np.array_equal(ours[0], theirs[0]) and ours[1] == theirs[1]
-            if not self.base.comm.allreduce(same, op=MPI.LAND):
-                raise InputError(
-                    f"{name}: {parameter.value:g} is a border at which the contact nodes or the "
-                    "mesh change; accepted: a parameter that leaves them"
-                )
-        return Family((problems[0], problems[1]), (ways[0], ways[1]))
+        return family_of(name, parameter, self.steps)
 
 
 def _with_gradients(quantities: Mapping[str, Quantity]) -> dict[str, Differentiable]:
@@ -309,10 +264,7 @@ class _Direction:
 
 
 def _beside(family: Family, state: State, direction: _Direction | None = None) -> _Sides:
-    """Return problems and states at both sides of a parameter, moved along a direction.
-
-    Collective.
-    """
+    """Return problems and states beside a parameter, moved along a direction. Collective."""
     found = []
     for way, problem in zip(family.ways, family.problems, strict=True):
         there = state
@@ -321,9 +273,7 @@ def _beside(family: Family, state: State, direction: _Direction | None = None) -
                 moved_state(problem, state, way * direction.x, way * direction.forces),
                 history=_sum(state.history, way, direction.history),
             )
-        here = problem.at(state.time, there.history)
-        x = here.equilibrium.prescribe(there.x, state.time)
-        found.append((here, replace(there, x=x)))
+        found.append(at(problem, there))
     return found
 
 
@@ -336,19 +286,24 @@ def _sum(history: History, factor: float, change: History) -> History:
 def _explicit(family: Family, state: State, linearised: Linearised) -> tuple[Equations, _Sides]:
     """Return dR/dm at the fixed state and history, and the problems beside it. Collective."""
     sides = _beside(family, state)
-    ahead, behind = (equations(*side, linearised.active) for side in sides)
+    found = [equations(*side, linearised.active) for side in sides]
     change = Equations(
-        family.slope(ahead.forces, behind.forces),
-        family.slope(ahead.conditions, behind.conditions),
+        family.slope([one.forces for one in found]),
+        family.slope([one.conditions for one in found]),
     )
     return change, sides
 
 
 def _explicit_history(family: Family, sides: _Sides) -> History:
     """Return dH/dm: how the history at the end of a step changes at the fixed state. Collective."""
-    ahead, behind = (here.commit(there) for here, there in sides)
-    less = behind.arrays()
-    return ahead.replaced({k: family.slope(v, less[k]) for k, v in ahead.arrays().items()})
+    found = [here.commit(there) for here, there in sides]
+    every = [one.arrays() for one in found]
+    return found[0].replaced({k: family.slope([one[k] for one in every]) for k in every[0]})
+
+
+def _slope_of(family: Family, quantity: Quantity, sides: _Sides) -> float:
+    """Return the difference quotient of a quantity. Collective."""
+    return float(family.slope([np.asarray(quantity(*side)) for side in sides]))
 
 
 def _tangent(
@@ -376,12 +331,11 @@ def _tangent(
             for name, quantity in quantities.items():
                 if name not in gradients:
                     direction = _Direction(x, forces, histories[key])
-                    ahead, behind = (quantity(*it) for it in _beside(family, state, direction))
-                    rows[name][key].append((ahead - behind) / family.over)
+                    moved = _beside(family, state, direction)
+                    rows[name][key].append(_slope_of(family, quantity, moved))
                     continue
                 by_x, by_force = gradients[name]
-                ahead, behind = (quantity(*it) for it in still)
-                value = (ahead - behind) / family.over + body.product(by_x, x)
+                value = _slope_of(family, quantity, still) + body.product(by_x, x)
                 value += _total(problem, by_force, forces)
                 if isinstance(quantity, Reaction):
                     value += body.product(quantity.weights(problem), by_history.forces)
@@ -459,8 +413,7 @@ def _adjoint(
                 found[name][key] -= problem.equilibrium.product(one.x, change.forces)
                 found[name][key] -= _total(problem, one.conditions, change.conditions)
                 if one.after is None:
-                    ahead, behind = (quantities[name](*side) for side in sides)
-                    found[name][key] += (ahead - behind) / family.over
+                    found[name][key] += _slope_of(family, quantities[name], sides)
                     continue
                 ends = _explicit_history(family, sides).arrays()
                 for part, weights in one.after.arrays().items():

@@ -19,13 +19,12 @@ from contact.body.field_work import FieldWork
 from contact.body.internal_variables import VARIABLES
 from contact.derivatives import (
     Adjoint,
-    Family,
     LoadPath,
-    Parameter,
     backwards,
     parameters_of,
     quantities_of,
 )
+from contact.differences import Family, Parameter
 from contact.errors import InputError
 from contact.history import InternalVariables
 from contact.output.differentiable import Differentiable, Quantity
@@ -145,7 +144,7 @@ class _FieldGradient:
     mesh, degree
         Of the field.
     family
-        The problems at two values of the constant.
+        The problems beside the constant.
     """
 
     def __init__(self, mesh: Mesh, family: Family, degree: int) -> None:
@@ -158,8 +157,8 @@ class _FieldGradient:
         state, scale = linearised.state, linearised.problem.equilibrium.phi_scale
         weights = None if adjoint.after is None else adjoint.after.get(VARIABLES)
         assert weights is None or isinstance(weights, InternalVariables)
-        ahead, behind = (work(state, adjoint.along, scale, weights) for work in self._works)
-        self._found += self._family.slope(ahead, behind)
+        found = [work(state, adjoint.along, scale, weights) for work in self._works]
+        self._found += self._family.slope(found)
 
     def function(self) -> fem.Function:
         """Return the gradient as a function of the field's space. Collective."""

@@ -33,6 +33,7 @@ LAYERS = (
         "nesting",
         "solving",
         "sweeping",
+        "differences",
         "derivatives",
         "gradients",
         "identification",

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from contact import load_case, parse_case, sensitivity, solve
+from contact import InputError, load_case, parse_case, sensitivity, solve
 from contact.case.text import number_at, with_number
 from scripts.studies.derivatives import values
 
@@ -48,7 +48,7 @@ def plate(dim=2, turning=True, revolved=False):
     }
 
 
-def keys_of_plate(data):
+def keys_of_plate(data, revolved):
     """Return the keys of the plate, its mesh and its material."""
     dim, (rigid,) = len(data["mesh"]["size"]), data["rigid"]
     found = ["material.young", "material.poisson", "friction.mu"]
@@ -56,23 +56,32 @@ def keys_of_plate(data):
     for name, value in rigid.items():
         many = value if isinstance(value, list) else [value]
         for i, one in enumerate(many):
-            if isinstance(one, float):
+            if isinstance(one, float) and not (revolved and one == 0):
                 found.append(f"rigid.0.{name}" + (f".{i}" if isinstance(value, list) else ""))
     return found
 
 
-def check(case, names, keys, way=1e-5, tolerance=1e-6):
-    """Compare tangent and adjoint with each other, and with central differences of solutions."""
+def check(case, names, keys, steps=None, tolerance=1e-6):
+    """Compare tangent and adjoint with each other, and with differences of solutions.
+
+    At 0 `steps` has those of the differences, on one side where a negative number is refused.
+    """
     run = solve(case, comm=SELF)
     tangent, adjoint = (sensitivity(run, names, keys, m) for m in ("tangent", "adjoint"))
-    size = np.abs(values(run, names))
+    here = values(run, names)
     for key in keys:
         at = number_at(case, key)
-        step = way * (abs(at) or 1.0)
-        ends = [solve(with_number(case, key, at + by), comm=SELF) for by in (step, -step)]
-        apart = np.subtract(*(values(end, names) for end in ends)) / (2 * step)
-        own, other = (np.array([found[name][key] for name in names]) for found in (tangent, adjoint))
-        scale = np.maximum(np.abs(apart), 1e-2 * size / (abs(at) or 1.0))
+        step = (steps or {}).get(key) or 1e-5 * (abs(at) or 1.0)
+        try:
+            places, factors = (step, -step), (0.5, -0.5)
+            ends = [solve(with_number(case, key, at + by), comm=SELF) for by in places]
+        except InputError:
+            places, factors = (step, 2 * step, 0.0), (2.0, -0.5, -1.5)
+            ends = [solve(with_number(case, key, at + by), comm=SELF) for by in places]
+        apart = sum(f * values(end, names) for f, end in zip(factors, ends, strict=True)) / step
+        own, other = (np.array([of[name][key] for name in names]) for of in (tangent, adjoint))
+        size = np.abs(here) / (abs(at) or 1e3 * step)
+        scale = np.maximum(np.abs(apart), 1e-2 * size)
         assert np.all(np.abs(own - apart) <= tolerance * scale), (key, own, apart)
         assert np.all(np.abs(own - other) <= 1e-10 * np.maximum(np.abs(own), size)), key
 
@@ -86,7 +95,7 @@ def test_a_rigid_part_by_all_of_its_parameters(dim, turning, revolved):
     data = plate(dim, turning, revolved)
     names = ["max_pressure", "max_displacement"] + ["contact_force_x"] * (not revolved)
     # The force along x is given where the plate is free; the pressure knows of its arms.
-    check(parse_case(data), names, keys_of_plate(data))
+    check(parse_case(data), names, keys_of_plate(data, revolved))
 
 
 def test_a_contact_force_where_all_is_open_and_supports_hold_nodes():
@@ -114,3 +123,96 @@ def test_a_ring_off_its_mandrel():
     ring = load_case("scripts/cases/ring-on-mandrel.toml", given)
     found = sensitivity(solve(ring, comm=SELF), ["contact_force_y"], ["friction.mu"], "adjoint")
     assert found["contact_force_y"]["friction.mu"] == pytest.approx(0, abs=1e-9)
+
+
+def at_zero(length=1.0, young=1.2):
+    """Return a block under a ball, many of whose numbers are 0, in any units."""
+    return {
+        "mesh": {"generator": "rectangle", "origin": [0.0, 0.0], "size": [2 * length, length],
+                 "cells": [8, 4], "rotation": 0.0},
+        "material": {"young": young, "poisson": 0.0},
+        "fixed": [{"on": "bottom", "displacement": [0.0, 0.0]}],
+        "load": [{"on": "right", "traction": [0.0, 0.0]}],
+        "contact": {
+            "on": "top",
+            "foundation": {"shape": "sphere", "centre": [0.0, 3 * length], "radius": 2 * length},
+            "rigid": {"displacement": [0.0, -0.05 * length], "rotation": 0.0, "centre": [0.0, 0.0]},
+        },
+        "friction": {"law": "coulomb", "mu": {"law": "slip", "a": 0.3, "b": 0.0, "rho": 0.0}},
+        "solver": {"tolerance": 1e-13},
+    }  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("length", "young"), [(1.0, 1.2), (1e-3, 200e9), (1e-6, 200e9), (1e3, 1.2)]
+)
+def test_numbers_that_are_0_in_any_units(length, young):
+    data = at_zero(length, young)
+    steps = {
+        "mesh.origin.0": 1e-5 * length,
+        "mesh.origin.1": 1e-7 * length,
+        "mesh.rotation": 1e-4,
+        "material.poisson": 1e-5,
+        "fixed.0.displacement.0": 1e-6 * length,
+        "fixed.0.displacement.1": 1e-6 * length,
+        "load.0.traction.0": 1e-5 * young,
+        "load.0.traction.1": 1e-5 * young,
+        "contact.foundation.centre.0": 1e-5 * length,
+        "contact.rigid.displacement.0": 1e-6 * length,
+        "contact.rigid.rotation": 1e-4,
+        "friction.mu.b": 1e-4,
+        "friction.mu.rho": 1e-3 / length,
+    }
+    case = parse_case(data)
+    check(case, ["contact_force_x", "contact_force_y", "max_pressure"], [*steps], steps, 2e-6)
+
+
+def test_numbers_near_0():
+    """A number of 1e-12 has the derivative of 0, up to rounding."""
+    found = []
+    for at in (0.0, 1e-12, 1e-8, -1e-10):
+        data = at_zero()
+        data["contact"]["foundation"]["centre"][0] = at
+        run = solve(parse_case(data), comm=SELF)
+        by = sensitivity(run, ["contact_force_x"], ["contact.foundation.centre.0"])
+        found.append(by["contact_force_x"]["contact.foundation.centre.0"])
+    assert found == pytest.approx([found[0]] * 4, rel=1e-6)
+
+
+def test_electric_numbers_that_are_0():
+    piezo = {"e31": 0.0, "e33": 15.8, "e15": 0.0, "beta11": 8.13866, "beta33": 7.37455}
+    data = {
+        "mesh": {"generator": "rectangle", "size": [2.0, 1.0], "cells": [8, 4]},
+        "material": {"young": 100.0, "poisson": 0.3, "piezo": piezo},
+        "fixed": [{"on": "top", "displacement": [0.004, -0.02], "potential": 0.0}],
+        "load": [{"on": "left", "charge": 0.0}],
+        "contact": {"on": "bottom", "gap": 0.0},
+        "friction": {"law": "coulomb", "mu": 0.2},
+        "electric": {"law": "perfect", "k_e": 0.0, "phi_f": 0.0},
+        "solver": {"tolerance": 1e-13},
+    }
+    steps = {
+        "material.piezo.e31": 1e-3,
+        "material.piezo.e15": 1e-3,
+        "fixed.0.potential": 1e-6,
+        "load.0.charge": 1e-5,
+        "electric.k_e": 1e-4,
+        "contact.gap": 1e-7,
+    }
+    # All of the charge is 0.
+    check(parse_case(data), ["contact_force_y", "max_pressure"], [*steps], steps)
+
+
+def test_a_parameter_of_a_generator_stands_where_the_case_has_it():
+    case = parse_case({
+        "mesh": {"generator": "half_disc", "radius": 1.0},
+        "material": {"young": 1.0, "poisson": 0.3},
+        "contact": {"on": "bottom"},
+    })  # fmt: skip
+    assert number_at(case, "mesh.radius") == number_at(case, "mesh.parameters.radius") == 1.0
+
+
+def test_a_number_with_a_single_value_is_refused():
+    run = solve(parse_case(plate(revolved=True)), comm=SELF)
+    with pytest.raises(InputError, match=r"accepted: 0 across the axis"):
+        sensitivity(run, ["max_pressure"], ["rigid.0.displacement.0"])

@@ -46,7 +46,9 @@ def number_at(case: Case, key: str) -> float:
         if isinstance(place, list) and name.isdigit() and int(name) < len(place):
             place = place[int(name)]
         else:
-            place = place.get(name) if isinstance(place, Mapping) else None
+            # Parameters of a mesh generator may stand in [mesh] itself.
+            inner = place.get("parameters", {}) if isinstance(place, Mapping) else {}
+            place = {**inner, **place}.get(name) if isinstance(place, Mapping) else None
     if isinstance(place, bool) or not isinstance(place, int | float):
         words = "nothing" if place is None else f"{place!r}"
         raise InputError(

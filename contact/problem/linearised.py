@@ -85,6 +85,20 @@ def equations(problem: ContactProblem, state: State, active: ActiveSet) -> Equat
     return Equations(forces, conditions)
 
 
+def sizes(problem: ContactProblem, state: State) -> tuple[float, float]:
+    """Return the norms that changes of the equations are compared with. Collective.
+
+    Those of the forces, and of the stresses and jumps at the contact nodes in L2(Gamma_3); of a
+    body on which nothing acts those at a small strain.
+    """
+    body, jump, scales = problem.equilibrium, problem.nodes, problem.scales
+    least = WEAK * scales.young * scales.area
+    forces = body.norm(body.internal_forces(state)) + body.norm(body.external(state.time))
+    moved = problem.interface.stiffness * problem.nodal(state)[:, : problem.dim]
+    stresses = jump.norm(moved) + jump.norm(state.forces.vectors(jump))
+    return forces + least, stresses + least / scales.area**0.5
+
+
 def weakly_active(problem: ContactProblem, state: State) -> Array:
     """Return the points of nodes at the border of two states, shape (n, d). Collective.
 
