@@ -110,8 +110,9 @@ def sensitivity(
         A converged solution.
     quantities
         Columns of ``steps.csv``: ``contact_force_x``, ``max_pressure``, ``max_displacement``,
-        ``rigid_x``, ``rigid_rotation``, ``rigid_force_x``, ``potential_PART``, ``charge_PART``,
-        ``charge_foundation``; and ``reactions.PART.x``. Or functions of problem and state, by name;
+        ``reaction_x_PART``, ``driven_y``, ``rigid_x``, ``rigid_rotation``, ``rigid_force_x``,
+        ``potential_PART``, ``charge_PART``, ``charge_foundation``; and ``energy``, ``dissipation``
+        and ``driven_force_x`` by the tangent. Or functions of problem and state, by name;
         the adjoint asks these for a `gradient` (`contact.output.differentiable`).
     parameters
         Keys of the case with a number: ``material.young``, ``friction.mu``, ``contact.gap``,

@@ -1,4 +1,4 @@
-"""The problems beside a parameter, and the difference quotients of what they say.
+"""The problems beside a parameter, and the difference quotients of values at them.
 
 The step of a quotient is relative to the parameter, unless that says nothing of the problem: at 0,
 near it, or far from it. Then it is chosen by its effect: the equations at the fixed solution change
@@ -56,10 +56,8 @@ class Family:
     ----------
     problems, ways
         The problems, and how far away their numbers are.
-    factors
-        What the values there are multiplied by.
-    over
-        What their sum is divided by.
+    factors, over
+        The quotient is the sum of the values times the factors, over this.
     """
 
     problems: tuple[ContactProblem, ...]
@@ -122,7 +120,8 @@ def _made(name: str, parameter: Parameter, step: float, base: ContactProblem) ->
             faults.append(error)
     if not problems:
         raise faults[0]
-    factors, over = (1.0, -1.0), 2 * step
+    factors: tuple[float, ...] = 1.0, -1.0
+    over = 2 * step
     if len(problems) == 1:
         # Of second order too.
         (way,) = problems

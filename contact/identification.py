@@ -19,7 +19,7 @@ from pathlib import Path
 
 import numpy as np
 from mpi4py import MPI
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import least_squares
 from scipy.stats import t as student
 
@@ -37,6 +37,14 @@ logger = logging.getLogger("contact.identify")
 
 #: The column with the times of a measurement.
 TIME = "t"
+
+#: Share of the largest singular value below which the measurements do not see a combination of
+#: parameters, and of a parameter in such a combination.
+UNSEEN, SHARE = 1e-8, 1e-4
+
+#: How often an interval is halved in which a number stops to be accepted, and how far from a bound
+#: the search begins, relative to it.
+HALVED, INSIDE = 50, 2e-10
 
 #: Changes of the parameters, and of the misfit, over themselves at which the search ends.
 ENOUGH = 1e-10
@@ -57,6 +65,11 @@ class Identified:
     covariance, correlation
         Of the parameters in this order, shape (k, k), from the derivatives at the solution and the
         scatter that is left.
+    undetermined
+        Parameters that the measurements do not determine, alone or in a combination with the others
+        here: infinite interval, infinite variance, covariances nan.
+    at_bound
+        Parameters whose value is a bound; their intervals are those without it.
     fits
         Of each measurement: column -> its values in the model at the measured times.
     misfit
@@ -72,6 +85,8 @@ class Identified:
     level: float
     covariance: Array
     correlation: Array
+    undetermined: tuple[str, ...]
+    at_bound: tuple[str, ...]
     fits: tuple[dict[str, Array], ...]
     misfit: float
     solutions: tuple[Solution, ...]
@@ -101,7 +116,8 @@ def identify(
     parameters
         Keys of the case with a number, ``friction.mu``, in all cases.
     bounds
-        Key -> least and largest value; none by default.
+        Key -> least and largest value; by default those that the case accepts: a modulus and a
+        coefficient of friction are not negative. A trial that cannot be solved is taken back.
     level
         Probability of the intervals.
     monitor
@@ -117,7 +133,7 @@ def identify(
     ------
     InputError
         If a key, a column or a time does not fit, there are fewer measurements than parameters, or
-        a run does not converge.
+        the first run does not converge.
 
     Examples
     --------
@@ -131,7 +147,8 @@ def identify(
     expect("parameters", parameters, "one key or more", len(parameters) > 0)
     models = [_Model(*pair, comm, monitor) for pair in zip(cases, given, strict=True)]
     first = np.array([number_at(cases[0], key) for key in parameters])
-    limits = [(bounds or {}).get(key, (-np.inf, np.inf)) for key in parameters]
+    bounds = bounds or {}
+    limits = [bounds.get(key) or _accepted(cases, key) for key in parameters]
     count = sum(model.count for model in models)
     enough = f"more than {len(parameters)}, the number of parameters"
     expect("data", f"{count} values", enough, count > len(parameters))
@@ -139,31 +156,55 @@ def identify(
         accepted = f"some around {value:g}, its number in the case"
         expect(f"bounds: {key}", f"{low:g} to {high:g}", accepted, low <= value <= high)
 
+    last = dict[bytes, Array]()
+
     def residuals(values: Array) -> Array:
-        runs = [model.run(dict(zip(parameters, values, strict=True))) for model in models]
-        return np.concatenate(runs)
+        key = values.tobytes()
+        if key not in last:
+            last.clear()
+            numbers = dict(zip(parameters, values, strict=True))
+            last[key] = np.concatenate([model.run(numbers) for model in models])
+        return last[key]
+
+    def trial(values: Array) -> Array:
+        try:
+            return residuals(values)
+        except InputError as error:
+            logger.info("%s: taken back", error)
+            return np.full(count, np.inf)  # scipy takes a shorter step then
 
     def jacobian(values: Array) -> Array:
         return np.concatenate([model.jacobian(parameters) for model in models])
 
-    scale = np.where(first == 0, 1.0, np.abs(first))
+    low, high = np.transpose(limits)
+    inside = INSIDE * np.maximum(1.0, np.abs(first))  # as scipy begins, too
+    begin = np.clip(first, low + inside, np.maximum(high - inside, low + inside))
+    residuals(begin)
+    size = np.linalg.norm(jacobian(begin), axis=0)
+    scale = np.where(first == 0, 1 / np.where(size > 0, size, 1.0), np.abs(first))
     found = least_squares(
-        residuals,
-        first,
+        trial,
+        begin,
         jac=jacobian,
-        bounds=tuple(np.transpose(limits)),
+        bounds=(low, high),
         x_scale=scale,
         ftol=ENOUGH,
         xtol=ENOUGH,
         gtol=ENOUGH,
     )
     left = residuals(found.x)  # the last trial may have been another
-    slopes = jacobian(found.x)
     freedom = left.size - found.x.size
-    covariance = np.linalg.pinv(slopes.T @ slopes) * (left @ left / freedom)
+    covariance, unseen = _covariance(jacobian(found.x), scale, left @ left / freedom)
     deviation = np.sqrt(np.diag(covariance))
     half = student.ppf(0.5 * (1 + level), freedom) * deviation
-    size = np.where(deviation > 0, deviation, 1.0)
+    size = np.where((deviation > 0) & ~unseen, deviation, 1.0)
+    undetermined = tuple(key for key, hidden in zip(parameters, unseen, strict=True) if hidden)
+    if undetermined:
+        logger.warning(
+            "%s: the measurements do not determine %s: other values fit as well",
+            ", ".join(undetermined),
+            "these parameters" if len(undetermined) > 1 else "this parameter",
+        )
     return Identified(
         dict(zip(parameters, found.x.tolist(), strict=True)),
         {
@@ -173,11 +214,66 @@ def identify(
         level,
         covariance,
         covariance / np.outer(size, size),
+        undetermined,
+        tuple(key for key, on in zip(parameters, found.active_mask, strict=True) if on),
         tuple(model.fit for model in models),
         float(np.sqrt(np.mean(left**2))),
         tuple(model.solution for model in models),
         found.nfev,
     )
+
+
+def _covariance(slopes: Array, scale: Array, variance: float) -> tuple[Array, NDArray[np.bool_]]:
+    """Return the covariance of parameters, and which of them the measurements do not determine.
+
+    Parameters
+    ----------
+    slopes
+        Derivatives of the residuals, shape (n, k).
+    scale
+        Sizes of the parameters, shape (k,).
+    variance
+        Of a residual.
+    """
+    _, singular, ways = np.linalg.svd(slopes * scale, full_matrices=False)
+    seen = singular > UNSEEN * singular.max()
+    unseen = np.abs(ways[~seen]).max(axis=0, initial=0.0) > SHARE
+    made = ways[seen] / singular[seen, None]
+    covariance = variance * np.outer(scale, scale) * (made.T @ made)
+    covariance[unseen] = covariance[:, unseen] = np.nan
+    covariance[unseen, unseen] = np.inf
+    return covariance, unseen
+
+
+def _accepted(cases: Sequence[Case], key: str) -> tuple[float, float]:
+    """Return the least and the largest number that cases accept at a key."""
+
+    def fits(value: float) -> bool:
+        try:
+            for case in cases:
+                with_number(case, key, value)
+        except InputError:
+            return False
+        return True
+
+    def border(way: float) -> float:
+        inside, outside = here, np.inf
+        for power in range(0, 13, 3):
+            value = here + way * 10.0**power
+            if not fits(value):
+                outside = value
+                break
+            inside = value
+        else:
+            return np.copysign(np.inf, way)
+        for _ in range(HALVED):
+            middle = 0.5 * (inside + outside)
+            inside, outside = (middle, outside) if fits(middle) else (inside, middle)
+        return inside
+
+    here = number_at(cases[0], key)
+    size = 2 * abs(here) or 1.0
+    return border(-size), border(size)
 
 
 class _Model:
@@ -225,9 +321,8 @@ class _Model:
         self.solution = solve(case, monitor=self._monitor, comm=self._comm)
         shown = ", ".join(f"{key} = {value:g}" for key, value in values.items())
         if not self.solution.converged:
-            raise InputError(
-                f"{shown}: {self.solution.outcome.reason}; accepted: bounds that leave it out"
-            )
+            reason = self.solution.outcome.reason
+            raise InputError(f"{shown}: {reason}; accepted: numbers with which the case converges")
         rows = [record.row for record in self.solution.steps]
         known = ", ".join(rows[0])
         for name in self._measured:

@@ -135,7 +135,7 @@ def test_a_law_without_a_differential_of_its_own(kinematic):
     data = problem(FAMILIES.index("evolution, j2"))[1]
     data["material"]["kinematic"] = kinematic
     # A reaction depends on the history of the last step by itself.
-    case, names = parse_case(data), ["contact_force_x", "max_pressure", "reactions.top.x"]
+    case, names = parse_case(data), ["contact_force_x", "max_pressure", "reaction_x_top"]
     law = case.material.build(2).law
     plain = SimpleNamespace(
         **{name: getattr(law, name) for name in ("young", "poisson", "bulk", "shear", "symmetric")},

@@ -6,7 +6,9 @@ from mpi4py import MPI
 
 from contact import InputError, identify, parse_case, read_data, solve
 from contact.case.text import number_at, to_toml, with_number
+from contact.cli.identify import report
 from contact.cli.main import main
+from contact.identification import _accepted
 from scripts.studies.derivatives import FAMILIES, problem
 from scripts.studies.identification import coverage
 
@@ -119,3 +121,75 @@ def test_intervals_contain_the_parameters_as_often_as_they_say():
     # of a linear model, in ten thousand repetitions
     shares = coverage(solve(case(), comm=SELF), COLUMNS)
     assert shares == pytest.approx([0.95, 0.95], abs=0.01)
+
+
+def with_columns(given, columns):
+    """Return t and columns of a run of a case, exactly."""
+    rows = [record.row for record in solve(given, comm=SELF).steps]
+    return {name: np.array([row[name] for row in rows]) for name in ("t", *columns)}
+
+
+def loaded(mu=0.3):
+    """Return the block with a load on its held top, and two equal ones on its left side."""
+    data = problem(FAMILIES.index("evolution"))[1]
+    data["fixed"][1]["displacement"] = [data["fixed"][1]["displacement"][0], "free"]
+    load = {"traction": [0.002, 0.0], "amplitude": "constant"}
+    data["load"] = [{"on": on, **load} for on in ("top", "left", "left")]
+    data["friction"]["mu"] = mu
+    return parse_case(data)
+
+
+@pytest.mark.parametrize(
+    ("keys", "undetermined"),
+    [
+        (["material.young", "load.0.traction.0"], ["load.0.traction.0"]),
+        (
+            ["load.1.traction.0", "material.young", "load.2.traction.0"],
+            ["load.1.traction.0", "load.2.traction.0"],
+        ),
+    ],
+)
+def test_parameters_that_measurements_do_not_determine(keys, undetermined, caplog):
+    """One without effect, and two that have the same: they were given intervals of nothing."""
+    given, rng = loaded(), np.random.default_rng(0)
+    data = with_columns(given, COLUMNS)
+    for name in COLUMNS:
+        data[name] += 0.01 * np.abs(data[name]).max() * rng.standard_normal(data["t"].size)
+    with caplog.at_level("WARNING", logger="contact"):
+        found = identify(given, data, keys, comm=SELF)
+    assert [*found.undetermined] == undetermined
+    assert "the measurements do not determine" in caplog.text
+    for key in keys:
+        ends = np.array(found.intervals[key])
+        assert np.isfinite(ends).all() == (key not in undetermined)
+    lines = report(found)
+    assert sum("any: the measurements do not determine it" in x for x in lines) == len(undetermined)
+    index = keys.index("material.young")
+    assert np.isfinite(found.covariance[index, index]) and found.covariance[index, index] > 0
+
+
+def test_bounds_are_those_of_the_case():
+    assert _accepted([case()], "friction.mu") == (0, np.inf)
+    assert _accepted([case()], "fixed.1.displacement.0") == (-np.inf, np.inf)
+    assert _accepted([case()], "material.poisson") == pytest.approx((-1, 0.5), abs=1e-9)
+    least, largest = _accepted([case()], "material.young")
+    assert 0 < least < 1e-9 and largest == np.inf
+
+
+@pytest.mark.parametrize("start", [0.6, 0.0])
+def test_a_search_stays_with_numbers_that_the_case_accepts(start):
+    # Forces of a block without friction: the best coefficient would be below 0 with this noise.
+    data = with_columns(with_number(case(), "friction.mu", 0.0), COLUMNS)
+    size = np.abs(data["contact_force_y"]).max()
+    data["contact_force_x"] = -0.01 * size * np.array([0, 1, 1, 1, 1, 1, -1, -1])[: data["t"].size]
+    found = identify(with_number(case(), "friction.mu", start), data, ["friction.mu"], comm=SELF)
+    assert 0 <= found.parameters["friction.mu"] < 0.05
+
+
+def test_columns_of_supports_and_energies_can_be_fitted():
+    columns = ["reaction_x_top", "reaction_y_top", "driven_force_x", "energy", "dissipation"]
+    data = with_columns(case(), columns)
+    wrong = with_number(with_number(case(), "friction.mu", 0.3), "material.young", 1.0)
+    found = identify(wrong, data, ["friction.mu", "material.young"], comm=SELF)
+    for key, value in found.parameters.items():
+        assert value == pytest.approx(number_at(case(), key), rel=1e-5)

@@ -69,12 +69,16 @@ def report(found: Identified) -> list[str]:
     lines = [f"{'parameter':{width}}  {'value':>12}  {found.level:.0%} interval"]
     for key, value in found.parameters.items():
         least, largest = found.intervals[key]
-        lines.append(f"{key:{width}}  {value:12.6g}  {least:.6g} to {largest:.6g}")
+        words = f"{least:.6g} to {largest:.6g}"
+        if key in found.undetermined:
+            words = "any: the measurements do not determine it"
+        at = ", at its bound" if key in found.at_bound else ""
+        lines.append(f"{key:{width}}  {value:12.6g}  {words}{at}")
     lines += [
         f"correlation of {one} and {other}: {found.correlation[i, j]:.3f}"
         for i, one in enumerate(found.parameters)
         for j, other in enumerate(found.parameters)
-        if i < j
+        if i < j and not {one, other} & {*found.undetermined}
     ]
     return [*lines, f"misfit {found.misfit:.3g} of the largest values; {found.evaluations} runs"]
 

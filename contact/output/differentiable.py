@@ -10,8 +10,16 @@ from typing import Protocol, runtime_checkable
 import numpy as np
 from mpi4py import MPI
 
-from contact.body.rigid import Electrode
-from contact.output.resultants import reaction_masks
+from contact.body.rigid import Electrode, Rigid
+from contact.output.resultants import (
+    NAMES,
+    columns_of,
+    driven_part,
+    name_ends,
+    nodes_of,
+    reaction_masks,
+)
+from contact.problem.energy import dissipated, stored, working_forces
 from contact.problem.problem import ContactProblem
 from contact.problem.residuals import residual_forces
 from contact.problem.state import State
@@ -110,6 +118,29 @@ class MaxDisplacement:
 
 
 @dataclass(frozen=True)
+class MeanDisplacement:
+    """A component of the mean displacement of the nodes of a part: the approach of a block."""
+
+    part: str
+    axis: int
+
+    def __call__(self, problem: ContactProblem, state: State) -> float:
+        """Return it. Collective."""
+        body = problem.equilibrium
+        return body.product(self._weights(problem), body.owned_part(state.x))
+
+    def _weights(self, problem: ContactProblem) -> Array:
+        weights, nodes = _no_weights(problem), nodes_of(problem, self.part)
+        count = problem.comm.allreduce(nodes.size, op=MPI.SUM)
+        problem.equilibrium.nodal(weights)[nodes, self.axis] = 1 / max(count, 1)
+        return weights
+
+    def gradient(self, problem: ContactProblem, state: State) -> tuple[Array, Array]:
+        """Return the derivatives. Collective."""
+        return self._weights(problem), np.zeros_like(problem.nodes.normal)
+
+
+@dataclass(frozen=True)
 class Reaction:
     """A weighted sum of residual forces: of a support, an electrode, or a rigid foundation.
 
@@ -117,14 +148,18 @@ class Reaction:
     ----------
     weights
         Returns those of the residual of a problem, on the owned unknowns and the global ones.
+    given
+        Returns a given force that the residual is without; None for none.
     """
 
     weights: Callable[[ContactProblem], Array]
+    given: Callable[[ContactProblem, State], float] | None = None
 
     def __call__(self, problem: ContactProblem, state: State) -> float:
         """Return it. Collective."""
         residual = residual_forces(problem, state)
-        return problem.equilibrium.product(self.weights(problem), residual)
+        given = 0.0 if self.given is None else self.given(problem, state)
+        return problem.equilibrium.product(self.weights(problem), residual) + given
 
     def gradient(self, problem: ContactProblem, state: State) -> tuple[Array, Array]:
         """Return the derivatives. Collective."""
@@ -206,49 +241,84 @@ def _largest(problem: ContactProblem, values: Array) -> Array:
     return at
 
 
-def named_quantities(problem: ContactProblem) -> dict[str, Differentiable]:
-    """Return the results of a problem that have derivatives, by name. Collective.
+def named_quantities(problem: ContactProblem) -> dict[str, Quantity]:
+    """Return the results of a problem that have derivatives, by their columns. Collective.
 
-    The names are those of ``steps.csv``, and ``reactions.PART.x`` of the summary.
+    They are all columns of ``steps.csv`` but times, counts, residuals and the work in a step.
     """
     axes, body = AXES[: problem.dim], problem.equilibrium
-    found: dict[str, Differentiable] = {
+    found: dict[str, Quantity] = {
         "max_pressure": MaxPressure(),
         "max_displacement": MaxDisplacement(),
+        "energy": stored,
+        "dissipation": dissipated,
     }
+    if body.laws.initial is not None:
+        found["plastic_dissipation"] = _lost
     found |= {f"contact_force_{axis}": ContactForce(i) for i, axis in enumerate(axes)}
-    for part in reaction_masks(problem, electric=False):
-        for i, axis in enumerate(axes):
-            found[f"reactions.{part}.{axis}"] = Reaction(partial(_on_support, part=part, axis=i))
+    driven = driven_part(problem)
+    for i, axis in enumerate(axes):
+        for part in reaction_masks(problem, electric=False):
+            found[f"reaction_{axis}_{part}"] = Reaction(partial(_on_support, part=part, axis=i))
+        if driven is not None:
+            found[f"driven_{axis}"] = MeanDisplacement(driven, i)
+            found[f"driven_force_{axis}"] = partial(_driving, part=driven, axis=i)
     if problem.piezoelectric:
         found["charge_foundation"] = FoundationCharge()
         for part in reaction_masks(problem, electric=True):
             found[f"charge_{part}"] = Reaction(partial(_on_electrode, part=part))
-    foundations = [member for member in body.global_unknowns.members if member.foundation]
-    for index, member in enumerate(body.global_unknowns.members):
+    members = body.global_unknowns.members
+    rigid = [i for i, member in enumerate(members) if isinstance(member.description, Rigid)]
+    foundations = [members[i].description.on for i in rigid if members[i].foundation]
+    parts = [members[i].description.on for i in rigid if not members[i].foundation]
+    for index, end in zip(rigid, name_ends(foundations, parts), strict=True):
+        found |= _of_rigid(problem, index, end)
+    for index, member in enumerate(members):
         part = member.description.on
         if isinstance(member.description, Electrode):
             found[f"potential_{part}"] = GlobalUnknown(index, 0)
-            continue
-        end = f"_{part}" if len(foundations) > 1 else ""
-        motions = len(member.description.motion.displacement)
-        turns = [""] if member.free.size == motions + 1 else [f"_{axis}" for axis in axes]
-        names = [f"_{axis}" for axis in axes[:motions]] + [f"_rotation{turn}" for turn in turns]
-        if member.foundation:
-            for i, name in enumerate(names[: member.free.size]):
-                degrees = np.rad2deg(1.0) if i >= motions else 1.0
-                found[f"rigid{name}{end}"] = GlobalUnknown(index, i, degrees)
-                if i < motions:
-                    found[f"rigid_force{name}{end}"] = Reaction(
-                        partial(_on_foundation, index=index, i=i)
-                    )
+            found[f"charge_{part}"] = Reaction(
+                partial(_on_member, index=index, i=0), partial(_given, index=index, i=0)
+            )
     return found
+
+
+def _of_rigid(problem: ContactProblem, index: int, end: str) -> dict[str, Quantity]:
+    """Return the motions, forces and moments of a rigid body, given the end of their columns."""
+    member, found = problem.equilibrium.global_unknowns.members[index], dict[str, Quantity]()
+    d = problem.dim
+    for first, size, motion, force in (
+        (0, d, "displacement", "force"),
+        (d, member.free.size - d, "rotation", "moment"),
+    ):
+        unit = np.rad2deg(1.0) if first else 1.0
+        for i in range(size):
+            moved = columns_of(NAMES[motion], size, end)[i]
+            found[moved] = GlobalUnknown(index, first + i, unit)
+            acting = columns_of(NAMES[force], size, end)[i]
+            found[acting] = Reaction(
+                partial(_on_member, index=index, i=first + i),
+                partial(_given, index=index, i=first + i),
+            )
+    return found
+
+
+def _lost(problem: ContactProblem, state: State) -> float:
+    """Return the energy that plastic flow takes in the step of a state. Collective."""
+    return problem.equilibrium.energies(state)[0]
+
+
+def _driving(problem: ContactProblem, state: State, part: str, axis: int) -> float:
+    """Return a component of the force that drives a part. Collective."""
+    given, nodes = working_forces(problem, state)[0], nodes_of(problem, part)
+    own = float(problem.equilibrium.nodal(given)[nodes, axis].sum())
+    return float(problem.comm.allreduce(own, op=MPI.SUM))
 
 
 def _on_support(problem: ContactProblem, part: str, axis: int) -> Array:
     """Return the weights of a support's reaction. Collective."""
     nodes, mask = reaction_masks(problem, electric=False)[part]
-    weights = np.zeros(problem.equilibrium.owned + problem.equilibrium.global_unknowns.size)
+    weights = _no_weights(problem)
     turn = float(problem.domain.resultant(np.eye(problem.dim)[axis])[axis])
     problem.equilibrium.nodal(weights)[nodes, axis] = turn * mask[:, axis]
     return weights
@@ -257,16 +327,29 @@ def _on_support(problem: ContactProblem, part: str, axis: int) -> Array:
 def _on_electrode(problem: ContactProblem, part: str) -> Array:
     """Return the weights of the charge of a prescribed potential. Collective."""
     nodes, mask = reaction_masks(problem, electric=True)[part]
-    body = problem.equilibrium
-    weights = np.zeros(body.owned + body.global_unknowns.size)
+    body, weights = problem.equilibrium, _no_weights(problem)
     body.nodal(weights)[nodes, -1] = mask[:, 0] / body.phi_scale
     return weights
 
 
-def _on_foundation(problem: ContactProblem, index: int, i: int) -> Array:
-    """Return the weights of the force that holds a moving foundation."""
-    body = problem.equilibrium
+def _on_member(problem: ContactProblem, index: int, i: int) -> Array:
+    """Return the weights of a force on a rigid body, or of the charge of an electrode."""
+    body, weights = problem.equilibrium, _no_weights(problem)
     member = body.global_unknowns.members[index]
-    weights = np.zeros(body.owned + body.global_unknowns.size)
-    body.motion(weights)[member.begin + i] = 1 / member.units[i]
+    if problem.domain.revolved and isinstance(member.description, Rigid) and i != 1:
+        return weights  # over the full turn it cancels
+    at = member.begin + i
+    weights[: body.owned] = body.global_unknowns.ties[:, [at]].toarray()[:, 0] / member.units[i]
+    body.motion(weights)[at] = 1 / member.units[i]
     return weights
+
+
+def _given(problem: ContactProblem, state: State, index: int, i: int) -> float:
+    """Return the given force on a rigid body, or charge of an electrode, where that is free."""
+    member = problem.equilibrium.global_unknowns.members[index]
+    return float(member.forces(state.time)[i] / member.units[i])
+
+
+def _no_weights(problem: ContactProblem) -> Array:
+    body = problem.equilibrium
+    return np.zeros(body.owned + body.global_unknowns.size)

@@ -19,7 +19,7 @@ from dolfinx.la import InsertMode
 from mpi4py import MPI
 from numpy.typing import NDArray
 
-from contact.body.fields import constant
+from contact.body.fields import constant, knows_time, steady
 from contact.body.loads import expression
 from contact.body.rigid import Electrode
 from contact.errors import InputError
@@ -136,6 +136,21 @@ def nodes_of(problem: ContactProblem, part: str) -> NDArray[np.int32]:
     facets = problem.domain.facets(part)
     nodes = fem.locate_dofs_topological(body.space, problem.dim - 1, facets)
     return np.asarray(nodes[nodes < body.owned // body.block_size])
+
+
+def driven_part(problem: ContactProblem) -> str | None:
+    """Return the part that is moved or loaded in time: its way and its force make a loop.
+
+    That is the first one whose displacement is prescribed as a function of time, or the first
+    one with a load; None without any.
+    """
+    for fixed in problem.body.fixed:
+        given = [component for component in fixed.displacement or () if component is not None]
+        moves = any(not getattr(component, "is_zero", False) for component in given)
+        if moves and (knows_time(given) or fixed.factor is not steady):
+            return fixed.on
+    loaded = [load.on for load in problem.body.loads if load.on is not None]
+    return loaded[0] if loaded else None
 
 
 @dataclass(frozen=True)
@@ -332,18 +347,41 @@ def rigid_columns(moving: Mapping[str, Any]) -> dict[str, dict[str, float]]:
     found["potentials"] = {f"potential_{part}": e["potential"] for part, e in electrodes.items()}
     if isinstance(foundations.get("displacement"), list):  # a single one
         foundations = {"": foundations}
-    if not foundations and len(parts) == 1:
-        parts = {"": next(iter(parts.values()))}
-    for part, body in (*foundations.items(), *parts.items()):
-        end = f"_{part}" if part else ""
-        for kind, key, name in (
-            ("moved", "displacement", "rigid"),
-            ("moved", "rotation", "rigid_rotation"),
-            ("acting", "force", "rigid_force"),
-            ("acting", "moment", "rigid_moment"),
-        ):
-            values = body[key]
-            axes = [f"_{axis}" for axis in "xyz"] if isinstance(values, list) else [""]
-            for axis, value in zip(axes, np.atleast_1d(values), strict=False):
-                found[kind][f"{name}{axis}{end}"] = float(value)
+    for body, end in zip(
+        (*foundations.values(), *parts.values()),
+        name_ends([*foundations], [*parts]),
+        strict=True,
+    ):
+        for kind, (key, name) in zip(KINDS, NAMES.items(), strict=True):
+            for column, value in zip(
+                columns_of(name, np.size(body[key]), end), np.atleast_1d(body[key]), strict=True
+            ):
+                found[kind][column] = float(value)
     return found
+
+
+#: Keys of the movement of a rigid body -> the beginnings of their columns, and which of the
+#: `rigid_columns` these are.
+NAMES = {
+    "displacement": "rigid",
+    "rotation": "rigid_rotation",
+    "force": "rigid_force",
+    "moment": "rigid_moment",
+}
+KINDS = "moved", "moved", "acting", "acting"
+
+
+def name_ends(foundations: Sequence[str], parts: Sequence[str]) -> list[str]:
+    """Return the ends of the columns of moving foundations and of rigid parts."""
+    several = [f"_{part}" for part in foundations]
+    alone = not foundations and len(parts) == 1
+    return [
+        *(several if len(foundations) > 1 else [""] * len(foundations)),
+        *([""] if alone else [f"_{part}" for part in parts]),
+    ]
+
+
+def columns_of(name: str, size: int, end: str) -> list[str]:
+    """Return the columns of a scalar or vector of a rigid body."""
+    axes = [f"_{axis}" for axis in "xyz"[:size]] if size > 1 else [""]
+    return [f"{name}{axis}{end}" for axis in axes]

@@ -8,10 +8,9 @@ import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
 
-from contact.body.fields import knows_time, steady
 from contact.methods.load_stepping import LoadStep
 from contact.output.quantities import STEPS, values_of
-from contact.output.resultants import nodes_of
+from contact.output.resultants import driven_part, nodes_of
 from contact.output.solution import Solution, StepRecord
 from contact.output.surface import contact_table
 from contact.problem.energy import Moment, balance, moment
@@ -37,7 +36,7 @@ class StepRecorder:
             self._before = moment(here, last.state, self._before)
             self._before = replace(self._before, enthalpy=last.enthalpy)
         self._rounding = 0.0 if last is None else last.rounding
-        part = _driven_part(problem)
+        part = driven_part(problem)
         self._nodes = None if part is None else nodes_of(problem, part)
 
     def record(self, step: LoadStep) -> StepRecord:
@@ -53,21 +52,6 @@ class StepRecorder:
         table, row = contact_table(solution), values_of(STEPS, solution)
         self._rounding = max(self._rounding, step.outcome.kkt.rounding)
         return StepRecord(state, row, table, now.enthalpy, self._rounding)
-
-
-def _driven_part(problem: ContactProblem) -> str | None:
-    """Return the part that is moved or loaded in time: its way and its force make a loop.
-
-    That is the first one whose displacement is prescribed as a function of time, or the first
-    one with a load; None without any.
-    """
-    for fixed in problem.body.fixed:
-        given = [component for component in fixed.displacement or () if component is not None]
-        moves = any(not getattr(component, "is_zero", False) for component in given)
-        if moves and (knows_time(given) or fixed.factor is not steady):
-            return fixed.on
-    loaded = [load.on for load in problem.body.loads if load.on is not None]
-    return loaded[0] if loaded else None
 
 
 def _driven(problem: ContactProblem, nodes: NDArray[np.int32], now: Moment) -> tuple[Array, Array]:

@@ -17,7 +17,6 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
-from mpi4py import MPI
 
 from contact.problem.problem import ContactProblem
 from contact.problem.residuals import residual_forces
@@ -26,6 +25,10 @@ from contact.typing import Array
 
 #: Points at which the stress power of a step is taken where the material is not linear.
 _POINTS, _WEIGHTS = np.polynomial.legendre.leggauss(4)
+
+#: The same on sixteen parts of the way from nothing to a state.
+_WAY = ((np.arange(16)[:, None] + 0.5 + 0.5 * _POINTS) / 16).ravel()
+_SHARES = np.tile(_WEIGHTS / 32, 16)
 
 
 @dataclass(frozen=True)
@@ -80,8 +83,11 @@ class Balance:
     plastic: float | None = None
 
 
-def moment(problem: ContactProblem, state: State, before: Moment) -> Moment:
-    """Return the data of a step that began at another moment. Collective."""
+def working_forces(problem: ContactProblem, state: State) -> tuple[Array, Array]:
+    """Return the forces and charges that do work, and those of the stresses. Collective.
+
+    On the owned unknowns: loads, supports, layer and conductive foundation are the first.
+    """
     body, interface = problem.equilibrium, problem.interface
     external = body.external(state.time)
     residual = residual_forces(problem, state)
@@ -90,7 +96,41 @@ def moment(problem: ContactProblem, state: State, before: Moment) -> Moment:
     internal = residual + external - foundation
     vectors = interface.jump.weight[:, None] * state.forces.vectors(interface.jump)
     interface.jump.transpose(-vectors, foundation)
-    given = external - foundation + body.reactions(residual)
+    return external - foundation + body.reactions(residual), internal
+
+
+def dissipated(problem: ContactProblem, state: State) -> float:
+    """Return the energy that friction takes during the step of a state. Collective."""
+    interface = problem.interface
+    slip = interface.slip(problem.nodal(state))
+    return interface.jump.sum(np.einsum("ni,ni->n", state.forces.friction, slip))
+
+
+def stored(problem: ContactProblem, state: State) -> float:
+    """Return the energy that is stored in the body at a state. Collective.
+
+    It is the work of the stresses on a straight way there, and, of materials with internal
+    variables, the energy that they state; nan where one does not.
+    """
+    body, x = problem.equilibrium, problem.equilibrium.owned_part(state.x)
+    own = 0.0
+    if body.laws.initial is not None:
+        stated = body.energies(state)[1]
+        own = np.nan if stated is None else stated
+    forces = body.forces_without_history(state)
+    electric = body.product(np.where(body.component_norms.mechanical, 0.0, x), forces)
+    if body.linear:
+        return own + body.product(0.5 * forces, x) - electric
+    for part, share in zip(_WAY, _SHARES, strict=True):
+        way = body.forces_without_history(replace(state, x=part * state.x))
+        own += share * body.product(way, x)
+    return own - electric
+
+
+def moment(problem: ContactProblem, state: State, before: Moment) -> Moment:
+    """Return the data of a step that began at another moment. Collective."""
+    body = problem.equilibrium
+    given, internal = working_forces(problem, state)
     moved = body.owned_part(state.x) - body.owned_part(before.x)
     plastic, stored = body.energies(state)
     forces_at: Callable[[State], Array] = body.internal_forces
@@ -111,7 +151,7 @@ def moment(problem: ContactProblem, state: State, before: Moment) -> Moment:
 
 def balance(problem: ContactProblem, state: State, before: Moment, now: Moment) -> Balance:
     """Return the energies of a step from one moment to another. Collective."""
-    body, interface = problem.equilibrium, problem.interface
+    body = problem.equilibrium
     x, x_before = (body.owned_part(m.x) for m in (now, before))
     # The enthalpy's work is that of charges on changing potentials: potentials move charges.
     work = np.where(
@@ -120,9 +160,7 @@ def balance(problem: ContactProblem, state: State, before: Moment, now: Moment) 
         -0.5 * (x + x_before) * (now.given - before.given),
     )
     stored = body.product(np.where(body.component_norms.mechanical, 0.0, x), now.internal)
-    slip = interface.slip(interface.jump.apply(state.x))
-    friction = interface.jump.weight @ np.einsum("ni,ni->n", state.forces.friction, slip)
-    dissipation = float(problem.comm.allreduce(friction, op=MPI.SUM))
+    dissipation = dissipated(problem, state)
     done = body.product(work, np.ones_like(work))
     flows = body.laws.initial is not None
     return Balance(done, now.enthalpy - stored, dissipation, now.plastic if flows else None)

@@ -283,7 +283,7 @@ def compared(seed: int, comm: MPI.Intracomm, each: bool = True) -> Compared:
     if family == "piezo":
         names += ["charge_foundation", "charge_top"]
     if family == "evolution, electrode":
-        names += ["charge_foundation", "potential_top", "reactions.top.x"]
+        names += ["charge_foundation", "potential_top", "reaction_x_top"]
     size = np.array([number_at(solution.source, key) for key in given])
     found = sensitivity(solution, names, given, "tangent")
     other = sensitivity(solution, names, given, "adjoint")

@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+import ufl
 from mpi4py import MPI
 
 from contact import (
@@ -202,6 +203,7 @@ def test_a_modulus() -> None:
         (nothing, "returns None"),
         (lambda t: np.nan * t, "nan without strain|returns nan"),
         (lambda t: [t, t], r"returns \["),
+        (lambda t: ufl.as_ufl(0.4), r"for a number; .* Material\(law, factor=...\)"),
     ):
         with pytest.raises(ValueError, match=f"^UserLaw: modulus: .*{words}"):
             UserLaw(10.0, 0.3, modulus=modulus)
