@@ -12,6 +12,7 @@ import numpy as np
 from mpi4py import MPI
 
 from contact.body.elements import unlocked
+from contact.body.pointwise import CHUNK
 from contact.case.build import build_problem
 from contact.case.checks import growing
 from contact.case.file import Case, load_case
@@ -151,7 +152,9 @@ def quality(shape: Shape, corners: Array) -> Array:
 
 def _quality(problem: ContactProblem) -> list[str]:
     comm = problem.comm
-    ratio = quality(shape_of(problem.domain.mesh), geometry_nodes(problem.domain))
+    shape, nodes = shape_of(problem.domain.mesh), geometry_nodes(problem.domain)
+    chunks = np.array_split(nodes, len(nodes) // CHUNK + 1)
+    ratio = np.concatenate([quality(shape, some) for some in chunks])
     least = comm.allreduce(float(ratio.min(initial=1.0)), op=MPI.MIN)
     thin = comm.allreduce(int(np.count_nonzero(ratio < THIN)), op=MPI.SUM)
     lines = [f"# mesh quality: the worst cell has the mean ratio {least:.2g} (1: regular)"]
