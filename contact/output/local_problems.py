@@ -2,9 +2,10 @@
 
 Bank and Weiser, Math. Comp. 44, 1985. In each cell the error is sought among the cubics that vanish
 at the nodes: M strain(e) : strain(v) = work of the loads - flux : strain(v) + work of the mean flux
-through the facets. The flux is sigma, with D where there is coupling, and the strain eps, with
-E = -grad phi. Recovery of the stress, which serves degree 1, follows that of degree 2 into its
-singularities, and sees half of the error there.
+through the facets, at a contact of the multipliers (Weiss and Wohlmuth, Math. Comp. 78, 2009). The
+flux is sigma, with D where there is coupling, and the strain eps, with E = -grad phi. Recovery of
+the stress, which serves degree 1, follows that of degree 2 into its singularities, and sees half of
+the error there.
 """
 
 from __future__ import annotations
@@ -148,7 +149,8 @@ class LocalProblems:
         """Return the flux into each cell through its facets, and which of its components are held.
 
         Inside it is the mean of both sides. On the boundary it is among the loads, where these are
-        known; at a contact that touches, the flux itself. Held components have no error.
+        known; at a contact that touches, that of the multipliers, and the flux itself where there
+        are none: of charge, on the other side. Held components have no error.
         """
         body, d = self._body, self._body.dim
         mesh, space = body.domain.mesh, body.space
@@ -172,6 +174,14 @@ class LocalProblems:
         forces = np.zeros(body.owned + body.global_unknowns.size)
         problem.interface.add_forces(forces, state.x, state.forces)
         touch = np.any(body.nodal(body.local(forces)) != 0, axis=1)[nodes].any(axis=2)
+        slave, master = (
+            np.isin(facets, np.concatenate([[], *map(body.domain.facets, names)]))
+            for names in (
+                [c.on for c in problem.contacts],
+                [c.against for c in problem.contacts if c.against],
+            )
+        )
+        touch &= slave | master
         # The traction of an elastic support is none of the loads either.
         for support in body.body.elastic:
             touch |= np.isin(facets, body.domain.facets(support.on))
@@ -182,6 +192,9 @@ class LocalProblems:
         loaded = np.isin(facets, np.concatenate([[], *sides]))
         known = ~(inside | touch)[..., None, None]
         through = np.where(known, 0.0, out - np.where(inside[..., None, None], jump / 2, 0.0))
+        traction = _contact_traction(problem, state)[nodes]
+        pressed = (touch & slave)[..., None, None] & np.isfinite(traction)
+        through[..., :d] = np.where(pressed, traction, through[..., :d])
         held = ~inside[..., None] & ((free == 0) | (touch & loaded)[..., None])
         return through, held
 
@@ -256,6 +269,23 @@ class LocalProblems:
         matrix[:, places, places] += held
         errors = np.linalg.solve(matrix, right[..., None])[..., 0]
         return np.asarray(np.sum(errors * right, axis=1))
+
+
+def _contact_traction(problem: ContactProblem, state: State) -> Array:
+    """Return the traction of the multipliers and layers at the nodes, shape (n, d). Collective.
+
+    Weiss and Wohlmuth, Math. Comp. 78, 2009. No numbers at nodes without a multiplier.
+    """
+    body, interface = problem.equilibrium, problem.interface
+    pressure = interface.pressure(problem.nodal(state), state.forces)
+    found = la.vector(body.space.dofmap.index_map, body.dim)
+    found.array[:] = np.nan
+    at_nodes = found.array.reshape(-1, body.dim)
+    at_nodes[interface.jump.nodes] = (
+        -pressure[:, None] * interface.jump.normal - state.forces.friction
+    )
+    found.scatter_forward()
+    return at_nodes
 
 
 def _loads(body: BodyEquilibrium, time: float) -> Array:

@@ -34,7 +34,7 @@ from scripts.studies.exact_solutions import Singular, exact, manufactured
 from tests.problems.bar import changed
 from tests.problems.mechanics import flat
 from tests.problems.membrane import cook
-from tests.problems.revolution import Drum, Tube, pressed_cylinder
+from tests.problems.revolution import Drum, Layers, Tube, pressed_cylinder
 
 LINEAR = {"material__law": "linear", "material__yield_strain": None}
 #: The bar of Example 7.2 where it locks.
@@ -55,16 +55,32 @@ def state_of(problem: ContactProblem) -> State:
     return Newton(problem, NewtonOptions(tolerance=1e-9)).solve(problem.start())[0]
 
 
+#: Effectivities that are asked for, and why some are not.
+WITHIN = 0.7, 1.5
+WHY = {
+    ("Hencky, 3-D", "P2"): "facets are not in balance; smooth",
+    ("tube, nu = 0.4999", "P1"): "locked",
+    ("bar, nu = 0.4999", "P1"): "locked",
+    ("bar, nu = 0.4999", "P2"): "nearly incompressible corners",
+    ("pressed cylinder, revolved", "P2"): "nearly incompressible corner",
+}
+
+
 def effectivity(report: Report, coarse: bool) -> None:
     """Make the table of estimates beside known errors. Collective."""
     columns: dict[str, list[Any]] = {
-        name: [] for name in ("problem", "element", "cells", "error", "estimate", "effectivity")
+        name: []
+        for name in ("problem", "element", "cells", "error", "estimate", "effectivity", "why not")
     }
-    tube, drum, singular = Tube(), Drum(), Singular()
+    tube, drum, singular, layers = Tube(), Drum(), Singular(), Layers()
     soft = Tube(law=Linear(1.0, 0.4999))
     known: list[tuple[str, Any, Any, tuple[int, int]]] = [
         ("Hencky, 2-D", lambda n, p: manufactured(2, p, n), exact(2), (32, 16)),
         ("Hencky, 3-D", lambda n, p: manufactured(3, p, n), exact(3), (8, 4)),
+        ("quadrilaterals", partial(_cells, 2, "quadrilateral"), exact(2), (32, 16)),
+        ("hexahedra", partial(_cells, 3, "hexahedron"), exact(3), (8, 4)),
+        ("two materials", lambda n, p: layers.problem(n, p, 1), layers.displacement, (24, 12)),
+        ("two bodies", lambda n, p: layers.problem(n, p, 2), layers.displacement, (24, 12)),
         ("Lamé's tube", lambda n, p: tube.problem(n, p), tube.displacement, (32, 16)),
         ("tube, nu = 0.4999", lambda n, p: soft.problem(n, p), soft.displacement, (32, 16)),
         ("Hencky, revolved", lambda n, p: drum.problem(n, p), drum.displacement, (32, 16)),
@@ -93,14 +109,21 @@ def effectivity(report: Report, coarse: bool) -> None:
         "effectivity",
         "Estimated error over the error, in the energy norm, relative",
         columns,
-        "Exact: manufactured solutions (Hencky), Lamé's tube under a pressed-on casing (also "
-        "nearly incompressible), contact without friction of a half plane that ends at a point. "
-        "Bars, cylinder (Hencky's law and friction, revolved) and block (3-D, clamped at an "
-        "end) are set beside P2 on 64, 48 and 8 cells a unit. At nu = 0.4999 P1 locks: there the "
-        "estimate is a lower bound, as the run says. Of degree 2 the local problems are cubic, "
-        "overestimate smooth solutions in 3-D, and see less where the material is nearly "
-        "incompressible.",
+        "Exact: manufactured solutions (Hencky, also on quadrilaterals and hexahedra), Lamé's "
+        "tube under a pressed-on casing (also nearly incompressible), a tube in another one (of"
+        " one body with two materials, or two bodies whose meshes do not match), contact "
+        "without friction of a half plane that ends at a point. Bars, cylinder (Hencky's law "
+        "and friction, revolved) and block (3-D, clamped at an end) are set beside P2 on 64, 48"
+        " and 8 cells a unit. Not within 0.7 to 1.5: where P1 locks the estimate is a lower "
+        "bound, as the run says. Of degree 2 the local problems are cubic: mean fluxes are not "
+        "in balance with the loads of a cell, which shows in 3-D; and at corners with infinite "
+        "stresses they see half of the error where the material is nearly incompressible, at "
+        "the rim of the cylinder far in the plastic range.",
     )
+
+
+def _cells(dim: int, cell: str, n: int, degree: int) -> ContactProblem:
+    return manufactured(dim, degree, n, cell=cell)
 
 
 def beside() -> dict[str, tuple[Callable[[int, int], ContactProblem], list[Any], int]]:
@@ -143,7 +166,9 @@ def _append(
     found = estimated(problem, state)
     norm = errors(problem.equilibrium, state.x, None).energy
     estimate = float(np.sqrt(found.total))
-    append(columns, name, element, n, error / norm, estimate / norm, estimate / error)
+    ratio = estimate / error
+    why = "" if WITHIN[0] <= ratio <= WITHIN[1] else WHY.get((name, element), "?")
+    append(columns, name, element, n, error / norm, estimate / norm, ratio, why)
 
 
 def bar(n: int, degree: int, element: str = "standard", **changes: Any) -> ContactProblem:
@@ -309,24 +334,24 @@ def adaptive(report: Report, coarse: bool) -> None:
     figure, axes = subplots(1, 2)
     data: dict[str, Sequence[Any]] = {}
     columns: dict[str, list[Any]] = {
-        name: [] for name in ("problem", "element", "error asked for", "unknowns, adapted",
+        name: [] for name in ("problem", "element", "error", "unknowns, adapted",
                               "unknowns, uniform", "rate, adapted", "rate, uniform", "meshes",
-                              "seconds", "seconds, last mesh alone", "ratio")
+                              "unknowns, last", "seconds", "seconds, last alone", "ratio")
     }  # fmt: skip
-    for name, place, degree, asked, case, uniform in _adapted(coarse):
+    for name, place, degree, error, case, uniform in _adapted(coarse):
         rows, seconds, last = _timed(case)
         found = {"adapted": [(row["unknowns"], row["error"]) for row in rows], "uniform": []}
         for problem in uniform:
-            error = estimated(problem, state_of(problem)).relative
-            found["uniform"].append((problem.equilibrium.layout.unknowns, error))
+            estimate = estimated(problem, state_of(problem)).relative
+            found["uniform"].append((problem.equilibrium.layout.unknowns, estimate))
         for kind, line in (("adapted", "o-"), ("uniform", "s--")):
-            unknowns, error = np.array(found[kind]).T
+            unknowns, errors = np.array(found[kind]).T
             label = f"P{degree}, {kind}"
-            axes[place].loglog(unknowns, error, line, color=f"C{degree - 1}", ms=3, label=label)
-            data[f"unknowns, {name}, {label}"], data[f"error, {name}, {label}"] = unknowns, error
-        needed, rates = zip(*(_fall(found[kind], asked) for kind in found), strict=True)
-        append(columns, name, f"P{degree}", asked, *needed, *rates, len(rows), seconds, last,
-               seconds / last)  # fmt: skip
+            axes[place].loglog(unknowns, errors, line, color=f"C{degree - 1}", ms=3, label=label)
+            data[f"unknowns, {name}, {label}"], data[f"error, {name}, {label}"] = unknowns, errors
+        needed, rates = zip(*(_fall(found[kind], error) for kind in found), strict=True)
+        append(columns, name, f"P{degree}", error, *needed, *rates, len(rows),
+               found["adapted"][-1][0], seconds, last, seconds / last)  # fmt: skip
         axes[place].set(xlabel="unknowns", title=name)
     axes[0].set_ylabel("estimated relative error")
     for panel in axes:
@@ -336,16 +361,16 @@ def adaptive(report: Report, coarse: bool) -> None:
         "Error over unknowns on adapted and uniform meshes",
         figure,
         data,
-        "The bar of Example 7.2, linear, with mu = 0.6, and Hertz's ball.",
+        "The bar of Example 7.2, linear, with mu = 0.6, and a rigid ball on a block.",
     )
     report.table(
         "adapted",
         "Adapted beside uniform meshes",
         columns,
-        "Unknowns: by the line through the meshes next to the error, extended where no mesh has "
-        "it. Rates: of the error by the unknowns, over the last three meshes or factor of ten. "
-        "Seconds of the processor: of the whole `solve`, all meshes, and of the last mesh alone "
-        "from zero; forms compiled before, one thread.",
+        "Unknowns for an estimated error: by the line through the meshes next to it, extended "
+        "where no mesh has it. Rates: of the error by the unknowns, over the last three meshes or "
+        "factor of ten. Seconds of the processor: of the whole `solve`, all meshes, and of the "
+        "last mesh alone from zero; forms compiled before, one thread.",
     )
 
 
@@ -354,20 +379,36 @@ def _adapted(
 ) -> Iterator[tuple[str, int, int, float, Case, Iterator[ContactProblem]]]:
     """Give name, panel, degree, error, case with `[mesh.adapt]`, and uniform meshes. Collective."""
     changes = {**LINEAR, "friction__mu": 0.6}
-    for degree, asked in ((1, 0.05 if coarse else 0.01), (2, 0.02 if coarse else 2e-3)):
+    for degree, asked in ((1, 0.05 if coarse else 0.004), (2, 0.02 if coarse else 5e-4)):
         tables = changed(mesh__cells=[16, 4], space__degree=degree, **changes)
-        tables["mesh"]["adapt"] = {"error": asked, "max_unknowns": 200_000}
+        tables["mesh"]["adapt"] = {"error": asked, "max_unknowns": 400_000}
         cells = (4, 8) if coarse else (4, 8, 16, 32, 64)
         uniform = (bar(n, degree, **changes) for n in cells)
-        yield "bar with friction", 0, degree, asked, parse_case(tables), uniform
-    path = Path(__file__).parents[1] / "cases" / "hertz-sphere.toml"
-    for degree, asked, most in ((1, 0.08, 150_000), (2, 0.02, 60_000)):
-        keys = [f"space.degree={degree}", "mesh.adapt.error=" + str(2 * asked if coarse else asked)]
-        case = load_case(path, [*keys, f"mesh.adapt.max_unknowns={5000 if coarse else most}"])
-        levels = (0,) if coarse else (0, 1) if degree == 2 else (0, 1, 2)
-        plain = [f"space.degree={degree}"]
-        uniform = (build_problem(load_case(path, [*plain, f"mesh.refine={k}"])) for k in levels)
-        yield "ball, 3-D", 1, degree, asked, case, uniform
+        yield "bar with friction", 0, degree, 0.01, parse_case(tables), uniform
+    for degree, asked, error in ((1, 0.08, 0.1), (2, 0.02, 0.03)):
+        adapt = {"error": 3 * asked if coarse else asked, "max_unknowns": 150_000}
+        sizes = (4,) if coarse else (4, 8, 16) if degree == 2 else (4, 8, 16, 32)
+        uniform = (build_problem(parse_case(ball_on_block(n, degree))) for n in sizes)
+        case = parse_case(ball_on_block(4, degree, adapt=adapt))
+        yield "rigid ball, 3-D", 1, degree, error, case, uniform
+
+
+def ball_on_block(n: int, degree: int, **mesh: Any) -> dict[str, Any]:
+    """Return the case of a rigid ball of radius 2 on a quarter of a block, n cells a unit."""
+    return {
+        "mesh": {"generator": "box", "size": [1.0] * 3, "cells": [n] * 3, **mesh},
+        "space": {"degree": degree},
+        "material": {"young": 1.0, "poisson": 0.3},
+        "fixed": [
+            {"on": "left", "displacement": [0.0, "free", "free"]},
+            {"on": "front", "displacement": ["free", 0.0, "free"]},
+            {"on": "top", "displacement": ["free", "free", -0.02]},
+        ],
+        "contact": {
+            "on": "bottom",
+            "foundation": {"shape": "sphere", "centre": [0.0, 0.0, -2.0], "radius": 2.0},
+        },
+    }
 
 
 def _timed(case: Case) -> tuple[Sequence[Mapping[str, Any]], float, float]:

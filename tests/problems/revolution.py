@@ -5,14 +5,16 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Any
 
+import basix.ufl
 import numpy as np
 import ufl
+from dolfinx import mesh as dmesh
 from mpi4py import MPI
 
-from contact.body.description import Body, Fixed, Load
+from contact.body.description import Body, Fixed, Load, Material
 from contact.interface.friction import Friction
 from contact.interface.obstacle import GapFunction
-from contact.mesh.domain import Domain, revolved
+from contact.mesh.domain import Domain, from_mesh, revolved
 from contact.mesh.grid import rectangle
 from contact.problem.contact import Contact
 from contact.problem.problem import ContactProblem
@@ -75,6 +77,83 @@ class Tube:
         body = Body(self.law, held, [load])
         contact = Contact("right", flat(self.gap))
         return ContactProblem(domain, body, contact, degree=degree, element=element)
+
+
+@dataclass(frozen=True)
+class Layers:
+    """Two tubes, one in the other, under an inner pressure; held outside, in plane strain.
+
+    Of one body with two materials, or of two bodies in contact whose meshes do not match.
+    """
+
+    laws: tuple[Linear, Linear] = (Linear(1.0, 0.3), Linear(4.0, 0.2))
+    radii: tuple[float, float, float] = (1.0, 1.5, 2.0)
+    pressure: float = 0.2
+    height: float = 0.5
+
+    @property
+    def constants(self) -> np.ndarray:
+        """A and B of u_r = A r + B/r in each: shape (2, 2)."""
+        a, c, b = self.radii
+        (m, g), (n, k) = ((2 * (law.bulk + law.shear / 3), 2 * law.shear) for law in self.laws)
+        system = [
+            [m, -g / a**2, 0, 0],  # sigma_r at r is m A - g B/r^2
+            [c, 1 / c, -c, -1 / c],
+            [m, -g / c**2, -n, k / c**2],
+            [0, 0, b, 1 / b],
+        ]
+        return np.linalg.solve(system, [-self.pressure, 0, 0, 0]).reshape(2, 2)
+
+    def displacement(self, x: Any) -> Any:
+        """Return the displacement as a UFL vector."""
+        first, second = ((float(a) * x[0] + float(b) / x[0]) for a, b in self.constants)
+        radial = ufl.conditional(ufl.lt(x[0], self.radii[1]), first, second)
+        return ufl.as_vector([radial, 0.0])
+
+    def problem(self, n: int, degree: int, bodies: int) -> ContactProblem:
+        """Return the problem with n cells a unit, one body or two. Collective."""
+        a, c, b = self.radii
+        ends = [(a, c, n), (c, b, 2 * n // 3)] if bodies == 2 else [(a, b, n)]
+        points, cells = np.zeros((0, 2)), np.zeros((0, 3), dtype=np.int64)
+        for inner, outer, count in ends:
+            number = [round((outer - inner) * count), round(self.height * count)]
+            corners = [[inner, 0.0], [outer, self.height]]
+            tube = dmesh.create_rectangle(MPI.COMM_SELF, corners, number)
+            cells = np.concatenate([cells, tube.geometry.dofmap + len(points)])
+            points = np.concatenate([points, tube.geometry.x[:, :2]])
+        if MPI.COMM_WORLD.rank > 0:
+            points, cells = points[:0], cells[:0]
+        element = basix.ufl.element("Lagrange", "triangle", 1, shape=(2,), dtype=np.float64)
+        mesh = dmesh.create_mesh(MPI.COMM_WORLD, cells=cells, x=points, e=ufl.Mesh(element))
+        regions = {"in": lambda x: x[0] < c + 1e-9, "out": lambda x: x[0] > c - 1e-9}
+        domain = revolved(from_mesh(mesh, self._parts(mesh, bodies), regions=regions))
+        fixed = [Fixed("ends", [None, 0.0]), Fixed("outside", [0.0, None])]
+        load = Load("inside", pressure=constant(self.pressure, 2))
+        materials = [Material(law, on=name) for law, name in zip(self.laws, regions, strict=True)]
+        if bodies == 2:
+            contact = Contact("inner", against="outer")
+        else:
+            contact = Contact("inside", flat(10.0))
+        return ContactProblem(domain, Body(materials, fixed, [load]), contact, degree=degree)
+
+    def _parts(self, mesh: dmesh.Mesh, bodies: int) -> dict[str, Any]:
+        a, c, b = self.radii
+
+        def at(radius: float) -> Any:
+            return lambda x: np.abs(x[0] - radius) < 1e-9
+
+        def on_end(x: np.ndarray) -> Any:
+            return np.abs(np.abs(x[1] - self.height / 2) - self.height / 2) < 1e-9
+
+        parts = {"inside": at(a), "outside": at(b), "ends": on_end}
+        if bodies == 1:
+            return parts
+        mesh.topology.create_connectivity(1, 2)
+        between = dmesh.locate_entities_boundary(mesh, 1, at(c))
+        cells = mesh.topology.connectivity(1, 2)
+        mine = np.array([cells.links(facet)[0] for facet in between], dtype=np.int32)
+        inner = dmesh.compute_midpoints(mesh, 2, mine)[:, 0] < c
+        return {**parts, "inner": between[inner], "outer": between[~inner]}
 
 
 @dataclass(frozen=True)
