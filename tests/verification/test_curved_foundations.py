@@ -46,6 +46,14 @@ def test_hydrostatic_pressure_in_space(name, degree, monkeypatch):
     check(study.hydrostatic(name, 0.1, degree, "3-D"), 0.007, 0.1)
 
 
+def test_nodes_at_a_punch_edge_are_right_where_the_edges_are():
+    """By the vertices alone nodes beside the jump of the curvature are between 0 and 2.03."""
+    check(study.by_true_edges(0.1, 2), 0.002, 0.04)
+    vertices, w = study.hydrostatic("punch edge", 0.1, 2, "3-D")
+    off = np.abs(vertices - 1) > 0.1
+    assert 0.03 < w[off].sum() / w.sum() < 0.08
+
+
 def warnings(solution):
     """Return what is said about deviations of facets from curves."""
     return [text for text in solution.warnings if "straight facets deviate" in text]
