@@ -37,12 +37,16 @@ COMMON: dict[str, Any] = {
     "formatter_class": argparse.RawDescriptionHelpFormatter,
 }
 
+#: Options of one letter: not argparse's, which would take PETSc's for several of them.
+SHORT = {"-h": "--help", "-v": "--verbose"}
+
 #: Names of arguments that are no options.
-POSITIONAL = ("command", "case", "folder", "name", "mesh", "data", "keys")
+POSITIONAL = ("command", "case", "folder", "name", "mesh", "data", "keys", "file", "to")
 
 #: The one positional argument of a command, where that is no case file.
 ONE = {
     "new": "mesh file",
+    "mesh": "mesh file and the name of the new one",
     "plot": "folder with results",
     "materials": 'name of a material, in quotes where it has spaces: "PZT-4 Clevite"',
 }
@@ -68,8 +72,7 @@ def parse(arguments: Sequence[str]) -> tuple[argparse.Namespace, list[str]]:
     InputError
         If it is not understood.
     """
-    if "-h" in arguments:
-        arguments = ["--help" if argument == "-h" else argument for argument in arguments]
+    arguments = [SHORT.get(argument, argument) for argument in arguments]
     options, rest = _parser().parse_known_args(arguments)
     known = [f"--{name}" for name in vars(options) if name not in POSITIONAL]
     known.append("--help")
@@ -137,6 +140,7 @@ def offered() -> Iterator[tuple[str, str, str | None, dict[str, dict[str, Any]]]
     replaces = _flag("replace results or checkpoints of another case, if DIR has any")
     shown = {
         "--quiet": _flag("show no progress"),
+        "--verbose": _flag("-v: show all iterations and remarks, with the time"),
         "--log": _value("FILE", "write a log to the end of a file"),
     }
     yield (

@@ -49,7 +49,7 @@ def shown(iteration: int) -> bool:
 
 @contextmanager
 def progress(
-    comm: MPI.Intracomm, quiet: bool = False, log: str | None = None
+    comm: MPI.Intracomm, quiet: bool = False, log: str | None = None, verbose: bool = False
 ) -> Iterator[Monitor | None]:
     """Show the logs of ``contact`` on rank 0 and yield the monitor that shows the iterations.
 
@@ -61,6 +61,8 @@ def progress(
         Show warnings alone.
     log
         A file, to whose end all records are written with the time, inner iterations too.
+    verbose
+        Show all records, with the time.
 
     Raises
     ------
@@ -71,11 +73,11 @@ def progress(
     on_root(comm, lambda: handlers.append(_log(log)) if log is not None else None)
     monitor = bar = None
     if comm.rank == 0:
-        if not quiet and sys.stderr.isatty():
+        if not (quiet or verbose) and sys.stderr.isatty():
             from tqdm import tqdm
 
             bar = tqdm(unit=" iterations", file=sys.stderr)
-        monitor = Console(quiet, bar)
+        monitor = Console(quiet, bar, verbose)
         handlers.append(monitor)
     logger = logging.getLogger("contact")
     level = logger.level
@@ -104,18 +106,20 @@ class Console(logging.Handler):
         Whether warnings alone are shown.
     bar
         tqdm's, on a terminal: over outer iterations, or over the finished share of many solves.
+    verbose
+        Whether all lines are shown, with the time, and no table.
     """
 
-    def __init__(self, quiet: bool = False, bar: Any = None) -> None:
+    def __init__(self, quiet: bool = False, bar: Any = None, verbose: bool = False) -> None:
         super().__init__(logging.WARNING if quiet else logging.DEBUG)
-        self._quiet, self._bar = quiet, bar
+        self._quiet, self._bar, self._verbose = quiet, bar, verbose
         self._lead = RANKS.index(OUTER)
         self._last = time.monotonic()
         self._headed = False
 
     def __call__(self, record: Record) -> None:
         """Show an outer iteration, where iterations lead."""
-        if self._quiet or RANKS[self._lead] != OUTER:
+        if self._quiet or self._verbose or RANKS[self._lead] != OUTER:
             return
         for line in ([] if self._headed else [HEAD]) + table(record):
             self._write(line)
@@ -125,6 +129,9 @@ class Console(logging.Handler):
 
     def emit(self, record: logging.LogRecord) -> None:
         """Show a line of the leading logger, or of none of the ranks; others now and then."""
+        if self._verbose:
+            self._write(f"{time.strftime('%H:%M:%S')} {_told(record)}")
+            return
         rank = RANKS.index(record.name) if record.name in RANKS else None
         self._lead = max(self._lead, rank or 0)
         leads, warns = rank in (None, self._lead), record.levelno >= logging.WARNING
@@ -140,7 +147,7 @@ class Console(logging.Handler):
             self._bar.set_postfix_str(record.getMessage())
             self._last = time.monotonic()
         elif (leads and record.levelno >= logging.INFO) or (rank is not None and silent):
-            self._write(("warning: " if warns else "") + record.getMessage())
+            self._write(_told(record))
             self._last = time.monotonic()
 
     def _write(self, line: str) -> None:
@@ -154,6 +161,11 @@ class Console(logging.Handler):
         if self._bar is not None:
             self._bar.close()
         super().close()
+
+
+def _told(record: logging.LogRecord) -> str:
+    """Return a record as it is shown."""
+    return ("warning: " if record.levelno >= logging.WARNING else "") + record.getMessage()
 
 
 def _log(name: str) -> logging.Handler:

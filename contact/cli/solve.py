@@ -58,7 +58,7 @@ def _solve(options: argparse.Namespace, comm: MPI.Intracomm) -> int:
     with result_folder(out, comm, overwrite=True) as folder:
         if not options.overwrite:
             on_root(comm, lambda: _check_results(folder.path, case))
-        with progress(comm, options.quiet, options.log) as monitor:
+        with progress(comm, options.quiet, options.log, options.verbose) as monitor:
             try:
                 solution = solve(
                     case, monitor=monitor, comm=comm, folder=folder.path, restart=restart
@@ -147,7 +147,7 @@ def _sweep(options: argparse.Namespace, comm: MPI.Intracomm) -> int:
     if not options.out:
         raise InputError("--out: missing; accepted: a folder to write to")
     axes = [Axis.of(text) for text in options.over]
-    shown = progress(comm, options.quiet, options.log)
+    shown = progress(comm, options.quiet, options.log, options.verbose)
     with result_folder(options.out, comm, overwrite=True) as folder, shown as monitor:
         rows = sweep(
             options.case,

@@ -50,6 +50,18 @@ def test_a_static_solve_has_a_line_an_iteration(
     assert float(pressure[2]) == pytest.approx(summary["max_pressure"], rel=1e-5)
 
 
+def test_verbose_shows_all_lines_with_the_time(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    arguments = ["solve", str(CASES / "fretting.toml"), "--out", str(tmp_path / "out"), *STEPS]
+    assert main([*arguments, "-v"]) == 0
+    lines = capsys.readouterr().err.splitlines()
+    assert lines and all(re.match(r"\d\d:\d\d:\d\d ", line) for line in lines)
+    said = [line.split(" ", 1)[1] for line in lines]
+    assert sum(line.startswith("t = ") for line in said) == 5
+    assert sum(line.startswith("iteration ") for line in said) > 5
+
+
 def test_long_tables_are_thinned() -> None:
     assert [i for i in range(1000) if shown(i)] == [*range(31), *range(40, 100, 10),
                                                     *range(100, 1000, 100)]  # fmt: skip

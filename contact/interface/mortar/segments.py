@@ -316,9 +316,7 @@ def _carried_back(side: Surface, nodes: Array, y: Array) -> Array:
     at = np.repeat(shape.middle, len(y), axis=0)
     for _ in range(20):
         slope = inverse(_slopes(shape.gradients(side.order, at), nodes[..., : shape.dim]))
-        left = y - np.einsum(
-            "pk,pkd->pd", shape.lagrange(side.order, at), nodes[..., : shape.dim]
-        )
+        left = y - np.einsum("pk,pkd->pd", shape.lagrange(side.order, at), nodes[..., : shape.dim])
         step = np.einsum("pij,pj->pi", slope, left)
         # Nothing common lies farther from a facet.
         at = np.clip(at + step, -1.0, 2.0)
