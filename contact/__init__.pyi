@@ -21,7 +21,6 @@ from contact.gradients import field_gradient as field_gradient
 from contact.gradients import gap_gradient as gap_gradient
 from contact.identification import Identified as Identified
 from contact.identification import identify as identify
-from contact.identification import read_data as read_data
 from contact.interface.friction import Friction as Friction
 from contact.interface.law import Conductor as Conductor
 from contact.interface.layer import Layer as Layer
@@ -42,6 +41,7 @@ from contact.methods.options import FixedPointOptions as FixedPointOptions
 from contact.methods.options import NewtonOptions as NewtonOptions
 from contact.methods.options import PenaltyOptions as PenaltyOptions
 from contact.output.files import write_outputs as write_outputs
+from contact.output.formats import read_data as read_data
 from contact.output.solution import Solution as Solution
 from contact.problem.contact import Contact as Contact
 from contact.problem.problem import ContactProblem as Problem  # noqa: F401

@@ -11,11 +11,9 @@ Regression Analysis and Its Applications (1988), for the intervals.
 
 from __future__ import annotations
 
-import csv
 import logging
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 from mpi4py import MPI
@@ -353,31 +351,3 @@ class _Model:
         ends = [record.state.time for record in self.solution.steps]
         course = np.concatenate([[0.0], np.asarray(values, dtype=float)])
         return np.interp(self._time, [begin, *ends], course)
-
-
-def read_data(path: str | Path) -> dict[str, Array]:
-    """Read measurements from a CSV file with a row of names.
-
-    Returns
-    -------
-    Column -> values, shape (n,).
-
-    Raises
-    ------
-    InputError
-        If it is none.
-    """
-    path = Path(path)
-    try:
-        with path.open(newline="", encoding="utf-8-sig") as file:
-            names, *rows = [row for row in csv.reader(file) if row]
-        if len(set(names)) < len(names):
-            raise ValueError("a name stands twice")
-        values = np.array([[float(value) for value in row] for row in rows]).reshape(-1, len(names))
-    except OSError as error:
-        raise InputError(f"{path}: {error.strerror}; accepted: a CSV file") from None
-    except ValueError as error:
-        raise InputError(
-            f"{path}: {error}; accepted: a row of names, then rows of numbers"
-        ) from None
-    return {name.strip(): column for name, column in zip(names, values.T, strict=True)}

@@ -11,6 +11,7 @@ import numpy as np
 from mpi4py import MPI
 from pydantic import Field, Tag, model_validator
 
+from contact.arguments import expect, naming
 from contact.body.fields import steady
 from contact.case.body import Rigid
 from contact.case.formula import Expression, NodalField, as_field, as_number
@@ -35,6 +36,7 @@ from contact.interface.obstacle import GapFunction, Obstacle, Shape
 from contact.interface.obstacle.triangles import read_stl
 from contact.mesh.domain import Domain
 from contact.mesh.together import meet
+from contact.output.formats import read_data
 from contact.settings import Accepted, NonNegative, Positive, ReadWith, Switch
 from contact.typing import Array
 from forms import laws
@@ -70,6 +72,61 @@ class Surface(Section):
         return obstacle.Triangles(read_stl(self.file))
 
 
+class HeightMap(Section):
+    """`foundation = { shape = "heights", ... }`: a measured surface, by its heights."""
+
+    only: ClassVar[int | None] = None
+
+    shape: Literal["heights"]
+    """A body below heights along the last axis, smooth between them (cubic splines)."""
+    file: Annotated[File, Accepted("a CSV file, or a .npy file with an array of heights")]
+    """CSV file with a row of names and the columns x, y (3-D: x, y, z, at all points of a grid); or
+    a NumPy array of heights, an image for instance. Relative to the case file."""
+    spacing: Annotated[
+        list[Positive] | None, Accepted("distances > 0, one a direction of the array")
+    ] = None
+    """Distances of the points of an array: along its first axis, which is x, and in 3-D along its
+    second, y. Required for an array."""
+    origin: list[float] | None = None
+    """Place of the first point of an array. Default: zeros."""
+    above: Switch = False
+    """Whether the rigid body lies above the heights, and the elastic one below."""
+
+    def build(self) -> Shape:
+        """Read the heights."""
+        places, heights = self._array() if self.file.endswith(".npy") else self._columns()
+        with naming(self.file):
+            return obstacle.Heights(places, heights, above=self.above)
+
+    def _array(self) -> tuple[tuple[Array, ...], Array]:
+        try:
+            heights = np.asarray(np.load(self.file), dtype=float)
+        except (OSError, ValueError, EOFError) as error:
+            raise InputError(f"{self.file}: {error}; accepted: a NumPy array of heights") from None
+        spacing, origin = self.spacing or [], self.origin or [0.0] * heights.ndim
+        one = f"{heights.ndim} numbers, one a direction of the array"
+        for key, given in (("spacing", spacing), ("origin", origin)):
+            expect(f"foundation.{key}", given, one, len(given) == heights.ndim)
+        steps = zip(origin, spacing, heights.shape, strict=True)
+        return tuple(first + step * np.arange(n) for first, step, n in steps), heights
+
+    def _columns(self) -> tuple[tuple[Array, ...], Array]:
+        columns = read_data(self.file)
+        names = [name for name in "xyz" if name in columns]
+        accepted = "columns x, y in the plane, x, y, z in 3-D"
+        expect(self.file, f"columns {', '.join(columns)}", accepted, len(names) > 1)
+        *across, heights = (columns[name] for name in names)
+        order = np.lexsort(across[::-1])
+        places = tuple(np.unique(values) for values in across)
+        shape = tuple(axis.size for axis in places)
+        grid = np.stack(np.meshgrid(*places, indexing="ij"), axis=-1).reshape(-1, len(across))
+        given = np.column_stack(across)[order]
+        accepted = "each point of a grid once"
+        fits = given.shape == grid.shape and bool(np.all(given == grid))
+        expect(self.file, f"{len(heights)} points", accepted, fits)
+        return places, heights[order].reshape(shape)
+
+
 def _quiet(expression: Expression, points: Array) -> Array:
     """Return values at points of shape (n, d), NaN for none: ranks ask at points of their own."""
     try:
@@ -87,6 +144,7 @@ Foundation: TypeAlias = Annotated[
     | Annotated[obstacle.Paraboloid, FromTable]
     | Annotated[obstacle.Punch, FromTable]
     | Distance
+    | HeightMap
     | Surface,
     Field(discriminator="shape"),
 ]

@@ -15,6 +15,7 @@ import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
 
+from contact.errors import InputError
 from contact.mesh.cells import Shape
 from contact.typing import Array
 
@@ -125,3 +126,31 @@ def write_csv(path: Path, header: Iterable[str], rows: Iterable[Iterable[Any]]) 
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow(header)
         writer.writerows(rows)
+
+
+def read_data(path: str | Path) -> dict[str, Array]:
+    """Read measurements from a CSV file with a row of names.
+
+    Returns
+    -------
+    Column -> values, shape (n,).
+
+    Raises
+    ------
+    InputError
+        If it is none.
+    """
+    path = Path(path)
+    try:
+        with path.open(newline="", encoding="utf-8-sig") as file:
+            names, *rows = [row for row in csv.reader(file) if row]
+        if len(set(names)) < len(names):
+            raise ValueError("a name stands twice")
+        values = np.array([[float(value) for value in row] for row in rows]).reshape(-1, len(names))
+    except OSError as error:
+        raise InputError(f"{path}: {error.strerror}; accepted: a CSV file") from None
+    except ValueError as error:
+        raise InputError(
+            f"{path}: {error}; accepted: a row of names, then rows of numbers"
+        ) from None
+    return {name.strip(): column for name, column in zip(names, values.T, strict=True)}

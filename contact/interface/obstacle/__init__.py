@@ -4,6 +4,7 @@ Each shape says its signed distance with normals, and its chord rule; gaps along
 follow (`protocol.Shape`).
 """
 
+from contact.interface.obstacle.heights import Heights
 from contact.interface.obstacle.protocol import GapFunction, Obstacle, Shape
 from contact.interface.obstacle.shapes import (
     Cone,
@@ -20,6 +21,7 @@ __all__ = [
     "Cone",
     "Cylinder",
     "GapFunction",
+    "Heights",
     "Level",
     "Obstacle",
     "Paraboloid",
