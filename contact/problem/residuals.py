@@ -200,8 +200,7 @@ def evaluate(problem: Problem, state: State) -> Residuals:
     answers = body.sizes(on_contact) + body.exchanged(state)
     scale = loads + answers + body.sizes(body.reactions(residual))
     unbalanced = body.sizes(body.unbalanced(residual))
-    most = body.most_rounding * scale
-    acted = (loads > 0) | (answers > most)
+    most, acted = body.most_rounding * scale, loads > 0
     asked = ~acted | (unbalanced <= most)
     rounding, unknown = np.zeros_like(scale), np.zeros(interface.components)
     if asked.any():
