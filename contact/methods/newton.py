@@ -243,7 +243,7 @@ class Newton:
         state = iterate.state
         x = self.problem.equilibrium.moved(state.x, -found[0])
         # Where nothing presses, forces by rounding alone are out of balance elsewhere.
-        for forces in (state.forces, Multipliers.zero(self.problem.interface.jump)):
+        for forces in (Multipliers.zero(self.problem.interface.jump), state.forces):
             least = replace(iterate, state=replace(state, x=x, forces=forces))
             residuals = evaluate(self.problem, least.state)
             if not residuals.excess(self.options.allowed):
