@@ -25,27 +25,29 @@ CONSTANT = (
 ENOUGH = "quadrilaterals and hexahedra of degree 2 hardly lock"
 
 
-def check_element(element: str, degree: int, shape: Shape) -> None:
+def check_element(element: str, degree: int, shape: Shape, order: int = 1) -> None:
     """Refuse elements that are none on cells of a shape.
 
     Raises
     ------
     InputError
-        If the degree is none, the element has no such name, or not this degree.
+        If the degree is none, the element has no such name, or not this degree, or these cells.
     """
     if degree not in (1, 2):
         raise InputError(f"degree: given {degree!r}; accepted: 1 or 2")
     if element not in ELEMENTS:
         raise InputError(f"element: given {element!r}; accepted: {', '.join(map(repr, ELEMENTS))}")
-    accepted = needed(element, degree, shape)
+    accepted = needed(element, degree, shape, order)
     if accepted is not None:
         raise InputError(f"element: given {element!r} of degree {degree}; accepted: {accepted}")
 
 
-def needed(element: str, degree: int, shape: Shape) -> str | None:
+def needed(element: str, degree: int, shape: Shape, order: int = 1) -> str | None:
     """Return the degree and cells that an element asks for; None where it has them."""
     if element != MEAN_DILATATION:
         return None
+    if order > 1:
+        return "'standard' on curved cells"
     if shape.simplex:
         return None if degree == 2 else f"degree = 2, or 'standard': {CONSTANT}"
     if shape == HEXAHEDRON:

@@ -68,7 +68,7 @@ class BodyEquilibrium:
         self, domain: Domain, body: Body, degree: int = 1, element: str = STANDARD
     ) -> None:
         body.check(domain.dim)
-        check_element(element, degree, shape_of(domain.mesh))
+        check_element(element, degree, shape_of(domain.mesh), domain.order)
         self.domain, self.body, self.degree, self.element = domain, body, degree, element
         self.dim, self.phi_scale = domain.dim, body.phi_scale
         self.block_size = self.dim + (body.piezo is not None)

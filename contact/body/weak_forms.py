@@ -82,8 +82,9 @@ class WeakForms:
         # Stresses at points are no function that more of them would integrate more exactly.
         smooth = all(is_linear(m.law) or isinstance(m.law, HistoryLaw) for m in body.materials)
         simplex = shape_of(domain.mesh).simplex
-        # Strains of simplices are of one degree less than displacements, of others of the same.
-        exact = max(2 * degree - 2, 1) if simplex else 2 * degree
+        # Strains of straight simplices are of one degree less than displacements, of others of the
+        # same.
+        exact = max(2 * degree - 2, 1) if simplex and domain.order == 1 else 2 * degree
         exact += 2 * (degree == 2 and not smooth)
         exact += domain.kinematics.added_degree
         base, seen = domain.kinematics, kinematics_of(domain, element)

@@ -144,7 +144,7 @@ def quality(shape: Shape, corners: Array) -> Array:
     J. Sci. Comput. 23, 2001).
     """
     if shape.simplex:
-        return mean_ratio(corners)
+        return mean_ratio(corners[:, : shape.corners])
     d, jacobian = shape.dim, jacobians(shape, corners, shape.nodes(1))
     size = np.maximum(determinant(jacobian), 0.0) ** (2 / d)
     return np.asarray((d * size / np.sum(jacobian**2, axis=(2, 3))).min(axis=1))

@@ -84,7 +84,7 @@ def draw_setup(case: Case, problem: ContactProblem) -> Figure | None:
     roles = list(_roles(case, problem))
     boundary = _gathered(domain, _corners(domain, exterior_facets(domain.mesh)))
     owned = slice(domain.mesh.topology.index_map(domain.dim).size_local)
-    places = _compat.geometry_dofmap(domain.mesh)[owned]
+    places = _compat.geometry_dofmap(domain.mesh)[owned, : shape_of(domain.mesh).corners]
     cells = _gathered(domain, domain.mesh.geometry.x[places][..., : domain.dim])
     surface = _foundation(problem)
     if boundary is None or cells is None:

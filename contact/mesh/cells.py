@@ -114,6 +114,28 @@ class Shape:
         return np.asarray(self.facet.lagrange(1, at) @ corners)
 
     @property
+    def serendipity(self) -> list[tuple[Nodes, Nodes, Array]]:
+        """The nodes of degree 2 within faces, (k,), corners there, and weights of other nodes.
+
+        Then those within the cell. With them a serendipity cell is one of degree 2, whose
+        functions contain its own.
+        """
+        found: list[tuple[Nodes, Nodes, Array]] = []
+        dofs = _element(self, 2).entity_dofs
+        for dim in range(2, self.dim + 1):
+            ends = [of for of, own in zip(self.topology[dim], dofs[dim], strict=True) if own]
+            weights = np.zeros((len(ends), len(self.nodes(2))))
+            for i, corners in enumerate(ends):
+                around = [k for k, edge in enumerate(self.edges) if {*edge} <= {*corners}]
+                weights[i, corners] = -1 / 4
+                # Half of the edges of a face, a quarter of those of the cell.
+                weights[i, [dofs[1][k][0] for k in around]] = 1 / 2 if dim == 2 else 1 / 4
+            if ends:
+                nodes = np.concatenate([own for own in dofs[dim] if own])
+                found.append((nodes, np.array(ends), weights))
+        return found
+
+    @property
     def children(self) -> Nodes:
         """Corners of the halves along each axis as nodes of degree 2, (children, corners)."""
         corners = basix.geometry(self.kind)

@@ -72,7 +72,7 @@ class Domain:
     Attributes
     ----------
     mesh
-        Mesh of cells with straight edges, of one of `contact.mesh.cells.SHAPES`.
+        Mesh of cells of one of `contact.mesh.cells.SHAPES`, straight or of second order.
     parts
         Name of a part of the boundary -> its facets that this rank owns. The same names in the
         same order on all ranks.
@@ -120,7 +120,7 @@ class Domain:
         Parameters
         ----------
         mesh
-            Cells with straight edges: triangles, quadrilaterals, tetrahedra or hexahedra.
+            Triangles, quadrilaterals, tetrahedra or hexahedra, straight or of second order.
         facet_tags
             Tags of facets, for instance those that dolfinx reads from Gmsh.
         names
@@ -148,6 +148,11 @@ class Domain:
     def dim(self) -> int:
         """Space dimension, 2 or 3."""
         return self.mesh.geometry.dim
+
+    @property
+    def order(self) -> int:
+        """Degree of the geometry of the cells, 1 or 2: 1 for straight edges."""
+        return _compat.geometry_degree(self.mesh)
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -256,7 +261,7 @@ def from_mesh(
     Parameters
     ----------
     mesh
-        Cells with straight edges: triangles, quadrilaterals, tetrahedra or hexahedra.
+        Triangles, quadrilaterals, tetrahedra or hexahedra, straight or of second order.
     parts
         Name -> function of x, shape (3, n), that is true at all vertices of the part's facets;
         or the local indices of the facets. The same names on all ranks.
@@ -271,11 +276,11 @@ def from_mesh(
         For other meshes, an empty part or region, or an interior facet in a part.
     """
     tdim = mesh.topology.dim
-    flat = tdim == mesh.geometry.dim and _compat.geometry_degree(mesh) == 1
+    flat = tdim == mesh.geometry.dim and _compat.geometry_degree(mesh) in (1, 2)
     if shape_of(mesh) not in SHAPES or not flat:
         raise InputError(
             "the mesh must consist of triangles or quadrilaterals in the plane, or of tetrahedra "
-            "or hexahedra, with straight edges (geometry of degree 1)"
+            "or hexahedra, with a geometry of degree 1 or 2"
         )
     boundary = exterior_facets(mesh)
     chosen = {name: _owned(mesh, tdim - 1, given) for name, given in parts.items()}

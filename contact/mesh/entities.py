@@ -77,7 +77,8 @@ def elongation(mesh: dmesh.Mesh, facets: Indices) -> float:
     behind, _ = cells_at(mesh, facets)
     dim, found = mesh.topology.dim, 1.0
     if facets.size:
-        corners = mesh.geometry.x[dmesh.entities_to_geometry(mesh, dim - 1, facets)]
+        places = dmesh.entities_to_geometry(mesh, dim - 1, facets)
+        corners = mesh.geometry.x[places[:, shape_of(mesh).facet.around]]
         edges = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2)
         found = float(np.max(mesh.h(dim, behind) / (2 * edges.min(axis=1)), initial=1.0))
     return mesh.comm.allreduce(found, op=MPI.MAX)

@@ -11,7 +11,7 @@ from contact.typing import Array
 
 
 def geometry_nodes(domain: Domain) -> Array:
-    """Return the nodes of the owned cells, of straight ones the corners, (cells, nodes, d)."""
+    """Return the nodes of the owned cells, corners first, (cells, nodes, d)."""
     mesh, d = domain.mesh, domain.dim
     owned = mesh.topology.index_map(d).size_local
     return np.asarray(mesh.geometry.x[_compat.geometry_dofmap(mesh)[:owned], :d])
@@ -108,5 +108,5 @@ def measures(revolved: bool, shape: Shape, of: Array, at: Array, weights: Array)
 def volumes(domain: Domain) -> Array:
     """Return the volumes of the owned cells, or of the rings that they are, shape (cells,)."""
     shape = shape_of(domain.mesh)
-    points, weights = rule(shape, 1 if shape.simplex else 3)
+    points, weights = rule(shape, 1 if shape.simplex and domain.order == 1 else 3 * domain.order)
     return measures(domain.revolved, shape, geometry_nodes(domain), points, weights).sum(axis=1)

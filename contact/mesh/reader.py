@@ -62,8 +62,8 @@ def from_msh(comm: MPI.Intracomm, path: str | Path) -> Domain:
     Raises
     ------
     InputError
-        If the file is missing, damaged or no mesh, has no boundary groups, cells of several kinds
-        or of curved geometry, or degenerate or overlapping cells. The message names the file.
+        If the file is missing, damaged or no mesh, has no boundary groups, cells of several kinds,
+        or degenerate, folded or overlapping cells. The message names the file.
     """
     return _from_rank_0(comm, lambda: _read_msh(Path(path)), f"mesh file {path}")
 
@@ -275,7 +275,8 @@ def _checked(load: Callable[[], Model], source: str) -> Cells:
 
 def _distribute(comm: MPI.Intracomm, raw: Cells, source: str) -> Domain:
     dim = raw.points.shape[1]
-    element = basix.ufl.element("Lagrange", raw.shape.name, 1, shape=(dim,), dtype=np.float64)
+    order = raw.shape.degree_of(raw.regions.rows.shape[1])
+    element = basix.ufl.element("Lagrange", raw.shape.name, order, shape=(dim,), dtype=np.float64)
     mesh = dmesh.create_mesh(comm, cells=raw.regions.rows, x=raw.points, e=ufl.Mesh(element))
     exterior_facets(mesh)
     domain = with_names(mesh, _sets(mesh, dim - 1, raw.parts), _sets(mesh, dim, raw.regions))

@@ -23,7 +23,7 @@ from contact.mesh.cells import Shape
 from contact.mesh.validity import Cells, Groups
 from contact.ranks import on_root
 
-#: XDMF's names of cells and facets.
+#: XDMF's names of cells and facets; behind those of second order is the number of nodes.
 NAMES = {
     "interval": "Polyline",
     "triangle": "Triangle",
@@ -72,7 +72,7 @@ def write(cells: Cells, path: Path) -> None:
         mark = f"{heavy.name} {_sha256(made)}"
         light = Path(folder) / path.name
         grids = "".join(
-            _grid(name, NAMES[shapes[name].name], group.rows.shape, cells.points.shape, heavy.name)
+            _grid(name, shapes[name], group.rows.shape, cells.points.shape, heavy.name)
             for name, group in groups.items()
         )
         light.write_text(
@@ -83,9 +83,12 @@ def write(cells: Cells, path: Path) -> None:
         light.rename(path)
 
 
-def _grid(name: str, kind: str, rows: tuple[int, ...], points: tuple[int, ...], heavy: str) -> str:
+def _grid(
+    name: str, shape: Shape, rows: tuple[int, ...], points: tuple[int, ...], heavy: str
+) -> str:
     """Return the XDMF of the cells, or of the facets of parts, with the labels of their groups."""
     n, corners = rows
+    kind = NAMES[shape.name] + (f"_{corners}" if corners > shape.corners else "")
     where = f'Format="HDF">{heavy}:'
     of_polyline = f' NodesPerElement="{corners}"' if kind == "Polyline" else ""
     return (

@@ -83,6 +83,11 @@ def _cut(coarse: dmesh.Mesh, marked: Indices | None) -> tuple[dmesh.Mesh, Indice
 
     Collective. The refined cells stay on the rank of their parent.
     """
+    if _compat.geometry_degree(coarse) > 1:
+        raise InputError(
+            "mesh.refine, mesh.adapt: the cells are curved; accepted: cells of order 1, or a finer "
+            "mesh of order 2"
+        )
     if not shape_of(coarse).simplex:
         return _halved(coarse, marked)
     coarse.topology.create_entities(1)

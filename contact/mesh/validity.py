@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from contact.errors import InputError
-from contact.mesh.cells import SHAPES, Shape
+from contact.mesh.cells import SHAPES, Shape, rule
 from contact.mesh.entities import combinations
 from contact.mesh.extraction import BODY, Ints, Model
 from contact.mesh.geometry import determinant, jacobians
@@ -60,7 +60,8 @@ class Cells:
     points
         Coordinates, shape (n, d).
     regions
-        Groups of cells; their rows, shape (m, corners), are all cells of the mesh.
+        Groups of cells; their rows, shape (m, k), are all cells of the mesh by the nodes of the
+        Lagrange element of degree 1, or of degree 2 where some are curved.
     parts
         Groups of facets on its boundary.
     unusable, notes
@@ -90,8 +91,8 @@ def check_model(model: Model) -> Cells:
     Raises
     ------
     InputError
-        For other meshes than of straight-sided triangles or quadrilaterals in a plane z = const, or
-        of tetrahedra or hexahedra, for cells without volume or that overlap, and if no part is
+        For other meshes than of triangles or quadrilaterals in a plane z = const, or of tetrahedra
+        or hexahedra, of order 1 or 2, for cells without volume or that overlap, and if no part is
         left.
     """
     dim = model.dim
@@ -100,23 +101,23 @@ def check_model(model: Model) -> Cells:
     tags, points = model.tags[order], model.points[order]
     if np.any(tags[1:] == tags[:-1]):
         raise InputError("it has several nodes of one number")
-    first = _corners_first(shape, model.places)
+    first = _placed(shape.nodes(1), model.places)
     every = _places(tags, model.cells)
-    _check_straight(points, every, model.places, shape, first)
+    curved = _curved(points, every, model.places, shape, first)
+    kept = _placed(shape.nodes(2), model.places) if curved else first
     regions = _join(
-        {
-            name: _places(tags, nodes)[:, first]
-            for name, nodes in model.regions.items()
-            if len(nodes)
-        }
-        or {BODY: every[:, first]}
+        {name: _places(tags, nodes)[:, kept] for name, nodes in model.regions.items() if len(nodes)}
+        or {BODY: every[:, kept]}
     )
+    if np.any(kept < 0):
+        points, rows = _filled(points, regions.rows, shape, kept)
+        regions = replace(regions, rows=rows)
     notes = [*model.notes]
     if left := len(_first_of_each(every[:, first])) - len(regions.rows):
         notes.append(f"{left} cell(s) in no physical group are no part of the body")
     # The nodes of the body alone; others may be centres of circles.
     used = np.unique(regions.rows)
-    new = np.full(tags.size, -1)
+    new = np.full(len(points), -1)
     new[used] = np.arange(used.size)
     points = _flatten(points[used], dim)
     cells = new[regions.rows]
@@ -146,7 +147,7 @@ def _check_kinds(kinds: Sequence[tuple[str, int, int]], dim: int) -> Shape:
             why = "another shape" if order < 3 else f"order {order}"
             raise InputError(
                 f"its cells include {label!r}, of {why}; accepted are triangles or quadrilaterals "
-                "in 2-D, tetrahedra or hexahedra in 3-D, of order 1 or 2 with straight edges"
+                "in 2-D, tetrahedra or hexahedra in 3-D, of order 1 or 2"
             )
     if len(labels) > 1:
         found = " beside ".join(repr(label) for label, _ in labels)
@@ -157,13 +158,14 @@ def _check_kinds(kinds: Sequence[tuple[str, int, int]], dim: int) -> Shape:
     return Shape(labels[0][0].split()[0].lower())
 
 
-def _corners_first(shape: Shape, places: Array) -> Ints:
-    """Return which nodes of a cell of a file are the corners of the shape, in its order."""
-    return np.asarray(np.linalg.norm(shape.nodes(1)[:, None] - places, axis=2).argmin(axis=1))
+def _placed(nodes: Array, places: Array) -> Ints:
+    """Return which nodes of a cell of a file are those of an element, -1 for none, (k,)."""
+    distance = np.linalg.norm(nodes[:, None] - places, axis=2)
+    return np.where(distance.min(axis=1) < 0.1, distance.argmin(axis=1), -1)
 
 
-def _check_straight(points: Array, cells: Ints, places: Array, shape: Shape, first: Ints) -> None:
-    """Refuse cells of degree 2 whose nodes are not where straight edges have them.
+def _curved(points: Array, cells: Ints, places: Array, shape: Shape, first: Ints) -> bool:
+    """Tell whether some nodes of cells are not where straight edges have them.
 
     Parameters
     ----------
@@ -173,18 +175,32 @@ def _check_straight(points: Array, cells: Ints, places: Array, shape: Shape, fir
         The nodes of a cell in the reference cell, its shape, and which of them are its corners.
     """
     if len(places) == shape.corners:
-        return
+        return False
     corners = points[cells[:, first]]
     aside = np.linalg.norm(points[cells] - shape.lagrange(1, places) @ corners, axis=2)
     unit = np.ptp(corners, axis=1).max(axis=1)
-    curved = ~(aside.max(axis=1) <= STRAIGHT * unit)
-    if np.any(curved):
-        middle = ", ".join(f"{v:g}" for v in corners[curved][0].mean(axis=0))
-        raise InputError(
-            f"it has {curved.sum()} cell(s) of curved geometry, the first near ({middle}); "
-            "accepted are straight edges, with nodes in their middles or without "
-            "(Mesh.ElementOrder = 1, or Mesh.SecondOrderLinear = 1)"
-        )
+    return not bool(np.all(aside.max(axis=1) <= STRAIGHT * unit))
+
+
+def _filled(points: Array, cells: Ints, shape: Shape, kept: Ints) -> tuple[Array, Ints]:
+    """Return serendipity cells as those of degree 2, with the points added to them.
+
+    Parameters
+    ----------
+    points, cells
+        Coordinates, and nodes of cells, shape (m, k); where there is none in `kept` any.
+    shape, kept
+        The shape of the cells, and which nodes there are, -1 for none.
+    """
+    rows = cells.copy()
+    for nodes, ends, weights in shape.serendipity:
+        if kept[nodes[0]] < 0:
+            corners = cells[:, ends].reshape(-1, ends.shape[1])
+            number = _number(corners)
+            added = (weights @ points[cells]).reshape(-1, 3)
+            rows[:, nodes] = len(points) + number.reshape(len(cells), -1)
+            points = np.concatenate([points, added[np.unique(number, return_index=True)[1]]])
+    return points, rows
 
 
 def _places(tags: Ints, nodes: Ints) -> Ints:
@@ -233,6 +249,11 @@ def _join(groups: Mapping[str, Ints]) -> Groups:
     return Groups(tuple(groups), rows[first], labels, sets)
 
 
+def _first(wrong: npt.NDArray[np.bool_], corners: Array) -> str:
+    """Return where the first wrong cell is, given the corners of all, shape (m, corners, d)."""
+    return "(" + ", ".join(f"{v:g}" for v in corners[wrong][0].mean(axis=0)) + ")"
+
+
 def _check_cells(
     shape: Shape, points: Array, cells: Ints, parts: Mapping[str, Ints]
 ) -> dict[str, str]:
@@ -241,7 +262,7 @@ def _check_cells(
     Parameters
     ----------
     shape, points, cells
-        Of the cells, coordinates, shape (n, d), and corners, shape (m, corners).
+        Of the cells, coordinates, shape (n, d), and nodes, shape (m, k), corners first.
     parts
         Name -> corners of facets, -1 for a node of no cell.
 
@@ -256,20 +277,30 @@ def _check_cells(
     """
     # Without a unit of length, so that no volume overflows or vanishes.
     unit = np.ptp(points, axis=0).max() or 1.0
-    x = points[cells] / unit
-    volume = determinant(jacobians(shape, x, shape.nodes(1)))
+    nodes, cells = points[cells] / unit, cells[:, : shape.corners]
+    x = nodes[:, : shape.corners]
     longest = np.linalg.norm(x[:, :, None] - x[:, None], axis=-1).max(axis=(1, 2))
+    volume = determinant(jacobians(shape, x, shape.nodes(1)))
     flat = ~(np.abs(volume).min(axis=1) > FLAT * longest ** points.shape[1])
     if np.any(flat):
-        middle = ", ".join(f"{v:g}" for v in points[cells[flat][0]].mean(axis=0))
-        raise InputError(f"it has {flat.sum()} cell(s) of zero volume, the first near ({middle})")
+        where = _first(flat, x * unit)
+        raise InputError(f"it has {flat.sum()} cell(s) of zero volume, the first near {where}")
     folded = np.abs(np.sign(volume).sum(axis=1)) < volume.shape[1]
     if np.any(folded):
-        middle = ", ".join(f"{v:g}" for v in points[cells[folded][0]].mean(axis=0))
         raise InputError(
             f"it has {folded.sum()} cell(s) with a corner of 180 degrees or more, the first near "
-            f"({middle})"
+            f"{_first(folded, x * unit)}"
         )
+    if nodes.shape[1] > shape.corners:
+        # At the corners, between them, and where integrals are taken.
+        at = np.concatenate([shape.nodes(2), rule(shape, 4)[0]])
+        volume = determinant(jacobians(shape, nodes, at)) * np.sign(volume[:, :1])
+        bent = ~(volume.min(axis=1) > FLAT * longest ** points.shape[1])
+        if np.any(bent):
+            raise InputError(
+                f"it has {bent.sum()} cell(s) that are folded by their curved edges, the first "
+                f"near {_first(bent, x * unit)}"
+            )
 
     cell_facets = np.sort(cells[:, shape.facet_corners], axis=2)
     # Three corners of a facet, two in 2-D, the same for both of its cells, and one inside.

@@ -240,7 +240,8 @@ def _at_contact(problem: ContactProblem, state: State) -> Array:
         bound * np.linalg.norm(slip, axis=-1) - np.sum(slip * friction, axis=-1)
     )
     behind = geometry_nodes(domain)[cells]
-    of_facet = np.take_along_axis(behind, shape.facet_corners[place][..., None], axis=1)
+    ends = shape.facet_nodes(domain.order)[place]
+    of_facet = np.take_along_axis(behind, ends[..., None], axis=1)
     areas = measures(domain.revolved, shape.facet, of_facet, at, weights)
     np.add.at(squares, cells, np.sum(areas * density, axis=1))
     return squares

@@ -16,6 +16,7 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 from ufl.core.expr import Expr
 
+from contact import _compat
 from contact.body.description import Material
 from contact.body.elements import kinematics_of
 from contact.body.equilibrium import BodyEquilibrium
@@ -66,12 +67,14 @@ def discontinuous(space: fem.FunctionSpace, name: str, shape: tuple[int, ...]) -
 
 
 def linear(function: fem.Function) -> fem.Function:
-    """Return the Lagrange interpolant of degree 1 of a function. Collective."""
+    """Return the Lagrange interpolant of the geometry's degree of a function. Collective."""
     space = function.function_space
-    if space.ufl_element().embedded_superdegree == 1:
+    order = _compat.geometry_degree(space.mesh)
+    if space.ufl_element().embedded_superdegree == order:
         return function
     shape = space.ufl_element().reference_value_shape
-    made = fem.Function(fem.functionspace(space.mesh, ("Lagrange", 1, shape)), name=function.name)
+    element = ("Lagrange", order, shape)
+    made = fem.Function(fem.functionspace(space.mesh, element), name=function.name)
     made.interpolate(function)
     return made
 

@@ -224,7 +224,8 @@ class LocalProblems:
         kept = [0, 1, 2, 5] if d == 2 else list(range(6))
         kept += [6, 7, 8][:d] * body.piezoelectric
         moduli = moduli[:, kept][:, :, kept]
-        degree = (4 if shape.simplex else 6) + body.domain.revolved
+        order = body.domain.order
+        degree = (4 if shape.simplex else 6) + 2 * (order - 1) + body.domain.revolved
         (at, weights), (values, derivatives) = rule(shape, degree), surplus(shape, degree)
         volumes = measures(body.domain.revolved, shape, of, at, weights)
         back = np.broadcast_to(inverse(jacobians(shape, of, at)), (len(of), len(at), d, d))
@@ -241,7 +242,7 @@ class LocalProblems:
                 strains[..., i, m] = gradients[..., j] / np.sqrt(2)
                 strains[..., j, m] = gradients[..., i] / np.sqrt(2)
             elif body.domain.revolved and i == j:
-                strains[..., 0, m] = values / (of[..., 0] @ shape.lagrange(1, at).T)[..., None]
+                strains[..., 0, m] = values / (of[..., 0] @ shape.lagrange(order, at).T)[..., None]
         count = len(cells)
         strains = strains.reshape(count, len(weights), -1, len(kept)).swapaxes(2, 3)
         weighted = (volumes[:, :, None, None] * strains).reshape(count, -1, strains.shape[3])
@@ -253,7 +254,7 @@ class LocalProblems:
         )
         held = np.zeros(right.shape, dtype=bool)
         at, weights = rule(shape.facet, 5)
-        for facet, ends in enumerate(shape.facet_corners):
+        for facet, ends in enumerate(shape.facet_nodes(order)):
             values = cubics(shape, shape.on_facet(facet, at))
             areas = measures(body.domain.revolved, shape.facet, of[:, ends], at, weights)
             flux = shape.facet.lagrange(2, at) @ self._through[cells, facet]

@@ -7,12 +7,13 @@ from dolfinx import la
 from scipy import sparse
 
 from contact import _compat
+from contact.mesh.cells import shape_of
 from contact.mesh.domain import Domain, Indices
 from contact.typing import Array
 
 
 def nodal_means(domain: Domain, cells: Indices, values: Array) -> Array:
-    """Return the means around the vertices of cells, shape (cells, d + 1, components). Collective.
+    """Return the means around the corners of cells, (cells, corners, components). Collective.
 
     Parameters
     ----------
@@ -23,7 +24,8 @@ def nodal_means(domain: Domain, cells: Indices, values: Array) -> Array:
     values
         Constant in each of the cells, shape (cells, components).
     """
-    vertices = _compat.geometry_dofmap(domain.mesh)[cells]
+    corners = shape_of(domain.mesh).corners
+    vertices = _compat.geometry_dofmap(domain.mesh)[cells, :corners]
     index_map = domain.mesh.geometry.index_map()
     count = index_map.size_local + index_map.num_ghosts
     with_ones = np.column_stack([values, np.ones(len(values))])

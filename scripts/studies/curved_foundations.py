@@ -43,6 +43,7 @@ from contact import (
     solve,
 )
 from contact.interface.mortar import deviation
+from contact.mesh.cells import TRIANGLE
 from contact.mesh.domain import revolved
 from contact.methods.options import NewtonOptions
 from contact.typing import Array
@@ -368,7 +369,7 @@ def by_true_edges(h: float, degree: int) -> Array:
     """
 
     def exact(_: Any, corners: Array, *_more: Any) -> Array:
-        ends = [corners[:, pair] for pair in deviation.pairs_of(3)]
+        ends = [corners[:, pair] for pair in TRIANGLE.edges]
         middle = np.stack([pair.mean(axis=1) for pair in ends], axis=1)
         r, z = np.hypot(middle[..., 0], middle[..., 1]), middle[..., 2]
         return 4 * np.where(r > 0.5, np.hypot(r - 0.5, z) - 1, -(z + 1))

@@ -112,6 +112,23 @@ def test_refined_meshes_keep_parts_regions_and_space(name):
     assert fine.levels == 2
 
 
+@pytest.mark.parametrize("shape", SHAPES, ids=NAMES)
+def test_serendipity_cells_are_cells_of_degree_2(shape):
+    """The nodes in the middle of faces and cells have the values of serendipity functions."""
+    nodes, axes = shape.nodes(2), range(shape.dim)
+    powers = [np.array(p) for p in np.ndindex(*(3,) * shape.dim)]
+    # Superlinear degree: factors of degree 1 do not count.
+    kept = [p for p in powers if p[p > 1].sum() <= 2 and p.sum() - max(p.max(), 1) <= 2]
+    found = 0
+    for own, corners, weights in shape.serendipity:
+        assert np.abs(weights[:, own]).max() == 0 and corners.shape[0] == len(own)
+        for power in kept:
+            values = np.prod([nodes[:, k] ** power[k] for k in axes], axis=0)
+            np.testing.assert_allclose(weights @ values, values[own], atol=1e-14)
+        found += len(own)
+    assert found == {"quadrilateral": 1, "hexahedron": 7}.get(shape.name, 0)
+
+
 def test_some_quadrilaterals_alone_are_not_refined():
     domain = rectangle(MPI.COMM_SELF, (0, 0), (1, 1), (2, 2), cell="quadrilateral")
     with pytest.raises(InputError, match="quadrilaterals, of which some cannot be refined alone"):

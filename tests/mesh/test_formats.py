@@ -162,10 +162,15 @@ def test_faces_of_twenty_node_bricks(shared_tmp_path):
             assert np.ptp(x[entities_to_geometry(domain.mesh, 2, facets)][..., axis] - value) == 0
 
 
-def test_bent_edges_are_refused(tmp_path):
+def test_bent_edges_are_kept(tmp_path):
+    """Twenty nodes of a brick are those of 27, with its own functions on the faces and inside."""
     (tmp_path / "bent.inp").write_text(bricks(0.05))
-    with pytest.raises(InputError, match=r"bent\.inp: it has 1 cell\(s\) of curved geometry"):
-        from_file(MPI.COMM_SELF, tmp_path / "bent.inp")
+    domain = from_file(MPI.COMM_SELF, tmp_path / "bent.inp")
+    assert domain.order == 2 and domain.mesh.geometry.dofmap.shape == (2, 27)
+    assert domain.mesh.geometry.index_map().size_global == 45
+    (tmp_path / "folded.inp").write_text(bricks(1.5))
+    with pytest.raises(InputError, match=r"folded\.inp: .* folded by their curved edges"):
+        from_file(MPI.COMM_SELF, tmp_path / "folded.inp")
 
 
 @pytest.mark.parallel

@@ -50,7 +50,7 @@ BAD = {
     "folded.msh": "cells overlap",
     "two-kinds.msh": "'Triangle 3' beside 'Quadrilateral 4'; accepted are cells of one kind",
     "arrow.msh": r"1 cell\(s\) with a corner of 180 degrees or more",
-    "second-order.msh": r"1 cell\(s\) of curved geometry.*accepted are straight edges",
+    "curled.msh": r"1 cell\(s\) that are folded by their curved edges, the first near \(0\.333",
     "surface.msh": "surface in 3-D",
     "text.msh": "no Gmsh .msh file",
     "cut.msh": "it is cut off",
@@ -65,6 +65,14 @@ def test_mesh_files_are_read_with_their_parts(name):
     domain = from_msh(COMM, FIXTURES / name)
     assert domain.dim == dim
     assert measures(domain) == pytest.approx(expected)
+
+
+@pytest.mark.parallel
+def test_cells_of_second_order_keep_their_nodes():
+    domain = from_msh(COMM, FIXTURES / "curved.msh")
+    assert domain.order == 2 and domain.mesh.geometry.index_map().size_global == 6
+    arc = (np.sqrt(1.16) + np.arcsinh(0.4) / 0.4) / 2  # of a parabola
+    assert measures(domain) == pytest.approx({"bottom": arc, "top": 2**0.5}, rel=1e-3)
 
 
 @pytest.mark.parallel

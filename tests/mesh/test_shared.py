@@ -52,7 +52,12 @@ $Elements
 $EndElements
 """
 
-SOURCES = {"plate.inp": PLATE, "bricks.inp": bricks(), "square.msh": SQUARE}
+SOURCES = {
+    "plate.inp": PLATE,
+    "bricks.inp": bricks(),
+    "bent.inp": bricks(0.05),
+    "square.msh": SQUARE,
+}
 
 
 def written(folder, name):
@@ -74,6 +79,7 @@ def test_a_shared_mesh_is_its_source(name, shared_tmp_path, capsys):
     assert measures(other) == pytest.approx(measures(one), rel=1e-13)
     assert regions(other) == pytest.approx(regions(one), rel=1e-13)
     assert [*other.parts] == [*one.parts]
+    assert other.order == one.order == (2 if name == "bent.inp" else 1)
     assert [*other.regions] == [*one.regions]
     assert (other.size, other.notes) == (one.size, one.notes)
     said = [{key: text.split(": ", 1)[1] for key, text in d.unusable.items()} for d in (one, other)]

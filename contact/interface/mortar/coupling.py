@@ -102,7 +102,7 @@ class Parts:
     whole
         int Phi_i over all of the facet, shape (f, k).
     normal
-        int Phi_i times the direction, shape (f, k, d).
+        int N~_i times the direction, shape (f, k, d).
     gap
         int Phi_i times the vector across, everywhere and where the sides do not cut each other,
         shape (f, k, 2, d).
@@ -145,19 +145,19 @@ def integrate(slave: Surface, master: Surface, reach: float, carriers: Carriers)
     gap, normal = np.zeros((*weight.shape, 2)), np.zeros((*weight.shape, direction.shape[1]))
     entries: list[Entries] = [(NOTHING, NOTHING, np.zeros(0))]
     for points in found:
-        phi = np.einsum("pij,pj->pi", dual[points.slave], _functions(points, slave, change))
-        phi *= points.weight[:, None]
+        own_share = points.weight[:, None] * _functions(points, slave, change)
+        phi = np.einsum("pij,pj->pi", dual[points.slave], own_share)
         across = np.column_stack([points.gap, np.maximum(points.gap, 0.0)])
         _add(gap, points.slave, phi[:, :, None] * across[:, None, :])
         normals = _normals(points, slave, master, direction)
-        _add(normal, points.slave, phi[:, :, None] * normals[:, None, :])
+        _add(normal, points.slave, own_share[:, :, None] * normals[:, None, :])
         entries.append(_master_entries(points, phi, carriers.nodes, master))
     return Parts(
         slave.nodes,
         carriers.nodes,
         own,
         np.einsum("fij,fj->fi", carriers.functions, integrals(slave)),
-        normal,
+        carriers.functions @ normal,
         gap[:, :, :, None] * direction[:, None, None, :],
         *(np.concatenate(part) for part in zip(*entries, strict=True)),
     )

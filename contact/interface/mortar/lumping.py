@@ -123,6 +123,9 @@ class Lumping:
         From the nodes to the curved surface that the facets approximate, shape (n, d) (length).
     mixing
         The jumps that belong to the weights; None where they are the nodal values.
+    means
+        int N~_j N_k: on curved facets a direction is the mean of those at the nodes with N~_j, by
+        which a constant pressure has its own nodal forces. None where facets are straight.
     """
 
     nodes: NDArray[np.int64]
@@ -130,6 +133,7 @@ class Lumping:
     normal: Array
     deviation: Array
     mixing: Mixing | None
+    means: Mixing | None
 
     @staticmethod
     def of(surface: Surface) -> Lumping:
@@ -146,11 +150,16 @@ class Lumping:
         deviation = np.zeros_like(normal)
         np.add.at(deviation, place, surface.node_deviations)
         deviation /= np.bincount(place.ravel(), minlength=nodes.size)[:, None]
-        change = dual_basis_transformation(surface.shape, surface.degree)
-        if np.array_equal(change, np.eye(len(change))):
-            return Lumping(nodes, weight, normal, deviation, None)
-        mixing = Mixing.alone(nodes, coefficients(place, nodes.size, change))
-        return Lumping(nodes, weight, normal, deviation, mixing)
+        change, mixing, means = dual_basis_transformation(surface.shape, surface.degree), None, None
+        if not np.array_equal(change, np.eye(len(change))):
+            mixing = Mixing.alone(nodes, coefficients(place, nodes.size, change))
+        if surface.order > 1:
+            own = surface.shape.lagrange(surface.degree, places)
+            masses = np.einsum("fq,qi,qk->fik", measure, functions, own)
+            rows, columns = np.broadcast_arrays(place[:, :, None], place[:, None, :])
+            pairs, shape = (rows.ravel(), columns.ravel()), (nodes.size, nodes.size)
+            means = Mixing.alone(nodes, sparse.csr_array((masses.ravel(), pairs), shape=shape))
+        return Lumping(nodes, weight, normal, deviation, mixing, means)
 
     def without_axis(self, surface: Surface) -> Lumping:
         """Return the areas where nodes on the axis of revolution carry no multiplier (degree 1).

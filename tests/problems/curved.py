@@ -1,0 +1,139 @@
+"""Quarters of thick rings of any cells, straight or of second order, and Lame's solution there."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+import basix.ufl
+import numpy as np
+import ufl
+from dolfinx import fem
+from dolfinx import mesh as dmesh
+from mpi4py import MPI
+
+from contact.mesh.cells import Shape
+from contact.mesh.domain import Domain, from_mesh
+from contact.mesh.grid import box, rectangle
+from contact.typing import Array
+
+#: Cells around a ring and across it for each on the other way.
+AROUND = 2
+
+
+@dataclass(frozen=True)
+class Lame:
+    """A ring between two radii under a pressure inside, in plane strain.
+
+    Attributes
+    ----------
+    inner, outer
+        Radii.
+    pressure
+        Inside.
+    young, poisson
+        Of the material.
+    """
+
+    inner: float = 1.0
+    outer: float = 2.0
+    pressure: float = 0.01
+    young: float = 1.0
+    poisson: float = 0.3
+
+    def _constants(self) -> tuple[float, float]:
+        squares = self.inner**2, self.outer**2
+        stress = self.pressure * squares[0] / (squares[1] - squares[0])
+        return stress, stress * squares[1]
+
+    def displacement(self, radius: Array) -> Array:
+        """Return the radial displacement."""
+        mean, rest = self._constants()
+        factor = (1 + self.poisson) / self.young
+        return factor * ((1 - 2 * self.poisson) * mean * radius + rest / radius)
+
+    def radial(self, radius: Array) -> Array:
+        """Return the radial stress."""
+        mean, rest = self._constants()
+        return mean - rest / radius**2
+
+
+def rings(
+    comm: MPI.Intracomm, cell: str, order: int, radii: Sequence[float], cells: Sequence[int]
+) -> Domain:
+    """Return quarters of rings about each other, with parts `inner0`, `outer0`, `inner1`, ...
+
+    In 3-D they are one deep. The others are `left` on x = 0, `bottom` on y = 0, `front` on z = 0
+    and `back`; regions are `ring0`, ...
+
+    Parameters
+    ----------
+    comm
+        Communicator.
+    cell
+        Shape of the cells.
+    order
+        Degree of their geometry.
+    radii
+        Those between which rings are, ascending.
+    cells
+        Cells across each ring; around there are twice as many.
+    """
+    shape = Shape(cell)
+    d, places, rows, count = shape.dim, [], [], 0
+    for low, high, n in zip(radii[:-1], radii[1:], cells, strict=True):
+        counts = [n, AROUND * n, max(n // 2, 1)][:d]
+        make = rectangle if d == 2 else box
+        grid = make(MPI.COMM_SELF, (0.0,) * d, (1.0,) * d, counts, cell=cell).mesh
+        space = fem.functionspace(grid, ("Lagrange", order))
+        x = space.tabulate_dof_coordinates()[:, :d].copy()
+        radius, angle = low + (high - low) * x[:, 0], np.pi / 2 * x[:, 1]
+        x[:, 0], x[:, 1] = radius * np.cos(angle), radius * np.sin(angle)
+        # Nodes of the next ring at the same radius are others.
+        places.append(x)
+        rows.append(space.dofmap.list + count)
+        count += len(x)
+    element = basix.ufl.element("Lagrange", cell, order, shape=(d,), dtype=np.float64)
+    first = comm.rank == 0
+    cells_here = np.concatenate(rows).astype(np.int64)[: None if first else 0]
+    x = np.concatenate(places)[: None if first else 0]
+    mesh = dmesh.create_mesh(comm, cells=cells_here, x=x, e=ufl.Mesh(element))
+    mesh.topology.create_connectivity(d - 1, d)
+    facets = dmesh.exterior_facet_indices(mesh.topology)
+    to_cell = mesh.topology.connectivity(d - 1, d)
+    behind = dmesh.compute_midpoints(mesh, d, to_cell.array[to_cell.offsets[facets]])
+    middle = dmesh.compute_midpoints(mesh, d - 1, facets)
+    every = np.arange(mesh.topology.index_map(d).size_local, dtype=np.int32)
+    centre = np.linalg.norm(dmesh.compute_midpoints(mesh, d, every)[:, :2], axis=1)
+    inside, at = (np.linalg.norm(x[:, :2], axis=1) for x in (behind, middle))
+    flat = {"left": 0, "bottom": 1, "front": 2}
+    sides = {name: np.abs(middle[:, k]) < 1e-9 for name, k in flat.items() if k < d}
+    if d == 3:
+        sides["back"] = np.abs(middle[:, 2] - 1) < 1e-9
+    round_ = ~np.any([*sides.values()], axis=0)
+    regions = {}
+    for k, (low, high) in enumerate(pairwise(radii)):
+        # Chords lie within the circles.
+        own = round_ & (inside > low * 0.95) & (inside < high)
+        sides[f"inner{k}"] = own & (at < inside)
+        sides[f"outer{k}"] = own & (at > inside)
+        regions[f"ring{k}"] = every[(centre > low * 0.95) & (centre < high)]
+    parts = {name: facets[chosen] for name, chosen in sides.items()}
+    return from_mesh(mesh, parts, radii[-1], regions)
+
+
+def error(space: fem.FunctionSpace, x: Array, exact: Lame) -> float:
+    """Return the relative error of displacements in L2. Collective."""
+    mesh, u = space.mesh, fem.Function(space)
+    u.x.array[:] = x[: u.x.array.size]
+    place = ufl.SpatialCoordinate(mesh)
+    radius = ufl.sqrt(place[0] ** 2 + place[1] ** 2)
+    mean, rest = exact._constants()
+    factor = (1 + exact.poisson) / exact.young
+    size = factor * ((1 - 2 * exact.poisson) * mean + rest / radius**2)
+    known = ufl.as_vector([size * place[0], size * place[1], 0][: mesh.geometry.dim])
+    dx = ufl.dx(metadata={"quadrature_degree": 10})
+    squares = [fem.assemble_scalar(fem.form(ufl.inner(v, v) * dx)) for v in (u - known, known)]
+    off, whole = mesh.comm.allreduce(np.array(squares))
+    return float(np.sqrt(off / whole))

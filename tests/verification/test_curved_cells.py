@@ -1,0 +1,159 @@
+"""Cells of second order: full orders on round bodies, in front of foundations and between bodies.
+
+The exact solutions are Lame's: a ring that is pressed on a shaft, and two rings about each other.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+
+from contact.body.description import Body, Fixed, Load
+from contact.errors import InputError
+from contact.interface.obstacle import Cylinder, GapFunction, Sphere
+from contact.mesh.cells import SHAPES, rule, shape_of
+from contact.mesh.domain import Domain
+from contact.mesh.geometry import geometry_nodes, inverse, jacobians, sizes, volumes
+from contact.mesh.transfer import refined
+from contact.methods.newton import Newton
+from contact.methods.options import NewtonOptions
+from contact.output.error_estimate import estimated
+from contact.problem.contact import Contact
+from contact.problem.problem import ContactProblem
+from forms.hencky import Linear
+from scripts.force_balance import force_balance
+from tests.problems.curved import Lame, error, rings
+from tests.problems.mechanics import constant
+
+COMM = MPI.COMM_WORLD
+NAMES = [shape.name for shape in SHAPES]
+LAME = Lame()
+LAW = Linear(LAME.young, LAME.poisson)
+
+
+def supports(dim: int) -> list[Fixed]:
+    zero = constant(0.0, dim)
+    sides = [("left", 0), ("bottom", 1), ("front", 2), ("back", 2)][: 2 * dim - 2]
+    return [Fixed(part, [zero if i == k else None for i in range(dim)]) for part, k in sides]
+
+
+def on_a_shaft(domain: Domain, degree: int) -> ContactProblem:
+    """Press a ring on a shaft, whose radius is that at which the pressure is LAME's."""
+    dim = domain.dim
+    radius = 1.0 + float(LAME.displacement(np.array(1.0)))
+    shaft = (
+        Sphere((0.0, 0.0), radius)
+        if dim == 2
+        else Cylinder((0.0, 0.0, 0.0), (0.0, 0.0, 1.0), radius)
+    )
+    contact = Contact("inner0", shaft, press=True)
+    return ContactProblem(domain, Body(LAW, supports(dim)), contact, degree=degree)
+
+
+def two_rings(domain: Domain, degree: int, on: str) -> ContactProblem:
+    """Put two rings about each other, as one, under a pressure inside."""
+    nothing = GapFunction(lambda points: np.zeros(len(points)))
+    against = {"outer0": "inner1", "inner1": "outer0"}[on]
+    load = Load("inner0", pressure=constant(LAME.pressure, domain.dim))
+    body = Body(LAW, supports(domain.dim), [load])
+    return ContactProblem(domain, body, Contact(on, nothing, against=against), degree=degree)
+
+
+def solved(problem: ContactProblem) -> tuple[float, np.ndarray]:
+    """Return the error of the displacements in L2, and the pressures of all ranks."""
+    state, outcome = Newton(problem, NewtonOptions(tolerance=1e-11)).solve()
+    assert outcome.converged, outcome
+    assert force_balance(problem, state).imbalance < 1e-9
+    size = error(problem.equilibrium.space, state.x, LAME)
+    return size, problem.nodes.gather(state.forces.pressure)
+
+
+@pytest.mark.parallel
+@pytest.mark.parametrize("name", NAMES)
+def test_a_ring_on_a_shaft_converges_with_the_third_order(name: str) -> None:
+    found = [solved(on_a_shaft(rings(COMM, name, 2, (1.0, 2.0), (n,)), 2)) for n in (2, 4)]
+    assert found[1][0] < found[0][0] / 2**2.8 < 5e-4
+    np.testing.assert_allclose(found[1][1], LAME.pressure, rtol=0.03)
+
+
+@pytest.mark.parallel
+@pytest.mark.parametrize("on", ["outer0", "inner1"])
+@pytest.mark.parametrize("name", NAMES)
+def test_two_rings_converge_with_the_third_order(name: str, on: str) -> None:
+    """On meshes that do not match, whichever is the slave."""
+    radii = (1.0, 1.5, 2.0)
+    found = [solved(two_rings(rings(COMM, name, 2, radii, (n, n + 1)), 2, on)) for n in (2, 4)]
+    assert found[1][0] < found[0][0] / 2**2.8 < 5e-4
+    pressure = -float(LAME.radial(np.array(1.5)))
+    np.testing.assert_allclose(found[1][1], pressure, rtol=0.06)
+
+
+@pytest.mark.parametrize("name", NAMES[:2])
+def test_straight_cells_have_the_second_order(name: str) -> None:
+    """On the polygon that they are: curved ones are ten times as exact."""
+    straight, curved = (
+        [solved(on_a_shaft(rings(COMM, name, order, (1.0, 2.0), (n,)), 2))[0] for n in (4, 8)]
+        for order in (1, 2)
+    )
+    assert straight[0] / straight[1] < 2**2.1
+    assert curved[1] < straight[1] / 10
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_displacements_of_degree_1_on_curved_cells(name: str) -> None:
+    found = [
+        solved(on_a_shaft(rings(MPI.COMM_SELF, name, 2, (1.0, 2.0), (n,)), 1))[0] for n in (2, 4)
+    ]
+    assert found[1] < found[0] / 2**1.4
+
+
+@pytest.mark.parallel
+@pytest.mark.parametrize("name", NAMES)
+def test_volumes_and_areas_are_those_of_round_bodies(name: str) -> None:
+    domain = rings(COMM, name, 2, (1.0, 2.0), (4,))
+    assert domain.order == 2
+    exact = 3 * np.pi / 4
+    assert COMM.allreduce(volumes(domain).sum()) == pytest.approx(exact, rel=1e-5)
+    assert domain.volume(domain.ds("inner0")) == pytest.approx(np.pi / 2, rel=1e-5)
+    nodes = on_a_shaft(domain, 2).nodes
+    assert nodes.sum(np.ones(nodes.nodes.size)) == pytest.approx(np.pi / 2, rel=1e-5)
+
+
+@pytest.mark.parametrize("shape", SHAPES, ids=NAMES)
+def test_sizes_of_curved_facets_and_their_normals_close_the_cell(shape) -> None:
+    """The integral of n over the boundary is 0, and that of x.n is dim times the volume."""
+    domain = rings(MPI.COMM_SELF, shape.name, 2, (1.0, 2.0), (2,))
+    of, total, through = geometry_nodes(domain), 0.0, 0.0
+    points, weights = rule(shape.facet, 8)
+    for facet, nodes in enumerate(shape.facet_nodes(2)):
+        on_cell = shape.on_facet(facet, points)
+        normal = shape.facet_normals[facet] @ inverse(jacobians(shape, of, on_cell))
+        normal = normal / np.linalg.norm(normal, axis=-1, keepdims=True)
+        area = (sizes(shape.facet, of[:, nodes], points) * weights)[..., None]
+        total += (area * normal).sum(axis=1)
+        through += (area * normal * (shape.lagrange(2, on_cell) @ of)).sum(axis=(1, 2))
+    np.testing.assert_allclose(total, 0, atol=1e-13)
+    assert shape_of(domain.mesh) == shape
+    np.testing.assert_allclose(through, shape.dim * volumes(domain), rtol=1e-10)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_estimates_follow_the_error(name: str) -> None:
+    found = []
+    for n in (2, 4):
+        problem = on_a_shaft(rings(MPI.COMM_SELF, name, 2, (1.0, 2.0), (n,)), 2)
+        state, _ = Newton(problem, NewtonOptions(tolerance=1e-11)).solve()
+        found.append(estimated(problem, state).relative)
+    assert found[1] < found[0] / 2.5 < 0.05
+
+
+def test_curved_cells_are_neither_refined_nor_of_mean_dilatation() -> None:
+    domain = rings(MPI.COMM_SELF, "triangle", 2, (1.0, 2.0), (2,))
+    for marked in (None, np.array([0], dtype=np.int32)):
+        with pytest.raises(InputError, match=r"mesh\.refine, mesh\.adapt: the cells are curved"):
+            refined(domain, marked)
+    body, contact = Body(LAW, supports(2)), Contact("inner0", Sphere((0.0, 0.0), 1.0))
+    with pytest.raises(InputError, match="accepted: 'standard' on curved cells"):
+        ContactProblem(domain, body, contact, degree=2, element="mean_dilatation")
+
