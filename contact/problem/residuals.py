@@ -134,13 +134,19 @@ def residual_forces(problem: Problem, state: State, secant_at: Array | None = No
     return residual
 
 
+#: Unknowns beside those of a state, and the internal forces there.
+_Beside = tuple[Array, Array]
+
+
 @lru_cache(maxsize=2)  # of the body, and of its contact nodes
 def _perturbation(size: int) -> Array:
     """Return relative perturbations of unknowns, with random signs."""
     return PERTURBATION * np.random.default_rng(0).choice((-1.0, 1.0), size)
 
 
-def force_rounding(problem: Problem, state: State, internal: Array) -> Array:
+def force_rounding(
+    problem: Problem, state: State, internal: Array, beside: _Beside | None = None
+) -> Array:
     """Return the rounding of the forces, and of the charges, by component. Collective.
 
     Unknowns are known to `EPS` of their size. The stresses around a node of a slender body, or of
@@ -149,14 +155,20 @@ def force_rounding(problem: Problem, state: State, internal: Array) -> Array:
     unknown remains: seen by moving all of them, up and down at random. No backward stable method
     leaves less (Rigal and Gaches, J. ACM 14 (1967) 543).
     """
+    body, (moved, there) = problem.equilibrium, beside or _beside(problem, state)
+    change = there - internal
+    problem.interface.add_current(change, state.x, moved - state.x, state.forces)
+    return MARGIN * EPS / PERTURBATION * body.sizes(body.unbalanced(change))
+
+
+def _beside(problem: Problem, state: State) -> _Beside:
+    """Return unknowns that are a little moved, and the internal forces there. Collective."""
     body, own = problem.equilibrium, problem.equilibrium.owned_part(state.x)
     # All ranks hold the global unknowns behind those of the nodes.
     step = np.full(own.size, PERTURBATION)
     step[: body.owned] = _perturbation(body.owned)
     moved = body.moved(state.x, step * own)
-    change = body.internal_forces(replace(state, x=moved)) - internal
-    problem.interface.add_current(change, state.x, moved - state.x, state.forces)
-    return MARGIN * EPS / PERTURBATION * body.sizes(body.unbalanced(change))
+    return moved, body.internal_forces(replace(state, x=moved))
 
 
 def _as_pressures(interface: Interface, forces: Array) -> Array:
@@ -192,11 +204,13 @@ def evaluate(problem: Problem, state: State) -> Residuals:
     Those of a body that flies away are no numbers, which is all there is to say of them.
     """
     body, interface = problem.equilibrium, problem.interface
+    loads = body.load_sizes(state.time)
+    # Asked for first: laws with history keep their last response, which is then that of the state.
+    beside = None if (loads > 0).all() else _beside(problem, state)
     internal = body.internal_forces(state)
     on_contact = np.zeros_like(internal)
     interface.add_forces(on_contact, state.x, state.forces)
     residual = internal - body.external(state.time) + on_contact
-    loads = body.load_sizes(state.time)
     answers = body.sizes(on_contact) + body.exchanged(state)
     scale = loads + answers + body.sizes(body.reactions(residual))
     unbalanced = body.sizes(body.unbalanced(residual))
@@ -204,7 +218,8 @@ def evaluate(problem: Problem, state: State) -> Residuals:
     asked = ~acted | (unbalanced <= most)
     rounding, unknown = np.zeros_like(scale), np.zeros(interface.components)
     if asked.any():
-        rounding = np.where(asked, force_rounding(problem, state, internal), 0.0)
+        found = force_rounding(problem, state, internal, beside)
+        rounding = np.where(asked, found, 0.0)
         unknown = np.minimum(rounding, most)[0]
         acted |= answers > rounding
         # Where nothing acts on a body all of its forces are rounding, its own or that of others.
