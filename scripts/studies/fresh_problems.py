@@ -42,7 +42,7 @@ def along_normal(solution: Solution) -> float:
     That is the largest pressure but for bodies that touch nothing, where rounding is left of both.
     """
     nodes, forces = solution.problem.nodes, solution.forces
-    stresses = np.abs(forces.pressure), np.linalg.norm(forces.friction, axis=1)
+    stresses = np.abs(forces.pressure), np.abs(forces.friction)  # their squares may underflow
     scale = max(stress.max(initial=0.0) for stress in stresses)
     largest = np.abs(nodes.normal_component(forces.friction)).max(initial=0.0)
     return float(largest / max(scale, 1e-300))
