@@ -18,6 +18,7 @@ from contact import solve
 from contact.case.file import Case, parse_case
 from contact.case.text import number_at, to_toml, with_number
 from contact.derivatives import sensitivity
+from contact.errors import InputError
 from contact.output.differentiable import named_quantities
 from contact.output.solution import Solution
 from contact.problem.linearised import active_set
@@ -25,7 +26,7 @@ from contact.typing import Array
 from scripts.reporting import Report, append, parser
 
 #: Relative changes of a parameter in the central differences: the first without a kink between.
-STEPS = (1e-4, 1e-5, 1e-6)
+STEPS = (2e-5, 5e-6, 1e-6)
 
 #: Sections with parameters.
 SECTIONS = ("material", "fixed", "load", "contact", "friction", "electric", "electrode")
@@ -79,7 +80,7 @@ def _slip(rng: np.random.Generator) -> dict[str, Any]:
 def problem(seed: int) -> tuple[str, dict[str, Any]]:
     """Return a random problem: its family, and the data of its case."""
     rng = np.random.default_rng(seed)
-    data, family = block(rng), FAMILIES[seed % len(FAMILIES)]
+    data, family = block(rng), family_of(seed)
     if family == "slip":
         data["friction"]["mu"] = _slip(rng)
     elif family == "log":
@@ -141,8 +142,49 @@ def problem(seed: int) -> tuple[str, dict[str, Any]]:
         data["space"] = {"kinematics": "axisymmetric", "degree": 2}
         data["fixed"] = [{"on": "top", "displacement": [0.0, -0.01]}]
         data["contact"]["gap"] = "0.01*x**2"
+    elif family == "turning plate":
+        data["fixed"] = []
+        force = [rng.uniform(-3e-3, 3e-3), -rng.uniform(0.01, 0.02)]
+        plate = {"on": "top", "displacement": ["free", "free"], "force": force}
+        plate |= {"rotation": "free", "moment": rng.uniform(-1e-3, 1e-3)}
+        data["rigid"] = [{**plate, "centre": [rng.uniform(0.6, 1.4), 0.0]}]
+        data["friction"]["mu"] = max(data["friction"]["mu"], 0.5)
+    elif family == "slant, in SI":
+        size, young = 10 ** rng.uniform(-3, 0), 210e9
+        angle = rng.uniform(10, 80)
+        c, s = np.cos(np.radians(angle)), np.sin(np.radians(angle))
+        push = 1e-3 * size * np.array([[c, -s], [s, c]]) @ [rng.uniform(-1, 1), -4.0]
+        data["mesh"] |= {"size": [2 * size, size], "rotation": angle}
+        data["material"]["young"] = young
+        data["fixed"] = [{"on": "top", "displacement": push.tolist()}]
+        data["load"] = [{"on": "left", "traction": [0.0, 1e-5 * young]}]
+        data["contact"]["gap"] = 1e-3 * size
+    elif family == "numbers at 0":
+        size, young = 10 ** rng.uniform(-6, 0), 10 ** rng.uniform(0, 11)
+        data["mesh"] |= {"size": [2 * size, size], "origin": [0.0, 0.0], "rotation": 0.0}
+        data["material"] = {"young": young, "poisson": 0.0}
+        data["fixed"] = [{"on": "bottom", "displacement": [0.0, 0.0]}]
+        data["load"] = [{"on": "right", "traction": [0.0, 0.0]}]
+        ball = {"shape": "sphere", "centre": [0.0, 3.01 * size], "radius": 2 * size}
+        motion = {"displacement": [0.0, -0.06 * size], "rotation": 0.0, "centre": [0.0, 0.0]}
+        data["contact"] = {"on": "top", "foundation": ball, "rigid": motion}
+        law = {"law": "slip", "a": rng.uniform(0.2, 0.6), "b": 0.0, "rho": 0.0}
+        data["friction"] = {"law": "coulomb", "mu": law}
     return family, data | {"solver": {"tolerance": 1e-13}}
 
+
+def family_of(seed: int) -> str:
+    """Return the family of a problem: those of `FURTHER` come after the others."""
+    if seed < COUNT:
+        return FAMILIES[seed % len(FAMILIES)]
+    return FURTHER[(seed - COUNT) % len(FURTHER)]
+
+
+#: Families of which all numbers are parameters, those of the mesh and 0 among them.
+FURTHER = ("turning plate", "slant, in SI", "numbers at 0")
+
+#: Problems of the others, and of all.
+COUNT, ALL = 60, 72
 
 FAMILIES = (
     "number",
@@ -163,21 +205,56 @@ FAMILIES = (
 )
 
 
-def keys(case: Case) -> list[str]:
-    """Return the keys of a case with numbers that its solution depends on."""
+def keys(case: Case, every: bool = False) -> list[str]:
+    """Return the keys of a case with numbers that its solution depends on.
+
+    Every one, or those of the sections but the mesh and rigid parts that are not 0.
+    """
     data = tomllib.loads(to_toml(case))
-    found = [key for name in SECTIONS if name in data for key in _numbers(data[name], name)]
-    return [key for key in found if key.rpartition(".")[2] not in CHOICES]
+    sections = (*SECTIONS, "mesh", "rigid") if every else SECTIONS
+    found = [key for name in sections if name in data for key in _numbers(data[name], name, every)]
+    kept = [key for key in found if key.rpartition(".")[2] not in CHOICES or "foundation" in key]
+    return [key for key in kept if _moves(case, key)]
 
 
-def _numbers(value: Any, path: str) -> Iterator[str]:
+def _moves(case: Case, key: str) -> bool:
+    """Tell whether a larger number is accepted: no moment is where no rotation is free."""
+    try:
+        with_number(case, key, number_at(case, key) + 1e-9)
+    except InputError:
+        return False
+    return True
+
+
+def _numbers(value: Any, path: str, every: bool) -> Iterator[str]:
     if isinstance(value, Mapping | list):
         inner = value.items() if isinstance(value, Mapping) else enumerate(value)
         for key, item in inner:
-            if key not in ("foundation", "centre"):
-                yield from _numbers(item, f"{path}.{key}")
-    elif isinstance(value, float) and 0 < abs(value) < np.inf:
+            if every or key not in ("foundation", "centre"):
+                yield from _numbers(item, f"{path}.{key}", every)
+    elif isinstance(value, float) and abs(value) < np.inf and (every or value != 0):
         yield path
+
+
+def size_of(case: Case, key: str) -> float:
+    """Return the size of a parameter, by the units of the body where it is 0."""
+    size = abs(number_at(case, key))
+    if size > 0:
+        return size
+    assert case.mesh.size is not None  # numbers at 0 are those of rectangles
+    length, young = case.mesh.size[-1], number_at(case, f"{case.materials[0][0]}.young")
+    sizes = {
+        "displacement": 0.01 * length,
+        "traction": 0.01 * young,
+        "rotation": 1.0,
+        "poisson": 0.1,
+        "origin": 0.1 * length,
+        "centre": 0.1 * length,
+        "b": 0.1,
+        "rho": 1 / length,
+    }
+    named = [name for name in key.split(".") if not name.isdigit()]
+    return sizes[named[-1]]
 
 
 def values(solution: Solution, names: list[str]) -> Array:
@@ -188,53 +265,63 @@ def values(solution: Solution, names: list[str]) -> Array:
 
 
 def moved(case: Case, way: Mapping[str, float], by: float) -> Case:
-    """Return a case with each of some numbers changed by so many times its way, relatively."""
+    """Return a case with each of some numbers changed by so many times its way and size."""
+    made = case
     for key, change in way.items():
-        case = with_number(case, key, number_at(case, key) * (1 + by * change))
-    return case
+        if change:
+            made = with_number(made, key, number_at(case, key) + by * change * size_of(case, key))
+    return made
 
 
 def active_sets(solution: Solution) -> Array:
-    """Return places, state and slip of the contact nodes of all steps, sorted. Collective.
+    """Return states of the contact nodes of all steps, in an order of their places. Collective.
 
-    Of all ranks: two runs need not divide a mesh alike.
+    Of all ranks: two runs need not divide a mesh alike, and their meshes may differ a little.
     """
     base, found = solution.problem, []
+    along = np.sqrt([1.0, 2.0, 3.0])[: base.dim]
     for state in [step.state for step in solution.steps] or [solution.state]:
         active = active_set(base.at(state.time, state.history), state)
-        own = np.column_stack([base.nodes.points.round(9), active.closed, active.slips])
+        own = np.column_stack([base.nodes.points @ along, active.closed, active.slips])
         rows = base.nodes.gather(own)
-        found.append(rows[np.lexsort(rows.T)])
+        found.append(rows[np.argsort(rows[:, 0]), 1:])
     return np.array(found)
 
 
 def differences(
     solution: Solution, names: list[str], way: Mapping[str, float]
 ) -> tuple[Array, float]:
-    """Return the derivatives along a way of parameters by central differences of solutions.
+    """Return the derivatives along a way of parameters by differences of solutions.
 
-    Where the active sets of the two ends differ in a step, the difference goes across a kink of
-    the results: it is taken over a tenth of the way then, and over a hundredth.
+    Where the active sets of the ends differ in a step, the difference goes across a kink of
+    the results: it is taken over a smaller part of the way then. It is central, or
+    of second order on one side where no number is accepted on the other.
 
     Parameters
     ----------
     solution, names
         The solution, and results of it.
     way
-        Key -> change of the parameter, relative to its value.
+        Key -> change of the parameter, relative to its `size_of`.
 
     Returns
     -------
-    The derivatives, and over which relative change they were taken.
+    The derivatives, and over which relative change they were taken; 0 where there is a kink between
+    the ends of the smallest.
     """
     comm, case = solution.problem.comm, solution.source
     for step in STEPS:
-        ends = [solve(moved(case, way, by), comm=comm) for by in (step, -step)]
-        one, other = (active_sets(end) for end in ends)
-        if np.array_equal(one, other):
+        try:
+            ends, factors = [moved(case, way, by) for by in (step, -step)], (0.5, -0.5)
+        except InputError:  # a border
+            ends, factors = [moved(case, way, by) for by in (step, 2 * step, 0.0)], (2, -0.5, -1.5)
+        runs = [solve(end, comm=comm) for end in ends]
+        one, *others = (active_sets(run) for run in runs)
+        same = all(np.array_equal(one, other) for other in others)
+        if same:
             break
-    ahead, behind = (values(end, names) for end in ends)
-    return (ahead - behind) / (2 * step), step
+    found = sum(f * values(run, names) for f, run in zip(factors, runs, strict=True)) / step
+    return found, step if same else 0.0
 
 
 @dataclass(frozen=True)
@@ -246,8 +333,8 @@ class Compared:
     apart, adjoint
         To central differences of solutions, and to the adjoint.
     weak, kinks
-        Numbers of weakly active nodes, and of differences that were shortened: at their ends
-        another node touches, sticks or slips.
+        Number of weakly active nodes; names of the parameters whose differences were shortened, for
+        at their ends another node touches, sticks or slips, each with the step.
     parameters, results, ways
         How many there are; ways of parameters along which solutions were compared.
     """
@@ -256,7 +343,7 @@ class Compared:
     apart: float
     adjoint: float
     weak: int
-    kinks: int
+    kinks: str
     parameters: int
     results: int
     ways: int
@@ -275,7 +362,7 @@ def compared(seed: int, comm: MPI.Intracomm, each: bool = True) -> Compared:
     """
     family, data = problem(seed)
     solution = solve(parse_case(data), comm=comm)
-    given = keys(solution.source)
+    given = keys(solution.source, every=family in FURTHER)
     names = ["contact_force_x", "contact_force_y", "max_pressure", "max_displacement"]
     names = names[1:] if family == "revolution" else names
     if family == "ball under a force":
@@ -284,7 +371,9 @@ def compared(seed: int, comm: MPI.Intracomm, each: bool = True) -> Compared:
         names += ["charge_foundation", "charge_top"]
     if family == "evolution, electrode":
         names += ["charge_foundation", "potential_top", "reaction_x_top"]
-    size = np.array([number_at(solution.source, key) for key in given])
+    if family == "turning plate":
+        names += ["rigid_x", "rigid_y", "rigid_rotation", "rigid_moment"]
+    size = np.array([size_of(solution.source, key) for key in given])
     found = sensitivity(solution, names, given, "tangent")
     other = sensitivity(solution, names, given, "adjoint")
     # By relative changes of the parameters: in the units of the results.
@@ -299,12 +388,14 @@ def compared(seed: int, comm: MPI.Intracomm, each: bool = True) -> Compared:
         ways = np.random.default_rng(seed).uniform(-1, 1, (len(given), 1))
     ends = [differences(solution, names, dict(zip(given, way, strict=True))) for way in ways.T]
     apart, along = np.column_stack([end for end, _ in ends]), tangent @ ways
+    known = given if each else ["all of them"]
+    kinks = [f"{k} ({step:g})" for k, (_, step) in zip(known, ends, strict=True) if step < STEPS[0]]
     return Compared(
         family,
         float((np.abs(along - apart) / np.maximum(np.abs(apart), LEAST * natural)).max()),
         both,
         len(found.weakly_active),
-        sum(step < STEPS[0] for _, step in ends),
+        "; ".join(kinks),
         len(given),
         len(names),
         ways.shape[1],
@@ -314,12 +405,12 @@ def compared(seed: int, comm: MPI.Intracomm, each: bool = True) -> Compared:
 def main(arguments: Sequence[str] | None = None) -> None:
     """Compare the problems, and tabulate those of all numbers of ranks in the folder."""
     made = parser(__doc__, "derivatives")
-    made.add_argument("--count", type=int, default=60, help="number of problems")
+    made.add_argument("--count", type=int, default=ALL, help="number of problems")
     made.add_argument("--together", action="store_true", help="solutions along one way alone")
     given, comm = made.parse_args(arguments), MPI.COMM_WORLD
     report = Report(given.out)
     rows: dict[str, list[Any]] = {name: [] for name in ("ranks", *Compared.__annotations__)}
-    for seed in range(len(FAMILIES) if given.coarse else given.count):
+    for seed in range(len(FAMILIES) if given.coarse else given.count):  # one of each
         begin, one = time.perf_counter(), compared(seed, comm, not (given.together or given.coarse))
         append(rows, comm.size, *vars(one).values())
         if comm.rank == 0:
@@ -345,14 +436,17 @@ def tabulate(report: Report) -> None:
     for path in sorted(report.out.glob("problems-*.csv")):
         with path.open(newline="") as stream:
             every = list(csv.DictReader(stream))
-        for family in FAMILIES:
+        for family in (*FAMILIES, *FURTHER):
             own = [row for row in every if row["family"] == family]
+            if not own:
+                continue
             apart, adjoint = (max(float(row[name]) for row in own) for name in ("apart", "adjoint"))
             by, along = (
                 sum(int(row[name]) * int(row["results"]) for row in own)
                 for name in ("parameters", "ways")
             )
-            kinks, ranks = sum(int(row["kinks"]) for row in own), every[0]["ranks"]
+            kinks = sum(len(row["kinks"].split(";")) for row in own if row["kinks"])
+            ranks = every[0]["ranks"]
             append(columns, family, ranks, len(own), by, adjoint, along, apart, kinks)
     report.table(
         "problems",
@@ -363,7 +457,8 @@ def tabulate(report: Report) -> None:
         "derivatives, along one random way of all. Derivatives are compared relative to "
         "themselves, but to not less than a hundredth of the result (apart) or the result "
         "(adjoint) over the parameter. Kinks: differences between whose ends a node begins to "
-        "touch, stick or slip, and which were taken over a tenth or hundredth of the way.",
+        "touch, stick or slip, and which were taken over a smaller part of the way; "
+        "problems-1.csv names their parameters.",
     )
 
 
