@@ -357,14 +357,17 @@ class ConstrainedOperator:
             solution[self._owned :][free] += self._gives @ left[free]
         return solution
 
-    def multiply(self, values: Array) -> Array:
-        """Return the matrix times owned values and q, as forces on x and q. Collective."""
+    def multiply(self, values: Array, transposed: bool = False) -> Array:
+        """Return the matrix, or its transpose, times values on x and q, as forces. Collective.
+
+        The border is its own transpose: of a matrix that is not symmetric no q is free.
+        """
         bulk, layout = self._bulk, self._bulk.layout
         relative = self._constraint.relative(values)
         own, q = relative[: self._owned], relative[self._owned :]
         if q.size == 0:
-            return self._constraint.forces(self._inner.multiply(own))
-        forces = layout.mask(self._inner.multiply(layout.mask(own)) + bulk.columns @ q)
+            return self._constraint.forces(self._inner.multiply(own, transposed))
+        forces = layout.mask(self._inner.multiply(layout.mask(own), transposed) + bulk.columns @ q)
         on_q = self._on_q(bulk.columns, own) + bulk.corner @ q
         return self._constraint.forces(np.concatenate([forces, on_q]))
 

@@ -134,9 +134,9 @@ class SparseOperator:
         with petsc_options(prefix):
             self.ksp.setFromOptions()
 
-    def multiply(self, values: Array) -> Array:
-        """Return the matrix times owned values. Collective."""
-        return times(self.matrix, values)
+    def multiply(self, values: Array, transposed: bool = False) -> Array:
+        """Return the matrix, or its transpose, times owned values. Collective."""
+        return times(self.matrix, values, transposed)
 
     def update(self, kind: str, state: Evaluated, blocks: Array, *, constant: bool = False) -> bool:
         """Assemble the operator at a state. Collective.

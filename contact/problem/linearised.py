@@ -231,7 +231,7 @@ class Linearised:
             )
             x, f = x + dx, f + df
             left = left - self._conditions_of(moved, df)
-            rhs = np.zeros_like(rhs)
+            rhs -= self._operator.multiply(dx)  # rounding of stiff blocks: iterative refinement
             size, steps = max(size, self._norm(x, f)), [*steps, self._norm(dx, df)]
             if self._enough(steps, size):
                 return x, f
@@ -259,7 +259,7 @@ class Linearised:
             x, c = x + dx, c + dc
             by_jump, by_own = self._smoothed_transposed(dc)
             left = left - moved - np.einsum("nji,nj->ni", self._by_force, dc) - by_own
-            rhs = np.zeros_like(rhs)
+            rhs -= self._operator.multiply(dx, transposed=True)
             jump.transpose(-by_jump, rhs)
             size, steps = max(size, self._norm(x, c)), [*steps, self._norm(dx, dc)]
             if self._enough(steps, size):
