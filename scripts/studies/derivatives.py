@@ -386,6 +386,8 @@ def compared(seed: int, comm: MPI.Intracomm, each: bool = True) -> Compared:
     ways = np.eye(len(given))
     if not each:
         ways = np.random.default_rng(seed).uniform(-1, 1, (len(given), 1))
+        at = np.array([number_at(solution.source, key) for key in given])
+        ways[at == 0] = np.abs(ways[at == 0])  # 0 may be the least that is accepted
     ends = [differences(solution, names, dict(zip(given, way, strict=True))) for way in ways.T]
     apart, along = np.column_stack([end for end, _ in ends]), tangent @ ways
     known = given if each else ["all of them"]
