@@ -7,8 +7,9 @@ a piece of the mesh stands for, is stated by a `Kinematics`.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import math
 from dataclasses import dataclass
+from itertools import combinations
 from typing import Protocol
 
 import ufl
@@ -165,7 +166,7 @@ class MeanDilatation:
 
 @dataclass(frozen=True)
 class MultilinearMean:
-    """The same on quadrilaterals of degree 1: Q1-P0 with the pressure condensed.
+    """The same on quadrilaterals and hexahedra of degree 1: Q1-P0 with the pressure condensed.
 
     All but `base` are functions: of UFL's own Jacobian no form can be differentiated.
 
@@ -189,31 +190,20 @@ class MultilinearMean:
 
     def gradient(self, u: Expr) -> Expr:
         """Return the displacement gradient with the mean of its trace."""
-        gradient, values = self.base.gradient(u), [u]
-        for _ in range(len(u)):
-            values.append(ufl.dot(ufl.grad(values[-1]), self.jacobian))
+        gradient = self.base.gradient(u)
         corners, dim = self.ways.ufl_shape
-        mean = sum(
-            ufl.dot(_row(self.weights, a, dim), _taylor(values, _row(self.ways, a, dim)))
-            for a in range(corners)
-        )
+        # u of a corner is the sum over sets of axes of its derivatives along these, times the way.
+        sets = [axes for size in range(dim + 1) for axes in combinations(range(dim), size)]
+        derivatives: dict[tuple[int, ...], Expr] = {(): u}
+        mean = 0
+        for axes in sets:
+            if axes:
+                slope = ufl.as_vector([self.jacobian[i, axes[-1]] for i in range(dim)])
+                derivatives[axes] = ufl.dot(ufl.grad(derivatives[axes[:-1]]), slope)
+            ways = [math.prod(self.ways[a, i] for i in axes) for a in range(corners)]
+            moment = [sum(ways[a] * self.weights[a, i] for a in range(corners)) for i in range(dim)]
+            mean += ufl.dot(ufl.as_vector(moment), derivatives[axes])
         return gradient + (mean - ufl.tr(gradient)) / 3 * ufl.Identity(3)
-
-
-def _row(matrix: Expr, row: int, length: int) -> Expr:
-    return ufl.as_vector([matrix[row, i] for i in range(length)])
-
-
-def _taylor(derivatives: Sequence[Expr], way: Expr) -> Expr:
-    """Return the value at the end of a way, given all derivatives at its beginning."""
-    found, factorial = derivatives[0], 1.0
-    for k, term in enumerate(derivatives[1:], 1):
-        factorial *= k
-        along = term
-        for _ in range(k):
-            along = ufl.dot(along, way)
-        found = found + along / factorial
-    return found
 
 
 def _way(u: Expr, centroid: Expr) -> Expr:

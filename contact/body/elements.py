@@ -8,7 +8,7 @@ import numpy as np
 from dolfinx import fem
 
 from contact.errors import InputError
-from contact.mesh.cells import HEXAHEDRON, QUADRILATERAL, Shape, rule, shape_of
+from contact.mesh.cells import Shape, rule, shape_of
 from contact.mesh.domain import Domain
 from contact.mesh.geometry import geometry_nodes, inverse, jacobians, measures
 from contact.typing import Array
@@ -50,19 +50,15 @@ def needed(element: str, degree: int, shape: Shape, order: int = 1) -> str | Non
         return "'standard' on curved cells"
     if shape.simplex:
         return None if degree == 2 else f"degree = 2, or 'standard': {CONSTANT}"
-    if shape == HEXAHEDRON:
-        return f"'standard' on hexahedra: {ENOUGH}"
-    return None if degree == 1 else f"degree = 1 on quadrilaterals, or 'standard': {ENOUGH}"
+    return None if degree == 1 else f"degree = 1 on {shape.plural}, or 'standard': {ENOUGH}"
 
 
 def unlocked(element: str, degree: int, shape: Shape) -> str | None:
     """Return the remedy for elements that lock where volumes hardly change; None if none do."""
     if degree > 1 or element == MEAN_DILATATION:
         return None
-    if shape == QUADRILATERAL:
+    if not shape.simplex:
         return 'element = "mean_dilatation", or space.degree = 2, does not lock'
-    if shape == HEXAHEDRON:
-        return "space.degree = 2 does not lock"
     return 'space.degree = 2 does not lock, least of all with element = "mean_dilatation"'
 
 
@@ -91,7 +87,7 @@ def kinematics_of(domain: Domain, element: str, on_axis: bool = False) -> Strain
 
 
 def _multilinear_mean(domain: Domain, kinematics: Kinematics) -> MultilinearMean:
-    """Return the mean dilatation on quadrilaterals. Collective."""
+    """Return the mean dilatation on quadrilaterals or hexahedra. Collective."""
     shape, of = shape_of(domain.mesh), geometry_nodes(domain)
     corners = shape.nodes(1)
     # Volumes and derivatives of the corners' functions are quadratic along each axis at most.

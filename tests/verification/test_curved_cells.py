@@ -9,11 +9,10 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from contact.body.description import Body, Fixed, Load
+from contact.body.description import Body
 from contact.errors import InputError
-from contact.interface.obstacle import Cylinder, GapFunction, Sphere
+from contact.interface.obstacle import Sphere
 from contact.mesh.cells import SHAPES, rule, shape_of
-from contact.mesh.domain import Domain
 from contact.mesh.geometry import geometry_nodes, inverse, jacobians, sizes, volumes
 from contact.mesh.transfer import refined
 from contact.methods.newton import Newton
@@ -21,52 +20,13 @@ from contact.methods.options import NewtonOptions
 from contact.output.error_estimate import estimated
 from contact.problem.contact import Contact
 from contact.problem.problem import ContactProblem
-from forms.hencky import Linear
 from scripts.force_balance import force_balance
-from tests.problems.curved import Lame, error, rings
-from tests.problems.mechanics import constant
+from scripts.studies import curved_cells
+from scripts.studies.curved_cells import LAME, LAW, on_a_shaft, solved, supports, two_rings
+from scripts.studies.lame_rings import rings
 
 COMM = MPI.COMM_WORLD
 NAMES = [shape.name for shape in SHAPES]
-LAME = Lame()
-LAW = Linear(LAME.young, LAME.poisson)
-
-
-def supports(dim: int) -> list[Fixed]:
-    zero = constant(0.0, dim)
-    sides = [("left", 0), ("bottom", 1), ("front", 2), ("back", 2)][: 2 * dim - 2]
-    return [Fixed(part, [zero if i == k else None for i in range(dim)]) for part, k in sides]
-
-
-def on_a_shaft(domain: Domain, degree: int) -> ContactProblem:
-    """Press a ring on a shaft, whose radius is that at which the pressure is LAME's."""
-    dim = domain.dim
-    radius = 1.0 + float(LAME.displacement(np.array(1.0)))
-    shaft = (
-        Sphere((0.0, 0.0), radius)
-        if dim == 2
-        else Cylinder((0.0, 0.0, 0.0), (0.0, 0.0, 1.0), radius)
-    )
-    contact = Contact("inner0", shaft, press=True)
-    return ContactProblem(domain, Body(LAW, supports(dim)), contact, degree=degree)
-
-
-def two_rings(domain: Domain, degree: int, on: str) -> ContactProblem:
-    """Put two rings about each other, as one, under a pressure inside."""
-    nothing = GapFunction(lambda points: np.zeros(len(points)))
-    against = {"outer0": "inner1", "inner1": "outer0"}[on]
-    load = Load("inner0", pressure=constant(LAME.pressure, domain.dim))
-    body = Body(LAW, supports(domain.dim), [load])
-    return ContactProblem(domain, body, Contact(on, nothing, against=against), degree=degree)
-
-
-def solved(problem: ContactProblem) -> tuple[float, np.ndarray]:
-    """Return the error of the displacements in L2, and the pressures of all ranks."""
-    state, outcome = Newton(problem, NewtonOptions(tolerance=1e-11)).solve()
-    assert outcome.converged, outcome
-    assert force_balance(problem, state).imbalance < 1e-9
-    size = error(problem.equilibrium.space, state.x, LAME)
-    return size, problem.nodes.gather(state.forces.pressure)
 
 
 @pytest.mark.parallel
@@ -157,3 +117,16 @@ def test_curved_cells_are_neither_refined_nor_of_mean_dilatation() -> None:
     with pytest.raises(InputError, match="accepted: 'standard' on curved cells"):
         ContactProblem(domain, body, contact, degree=2, element="mean_dilatation")
 
+
+def test_the_resultants_balance_on_curved_facets() -> None:
+    problem = two_rings(rings(MPI.COMM_SELF, "triangle", 2, (1.0, 1.5, 2.0), (2, 3)), 2)
+    state, _ = Newton(problem, NewtonOptions(tolerance=1e-11)).solve()
+    assert force_balance(problem, state).imbalance < 1e-9
+
+
+def test_the_study_sees_both_orders(tmp_path, monkeypatch) -> None:
+    monkeypatch.setattr(curved_cells, "SHAPES", SHAPES[:1])
+    orders = curved_cells.main(["--coarse", "--out", str(tmp_path)])
+    for kind in ("shaft", "two rings"):
+        assert orders[kind, "triangle", 2, 2] > 2.8 > 2.3 > orders[kind, "triangle", 1, 2]
+    assert (tmp_path / "curved-cells.md").exists()

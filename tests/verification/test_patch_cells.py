@@ -27,6 +27,7 @@ CELLS = [cell for cells in SHAPES.values() for cell in cells]
 KINDS = [
     *((cell, degree, "standard") for cell in CELLS for degree in (1, 2)),
     ("quadrilateral", 1, "mean_dilatation"),
+    ("hexahedron", 1, "mean_dilatation"),
 ]
 NAMES = [f"{cell}-{degree}-{element}" for cell, degree, element in KINDS]
 

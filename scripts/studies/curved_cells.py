@@ -1,0 +1,120 @@
+"""Orders of convergence on round bodies, on straight cells and on those of second order.
+
+`python3 -m scripts.studies.curved_cells [--out DIR] [--coarse]`
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from mpi4py import MPI
+
+from contact import Body, Contact, Cylinder, Domain, Fixed, Linear, Load, Sphere
+from contact.mesh.cells import SHAPES
+from contact.methods.newton import Newton
+from contact.methods.options import NewtonOptions
+from contact.problem.problem import ContactProblem
+from contact.typing import Array
+from scripts.reporting import Report, append, options
+from scripts.studies.lame_rings import Lame, error, rings
+
+CAPTION = "Displacements of round bodies on straight and on curved cells"
+NOTE = (
+    "Lame's ring between the radii 1 and 2, plane strain (in 3-D one deep), nu = 0.3. shaft: "
+    "pressed on a rigid shaft. two rings: cut at the radius 1.5 into two bodies whose meshes do "
+    "not match, under a pressure inside. Errors in L2, relative; the order is that between this "
+    "mesh and the one before; pressure: the largest error of a nodal pressure, relative."
+)
+
+LAME = Lame()
+LAW = Linear(LAME.young, LAME.poisson)
+
+#: Geometry and displacements: their degrees.
+ELEMENTS = ((1, 1), (1, 2), (2, 2))
+
+#: Cells across the ring, by dimension.
+CELLS = {2: (4, 8, 16), 3: (4, 8)}
+
+
+def supports(dim: int) -> list[Fixed]:
+    """Return the supports of a quarter of a ring, by symmetry."""
+    sides = [("left", 0), ("bottom", 1), ("front", 2), ("back", 2)][: 2 * dim - 2]
+    return [Fixed(part, [0.0 if i == k else None for i in range(dim)]) for part, k in sides]
+
+
+def on_a_shaft(domain: Domain, degree: int) -> ContactProblem:
+    """Press a ring on a shaft, whose radius is that at which the pressure is LAME's."""
+    dim = domain.dim
+    radius = 1.0 + float(LAME.displacement(np.array(1.0)))
+    shaft = (
+        Sphere((0.0, 0.0), radius)
+        if dim == 2
+        else Cylinder((0.0, 0.0, 0.0), (0.0, 0.0, 1.0), radius)
+    )
+    contact = Contact("inner0", shaft, press=True)
+    return ContactProblem(domain, Body(LAW, supports(dim)), contact, degree=degree)
+
+
+def two_rings(domain: Domain, degree: int, on: str = "outer0") -> ContactProblem:
+    """Put two rings about each other, as one, under a pressure inside."""
+    against = {"outer0": "inner1", "inner1": "outer0"}[on]
+    body = Body(LAW, supports(domain.dim), [Load("inner0", pressure=LAME.pressure)])
+    return ContactProblem(domain, body, Contact(on, 0.0, against=against), degree=degree)
+
+
+def solved(problem: ContactProblem) -> tuple[float, Array]:
+    """Return the error of the displacements in L2, and the pressures of all ranks.
+
+    Raises
+    ------
+    RuntimeError
+        If it does not converge.
+    """
+    state, outcome = Newton(problem, NewtonOptions(tolerance=1e-11)).solve()
+    if not outcome.converged:
+        raise RuntimeError(outcome.reason)
+    size = error(problem.equilibrium.space, state.x, LAME)
+    return size, problem.nodes.gather(state.forces.pressure)
+
+
+def problem_of(kind: str, cell: str, order: int, degree: int, n: int) -> ContactProblem:
+    """Return a problem on a mesh of n cells across."""
+    if kind == "shaft":
+        return on_a_shaft(rings(MPI.COMM_WORLD, cell, order, (1.0, 2.0), (n,)), degree)
+    domain = rings(MPI.COMM_WORLD, cell, order, (1.0, 1.5, 2.0), (n // 2, n // 2 + 1))
+    return two_rings(domain, degree)
+
+
+def main(arguments: Sequence[str] | None = None) -> dict[tuple[str, str, int, int], float]:
+    """Make the table; return the last orders by problem, cell, and the degrees of both."""
+    chosen = options(__doc__, "curved_cells", arguments)
+    names = ("problem", "cells", "geometry", "degree", "across", "unknowns", "error", "order")
+    columns: dict[str, list[object]] = {name: [] for name in (*names, "pressure")}
+    orders = {}
+    for kind, exact in (
+        ("shaft", LAME.pressure),
+        ("two rings", -float(LAME.radial(np.array(1.5)))),
+    ):
+        for shape in SHAPES:
+            counts = CELLS[shape.dim][: 2 if chosen.coarse else None]
+            for order, degree in ELEMENTS:
+                last = None
+                for n in counts:
+                    problem = problem_of(kind, shape.name, order, degree, n)
+                    size, pressure = solved(problem)
+                    rate = None if last is None else float(np.log2(last / size))
+                    last, off = size, float(np.abs(pressure / exact - 1).max())
+                    unknowns = problem.equilibrium.layout.index_map.size_global * shape.dim
+                    shown = "" if rate is None else f"{rate:.2f}"
+                    row = (kind, shape.name, order, degree, n, unknowns, f"{size:.2e}", shown)
+                    append(columns, *row, f"{off:.1e}")
+                    print(*row, f"{off:.1e}", flush=True)
+                    if rate is not None:
+                        orders[kind, shape.name, order, degree] = rate
+    Report(chosen.out).table("curved-cells", CAPTION, columns, NOTE)
+    return orders
+
+
+if __name__ == "__main__":
+    main()
