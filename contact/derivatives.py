@@ -39,7 +39,13 @@ from contact.history import History
 from contact.linear.operator import Counters
 from contact.methods.options import NewtonOptions
 from contact.methods.parameters import complementarity_parameters
-from contact.output.differentiable import Differentiable, Quantity, Reaction, named_quantities
+from contact.output.differentiable import (
+    Differentiable,
+    Largest,
+    Quantity,
+    Reaction,
+    named_quantities,
+)
 from contact.output.solution import Solution
 from contact.problem.linearised import (
     Equations,
@@ -68,6 +74,9 @@ WITHOUT = "case", "solver", "output", "evolution"
 
 #: Numbers of [friction] without which there is none.
 BEGIN = "mu", "bound", "radius"
+
+#: The method whose solutions meet other equations.
+PENALTY = "penalty"
 
 #: Methods of `sensitivity`.
 AUTO, TANGENT, ADJOINT = "auto", "tangent", "adjoint"
@@ -223,6 +232,11 @@ class LoadPath:
         if not solution.converged:
             reason = solution.outcome.reason
             raise InputError(f"solution: {reason}; accepted: one that has converged")
+        if solution.method == PENALTY:
+            raise InputError(
+                "solution: a penalty lets the body penetrate, and derivatives are those of contact "
+                "without; accepted: method 'newton' or 'uzawa'"
+            )
         base = solution.problem
         body = base.equilibrium
         if not body.symmetric and body.global_unknowns.free.any():
@@ -307,6 +321,11 @@ def _slope_of(family: Family, quantity: Quantity, sides: _Sides) -> float:
     return float(family.slope([np.asarray(quantity(*side)) for side in sides]))
 
 
+def _located(quantity: Quantity, problem: ContactProblem, state: State) -> Quantity:
+    """Return a quantity at the node to which its gradient belongs: others may be as large."""
+    return quantity.located(problem, state) if isinstance(quantity, Largest) else quantity
+
+
 def _tangent(
     path: LoadPath,
     quantities: Mapping[str, Quantity],
@@ -336,7 +355,8 @@ def _tangent(
                     rows[name][key].append(_slope_of(family, quantity, moved))
                     continue
                 by_x, by_force = gradients[name]
-                value = _slope_of(family, quantity, still) + body.product(by_x, x)
+                value = _slope_of(family, _located(quantity, problem, state), still)
+                value += body.product(by_x, x)
                 value += _total(problem, by_force, forces)
                 if isinstance(quantity, Reaction):
                     value += body.product(quantity.weights(problem), by_history.forces)
@@ -414,7 +434,8 @@ def _adjoint(
                 found[name][key] -= problem.equilibrium.product(one.x, change.forces)
                 found[name][key] -= _total(problem, one.conditions, change.conditions)
                 if one.after is None:
-                    found[name][key] += _slope_of(family, quantities[name], sides)
+                    quantity = _located(quantities[name], problem, state)
+                    found[name][key] += _slope_of(family, quantity, sides)
                     continue
                 ends = _explicit_history(family, sides).arrays()
                 for part, weights in one.after.arrays().items():

@@ -86,7 +86,8 @@ def family_of(
     Raises
     ------
     InputError
-        If no number beside its own is accepted, or contact nodes or mesh change with it.
+        If no number beside its own is accepted, or contact nodes, mesh or the variables of the
+        material change with it.
     """
     step, found, fault = STEP * (abs(parameter.value) or 1.0), None, None
     for _ in range(TRIES):
@@ -128,14 +129,14 @@ def _made(name: str, parameter: Parameter, step: float, base: ContactProblem) ->
         factors, over = (4.0, -3.0, -1.0), 2 * way
         for other in (0.0, 2 * way):
             problems[other] = parameter.problem(parameter.value + other)
-    ours = base.nodes.nodes, base.equilibrium.rest().size
     for problem in problems.values():
-        theirs = problem.nodes.nodes, problem.equilibrium.rest().size
-        same = np.array_equal(ours[0], theirs[0]) and ours[1] == theirs[1]
+        same = np.array_equal(base.nodes.nodes, problem.nodes.nodes)
+        same = same and base.equilibrium.rest().size == problem.equilibrium.rest().size
+        same = same and base.initial.arrays().keys() == problem.initial.arrays().keys()
         if not base.comm.allreduce(same, op=MPI.LAND):
             raise InputError(
-                f"{name}: {parameter.value:g} is a border at which the contact nodes or the "
-                "mesh change; accepted: a parameter that leaves them"
+                f"{name}: {parameter.value:g} is a border at which the contact nodes, the mesh or "
+                "the variables of the material change; accepted: a parameter that leaves them"
             )
     return Family((*problems.values(),), (*problems,), factors, over)
 

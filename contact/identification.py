@@ -142,7 +142,11 @@ def identify(
     cases = [case] if isinstance(case, Case) else list(case)
     given = [data] if isinstance(data, Mapping) else list(data)
     expect("data", len(given), f"{len(cases)}, one a case", len(given) == len(cases))
-    expect("parameters", parameters, "one key or more", len(parameters) > 0)
+    single = not isinstance(parameters, str) and len(set(parameters)) == len(parameters)
+    accepted = "a list of keys, each once"
+    expect("parameters", parameters, accepted, single and len(parameters) > 0)
+    for key in (bounds or {}).keys() - set(parameters):
+        expect("bounds", key, f"one of the parameters {', '.join(parameters)}", False)
     models = [_Model(*pair, comm, monitor) for pair in zip(cases, given, strict=True)]
     first = np.array([number_at(cases[0], key) for key in parameters])
     bounds = bounds or {}
@@ -199,9 +203,9 @@ def identify(
     undetermined = tuple(key for key, hidden in zip(parameters, unseen, strict=True) if hidden)
     if undetermined:
         logger.warning(
-            "%s: the measurements do not determine %s: other values fit as well",
+            "%s: the measurements do not determine these parameters: near the values found they do "
+            "not change with them; another first value may lead elsewhere",
             ", ".join(undetermined),
-            "these parameters" if len(undetermined) > 1 else "this parameter",
         )
     return Identified(
         dict(zip(parameters, found.x.tolist(), strict=True)),

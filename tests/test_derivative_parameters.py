@@ -216,3 +216,47 @@ def test_a_number_with_a_single_value_is_refused():
     run = solve(parse_case(plate(revolved=True)), comm=SELF)
     with pytest.raises(InputError, match=r"accepted: 0 across the axis"):
         sensitivity(run, ["max_pressure"], ["rigid.0.displacement.0"])
+
+
+def block(material=None, **more):
+    """Return a block whose top is moved."""
+    return parse_case(
+        {
+            "mesh": {"generator": "rectangle", "size": [2.0, 1.0], "cells": [4, 2]},
+            "material": material or {"young": 3.0, "poisson": 0.3},
+            "contact": {"on": "bottom", "gap": 0.0},
+            "solver": {"tolerance": 1e-12},
+            **more,
+        }
+    )
+
+
+@pytest.mark.parametrize("method", ["tangent", "adjoint"])
+def test_all_nodes_have_the_largest_displacement(method):
+    """Lifted off: the derivative is that at one node, held or free."""
+    run = solve(block(fixed=[{"on": "top", "displacement": [-0.003, 0.004]}]), comm=SELF)
+    key = "fixed.0.displacement.0"
+    found = sensitivity(run, ["max_displacement"], [key], method)["max_displacement"][key]
+    assert found == pytest.approx(-0.6, rel=1e-6)
+
+
+def test_a_body_that_touches_unmoved_has_one_sided_derivatives():
+    run = solve(block(fixed=[{"on": "top", "displacement": [0.0, 0.0]}]), comm=SELF)
+    found = sensitivity(run, ["contact_force_y"], ["fixed.0.displacement.1"])
+    assert len(found.weakly_active) == 5
+
+
+def test_solutions_of_a_penalty_have_none():
+    given = block(
+        fixed=[{"on": "top", "displacement": [0.0, -0.02]}],
+        solver={"method": "penalty", "tolerance": 1e-10},
+    )
+    with pytest.raises(InputError, match="a penalty lets the body penetrate"):
+        sensitivity(solve(given, comm=SELF), ["contact_force_y"], ["material.young"])
+
+
+def test_a_number_that_brings_a_variable_of_the_material_has_none_at_0():
+    steel = {"law": "j2", "young": 200e3, "poisson": 0.3, "yield_stress": 250.0, "kinematic": 0.0}
+    given = block(steel, fixed=[{"on": "top", "displacement": [0.0, -0.009]}])
+    with pytest.raises(InputError, match=r"material\.kinematic: 0 is a border .*variables"):
+        sensitivity(solve(given, comm=SELF), ["contact_force_y"], ["material.kinematic"])

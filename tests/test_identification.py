@@ -163,7 +163,7 @@ def test_parameters_that_measurements_do_not_determine(keys, undetermined, caplo
         ends = np.array(found.intervals[key])
         assert np.isfinite(ends).all() == (key not in undetermined)
     lines = report(found)
-    assert sum("any: the measurements do not determine it" in x for x in lines) == len(undetermined)
+    assert sum("none: the measurements do not" in x for x in lines) == len(undetermined)
     index = keys.index("material.young")
     assert np.isfinite(found.covariance[index, index]) and found.covariance[index, index] > 0
 
@@ -193,3 +193,28 @@ def test_columns_of_supports_and_energies_can_be_fitted():
     found = identify(wrong, data, ["friction.mu", "material.young"], comm=SELF)
     for key, value in found.parameters.items():
         assert value == pytest.approx(number_at(case(), key), rel=1e-5)
+
+
+BAD_FILES = {
+    "empty": ("", "it is empty"),
+    "short": ("t,contact_force_x\n1,2\n\n3\n", "row 4 has 1 values for 2 names"),
+    "words": ("t,contact_force_x\n1,2\n2,two\n", "row 3, column contact_force_x: 'two' is no numb"),
+    "blank": ("t,contact_force_x\n1,\n", "row 2, column contact_force_x: '' is no number"),
+}
+
+
+@pytest.mark.parametrize("name", BAD_FILES)
+def test_files_say_where_they_are_wrong(tmp_path, name):
+    text, words = BAD_FILES[name]
+    (tmp_path / "bad.csv").write_text(text)
+    with pytest.raises(InputError) as error:
+        read_data(tmp_path / "bad.csv")
+    assert words in str(error.value)
+
+
+def test_keys_stand_once_and_bounds_have_one():
+    data = measured()
+    with pytest.raises(InputError, match=r"parameters: .*a list of keys, each once"):
+        identify(case(), data, ["friction.mu", "friction.mu"], comm=SELF)
+    with pytest.raises(InputError, match=r"bounds: given 'friction\.nu'; accepted: one of"):
+        identify(case(), data, ["friction.mu"], bounds={"friction.nu": (0, 1)}, comm=SELF)

@@ -48,6 +48,8 @@ def _check_free(path: Path | None) -> None:
         return
     if path.suffix not in (".png", ".pdf", ".svg"):
         raise InputError(f"--plot {path}: accepted: a file that ends in .png, .pdf or .svg")
+    if not path.parent.is_dir():
+        raise InputError(f"--plot {path}: there is no such folder; accepted: one that is there")
     if path.exists():
         raise InputError(f"--plot {path}: it exists; accepted: a new file")
 
@@ -72,7 +74,7 @@ def report(found: Identified) -> list[str]:
         least, largest = found.intervals[key]
         words = f"{least:.6g} to {largest:.6g}"
         if key in found.undetermined:
-            words = "any: the measurements do not determine it"
+            words = "none: the measurements do not determine it near this value"
         at = ", at its bound" if key in found.at_bound else ""
         lines.append(f"{key:{width}}  {value:12.6g}  {words}{at}")
     lines += [

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
@@ -74,33 +75,57 @@ class ContactForce:
         return by_x, by_force
 
 
-@dataclass(frozen=True)
-class MaxPressure:
-    """The largest contact pressure; its derivative is that at the node."""
+class Largest(ABC):
+    """The largest of values at nodes; its derivative is that at the first of the largest."""
+
+    @abstractmethod
+    def values(self, problem: ContactProblem, state: State) -> Array:
+        """Return the values at the owned nodes. Collective."""
 
     def __call__(self, problem: ContactProblem, state: State) -> float:
         """Return it. Collective."""
-        pressure = problem.interface.pressure(problem.nodal(state), state.forces)
-        return problem.nodes.maximum(pressure)
+        own = float(self.values(problem, state).max(initial=0.0))
+        return float(problem.comm.allreduce(own, op=MPI.MAX))
+
+    def located(self, problem: ContactProblem, state: State) -> Quantity:
+        """Return the value at the node that has the largest here, whatever others have. Collective.
+
+        Where two nodes have the largest, a difference of the maximum would be that of the other.
+        """
+        at = _largest(problem, self.values(problem, state))
+
+        def value(problem: ContactProblem, state: State) -> float:
+            own = float(at @ self.values(problem, state))
+            return float(problem.comm.allreduce(own, op=MPI.SUM))
+
+        return value
+
+
+@dataclass(frozen=True)
+class MaxPressure(Largest):
+    """The largest contact pressure."""
+
+    def values(self, problem: ContactProblem, state: State) -> Array:
+        """Return the pressures."""
+        return problem.interface.pressure(problem.nodal(state), state.forces)
 
     def gradient(self, problem: ContactProblem, state: State) -> tuple[Array, Array]:
         """Return the derivatives. Collective."""
-        jump, nodal = problem.nodes, problem.nodal(state)
-        at = _largest(problem, problem.interface.pressure(nodal, state.forces))
-        layer = problem.interface.law.layer_gradient(nodal)
+        jump = problem.nodes
+        at = _largest(problem, self.values(problem, state))
+        layer = problem.interface.law.layer_gradient(problem.nodal(state))
         by_x = np.zeros_like(problem.equilibrium.owned_part(state.x))
         jump.transpose(at[:, None] * layer, by_x)
         return by_x, at[:, None] * jump.normal
 
 
 @dataclass(frozen=True)
-class MaxDisplacement:
+class MaxDisplacement(Largest):
     """The largest norm of the displacement over the nodes."""
 
-    def __call__(self, problem: ContactProblem, state: State) -> float:
-        """Return it. Collective."""
-        own = np.linalg.norm(self._nodal(problem, state), axis=1).max(initial=0.0)
-        return float(problem.comm.allreduce(float(own), op=MPI.MAX))
+    def values(self, problem: ContactProblem, state: State) -> Array:
+        """Return the norms."""
+        return np.asarray(np.linalg.norm(self._nodal(problem, state), axis=1))
 
     @staticmethod
     def _nodal(problem: ContactProblem, state: State) -> Array:

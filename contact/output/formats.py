@@ -6,7 +6,7 @@ A grid is one piece whatever the number of ranks: the shares are gathered on ran
 from __future__ import annotations
 
 import csv
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -143,14 +143,31 @@ def read_data(path: str | Path) -> dict[str, Array]:
     path = Path(path)
     try:
         with path.open(newline="", encoding="utf-8-sig") as file:
-            names, *rows = [row for row in csv.reader(file) if row]
+            numbered = [(i, row) for i, row in enumerate(csv.reader(file), 1) if row]
+        if not numbered:
+            raise ValueError("it is empty")
+        names = [name.strip() for name in numbered[0][1]]
         if len(set(names)) < len(names):
             raise ValueError("a name stands twice")
-        values = np.array([[float(value) for value in row] for row in rows]).reshape(-1, len(names))
+        values = np.array([_numbers(number, names, row) for number, row in numbered[1:]])
     except OSError as error:
         raise InputError(f"{path}: {error.strerror}; accepted: a CSV file") from None
     except ValueError as error:
         raise InputError(
             f"{path}: {error}; accepted: a row of names, then rows of numbers"
         ) from None
-    return {name.strip(): column for name, column in zip(names, values.T, strict=True)}
+    columns = values.reshape(-1, len(names)).T
+    return dict(zip(names, columns, strict=True))
+
+
+def _numbers(number: int, names: Sequence[str], row: Sequence[str]) -> list[float]:
+    """Return the numbers of a row, or raise a ValueError that says where there is none."""
+    if len(row) != len(names):
+        raise ValueError(f"row {number} has {len(row)} values for {len(names)} names")
+    found = []
+    for name, text in zip(names, row, strict=True):
+        try:
+            found.append(float(text))
+        except ValueError:
+            raise ValueError(f"row {number}, column {name}: {text!r} is no number") from None
+    return found

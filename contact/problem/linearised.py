@@ -110,7 +110,8 @@ def weakly_active(problem: ContactProblem, state: State) -> Array:
     moved = c * np.linalg.norm(nodal[:, : problem.dim], axis=1)
     small = WEAK * problem.nodes.maximum(np.maximum(interface.pressure(nodal, forces), moved))
     opening, length = np.abs(interface.opening(nodal)), interface.slip_length(nodal)
-    weak = np.where(active.closed, np.abs(forces.pressure) < small, c * opening < small)
+    # Where a body touches without being moved all of these are 0.
+    weak = np.where(active.closed, np.abs(forces.pressure) <= small, c * opening <= small)
     if interface.friction.acts:
         bound = interface.bound(nodal, forces)
         left = np.abs(bound - np.linalg.norm(forces.friction, axis=1))
