@@ -438,6 +438,8 @@ class NewtonLoop:
                 # from loading.
                 tangent = falls or not tangent
             if stagnation(residuals.significant):
+                if (found := self._without_forces(iterate)) is not None:
+                    return found
                 ended = f"Newton's method stalled at {stagnation.best:.1e}"
                 return iterate, self._end(residuals, ended)
         steps = len(iteration.history.records)
@@ -467,6 +469,20 @@ class NewtonLoop:
         self.iteration.see(iterate, found[1])
         self.iteration.history.record(found[1], f"{note} zero displacement".strip(), inner=0)
         return iterate, self._end(found[1])
+
+    def _without_forces(self, iterate: Iterate) -> tuple[Iterate, Outcome] | None:
+        """Return the unknowns without contact forces, where they are a solution. Collective.
+
+        The active sets may cycle on forces that are all rounding of others.
+        """
+        problem = self.iteration.problem
+        zero = Multipliers.zero(problem.interface.jump)
+        iterate = replace(iterate, state=replace(iterate.state, forces=zero))
+        residuals = evaluate(problem, iterate.state)
+        if not residuals.significant <= self.iteration.options.tolerance:
+            return None
+        self.iteration.see(iterate, residuals)
+        return iterate, self._end(residuals)
 
     def _end(self, residuals: Residuals, ended: str = "") -> Outcome:
         return Outcome(residuals, self.iteration.options.allowed, ended)

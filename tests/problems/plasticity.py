@@ -54,7 +54,7 @@ def homogeneous(kind, material, times, values, *, degree=1, cells=2, **more):
             "material": {"law": "j2", "poisson": 0.3, **material},
             "fixed": fixed,
             "contact": {"on": "bottom"} if stands else {"on": "right", "gap": FAR},
-            "solver": {"tolerance": 1e-11},
+            "solver": {"tolerance": 1e-12},
             "evolution": {
                 "times": [0.0, *times],
                 "steps": [1] * len(times),
