@@ -1,4 +1,4 @@
-"""Work of one rank, and errors of one rank, for all: the others would wait for it for ever."""
+"""Work and errors of one rank for all, which else wait for ever; values of neighbouring ranks."""
 
 from __future__ import annotations
 

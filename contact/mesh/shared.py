@@ -1,7 +1,7 @@
 """Meshes in XDMF and HDF5 of which each rank reads its own share.
 
 A file of another format is read and checked on rank 0, which has to hold all of it. `write` keeps
-the checked mesh: XDMF for other programs, and behind it HDF5 with the names of regions and parts.
+the checked mesh: XDMF, as dolfinx reads it, and behind it HDF5 with the names of regions and parts.
 `read` takes slices of that, and no rank ever has more.
 """
 
@@ -11,6 +11,7 @@ import hashlib
 import json
 import re
 import tempfile
+from html import escape, unescape
 from pathlib import Path
 from typing import Any
 
@@ -33,7 +34,7 @@ NAMES = {
 }
 
 #: Where the file of names and shares is told, with its SHA-256.
-MARK = re.compile(r'<Information Name="contact" Value="(\S+) ([0-9a-f]{64})"/>')
+MARK = re.compile(r'<Information Name="contact" Value="([^"]+) ([0-9a-f]{64})"/>')
 
 #: The groups of a mesh in the HDF5 file.
 GROUPS = ("regions", "parts")
@@ -64,15 +65,16 @@ def write(cells: Cells, path: Path) -> None:
     with tempfile.TemporaryDirectory(dir=path.parent) as folder:
         made = Path(folder) / heavy.name
         with h5py.File(made, "w") as store:
-            store.attrs["contact"] = json.dumps(said)
+            store["contact"] = json.dumps(said)  # an attribute has 64 kB at most
             store["points"] = cells.points
             for name, group in groups.items():
                 order = _vtk_order(shapes[name], group.rows.shape[1])
                 store[name], store[f"{name}-label"] = group.rows[:, order], group.labels
-        mark = f"{heavy.name} {_sha256(made)}"
+        name_in_xml = escape(heavy.name)
+        mark = f"{name_in_xml} {_sha256(made)}"
         light = Path(folder) / path.name
         grids = "".join(
-            _grid(name, shapes[name], group.rows.shape, cells.points.shape, heavy.name)
+            _grid(name, shapes[name], group.rows.shape, cells.points.shape, name_in_xml)
             for name, group in groups.items()
         )
         light.write_text(
@@ -124,7 +126,7 @@ def heavy_file(path: Path) -> tuple[Path, str] | None:
         return None
     with open(path, errors="replace") as file:
         found = MARK.search(file.read(1000))
-    return None if found is None else (path.with_name(found[1]), found[2])
+    return None if found is None else (path.with_name(unescape(found[1])), found[2])
 
 
 def read(comm: MPI.Intracomm, heavy: Path, digest: str) -> Cells:
@@ -154,7 +156,7 @@ def read(comm: MPI.Intracomm, heavy: Path, digest: str) -> Cells:
 
     on_root(comm, check)
     with h5py.File(heavy, "r", locking=False) as store:
-        said = json.loads(store.attrs["contact"])
+        said = json.loads(store["contact"].asstr()[()])
 
         def share(name: str) -> NDArray[Any]:
             """Return this rank's rows of an array."""

@@ -98,6 +98,14 @@ def moments(domain):
     return [integral(domain, dx, x[i]) for dx in measures for i in range(domain.dim)]
 
 
+def test_names_with_blanks_and_many_groups(tmp_path, capsys):
+    nodes = "".join(f"*NSET, NSET=set{k}{'x' * 60}\n1, 2\n" for k in range(1200))
+    (tmp_path / "many.inp").write_text(PLATE.replace("*STEP\n", nodes + "*STEP\n", 1))
+    made = tmp_path / "a part & more.xdmf"
+    assert main(["mesh", str(tmp_path / "many.inp"), str(made)]) == CONVERGED
+    assert len(from_file(MPI.COMM_SELF, made).parts) > 1200
+
+
 @pytest.mark.parallel
 def test_dolfinx_reads_it_too(shared_tmp_path, capsys):
     from dolfinx.io import XDMFFile
