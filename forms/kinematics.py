@@ -90,7 +90,8 @@ class Axisymmetric:
         hoop = u[0] / r
         if self.on_axis:
             # Rounding may put points a little beside the axis.
-            rounding = 1e-9 * ufl.CellDiameter(extract_unique_domain(u))
+            jacobian = ufl.Jacobian(extract_unique_domain(u))
+            rounding = 1e-9 * ufl.sqrt(ufl.inner(jacobian, jacobian))
             hoop = ufl.conditional(ufl.gt(r, rounding), hoop, grad[0, 0])
         return embed(grad, hoop)
 

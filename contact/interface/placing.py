@@ -45,8 +45,6 @@ class Candidates:
         Global numbers of the nodes, shape (n,).
     mixing
         The jumps, where these are no nodal values.
-    means
-        The means of directions, on curved facets (`contact.interface.mortar.lumping`).
     """
 
     comm: MPI.Intracomm
@@ -58,7 +56,6 @@ class Candidates:
     deviation: float
     numbers: NDArray[np.int64]
     mixing: Mixing | None
-    means: Mixing | None
 
     def jumps(self, values: Array) -> Array:
         """Return the jumps of values at these nodes, shape (n, m). Collective."""
@@ -70,19 +67,16 @@ class Candidates:
         """Return the points from which gaps are measured: given gaps are those of the nodes."""
         return self.surface if obstacle.is_shape else self.points
 
-    def along(self, direction: Array, gap: Array) -> tuple[Array, Array]:
-        """Return the directions and gaps of the jumps, given those at the nodes. Collective.
+    def along(self, direction: Array, gap: Array) -> Array:
+        """Return the gaps of the jumps, given directions and gaps at the nodes. Collective.
 
         Next to infinite gaps these are no numbers.
         """
-        if self.mixing is None and self.means is None:
-            return direction, gap
+        if self.mixing is None:
+            return gap
         with np.errstate(invalid="ignore"):
             mixed = self.jumps(gap[:, None] * direction)
-            if self.means is not None:
-                direction = self.means.apply(self.comm, self.numbers, direction)
-                direction /= np.linalg.norm(direction, axis=1)[:, None]
-            return direction, np.asarray(np.einsum("nd,nd->n", direction, mixed))
+            return np.asarray(np.einsum("nd,nd->n", direction, mixed))
 
 
 def candidates(domain: Domain, space: fem.FunctionSpace, part: str) -> Candidates:
@@ -107,7 +101,6 @@ def candidates(domain: Domain, space: fem.FunctionSpace, part: str) -> Candidate
         facets.largest_deviation,
         numbers,
         lumped.mixing,
-        lumped.means,
     )
 
 
@@ -259,7 +252,7 @@ def find_nodes(
         check_gap(domain, gap, key, press)
     free = body.free[nodes, :d]
     fixed = found.jumps(body.nodal(body.prescribe(body.rest()))[nodes, :d])
-    direction, gap = found.along(direction, gap)
+    gap = found.along(direction, gap)
     gap = gap - np.einsum("ni,ni->n", direction, ~free * fixed)
     admissible = direction * free
     length = np.linalg.norm(admissible, axis=1)
@@ -347,7 +340,7 @@ def held_nodes(
         The contact nodes.
     """
     direction, gap = obstacle.measure(found.in_front_of(obstacle), found.normal)
-    direction, gap = found.along(direction, gap)
+    gap = found.along(direction, gap)
     keep = ~np.isin(found.nodes, jump.nodes) & free[found.nodes, -1] & np.isfinite(gap)
     keep &= found.weight > 0
     return replace(

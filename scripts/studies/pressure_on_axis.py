@@ -31,11 +31,13 @@ WAYS = "right", "left", "crossed", "left_right", "whole"
 CAPTION = "Contact pressure next to the axis of revolution: a rigid ball of radius 4 on a block"
 NOTE = (
     "Squares of 1/h a unit in a block of 0.5 x 0.5, cut by diagonals or whole (quadrilaterals); "
-    "a = 0.06 = 6, 12 and 24 h. First to third: pressures of the nodes at r = h, 2 h, 3 h "
-    "(degree 2: h/2, h, 3 h/2) over p_0 (1 - r^2/a^2)^(1/2) as fitted to the nodes with "
-    "1.5 h < r < 0.6 a. Errors: of p_0 and of the first pressure beside the fit of degree 2 on the "
-    "finest mesh, in per cent. At degree 1 no node on the axis carries a multiplier. A case file "
-    "whose rectangle reaches the axis is cut by both diagonals at degree 1."
+    "a = 0.06 = 6, 12 and 24 h. Errors, in per cent, beside the fit p_0 (1 - r^2/a^2)^(1/2) of "
+    "degree 2 on the finest mesh: of p_0 by the like fit to the nodes with 1.5 h < r < 0.6 a, and "
+    "of the nodes at r = h, 2 h, 3 h (degree 2: h/2, h, 3 h/2) and r = a/2. At degree 1 on squares "
+    "that are whole or cut by both diagonals they are those of C h^2/r: all rings fall like h "
+    "where they are as many cells from the axis, and like h^2 where they are as far from it. "
+    "At degree 1 no node on the axis carries a multiplier. A case file whose rectangle reaches the "
+    "axis is cut by both diagonals at degree 1."
 )
 
 
@@ -82,17 +84,14 @@ def main(arguments: Sequence[str] | None = None) -> dict[tuple[int, str, int], P
     kinds = [(1, way) for way in WAYS] + [(2, way) for way in WAYS if way != "left_right"]
     found = {(*kind, n): profile(n, *kind) for kind in kinds for n in meshes}
     best = found[2, "crossed", meshes[-1]]
-    names = (
-        "degree", "squares", "1/h", "p_0", "first", "second", "third", "error of p_0, %",
-        "error of the first, %",
-    )  # fmt: skip
+    names = "degree", "squares", "1/h", "p_0", "error of p_0", "r = h", "2 h", "3 h", "a/2"
     rows = []
     for (degree, way, n), one in found.items():
-        at_axis = np.sqrt(one.square / best.square)
-        first = one.pressure[0] / best.fitted(one.radius[:1])[0]
-        errors = (100 * (float(ratio) - 1) for ratio in (at_axis, first))
-        ratios = one.ratios[:3].round(4).tolist()
-        rows.append((degree, way, n, one.square**0.5, *ratios, *(round(e, 2) for e in errors)))
+        error = 100 * (one.pressure / best.fitted(one.radius) - 1)
+        middle = error[np.argmin(np.abs(one.radius - 0.03))]
+        at_axis = 100 * (np.sqrt(one.square / best.square) - 1)
+        values = (at_axis, *error[:3], middle)
+        rows.append((degree, way, n, one.square**0.5, *(round(float(e), 3) + 0.0 for e in values)))
     columns = {k: list(v) for k, v in zip(names, zip(*rows, strict=True), strict=True)}
     Report(chosen.out).table("pressure-on-axis-table", CAPTION, columns, NOTE)
     return found

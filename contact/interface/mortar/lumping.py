@@ -118,14 +118,11 @@ class Lumping:
     weight
         int N~_j, shape (n,) (length^(d - 1)).
     normal
-        int N~_j nu, shape (n, d).
+        Along the outward normals, int N~_j nu of straight facets, shape (n, d).
     deviation
         From the nodes to the curved surface that the facets approximate, shape (n, d) (length).
     mixing
         The jumps that belong to the weights; None where they are the nodal values.
-    means
-        int N~_j N_k: on curved facets a direction is the mean of those at the nodes with N~_j, by
-        which a constant pressure has its own nodal forces. None where facets are straight.
     """
 
     nodes: NDArray[np.int64]
@@ -133,7 +130,6 @@ class Lumping:
     normal: Array
     deviation: Array
     mixing: Mixing | None
-    means: Mixing | None
 
     @staticmethod
     def of(surface: Surface) -> Lumping:
@@ -141,28 +137,26 @@ class Lumping:
         nodes, place = np.unique(surface.nodes, return_inverse=True)
         place = place.reshape(surface.nodes.shape)
         places, measure, functions = _integrated(surface)
+        areas, shares = measure @ functions, measure[:, :, None] * functions
+        if surface.order > 1:
+            # Means on curved facets would be the normals at the centroids of the functions.
+            places = surface.shape.nodes(surface.degree)
+            shares = measure.sum(axis=1)[:, None, None] * np.eye(len(places))
         slopes = jacobians(surface.shape, surface.points, places)
-        facets = np.arange(surface.count)[:, None]
-        normals = measure[:, :, None] * surface.normals(facets, slopes)
+        normals = surface.normals(np.arange(surface.count)[:, None], slopes)
         weight, normal = np.zeros(nodes.size), np.zeros((nodes.size, surface.normal.shape[1]))
-        np.add.at(weight, place, measure @ functions)
-        np.add.at(normal, place, np.einsum("fqd,qk->fkd", normals, functions))
+        np.add.at(weight, place, areas)
+        np.add.at(normal, place, np.einsum("fqd,fqk->fkd", normals, shares))
         deviation = np.zeros_like(normal)
         np.add.at(deviation, place, surface.node_deviations)
         deviation /= np.bincount(place.ravel(), minlength=nodes.size)[:, None]
-        change, mixing, means = dual_basis_transformation(surface.shape, surface.degree), None, None
+        change, mixing = dual_basis_transformation(surface.shape, surface.degree), None
         if not np.array_equal(change, np.eye(len(change))):
             mixing = Mixing.alone(nodes, coefficients(place, nodes.size, change))
-        if surface.order > 1:
-            own = surface.shape.lagrange(surface.degree, places)
-            masses = np.einsum("fq,qi,qk->fik", measure, functions, own)
-            rows, columns = np.broadcast_arrays(place[:, :, None], place[:, None, :])
-            pairs, shape = (rows.ravel(), columns.ravel()), (nodes.size, nodes.size)
-            means = Mixing.alone(nodes, sparse.csr_array((masses.ravel(), pairs), shape=shape))
-        return Lumping(nodes, weight, normal, deviation, mixing, means)
+        return Lumping(nodes, weight, normal, deviation, mixing)
 
     def without_axis(self, surface: Surface) -> Lumping:
-        """Return the areas where nodes on the axis of revolution carry no multiplier (degree 1).
+        """Return the areas where nodes on the axis of revolution carry no multiplier.
 
         Pressures at degree 1 are of second order by a cancellation between alike elements alone,
         which ends at the axis; a node there has so little area that its pressure would be off by
@@ -183,11 +177,11 @@ class Lumping:
 def pairs_at_axis(surface: Surface, numbers: NDArray[Any]) -> NDArray[Any]:
     """Return the numbers of nodes on the axis of revolution and of those beside them, (k, 2).
 
-    None at degree 2, where the functions of nodes on the axis have no mean.
+    None of degree 2 on straight facets, where functions of nodes on the axis have no mean.
     """
     radius = surface.corners[:, :, 0]
     on_axis = radius <= 1e-12 * radius.max(initial=0.0)
     at = on_axis.any(axis=1) & ~on_axis.all(axis=1)
-    if not surface.revolved or surface.degree > 1:
+    if not surface.revolved or surface.degree > 1 == surface.order:
         at[:] = False
     return np.take_along_axis(numbers[at], np.argsort(~on_axis[at], axis=1), axis=1)
