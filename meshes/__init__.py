@@ -1,8 +1,8 @@
 """Parametric mesh generators: bodies by Gmsh, their boundary parts as named physical groups.
 
 A generator is a function with keyword parameters (lengths, all positive) that fills the current
-Gmsh model and meshes it with straight-sided triangles or tetrahedra. ``GENERATORS`` lists them by
-name. In a case file::
+Gmsh model and meshes it, with straight-sided triangles or tetrahedra if nothing else is asked for.
+``GENERATORS`` lists them by name. In a case file::
 
     [mesh]
     generator = "quarter_disc"
@@ -14,8 +14,10 @@ On the command line: ``python3 -m meshes quarter_disc --contact-size 0.1 --out b
 import difflib
 import inspect
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 from contact.errors import InputError
 from meshes.bars import bar, bar_on_ends, block, column, piezo_bar
@@ -74,15 +76,56 @@ def parameters(name: str) -> dict[str, float]:
     return {key: parameter.default for key, parameter in signature.parameters.items()}
 
 
-def build(name: str, **given: float) -> None:
+#: Generators whose mesh is swept: of tetrahedra of first order.
+SWEPT = ("half_cylinder",)
+
+#: Shape of the cells -> Gmsh's options. Triangles of twice the size are put together in pairs, and
+#: all are cut into quadrilaterals; tetrahedra of twice the size are cut into four hexahedra each.
+CELLS: Mapping[str, Mapping[str, float]] = {
+    "triangle": {},
+    "quadrilateral": {"RecombineAll": 1, "RecombinationAlgorithm": 2},
+    "tetrahedron": {},
+    "hexahedron": {"SubdivisionAlgorithm": 2, "MeshSizeFactor": 2},
+}
+
+
+@contextmanager
+def _cells(gmsh: Any, cell: str | None, order: int) -> Iterator[None]:
+    """Let Gmsh make cells of a shape and an order; its options are left as they were."""
+    options = {"ElementOrder": order, "SecondOrderIncomplete": 0, **CELLS.get(cell or "", {})}
+    before = {key: gmsh.option.getNumber(f"Mesh.{key}") for key in options}
+    try:
+        for key, value in options.items():
+            gmsh.option.setNumber(f"Mesh.{key}", value)
+        yield
+    finally:
+        for key, value in before.items():
+            gmsh.option.setNumber(f"Mesh.{key}", value)
+
+
+def build(name: str, cell: str | None = None, order: int = 1, **given: float) -> None:
     """Fill the current Gmsh model by a generator and mesh it; Gmsh must be initialised.
+
+    Parameters
+    ----------
+    name
+        Of the generator.
+    cell
+        Shape of the cells: in 2-D ``triangle``, the default, or ``quadrilateral``, in 3-D
+        ``tetrahedron`` or ``hexahedron``.
+    order
+        Order of the cells, 1 or 2: those of 2 are curved.
+    given
+        Parameters of the generator.
 
     Raises
     ------
     InputError
-        For an unknown generator or parameter, for a length that is not positive, and for sizes
-        that would give too many cells.
+        For an unknown generator or parameter, for a length that is not positive, for cells that
+        the generator cannot make, and for sizes that would give too many cells.
     """
+    import gmsh
+
     defaults = parameters(name)
     for key, value in given.items():
         if key not in defaults:
@@ -92,11 +135,33 @@ def build(name: str, **given: float) -> None:
             raise InputError(
                 f"{key} of the mesh generator must be a positive number; given: {value}"
             )
-    GENERATORS[name](**given)
+    if order not in (1, 2):
+        raise InputError(f"order of the mesh generator must be 1 or 2; given: {order}")
+    if name in SWEPT and (cell not in (None, "tetrahedron") or order > 1):
+        raise InputError(
+            f"cells of the mesh generator {name!r} must be tetrahedra of order 1; given: "
+            f"{cell or 'tetrahedron'}, order {order}"
+        )
+    with _cells(gmsh, cell, order):
+        GENERATORS[name](**given)
+    known = {2: ("triangle", "quadrilateral"), 3: ("tetrahedron", "hexahedron")}
+    accepted = known[gmsh.model.getDimension()]
+    if cell not in (None, *accepted):
+        raise InputError(
+            f"cell of the mesh generator {name!r} must be {' or '.join(accepted)}; given: {cell}"
+        )
 
 
-def write(name: str, path: str | Path, *, version: float = 4.1, **given: float) -> None:
-    """Write a generator's mesh to a ``.msh`` file of format 4.1 or 2.2.
+def write(
+    name: str,
+    path: str | Path,
+    cell: str | None = None,
+    order: int = 1,
+    *,
+    version: float = 4.1,
+    **given: float,
+) -> None:
+    """Write a generator's mesh to a ``.msh`` file of format 4.1 or 2.2; cells as in `build`.
 
     Raises
     ------
@@ -110,7 +175,7 @@ def write(name: str, path: str | Path, *, version: float = 4.1, **given: float) 
         gmsh.option.setNumber("General.Terminal", 0)
         gmsh.option.setNumber("Mesh.MshFileVersion", version)
         gmsh.model.add(name)
-        build(name, **given)
+        build(name, cell, order, **given)
         gmsh.write(str(path))
     finally:
         gmsh.finalize()

@@ -5,7 +5,7 @@ import inspect
 import sys
 
 from contact.errors import InputError
-from meshes import GENERATORS, parameters, write
+from meshes import CELLS, GENERATORS, parameters, write
 
 
 def main(arguments: list[str] | None = None) -> int:
@@ -19,6 +19,8 @@ def main(arguments: list[str] | None = None) -> int:
             options.add_argument(
                 f"--{key.replace('_', '-')}", type=float, default=default, help=f"[{default:g}]"
             )
+        options.add_argument("--cell", choices=CELLS, help="shape of the cells")
+        options.add_argument("--order", type=int, default=1, choices=(1, 2), help="of the cells")
         options.add_argument("--out", required=True, metavar="FILE.msh")
         options.add_argument("--format", type=float, default=4.1, choices=(2.2, 4.1))
     given = vars(parser.parse_args(arguments))

@@ -187,5 +187,4 @@ def finish(
         gmsh.model.addPhysicalGroup(dim, list(entities), name=name)
     for name, entities in parts.items():
         gmsh.model.addPhysicalGroup(dim - 1, list(entities), name=name)
-    gmsh.option.setNumber("Mesh.ElementOrder", 1)
     gmsh.model.mesh.generate(dim)

@@ -26,7 +26,7 @@ from contact.case.section import (
 )
 from contact.errors import InputError
 from contact.mesh import grid
-from contact.mesh.cells import Shape
+from contact.mesh.cells import SHAPES, Shape
 from contact.mesh.domain import Domain
 from contact.mesh.grid import rotate
 from contact.mesh.reader import from_file, from_generator
@@ -36,7 +36,7 @@ from contact.settings import Accepted, Count, Number, Positive
 from meshes.grading import memory
 
 #: Keys of `[mesh]` that go with every generator and file.
-COMMON = ("generator", "file", "rotation", "axis", "refine", "adapt")
+COMMON = ("generator", "file", "cell", "order", "rotation", "axis", "refine", "adapt")
 
 #: Bytes that making the mesh takes for a cell, without any unknowns (seen: 235 to 345).
 CELL_MEMORY = 200
@@ -142,8 +142,11 @@ class Mesh(Section):
     """How a rectangle's squares are cut into triangles; there "right" by default, and "crossed" in
     a body of revolution of degree 1 that reaches its axis."""
     cell: Literal["triangle", "quadrilateral", "tetrahedron", "hexahedron"] | None = None
-    """Shape of the cells of a rectangle, "triangle" or "quadrilateral", or of a box, "tetrahedron"
+    """Shape of the cells of a generator: in 2-D "triangle" or "quadrilateral", in 3-D "tetrahedron"
     or "hexahedron". Default: the first of them."""
+    order: Literal[1, 2] = 1
+    """Order of the cells of a parametric mesh generator: those of 2 are curved where the body is
+    round."""
     rotation: Number = 0.0
     """Angle (degrees) by which the mesh is turned about the origin of coordinates,
     counter-clockwise; in 3-D about `axis`."""
@@ -175,8 +178,8 @@ class Mesh(Section):
     @property
     def shape(self) -> Shape | None:
         """Shape of the cells; None if only the mesh itself can tell."""
-        known = grid.CELLS.get(self.generator or "")
-        return None if known is None else Shape(self.cell or known[0])
+        name = self.cell or grid.CELLS.get(self.generator or "", (None,))[0]
+        return None if name is None else Shape(name)
 
     @property
     def dimension(self) -> int | None:
@@ -220,10 +223,12 @@ class Mesh(Section):
             raise fault("generator", Words(given), "one of generator and file")
         if self.diagonal is not None and self.generator != "rectangle":
             raise fault("diagonal", self.diagonal, "diagonal for a rectangle only")
-        known = grid.CELLS.get(self.generator or "", ())
-        if self.cell is not None and self.cell not in known:
+        known = grid.CELLS.get(self.generator or "", tuple(shape.name for shape in SHAPES))
+        if self.cell is not None and (self.file is not None or self.cell not in known):
             accepted = " or ".join(f'"{name}"' for name in known)
-            raise fault("cell", self.cell, accepted or "cell for a rectangle or box only")
+            raise fault("cell", self.cell, accepted if self.file is None else "cell of generators")
+        if self.order > 1 and (self.file is not None or self.sides):
+            raise fault("order", self.order, "order 2 of other generators than rectangle and box")
         if self.generator is not None and self.sides:
             self._check_keys()
             return self
@@ -266,20 +271,24 @@ class Mesh(Section):
         shape = self.shape
         if self.file is not None:
             domain = from_file(comm, self.file)
-        elif shape is not None and shape.dim == 2:
+        elif self.generator == "rectangle":
+            assert shape is not None
             triangles = 4 if self.diagonal == "crossed" else 2
             each = triangles if shape.simplex else 1  # of a square
             self._check_memory(comm, each * math.prod(self.cells or ()), 2)
             diagonal = self.diagonal or "right"
             domain = grid.rectangle(comm, *self._grid, diagonal=diagonal, cell=shape.name)
-        elif shape is not None:
+        elif self.generator == "box":
+            assert shape is not None
             each = 6 if shape.simplex else 1  # of a cube
             self._check_memory(comm, each * math.prod(self.cells or ()), 3)
             domain = grid.box(comm, *self._grid, cell=shape.name)
         else:
             assert self.generator is not None
             with deaf():
-                domain = from_generator(comm, self.generator, **self.parameters)
+                domain = from_generator(
+                    comm, self.generator, self.cell, self.order, **self.parameters
+                )
         axis = self.axis or (0.0, 1.0, 0.0)
         rotate(domain.mesh, self.rotation, axis if domain.dim == 3 else (0.0, 0.0, 1.0))
         if not self.sides:

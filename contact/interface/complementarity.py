@@ -206,13 +206,14 @@ def linearise(
     length = np.linalg.norm(slip, axis=1)
     total = interface.pressure(nodal, forces)
     bound = interface.friction.bound(total, length)
-    trial = lam + c * slip
-    size = np.linalg.norm(trial, axis=1)
-
     if before is None:
         active = ActiveSet.without_slip(opening <= 1e-12 * interface.size, frictional)
     else:
-        active = interface.active_set(nodal, forces, bound, c).stopped(before, lam, slip)
+        lam = at_bound(before, lam, slip, bound)
+        known = Multipliers(p, lam)
+        active = interface.active_set(nodal, known, bound, c).stopped(before, lam, slip)
+    trial = lam + c * slip
+    size = np.linalg.norm(trial, axis=1)
     closed, sticks, slips = active.closed, active.sticks, active.slips
     changed = before is None or not active.same(before)
     unchanged = interface.comm.allreduce(int(changed), op=MPI.SUM) == 0
@@ -244,6 +245,18 @@ def linearise(
         blocks[slips, :d, :] += along[slips, :, None] * rate[slips, None, :]
         blocks[slips, :d, :d] += sliding[slips]
     return LinearisedContact(Multipliers(pressure, friction), blocks, active, unchanged)
+
+
+def at_bound(before: ActiveSet, friction: Array, slip: Array, bound: Array) -> Array:
+    """Return friction, at its bound where nodes go on slipping against it, shape (n, d).
+
+    The linearised bound of a coefficient that falls with the slip may be far below that of the new
+    slip. A node would stick by it, be released for the same reason as before, and so on.
+    """
+    size = np.linalg.norm(friction, axis=1)
+    slides = before.slips & (np.einsum("ni,ni->n", friction, slip) > 0) & (size < bound)
+    scale = np.where(slides, bound / np.where(slides, size, 1.0), 1.0)
+    return friction * scale[:, None]
 
 
 def _bound_gradient(

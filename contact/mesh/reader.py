@@ -232,8 +232,17 @@ def _plain_name(file: Path) -> Iterator[Path]:
         yield plain
 
 
-def from_generator(comm: MPI.Intracomm, name: str, **parameters: Any) -> Domain:
+def from_generator(
+    comm: MPI.Intracomm, name: str, cell: str | None = None, order: int = 1, **parameters: Any
+) -> Domain:
     """Build a generator of the package `meshes`, by name. Collective.
+
+    Parameters
+    ----------
+    comm
+        Communicator.
+    name, cell, order, parameters
+        As `meshes.build` takes them.
 
     Raises
     ------
@@ -244,7 +253,7 @@ def from_generator(comm: MPI.Intracomm, name: str, **parameters: Any) -> Domain:
 
     def build() -> Model:
         with _gmsh() as gmsh:
-            meshes.build(name, **parameters)
+            meshes.build(name, cell, order, **parameters)
             return extract(gmsh.model, entities_are_groups=False)
 
     return _from_rank_0(comm, build, f"mesh generator {name!r}")

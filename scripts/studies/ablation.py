@@ -20,6 +20,7 @@ from unittest.mock import patch
 
 from contact import Solution, load_case, solve
 from contact.case.file import Case
+from contact.interface import complementarity
 from contact.linear import block, dense, multigrid
 from contact.methods import (
     chord,
@@ -132,6 +133,12 @@ def _block() -> Case:
     return case
 
 
+def _steep() -> Case:
+    return sweep.on_cells(
+        next(case for _, case in sweep.problems(False, "bar-67")), "quadrilateral"
+    )
+
+
 DEVICES = (
     Device("interior point", (interior_point,), "Mehrotra 1992; Nesterov and Todd 1998",
            ((newton, "interior_point", _no_fallback),)),
@@ -151,6 +158,8 @@ DEVICES = (
     Device("layer linearised where its law is met", (newton_step.linearised_layer,), "-",
            ((newton_step, "linearised_layer", _linearised(newton_step.linearised_layer)),)),
     Device("limited softening", (), "-", (), (("softening", float("inf")),)),
+    Device("sliding nodes at their bound", (complementarity.at_bound,), "-",
+           ((complementarity, "at_bound", lambda _, friction, *__: friction),), (), _steep),
     Device("derivative of the conductivity by the gap", (conductivity_derivative,), "-",
            ((conductivity_derivative.ConductivityDerivative, "__call__", lambda *_: False),)),
     Device("stagnation limit of the steps after a fallback", (), "-",

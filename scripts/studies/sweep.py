@@ -1,8 +1,9 @@
 """Robustness sweep: some 300 problems, how many converge by each method, and their costs.
 
 `python3 -m scripts.studies.sweep [--out DIR] [--coarse] [--methods newton uzawa] [--only NAME]
-[--hard]`, also under mpirun. The problems are drawn once, with a fixed seed, from the ranges
-below; with --hard from those of `hard_problems`. With several methods the table says how far
+[--hard | --cells] [--seed N]`, also under mpirun. The problems are drawn once, with a fixed seed,
+from the ranges below; with --hard from those of `hard_problems`, with --cells on all shapes of
+cells from those of `cell_problems`. With several methods the table says how far
 their displacements are from those of the first, relative to the largest.
 """
 
@@ -19,7 +20,7 @@ from contact import Solution, build_problem, solve
 from contact.case.file import Case, parse_case
 from contact.methods.options import OPTIONS, with_method
 from scripts.reporting import Report, append, parser
-from scripts.studies import hard_problems
+from scripts.studies import cell_problems, hard_problems
 
 METHODS = ("newton", "uzawa")
 #: How many problems of each family; --coarse takes a tenth.
@@ -200,17 +201,30 @@ FAMILIES = {"bar": bar, "piezo": piezo, "layer": layer, "hertz": hertz, "block":
 
 
 def problems(
-    coarse: bool, only: str | None = None, hard: bool = False
+    coarse: bool,
+    only: str | None = None,
+    hard: bool = False,
+    cells: bool = False,
+    seed: int = SEED,
 ) -> Iterator[tuple[str, Case]]:
     """Draw the problems, the same ones on every machine and rank."""
-    families = hard_problems.FAMILIES if hard else FAMILIES
-    counts = hard_problems.COUNTS if hard else COUNTS
+    families, counts, key = FAMILIES, COUNTS, [seed]
+    if hard:
+        families, counts, key = hard_problems.FAMILIES, hard_problems.COUNTS, [seed, 1]
+    if cells:
+        families = cell_problems.families((bar, piezo, layer), (block,))
+        counts, key = dict.fromkeys(families, cell_problems.COUNT), [seed, 2]
     for number, (name, draw) in enumerate(families.items()):
-        rng = np.random.default_rng([SEED, hard, number] if hard else [SEED, number])
+        rng = np.random.default_rng([*key, number])
         for k in range(counts[name] // 10 if coarse else counts[name]):
             case = parse_case(draw(rng), source=f"{name}-{k}")
             if only is None or case.source == only or name == only:
                 yield name, case
+
+
+def on_cells(case: Case, cell: str) -> Case:
+    """Return a problem on a grid with cells of another shape."""
+    return case.model_copy(update={"mesh": case.mesh.model_copy(update={"cell": cell})})
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
@@ -218,7 +232,10 @@ def main(arguments: Sequence[str] | None = None) -> None:
     command = parser(__doc__, "sweep")
     command.add_argument("--methods", nargs="+", default=list(METHODS), choices=METHODS)
     command.add_argument("--only", help="a family, or one problem such as bar-7")
-    command.add_argument("--hard", action="store_true", help="those that bend, stick and stretch")
+    kinds = command.add_mutually_exclusive_group()
+    kinds.add_argument("--hard", action="store_true", help="those that bend, stick and stretch")
+    kinds.add_argument("--cells", action="store_true", help="those on cells of all shapes")
+    command.add_argument("--seed", type=int, default=SEED, help="of the drawn problems")
     given = command.parse_args(arguments)
     keys = (
         "problem",
@@ -232,7 +249,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
         "critical",
     )
     rows: dict[str, list[Any]] = {key: [] for key in keys}
-    for _, case in problems(given.coarse, given.only, given.hard):
+    drawn = problems(given.coarse, given.only, given.hard, given.cells, given.seed)
+    for _, case in drawn:
         problem, first = build_problem(case), None
         law = problem.interface.friction.law
         for method in given.methods:
@@ -262,7 +280,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
             ):
                 print(*row, flush=True)
     report = Report(given.out)
-    name = "sweep-hard" if given.hard else "sweep"
+    name = "sweep-hard" if given.hard else "sweep-cells" if given.cells else "sweep"
     report.numbers(name, rows)
     report.table(f"{name}-summary", "Robustness sweep", summary(rows, given.methods))
 

@@ -72,6 +72,17 @@ BAD = {
     "half cells": ({"mesh__cells": [8, 2.5]}, "mesh.cells.1: given 2.5"),
     "3 sizes": ({"mesh__size": [1, 1, 1]}, "mesh.size: given [1.0, 1.0, 1.0]; accepted: a list"),
     "axis in the plane": ({"mesh__axis": [0, 0, 1]}, "mesh.axis"),
+    "cell of a file": ({"mesh": {"file": "a.msh", "cell": "triangle"}}, "cell of generators"),
+    "order of a file": ({"mesh": {"file": "a.msh", "order": 2}}, "other generators than rectangle"),
+    "order of a grid": (
+        {"mesh": {**box, "order": 2}},
+        "order 2 of other generators than rectangle",
+    ),
+    "cell of a box": ({"mesh": {**box, "cell": "triangle"}}, '"tetrahedron" or "hexahedron"'),
+    "order of a cell": (
+        {"mesh": {"generator": "quarter_disc", "order": 3}},
+        "mesh.order: given 3; accepted: 1 or 2",
+    ),
     "diagonal of a box": ({"mesh": {**box, "diagonal": "left"}}, "for a rectangle only"),
     "side": ({"mesh__parts__loaded__side": "front"}, "left, right, bottom, top"),
     "backward piece": ({"mesh__parts__loaded__to": 1.0}, "mesh.parts.loaded.to: given 1.0"),

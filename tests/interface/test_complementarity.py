@@ -7,7 +7,7 @@ import pytest
 from mpi4py import MPI
 
 from contact.interface.active_set import ActiveSet
-from contact.interface.complementarity import ComplementarityParameters, linearise
+from contact.interface.complementarity import ComplementarityParameters, at_bound, linearise
 from contact.interface.friction import Friction
 from contact.interface.multipliers import Multipliers
 from forms.laws import ConstantCoefficient, Coulomb, SlipCoefficient
@@ -70,3 +70,13 @@ def test_falling_friction_is_followed_as_far_as_allowed(softening):
     assert np.all(change < -0.25 * 20.0)
     expected = np.maximum(change, -softening * parameters.nodal_stiffness)
     assert np.allclose(base.blocks[:, 0, 0], expected, rtol=1e-4)
+
+
+def test_sliding_nodes_are_at_their_bound():
+    """Those that slid in the step before and do so against their friction; no others."""
+    yes = np.ones(4, dtype=bool)
+    before = ActiveSet(yes, ~yes, np.array([True, True, True, False]))
+    slip = np.array([[1.0, 0.0], [-1.0, 0.0], [0.6, 0.8], [1.0, 0.0]])
+    friction = np.array([[0.2, 0.0], [0.2, 0.0], [0.3, 0.4], [0.2, 0.0]])
+    found = at_bound(before, friction, slip, np.array([0.5, 0.5, 0.4, 0.5]))
+    np.testing.assert_allclose(found, [[0.5, 0.0], [0.2, 0.0], [0.3, 0.4], [0.2, 0.0]])

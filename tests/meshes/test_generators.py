@@ -11,6 +11,7 @@ from mpi4py import MPI
 
 import meshes
 from contact.errors import InputError
+from contact.mesh.cells import shape_of
 from contact.mesh.reader import from_generator, from_msh
 from meshes import grading
 from meshes.__main__ import main
@@ -166,6 +167,36 @@ def test_generators_make_their_parts(name):
     assert integral(domain, domain.dx) == pytest.approx(volume, rel=2e-2)
 
 
+ROUND = [name for name in GENERATORS if re.search("disc|sphere|cylinder|ball", name)]
+
+
+@pytest.mark.parallel
+@pytest.mark.parametrize("order", [1, 2])
+@pytest.mark.parametrize("name", [name for name in meshes.GENERATORS if name not in meshes.SWEPT])
+def test_generators_make_other_cells(name, order):
+    volume, expected = GENERATORS[name]
+    flat = from_generator(COMM, name).dim == 2
+    sizes = {k: 2 * v for k, v in meshes.parameters(name).items() if k.endswith("size")}
+    cell = "quadrilateral" if flat else "hexahedron"
+    domain = from_generator(COMM, name, cell, order, **({} if flat else sizes))
+    assert shape_of(domain.mesh).name == cell
+    # Straight cells of second order are kept as those of first.
+    assert domain.order == (order if name in ROUND else 1)
+    # Sides of second order miss next to nothing of a round body.
+    least = {1: 3e-2, 2: 5e-4}[order]
+    assert measures(domain) == pytest.approx(expected, rel=least)
+    assert integral(domain, domain.dx) == pytest.approx(volume, rel=least)
+
+
+@pytest.mark.parametrize("cell", ["quadrilateral", "hexahedron"])
+def test_edges_of_other_cells_have_the_size_that_is_asked_for(cell):
+    name, dim = ("piezo_bar", 2) if cell == "quadrilateral" else ("block", 3)
+    domain = from_generator(MPI.COMM_SELF, name, cell, size=0.2, contact_size=0.2)
+    cells = domain.mesh.topology.index_map(dim).size_local
+    size = (GENERATORS[name][0] / cells) ** (1 / dim)
+    assert 0.5 * 0.2 < size < 1.3 * 0.2
+
+
 PLANES = {
     "left": (-1, 0, 0),
     "right": (1, 0, 0),
@@ -247,6 +278,11 @@ def test_smaller_sizes_give_more_nodes(name):
         ("bar", {"loaded_from": 4.0}, "loaded_from must be less than the length"),
         ("bar_on_ends", {"end": 6.0}, "end must be less than half the length"),
         ("disc", {"top_angle": 91.0}, "top_angle must be at most 90"),
+        ("bar", {"cell": "hexahedron"}, "must be triangle or quadrilateral; given: hexahedron"),
+        ("sphere", {"cell": "triangle", "contact_size": 2.0}, "must be tetrahedron or hexahedron"),
+        ("bar", {"order": 3}, "order of the mesh generator must be 1 or 2; given: 3"),
+        ("half_cylinder", {"order": 2}, "must be tetrahedra of order 1; given: tetrahedron, order"),
+        ("half_cylinder", {"cell": "hexahedron"}, "of order 1; given: hexahedron, order 1"),
         (
             "half_cylinder",
             {"radius": 0.05},
@@ -284,6 +320,10 @@ def test_command_line_writes_a_mesh(tmp_path, version):
     assert path.read_text().split()[1] == version
     domain = from_msh(COMM, path)
     assert measures(domain) == pytest.approx({**BAR, "bottom": 5.0, "top": 5.0, "loaded": 3.0})
+    disc = ["quarter_disc", "--cell", "quadrilateral", "--order", "2", *arguments[5:]]
+    assert main(disc) == 0
+    domain = from_msh(COMM, path)
+    assert (shape_of(domain.mesh).name, domain.order) == ("quadrilateral", 2)
 
 
 def test_command_line_refuses_wrong_sizes(tmp_path, capsys):
