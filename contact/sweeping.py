@@ -386,7 +386,12 @@ def _alike(before: Case, case: Case) -> bool:
         | {
             "friction": None if given.friction is None else given.friction.law,
             "fixed": [
-                (f.on, [c == "free" for c in f.displacement or ()], f.potential is None)
+                (
+                    f.on,
+                    [c == "free" for c in f.displacement or ()],
+                    f.potential is None,
+                    f.normal is None,
+                )
                 for f in given.fixed
             ],
         }

@@ -16,6 +16,8 @@ FORMATS = {
     "HEADER",
     "EACH",
     "SIGNALLED",
+    "SMOOTH",
+    "APART",
 }
 
 

@@ -64,6 +64,9 @@ class Fixed:
         free. Or one UFL expression or Function of vectors.
     potential
         Of a piezoelectric body, likewise; None leaves it free.
+    normal
+        Instead of a displacement: that along the outward normal of the part, as on rollers; a
+        number or a function likewise. The part is free to move along itself.
     amplitude
         Function of time by which they are multiplied; "constant": they always act. By default
         they grow from 0 at time 0 to all at time 1, and stay; values that are functions of time
@@ -79,27 +82,37 @@ class Fixed:
     displacement: Given = None
     potential: Given = None
     amplitude: Amplitude | None = None
+    normal: Given = default(default=None, kw_only=True)
 
     def __post_init__(self) -> None:
         """Make fields of the given values."""
         object.__setattr__(self, "on", part(self.on))
         object.__setattr__(self, "displacement", vector(self.displacement, free=True))
+        object.__setattr__(self, "normal", field(self.normal))
         object.__setattr__(self, "potential", field(self.potential))
         amplitude = own_amplitude(f"Fixed on {self.on!r}", self.amplitude)
         object.__setattr__(self, "amplitude", amplitude)
-        given = [*(self.displacement or ()), self.potential]
-        if all(value is None for value in given):
+        if all(value is None for value in self.given.values()):
             raise InputError(
                 f"Fixed on {self.on!r}: nothing is prescribed; accepted: a displacement with a "
-                "component that is not free, or a potential"
+                "component that is not free, normal, or a potential"
             )
+        if self.normal is not None and self.displacement is not None:
+            raise InputError(
+                f"Fixed on {self.on!r}: normal and displacement; accepted: one of them, and two "
+                "supports for both"
+            )
+
+    @property
+    def given(self) -> dict[str, Given]:
+        """All that may be prescribed, by key; None where free."""
+        found = {f"displacement.{k}": value for k, value in enumerate(self.displacement or ())}
+        return found | {"normal": self.normal, "potential": self.potential}
 
     @property
     def factor(self) -> Amplitude:
         """The amplitude, also where none is given."""
-        return amplitude_of(
-            self.amplitude, knows_time([*(self.displacement or ()), self.potential])
-        )
+        return amplitude_of(self.amplitude, knows_time([*self.given.values()]))
 
 
 @dataclass(frozen=True)

@@ -31,11 +31,13 @@ from contact.body.global_unknowns import make_global_unknowns
 from contact.body.loads import Loads, assembled
 from contact.body.materials import cells_of, factor_of
 from contact.body.pointwise import Pointwise
+from contact.body.rollers import rollers_of
 from contact.body.supports import free_components, supports_of, without_field
 from contact.body.weak_forms import WeakForms
+from contact.errors import InputError
 from contact.history import BodyState, Evaluated, InternalVariables
 from contact.linear.constraint import ConstrainedBulk, ConstrainedOperator, Constraint
-from contact.linear.layout import Layout, times
+from contact.linear.layout import Layout, masked, projectors, times
 from contact.linear.operator import Counters, SparseOperator
 from contact.mesh.cells import shape_of
 from contact.mesh.domain import Domain
@@ -86,6 +88,7 @@ class BodyEquilibrium:
         index_map = self.space.dofmap.index_map
         #: Which unknowns of the owned nodes no support holds, shape (nodes, block size).
         self.unsupported = free_components(self.space, self.supports)
+        self.rollers, inclined = rollers_of(domain, self.space, body, self.unsupported)
         self.global_unknowns = make_global_unknowns(domain, self.space, body, self.unsupported)
         #: Which forces are compared with each other.
         self.components = components(self.space)
@@ -100,7 +103,9 @@ class BodyEquilibrium:
             domain.size,
             float(body.law.young),
             domain.revolved,
+            inclined,
         )
+        self._check_rollers()
         #: Where the forms are evaluated is written anew by each query.
         self.forms = WeakForms(
             domain, body, self.space, self.cells, degree, element, self.pointwise
@@ -181,6 +186,8 @@ class BodyEquilibrium:
             ]
         for support in self.supports:
             support.set(at.array, time)
+        for roller in self.rollers:
+            roller.set(at.array[: self.owned].reshape(-1, self.block_size), time)
         at.scatter_forward()
         return np.concatenate([at.array, q])
 
@@ -354,7 +361,27 @@ class BodyEquilibrium:
         """Return the forces that supports bear, and those that hold given motions. Collective."""
         global_unknowns, own = self.global_unknowns, forces[: self.owned]
         q = np.where(global_unknowns.free, 0.0, self.motion(forces) + global_unknowns.gathered(own))
-        return np.concatenate([np.where(self.unsupported.ravel(), 0.0, own), q])
+        return np.concatenate([own - masked(self.unsupported, self.layout.inclined, own), q])
+
+    @cached_property
+    def _projection(self) -> PETSc.Mat:
+        """The projector onto the directions that no roller holds. Collective."""
+        assert self.layout.inclined is not None
+        return self.layout.inclined.projection(self.layout)
+
+    def _check_rollers(self) -> None:
+        """Refuse rollers whose nodes follow a rigid part. Collective."""
+        tied = self.global_unknowns.tied[:, : self.dim]
+        for roller in self.rollers:
+            if self.comm.allreduce(bool(tied[roller.nodes].any()), op=MPI.LOR):
+                raise InputError(
+                    f"fixed.{roller.number}.normal: the part shares nodes with a rigid part; "
+                    "accepted: parts apart"
+                )
+
+    def movable(self, nodes: NDArray[np.int32]) -> Array:
+        """Return the projectors onto the directions in which owned nodes can move, (n, d, d)."""
+        return projectors(*self.layout.at(nodes))[:, : self.dim, : self.dim]
 
     def create_matrix(self) -> PETSc.Mat:
         """Return an empty matrix with the pattern of the body. Collective."""
@@ -377,6 +404,13 @@ class BodyEquilibrium:
         for form in forms.secant if kind == "secant" else forms.tangent:
             assemble_matrix(matrix, form, bcs=conditions)
             matrix.assemble()
+        inclined = self.layout.inclined
+        if held and inclined is not None:
+            # P K P + 1 - P, as of fixed unknowns: P has the pattern of the nodes' blocks.
+            product = matrix.ptap(self._projection)
+            product.copy(matrix)
+            product.destroy()
+            inclined.add(matrix, 1.0)
 
     def operator(
         self,

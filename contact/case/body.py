@@ -68,6 +68,9 @@ class Fixed(Section):
     symmetry: Literal["x", "y", "z"] | None = None
     """Instead of a displacement: the part lies in a plane of symmetry across this axis; its
     displacement along the axis is 0."""
+    normal: Formula | None = None
+    """Instead of a displacement: that along the outward normal of the part; 0 for rollers. The part
+    may be inclined or curved, and is free to move along itself."""
     potential: Formula | None = None
     """Electric potential of the part."""
     amplitude: AmplitudeName | None = None
@@ -80,13 +83,17 @@ class Fixed(Section):
 
     @model_validator(mode="after")
     def _check(self) -> Self:
-        if self.symmetry is not None:
-            if self.displacement is not None:
-                raise fault("symmetry", self.symmetry, "one of symmetry and displacement")
+        keys = ("symmetry", "normal", "displacement")
+        one = [key for key in keys if getattr(self, key) is not None]
+        if len(one) > 1:
+            accepted = f"one of {' and '.join(one)}, and for more another entry"
+            raise fault(one[0], as_given(getattr(self, one[0])), accepted)
+        if self.symmetry is not None or self.normal is not None:
             return self
         if self.potential is None and all(c == "free" for c in self.displacement or ()):
             given = self.displacement or Words("missing")
-            raise fault("displacement", given, "a component that is fixed, or a potential")
+            accepted = "a component that is fixed, normal, symmetry or a potential"
+            raise fault("displacement", given, accepted)
         return self
 
     def build(self, key: str, case: Case, domain: Domain) -> description.Fixed:
@@ -104,7 +111,8 @@ class Fixed(Section):
             ]
         potential = as_field(f"{key}.potential", self.potential, comm)
         amplitude = case.amplitude(self.amplitude)
-        return description.Fixed(self.on, displacement, potential, amplitude)
+        normal = as_field(f"{key}.normal", self.normal, comm)
+        return description.Fixed(self.on, displacement, potential, amplitude, normal=normal)
 
 
 class Elastic(Section):

@@ -122,6 +122,9 @@ def _roles(case: Case, problem: ContactProblem) -> Iterable[Role | None]:
         if fixed.displacement is not None:
             words = f"$u$ = ({_said(*fixed.displacement)}) on {fixed.on}"
             yield _role(domain, fixed.on, HELD, words)
+        if fixed.normal is not None:
+            words = rf"$u_\nu$ = {_said(fixed.normal)} on {fixed.on}"
+            yield _role(domain, fixed.on, HELD, words)
         if fixed.potential is not None:
             words = rf"$\varphi$ = {_said(fixed.potential)} on {fixed.on}"
             yield _role(domain, fixed.on, ELECTRODE, words)

@@ -30,6 +30,7 @@ from contact.interface.mortar.operator import CouplingOperator, coupling_operato
 from contact.interface.multipliers import SlipHistory
 from contact.interface.nodes import ContactNodes
 from contact.interface.smoothing import Smoothing
+from contact.linear.layout import Inclined
 from contact.typing import Array
 from forms.laws import (
     Compliance,
@@ -142,6 +143,7 @@ def joined_nodes(
     index_map: IndexMap,
     free: NDArray[np.bool_],
     ties: sparse.csr_array,
+    inclined: Inclined | None = None,
 ) -> ContactNodes:
     """Return the nodes of all entries, one entry after the other. Collective.
 
@@ -153,18 +155,33 @@ def joined_nodes(
         Nodes of the mesh, and which of their unknowns are not fixed.
     ties
         How those that follow move with the global unknowns (`contact.body.global_unknowns`).
+    inclined
+        Directions in which supports hold nodes; None for none.
 
     Raises
     ------
     InputError
-        If two entries share nodes, or a node is on both sides of pairs of bodies.
+        If two entries share nodes, a node is on both sides of pairs of bodies, or one whose jump
+        is a sum is on a roller.
     """
     _check_apart(entries)
     nodes = _side_by_side([entry.nodes for entry in entries])
     given = [entry.coupling or entry.mixing for entry in entries]
     rows = [jumps for jumps in given if jumps is not None]
     coupling = coupling_operator(nodes.comm, index_map, rows, nodes.nodes, free)
+    if coupling is not None and inclined is not None:
+        _check_rollers(coupling, inclined)
     return replace(nodes, coupling=coupling, carried=_carried(nodes, coupling, ties, free))
+
+
+def _check_rollers(coupling: CouplingOperator, inclined: Inclined) -> None:
+    """Refuse jumps of several nodes, which have no common direction, on rollers. Collective."""
+    shared = bool(np.isin(coupling.local, inclined.nodes).any())
+    if coupling.comm.allreduce(shared, op=MPI.LOR):
+        raise InputError(
+            "fixed.normal: its part shares nodes with a contact of two bodies, or of degree 2 in "
+            "3-D; accepted: there a displacement across an axis, or parts apart"
+        )
 
 
 def _carried(

@@ -18,20 +18,17 @@ from contact.interface.mortar.operator import CouplingOperator
 from contact.typing import Array
 
 
-def projectors(direction: Array, free: NDArray[np.bool_]) -> Array:
+def projectors(direction: Array, movable: Array) -> Array:
     """Return the projectors onto the free tangential directions, shape (n, d, d).
 
     Parameters
     ----------
     direction
-        Unit vectors with nothing along components that are not free, shape (n, d).
-    free
-        Which components are, shape (n, d).
+        Unit vectors with nothing along directions that are not free, shape (n, d).
+    movable
+        The projectors onto those that are, shape (n, d, d).
     """
-    made = -direction[:, :, None] * direction[:, None, :]
-    diagonal = np.arange(direction.shape[1])
-    made[:, diagonal, diagonal] += free
-    return made
+    return movable - direction[:, :, None] * direction[:, None, :]
 
 
 @dataclass(frozen=True)

@@ -76,8 +76,8 @@ def find_pair(
     expect(f"{key}.foundation", distance, "a gap with against", not distance.is_shape)
     _, added = measured(distance, points, normal, body.comm, key)
     check_gap(body.domain, added, key, press)
-    moves = body.free[local, :d]
-    admissible = normal * moves
+    movable = body.movable(local)
+    admissible = np.einsum("nij,nj->ni", movable, normal)
     length = np.linalg.norm(admissible, axis=1)
     direction = admissible / length[:, None]
     sides = (side.largest_deviation for side in (slave, master) if not side.follows)
@@ -88,7 +88,7 @@ def find_pair(
         points,
         coupling.weight[here],
         direction,
-        projectors(direction, moves),
+        projectors(direction, movable),
         (gap + added) / length,
         body.block_size,
         cut,

@@ -250,11 +250,12 @@ def find_nodes(
             gap, cut = _place(domain, space, obstacle, found, direction, gap, press)
     else:
         check_gap(domain, gap, key, press)
-    free = body.free[nodes, :d]
+    movable = body.movable(nodes)
     fixed = found.jumps(body.nodal(body.prescribe(body.rest()))[nodes, :d])
     gap = found.along(direction, gap)
-    gap = gap - np.einsum("ni,ni->n", direction, ~free * fixed)
-    admissible = direction * free
+    admissible = np.einsum("nij,nj->ni", movable, direction)
+    held = direction - admissible
+    gap = gap - np.einsum("ni,ni->n", held, fixed)
     length = np.linalg.norm(admissible, axis=1)
     # A gap is infinite where the contact direction does not lead to the foundation.
     meets = np.isfinite(gap)
@@ -265,8 +266,8 @@ def find_nodes(
         )
     keep = (length > 0.5) & meets & (weight > 0)
     nodes, points, weight = nodes[keep], points[keep], weight[keep]
-    gap, free = gap[keep], free[keep]
-    held = (direction * ~body.free[found.nodes, :d])[keep] / length[keep, None]
+    gap, movable = gap[keep], movable[keep]
+    held = held[keep] / length[keep, None]
     direction = admissible[keep] / length[keep, None]
     gap = gap / length[keep]
     jump = ContactNodes(
@@ -275,13 +276,13 @@ def find_nodes(
         points,
         weight,
         direction,
-        projectors(direction, free),
+        projectors(direction, movable),
         gap,
         space.dofmap.index_map_bs,
         cut if cut > 1e-5 * domain.size else 0.0,
         found.deviation if obstacle.is_shape and domain.levels > 0 else 0.0,
         domain.revolved,
-        _motion(body, part, points, direction, (free, held)),
+        _motion(body, part, points, direction, (movable, held)),
         held=held,
     )
     if jump.size == 0:
@@ -296,7 +297,7 @@ def _motion(
     part: str,
     points: Array,
     direction: Array,
-    supports: tuple[NDArray[np.bool_], Array],
+    supports: tuple[Array, Array],
 ) -> Array | None:
     """Return how the foundation moves at contact nodes, shape (n, block size, m).
 
@@ -307,16 +308,16 @@ def _motion(
     direction
         The admissible part of the contact direction, of length 1, shape (n, d).
     supports
-        Components that no support holds, and the part of the direction that supports have
-        taken, (n, d).
+        Projectors onto the directions that no support holds, shape (n, d, d), and the part of the
+        direction that supports have taken, (n, d).
     """
-    masters, (free, held) = body.global_unknowns, supports
+    masters, (movable, held) = body.global_unknowns, supports
     motion, member = masters.still(len(points), body.block_size), masters.member(part)
     if motion is not None and member is not None:
         own, d = member.motion(points, body.block_size), body.dim
         # Along the supports the motion counts as far as it closes the gap.
         towards = np.einsum("ni,nik->nk", held, own[:, :d])
-        own[:, :d] *= free[:, :, None]
+        own[:, :d] = movable @ own[:, :d]
         own[:, :d] += direction[:, :, None] * towards[:, None, :]
         motion[:, :, member.columns] = own
     return motion

@@ -246,7 +246,7 @@ class ConstrainedBulk:
 
     @property
     def layout(self) -> Layout:
-        """The unknowns: fixed ones are the same in x and y."""
+        """The unknowns: fixed ones, and fixed directions, are the same in x and y."""
         return self.constraint.layout
 
     def create_matrix(self) -> PETSc.Mat:
@@ -275,7 +275,7 @@ class ConstrainedBulk:
         for k, column in enumerate(self.constraint.motions.T.toarray()):
             self.columns[:, k] = times(matrix, column)
         self.corner = self.constraint.gathered(self.columns)
-        self.columns *= self.layout.free.ravel()[:, None]
+        self.columns = np.stack([self.layout.mask(column) for column in self.columns.T], axis=1)
         self._without_followers(matrix)
 
     def _without_followers(self, matrix: PETSc.Mat) -> None:

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from scipy.linalg.lapack import dgetrf, dgetrs, dpotrf, dpotrs
 
 from contact.history import Evaluated
+from contact.linear.layout import Inclined, masked, masked_blocks
 from contact.linear.operator import Counters
 from contact.ranks import on_root
 from contact.typing import Array
@@ -28,20 +29,27 @@ class DenseOperator:
         The matrix, in rank order: on the first rank alone.
     counters
         Where factorisations and solves are counted.
+    inclined
+        Directions in which supports hold kept nodes, by their places; None for none.
     """
 
     symmetric, iterative = False, False
 
     def __init__(
-        self, comm: MPI.Intracomm, free: NDArray[np.bool_], stiffness: Array, counters: Counters
+        self,
+        comm: MPI.Intracomm,
+        free: NDArray[np.bool_],
+        stiffness: Array,
+        counters: Counters,
+        inclined: Inclined | None = None,
     ) -> None:
         self._comm, self._free, self._stiffness = comm, free, stiffness
+        self._inclined = inclined
         self.counters = counters
 
     def update(self, kind: str, state: Evaluated, blocks: Array, *, constant: bool = False) -> bool:
         """Add up and factorise. Collective; see `operator.SparseOperator.update`."""
-        free = self._free.astype(float)
-        gathered = self._comm.gather(blocks * free[:, :, None] * free[:, None, :])
+        gathered = self._comm.gather(masked_blocks(self._free, self._inclined, blocks))
         on_root(self._comm, lambda: self._factorise(np.concatenate(gathered)))
         self.counters.factorizations += 1
         return True
@@ -62,7 +70,7 @@ class DenseOperator:
 
     def solve(self, rhs: Array, rtol: float | None = None, guess: Array | None = None) -> Array:
         """Solve for the owned unknowns. Collective; see `operator.SparseOperator.solve`."""
-        total = self._comm.gather(np.where(self._free.ravel(), rhs, 0.0))
+        total = self._comm.gather(masked(self._free, self._inclined, rhs))
         self.counters.linear_solves += 1
         begin = self._comm.scan(rhs.size) - rhs.size
         solution = on_root(self._comm, lambda: self._solve(np.concatenate(total))[0])

@@ -9,8 +9,88 @@ from dolfinx.common import IndexMap
 from mpi4py import MPI
 from numpy.typing import NDArray
 from petsc4py import PETSc
+from scipy import sparse
 
 from contact.typing import Array
+
+
+@dataclass(frozen=True)
+class Inclined:
+    """Directions across the axes in which supports hold some nodes: rollers on inclined faces.
+
+    Attributes
+    ----------
+    nodes
+        Which nodes, shape (n,).
+    across
+        The projectors onto their directions, shape (n, block size, block size); these have nothing
+        along unknowns that are fixed.
+    """
+
+    nodes: NDArray[np.int32]
+    across: Array
+
+    def at(self, nodes: NDArray[np.int32]) -> Inclined:
+        """Return the directions of some nodes, by their places among these."""
+        _, places, rows = np.intersect1d(nodes, self.nodes, return_indices=True)
+        return Inclined(places.astype(np.int32), self.across[rows])
+
+    def held(self, values: Array) -> Array:
+        """Return the parts of flat nodal values along the directions, 0 at all other nodes."""
+        nodal = values.reshape(-1, self.across.shape[1])
+        found = np.zeros_like(nodal)
+        found[self.nodes] = np.einsum("nij,nj->ni", self.across, nodal[self.nodes])
+        return found.reshape(values.shape)
+
+    def projection(self, layout: Layout) -> PETSc.Mat:
+        """Return the projector P of all unknowns onto the other directions. Collective."""
+        size, owned = layout.block_size, layout.free.shape[0]
+        rows = size * self.nodes[:, None] + np.arange(size)
+        grid = np.broadcast_arrays(rows[:, :, None], rows[:, None, :])
+        square = (owned * size, owned * size)
+        taken = sparse.coo_array((self.across.ravel(), [g.ravel() for g in grid]), shape=square)
+        own = sparse.csr_array(sparse.eye_array(owned * size) - taken)
+        own.sort_indices()
+        shape = ((owned * size, None), (owned * size, None))
+        begin = layout.index_map.local_range[0] * size
+        parts = own.indptr.astype(PETSc.IntType), (own.indices + begin).astype(PETSc.IntType)
+        made = PETSc.Mat().createAIJ(shape, bsize=size, csr=(*parts, own.data), comm=layout.comm)
+        made.assemble()
+        return made
+
+    def add(self, matrix: PETSc.Mat, scale: float) -> None:
+        """Add the projectors, times a number, to a matrix. Collective."""
+        insert_blocks(matrix, self.nodes, scale * self.across, PETSc.InsertMode.ADD_VALUES)
+
+
+def masked(free: NDArray[np.bool_], inclined: Inclined | None, values: Array) -> Array:
+    """Return flat values of nodes, 0 at fixed unknowns and along fixed directions."""
+    own = np.where(free.ravel(), values, 0.0)
+    return own if inclined is None else own - inclined.held(own)
+
+
+def projectors(free: NDArray[np.bool_], inclined: Inclined | None) -> Array:
+    """Return the projectors onto the free directions of nodes, shape (n, block size, block size).
+
+    Parameters
+    ----------
+    free, inclined
+        Which unknowns of the nodes are not fixed, shape (n, block size), and their inclined
+        directions, by their places among these.
+    """
+    made = np.eye(free.shape[1]) * free[:, None, :]
+    if inclined is not None:
+        made[inclined.nodes] -= inclined.across
+    return made
+
+
+def masked_blocks(free: NDArray[np.bool_], inclined: Inclined | None, blocks: Array) -> Array:
+    """Return blocks at nodes, 0 at fixed unknowns and along fixed directions; as `projectors`."""
+    if inclined is None:
+        own = free.astype(float)
+        return blocks * own[:, :, None] * own[:, None, :]
+    along = projectors(free, inclined)
+    return np.asarray(along @ blocks @ along)
 
 
 @dataclass(frozen=True)
@@ -34,6 +114,8 @@ class Layout:
     revolved
         Whether the nodes are those of the half plane of a body of revolution, x its radius: it
         then moves along y alone.
+    inclined
+        Directions across the axes in which supports hold nodes; None where no rank has any.
     """
 
     comm: MPI.Intracomm
@@ -43,6 +125,7 @@ class Layout:
     size: float
     stiffness: float
     revolved: bool = False
+    inclined: Inclined | None = None
 
     @property
     def dim(self) -> int:
@@ -65,8 +148,12 @@ class Layout:
         return int(self.index_map.size_global) * self.block_size
 
     def mask(self, values: Array) -> Array:
-        """Return owned values, 0 where the unknown is fixed."""
-        return np.where(self.free.ravel(), values, 0.0)
+        """Return owned values, 0 where the unknown is fixed, and along fixed directions."""
+        return masked(self.free, self.inclined, values)
+
+    def at(self, nodes: NDArray[np.int32]) -> tuple[NDArray[np.bool_], Inclined | None]:
+        """Return which unknowns of owned nodes are free, and their inclined directions."""
+        return self.free[nodes], None if self.inclined is None else self.inclined.at(nodes)
 
 
 def times(matrix: PETSc.Mat | None, values: Array, transposed: bool = False) -> Array:
@@ -82,6 +169,8 @@ def times(matrix: PETSc.Mat | None, values: Array, transposed: bool = False) -> 
 def balance(matrix: PETSc.Mat, layout: Layout) -> None:
     """Put the size of the matrix's own diagonal at fixed unknowns, in place of ones. Collective.
 
+    So along fixed directions.
+
     Against a modulus of 1e12 ones are nothing, and multigrid takes them for a body that is not
     held; against 1e-12 they are all that it sees.
     """
@@ -91,6 +180,8 @@ def balance(matrix: PETSc.Mat, layout: Layout) -> None:
     if sizes[0] > 0 and np.isfinite(sizes[0]):
         diagonal.array[~free] = sizes[0] / sizes[1]
         matrix.setDiagonal(diagonal)
+        if layout.inclined is not None:
+            layout.inclined.add(matrix, sizes[0] / sizes[1] - 1)
 
 
 def nodal_blocks(matrix: PETSc.Mat, nodes: NDArray[np.int32]) -> Array:
@@ -106,8 +197,13 @@ def nodal_blocks(matrix: PETSc.Mat, nodes: NDArray[np.int32]) -> Array:
     return blocks
 
 
-def insert_blocks(matrix: PETSc.Mat, nodes: NDArray[np.int32], blocks: Array) -> None:
-    """Put blocks at owned nodes, in place of those that are there. Collective."""
+def insert_blocks(
+    matrix: PETSc.Mat,
+    nodes: NDArray[np.int32],
+    blocks: Array,
+    mode: PETSc.InsertMode = PETSc.InsertMode.INSERT_VALUES,
+) -> None:
+    """Put blocks at owned nodes, in place of those that are there, or add them. Collective."""
     rows, at = np.arange(nodes.size + 1, dtype=PETSc.IntType), nodes.astype(PETSc.IntType)
-    matrix.setValuesBlockedLocalIJV(rows, at, blocks, rowmap=at)
+    matrix.setValuesBlockedLocalIJV(rows, at, blocks, addv=mode, rowmap=at)
     matrix.assemble()

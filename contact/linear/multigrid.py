@@ -127,11 +127,10 @@ def _along_axis(layout: Layout) -> PETSc.NullSpace:
 
 def held_motions(layout: Layout) -> PETSc.NullSpace:
     """Return the rigid motions, 0 where the displacement is fixed, orthonormalised. Collective."""
-    free = layout.free[:, : layout.dim].ravel()
     vectors: list[PETSc.Vec] = []
     for motion in rigid_motions(layout).getVecs():
         vector = motion.copy()  # PETSc locks those of a null space
-        vector.array[:] *= free
+        vector.array[:] = layout.mask(vector.array)
         for other in vectors:
             vector.axpy(-vector.dot(other), other)
         vector.normalize()

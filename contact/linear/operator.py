@@ -24,7 +24,14 @@ from contact.linear.faults import (
     set_up_with_workspace,
 )
 from contact.linear.krylov import Components, refine
-from contact.linear.layout import Layout, balance, insert_blocks, nodal_blocks, times
+from contact.linear.layout import (
+    Layout,
+    balance,
+    insert_blocks,
+    masked_blocks,
+    nodal_blocks,
+    times,
+)
 from contact.linear.multigrid import TOUCH, Hierarchy, held_motions
 from contact.typing import Array
 
@@ -165,7 +172,7 @@ class SparseOperator:
             self.bulk.assemble(self.matrix, kind, state)
             balance(self.matrix, self.layout)
             self._own = nodal_blocks(self.matrix, nodes)
-        rest, own = self._masked(nodes, blocks), self._own
+        rest, own = masked_blocks(*self.layout.at(nodes), blocks), self._own
         # To insert nothing would be a reason to set the solver up again.
         inserts = same or not self._all(not rest.any())
         if self._multigrid and self._hierarchy is None:
@@ -198,11 +205,6 @@ class SparseOperator:
         self.ksp.setOperators(self.system, split.matrix(self.matrix) if split else self.matrix)
         with petsc_options(self._prefix):
             set_up_with_workspace(self.ksp)
-
-    def _masked(self, at: NDArray[np.int32], blocks: Array) -> Array:
-        """Return blocks at nodes, zero where an unknown is fixed."""
-        free = self.layout.free[at].astype(float)
-        return blocks * free[:, :, None] * free[:, None, :]
 
     def solve(self, rhs: Array, rtol: float | None = None, guess: Array | None = None) -> Array:
         """Solve with the owned part of a right-hand side; fixed unknowns stay 0. Collective.

@@ -247,5 +247,7 @@ def _loads(problem: Problem) -> Array:
 def _without_supports(problem: ContactProblem) -> NDArray[np.bool_]:
     """Return which connected components have no support at all, shape (k,). Collective."""
     body, of = problem.equilibrium, problem.equilibrium.component_norms
-    supported = ~body.unsupported[:, : body.dim].all(axis=1)
-    return component_sums(problem.comm, of.component, supported.astype(float), of.count) == 0
+    supported = np.any(~body.unsupported[:, : body.dim], axis=1).astype(float)
+    if body.layout.inclined is not None:
+        supported[body.layout.inclined.nodes] = 1.0
+    return component_sums(problem.comm, of.component, supported, of.count) == 0

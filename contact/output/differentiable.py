@@ -16,9 +16,9 @@ from contact.output.resultants import (
     NAMES,
     columns_of,
     driven_part,
+    holding,
     name_ends,
     nodes_of,
-    reaction_masks,
 )
 from contact.problem.energy import dissipated, stored, working_forces
 from contact.problem.problem import ContactProblem
@@ -283,14 +283,14 @@ def named_quantities(problem: ContactProblem) -> dict[str, Quantity]:
     found |= {f"contact_force_{axis}": ContactForce(i) for i, axis in enumerate(axes)}
     driven = driven_part(problem)
     for i, axis in enumerate(axes):
-        for part in reaction_masks(problem, electric=False):
+        for part in holding(problem, electric=False):
             found[f"reaction_{axis}_{part}"] = Reaction(partial(_on_support, part=part, axis=i))
         if driven is not None:
             found[f"driven_{axis}"] = MeanDisplacement(driven, i)
             found[f"driven_force_{axis}"] = partial(_driving, part=driven, axis=i)
     if problem.piezoelectric:
         found["charge_foundation"] = FoundationCharge()
-        for part in reaction_masks(problem, electric=True):
+        for part in holding(problem, electric=True):
             found[f"charge_{part}"] = Reaction(partial(_on_electrode, part=part))
     members = body.global_unknowns.members
     rigid = [i for i, member in enumerate(members) if isinstance(member.description, Rigid)]
@@ -342,18 +342,18 @@ def _driving(problem: ContactProblem, state: State, part: str, axis: int) -> flo
 
 def _on_support(problem: ContactProblem, part: str, axis: int) -> Array:
     """Return the weights of a support's reaction. Collective."""
-    nodes, mask = reaction_masks(problem, electric=False)[part]
+    nodes, held = holding(problem, electric=False)[part]
     weights = _no_weights(problem)
     turn = float(problem.domain.resultant(np.eye(problem.dim)[axis])[axis])
-    problem.equilibrium.nodal(weights)[nodes, axis] = turn * mask[:, axis]
+    problem.equilibrium.nodal(weights)[nodes, : problem.dim] = turn * held[:, axis]
     return weights
 
 
 def _on_electrode(problem: ContactProblem, part: str) -> Array:
     """Return the weights of the charge of a prescribed potential. Collective."""
-    nodes, mask = reaction_masks(problem, electric=True)[part]
+    nodes, held = holding(problem, electric=True)[part]
     body, weights = problem.equilibrium, _no_weights(problem)
-    body.nodal(weights)[nodes, -1] = mask[:, 0] / body.phi_scale
+    body.nodal(weights)[nodes, -1] = held[:, 0, 0] / body.phi_scale
     return weights
 
 

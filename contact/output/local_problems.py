@@ -182,9 +182,10 @@ class LocalProblems:
             )
         )
         touch &= slave | master
-        # The traction of an elastic support is none of the loads either.
-        for support in body.body.elastic:
-            touch |= np.isin(facets, body.domain.facets(support.on))
+        # The traction of an elastic support is none of the loads either, nor is that of a roller.
+        rollers = [fixed.on for fixed in body.body.fixed if fixed.normal is not None]
+        for part in [*(support.on for support in body.body.elastic), *rollers]:
+            touch |= np.isin(facets, body.domain.facets(part))
         own = np.zeros(body.owned + body.global_unknowns.size)
         own[: body.owned] = body.free.ravel()
         free = body.nodal(body.local(own))[nodes].any(axis=2)

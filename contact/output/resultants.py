@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 from contact.body.fields import constant, knows_time, steady
 from contact.body.loads import expression
 from contact.body.rigid import Electrode
+from contact.body.rollers import directions_of
 from contact.errors import InputError
 from contact.mesh.together import members
 from contact.problem.problem import ContactProblem
@@ -76,10 +77,9 @@ def supports(problem: ContactProblem, state: State) -> Mapping[str, Resultant]:
     d, body = problem.dim, problem.equilibrium
     residual = body.nodal(residual_forces(problem, state))[:, :d]
     points = body.space.tabulate_dof_coordinates()[:, :d]
-    held = [fixed.displacement or (None,) * d for fixed in problem.body.fixed]
     found = {
-        part: resultant(problem, points[nodes], forces)
-        for part, (nodes, forces) in _reactions(problem, residual, held, slice(d)).items()
+        part: resultant(problem, points[nodes], np.einsum("nij,nj->ni", held, residual[nodes]))
+        for part, (nodes, held) in holding(problem, electric=False).items()
     }
     owned = body.owned // body.block_size
     forces_of = body.elastic_forces(state.x)
@@ -91,43 +91,34 @@ def supports(problem: ContactProblem, state: State) -> Mapping[str, Resultant]:
     return found
 
 
-def _reactions(
-    problem: ContactProblem, residual: Array, given: Sequence[Sequence[Any]], columns: slice
-) -> dict[str, tuple[NDArray[np.int32], Array]]:
-    """Return the residuals where supports act, part by part: the nodes, and values (n, k) there.
-
-    The residual is that at the owned nodes, shape (nodes, k); `given` are the prescribed values of
-    each of the body's `fixed`, None where free, and `columns` their components of a node.
-    """
-    found: dict[str, tuple[NDArray[np.int32], Array]] = {}
-    left = ~problem.equilibrium.unsupported[:, columns]
-    for fixed, values in zip(problem.body.fixed, given, strict=True):
-        held = np.array([value is not None for value in values])
-        for part in members(fixed.on) if held.any() else ():
-            nodes = nodes_of(problem, part)
-            forces = np.where(left[nodes] & held, residual[nodes], 0.0)
-            left[nodes] &= ~held
-            if part in found:  # prescribed there by several entries
-                forces = forces + found[part][1]
-            found[part] = nodes, forces
-    return found
-
-
-def reaction_masks(
-    problem: ContactProblem, electric: bool
-) -> dict[str, tuple[NDArray[np.int32], Array]]:
+def holding(problem: ContactProblem, electric: bool) -> dict[str, tuple[NDArray[np.int32], Array]]:
     """Return where the residuals are reactions of a support, or charges of an electrode, by part.
 
     Collective.
 
     Returns
     -------
-    Part -> its nodes, and 1 at their held components, shape (n, d) or (n, 1).
+    Part -> its nodes, and the projectors of residuals there onto its directions, shape (n, d, d),
+    or (n, 1, 1).
     """
-    d, fixed = problem.dim, problem.body.fixed
-    ones = np.ones((problem.equilibrium.unsupported.shape[0], 1 if electric else d))
-    held = [(f.potential,) if electric else f.displacement or (None,) * d for f in fixed]
-    return _reactions(problem, ones, held, slice(d, None) if electric else slice(d))
+    d, body = problem.dim, problem.equilibrium
+    found: dict[str, tuple[NDArray[np.int32], Array]] = {}
+    left = ~body.unsupported[:, slice(d, None) if electric else slice(d)]
+    for number, fixed in enumerate(problem.body.fixed):
+        values = (fixed.potential,) if electric else fixed.displacement or (None,) * d
+        held = np.array([value is not None for value in values])
+        rolls = fixed.normal is not None and not electric
+        for part in members(fixed.on) if held.any() or rolls else ():
+            nodes = nodes_of(problem, part)
+            if rolls:
+                along = directions_of(body.rollers, number, nodes)
+            else:
+                along = np.eye(held.size) * (left[nodes] & held)[:, None, :]
+                left[nodes] &= ~held
+            if part in found:  # prescribed there by several entries
+                along = along + found[part][1]
+            found[part] = nodes, along
+    return found
 
 
 def nodes_of(problem: ContactProblem, part: str) -> NDArray[np.int32]:
@@ -145,7 +136,8 @@ def driven_part(problem: ContactProblem) -> str | None:
     one with a load; None without any.
     """
     for fixed in problem.body.fixed:
-        given = [component for component in fixed.displacement or () if component is not None]
+        ways = (*(fixed.displacement or ()), fixed.normal)
+        given = [component for component in ways if component is not None]
         moves = any(not getattr(component, "is_zero", False) for component in given)
         if moves and (knows_time(given) or fixed.factor is not steady):
             return fixed.on
@@ -213,9 +205,8 @@ def charge_balance(problem: ContactProblem, state: State) -> ChargeBalance:
     d, bs = problem.dim, equilibrium.block_size
     residual = equilibrium.nodal(residual_forces(problem, state))[:, d:]
     residual = np.asarray(residual / equilibrium.phi_scale)
-    held = [(fixed.potential,) for fixed in problem.body.fixed]
-    parts = _reactions(problem, residual, held, slice(d, None))
-    nodal = {part: charges for part, (_, charges) in parts.items()}
+    parts = holding(problem, electric=True)
+    nodal = {part: held[:, 0] * residual[nodes] for part, (nodes, held) in parts.items()}
     nodal |= {e.on: residual[nodes_of(problem, e.on)] for e in problem.body.electrodes}
     electrodes = {part: _sum(problem, charges) for part, charges in nodal.items()}
     magnitude = sum(_sum(problem, np.abs(charges)) for charges in nodal.values())

@@ -161,9 +161,7 @@ def check_supports(problem: ContactProblem) -> None:
 
 def _prescribed(fixed: Fixed) -> dict[str, Any]:
     """Return the fields of a support by their keys."""
-    given = {f"displacement.{k}": field for k, field in enumerate(fixed.displacement or ())}
-    given["potential"] = fixed.potential
-    return {name: field for name, field in given.items() if field is not None}
+    return {name: field for name, field in fixed.given.items() if field is not None}
 
 
 def check_rigid_modes(problem: ContactProblem) -> None:

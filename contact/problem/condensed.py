@@ -24,7 +24,7 @@ from contact.linear import multigrid
 from contact.linear.constraint import ConstrainedBulk, Constraint
 from contact.linear.dense import DenseOperator
 from contact.linear.faults import check_overflow, petsc_options
-from contact.linear.layout import balance
+from contact.linear.layout import Inclined, balance, masked
 from contact.linear.operator import Counters
 from contact.linear.schur import SchurComplement
 from contact.problem.problem import ContactProblem
@@ -72,6 +72,8 @@ class CondensedBody:
         `sizes` of all that acts on the whole body: loads, reactions, and one field on the other.
     component_norms
         Which forces are compared with each other.
+    inclined
+        Directions in which supports hold kept nodes, by their places; None for none.
     """
 
     comm: MPI.Intracomm
@@ -84,6 +86,7 @@ class CondensedBody:
     own: slice
     acting: Array
     component_norms: ComponentNorms
+    inclined: Inclined | None = None
 
     linear, symmetric, most_rounding = True, True, MOST_ROUNDING
 
@@ -103,7 +106,8 @@ class CondensedBody:
 
     def prescribe(self, x: Array, time: float = 1.0) -> Array:
         """Return unknowns with the fixed ones as they were: the load has been condensed."""
-        return np.where(self.free.ravel(), x, self.at)
+        fixed = self.at - masked(self.free, self.inclined, self.at)
+        return masked(self.free, self.inclined, x) + fixed
 
     def moved(self, x: Array, increment: Array) -> Array:
         """Return unknowns plus an increment."""
@@ -124,11 +128,11 @@ class CondensedBody:
 
     def unbalanced(self, forces: Array) -> Array:
         """Return the forces on free unknowns."""
-        return np.where(self.free.ravel(), forces, 0.0)
+        return masked(self.free, self.inclined, forces)
 
     def reactions(self, forces: Array) -> Array:
         """Return the forces on fixed unknowns."""
-        return np.where(self.free.ravel(), 0.0, forces)
+        return forces - masked(self.free, self.inclined, forces)
 
     def sizes(self, values: Array) -> Array:
         """Return the norms of forces, and of charges, of each component apart. Collective."""
@@ -152,7 +156,7 @@ class CondensedBody:
         kind: str,
     ) -> DenseOperator:
         """Return the dense operator; it has blocks at all nodes, in their order."""
-        return DenseOperator(self.comm, self.free, self.stiffness, counters)
+        return DenseOperator(self.comm, self.free, self.stiffness, counters, self.inclined)
 
     def norm(self, values: Array) -> float:
         """Return the Euclidean norm of owned values. Collective."""
@@ -280,10 +284,11 @@ class Condensation:
         )
         if not (self._regular and np.isfinite(forces).all()):
             return None
+        free, inclined = body.layout.at(self.nodes)
         condensed = CondensedBody(
             body.comm,
             body.dim,
-            body.free[self.nodes],
+            free,
             self._rows,
             self._stiffness,
             forces,
@@ -291,6 +296,7 @@ class Condensation:
             self._own,
             acting,
             body.component_norms.at(self.nodes),
+            inclined,
         )
         return CondensedProblem(condensed, self._interface, self.full.scales, state.time)
 

@@ -214,7 +214,11 @@ class ContactProblem:
         )
         body = self.equilibrium
         found = joined_nodes(
-            self.entries, body.layout.index_map, body.free, body.global_unknowns.ties
+            self.entries,
+            body.layout.index_map,
+            body.free,
+            body.global_unknowns.ties,
+            body.layout.inclined,
         )
         stiffness = self._young_of_contacts() / size
         law = joined_law(self.entries, found, body.phi_scale, stiffness)

@@ -211,8 +211,9 @@ def _group(
     moved = np.stack(columns, axis=1)
     # Relative to its restraints: supports, and rigid parts where nodes follow them.
     apart = moved[: body.owned] - global_unknowns.ties @ moved[body.owned :]
-    fixed = ~body.free.copy()
-    fixed[:, d:] = False
+    nodal = apart.reshape(len(body.free), body.block_size, -1)[:, :d]
+    every = np.arange(len(body.free), dtype=np.int32)
+    held = nodal - np.einsum("nij,njk->nik", body.movable(every), nodal)
     return Group(
         problem,
         components,
@@ -221,7 +222,7 @@ def _group(
         moved,
         names,
         np.array(centres),
-        _gram(problem, apart[fixed.ravel()][:, None, :]) + _elastic_gram(problem, moved),
+        _gram(problem, held) + _elastic_gram(problem, moved),
         bool(moving),
     )
 
