@@ -28,16 +28,7 @@ LAYERS = (
     {"methods"},
     {"output"},
     {"case"},
-    {
-        "adapting",
-        "nesting",
-        "solving",
-        "sweeping",
-        "differences",
-        "derivatives",
-        "gradients",
-        "identification",
-    },
+    {"adapting", "nesting", "solving", "sweeping", "derivatives"},
     {"cli"},
 )
 

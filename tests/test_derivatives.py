@@ -32,7 +32,7 @@ from contact import (
 )
 from contact.case.build import build_problem
 from contact.case.text import number_at, with_number
-from contact.derivatives import logger
+from contact.derivatives.by_parameters import logger
 from contact.linear.operator import SparseOperator
 from contact.mesh.domain import from_mesh
 from contact.output.differentiable import named_quantities

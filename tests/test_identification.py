@@ -8,7 +8,7 @@ from contact import InputError, identify, parse_case, read_data, solve
 from contact.case.text import number_at, to_toml, with_number
 from contact.cli.identify import report
 from contact.cli.main import main
-from contact.identification import _accepted
+from contact.derivatives.identification import _accepted
 from scripts.studies.derivatives import FAMILIES, problem
 from scripts.studies.identification import coverage
 

@@ -13,8 +13,8 @@ from mpi4py import MPI
 from contact.case.file import load_case
 from contact.cli.main import CONVERGED
 from contact.cli.progress import progress
+from contact.derivatives.identification import TIME, Identified, identify
 from contact.errors import InputError
-from contact.identification import TIME, Identified, identify
 from contact.output.figures.style import BLUE, GREY, ORANGE, STYLE, sheet
 from contact.output.folder import on_root
 from contact.output.formats import read_data

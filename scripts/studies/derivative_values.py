@@ -17,7 +17,7 @@ import numpy as np
 from contact import field_gradient, gap_gradient, load_case, parse_case, sensitivity
 from contact.case.file import Case
 from contact.case.text import number_at, to_toml, with_number
-from contact.derivatives import LoadPath
+from contact.derivatives.by_parameters import LoadPath
 from contact.output.differentiable import named_quantities
 from contact.output.solution import Solution
 from contact.typing import Array

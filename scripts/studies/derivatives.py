@@ -17,7 +17,7 @@ from mpi4py import MPI
 from contact import solve
 from contact.case.file import Case, parse_case
 from contact.case.text import number_at, to_toml, with_number
-from contact.derivatives import sensitivity
+from contact.derivatives.by_parameters import sensitivity
 from contact.errors import InputError
 from contact.output.differentiable import named_quantities
 from contact.output.solution import Solution

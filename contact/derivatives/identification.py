@@ -1,7 +1,7 @@
 """Parameters from measurements: least squares on the columns of ``steps.csv``.
 
-The derivatives are those of `contact.derivatives`, so that an evaluation costs one run and a few
-back-substitutions a step, however many parameters there are.
+The derivatives are those of `contact.derivatives.by_parameters`, so that an evaluation costs one
+run and a few back-substitutions a step, however many parameters there are.
 
 References
 ----------
@@ -24,7 +24,7 @@ from scipy.stats import t as student
 from contact.arguments import expect
 from contact.case.file import Case
 from contact.case.text import number_at, with_number
-from contact.derivatives import sensitivity
+from contact.derivatives.by_parameters import sensitivity
 from contact.errors import InputError
 from contact.methods.report import Monitor
 from contact.output.solution import Solution

@@ -17,14 +17,14 @@ from dolfinx.mesh import Mesh
 from contact.arguments import expect
 from contact.body.field_work import FieldWork
 from contact.body.internal_variables import VARIABLES
-from contact.derivatives import (
+from contact.derivatives.by_parameters import (
     Adjoint,
     LoadPath,
     backwards,
     parameters_of,
     quantities_of,
 )
-from contact.differences import Family, Parameter
+from contact.derivatives.differences import Family, Parameter
 from contact.errors import InputError
 from contact.history import InternalVariables
 from contact.output.differentiable import Differentiable, Quantity

@@ -33,7 +33,7 @@ from mpi4py import MPI
 from contact.arguments import expect
 from contact.case.build import build_problem
 from contact.case.text import number_at, with_number
-from contact.differences import Family, Parameter, at, family_of
+from contact.derivatives.differences import Family, Parameter, at, family_of
 from contact.errors import InputError
 from contact.history import History
 from contact.linear.operator import Counters
