@@ -142,7 +142,7 @@ def _coarser(mesh: Mesh) -> Mesh | None:
     """Return the next coarser mesh, if there is one."""
     if mesh.refine > 0:
         return mesh.model_copy(update={"refine": mesh.refine - 1})
-    if mesh.cells is None or min(mesh.cells) < 2 * COARSEST:
+    if mesh.cells is None or min(mesh.cells) < 2 * COARSEST or mesh.inside or mesh.regions:
         return None
     coarser = mesh.model_copy(update={"cells": tuple((n + 1) // 2 for n in mesh.cells)})
     try:

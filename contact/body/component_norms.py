@@ -111,7 +111,7 @@ def component_norms_of(
         touched = np.zeros((len(members), count), dtype=np.intc)
         for member, at in zip(members, touched, strict=True):
             if member.free.any():
-                facets = domain.facets(member.description.on)
+                facets = domain.facets_anywhere(member.description.on)
                 nodes = fem.locate_dofs_topological(space, d - 1, facets)
                 at[component[nodes[nodes < component.size]]] = 1
         domain.comm.Allreduce(MPI.IN_PLACE, touched, op=MPI.MAX)

@@ -232,7 +232,7 @@ def _tie(
     """Return the rows of a plate or an electrode, and mark them as tied. Collective."""
     d, key = domain.dim, f"{member.description.name} on {member.description.on!r}"
     domain.mesh.topology.create_connectivity(d - 1, d)
-    nodes = fem.locate_dofs_topological(space, d - 1, domain.facets(member.description.on))
+    nodes = fem.locate_dofs_topological(space, d - 1, domain.facets_anywhere(member.description.on))
     nodes = nodes[nodes < free.shape[0]]
     points = space.tabulate_dof_coordinates()[nodes, :d]
     motion = member.motion(points, free.shape[1])

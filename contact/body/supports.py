@@ -155,7 +155,7 @@ def _support(
     amplitude: Amplitude,
     name: str,
 ) -> Support:
-    dim, facets = domain.dim, domain.facets(part)
+    dim, facets = domain.dim, domain.facets_anywhere(part)
     subspace = space.sub(component)
     scalar, _ = collapse(subspace)
     data = fem.Function(scalar)

@@ -53,7 +53,8 @@ def check_sections(case: Case) -> None:
         if accepted is not None:
             raise fault("space.element", case.space.element, accepted)
     if case.mesh.dimension is not None:
-        check_mesh(case, case.mesh.dimension, [*case.mesh.sides, *case.mesh.parts])
+        parts = [*case.mesh.sides, *case.mesh.parts, *case.mesh.inside]
+        check_mesh(case, case.mesh.dimension, parts)
 
 
 def check_mesh(case: Case, dimension: int, parts: Iterable[str]) -> None:

@@ -12,12 +12,14 @@ from mpi4py import MPI
 from pydantic import Field, PrivateAttr, model_validator
 
 import meshes
+from contact.case.formula import Expression
 from contact.case.messages import UNKNOWN, Words, fault
 from contact.case.section import (
     Axis,
     Either,
     Few,
     File,
+    Formula,
     Name,
     OneOrSome,
     Section,
@@ -27,16 +29,17 @@ from contact.case.section import (
 from contact.errors import InputError
 from contact.mesh import grid
 from contact.mesh.cells import SHAPES, Shape
-from contact.mesh.domain import Domain
+from contact.mesh.domain import Domain, Marker, cells_in, facets_inside, with_further_names
 from contact.mesh.grid import rotate
 from contact.mesh.reader import from_file, from_generator
 from contact.mesh.transfer import refined
 from contact.methods.signals import deaf
+from contact.ranks import on_all_ranks
 from contact.settings import Accepted, Count, Number, Positive
 from meshes.grading import memory
 
 #: Keys of `[mesh]` that go with every generator and file.
-COMMON = ("generator", "file", "cell", "order", "rotation", "axis", "refine", "adapt")
+COMMON = tuple("generator file cell order rotation axis refine adapt inside regions".split())
 
 #: Bytes that making the mesh takes for a cell, without any unknowns (seen: 235 to 345).
 CELL_MEMORY = 200
@@ -158,6 +161,13 @@ class Mesh(Section):
     """Adaptive refinement, `[mesh.adapt]`. Default: none."""
     parts: dict[Name, Pieces] = Field(default={})
     """Further parts of a rectangle or box by name: `[mesh.parts.NAME]`."""
+    inside: dict[Name, Formula] = Field(default={})
+    """Parts inside of the body by name, of any mesh: the facets at all of whose corners a formula
+    is not 0, such as `middle = "abs(y - 0.5) < 1e-6"`, in the coordinates before rotation.
+    `[[fixed]]`, `[[electrode]]` and `[[rigid]]` may name them: an electrode between two layers."""
+    regions: dict[Name, Formula] = Field(default={})
+    """Further regions by name, of any mesh: the cells in whose middle a formula is not 0, likewise.
+    `[[material]]` names them."""
     parameters: dict[Name, Number] = Field(default={})
     """Parameters of another generator. They may stand in `[mesh]` itself."""
 
@@ -289,6 +299,7 @@ class Mesh(Section):
                 domain = from_generator(
                     comm, self.generator, self.cell, self.order, **self.parameters
                 )
+        domain = self._named(domain)
         axis = self.axis or (0.0, 1.0, 0.0)
         rotate(domain.mesh, self.rotation, axis if domain.dim == 3 else (0.0, 0.0, 1.0))
         if not self.sides:
@@ -297,6 +308,27 @@ class Mesh(Section):
         for _ in range(self.refine):
             domain = refined(domain)
         return domain
+
+    def _named(self, domain: Domain) -> Domain:
+        """Return a domain with the names of `inside` and `regions`. Collective."""
+        for key, known in (("inside", domain.names), ("regions", tuple(domain.regions))):
+            for name in getattr(self, key):
+                if name in known:
+                    accepted = f"a name that the mesh has not: {', '.join(known)} are there"
+                    raise InputError(f"mesh.{key}.{name}: given again; accepted: {accepted}")
+
+        def marker(formula: Expression) -> Marker:
+            return lambda x: formula.numpy(x[: domain.dim].T) != 0
+
+        mesh = domain.mesh
+        with on_all_ranks(domain.comm):  # a formula may have no value on one of them
+            facets = {
+                name: facets_inside(mesh, marker(formula)) for name, formula in self.inside.items()
+            }
+            cells = {
+                name: cells_in(mesh, marker(formula)) for name, formula in self.regions.items()
+            }
+        return with_further_names(domain, facets, cells)
 
     def _check_memory(self, comm: MPI.Intracomm, cells: int, dim: int) -> None:
         """Refuse a mesh that certainly does not fit, and warn of a large one, which takes long."""

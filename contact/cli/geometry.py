@@ -11,7 +11,10 @@ from dolfinx import fem
 from mpi4py import MPI
 
 from contact import _compat
+from contact.mesh.cells import rule, shape_of
 from contact.mesh.domain import Domain
+from contact.mesh.entities import cells_at
+from contact.mesh.geometry import measures
 from contact.typing import Array
 
 #: Length of the mean of a part's normals from which on the part counts as flat, and below which
@@ -43,7 +46,29 @@ def parts(domain: Domain) -> list[str]:
             across = f"curved, mean normal {_vector(mean / length)}"
         place = f"centroid {_vector(domain.resultant(centroid))}"
         rows.append([name, f"{count} facets", f"{_extent(domain)} {area:.6g}", place, across])
-    return ["# parts of its boundary:", *_table(rows)]
+    inside = [*_table([_inside(domain, name) for name in sorted(domain.inside)])]
+    return [
+        "# parts of its boundary:",
+        *_table(rows),
+        *(["# parts inside of it:"] if inside else []),
+        *inside,
+    ]
+
+
+def _inside(domain: Domain, name: str) -> list[str]:
+    """Return the facets, area and centroid of a part inside of the body. Collective."""
+    facets, d, order = domain.inside[name], domain.dim, domain.order
+    cells, place = cells_at(domain.mesh, facets)
+    shape = shape_of(domain.mesh)
+    x = domain.mesh.geometry.x[_compat.geometry_dofmap(domain.mesh)[cells]][:, :, :d]
+    nodes = np.take_along_axis(x, shape.facet_nodes(order)[place][:, :, None], axis=1)
+    at, weights = rule(shape.facet, 2 * order)
+    areas = measures(domain.revolved, shape.facet, nodes, at, weights)
+    points = np.einsum("qk,fkd->fqd", shape.facet.lagrange(order, at), nodes)
+    local = np.array([facets.size, areas.sum(), *np.einsum("fq,fqd->d", areas, points)])
+    count, area, *moment = domain.comm.allreduce(local, op=MPI.SUM)
+    centroid = _vector(domain.resultant(np.array(moment) / area if area > 0 else np.zeros(d)))
+    return [name, f"{count:.0f} facets", f"{_extent(domain)} {area:.6g}", f"centroid {centroid}"]
 
 
 def regions(domain: Domain) -> list[str]:

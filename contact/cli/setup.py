@@ -169,7 +169,7 @@ def _said(*values: Any) -> str:
 def _role(
     domain: Domain, part: str, colour: str, words: str, given: Sequence[Any] | None = None
 ) -> Role | None:
-    corners, force = _corners(domain, domain.facets(part)), None
+    corners, force = _corners(domain, domain.facets_anywhere(part)), None
     if given is not None:
         # Those that move, at the end of an evolution.
         fields = [field.at(1.0) if hasattr(field, "at") else field for field in given]

@@ -182,7 +182,7 @@ def _check_rim(
     """
     facets, filled = body.domain.facets(part), False
     for support in body.body.fixed:
-        held = np.isin(facets, body.domain.facets(support.on))
+        held = np.isin(facets, body.domain.facets_anywhere(support.on))
         for given, nodes in zip(support.displacement or (), lost, strict=False):
             if given is not None:
                 filled |= bool((held & np.isin(slave.nodes, nodes).all(axis=1)).any())

@@ -30,6 +30,9 @@ from contact.mesh.together import known, members, pieces
 from contact.typing import Array
 from forms.kinematics import CARTESIAN, Axisymmetric, Kinematics
 
+#: Where facets inside of the body may be a part all the same.
+UNLESS = ", unless its displacement or potential is given, or it is an electrode"
+
 
 @dataclass(frozen=True)
 class ExtendedMeasure:
@@ -91,6 +94,9 @@ class Domain:
     revolved
         Whether the mesh is the half plane of a body of revolution, x its radius and y its axis
        . Measures then are those of the whole body.
+    inside
+        Name of a group with facets inside of the body -> its facets that this rank owns, as of
+        parts. Nothing acts on these, but they may be fixed, or electrodes; they are unusable else.
     """
 
     mesh: dmesh.Mesh
@@ -101,6 +107,7 @@ class Domain:
     unusable: Mapping[str, str] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
     revolved: bool = False
+    inside: Mapping[str, Indices] = field(default_factory=dict)
 
     def __repr__(self) -> str:
         """Return the names, not the facets of each part."""
@@ -172,7 +179,15 @@ class Domain:
         for one in members(name):
             if one in self.unusable:
                 raise InputError(self.unusable[one])
-        found = [self.parts[known("part", one, self.parts)] for one in members(name)]
+        return self.facets_anywhere(name)
+
+    def facets_anywhere(self, name: str) -> Indices:
+        """Return the facets of a part, on the boundary or inside of the body; as `facets`."""
+        names = {**self.parts, **self.inside}
+        for one in members(name):
+            if one in self.unusable and one not in self.inside:
+                raise InputError(self.unusable[one])
+        found = [names[known("part", one, names)] for one in members(name)]
         return found[0] if len(found) == 1 else np.unique(np.concatenate(found))
 
     def cells(self, name: str) -> Indices:
@@ -255,6 +270,7 @@ def from_mesh(
     parts: Mapping[str, Marker | npt.NDArray[np.integer[Any]]],
     size: float | None = None,
     regions: Mapping[str, Marker | npt.NDArray[np.integer[Any]]] | None = None,
+    inside: Mapping[str, Marker | npt.NDArray[np.integer[Any]]] | None = None,
 ) -> Domain:
     """Name parts of the boundary, and regions, of a dolfinx mesh. Collective.
 
@@ -269,6 +285,8 @@ def from_mesh(
         Largest extent of the body; by default that of its bounding box.
     regions
         Name -> the like for cells; by default one region, ``body``.
+    inside
+        Name -> the like for facets inside of the body, which may be fixed, or electrodes.
 
     Raises
     ------
@@ -285,11 +303,54 @@ def from_mesh(
     boundary = exterior_facets(mesh)
     chosen = {name: _owned(mesh, tdim - 1, given) for name, given in parts.items()}
     for name, facets in chosen.items():
-        inside = int(np.count_nonzero(~np.isin(facets, boundary)))
-        if _compat.lasting(mesh.comm).allreduce(inside) > 0:
-            raise InputError(f"the part {name!r} contains interior facets of the mesh")
+        wrong = int(np.count_nonzero(~np.isin(facets, boundary)))
+        if _compat.lasting(mesh.comm).allreduce(wrong) > 0:
+            raise InputError(
+                f"the part {name!r} contains interior facets of the mesh; accepted: facets of the "
+                "boundary, or the name among inside={...}"
+            )
     cells = {name: _owned(mesh, tdim, given) for name, given in (regions or {}).items()}
-    return with_names(mesh, chosen, cells, size)
+    within = {name: facets_inside(mesh, given) for name, given in (inside or {}).items()}
+    return with_further_names(with_names(mesh, chosen, cells, size), within, {})
+
+
+def facets_inside(mesh: dmesh.Mesh, given: Marker | npt.NDArray[np.integer[Any]]) -> Indices:
+    """Return the owned ones of given facets that are not on the boundary, ascending."""
+    dim = mesh.topology.dim - 1
+    found = dmesh.locate_entities(mesh, dim, given) if callable(given) else given
+    return np.setdiff1d(_owned(mesh, dim, found), exterior_facets(mesh)).astype(np.int32)
+
+
+def cells_in(mesh: dmesh.Mesh, marker: Marker) -> Indices:
+    """Return the owned cells in whose middle a function of x is true, ascending."""
+    dim = mesh.topology.dim
+    cells = np.arange(mesh.topology.index_map(dim).size_local, dtype=np.int32)
+    if not cells.size:  # dolfinx divides by their number
+        return cells
+    return cells[marker(dmesh.compute_midpoints(mesh, dim, cells).T)]
+
+
+def with_further_names(
+    domain: Domain, inside: Mapping[str, Indices], regions: Mapping[str, Indices]
+) -> Domain:
+    """Return a domain with further names, of owned facets inside of the body and cells. Collective.
+
+    Raises
+    ------
+    InputError
+        If one is empty.
+    """
+    for name, own in (*inside.items(), *regions.items()):
+        if domain.comm.allreduce(own.size, op=MPI.SUM) == 0:
+            entity = "facet inside of the body" if name in inside else "cell"
+            raise InputError(f"{name!r} contains no {entity}")
+    reason = "the part {!r} lies inside of the body; a part must lie on its boundary" + UNLESS
+    return replace(
+        domain,
+        inside={**domain.inside, **inside},
+        unusable={**domain.unusable, **{name: reason.format(name) for name in inside}},
+        regions={**domain.regions, **regions},
+    )
 
 
 def _tagged(tags: dmesh.MeshTags, wanted: int | Sequence[int]) -> Indices:

@@ -288,12 +288,14 @@ def _distribute(comm: MPI.Intracomm, raw: Cells, source: str) -> Domain:
     element = basix.ufl.element("Lagrange", raw.shape.name, order, shape=(dim,), dtype=np.float64)
     mesh = dmesh.create_mesh(comm, cells=raw.regions.rows, x=raw.points, e=ufl.Mesh(element))
     exterior_facets(mesh)
-    domain = with_names(mesh, _sets(mesh, dim - 1, raw.parts), _sets(mesh, dim, raw.regions))
+    parts, regions = _sets(mesh, dim - 1, raw.parts), _sets(mesh, dim, raw.regions)
+    inside = {name: parts.pop(name) for name in raw.inside}
+    domain = with_names(mesh, parts, regions)
     if comm.rank == 0:
         for note in raw.notes:
             logger.info("%s: %s", source, note)
     unusable = {name: f"{source}: {reason}" for name, reason in raw.unusable.items()}
-    return replace(domain, unusable=unusable, notes=raw.notes)
+    return replace(domain, unusable=unusable, notes=raw.notes, inside=inside)
 
 
 def _sets(mesh: dmesh.Mesh, dim: int, groups: Groups) -> dict[str, Indices]:

@@ -61,6 +61,7 @@ def write(cells: Cells, path: Path) -> None:
         name: {"names": group.names, "sets": group.sets} for name, group in groups.items()
     }
     said |= {"shape": cells.shape.name, "unusable": cells.unusable, "notes": cells.notes}
+    said["inside"] = cells.inside
     shapes = {"regions": cells.shape, "parts": cells.shape.facet}
     with tempfile.TemporaryDirectory(dir=path.parent) as folder:
         made = Path(folder) / heavy.name
@@ -174,4 +175,5 @@ def read(comm: MPI.Intracomm, heavy: Path, digest: str) -> Cells:
             found.append(Groups(tuple(said[name]["names"]), rows[:, inverse], labels, sets))
         regions, parts = found
         notes = tuple(said["notes"])
-        return Cells(shape, share("points"), regions, parts, said["unusable"], notes)
+        inside = tuple(said.get("inside", ()))  # none in files of 0.1.0
+        return Cells(shape, share("points"), regions, parts, said["unusable"], notes, inside)

@@ -7,7 +7,7 @@ from dataclasses import replace
 import basix.ufl
 import numpy as np
 import ufl
-from dolfinx import fem
+from dolfinx import fem, la
 from dolfinx import mesh as dmesh
 from mpi4py import MPI
 from numpy.typing import NDArray
@@ -62,6 +62,11 @@ def with_parents(domain: Domain, marked: Indices | None = None) -> tuple[Domain,
     owner[fine_facets[cells, places]] = coarse_facets[parent[cells], local[cells, places]]
 
     parts = {name: facets[np.isin(owner[facets], old)] for name, old in domain.parts.items()}
+    facets = np.arange(min(owner.size, fine.topology.index_map(tdim - 1).size_local))
+    inside = {
+        name: facets[np.isin(owner[: facets.size], _with_ghosts(coarse, old))].astype(np.int32)
+        for name, old in domain.inside.items()
+    }
     owned = parent[: fine.topology.index_map(tdim).size_local]
     regions = {
         name: np.flatnonzero(np.isin(owned, old)).astype(np.int32)
@@ -74,8 +79,17 @@ def with_parents(domain: Domain, marked: Indices | None = None) -> tuple[Domain,
         unusable=domain.unusable,
         notes=domain.notes,
         revolved=domain.revolved,
+        inside=inside,
     )
     return made_of, owned
+
+
+def _with_ghosts(mesh: dmesh.Mesh, owned: Indices) -> Indices:
+    """Return all local facets that are among those that some rank owns. Collective."""
+    marks = la.vector(mesh.topology.index_map(mesh.topology.dim - 1))
+    marks.array[owned] = 1.0
+    marks.scatter_forward()
+    return np.flatnonzero(marks.array).astype(np.int32)
 
 
 def _cut(coarse: dmesh.Mesh, marked: Indices | None) -> tuple[dmesh.Mesh, Indices, Indices]:
@@ -126,8 +140,10 @@ def _halved(coarse: dmesh.Mesh, marked: Indices | None) -> tuple[dmesh.Mesh, Ind
     stay = _compat.destinations(np.full(len(cells), rank, dtype=np.int32))
     kept = {"partitioner": lambda *_: stay}
     fine = dmesh.create_mesh(coarse.comm, cells=cells, x=points, e=ufl.Mesh(element), **kept)
-    # A facet of a child that bounds the mesh lies in the parent's of the same place.
-    facets = np.tile(np.arange(len(shape.facet_corners), dtype=np.int32), len(cells))
+    # Facets of a child at the corner that it has of its parent lie in the parent's of their place.
+    places = np.arange(len(shape.facet_corners), dtype=np.int32)
+    at_corner = (shape.facet_corners[None] == np.arange(shape.corners)[:, None, None]).any(axis=2)
+    facets = np.tile(np.where(at_corner, places, -1).ravel(), owned)
     parents = np.repeat(np.arange(owned, dtype=np.int32), len(children))
     return fine, parents, facets
 

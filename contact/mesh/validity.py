@@ -10,6 +10,7 @@ import numpy.typing as npt
 
 from contact.errors import InputError
 from contact.mesh.cells import SHAPES, Shape, rule
+from contact.mesh.domain import UNLESS
 from contact.mesh.entities import combinations
 from contact.mesh.extraction import BODY, Ints, Model
 from contact.mesh.geometry import determinant, jacobians
@@ -66,6 +67,8 @@ class Cells:
         Groups of facets on its boundary.
     unusable, notes
         As in `Domain`.
+    inside
+        Which of the parts have facets inside of the body; these are unusable too, but for supports.
     """
 
     shape: Shape
@@ -74,6 +77,7 @@ class Cells:
     parts: Groups
     unusable: dict[str, str]
     notes: tuple[str, ...]
+    inside: tuple[str, ...] = ()
 
     def without_rows(self) -> Cells:
         """Return the names alone, for ranks that read nothing."""
@@ -85,8 +89,8 @@ def check_model(model: Model) -> Cells:
     """Check a mesh and bring it into the form in which it is distributed.
 
     The body consists of the cells in physical groups, or of all cells where no group has any.
-    Groups may overlap. A group of facets that are not all on the boundary of the body cannot be
-    a part and is set aside.
+    Groups may overlap. A group of facets that are not all on the boundary of the body can be
+    fixed, or an electrode, but is no part of the boundary; one without a cell is set aside.
 
     Raises
     ------
@@ -124,14 +128,18 @@ def check_model(model: Model) -> Cells:
 
     around = shape.facet.around
     parts = {name: new[_places(tags, nodes)][:, around] for name, nodes in model.parts.items()}
-    reasons = _check_cells(shape, points, cells, parts)
+    reasons, inside = _check_cells(shape, points, cells, parts)
     usable = {name: rows for name, rows in parts.items() if name not in reasons}
     if not usable:
         entities = "curves" if dim == 2 else "surfaces"
         reason = next(iter(reasons.values()), None)
         raise InputError(reason or f"it has no physical groups of {entities}: no part has a name")
-    notes += [f"ignored: {reason}" for reason in reasons.values()]
-    return Cells(shape, points, replace(regions, rows=cells), _join(usable), reasons, tuple(notes))
+    notes += [
+        reason if name in inside else f"ignored: {reason}" for name, reason in reasons.items()
+    ]
+    kept_parts = _join(usable | {name: parts[name] for name in inside})
+    regions = replace(regions, rows=cells)
+    return Cells(shape, points, regions, kept_parts, reasons, tuple(notes), inside)
 
 
 def _check_kinds(kinds: Sequence[tuple[str, int, int]], dim: int) -> Shape:
@@ -256,7 +264,7 @@ def _first(wrong: npt.NDArray[np.bool_], corners: Array) -> str:
 
 def _check_cells(
     shape: Shape, points: Array, cells: Ints, parts: Mapping[str, Ints]
-) -> dict[str, str]:
+) -> tuple[dict[str, str], tuple[str, ...]]:
     """Check cells, and which groups of facets cannot be parts of the boundary.
 
     Parameters
@@ -268,7 +276,7 @@ def _check_cells(
 
     Returns
     -------
-    Name of each group that cannot be a part -> the reason.
+    Name of each group that cannot be a part -> the reason; and those inside of the body.
 
     Raises
     ------
@@ -319,7 +327,8 @@ def _check_cells(
     if np.any(wrong):
         raise InputError(f"its cells overlap (inverted cells) at {wrong.sum()} facet(s)")
 
-    reasons = {}
+    reasons: dict[str, str] = {}
+    within: list[str] = []
     ends = np.cumsum([len(facets) for facets in parts.values()])
     for name, members in zip(parts, np.split(outer, ends), strict=False):
         neighbours = count[members]
@@ -328,8 +337,9 @@ def _check_cells(
         elif np.any(neighbours == 0):
             reasons[name] = f"the physical group {name!r} has facets that bound no cell"
         elif np.any(neighbours == 2):
+            within.append(name)
             reasons[name] = (
                 f"the physical group {name!r} has {np.count_nonzero(neighbours == 2)} interior "
-                "facet(s); a part must lie on the boundary of the body"
+                f"facet(s); a part must lie on the boundary of the body{UNLESS}"
             )
-    return reasons
+    return reasons, tuple(within)

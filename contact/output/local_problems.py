@@ -196,6 +196,13 @@ class LocalProblems:
         traction = _contact_traction(problem, state)[nodes]
         pressed = (touch & slave)[..., None, None] & np.isfinite(traction)
         through[..., :d] = np.where(pressed, traction, through[..., :d])
+        # Facets inside that are fixed, or an electrode, have a jump, of charges for instance.
+        names = [
+            *(fixed.on for fixed in body.body.fixed),
+            *(member.description.on for member in body.global_unknowns.members),
+        ]
+        parts = [body.domain.facets_anywhere(name) for name in names]
+        inside &= ~np.isin(facets, np.concatenate([[], *parts]))
         held = ~inside[..., None] & ((free == 0) | (touch & loaded)[..., None])
         return through, held
 

@@ -124,7 +124,7 @@ def holding(problem: ContactProblem, electric: bool) -> dict[str, tuple[NDArray[
 def nodes_of(problem: ContactProblem, part: str) -> NDArray[np.int32]:
     """Return the owned nodes of a part of the boundary."""
     body = problem.equilibrium
-    facets = problem.domain.facets(part)
+    facets = problem.domain.facets_anywhere(part)
     nodes = fem.locate_dofs_topological(body.space, problem.dim - 1, facets)
     return np.asarray(nodes[nodes < body.owned // body.block_size])
 

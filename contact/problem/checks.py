@@ -80,7 +80,7 @@ def check_problem(problem: ContactProblem) -> None:
 def _shared(problem: ContactProblem, one: str, other: str) -> tuple[NDArray[np.int32], bool]:
     """Return the facets of this rank that two parts share, and whether any rank has some."""
     domain = problem.domain
-    shared = np.intersect1d(domain.facets(one), domain.facets(other))
+    shared = np.intersect1d(domain.facets_anywhere(one), domain.facets_anywhere(other))
     return shared, domain.comm.allreduce(shared.size > 0, op=MPI.LOR)
 
 
