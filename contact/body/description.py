@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Sequence
-from dataclasses import InitVar, dataclass
+from dataclasses import InitVar, dataclass, replace
 from dataclasses import field as default
 from typing import Any, Protocol
 
@@ -32,6 +32,7 @@ from forms.elasticity import Anisotropic
 from forms.hencky import Law, is_linear
 from forms.history import HistoryLaw
 from forms.piezo import Piezo
+from forms.plane_stress import PlaneStressElastic, PlaneStressHistory, in_plane_stress
 
 #: For scripts that are older than the meaning of the word.
 CHANGED = (
@@ -285,6 +286,19 @@ class Material:
         fits = self.factor is None or not (self.piezo or isinstance(self.law, HistoryLaw))
         accepted = "a material without coupling and internal variables"
         expect("factor", self.factor, accepted, fits and not isinstance(self.factor, Moving))
+
+    @property
+    def in_plane_stress(self) -> bool:
+        """Whether no stress acts across a plane body of it."""
+        return isinstance(self.law, PlaneStressElastic | PlaneStressHistory)
+
+    def plane_stress(self) -> Material:
+        """Return the material of a plane body without stress across it, of unit thickness.
+
+        Crystals are in the axes of the body.
+        """
+        law, piezo = in_plane_stress(self.law, self.piezo)
+        return replace(self, law=law, piezo=piezo)
 
 
 def _leading(materials: Sequence[Material]) -> tuple[Law, Piezo | None]:

@@ -45,10 +45,11 @@ class Space(Section):
     element: Literal["standard", "mean_dilatation"] = "standard"
     """`"mean_dilatation"`: volumetric strains are averaged over each cell, so that nearly
     incompressible bodies, and yielding ones, do not lock. With `degree = 2`: P2-P0."""
-    kinematics: Literal["plane_strain", "axisymmetric"] = "plane_strain"
-    """The body of a mesh in 2-D: in plane strain, or a body of revolution whose half plane the
-    mesh is, x the radius and y the axis. There displacements are 0 across the axis without being
-    asked for, and loads, forces and charges are those of the full turn."""
+    kinematics: Literal["plane_strain", "plane_stress", "axisymmetric"] = "plane_strain"
+    """The body of a mesh in 2-D: in plane strain; in plane stress, a sheet of unit thickness that
+    is free to grow thinner; or a body of revolution whose half plane the mesh is, x the radius and
+    y the axis. There displacements are 0 across the axis without being asked for, and loads, forces
+    and charges are those of the full turn."""
 
 
 class Fixed(Section):

@@ -122,8 +122,9 @@ def _materials(case: Case, domain: Domain, law: Law | None) -> list[Material]:
         if domain.revolved:
             section.check_revolved(key)
         given = section.build(domain.dim)
-        made.append(given if law is None else replace(given, law=law))
-        check_range(f"{key}.young", float(made[-1].law.young))
+        own = given if law is None else replace(given, law=law)
+        check_range(f"{key}.young", float(own.law.young))
+        made.append(own.plane_stress() if case.space.kinematics == "plane_stress" else own)
     return made
 
 

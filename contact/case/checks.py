@@ -52,6 +52,9 @@ def check_sections(case: Case) -> None:
         accepted = needed(case.space.element, case.space.degree, case.mesh.shape)
         if accepted is not None:
             raise fault("space.element", case.space.element, accepted)
+    if case.space.kinematics == "plane_stress" and case.space.element != "standard":
+        accepted = '"standard" in plane stress, where nothing locks'
+        raise fault("space.element", case.space.element, accepted)
     if case.mesh.dimension is not None:
         parts = [*case.mesh.sides, *case.mesh.parts, *case.mesh.inside]
         check_mesh(case, case.mesh.dimension, parts)
@@ -77,7 +80,7 @@ def check_mesh(case: Case, dimension: int, parts: Iterable[str]) -> None:
         if only is not None and only != dimension:
             words = Words(f'given "{contact.foundation.shape}" in {dimension}-D')
             raise fault(f"{path}.foundation.shape", words, f"this shape in {only}-D only")
-    if dimension == 3 and case.space.kinematics == "axisymmetric":
+    if dimension == 3 and case.space.kinematics != "plane_strain":
         accepted = '"plane_strain" with a mesh in 3-D, where it has no effect'
         raise fault("space.kinematics", case.space.kinematics, accepted)
     if dimension == 2 and case.mesh.axis is not None:

@@ -35,6 +35,7 @@ from forms.history import HistoryLaw, components, to_tensor
 from forms.kinematics import deviator_squared, principal_values, strain, von_mises
 from forms.ops import maximum, sqrt
 from forms.piezo import coupling_stress, electric_displacement
+from forms.plane_stress import ACROSS, PlaneStressElastic, PlaneStressHistory
 
 #: Decrease of |dev eps|, over its earlier value, that counts as unloading; and of the secant
 #: modulus, over that of small strains, that counts as yielding.
@@ -118,12 +119,22 @@ class Point:
         u, self._phi = body.split(at)
         # The nodes may lie on the axis.
         kinematics = kinematics_of(body.domain, body.element, on_axis=True)
-        self._dim, self.strain = body.dim, strain(u, kinematics)
+        self._dim, plane = body.dim, strain(u, kinematics)
         self._piezo = material.piezo and piezo_with_constants(material.piezo, mesh)
         law = body.laws.fitted_law(form_law(material, mesh))
-        self.stress = stress(law, self.strain)
+        self.stress = stress(law, plane)
         if self._piezo is not None:
             self.stress += coupling_stress(self._piezo, self._phi)
+        #: That of the body: in plane stress with the strain across, which no form sees.
+        self.strain = plane
+        across: Expr | None = None
+        if isinstance(material.law, PlaneStressElastic):
+            gradient = None if self._piezo is None else ufl.grad(self._phi)
+            across = material.law.strain_across(plane, gradient)
+        elif isinstance(material.law, PlaneStressHistory):
+            across = body.laws.fits[ACROSS]
+        if across is not None:
+            self.strain = plane + across * ufl.as_tensor(np.diag([0.0, 0.0, 1.0]).tolist())
 
     @property
     def principal_stress(self) -> Expr:

@@ -58,7 +58,6 @@ def _sizes(record: Any) -> str:
 
 _ALL, _VECTOR = (SUMMARY, STEPS, SWEEP), "{name}_{axis}"
 _MESHES = (*_ALL, ADAPT)
-_STRAIN = {2: "plane_strain", 3: "solid"}
 
 _RUN = (
     Quantity("KEY", "", "A swept key, a column each: its value in this row.", _elsewhere, (SWEEP,)),
@@ -72,8 +71,8 @@ _RUN = (
     Quantity("reason", "", "Why the run ended, in words.", lambda r: r.outcome.reason),
     Quantity("method", "", "The method, as in `[solver]`."),
     Quantity(
-        "kinematics", "", "`plane_strain`, `axisymmetric` or `solid`.",
-        lambda r: "axisymmetric" if r.problem.domain.revolved else _STRAIN[r.problem.dim],
+        "kinematics", "", "`plane_strain`, `plane_stress`, `axisymmetric` or `solid`.",
+        lambda r: r.problem.kinematics,
     ),
     Quantity("dofs", "", "Number of unknowns.", lambda r: r.problem.equilibrium.layout.unknowns),
     Quantity(

@@ -326,6 +326,14 @@ class ContactProblem:
         return self.equilibrium.dim
 
     @property
+    def kinematics(self) -> str:
+        """The kinematics of the body as the case file names it; "solid" in 3-D."""
+        if self.domain.revolved or self.dim == 3:
+            return "axisymmetric" if self.domain.revolved else "solid"
+        thin = any(material.in_plane_stress for material in self.body.materials)
+        return "plane_stress" if thin else "plane_strain"
+
+    @property
     def piezoelectric(self) -> bool:
         """Whether there is a potential."""
         return self.equilibrium.piezoelectric

@@ -1,0 +1,215 @@
+"""Plane stress: a strip, a plate with a hole's ring, Cook's membrane, plasticity, a ceramic."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+
+from contact import Body, Contact, Fixed, Linear, Load, Log, Material, Problem, parse_case, solve
+from contact.case.build import build_problem
+from contact.errors import InputError
+from contact.mesh.grid import rectangle
+from contact.output.fields import DerivedFields
+from forms.history import differential
+from forms.j2 import J2, Voce
+from forms.plane_stress import ACROSS, HenckyAtPoints, in_plane_stress
+from tests.body.test_rollers import sector
+from tests.problem.test_electrodes_inside import BETA33, C11, C13, C33, CERAMIC, E31, E33
+
+COMM = MPI.COMM_WORLD
+YOUNG, POISSON = 200.0, 0.3
+
+LAWS = {
+    "linear": {"law": "linear"},
+    "log": {"law": "log", "yield_strain": 0.003},
+    "j2": {"law": "j2", "yield_stress": 1.0, "hardening": 20.0},
+}
+
+
+def strip(material, pull=1.2, kinematics="plane_stress", degree=1, **more):
+    """Return a strip that is pulled along x, free across."""
+    data = {
+        "mesh": {"generator": "rectangle", "size": [2.0, 1.0], "cells": [4, 2]},
+        "space": {"kinematics": kinematics, "degree": degree},
+        "material": {"young": YOUNG, "poisson": POISSON} | material,
+        "fixed": [{"on": "left", "symmetry": "x"}, {"on": "bottom", "symmetry": "y"}],
+        "load": [{"on": "right", "traction": [pull, 0.0]}],
+        "contact": {"on": "top", "gap": 10.0},
+        "solver": {"tolerance": 1e-12},
+    }
+    return parse_case(data | more)
+
+
+def corner(solution):
+    """Return the displacement of the corner far from the supports. Collective."""
+    body = solution.problem.equilibrium
+    u = body.nodal(solution.state.x)[: body.owned // body.block_size, :2]
+    there = np.isclose(body.layout.points.sum(axis=1), 3.0)
+    return np.concatenate(COMM.allgather(u[there]))[0]
+
+
+def uniaxial(name, stress):
+    """Return the strains along and across of a bar under a stress."""
+    elastic = stress / YOUNG
+    if name == "linear":
+        return elastic, -POISSON * elastic
+    if name == "j2":
+        plastic = max(stress - 1.0, 0.0) / 20.0
+        return elastic + plastic, -POISSON * elastic - plastic / 2
+    # |dev sigma| = 2 g t, and Hooke's law for the volume
+    law = Log(YOUNG, POISSON, yield_strain=0.003)
+    t = np.linspace(0.0, 0.1, 2_000_001)
+    size = np.interp(np.sqrt(2 / 3) * stress, 2 * law.secant_modulus(t**2) * t, t)
+    deviator, volume = size * np.sqrt(2 / 3), stress / (3 * law.bulk)
+    return deviator + volume / 3, -deviator / 2 + volume / 3
+
+
+@pytest.mark.parallel
+@pytest.mark.parametrize("degree", [1, 2])
+@pytest.mark.parametrize("name", LAWS)
+def test_a_strip_is_a_bar(name, degree):
+    """Its strains are those of the uniaxial curve, in the plane and across it."""
+    solution = solve(strip(LAWS[name], degree=degree), comm=COMM)
+    assert solution.converged
+    along, across = uniaxial(name, 1.2)
+    assert corner(solution) == pytest.approx([2 * along, across], rel=1e-8)
+    strain, stress = tensors(solution)
+    assert np.allclose(strain[:, 2, 2], across, rtol=1e-7, atol=0)
+    assert np.allclose(stress[:, 0, 0], 1.2, rtol=1e-8, atol=0)
+    assert np.abs(stress[:, [1, 2], [1, 2]]).max(initial=0.0) < 1e-8
+
+
+def tensors(solution):
+    """Return strains and stresses at points of the owned cells, shape (n, 3, 3) each."""
+    fields = DerivedFields(solution.problem.equilibrium, solution.state)
+    rows = [values.reshape(-1, values.shape[-1]) for _, values in fields.chunks()]
+    every = np.concatenate(rows) if rows else np.zeros((0, 40))
+    return [every[:, fields.columns[name]].reshape(-1, 3, 3) for name in ("strain", "stress")]
+
+
+@pytest.mark.parallel
+def test_a_ring_pressed_inside_is_lames_in_plane_stress():
+    """U = p a^2/(E (b^2 - a^2)) ((1 - nu) r + (1 + nu) b^2/r), a = 1 and b = 2."""
+    pressure, off = 0.5, []
+    for around in (8, 16):
+        material = Material(Linear(YOUNG, POISSON)).plane_stress()
+        supports = [Fixed("bottom", [None, 0.0]), Fixed("top", [0.0, None])]
+        body = Body(material, supports, Load("left", pressure=pressure))
+        domain = sector(COMM, around, 90.0)
+        solution = solve(Problem(domain, body, Contact("right", 10.0), degree=2))
+        assert solution.problem.kinematics == "plane_stress"
+        equilibrium = solution.problem.equilibrium
+        u, x = (
+            equilibrium.nodal(solution.state.x)[: equilibrium.owned // 2],
+            equilibrium.layout.points,
+        )
+        r = np.linalg.norm(x, axis=1)
+        radial = pressure / YOUNG / 3 * ((1 - POISSON) * r + (1 + POISSON) * 4 / r)
+        error = np.abs(u - (radial / r)[:, None] * x).max(initial=0.0)
+        off.append(COMM.allreduce(error, op=MPI.MAX) / (pressure / YOUNG))
+    assert off[1] < 5e-3
+    assert np.log2(off[0] / off[1]) > 1.8  # straight edges of a circle
+
+
+def membrane(comm, count):
+    """Return Cook's: a trapezoid of corners (0, 0), (48, 44), (48, 60) and (0, 44)."""
+    domain = rectangle(comm, (0.0, 0.0), (1.0, 1.0), (count, count), cell="quadrilateral")
+    x = domain.mesh.geometry.x
+    a, b = x[:, 0].copy(), x[:, 1].copy()
+    x[:, 0], x[:, 1] = 48 * a, 44 * a + b * (44 - 28 * a)
+    return replace(domain, size=60.0)
+
+
+@pytest.mark.parallel
+def test_cooks_membrane():
+    """E = 1, nu = 1/3, a shear of 1: the middle of the end rises by 23.96 (Cook 1974; Bergan)."""
+    material = Material(Linear(1.0, 1 / 3)).plane_stress()
+    body = Body(material, Fixed("left", [0.0, 0.0]), Load("right", traction=[0.0, 1 / 16]))
+    solution = solve(Problem(membrane(COMM, 16), body, Contact("top", 1e3), degree=2))
+    equilibrium = solution.problem.equilibrium
+    u = equilibrium.nodal(solution.state.x)[: equilibrium.owned // 2, 1]
+    end = np.all(np.isclose(equilibrium.layout.points, [48.0, 52.0]), axis=1)
+    assert np.concatenate(COMM.allgather(u[end]))[0] == pytest.approx(23.96, rel=2e-3)
+
+
+@pytest.mark.parallel
+def test_a_ceramic_sheet_under_a_voltage_and_a_pull():
+    """Strains are those of the whole compliance and of d, in all three directions."""
+    voltage, pull = 0.02, 0.03
+    ceramic = {key: value for key, value in CERAMIC.items() if key != "law"}
+    solution = solve(
+        strip(
+            {"law": "anisotropic"} | ceramic | {"young": None, "poisson": None},
+            pull,
+            fixed=[
+                {"on": "left", "symmetry": "x"},
+                {"on": "bottom", "symmetry": "y", "potential": 0.0},
+                {"on": "top", "potential": voltage},
+            ],
+        ),
+        comm=COMM,
+    )
+    c = np.array([[C11, 7.95, C13], [7.95, C11, C13], [C13, C13, C33]])  # X1, X2, X3
+    e = np.array([E31, E31, E33])
+    # across, x, y; phi grows along y, by which the field is -voltage
+    strain = np.linalg.solve(c, np.array([0.0, pull, 0.0]) - e * voltage)
+    assert corner(solution) == pytest.approx([2 * strain[1], strain[2]], rel=1e-9)
+    found = tensors(solution)[0]
+    assert np.allclose(found[:, 2, 2], strain[0], rtol=1e-8, atol=0)
+    charge = solution.charges.electrodes["top"]
+    displacement = e @ strain - BETA33 * voltage
+    assert charge == pytest.approx(2 * displacement, rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    "law",
+    [
+        J2(YOUNG, POISSON, yield_stress=1.0, hardening=Voce(saturation=0.5, rate=50.0)),
+        J2(YOUNG, POISSON, yield_stress=1.0, kinematic=[(30.0, 5.0)]),
+        HenckyAtPoints(Log(YOUNG, POISSON, yield_strain=0.003)),
+    ],
+    ids=["voce", "back stress", "log"],
+)
+def test_the_tangent_is_the_derivative_of_the_stress(law):
+    law, _ = in_plane_stress(law)
+    random = np.random.default_rng(2)
+    strain = 0.01 * random.standard_normal((40, 4))
+    strain[:, 2] = 0.0
+    first = {name: np.array([value] * 40) for name, value in law.variables(4).items()}
+    variables = law.respond(strain, first).variables
+    strain = strain + 0.01 * random.standard_normal((40, 4)) * [1, 1, 0, 1]
+    found = law.respond(strain, variables, "tangent")
+    moved = random.standard_normal((40, 4)) * [1, 1, 0, 1]
+    still = {name: np.zeros_like(value) for name, value in variables.items()}
+    known = differential(law, strain, variables, moved, still).stress
+    change = np.einsum("nij,nj->ni", found.stiffness, moved)
+    assert np.abs(change - known).max() < 1e-4 * np.abs(known).max()
+    full = strain.copy()
+    full[:, 2] = found.variables[ACROSS]
+    own = {name: value for name, value in variables.items() if name != ACROSS}
+    whole = law.base.respond(full, own).stress
+    assert np.abs(whole[:, 2]).max() < 1e-11
+    assert np.allclose(whole[:, [0, 1, 3]], found.stress[:, [0, 1, 3]])
+
+
+@pytest.mark.parametrize(
+    ("data", "words"),
+    [
+        (
+            {"space": {"kinematics": "plane_stress", "element": "mean_dilatation", "degree": 2}},
+            "locks",
+        ),
+        (
+            {
+                "mesh": {"generator": "box", "size": [2.0, 1.0, 1.0], "cells": [2, 2, 2]},
+                "load": [],
+                "fixed": [{"on": "left", "displacement": [0, 0, 0]}],
+            },
+            "plane_strain. with a mesh in 3-D",
+        ),
+    ],
+)
+def test_what_is_refused(data, words):
+    with pytest.raises(InputError, match=words):
+        build_problem(strip({"law": "linear"}, **data))
