@@ -366,10 +366,10 @@ class _Runner:
 
     def _static(self, problem: ContactProblem, name: str, method: Method) -> Solution:
         counted, ends = replace(method.counters), self._reached
-        start = about = None
+        start = linearised_at = None
         if ends:
-            start, about = predicted(problem, ends[-1], ends[0] if len(ends) > 1 else None)
-        state, outcome = solve_step(problem, method, start, about)
+            start, linearised_at = predicted(problem, ends[-1], ends[0] if len(ends) > 1 else None)
+        state, outcome = solve_step(problem, method, start, linearised_at)
         if start is not None and not outcome.converged and not outcome.signal:
             state, outcome = solve_step(problem, method, None)
         end = Reached.of(problem, state)

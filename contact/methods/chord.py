@@ -85,7 +85,7 @@ class Chord:
         if not self._made or self._worth <= 0:
             keep = False
         elif before is None:
-            keep = iterate.active_set is not None and iterate.about is None
+            keep = iterate.active_set is not None and iterate.linearised_at is None
         elif reached >= last and self._keeps:
             iterate, reached, keep = before, last, False
         else:

@@ -97,7 +97,7 @@ class CondensedStep:
         iterate, keep = self._chord.choose(iterate, reached.significant)
         state = iterate.state
         kind = "tangent" if tangent else "secant"
-        condensed = self.condensation.linearise(kind, state, keep, iterate.about)
+        condensed = self.condensation.linearise(kind, state, keep, iterate.linearised_at)
         if condensed is None:
             return None
         # No more accurate than the material is linearised, nor than the end asks for.
@@ -111,7 +111,9 @@ class CondensedStep:
             condense=False,
         )
         history = IterationHistory(lambda _: self._history.poll(), level=logging.DEBUG)
-        begin = replace(iterate, state=replace(state, x=condensed.equilibrium.at), about=None)
+        begin = replace(
+            iterate, state=replace(state, x=condensed.equilibrium.at), linearised_at=None
+        )
         end, outcome = self._solve(condensed, options, self.parameters, history, begin)
         solves = sum(record.inner for record in history.records)
         self.counters.contact_solves += solves

@@ -145,11 +145,11 @@ class Evolution:
         problem = self._at(time)
         method.set_load_step(problem)
         counted = replace(method.counters)
-        start = about = None
+        start = linearised_at = None
         if last is not None:
             before = None if self._before is None else Reached.of(problem, self._before)
-            start, about = predicted(problem, Reached.of(problem, last), before)
-        state, outcome = solve_step(problem, method, start, about)
+            start, linearised_at = predicted(problem, Reached.of(problem, last), before)
+        state, outcome = solve_step(problem, method, start, linearised_at)
         return LoadStep(problem, state, outcome, method.history, since(method.counters, counted))
 
 
@@ -186,11 +186,11 @@ def check_gaps(problem: ContactProblem, times: Sequence[float]) -> None:
 
 
 def solve_step(
-    problem: ContactProblem, method: Method, start: State | None, about: Array | None = None
+    problem: ContactProblem, method: Method, start: State | None, linearised_at: Array | None = None
 ) -> tuple[State, Outcome]:
     """Solve by a method, and evaluate the residuals once more. Collective."""
     try:
-        state, outcome = method.solve(start, about)
+        state, outcome = method.solve(start, linearised_at)
     except Interrupted as interrupt:
         state = method.state
         outcome = Outcome(NOTHING, NOTHING, str(interrupt), interrupt.number)

@@ -47,7 +47,7 @@ class Method(Protocol):
         """
 
     def solve(
-        self, start: State | None = None, about: Array | None = None
+        self, start: State | None = None, linearised_at: Array | None = None
     ) -> tuple[State, Outcome]:
         """Iterate until convergence or a limit. Collective.
 
@@ -55,7 +55,7 @@ class Method(Protocol):
         ----------
         start
             Initial guess; zero by default.
-        about
+        linearised_at
             Unknowns at which the material is linearised first, by its secant; those of the start by
             default. Prescribed values that have changed strain the elements beside them alone.
 

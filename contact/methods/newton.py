@@ -177,7 +177,7 @@ class Newton:
         return self.iteration.at.state
 
     def solve(
-        self, start: State | None = None, about: Array | None = None
+        self, start: State | None = None, linearised_at: Array | None = None
     ) -> tuple[State, Outcome]:
         """Iterate until convergence or the limit. Collective.
 
@@ -186,7 +186,7 @@ class Newton:
         start
             Initial guess; zero by default, where the material is linearised in the reference
             configuration.
-        about
+        linearised_at
             Unknowns at which the material is linearised first; those of the start by default.
         """
         self._begin()
@@ -195,7 +195,9 @@ class Newton:
         iterate = self.iteration.at if start is None else self.iterate_at(start)
         body = self.problem.equilibrium
         if not body.linear:
-            iterate = replace(iterate, about=body.rest() if start is None else about)
+            iterate = replace(
+                iterate, linearised_at=body.rest() if start is None else linearised_at
+            )
         iterate, outcome = self.run(iterate)
         return iterate.state, outcome
 
@@ -404,7 +406,7 @@ class NewtonLoop:
             return iterate, self._end(residuals)
         self.step.begin()
         # A start from elsewhere is near the solution; zero displacement has no better tangent.
-        tangent = iterate.active_set is not None and iterate.about is None and not linear
+        tangent = iterate.active_set is not None and iterate.linearised_at is None and not linear
         for _ in range(min(options.max_iterations, iteration.left)):
             before, kept = residuals, iterate
             taken = self.step(iterate, tangent, residuals)
@@ -438,8 +440,6 @@ class NewtonLoop:
                 # from loading.
                 tangent = falls or not tangent
             if stagnation(residuals.significant):
-                if (found := self._without_forces(iterate)) is not None:
-                    return found
                 ended = f"Newton's method stalled at {stagnation.best:.1e}"
                 return iterate, self._end(residuals, ended)
         steps = len(iteration.history.records)
@@ -469,20 +469,6 @@ class NewtonLoop:
         self.iteration.see(iterate, found[1])
         self.iteration.history.record(found[1], f"{note} zero displacement".strip(), inner=0)
         return iterate, self._end(found[1])
-
-    def _without_forces(self, iterate: Iterate) -> tuple[Iterate, Outcome] | None:
-        """Return the unknowns without contact forces, where they are a solution. Collective.
-
-        The active sets may cycle on forces that are all rounding of others.
-        """
-        problem = self.iteration.problem
-        zero = Multipliers.zero(problem.interface.jump)
-        iterate = replace(iterate, state=replace(iterate.state, forces=zero))
-        residuals = evaluate(problem, iterate.state)
-        if not residuals.significant <= self.iteration.options.tolerance:
-            return None
-        self.iteration.see(iterate, residuals)
-        return iterate, self._end(residuals)
 
     def _end(self, residuals: Residuals, ended: str = "") -> Outcome:
         return Outcome(residuals, self.iteration.options.allowed, ended)

@@ -60,7 +60,7 @@ class Iterate:
         Which nodes were open, stuck or slipped in that step; None before the first one.
     layer_pressure
         Pressure of the linearised layer after it, shape (n,); None for that of the state.
-    about
+    linearised_at
         Unknowns at which the material is linearised in the next step, by its secant; None for those
         of the state. Prescribed values that have changed strain the elements beside them alone.
     """
@@ -68,7 +68,7 @@ class Iterate:
     state: State
     active_set: ActiveSet | None = None
     layer_pressure: Array | None = None
-    about: Array | None = None
+    linearised_at: Array | None = None
 
 
 @dataclass(frozen=True)
@@ -240,11 +240,12 @@ class NewtonStep:
             along = jump.normal[:, :, None] * jump.normal[:, None, :]
             blocks[:, : body.dim, : body.dim] += stiffness * (along + jump.tangent)
         blocks = interface.weighted(blocks, state.x)
-        about = state if iterate.about is None else replace(state, x=iterate.about)
-        self.operator.update(kind, about, blocks, constant=body.linear or remains)
+        x = iterate.linearised_at
+        at = state if x is None else replace(state, x=x)
+        self.operator.update(kind, at, blocks, constant=body.linear or remains)
         self._kind = kind
         here = replace(state, forces=contact.forces)
-        residual = residual_forces(self.problem, here, iterate.about)
+        residual = residual_forces(self.problem, here, iterate.linearised_at)
         jump.transpose((jump.weight * shift)[:, None] * jump.normal, residual)
         try:
             increment = self.operator.solve(-residual, self._forcing_term(reached.significant))
@@ -296,8 +297,8 @@ def linearised_layer(
     u_n, layer = jump.normal_component(nodal), law.layer_pressure(nodal)
     known = layer if iterate.layer_pressure is None else iterate.layer_pressure
     place = graph.displacement(iterate.state.forces.pressure + known + c * u_n, c)
-    about = nodal.copy()
-    about[:, : interface.dim] += (place - u_n)[:, None] * jump.normal
-    block = law.layer_block(about, full)
-    back = jump.normal_component(np.einsum("nij,nj->ni", block, nodal - about))
-    return block, law.layer_pressure(about) + back - layer
+    linearised_at = nodal.copy()
+    linearised_at[:, : interface.dim] += (place - u_n)[:, None] * jump.normal
+    block = law.layer_block(linearised_at, full)
+    back = jump.normal_component(np.einsum("nij,nj->ni", block, nodal - linearised_at))
+    return block, law.layer_pressure(linearised_at) + back - layer

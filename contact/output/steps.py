@@ -13,7 +13,7 @@ from contact.output.quantities import STEPS, values_of
 from contact.output.resultants import driven_part, nodes_of
 from contact.output.solution import Solution, StepRecord
 from contact.output.surface import contact_table
-from contact.problem.energy import Moment, balance, moment
+from contact.problem.energy import StepEnd, balance, step_end
 from contact.problem.problem import ContactProblem
 from contact.typing import Array
 
@@ -30,10 +30,10 @@ class StepRecorder:
     """
 
     def __init__(self, problem: ContactProblem, last: StepRecord | None = None) -> None:
-        self._before = Moment.rest(problem)
+        self._before = StepEnd.rest(problem)
         if last is not None:
             here = problem.at(last.state.time, last.state.history)
-            self._before = moment(here, last.state, self._before)
+            self._before = step_end(here, last.state, self._before)
             self._before = replace(self._before, enthalpy=last.enthalpy)
         self._rounding = 0.0 if last is None else last.rounding
         part = driven_part(problem)
@@ -42,7 +42,7 @@ class StepRecorder:
     def record(self, step: LoadStep) -> StepRecord:
         """Return the record of a step that follows the last one. Collective."""
         problem, state = step.problem, step.state
-        now = moment(problem, state, self._before)
+        now = step_end(problem, state, self._before)
         energies = balance(problem, state, self._before, now)
         self._before = now
         solution = Solution(problem, state, step.outcome, step.history, step.counters, "", {})
@@ -54,7 +54,7 @@ class StepRecorder:
         return StepRecord(state, row, table, now.enthalpy, self._rounding)
 
 
-def _driven(problem: ContactProblem, nodes: NDArray[np.int32], now: Moment) -> tuple[Array, Array]:
+def _driven(problem: ContactProblem, nodes: NDArray[np.int32], now: StepEnd) -> tuple[Array, Array]:
     """Return the mean displacement of nodes, and the force that drives them. Collective."""
     body, d = problem.equilibrium, problem.dim
     x, given = body.nodal(now.x)[nodes, :d], body.nodal(now.given)[nodes, :d]

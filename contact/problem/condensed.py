@@ -238,7 +238,7 @@ class Condensation:
         self._interface = at_kept_nodes(full.interface)
 
     def linearise(
-        self, kind: str, state: State, keep: bool = False, about: Array | None = None
+        self, kind: str, state: State, keep: bool = False, linearised_at: Array | None = None
     ) -> CondensedProblem | None:
         """Condense the body, linearised at a state of the full problem. Collective.
 
@@ -248,7 +248,7 @@ class Condensation:
             "secant" or "tangent", and where.
         keep
             Whether to take the last factorisation, wherever that was.
-        about
+        linearised_at
             Unknowns at which a secant is taken; those of the state by default.
 
         Returns
@@ -265,8 +265,10 @@ class Condensation:
         if not 0 < self._schur.size <= min(LARGEST, body.layout.unknowns - 1):
             return None
         if not self._kind or not (keep or (body.linear and kind == self._kind)):
-            self._factorise(kind, state if about is None else replace(state, x=about))
-        residual = body.internal_forces(state, about) - body.external(state.time)
+            self._factorise(
+                kind, state if linearised_at is None else replace(state, x=linearised_at)
+            )
+        residual = body.internal_forces(state, linearised_at) - body.external(state.time)
         check_overflow(body.layout, self._size, body.norm(residual))
         reactions = body.sizes(body.reactions(residual))
         acting = body.load_sizes(state.time) + reactions + body.exchanged(state)

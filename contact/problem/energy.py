@@ -32,7 +32,7 @@ _SHARES = np.tile(_WEIGHTS / 32, 16)
 
 
 @dataclass(frozen=True)
-class Moment:
+class StepEnd:
     """Data of the end of a step for the balance.
 
     Attributes
@@ -54,11 +54,11 @@ class Moment:
     plastic: float = 0.0
 
     @staticmethod
-    def rest(problem: ContactProblem) -> Moment:
+    def rest(problem: ContactProblem) -> StepEnd:
         """Return that of a body to which nothing has been done."""
         body = problem.equilibrium
         zero = np.zeros_like(body.owned_part(body.rest()))
-        return Moment(body.rest(), zero, zero, 0.0)
+        return StepEnd(body.rest(), zero, zero, 0.0)
 
 
 @dataclass(frozen=True)
@@ -127,7 +127,7 @@ def stored(problem: ContactProblem, state: State) -> float:
     return own - electric
 
 
-def moment(problem: ContactProblem, state: State, before: Moment) -> Moment:
+def step_end(problem: ContactProblem, state: State, before: StepEnd) -> StepEnd:
     """Return the data of a step that began at another moment. Collective."""
     body = problem.equilibrium
     given, internal = working_forces(problem, state)
@@ -146,10 +146,10 @@ def moment(problem: ContactProblem, state: State, before: Moment) -> Moment:
         way = [0.5 * ((1 - s) * before.x + (1 + s) * state.x) for s in _POINTS]
         power = 0.5 * _WEIGHTS @ np.array([forces_at(replace(state, x=x)) for x in way])
     enthalpy = before.enthalpy + body.product(power, moved) + gained
-    return Moment(state.x, given, internal, enthalpy, plastic)
+    return StepEnd(state.x, given, internal, enthalpy, plastic)
 
 
-def balance(problem: ContactProblem, state: State, before: Moment, now: Moment) -> Balance:
+def balance(problem: ContactProblem, state: State, before: StepEnd, now: StepEnd) -> Balance:
     """Return the energies of a step from one moment to another. Collective."""
     body = problem.equilibrium
     x, x_before = (body.owned_part(m.x) for m in (now, before))

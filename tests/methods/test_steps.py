@@ -9,7 +9,7 @@ from contact import build_problem, evolve, load_case
 from contact.case.file import parse_case
 from contact.errors import InputError
 from contact.methods.options import NewtonOptions, PenaltyOptions
-from contact.problem.energy import Moment, balance, moment
+from contact.problem.energy import StepEnd, balance, step_end
 from contact.problem.residuals import evaluate
 from contact.solving import solve
 from forms.hencky import Linear, Log
@@ -73,9 +73,9 @@ def test_one_step_from_rest_is_the_static_problem():
 
 def balances(problem, steps):
     """Return the energies of all steps."""
-    before, found = Moment.rest(problem), []
+    before, found = StepEnd.rest(problem), []
     for step in steps:
-        now = moment(step.problem, step.state, before)
+        now = step_end(step.problem, step.state, before)
         found.append(balance(step.problem, step.state, before, now))
         before = now
     return found

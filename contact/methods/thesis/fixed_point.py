@@ -66,13 +66,13 @@ class FixedPoint(OuterLoop):
         )
 
     def solve(
-        self, start: State | None = None, about: Array | None = None
+        self, start: State | None = None, linearised_at: Array | None = None
     ) -> tuple[State, Outcome]:
         """Iterate until convergence, stagnation or the limit. Collective.
 
         Parameters
         ----------
-        start, about
+        start, linearised_at
             Initial guess, zero by default; and unknowns at which the first secant is taken.
         """
         self._stalled, self._residual = False, np.inf
@@ -92,7 +92,11 @@ class FixedPoint(OuterLoop):
             self._z = self._about(0.0, frictional and first > 0)
             self.bound = np.zeros(interface.jump.gap.size) if stuck is None else stuck
         else:
-            self.state, self._secant_at, first = start, start.x if about is None else about, 1
+            self.state, self._secant_at, first = (
+                start,
+                start.x if linearised_at is None else linearised_at,
+                1,
+            )
             nodal, pressure = interface.jump.apply(start.x), start.forces.pressure
             if interface.law.normal_law(nodal) is not None:
                 pressure = interface.pressure(nodal, start.forces)
@@ -120,9 +124,9 @@ class FixedPoint(OuterLoop):
             blocks = blocks + self._current_block(nodal, interface.pressure(nodal, state.forces))
         # Newton's tangent of a zero strain is the secant, and cheaper.
         kind = "tangent" if self._tangent and iteration > self._first else "secant"
-        about = self._secant_at if kind == "secant" else state.x
+        linearised_at = self._secant_at if kind == "secant" else state.x
         weighted = interface.weighted(blocks, state.x)
-        self.operator.update(kind, replace(state, x=about), weighted, constant=body.linear)
+        self.operator.update(kind, replace(state, x=linearised_at), weighted, constant=body.linear)
         result = uzawa_block_relaxation(
             problem,
             state,

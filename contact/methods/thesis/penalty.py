@@ -232,10 +232,10 @@ class PenalisedProblem:
             u_n = jump.normal_component(nodal)
             slope = np.where(u_n < jump.gap, self._layer.layer_slope(u_n), 0.0)
             blocks[:, :d, :d] += slope[:, None, None] * outer(jump.normal, jump.normal)
-        kind, about = ("tangent", x) if self._implicit else ("secant", self._state.x)
+        kind, linearised_at = ("tangent", x) if self._implicit else ("secant", self._state.x)
         unchanged = body.linear or (self._assembled and not self._implicit)
         blocks = self._interface.weighted(blocks, x)
-        at = replace(self._state, x=about)
+        at = replace(self._state, x=linearised_at)
         self.operator.update(kind, at, blocks, constant=unchanged)
         self._assembled = True
 
@@ -298,7 +298,7 @@ class Penalty(OuterLoop):
             solver.set_load_step(problem, self._eps)
 
     def solve(
-        self, start: State | None = None, about: Array | None = None
+        self, start: State | None = None, linearised_at: Array | None = None
     ) -> tuple[State, Outcome]:
         """Iterate until convergence, stagnation or the limit. Collective.
 
@@ -307,7 +307,7 @@ class Penalty(OuterLoop):
         start
             Initial guess; zero by default. From the solution of a somewhat larger eps, small
             ones are reached that are too hard from there.
-        about
+        linearised_at
             Of no effect.
         """
         self.state = self.problem.start() if start is None else start
