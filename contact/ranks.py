@@ -8,6 +8,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 from mpi4py import MPI
+from numpy.typing import NDArray
 
 from contact.errors import InputError
 from contact.typing import Array
@@ -48,6 +49,54 @@ def on_root(comm: MPI.Intracomm, action: Callable[[], T]) -> T:
     return comm.bcast(result)  # type: ignore[no-any-return]
 
 
+def exchanged(
+    comm: MPI.Comm, ranks: NDArray[np.integer[Any]], *arrays: NDArray[Any]
+) -> tuple[NDArray[Any], ...]:
+    """Send rows of arrays to ranks, and return those that this rank is sent. Collective.
+
+    Ranks that nothing is sent to get no message but its length.
+
+    Parameters
+    ----------
+    comm
+        Communicator.
+    ranks
+        Where each row goes, shape (n,).
+    arrays
+        Of the same kinds and shapes of rows on all ranks, shapes (n, ...).
+
+    Returns
+    -------
+    The rank that sent each row, ascending, shape (m,), and the rows in the order in which it sent
+    them, shapes (m, ...).
+    """
+    counts = np.bincount(ranks, minlength=comm.size)
+    coming = np.empty_like(counts)
+    comm.Alltoall(counts, coming)
+    order = np.argsort(ranks, kind="stable")
+    to, by = (np.append(0, np.cumsum(sizes)) for sizes in (counts, coming))
+    found: list[NDArray[Any]] = [np.repeat(np.arange(comm.size), coming)]
+    for array in arrays:
+        rows, here = array[order], np.empty((by[-1], *array.shape[1:]), dtype=array.dtype)
+        waiting = [comm.Irecv(here[by[k] : by[k + 1]], k) for k in np.flatnonzero(coming)]
+        waiting += [comm.Isend(rows[to[k] : to[k + 1]], k) for k in np.flatnonzero(counts)]
+        MPI.Request.Waitall(waiting)
+        found.append(here)
+    return tuple(found)
+
+
+def boxes(comm: MPI.Comm, points: Array) -> Array:
+    """Return the lower and upper corners of the boxes around the points of each rank. Collective.
+
+    Of shape (ranks, 2, d); around no points, upper corners are below lower ones.
+    """
+    none = np.full(points.shape[1], np.inf)
+    own = [points.min(axis=0), points.max(axis=0)] if len(points) else [none, -none]
+    found = np.empty((comm.size, 2, points.shape[1]))
+    comm.Allgather(np.array(own), found)
+    return found
+
+
 def neighbours(comm: MPI.Comm, points: Array, values: Array, reach: float) -> Array:
     """Return the values at points near those of this rank, from the ranks that have them.
 
@@ -66,13 +115,12 @@ def neighbours(comm: MPI.Comm, points: Array, values: Array, reach: float) -> Ar
     -------
     In the order of the ranks, shape (near, k).
     """
-    none = np.full(points.shape[1], np.inf)
-    low, high = (points.min(axis=0), points.max(axis=0)) if len(points) else (none, -none)
-    sent = [
-        values[np.all((points >= lower - reach) & (points <= upper + reach), axis=1)]
-        for lower, upper in comm.allgather((low, high))
+    asked = [
+        np.flatnonzero(np.all((points >= lower - reach) & (points <= upper + reach), axis=1))
+        for lower, upper in boxes(comm, points)
     ]
-    return np.concatenate(comm.alltoall(sent))
+    ranks = np.repeat(np.arange(comm.size), [rows.size for rows in asked])
+    return exchanged(comm, ranks, values[np.concatenate(asked)])[1]
 
 
 def refused(error: OSError) -> InputError:

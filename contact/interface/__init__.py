@@ -23,8 +23,9 @@ contact nodes
     in front of a rigid foundation `placing`, of another body `pairing`; of several contacts
     `entries`.
 mortar coupling
-    `mortar`: `coupling` integrates the dual operator over `segments`, `operator` applies it on all
-    ranks, `lumping` has the areas of nodes, `deviation` the distance of a curve from its chords.
+    `mortar`: `search` finds the facets opposite, on whatever rank, `coupling` integrates the dual
+    operator over their `segments`, `operator` applies it, `lumping` has the areas of nodes,
+    `deviation` the distance of a curve from its chords. Each rank has the rows of its own nodes.
 rigid shapes
     `obstacle`: `protocol` is the base class of shapes, which `shapes` and `triangles` are.
 """

@@ -170,14 +170,14 @@ def joined_nodes(
     rows = [jumps for jumps in given if jumps is not None]
     coupling = coupling_operator(nodes.comm, index_map, rows, nodes.nodes, free)
     if coupling is not None and inclined is not None:
-        _check_rollers(coupling, inclined)
+        _check_rollers(nodes.comm, coupling, inclined)
     return replace(nodes, coupling=coupling, carried=_carried(nodes, coupling, ties, free))
 
 
-def _check_rollers(coupling: CouplingOperator, inclined: Inclined) -> None:
+def _check_rollers(comm: MPI.Comm, coupling: CouplingOperator, inclined: Inclined) -> None:
     """Refuse jumps of several nodes, which have no common direction, on rollers. Collective."""
     shared = bool(np.isin(coupling.local, inclined.nodes).any())
-    if coupling.comm.allreduce(shared, op=MPI.LOR):
+    if comm.allreduce(shared, op=MPI.LOR):
         raise InputError(
             "fixed.normal: its part shares nodes with a contact of two bodies, or of degree 2 in "
             "3-D; accepted: there a displacement across an axis, or parts apart"

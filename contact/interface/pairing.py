@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from contact.arguments import expect
 from contact.body.equilibrium import BodyEquilibrium
 from contact.errors import InputError
-from contact.interface.mortar.coupling import NOTHING, Coupling, couple
+from contact.interface.mortar.coupling import Coupling, couple
 from contact.interface.mortar.lumping import pairs_at_axis
 from contact.interface.mortar.surface import Surface, surface_of
 from contact.interface.nodes import ContactNodes, projectors
@@ -19,6 +19,7 @@ from contact.interface.obstacle.protocol import measured
 from contact.interface.placing import check_gap
 from contact.mesh.domain import Domain
 from contact.mesh.entities import components, owned_among
+from contact.mesh.owners import Owners
 from contact.typing import Array
 
 #: Share of the mesh's extent up to which facets are taken to face each other.
@@ -65,14 +66,14 @@ def find_pair(
     """
     label = f"{key}.against: {part!r} and {against!r}"
     slave = surface_of(body.domain, body.space, part)
-    master = surface_of(body.domain, body.space, against).gathered(body.comm)
+    master = surface_of(body.domain, body.space, against)
     coupling = _coupled(body, slave, master, label, part if friction else None)
-    here, local = owned_among(body.layout.index_map, coupling.nodes)
+    _, local = owned_among(body.layout.index_map, coupling.nodes)
     d = body.dim
-    points, normal = body.space.tabulate_dof_coordinates()[local, :d], coupling.normal[here]
-    gap, cut = coupling.gap[here], 0.0
+    points, normal = body.space.tabulate_dof_coordinates()[local, :d], coupling.normal
+    gap, cut = coupling.gap, 0.0
     if not press:
-        gap, cut = _apart(here, slave, body, coupling, label)
+        gap, cut = _apart(slave, body, coupling, label)
     expect(f"{key}.foundation", distance, "a gap with against", not distance.is_shape)
     _, added = measured(distance, points, normal, body.comm, key)
     check_gap(body.domain, added, key, press)
@@ -86,7 +87,7 @@ def find_pair(
         body.comm,
         local,
         points,
-        coupling.weight[here],
+        coupling.weight,
         direction,
         projectors(direction, movable),
         (gap + added) / length,
@@ -111,36 +112,36 @@ def _coupled(
     rough
         The part that the slave side is, if there is friction.
     """
-    common = np.intersect1d(slave.nodes, master.nodes).size
-    if body.comm.allreduce(common, op=MPI.SUM) > 0:
+    owners = slave.owners
+    one, other = (owners.named(side.nodes.ravel()) for side in (slave, master))
+    if body.comm.allreduce(np.intersect1d(one, other).size, op=MPI.SUM) > 0:
         raise InputError(
             f"{label} share nodes; accepted: parts of two bodies whose meshes are apart"
         )
     reach = REACH * body.domain.size
-    coupling = couple(slave, master, reach, body.comm)
-    on_axis = np.concatenate(body.comm.allgather(pairs_at_axis(slave, slave.nodes)[:, 0]))
+    coupling = couple(slave, master, reach)
+    on_axis = owners.named(pairs_at_axis(slave, slave.nodes)[:, 0])
     stuck = np.union1d(_stuck(body, coupling), on_axis)
     if rough is not None:
-        one_sided = _one_sided(body, coupling)
+        one_sided = _one_sided(body, coupling, owners)
         one_sided[np.isin(coupling.nodes, stuck)] = False
         _check_rim(body, slave, rough, [coupling.nodes[lost] for lost in one_sided.T], label)
         stuck = np.union1d(stuck, coupling.nodes[one_sided.any(axis=1)])
-    if stuck.size:
-        coupling = couple(slave, master, reach, body.comm, stuck)
-    if coupling.nodes.size == 0:
+    if body.comm.allreduce(stuck.size, op=MPI.SUM) > 0:
+        without = owners.among(stuck, slave.nodes.ravel())
+        coupling = couple(slave, master, reach, without)
+    if body.comm.allreduce(coupling.nodes.size, op=MPI.SUM) == 0:
         raise InputError(
             f"{label} have no facets that face each other within {reach:.3g}, or their nodes are "
             "held there; accepted: sides of two bodies that look at each other"
         )
-    _check_apart(body, coupling, label)
+    _check_apart(body, coupling, owners, label)
     return coupling
 
 
-def _check_apart(body: BodyEquilibrium, coupling: Coupling, label: str) -> None:
+def _check_apart(body: BodyEquilibrium, coupling: Coupling, owners: Owners, label: str) -> None:
     """Refuse jumps of nodes that follow something rigid or an electrode. Collective."""
-    sides = (coupling.slaves, coupling.own), (coupling.masters, coupling.other)
-    taking = np.concatenate([every[abs(part).sum(axis=0) > 0] for every, part in sides])
-    _, local = owned_among(body.layout.index_map, taking)
+    local = owners.named(np.concatenate([coupling.slaves, coupling.masters])) - owners.begin
     if body.comm.allreduce(bool(body.global_unknowns.tied[local].any()), op=MPI.LOR):
         raise InputError(
             f"{label}: their nodes follow a rigid part or an electrode of unknown potential; "
@@ -149,23 +150,22 @@ def _check_apart(body: BodyEquilibrium, coupling: Coupling, label: str) -> None:
 
 
 def _stuck(body: BodyEquilibrium, coupling: Coupling) -> NDArray[np.int64]:
-    """Return the slave nodes of all ranks whose normal is fixed. Collective."""
-    here, local = owned_among(body.layout.index_map, coupling.nodes)
+    """Return the slave nodes of this rank whose normal is fixed."""
+    _, local = owned_among(body.layout.index_map, coupling.nodes)
     moves = body.free[local, : body.dim]
-    held = np.linalg.norm(coupling.normal[here] * moves, axis=1) <= 0.5
-    found = np.concatenate(body.comm.allgather(coupling.nodes[here[held]]))
-    return np.unique(np.concatenate([NOTHING, found]))
+    held = np.linalg.norm(coupling.normal * moves, axis=1) <= 0.5
+    return coupling.nodes[held]
 
 
-def _one_sided(body: BodyEquilibrium, coupling: Coupling) -> NDArray[np.bool_]:
+def _one_sided(body: BodyEquilibrium, coupling: Coupling, owners: Owners) -> NDArray[np.bool_]:
     """Tell which components of slave nodes are fixed, but free on the other side. Collective."""
-    every = np.concatenate([coupling.nodes, coupling.masters])
-    here, local = owned_among(body.layout.index_map, every)
-    fixed = np.zeros((every.size, body.dim), dtype=np.intc)
-    fixed[here] = ~body.free[local, : body.dim]
-    body.comm.Allreduce(MPI.IN_PLACE, fixed, op=MPI.SUM)
-    own, opposite = np.split(fixed, [coupling.nodes.size])
-    return (own > 0) & (np.abs(coupling.other) @ opposite <= 0)
+
+    def fixed(numbers: NDArray[np.int64]) -> NDArray[np.bool_]:
+        """Return which components of nodes of this rank are fixed."""
+        return ~body.free[numbers - owners.begin, : body.dim]
+
+    opposite = owners.values(coupling.masters, fixed)
+    return fixed(coupling.nodes) & (np.abs(coupling.other) @ opposite <= 0)
 
 
 def _check_rim(
@@ -178,8 +178,10 @@ def _check_rim(
     body, slave, part, label
         The slave side, and the name of the contact in messages.
     lost
-        Its nodes where a component is fixed, but free on the other side, for each of them.
+        Its nodes on this rank where a component is fixed, but free on the other side, for each of
+        them.
     """
+    lost = [slave.owners.among(nodes, slave.nodes.ravel()) for nodes in lost]
     facets, filled = body.domain.facets(part), False
     for support in body.body.fixed:
         held = np.isin(facets, body.domain.facets_anywhere(support.on))
@@ -194,7 +196,7 @@ def _check_rim(
 
 
 def _apart(
-    here: NDArray[np.intp], slave: Surface, body: BodyEquilibrium, coupling: Coupling, label: str
+    slave: Surface, body: BodyEquilibrium, coupling: Coupling, label: str
 ) -> tuple[Array, float]:
     """Refuse bodies that overlap; return gaps without depths, and the largest depth. Collective.
 
@@ -203,13 +205,13 @@ def _apart(
     sides that are apart remains, as in front of foundations, for the mean of a gap that touches 0
     within a facet is.
     """
-    comm, gap = body.comm, coupling.gap[here]
-    least = np.minimum(coupling.apart[here], 0.0)
+    comm, gap = body.comm, coupling.gap
+    least = np.minimum(coupling.apart, 0.0)
     longest = comm.allreduce(2 * float(slave.radii.max(initial=0.0)), op=MPI.MAX)
     cut = comm.allreduce(float(np.max(least - gap, initial=0.0)), op=MPI.MAX)
     if cut <= CHORDS * longest:
         return np.maximum(gap, least), cut if cut > 1e-5 * body.domain.size else 0.0
-    if _connected(body, coupling):
+    if _connected(body, coupling, slave.owners):
         raise InputError(
             f"{label} are sides of one body that look away from each other; accepted: parts of two "
             "bodies whose meshes are apart"
@@ -220,12 +222,12 @@ def _apart(
     )
 
 
-def _connected(body: BodyEquilibrium, coupling: Coupling) -> bool:
+def _connected(body: BodyEquilibrium, coupling: Coupling, owners: Owners) -> bool:
     """Tell whether both sides are on the same connected component. Collective."""
     piece, count = body.components
     found = np.zeros((2, count), dtype=np.intc)
     for k, nodes in enumerate((coupling.slaves, coupling.masters)):
-        found[k, piece[owned_among(body.layout.index_map, nodes)[1]]] = 1
+        found[k, piece[owners.named(nodes) - owners.begin]] = 1
     body.comm.Allreduce(MPI.IN_PLACE, found, op=MPI.MAX)
     return bool(found.all(axis=0).any())
 
@@ -240,24 +242,27 @@ def facing_parts(domain: Domain) -> list[tuple[str, str]]:
     if count == 1:
         return []
     comm = domain.comm
-    sides: list[tuple[float, str, Surface, Surface, int]] = []
+    sides: list[tuple[float, float, str, Surface, int]] = []
     for name in sorted(domain.parts):
-        own = surface_of(domain, space, name)
-        every = own.gathered(comm)
-        _, local = owned_among(space.dofmap.index_map, every.nodes.ravel())
+        side = surface_of(domain, space, name)
         there = np.zeros(count, dtype=np.intc)
-        there[piece[local]] = 1
+        there[piece[side.owners.named(side.nodes.ravel()) - side.owners.begin]] = 1
         comm.Allreduce(MPI.IN_PLACE, there, op=MPI.MAX)
+        total = comm.allreduce(np.array([side.radii.sum(), side.count]), op=MPI.SUM)
+        longest = comm.allreduce(float(side.radii.max(initial=0.0)), op=MPI.MAX)
         if there.sum() == 1:
-            sides.append((float(every.radii.mean()), name, own, every, int(there.argmax())))
+            # Of alike sides the first by name is the first.
+            mean = float(f"{total[0] / total[1]:.9e}")
+            sides.append((mean, longest, name, side, int(there.argmax())))
     found = []
-    sides.sort(key=lambda side: side[:2])
-    for i, (_, on, slave, fine, body) in enumerate(sides):
-        for _, against, _, master, other in sides[i + 1 :]:
+    sides.sort(key=lambda side: (side[0], side[2]))
+    for i, (_, longest, on, slave, body) in enumerate(sides):
+        for _, _, against, master, other in sides[i + 1 :]:
             if other == body:
                 continue
-            gap = couple(slave, master, REACH * domain.size, comm).gap
+            gap = couple(slave, master, REACH * domain.size).gap
+            least = comm.allreduce(float(gap.min(initial=np.inf)), op=MPI.MIN)
             # They look away from each other where it is negative.
-            if gap.size and gap.min() > -2 * CHORDS * float(fine.radii.max()):
-                found.append((float(gap.min()), on, against))
+            if np.isfinite(least) and least > -2 * CHORDS * longest:
+                found.append((least, on, against))
     return [(on, against) for _, on, against in sorted(found)]

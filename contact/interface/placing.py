@@ -22,6 +22,7 @@ from contact.interface.obstacle.protocol import measured
 from contact.mesh.cells import shape_of
 from contact.mesh.domain import Domain
 from contact.mesh.entities import owned_among
+from contact.mesh.owners import Owners
 from contact.ranks import on_all_ranks
 from contact.typing import Array
 
@@ -32,8 +33,6 @@ class Candidates:
 
     Attributes
     ----------
-    comm
-        Communicator.
     nodes, points, weight, normal
         As in `ContactNodes`, whatever is fixed there.
     surface
@@ -41,27 +40,26 @@ class Candidates:
         middle of straight edges are on chords, and gaps to a shape are measured from the surface.
     deviation
         Largest deviation of the curved surface from the facets (length).
-    numbers
-        Global numbers of the nodes, shape (n,).
+    owners
+        The owners of the nodes.
     mixing
         The jumps, where these are no nodal values.
     """
 
-    comm: MPI.Intracomm
     nodes: NDArray[np.int32]
     points: Array
     weight: Array
     normal: Array
     surface: Array
     deviation: float
-    numbers: NDArray[np.int64]
+    owners: Owners
     mixing: Mixing | None
 
     def jumps(self, values: Array) -> Array:
         """Return the jumps of values at these nodes, shape (n, m). Collective."""
         if self.mixing is None:
             return values
-        return self.mixing.apply(self.comm, self.numbers, values)
+        return self.mixing.apply(self.owners, values)
 
     def in_front_of(self, obstacle: Obstacle) -> Array:
         """Return the points from which gaps are measured: given gaps are those of the nodes."""
@@ -81,25 +79,24 @@ class Candidates:
 
 def candidates(domain: Domain, space: fem.FunctionSpace, part: str) -> Candidates:
     """Collect the nodes of a boundary part; those of no area carry no multiplier. Collective."""
-    facets = surface_of(domain, space, part).gathered(domain.comm)
+    comm, facets = domain.comm, surface_of(domain, space, part)
     lumped = Lumping.of(facets).without_axis(facets)
     # Functions without a mean on Gamma_3 carry nothing: P2 vertices on the axis of revolution.
-    light = lumped.weight <= 1e-9 * lumped.weight.sum() / max(lumped.weight.size, 1)
-    here, nodes = owned_among(space.dofmap.index_map, lumped.nodes)
-    numbers, normal = lumped.nodes[here], lumped.normal[here]
+    size = np.array([lumped.weight.sum(), lumped.weight.size])
+    area, count = comm.allreduce(size, op=MPI.SUM)
+    light = lumped.weight <= 1e-9 * area / max(count, 1)
+    _, nodes = owned_among(space.dofmap.index_map, lumped.nodes)
+    normal = lumped.normal
     points = space.tabulate_dof_coordinates()[nodes, : domain.dim]
     normal = normal / np.linalg.norm(normal, axis=1)[:, None]
-    weight = np.where(light, 0.0, lumped.weight)[here]
-    surface = points + lumped.deviation[here]
     return Candidates(
-        domain.comm,
         nodes,
         points,
-        weight,
+        np.where(light, 0.0, lumped.weight),
         normal,
-        surface,
-        facets.largest_deviation,
-        numbers,
+        points + lumped.deviation,
+        comm.allreduce(facets.largest_deviation, op=MPI.MAX),
+        facets.owners,
         lumped.mixing,
     )
 

@@ -30,141 +30,109 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 from petsc4py import PETSc
 from scipy import sparse
-from scipy.sparse import csgraph
 
 from contact.history import Evaluated
 from contact.linear.layout import Layout, times
 from contact.linear.operator import Bulk, Counters, SparseOperator
-from contact.mesh.entities import owned_among
+from contact.mesh.owners import Halo
 from contact.tolerances import ROUNDING
 from contact.typing import Array
 
 
 @dataclass(frozen=True)
 class Change:
-    """A change of basis, x = Q y, that makes jumps unknowns; the same on all ranks.
+    """A change of basis, x = Q y, that makes jumps unknowns.
 
     Attributes
     ----------
-    nodes
-        Global numbers of the nodes that take part, shape (c,).
     matrix
-        Q at their unknowns, node by node, shape (c block size, c block size); at all others it is
-        the identity.
+        Q, the identity but for the nodes that jumps take the place of.
     inverse
         Its inverse.
     """
 
-    nodes: NDArray[np.int64]
-    matrix: sparse.csr_array
-    inverse: sparse.csr_array
+    matrix: PETSc.Mat
+    inverse: PETSc.Mat
 
     @staticmethod
     def of(
-        nodes: NDArray[np.int64],
+        comm: MPI.Intracomm,
+        halo: Halo,
         rows: NDArray[np.intp],
         jumps: sparse.csr_array,
         free: NDArray[np.bool_],
     ) -> Change:
-        """Return the change that makes jumps unknowns, in place of those of some nodes.
+        """Return the change that makes jumps unknowns, in place of those of some nodes. Collective.
 
         Where an unknown is fixed it remains itself; the others lose their dependence on it, for it
-        does not change.
+        does not change. Of an unknown j = s x + ... s is the diagonal D, and x = F x + j/s: F is
+        nilpotent, for nothing follows itself, and Q = (1 + F + F^2 + ...)/D.
 
         Parameters
         ----------
-        nodes
-            Global numbers of the nodes that take part, shape (c,).
+        comm, halo
+            Communicator, and the nodes that jumps are made of.
         rows
-            Which of them are replaced, shape (r,).
+            The nodes of this rank that are replaced, local numbers, shape (r,).
         jumps
-            The jumps by the unknowns, shape (r, c). One is made of the node itself, of nodes that
-            are not replaced, and of replaced ones, but in no circle: see `cyclic_dependencies`.
+            The jumps by the values at the nodes of the halo, shape (r, nodes). One is made of the
+            node itself, of nodes that are not replaced, and of replaced ones, but in no circle.
         free
-            Which unknowns are not fixed, shape (c, block size).
+            Which unknowns of this rank's nodes are not fixed, shape (nodes, block size).
         """
-        made = [_of_component(rows, jumps, component) for component in free.T]
-        return Change(
-            nodes,
-            _interleaved([matrix for matrix, _ in made]),
-            _interleaved([inverse for _, inverse in made]),
+        (count, size), entries = free.shape, sparse.coo_array(jumps)
+        known = halo.forward(free.astype(float)) > 0
+        at, unit = rows[entries.row], np.arange(size)
+        own = at == entries.col
+        scale = np.ones((count, size))
+        scale[at[own]] = np.where(free[at[own]], entries.data[own, None], 1.0)
+        # An unknown of a replaced node for each of its entries in each component.
+        taken = free[at] & known[entries.col] & ~own[:, None] & (entries.data != 0)[:, None]
+        row, column = (
+            np.broadcast_to(part[:, None] * size + unit, taken.shape)[taken]
+            for part in (at, halo.numbers[entries.col])
         )
-
-    def petsc(self, matrix: sparse.csr_array, layout: Layout) -> PETSc.Mat:
-        """Return Q, or its inverse, as a parallel matrix. Collective."""
-        size, index_map = layout.block_size, layout.index_map
-        begin, end = index_map.local_range
-        columns = self.nodes[:, None] * size + np.arange(size)
-        here, _ = owned_among(index_map, self.nodes)
-        local = (columns[here] - begin * size).ravel()
-        own = (here[:, None] * size + np.arange(size)).ravel()
-        entries = matrix[own].tocoo()
-        rest = np.setdiff1d(np.arange((end - begin) * size), local)
-        rows = np.concatenate([local[entries.row], rest])
-        across = np.concatenate([columns.ravel()[entries.col], rest + begin * size])
-        values = np.concatenate([entries.data, np.ones(rest.size)])
-        shape = ((end - begin) * size, index_map.size_global * size)
-        csr = sparse.csr_array((values, (rows, across)), shape=shape)
-        csr.sort_indices()
-        sizes = (shape, shape)
-        parts = (csr.indptr.astype(PETSc.IntType), csr.indices.astype(PETSc.IntType), csr.data)
-        made = PETSc.Mat().createAIJ(sizes, bsize=size, csr=parts, comm=layout.comm)
-        made.assemble()
-        return made
-
-
-def cyclic_dependencies(rows: NDArray[np.intp], jumps: sparse.csr_array) -> NDArray[np.intp]:
-    """Return the replaced nodes that follow each other in circles; none, or there is no change.
-
-    Parameters
-    ----------
-    rows, jumps
-        As in `Change.of`.
-
-    Returns
-    -------
-    Places among the nodes that take part.
-    """
-    among = sparse.coo_array(jumps[:, rows])
-    edges = sparse.csr_array((among.data != 0, among.coords), shape=among.shape)
-    count, member = csgraph.connected_components(edges, connection="strong")
-    return rows[np.bincount(member, minlength=count)[member] > 1]
+        value = np.broadcast_to(entries.data[:, None], taken.shape)[taken]
+        begin, here = halo.begin * size, np.arange(count * size)
+        follows = _matrix(comm, size, count, row, column, -value / scale.ravel()[row])
+        diagonal = scale.ravel()
+        inverse = _matrix(
+            comm,
+            size,
+            count,
+            np.concatenate([row, here]),
+            np.concatenate([column, here + begin]),
+            np.concatenate([value, diagonal]),
+        )
+        whole = _matrix(comm, size, count, here, here + begin, np.ones(here.size))
+        further = follows
+        while further.getInfo(PETSc.Mat.InfoType.GLOBAL_SUM)["nz_used"] > 0:
+            whole.axpy(1.0, further, PETSc.Mat.Structure.DIFFERENT_NONZERO_PATTERN)
+            further = further.matMult(follows)
+        vector = whole.createVecRight()
+        vector.array[:] = 1 / diagonal
+        whole.diagonalScale(None, vector)
+        return Change(whole, inverse)
 
 
-def _of_component(
-    rows: NDArray[np.intp], jumps: sparse.csr_array, free: NDArray[np.bool_]
-) -> tuple[sparse.csr_array, sparse.csr_array]:
-    """Return the change and its inverse for one unknown of each node, given which are free."""
-    count = free.size
-    own = np.asarray(jumps[np.arange(rows.size), rows]).ravel()
-    replaced = np.flatnonzero(free[rows])
-    scale = np.ones(count)
-    scale[rows[replaced]] = own[replaced]
-    place = sparse.csr_array(
-        (np.ones(replaced.size), (rows[replaced], replaced)), shape=(count, rows.size)
-    )
-    others = place @ jumps @ sparse.diags_array(free.astype(float))
-    others = others - sparse.diags_array(others.diagonal())
-    identity = sparse.eye_array(count)
-    follows = -(sparse.diags_array(1 / scale) @ others)
-    # Followers of replaced nodes follow those that these follow; without circles there is an end.
-    whole, further = identity, follows
-    while further.count_nonzero():
-        whole = whole + further
-        further = further @ follows
-    whole = whole @ sparse.diags_array(1 / scale)
-    inverse = sparse.diags_array(scale) @ (identity - follows)
-    return sparse.csr_array(whole), sparse.csr_array(inverse)
-
-
-def _interleaved(components: list[sparse.csr_array]) -> sparse.csr_array:
-    """Return a matrix of blocks, node by node, given that of each component."""
-    size, total = len(components), None
-    for k, matrix in enumerate(components):
-        unit = sparse.csr_array(([1.0], ([k], [k])), shape=(size, size))
-        part = sparse.kron(matrix, unit, format="csr")
-        total = part if total is None else total + part
-    return sparse.csr_array(total)
+def _matrix(
+    comm: MPI.Intracomm,
+    size: int,
+    count: int,
+    row: NDArray[np.intp],
+    column: NDArray[np.int64],
+    values: Array,
+) -> PETSc.Mat:
+    """Return a matrix of entries in local rows and global columns of unknowns. Collective."""
+    local = count * size
+    width = comm.allreduce(local, op=MPI.SUM)
+    csr = sparse.csr_array((values, (row, column)), shape=(local, width))
+    csr.sort_indices()
+    parts = (csr.indptr.astype(PETSc.IntType), csr.indices.astype(PETSc.IntType), csr.data)
+    shape = (local, width)
+    made = PETSc.Mat().createAIJ((shape, shape), bsize=size, csr=parts, comm=comm)
+    made.assemble()
+    return made
 
 
 class Constraint:
@@ -191,8 +159,8 @@ class Constraint:
     ) -> None:
         self.layout, self.change, self.motions, self.free = layout, change, motions, free
         self.owned = layout.free.size
-        self.matrix = None if change is None else change.petsc(change.matrix, layout)
-        self._inverse = None if change is None else change.petsc(change.inverse, layout)
+        self.matrix = None if change is None else change.matrix
+        self._inverse = None if change is None else change.inverse
 
     def gathered(self, forces: Array) -> Array:
         """Return R^T f of owned forces, shape (owned,) or (owned, k). Collective."""

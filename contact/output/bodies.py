@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from scipy import linalg
 
 from contact.mesh.entities import cells_at, owned_among
+from contact.mesh.owners import Owners
 from contact.output.solution import Note, Remark, Solution
 from contact.problem.problem import ContactProblem
 from contact.problem.residuals import residual_forces
@@ -134,10 +135,11 @@ def passing(problem: ContactProblem) -> Iterator[Remark]:
     if count == 1:
         return
     met = np.zeros(count, dtype=np.intc)
+    owners = Owners.of(problem.equilibrium.layout.index_map, problem.comm)
     for entry in problem.entries:
         if entry.coupling is not None:
             both = np.concatenate([entry.coupling.slaves, entry.coupling.masters])
-            met[piece[owned_among(problem.equilibrium.layout.index_map, both)[1]]] = 1
+            met[piece[owners.named(both) - owners.begin]] = 1
     problem.comm.Allreduce(MPI.IN_PLACE, met, op=MPI.MAX)
     alone = count - int(np.count_nonzero(met))
     if alone:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
@@ -10,9 +12,10 @@ from scipy.sparse.linalg import splu
 from contact.interface.entries import Entry
 from contact.interface.mortar.coupling import Coupling
 from contact.interface.mortar.lumping import Lumping
-from contact.interface.mortar.surface import surface_of
+from contact.interface.mortar.surface import Surface, surface_of
 from contact.mesh.cells import shape_of
 from contact.mesh.entities import owned_among
+from contact.mesh.owners import ALONE
 from contact.output.formats import Grid, Table
 from contact.output.quantities import AGAINST, NODES, SURFACE, values_of
 from contact.output.solution import Solution
@@ -40,8 +43,11 @@ def contact_surface(solution: Solution) -> Grid:
     # A node of two contacts is one of each.
     facets = np.concatenate(
         [
-            k * size + surface_of(problem.domain, body.space, entry.on).gathered(comm).nodes
+            nodes
             for k, entry in enumerate(problem.entries)
+            for nodes in comm.allgather(
+                k * size + surface_of(problem.domain, body.space, entry.on).nodes
+            )
         ]
     )
     known, cells = np.unique(facets, return_inverse=True)
@@ -89,7 +95,7 @@ def opposite_surface(solution: Solution) -> Grid | None:
         against, entry = problem.contacts[i].against, problem.entries[i]
         if against is None or entry.coupling is None:
             continue
-        surface = surface_of(problem.domain, body.space, against).gathered(problem.comm)
+        surface = _whole(surface_of(problem.domain, body.space, against))
         lumped = Lumping.of(surface)
         acting = _acting(problem, entry, entry.coupling, lumped, own)
         points, x = _at_nodes(solution, lumped.nodes)
@@ -114,16 +120,24 @@ def opposite_surface(solution: Solution) -> Grid | None:
     )
 
 
+def _whole(surface: Surface) -> Surface:
+    """Return the facets of all ranks, as if there were one. Collective."""
+    size, facets = surface.owners.comm.size, np.arange(surface.count)
+    every = surface.sent(np.tile(facets, size), np.repeat(np.arange(size), surface.count))
+    return replace(every, owners=ALONE)
+
+
 def _acting(
     problem: ContactProblem, entry: Entry, coupling: Coupling, lumped: Lumping, own: Array
 ) -> Array:
-    """Return the stresses of this rank's contact nodes on the other side, shape (m, k)."""
-    names = problem.equilibrium.layout.index_map.local_to_global(entry.nodes.nodes)
-    forces = np.zeros((coupling.nodes.size, own.shape[1]))
-    forces[np.searchsorted(coupling.nodes, names)] = entry.nodes.weight[:, None] * own
-    problem.comm.Allreduce(MPI.IN_PLACE, forces, op=MPI.SUM)
+    """Return the stresses of all contact nodes on the other side, shape (m, k). Collective.
+
+    Those given are of this rank's nodes.
+    """
     on_nodes = np.zeros((lumped.nodes.size, own.shape[1]))
+    forces = entry.nodes.weight[:, None] * own
     on_nodes[np.searchsorted(lumped.nodes, coupling.masters)] = coupling.other.T @ forces
+    problem.comm.Allreduce(MPI.IN_PLACE, on_nodes, op=MPI.SUM)
     if lumped.mixing is not None:
         # Forces on coefficients S u, given those on u.
         on_nodes = splu(lumped.mixing.own.T.tocsc()).solve(on_nodes)

@@ -18,9 +18,8 @@ from contact.mesh.cells import INTERVAL, QUADRILATERAL, TRIANGLE, rule
 from contact.mesh.grid import box, rectangle
 from forms.hencky import Linear
 from tests.problems.mechanics import constant
+from tests.problems.sides import FIRST, KINDS, NAMES, flat, oriented
 
-KINDS = [(shape, degree) for shape in (INTERVAL, TRIANGLE, QUADRILATERAL) for degree in (1, 2)]
-NAMES = [f"{shape.name}-{degree}" for shape, degree in KINDS]
 UNLIKE = [
     ((TRIANGLE, 1), (QUADRILATERAL, 1)),
     ((QUADRILATERAL, 2), (TRIANGLE, 2)),
@@ -29,51 +28,6 @@ UNLIKE = [
 ]
 PAIRS = [*((kind, kind) for kind in KINDS), *UNLIKE]
 PAIR_NAMES = [f"{a.name}-{p}-{b.name}-{q}" for (a, p), (b, q) in PAIRS]
-FIRST = 100_000
-
-
-def edges(n, rng):
-    """Return corner points in [0, 1] and the edges between them."""
-    x = np.linspace(0, 1, n + 1)
-    x[1:-1] += rng.uniform(-0.3, 0.3, n - 1) / n
-    return x[:, None], np.column_stack([np.arange(n), np.arange(1, n + 1)])
-
-
-def triangles(n, rng):
-    """Return corner points in the unit square and triangles of them."""
-    p, corners = squares(n, rng)
-    return p, np.concatenate([corners[:, [0, 1, 3]], corners[:, [0, 3, 2]]])
-
-
-def squares(n, rng):
-    """Return corner points in the unit square and quadrilaterals of them, no two alike."""
-    g = np.linspace(0, 1, n + 1)
-    p = np.stack(np.meshgrid(g, g, indexing="ij"), axis=-1).reshape(-1, 2)
-    inside = np.all((p > 1e-9) & (p < 1 - 1e-9), axis=1)
-    p[inside] += rng.uniform(-0.3, 0.3, (inside.sum(), 2)) / n
-    i = np.arange((n + 1) ** 2).reshape(n + 1, n + 1)
-    return p, np.stack([k.ravel() for k in (i[:-1, :-1], i[1:, :-1], i[:-1, 1:], i[1:, 1:])], 1)
-
-
-def flat(kind, n, height, up, seed, first=0, turn=None, size=1.0):
-    """Return a flat side at a height with its nodes' coordinates, by their number."""
-    (shape, degree), dim = kind, kind[0].dim + 1
-    rng = np.random.default_rng(seed)
-    p, corners = {INTERVAL: edges, TRIANGLE: triangles, QUADRILATERAL: squares}[shape](n, rng)
-    x = np.column_stack([size * p, np.full(len(p), height)])
-    x = x if turn is None else x @ turn.T
-    normal = np.zeros(dim)
-    normal[-1] = up
-    every = shape.lagrange(1, shape.nodes(degree)) @ x[corners]
-    _, first_of, number = np.unique(
-        every.reshape(-1, dim).round(9), axis=0, return_index=True, return_inverse=True
-    )
-    nodes = number.reshape(every.shape[:2])
-    normal = normal if turn is None else turn @ normal
-    out = np.tile(normal, (len(corners), 1))
-    none = np.zeros((len(corners), len(shape.edges)))
-    side = Surface(nodes + first, x[corners], out, none, degree)
-    return side, every.reshape(-1, dim)[first_of]
 
 
 def loads(side, nodes):
@@ -213,7 +167,7 @@ def test_concentric_arcs(degree) -> None:
         out = sign * out / np.linalg.norm(out, axis=1)[:, None]
         nodes = np.column_stack([np.arange(n), np.arange(1, n + 1)])
         nodes = nodes if degree == 1 else np.column_stack([nodes, n + 1 + np.arange(n)])
-        deviation = deviations(nodes[:, :2], c, out, MPI.COMM_SELF) * (degree - 1)
+        deviation = deviations(nodes[:, :2], c, out) * (degree - 1)
         return Surface(nodes + first, c, out, deviation, degree), a
 
     errors = []
@@ -247,16 +201,6 @@ def test_a_bowl_that_touches_within_facets_does_not_cut_them() -> None:
     assert cut.apart[deepest] > cut.gap[deepest] + 0.1
 
 
-def oriented(points, triangles, outwards):
-    """Return corners, unit normals on the side of a direction, and edges of triangles."""
-    corners = points[triangles]
-    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    sign = np.sign(np.einsum("fd,d->f", normal, outwards))
-    edges = [corners[:, j] - corners[:, i] for i, j in TRIANGLE.edges]
-    unit = normal * (sign / np.linalg.norm(normal, axis=1))[:, None]
-    return corners, unit, np.stack(edges, axis=1)
-
-
 def test_bulges() -> None:
     """They are those of a sphere, at the rim too; edges of a body are none of a smooth surface."""
     turns = [np.linspace(0, 2 * np.pi, 6 * k, endpoint=False) for k in range(1, 5)]
@@ -265,13 +209,13 @@ def test_bulges() -> None:
     triangles = Delaunay(flat).simplices.astype(np.int64)
     ball = np.column_stack([0.25 * flat, np.sqrt(1 - np.sum((0.25 * flat) ** 2, axis=1))])
     corners, normal, edges = oriented(ball, triangles, np.array([0.0, 0.0, 1.0]))
-    found = deviations(triangles, corners, normal, MPI.COMM_SELF)
+    found = deviations(triangles, corners, normal)
     np.testing.assert_allclose(found, np.sum(edges**2, axis=2) / 2, rtol=1e-9)
     x, y = (v.ravel() for v in np.meshgrid(np.linspace(0, 2, 9), np.linspace(0, 1, 5)))
     triangles = Delaunay(np.column_stack([x, y])).simplices.astype(np.int64)
     folded = np.column_stack([np.minimum(x, 1), y, -np.maximum(x - 1, 0)])
     corners, normal, _ = oriented(folded, triangles, np.array([1.0, 0.0, 1.0]))
-    np.testing.assert_array_equal(deviations(triangles, corners, normal, MPI.COMM_SELF), 0)
+    np.testing.assert_array_equal(deviations(triangles, corners, normal), 0)
 
 
 def test_surfaces_that_do_not_face_each_other_have_nothing_in_common() -> None:

@@ -9,8 +9,8 @@ the slave node j is then
 S being the identity, but for quadratic triangles, where N~ = A N (`dual_basis_transformation`)
 and S is made of the inverse of A^T. Constants pass: rows of S and of P have the sum 1.
 
-`integrate` finds these integrals on the facets of one rank, `couple` sums them up. Where nodes
-carry no multiplier, their functions are handed over to others.
+`integrate` finds these integrals on the facets of one rank, `couple` sums them up, each node's at
+the rank that owns it. Where nodes carry no multiplier, their functions are handed over to others.
 
 References
 ----------
@@ -25,15 +25,14 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from mpi4py import MPI
 from numpy.typing import NDArray
 from scipy import sparse
-from scipy.spatial import cKDTree
 
-from contact.interface.mortar.lumping import Mixing, coefficients, integrals
-from contact.interface.mortar.segments import Points, common_points, facing_pairs
+from contact.interface.mortar.lumping import Mixing, integrals
+from contact.interface.mortar.search import Opposite, nearest_named
+from contact.interface.mortar.segments import Points, common_points
 from contact.interface.mortar.surface import Surface, dual_basis_transformation
-from contact.mesh.cells import Shape
+from contact.mesh.owners import Owners, matrix
 from contact.tolerances import NEGLIGIBLE, ROUNDING
 from contact.typing import Array
 
@@ -60,30 +59,30 @@ class Carriers:
     functions: Array
 
     @staticmethod
-    def of(slave: Surface, without: NDArray[np.int64], comm: MPI.Intracomm) -> Carriers:
+    def of(slave: Surface, without: NDArray[np.int64]) -> Carriers:
         """Return the nodes that take over the dual functions of others. Collective.
 
         They go in equal parts to the others of the facet, and all of those of a facet without
-        others to the nearest corner of another facet.
+        others to the nearest corner of another facet, on whatever rank.
 
         Parameters
         ----------
-        slave, comm
-            Facets of this rank, and the communicator.
+        slave
+            Facets of this rank.
         without
-            Global numbers of the nodes.
+            Global numbers of the nodes, at least those of these facets.
         """
         gone = np.isin(slave.nodes, without)
         kept = ~gone
         among = kept / np.maximum(kept.sum(axis=1, keepdims=True), 1)
         functions = among[:, :, None] * gone[:, None, :] + kept[:, :, None] * np.eye(gone.shape[1])
         nodes, corners = slave.nodes.copy(), kept[:, : slave.corners.shape[1]]
-        names = np.concatenate(comm.allgather(slave.nodes[:, : corners.shape[1]][corners]))
-        places = np.concatenate(comm.allgather(slave.corners[corners]))
         alone = np.flatnonzero(gone.all(axis=1))
-        if alone.size and names.size:
-            nodes[alone, 0] = names[cKDTree(places).query(slave.centres[alone])[1]]
-            functions[alone, 0] = 1.0
+        names, places = slave.nodes[:, : corners.shape[1]][corners], slave.corners[corners]
+        beside = nearest_named(slave.owners.comm, slave.centres[alone], places, names)
+        alone, beside = alone[beside >= 0], beside[beside >= 0]
+        nodes[alone, 0] = beside
+        functions[alone, 0] = 1.0
         return Carriers(nodes, functions)
 
 
@@ -120,25 +119,19 @@ class Parts:
     columns: NDArray[np.int64]
     values: Array
 
-    def gathered(self, comm: MPI.Intracomm) -> Parts:
-        """Return those of all ranks. Collective."""
-        arrays = (np.concatenate(comm.allgather(array)) for array in vars(self).values())
-        return Parts(*arrays)
 
-
-def integrate(slave: Surface, master: Surface, reach: float, carriers: Carriers) -> Parts:
+def integrate(slave: Surface, opposite: Opposite, carriers: Carriers) -> Parts:
     """Integrate the dual functions of slave facets, alone and with the facets opposite.
 
     Parameters
     ----------
-    slave, master
-        Slave facets of this rank, and all master facets.
-    reach
-        Largest distance at which facets face each other (length).
+    slave, opposite
+        Slave facets of this rank, and the master facets that they may face.
     carriers
         The nodes whose functions act on the slave facets.
     """
-    direction, found = _facing(slave, master, reach)
+    master = opposite.master
+    direction, found = _facing(slave, opposite)
     change = dual_basis_transformation(slave.shape, slave.degree)
     dual, weight = _dual(slave, found, change)
     dual, own = carriers.functions @ dual, carriers.functions * weight[:, None, :]
@@ -163,10 +156,9 @@ def integrate(slave: Surface, master: Surface, reach: float, carriers: Carriers)
     )
 
 
-def _facing(slave: Surface, master: Surface, reach: float) -> tuple[Array, list[Points]]:
+def _facing(slave: Surface, opposite: Opposite) -> tuple[Array, list[Points]]:
     """Return the directions along which facets look, (f, d), and the points where they meet."""
-    pairs = list(facing_pairs(slave, master, reach))
-    direction = slave.normal
+    master, pairs, direction = opposite.master, list(opposite.pairs(slave)), slave.normal
     found = [common_points(slave, master, pair, direction) for pair in pairs]
     middle = _middle(slave, master, found)
     if np.abs(middle - direction).max(initial=0.0) > ROUNDING:
@@ -254,7 +246,7 @@ LEAST_COVERED = 1e-3
 
 @dataclass(frozen=True)
 class Coupling(Mixing):
-    """The jump of two surfaces at the slave nodes that carry a multiplier.
+    """The jump of two surfaces at the slave nodes of this rank that carry a multiplier.
 
     Attributes
     ----------
@@ -279,61 +271,50 @@ class Coupling(Mixing):
 
 
 def couple(
-    slave: Surface,
-    master: Surface,
-    reach: float,
-    comm: MPI.Intracomm = MPI.COMM_SELF,
-    without: NDArray[np.int64] = NOTHING,
+    slave: Surface, master: Surface, reach: float, without: NDArray[np.int64] = NOTHING
 ) -> Coupling:
     """Integrate the dual mortar operator. Collective.
 
     Parameters
     ----------
-    slave
-        The slave facets that this rank owns.
-    master
-        All master facets.
+    slave, master
+        The facets of both sides that this rank owns.
     reach
         Largest distance at which facets face each other (length).
-    comm
-        Communicator.
     without
-        Global numbers of slave nodes that carry no multiplier: their functions go to the other
-        nodes of their facets, or to the nearest node where these have none, so that the multipliers
-        still contain the constants.
+        Global numbers of slave nodes that carry no multiplier, at least those of this rank and of
+        its facets: their functions go to the other nodes of their facets, or to the nearest node
+        where these have none, so that the multipliers still contain the constants.
     """
-    parts = integrate(slave, master, reach, Carriers.of(slave, without, comm)).gathered(comm)
-    return _assembled(parts, slave.shape, slave.degree, without)
+    opposite = Opposite.of(slave, master, reach)
+    parts = integrate(slave, opposite, Carriers.of(slave, without))
+    change = dual_basis_transformation(slave.shape, slave.degree)
+    return _assembled(parts, slave.owners, np.asarray(np.linalg.inv(change.T)), without)
 
 
-def _assembled(parts: Parts, shape: Shape, degree: int, without: NDArray[np.int64]) -> Coupling:
-    every, place = np.unique(parts.nodes, return_inverse=True)
-    place = place.reshape(parts.nodes.shape)
-    carrier = np.searchsorted(every, parts.carriers)
-
-    def summed(values: Array) -> Array:
-        total = np.zeros((every.size, *values.shape[2:]))
-        np.add.at(total, carrier, values)
-        return total
-
-    weight, whole = summed(parts.own.sum(axis=2)), summed(parts.whole)
+def _assembled(parts: Parts, owners: Owners, back: Array, without: NDArray[np.int64]) -> Coupling:
+    """Return the sums at the nodes of this rank, given those of its facets and S of a facet."""
+    f, k, _, d = parts.gap.shape
     # The integral of a quadratic function on the axis of revolution is rounding.
-    around = summed(np.broadcast_to(parts.whole.sum(axis=1, keepdims=True), place.shape))
+    around = np.broadcast_to(parts.whole.sum(axis=1, keepdims=True), parts.whole.shape)
+    shares = (parts.own.sum(axis=2), parts.whole, around, parts.normal, parts.gap)
+    every, total = owners.sums(
+        parts.carriers.ravel(),
+        np.hstack([part.reshape(f * k, int(np.prod(part.shape[2:]))) for part in shares]),
+    )
+    weight, whole, around, normal, *gaps = np.split(total, [1, 2, 3, 3 + d, 3 + 2 * d], axis=1)
+    weight, whole, around = weight[:, 0], whole[:, 0], around[:, 0]
     some = whole > NEGLIGIBLE * around
     covered = np.where(some, weight / np.where(some, whole, 1.0), 0.0)
     kept = np.flatnonzero((covered > LEAST_COVERED) & ~np.isin(every, without))
-    normal = summed(parts.normal)[kept]
+    nodes, weight, normal = every[kept], weight[kept], normal[kept]
     normal = normal / np.linalg.norm(normal, axis=1)[:, None]
-    gap, apart = np.einsum("nsd,nd->sn", summed(parts.gap)[kept], normal) / weight[kept]
-    masters, columns = np.unique(parts.columns, return_inverse=True)
-    rows = np.searchsorted(every, parts.rows)
-    other = sparse.csr_array((parts.values, (rows, columns)), shape=(every.size, masters.size))
-    divide = sparse.diags_array(1 / weight[kept])
-    rows, columns = np.broadcast_arrays(carrier[:, :, None], place[:, None, :])
-    places = (rows.ravel(), columns.ravel())
-    dual = sparse.csr_array((parts.own.ravel(), places), shape=(every.size, every.size))[kept]
-    own = divide @ dual @ coefficients(place, every.size, dual_basis_transformation(shape, degree))
-    own.eliminate_zeros()
-    other = sparse.csr_array(divide @ other[kept])
-    jumps = every[kept], every, sparse.csr_array(own), masters, other
-    return Coupling(*jumps, weight[kept], normal, gap, apart, covered[kept])
+    gap, apart = (np.einsum("nd,nd->n", vector[kept], normal) / weight for vector in gaps)
+    divide = sparse.diags_array(1 / weight)
+    # Each facet with a node has all of the node's row of S.
+    rows, columns = np.broadcast_arrays(parts.carriers[:, :, None], parts.nodes[:, None, :])
+    values = parts.own @ back
+    slaves, own = matrix(nodes, owners.entries(rows.ravel(), columns.ravel(), values.ravel()))
+    masters, other = matrix(nodes, owners.entries(parts.rows, parts.columns, parts.values))
+    jumps = nodes, slaves, sparse.csr_array(divide @ own), masters, sparse.csr_array(divide @ other)
+    return Coupling(*jumps, weight, normal, gap, apart, covered[kept])

@@ -17,12 +17,13 @@ from __future__ import annotations
 from itertools import combinations
 
 import numpy as np
-from mpi4py import MPI
 from numpy.typing import NDArray
 from scipy import sparse
 
 from contact.mesh.cells import facet_with
 from contact.mesh.geometry import across
+from contact.mesh.owners import ALONE, Owners
+from contact.ranks import exchanged
 from contact.typing import Array
 
 #: Least cosine between the normals of a surface and of its facets; corners of bodies have less.
@@ -42,7 +43,7 @@ def deviations(
     names: NDArray[np.int64],
     corners: Array,
     normal: Array,
-    comm: MPI.Intracomm,
+    owners: Owners = ALONE,
     levels: int = 0,
 ) -> Array:
     """Return c of the edges of each facet, positive outwards, shape (f, edges). Collective.
@@ -53,22 +54,64 @@ def deviations(
         Global numbers of the corners, shape (f, c).
     corners, normal
         Their coordinates, shape (f, c, d), and the facets' normals, shape (f, d).
-    comm
-        Communicator; the facets are those of this rank.
+    owners
+        The owners of the nodes; the facets are those of this rank.
     levels
         How often straight edges have been cut in two: c is then that of the edges at first, beside
         those of their ends at which the polygon turns.
     """
-    counts = comm.allgather(len(names))
-    names, corners, normal = (
-        np.concatenate(comm.allgather(array)) for array in (names, corners, normal)
-    )
-    first = sum(counts[: comm.rank])
-    return _deviations(names, corners, normal, levels)[first : first + counts[comm.rank]]
+    count = len(names)
+    return _deviations(*_with_rings(names, corners, normal, owners), levels)[:count]
+
+
+def _with_rings(
+    names: NDArray[np.int64], corners: Array, normal: Array, owners: Owners
+) -> tuple[NDArray[np.int64], Array, Array]:
+    """Return facets, and behind them those of other ranks in the rings around them. Collective.
+
+    The owner of a vertex knows which ranks have facets there.
+    """
+    comm, own = owners.comm, names
+    vertices = np.unique(own)
+    holder, held = exchanged(comm, owners.ranks(vertices), vertices)
+    order = np.argsort(held, kind="stable")
+    holder, held = holder[order], held[order]
+    by_vertex = np.argsort(own.ravel(), kind="stable")
+    at = own.ravel()[by_vertex]
+    every, asked = [(names, corners, normal)], np.zeros(0, dtype=np.int64)
+    sent = np.zeros((0, 2), dtype=np.intp)
+    # A fit takes vertices two edges away with their normals, and an edge those of its ends'
+    # neighbours.
+    for _ in range(4):
+        fresh = np.setdiff1d(np.concatenate([facets[0].ravel() for facets in every]), asked)
+        asked = np.union1d(asked, fresh)
+        asking, vertex = exchanged(comm, owners.ranks(fresh), fresh)
+        row, found = _runs(held, vertex)
+        other = holder[found] != asking[row]
+        to, row = holder[found][other], row[other]
+        _, asking, vertex = exchanged(comm, to, asking[row], vertex[row])
+        row, found = _runs(at, vertex)
+        pairs = np.column_stack([asking[row], by_vertex[found] // own.shape[1]])
+        before = len(sent)
+        whole, first = np.unique(np.concatenate([sent, pairs]), axis=0, return_index=True)
+        sent, new = np.concatenate([sent, whole[first >= before]]), whole[first >= before]
+        arrays = (array[new[:, 1]] for array in (names, corners, normal))
+        every.append(exchanged(comm, new[:, 0], *arrays)[1:])  # type: ignore[arg-type]
+    return tuple(np.concatenate(arrays) for arrays in zip(*every, strict=True))  # type: ignore[return-value]
+
+
+def _runs(
+    known: NDArray[np.int64], asked: NDArray[np.int64]
+) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """Return all pairs of an asked value and a place of it among ascending ones."""
+    begin, end = (np.searchsorted(known, asked, side=side) for side in ("left", "right"))  # type: ignore[call-overload]
+    counts = end - begin
+    row = np.repeat(np.arange(asked.size), counts)
+    return row, np.arange(row.size) + np.repeat(begin - np.cumsum(counts) + counts, counts)
 
 
 def _deviations(names: NDArray[np.int64], corners: Array, normal: Array, levels: int) -> Array:
-    """Return them, given all facets."""
+    """Return them, given all facets on which they depend."""
     vertices, place = np.unique(names, return_inverse=True)
     place = place.reshape(names.shape)
     points = np.zeros((vertices.size, normal.shape[1]))

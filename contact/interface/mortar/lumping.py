@@ -12,13 +12,13 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from mpi4py import MPI
 from numpy.typing import NDArray
 from scipy import sparse
 
 from contact.interface.mortar.surface import Surface, dual_basis_transformation
 from contact.mesh.cells import rule
 from contact.mesh.geometry import jacobians
+from contact.mesh.owners import Owners, matrix
 from contact.typing import Array
 
 
@@ -36,43 +36,19 @@ def _integrated(surface: Surface) -> tuple[Array, Array, Array]:
     return places, surface.measures(places, weights), functions
 
 
-def coefficients(place: NDArray[np.intp], count: int, change: Array) -> sparse.csr_array:
-    """Return S: the coefficients of a function in N~ as those in N, shape (count, count).
-
-    Parameters
-    ----------
-    place
-        Numbers of the nodes of each facet, shape (f, k).
-    count
-        Number of nodes.
-    change
-        A of a facet, shape (k, k).
-    """
-    own = np.linalg.inv(change.T)
-    rows = np.broadcast_to(place[:, :, None], (*place.shape, place.shape[1]))
-    columns = np.broadcast_to(place[:, None, :], rows.shape)
-    values = np.broadcast_to(own, rows.shape)
-    # Facets that share nodes say the same of them: any of them may be heard.
-    pairs, first = np.unique(rows.ravel() * count + columns.ravel(), return_index=True)
-    made = sparse.csr_array(
-        (values.ravel()[first], (pairs // count, pairs % count)), shape=(count, count)
-    )
-    made.eliminate_zeros()
-    return made
-
-
 @dataclass(frozen=True)
 class Mixing:
     """Jumps that are no nodal values, S u less P times the values of another body.
 
-    Rows are nodes in ascending order of their global numbers; the same on all ranks.
+    Rows are nodes that this rank owns in ascending order of their global numbers.
 
     Attributes
     ----------
     nodes
         Global numbers of the nodes that carry a multiplier, shape (n,).
     slaves, own
-        Global numbers of the nodes of their side, shape (s,), and S, shape (n, s).
+        Global numbers of the nodes of their side, of whatever ranks, shape (s,), and S, shape
+        (n, s).
     masters, other
         Those of the other body, shape (m,), and P, shape (n, m); none before a rigid foundation.
     """
@@ -84,32 +60,29 @@ class Mixing:
     other: sparse.csr_array
 
     @staticmethod
-    def alone(nodes: NDArray[np.int64], own: sparse.csr_array) -> Mixing:
-        """Return the jumps S u of all nodes of one side, S of shape (n, n)."""
+    def alone(nodes: NDArray[np.int64], slaves: NDArray[np.int64], own: sparse.csr_array) -> Mixing:
+        """Return the jumps S u of nodes of one side, given as the attributes are."""
         none = sparse.csr_array((nodes.size, 0))
-        return Mixing(nodes, nodes, own, np.zeros(0, dtype=np.int64), none)
+        return Mixing(nodes, slaves, own, np.zeros(0, dtype=np.int64), none)
 
-    def apply(self, comm: MPI.Intracomm, numbers: NDArray[np.int64], values: Array) -> Array:
-        """Return S times nodal values of owned nodes, shape (k, m). Collective.
+    def apply(self, owners: Owners, values: Array) -> Array:
+        """Return S times nodal values, shape (n, m). Collective.
 
         Jumps made of infinite values are NaN.
 
         Parameters
         ----------
-        comm, numbers, values
-            Communicator, the global numbers of the nodes that this rank owns, and their values.
+        owners, values
+            The owners of the nodes, and the values at `nodes`, which are all of their side.
         """
-        place = np.searchsorted(self.nodes, numbers)
-        total = np.zeros((self.nodes.size, values.shape[1]))
-        total[place] = values
-        comm.Allreduce(MPI.IN_PLACE, total, op=MPI.SUM)
+        there = owners.values(self.slaves, lambda given: values[np.searchsorted(self.nodes, given)])
         with np.errstate(invalid="ignore"):
-            return np.asarray((self.own @ total)[place])
+            return np.asarray(self.own @ there)
 
 
 @dataclass(frozen=True)
 class Lumping:
-    """The nodes of a surface with their areas; the same on all ranks.
+    """The nodes of a surface that this rank owns, with their areas.
 
     Attributes
     ----------
@@ -133,9 +106,8 @@ class Lumping:
 
     @staticmethod
     def of(surface: Surface) -> Lumping:
-        """Return the areas, given the facets of all ranks."""
-        nodes, place = np.unique(surface.nodes, return_inverse=True)
-        place = place.reshape(surface.nodes.shape)
+        """Return the areas, given the facets that this rank owns. Collective."""
+        owners, count, d = surface.owners, surface.nodes.size, surface.normal.shape[1]
         places, measure, functions = _integrated(surface)
         areas, shares = measure @ functions, measure[:, :, None] * functions
         if surface.order > 1:
@@ -144,16 +116,24 @@ class Lumping:
             shares = measure.sum(axis=1)[:, None, None] * np.eye(len(places))
         slopes = jacobians(surface.shape, surface.points, places)
         normals = surface.normals(np.arange(surface.count)[:, None], slopes)
-        weight, normal = np.zeros(nodes.size), np.zeros((nodes.size, surface.normal.shape[1]))
-        np.add.at(weight, place, areas)
-        np.add.at(normal, place, np.einsum("fqd,fqk->fkd", normals, shares))
-        deviation = np.zeros_like(normal)
-        np.add.at(deviation, place, surface.node_deviations)
-        deviation /= np.bincount(place.ravel(), minlength=nodes.size)[:, None]
+        parts = [
+            areas.reshape(count, 1),
+            np.einsum("fqd,fqk->fkd", normals, shares).reshape(count, d),
+            surface.node_deviations.reshape(count, d),
+            np.ones((count, 1)),
+        ]
+        nodes, total = owners.sums(surface.nodes.ravel(), np.hstack(parts))
+        weight, normal, deviation, often = np.split(total, [1, 1 + d, 1 + 2 * d], axis=1)
         change, mixing = dual_basis_transformation(surface.shape, surface.degree), None
         if not np.array_equal(change, np.eye(len(change))):
-            mixing = Mixing.alone(nodes, coefficients(place, nodes.size, change))
-        return Lumping(nodes, weight, normal, deviation, mixing)
+            both = np.broadcast_arrays(surface.nodes[:, :, None], surface.nodes[:, None, :])
+            values = np.broadcast_to(np.linalg.inv(change.T), both[0].shape)
+            entries = owners.entries(*(part.ravel() for part in (*both, values)))
+            # Facets that share nodes say the same of them: any of them may be heard.
+            _, first = np.unique(np.column_stack(entries[:2]), axis=0, return_index=True)
+            row, column, value = entries[0][first], entries[1][first], entries[2][first]
+            mixing = Mixing.alone(nodes, *matrix(nodes, (row, column, value)))
+        return Lumping(nodes, weight[:, 0], normal, deviation / often, mixing)
 
     def without_axis(self, surface: Surface) -> Lumping:
         """Return the areas where nodes on the axis of revolution carry no multiplier.
@@ -162,16 +142,25 @@ class Lumping:
         which ends at the axis; a node there has so little area that its pressure would be off by
         several times as much as others. As at crosspoints its function goes to its neighbour.
         """
-        facets = np.searchsorted(self.nodes, surface.nodes)
-        weight, own = self.weight.copy(), sparse.lil_array(sparse.eye_array(self.nodes.size))
-        for axis, beside in pairs_at_axis(surface, facets):
-            total = self.weight[axis] + self.weight[beside]
-            own[beside, axis] = self.weight[axis] / total
-            own[beside, beside] = self.weight[beside] / total
-            weight[axis], weight[beside] = 0.0, total
-        if np.array_equal(weight, self.weight):
+        owners, nodes = surface.owners, self.nodes
+        # A part has two ends in the half plane.
+        pairs = np.concatenate(owners.comm.allgather(pairs_at_axis(surface, surface.nodes)))
+        if len(pairs) == 0:
             return self
-        return replace(self, weight=weight, mixing=Mixing.alone(self.nodes, sparse.csr_array(own)))
+        weights = owners.values(
+            pairs.ravel(), lambda given: self.weight[np.searchsorted(nodes, given)]
+        ).reshape(pairs.shape)
+        (axis, beside), total, weight = pairs.T, weights.sum(axis=1), self.weight.copy()
+        for numbers, values in ((axis, np.zeros(axis.size)), (beside, total)):
+            here = np.isin(numbers, nodes)
+            weight[np.searchsorted(nodes, numbers[here])] = values[here]
+        alone = np.setdiff1d(nodes, beside)
+        entries = (
+            np.concatenate([alone, beside, beside]),
+            np.concatenate([alone, axis, beside]),
+            np.concatenate([np.ones(alone.size), *(weights / total[:, None]).T]),
+        )
+        return replace(self, weight=weight, mixing=Mixing.alone(nodes, *matrix(nodes, entries)))
 
 
 def pairs_at_axis(surface: Surface, numbers: NDArray[Any]) -> NDArray[Any]:

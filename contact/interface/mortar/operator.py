@@ -1,6 +1,7 @@
 """The mortar coupling operator: jumps that are sums over nodes of both bodies, on whatever rank.
 
-So are the jumps on quadratic triangles in front of a rigid foundation.
+So are the jumps on quadratic triangles in front of a rigid foundation. Each rank has those of its
+own contact nodes, and asks neighbours for the values of theirs.
 """
 
 from __future__ import annotations
@@ -17,8 +18,8 @@ from scipy import sparse
 
 from contact.errors import InputError
 from contact.interface.mortar.lumping import Mixing
-from contact.linear.constraint import Change, cyclic_dependencies
-from contact.mesh.entities import owned_among
+from contact.linear.constraint import Change
+from contact.mesh.owners import Halo, Owners
 from contact.typing import Array
 
 
@@ -28,41 +29,39 @@ class CouplingOperator:
 
     Attributes
     ----------
-    comm
-        Communicator.
+    halo
+        The nodes of this rank and those of others that take part.
     jumps
-        The jumps of all ranks by the values of the nodes that take part, shape (r, c).
+        The jumps of this rank by the values at these, shape (r, nodes).
     change
         The change of unknowns that makes them unknowns.
     numbers
         The global numbers of their nodes, shape (r,).
     between
         Whether other bodies take part.
+    local
+        Which nodes of this rank take part in jumps of any rank, local numbers, shape (h,).
     places
-        Where such nodes are among some nodes of this rank, shape (k,).
+        Where the nodes of jumps are among some nodes of this rank, shape (k,).
     own
         Their rows, shape (k,).
-    here, local
-        Which of the nodes that take part this rank owns, and their local numbers, shape (h,).
     """
 
-    comm: MPI.Intracomm
+    halo: Halo
     jumps: sparse.csr_array
     change: Change
     numbers: NDArray[np.int64]
     between: bool
+    local: NDArray[np.intp]
     places: NDArray[np.intp]
     own: NDArray[np.intp]
-    here: NDArray[np.intp]
-    local: NDArray[np.int32]
 
     def at(self, numbers: NDArray[np.int64]) -> CouplingOperator:
         """Return the operator at other nodes of this rank, given their global numbers."""
         order = np.argsort(self.numbers)
         found = np.searchsorted(self.numbers, numbers, sorter=order)
-        rows = order[np.minimum(found, self.numbers.size - 1)]
-        places = np.flatnonzero(self.numbers[rows] == numbers)
-        return replace(self, places=places, own=rows[places])
+        places = np.flatnonzero(np.isin(numbers, self.numbers))
+        return replace(self, places=places, own=order[found[places]])
 
     @cached_property
     def _here(self) -> sparse.csr_array:
@@ -71,16 +70,11 @@ class CouplingOperator:
 
     def apply(self, x: Array) -> Array:
         """Return the jumps at `places` of local unknowns, (nodes, block size). Collective."""
-        values = np.zeros((self.change.nodes.size, x.shape[1]))
-        values[self.here] = x[self.local]
-        self.comm.Allreduce(MPI.IN_PLACE, values, op=MPI.SUM)
-        return np.asarray(self._here @ values)
+        return np.asarray(self._here @ self.halo.forward(x[: self.halo.count]))
 
     def transpose(self, nodal: Array, into: Array) -> None:
         """Add the transpose of vectors at `places` to owned nodes, (nodes, k). Collective."""
-        forces = np.asarray(self._here.T @ nodal)
-        self.comm.Allreduce(MPI.IN_PLACE, forces, op=MPI.SUM)
-        into[self.local] += forces[self.here]
+        into[: self.halo.count] += self.halo.reverse(np.asarray(self._here.T @ nodal))
 
 
 def coupling_operator(
@@ -110,34 +104,69 @@ def coupling_operator(
     """
     if not given:
         return None
-    slaves = np.concatenate([rows.nodes for rows in given])
-    masters = np.concatenate([rows.masters for rows in given])
-    every = np.unique(np.concatenate([masters, *(rows.slaves for rows in given)]))
-    jumps = sparse.vstack([_over(rows, every) for rows in given], format="csr")
-    replaced = np.searchsorted(every, slaves)
-    circle = cyclic_dependencies(replaced, jumps)
-    if circle.size:
+    owners = Owners.of(index_map, comm)
+    columns = [np.concatenate([rows.slaves, rows.masters]) for rows in given]
+    halo = Halo(owners, index_map.size_local, np.concatenate(columns))
+    numbers = np.concatenate([rows.nodes for rows in given])
+    jumps = sparse.vstack(
+        [
+            _over(rows, halo.places(names), halo.numbers.size)
+            for rows, names in zip(given, columns, strict=True)
+        ],
+        format="csr",
+    )
+    replaced = halo.places(numbers)
+    circle = _cyclic(comm, halo, replaced, jumps)
+    if circle:
         raise InputError(
-            f"contact.against: {circle.size} contact nodes follow, by way of the nodes opposite, "
+            f"contact.against: {circle} contact nodes follow, by way of the nodes opposite, "
             "themselves; accepted: contacts that form no circle, such as one of two that are each "
             "other's opposite"
         )
-    here, local = owned_among(index_map, every)
-    flags = np.zeros((every.size, free.shape[1]), dtype=np.intc)
-    flags[here] = free[local]
-    comm.Allreduce(MPI.IN_PLACE, flags, op=MPI.SUM)
-    change = Change.of(every, replaced, jumps, flags > 0)
+    taking = np.zeros((halo.numbers.size, 1))
+    taking[jumps.indices] = 1.0
+    change = Change.of(comm, halo, replaced, jumps, free)
     none = np.zeros(0, dtype=np.intp)
-    operator = CouplingOperator(
-        comm, jumps, change, slaves, masters.size > 0, none, none, here, local
-    )
+    between = comm.allreduce(any(rows.masters.size for rows in given), op=MPI.LOR)
+    local = np.flatnonzero(halo.reverse(taking)[:, 0])
+    operator = CouplingOperator(halo, jumps, change, numbers, between, local, none, none)
     return operator.at(index_map.local_to_global(nodes))
 
 
-def _over(rows: Mixing, every: NDArray[np.int64]) -> sparse.csr_array:
+def _over(rows: Mixing, places: NDArray[np.intp], count: int) -> sparse.csr_array:
     """Return a contact's jumps by the values of the nodes of all contacts."""
     entries = sparse.hstack([rows.own, -rows.other], format="coo")
-    columns = np.searchsorted(every, np.concatenate([rows.slaves, rows.masters]))
     return sparse.csr_array(
-        (entries.data, (entries.row, columns[entries.col])), shape=(rows.nodes.size, every.size)
+        (entries.data, (entries.row, places[entries.col])), shape=(rows.nodes.size, count)
     )
+
+
+def _cyclic(
+    comm: MPI.Intracomm, halo: Halo, replaced: NDArray[np.intp], jumps: sparse.csr_array
+) -> int:
+    """Return how many replaced nodes follow each other in circles, or lie between. Collective.
+
+    Those that follow none that is left are taken away, and then those that none follows, as long
+    as there are any.
+    """
+    follows = sparse.coo_array(jumps)
+    others = (replaced[follows.row] != follows.col) & (follows.data != 0)
+    follows = sparse.csr_array(
+        (np.ones(np.count_nonzero(others)), (follows.row[others], follows.col[others])),
+        shape=jumps.shape,
+    )
+    left: Array = np.ones((replaced.size, 1))
+    total = comm.allreduce(replaced.size, op=MPI.SUM)
+    for leading in (False, True):
+        while total:
+            if leading:
+                met = halo.reverse(follows.T @ left)[replaced]
+            else:
+                every = np.zeros((halo.count, 1))
+                every[replaced] = left
+                met = follows @ halo.forward(every)
+            left = left * (met > 0)
+            before, total = total, comm.allreduce(int(left.sum()), op=MPI.SUM)
+            if total == before:
+                break
+    return int(total)

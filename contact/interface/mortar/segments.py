@@ -14,60 +14,17 @@ and Solberg, ibid. 197 (2008) 555 (pieces of facets of degree 2).
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import cKDTree
 
-from contact.body.pointwise import CHUNK
 from contact.interface.mortar.surface import Surface
 from contact.mesh.cells import INTERVAL, LARGEST, TRIANGLE, rule
 from contact.mesh.geometry import across, determinant, inverse, jacobians
 from contact.tolerances import ROUNDING
 from contact.typing import Array
-
-#: Least cosine between a normal and the opposite of the other.
-FACING = 0.1
-
-#: How much farther than the nearest facet the one along the normal may be.
-DETOUR = 2.0
-
-
-def facing_pairs(
-    slave: Surface, master: Surface, reach: float
-) -> Iterator[tuple[NDArray[np.intp], NDArray[np.intp]]]:
-    """Yield pairs of a slave and a master facet whose shadows along the slave's normal may meet.
-
-    Parameters
-    ----------
-    slave, master
-        The two sides.
-    reach
-        Slave facets that are farther than this from all of the other side face none (length).
-    """
-    if slave.count == 0 or master.count == 0:
-        return
-    tree, radii = cKDTree(master.centres), master.radii
-    widest = radii.max()
-    centres, own = slave.centres, slave.radii
-    distance = tree.query(centres)[0]
-    near = np.flatnonzero(distance <= reach + widest + own)
-    radius = (own + widest + DETOUR * distance)[near]
-    counts = tree.query_ball_point(centres[near], radius, return_length=True)
-    # Masses of the functions of a facet are found at its points.
-    ends = np.cumsum(counts) // max(CHUNK // slave.nodes.shape[1] ** 2, 1)
-    for chosen in np.split(np.arange(near.size), np.flatnonzero(np.diff(ends)) + 1):
-        found = tree.query_ball_point(centres[near[chosen]], radius[chosen], return_sorted=True)
-        i = np.repeat(near[chosen], [len(f) for f in found])
-        j = np.array([m for f in found for m in f], dtype=np.intp)
-        offset = master.centres[j] - centres[i]
-        height = np.einsum("pd,pd->p", offset, slave.normal[i])
-        aside = np.sqrt(np.maximum(np.einsum("pd,pd->p", offset, offset) - height**2, 0.0))
-        opposite = -np.einsum("pd,pd->p", slave.normal[i], master.normal[j])
-        keep = (aside <= own[i] + radii[j]) & (opposite > FACING) & (np.abs(height) <= reach)
-        yield i[keep], j[keep]
 
 
 def clipped(polygons: Array, by: Array) -> tuple[Array, NDArray[np.intp]]:

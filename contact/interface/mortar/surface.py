@@ -1,4 +1,4 @@
-"""The facets of a part of the boundary as plain arrays, on this rank or on all, and their basis.
+"""The facets of a part of the boundary that a rank owns as plain arrays, and their basis.
 
 Points on facets are those of the reference facet, and nodes are numbered, as in
 `contact.mesh.cells`.
@@ -6,13 +6,11 @@ Points on facets are those of the reference facet, and nodes are numbered, as in
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 from dolfinx import fem
-from mpi4py import MPI
 from numpy.typing import NDArray
 
 from contact import _compat
@@ -21,6 +19,8 @@ from contact.mesh.cells import TRIANGLE, Shape, facet_with, shape_of
 from contact.mesh.domain import Domain
 from contact.mesh.entities import cells_at
 from contact.mesh.geometry import across, inverse, jacobians, measures
+from contact.mesh.owners import ALONE, Owners
+from contact.ranks import exchanged
 from contact.tolerances import NEGLIGIBLE
 from contact.typing import Array
 
@@ -63,6 +63,8 @@ class Surface:
         Whether the facets stand for the rings through them, about the axis x = 0.
     refined
         Whether straight edges have been cut in two since the mesh met a curved boundary.
+    owners
+        The ranks that own the nodes.
     """
 
     nodes: NDArray[np.int64]
@@ -72,6 +74,7 @@ class Surface:
     degree: int
     revolved: bool = False
     refined: bool = False
+    owners: Owners = ALONE
 
     @property
     def count(self) -> int:
@@ -120,14 +123,12 @@ class Surface:
         found = np.abs(aside).sum(axis=2).max(axis=1, initial=0.0)
         return np.asarray(np.where(found > NEGLIGIBLE, found, 0.0))
 
-    def gathered(self, comm: MPI.Intracomm) -> Surface:
-        """Return the facets of all ranks. Collective."""
-        arrays: dict[str, Any] = {
-            f.name: np.concatenate(comm.allgather(getattr(self, f.name)))
-            for f in fields(self)
-            if f.name not in ("degree", "revolved", "refined")
-        }
-        return replace(self, **arrays)
+    def sent(self, facets: NDArray[np.intp], ranks: NDArray[np.intp]) -> Surface:
+        """Send facets of this rank to ranks, and return those that it is sent. Collective."""
+        arrays = (self.nodes, self.points, self.normal, self.deviation)
+        _, *found = exchanged(self.owners.comm, ranks, *(array[facets] for array in arrays))
+        nodes, points, normal, deviation = found
+        return replace(self, nodes=nodes, points=points, normal=normal, deviation=deviation)
 
     @property
     def largest_deviation(self) -> float:
@@ -156,7 +157,8 @@ class Surface:
         if not self.follows:
             return np.zeros(at.shape[:2])
         shape = self.shape
-        functions = shape.lagrange(1, at.reshape(-1, shape.dim)).reshape(*at.shape[:2], -1)
+        functions = shape.lagrange(1, at.reshape(-1, shape.dim))
+        functions = functions.reshape(*at.shape[:2], shape.corners)
         pairs = [(functions[..., i], functions[..., j]) for i, j in shape.edges]
         products = np.stack([one * other for one, other in pairs], axis=2)
         if not shape.simplex:
@@ -218,11 +220,13 @@ def surface_of(domain: Domain, space: fem.FunctionSpace, part: str) -> Surface:
     names = np.asarray(numbers, dtype=np.int64).reshape(nodes.shape)
     normal = _outward(shape.facet, points, x.mean(axis=1))
     corners = shape.facet.corners
+    owners = Owners.of(space.dofmap.index_map, domain.comm)
     if order == 1:
-        deviation = deviations(names[:, :corners], points, normal, domain.comm, domain.levels)
+        deviation = deviations(names[:, :corners], points, normal, owners, domain.levels)
     else:
         deviation = np.zeros((len(names), len(shape.facet.edges)))
-    return Surface(names, points, normal, deviation, degree, domain.revolved, domain.levels > 0)
+    refined = domain.levels > 0
+    return Surface(names, points, normal, deviation, degree, domain.revolved, refined, owners)
 
 
 def _outward(shape: Shape, points: Array, inside: Array) -> Array:

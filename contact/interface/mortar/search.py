@@ -1,0 +1,197 @@
+"""Contact search: the facets of the other side, of whatever rank, that slave facets may face.
+
+A rank asks those whose boxes are near its facets, and is sent no more than balls around these
+contain. So messages and memory do not grow with the number of ranks.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from mpi4py import MPI
+from numpy.typing import NDArray
+from scipy.spatial import cKDTree
+
+from contact.body.pointwise import CHUNK
+from contact.interface.mortar.surface import Surface
+from contact.ranks import boxes, exchanged
+from contact.tolerances import ROUNDING
+from contact.typing import Array
+
+#: Least cosine between a normal and the opposite of the other.
+FACING = 0.1
+
+#: How much farther than the nearest facet the one along the normal may be.
+DETOUR = 2.0
+
+
+@dataclass(frozen=True)
+class Opposite:
+    """The master facets that slave facets of this rank may face.
+
+    Attributes
+    ----------
+    master
+        The facets, of all ranks.
+    near
+        Those slave facets that are near enough, shape (n,).
+    radius
+        How far around the centres of these the others are sought, shape (n,) (length).
+    reach
+        Slave facets that are farther than this from all of the other side face none (length).
+    """
+
+    master: Surface
+    near: NDArray[np.intp]
+    radius: Array
+    reach: float
+
+    @staticmethod
+    def of(slave: Surface, master: Surface, reach: float) -> Opposite:
+        """Find them, given the facets of this rank. Collective."""
+        comm = slave.owners.comm
+        widest = comm.allreduce(float(master.radii.max(initial=0.0)), op=MPI.MAX)
+        distance = nearest(comm, slave.centres, master.centres)
+        near = np.flatnonzero(distance <= reach + widest + slave.radii)
+        radius = (slave.radii + widest + DETOUR * distance)[near]
+        centres = slave.centres[near]
+        ball, rank = _meeting(boxes(comm, master.centres), centres, radius)
+        asked = exchanged(comm, rank, centres[ball], radius[ball])
+        facets, ranks = _within(master.centres, *asked)
+        return Opposite(master.sent(facets, ranks), near, radius, reach)
+
+    def pairs(self, slave: Surface) -> Iterator[tuple[NDArray[np.intp], NDArray[np.intp]]]:
+        """Yield pairs of a slave and a master facet whose shadows along the slave's normal meet.
+
+        Perhaps: no others do.
+        """
+        master, near, radius = self.master, self.near, self.radius
+        if near.size == 0 or master.count == 0:
+            return
+        tree, radii = cKDTree(master.centres), master.radii
+        centres, own = slave.centres, slave.radii
+        counts = tree.query_ball_point(centres[near], radius, return_length=True)
+        # Masses of the functions of a facet are found at its points.
+        ends = np.cumsum(counts) // max(CHUNK // slave.nodes.shape[1] ** 2, 1)
+        for chosen in np.split(np.arange(near.size), np.flatnonzero(np.diff(ends)) + 1):
+            found = tree.query_ball_point(centres[near[chosen]], radius[chosen], return_sorted=True)
+            i = np.repeat(near[chosen], [len(f) for f in found])
+            j = np.array([m for f in found for m in f], dtype=np.intp)
+            offset = master.centres[j] - centres[i]
+            height = np.einsum("pd,pd->p", offset, slave.normal[i])
+            aside = np.sqrt(np.maximum(np.einsum("pd,pd->p", offset, offset) - height**2, 0.0))
+            opposite = -np.einsum("pd,pd->p", slave.normal[i], master.normal[j])
+            keep = (aside <= own[i] + radii[j]) & (opposite > FACING)
+            keep &= np.abs(height) <= self.reach
+            yield i[keep], j[keep]
+
+
+def nearest(comm: MPI.Intracomm, points: Array, places: Array) -> Array:
+    """Return how far points of this rank are from the nearest place of any rank. Collective.
+
+    Infinite where there are no places.
+
+    Parameters
+    ----------
+    comm, points, places
+        Communicator, and those of this rank, shapes (n, d) and (m, d).
+    """
+    point, rank = _holders(boxes(comm, places), points)
+    asked_by, asked = exchanged(comm, rank, points[point])
+    found = cKDTree(places).query(asked)[0] if len(places) else np.full(len(asked), np.inf)
+    _, distance = exchanged(comm, asked_by, found)
+    least = np.full(len(points), np.inf)
+    np.minimum.at(least, point[np.argsort(rank, kind="stable")], distance)
+    return least
+
+
+def nearest_named(
+    comm: MPI.Intracomm, points: Array, places: Array, names: NDArray[np.int64]
+) -> NDArray[np.int64]:
+    """Return the name of the place of any rank that is nearest to each point. Collective.
+
+    Of places that are equally near the one with the least coordinates is taken; where there are no
+    places the name is -1.
+    """
+    least = nearest(comm, points, places)
+    among = np.flatnonzero(np.isfinite(least))
+    radius = least[among] * (1 + 100 * ROUNDING)
+    ball, rank = _meeting(boxes(comm, places), points[among], radius)
+    source, number, centre, size = exchanged(
+        comm, rank, among[ball], points[among][ball], radius[ball]
+    )
+    found = cKDTree(places).query_ball_point(centre, size) if len(places) else []
+    counts = np.array([len(near) for near in found], dtype=np.intp)
+    near = np.array([k for some in found for k in some], dtype=np.intp)
+    row = np.repeat(np.arange(counts.size), counts)
+    _, number, place, name = exchanged(comm, source[row], number[row], places[near], names[near])
+    order = np.lexsort((*place.T[::-1], number))
+    chosen = np.full(len(points), -1, dtype=np.int64)
+    chosen[number[order][::-1]] = name[order][::-1]
+    return chosen
+
+
+def _distances(box: Array, points: Array) -> tuple[Array, Array]:
+    """Return how far points are at least, and at most, from places in a box around these."""
+    lower, upper = box
+    least = np.linalg.norm(np.maximum(np.maximum(lower - points, points - upper), 0.0), axis=1)
+    most = np.linalg.norm(np.maximum(np.abs(lower - points), np.abs(upper - points)), axis=1)
+    return least, most
+
+
+def _meeting(
+    every: Array, centres: Array, radius: Array
+) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """Return pairs of a ball and a rank whose box it meets."""
+    lower, upper = every[:, 0], every[:, 1]
+    low = (centres - radius[:, None]).min(axis=0, initial=np.inf)
+    high = (centres + radius[:, None]).max(axis=0, initial=-np.inf)
+    balls: list[NDArray[np.intp]] = [np.zeros(0, dtype=np.intp)]
+    ranks: list[NDArray[np.intp]] = [np.zeros(0, dtype=np.intp)]
+    for rank in np.flatnonzero(np.all((lower <= high) & (upper >= low), axis=1)):
+        ball = np.flatnonzero(_distances(every[rank], centres)[0] <= radius)
+        balls.append(ball)
+        ranks.append(np.full(ball.size, rank))
+    return np.concatenate(balls), np.concatenate(ranks)
+
+
+def _holders(every: Array, points: Array) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """Return pairs of a point and a rank that may have the nearest place, given the boxes."""
+    filled = np.flatnonzero(np.isfinite(every[:, 0, 0]))
+    none = np.zeros(0, dtype=np.intp)
+    if filled.size == 0 or len(points) == 0:
+        return none, none
+    # Of boxes around all points first: most ranks are far from these.
+    middle = (points.min(axis=0) + points.max(axis=0)) / 2
+    extent = np.linalg.norm(points.max(axis=0) - middle)
+    bounds = [_distances(every[rank], middle[None]) for rank in filled]
+    least, most = np.array(bounds)[:, :, 0].T
+    filled = filled[least - extent <= most.min() + extent]
+    bounds = [_distances(every[rank], points) for rank in filled]
+    allowed = np.min([most for _, most in bounds], axis=0)
+    chosen = [np.flatnonzero(least <= allowed) for least, _ in bounds]
+    ranks = np.repeat(filled, [own.size for own in chosen])
+    return np.concatenate(chosen), ranks
+
+
+def _within(
+    places: Array, source: NDArray[np.intp], centres: Array, radius: Array
+) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """Return places that are in balls, or beside them, and the ranks that these are of.
+
+    Balls of a rank that are alike in size are taken for equally large.
+    """
+    if len(places) == 0 or len(centres) == 0:
+        return np.zeros(0, dtype=np.intp), np.zeros(0, dtype=np.intp)
+    size = np.ceil(np.log2(radius)).astype(np.intp)
+    found = np.zeros((0, 2), dtype=np.intp)
+    for rank, exponent in np.unique(np.column_stack([source, size]), axis=0):
+        group = (source == rank) & (size == exponent)
+        far = radius[group].max() * (1 + 100 * ROUNDING)
+        distance = cKDTree(centres[group]).query(places, distance_upper_bound=far)[0]
+        inside = np.flatnonzero(np.isfinite(distance))
+        found = np.concatenate([found, np.column_stack([np.full(inside.size, rank), inside])])
+    ranks, facets = np.unique(found, axis=0).T
+    return facets, ranks
